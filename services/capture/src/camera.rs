@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::rc::Rc;
 
 use footage::{Fill, Pacer, Size, Warp};
-use messages::{Cause, FrameHeader, Stamp, Status, Timing, topic};
+use messages::{CameraCounts, Cause, FrameHeader, Stamp, Status, Timing, topic};
 use metrics::Passage;
 use runtime::{ExitKind, Failure, OrFail as _, Place, Service, SlicePublisher, Woken, now_nanos};
 use stage::Stage;
@@ -13,8 +13,12 @@ use crate::job::Job;
 use crate::supply::{Step, Supply};
 use deployment::capture::{Mode, Pace};
 
-/// Real-time footage begins this long after the run, so that every process has started.
-const LEAD_NANOS: u64 = 2_000_000_000;
+/// When a picture was taken, and when it was asked for or arrived; nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Shot {
+    pub(crate) captured_at: u64,
+    pub(crate) asked_at: u64,
+}
 
 /// One camera, and the topic of its frames.
 pub(crate) struct Camera<'a> {
@@ -33,11 +37,29 @@ pub(crate) struct Camera<'a> {
 }
 
 impl<'a> Camera<'a> {
+    /// A camera of footage.
     pub(crate) fn open(
         service: &'a Service,
         job: &'a Job,
         supply: &Supply,
     ) -> Result<Self, Failure> {
+        let pacer = match (job.pace, supply.info().frame_rate_hz) {
+            (Pace::Realtime, Some(rate)) => {
+                Pacer::realtime(service.session() + job.lead_nanos, rate)
+            }
+            _ => Pacer::as_fast_as_possible(),
+        };
+        Self::new(service, job, supply.info().size, pacer)
+    }
+
+    /// A live camera, which has a pace of its own.
+    ///
+    /// * `size`: of its pictures.
+    pub(crate) fn live(service: &'a Service, job: &'a Job, size: Size) -> Result<Self, Failure> {
+        Self::new(service, job, size, Pacer::as_fast_as_possible())
+    }
+
+    fn new(service: &'a Service, job: &'a Job, size: Size, pacer: Pacer) -> Result<Self, Failure> {
         let mut stage = Stage::new(service, job.patience);
         let publisher = stage.bulk_output(&topic::frame(job.view), job.n_consumers)?;
         let [width, height] = job.framing.out_size().map(|side| side as usize);
@@ -49,11 +71,7 @@ impl<'a> Camera<'a> {
         };
         let map = job.framing.source_from_output();
         let output = Size::new(width, height);
-        let warp = Warp::new(supply.info().size, output, &map, fill).or_fail(ExitKind::Input)?;
-        let pacer = match (job.pace, supply.info().frame_rate_hz) {
-            (Pace::Realtime, Some(rate)) => Pacer::realtime(service.session() + LEAD_NANOS, rate),
-            _ => Pacer::as_fast_as_possible(),
-        };
+        let warp = Warp::new(size, output, &map, fill).or_fail(ExitKind::Input)?;
         Ok(Self {
             service,
             job,
@@ -70,6 +88,12 @@ impl<'a> Camera<'a> {
 
     /// Waits for the receivers, then skips the frames that earlier epochs of this process have sent. Returns how many.
     pub(crate) fn resume(&mut self, supply: &mut Supply) -> u64 {
+        self.wait_for_receivers()
+            .map_or(0, |sent| supply.skip(sent))
+    }
+
+    /// Waits for the receivers. Returns how many frames earlier epochs of this process have sent, if there were some.
+    pub(crate) fn wait_for_receivers(&mut self) -> Option<u64> {
         let patience = self.service.patience_at_start(self.job.patience);
         let n = self
             .publisher
@@ -83,10 +107,26 @@ impl<'a> Camera<'a> {
             self.n_expected = n;
         }
         if self.service.epoch() == 0 {
-            return 0;
+            return None;
         }
         let [sent] = self.place.noted().unwrap_or([0]);
-        supply.skip(sent)
+        Some(sent)
+    }
+
+    /// Whether the run is to end; a turn of the main loop.
+    pub(crate) fn is_stopped(&self) -> Result<bool, Failure> {
+        Ok(self.stage.wait(Duration::ZERO)? == Woken::Stop)
+    }
+
+    /// Counts frames that were not sent, because this process was behind its clock.
+    pub(crate) fn drop_frames(&mut self, n: u64) {
+        self.n_dropped += n;
+        self.service.health().dropped(Cause::BehindClock, n);
+    }
+
+    /// Notes what became of the pictures of a live camera.
+    pub(crate) fn report(&self, counts: CameraCounts) {
+        self.service.health().camera(counts);
     }
 
     /// Logs once when the camera stops giving pictures, and once when it gives them again.
@@ -122,18 +162,14 @@ impl<'a> Camera<'a> {
             return Ok(0);
         }
         let n = supply.skip(latest - at);
-        self.n_dropped += n;
-        self.service.health().dropped(Cause::BehindClock, n);
+        self.drop_frames(n);
         Ok(n)
     }
 
     /// Sends a frame; with lossless delivery, sends it again if a receiver was restarted.
-    pub(crate) fn send_frame(
-        &mut self,
-        index: u64,
-        rgb: &[u8],
-        asked_at: u64,
-    ) -> Result<(), Failure> {
+    pub(crate) fn send_frame(&mut self, index: u64, rgb: &[u8], shot: Shot) -> Result<(), Failure> {
+        let asked_at = shot.asked_at;
+        let is_live = self.job.live.is_some();
         let mut computing = now_nanos() - asked_at;
         loop {
             let [width, height] = self.job.framing.out_size();
@@ -144,7 +180,7 @@ impl<'a> Camera<'a> {
             *loan.header_mut() = FrameHeader {
                 width,
                 height,
-                ..self.header(index, Status::OK, asked_at)
+                ..self.header(index, Status::OK, shot)
             };
             let n = loan.send()?;
             if self.job.mode == Mode::Realtime || n >= self.n_expected {
@@ -172,10 +208,10 @@ impl<'a> Camera<'a> {
         let health = self.service.health();
         health.sent(index);
         health.passed(&Passage {
-            waiting: None,
+            waiting: is_live.then(|| asked_at.saturating_sub(shot.captured_at)),
             computing,
             publishing: (now_nanos() - asked_at).saturating_sub(computing),
-            since_capture: None,
+            since_capture: is_live.then(|| now_nanos().saturating_sub(shot.captured_at)),
         });
         Ok(())
     }
@@ -184,22 +220,34 @@ impl<'a> Camera<'a> {
     pub(crate) fn send_empty(&self, frame: u64, status: Status) -> Result<(), Failure> {
         let mut loan = self.publisher.loan(1)?;
         loan.payload_mut().fill(0);
-        *loan.header_mut() = self.header(frame, status, now_nanos());
+        let now = now_nanos();
+        let shot = Shot {
+            captured_at: now,
+            asked_at: now,
+        };
+        *loan.header_mut() = self.header(frame, status, shot);
         loan.send()?;
         Ok(())
     }
 
-    fn header(&self, frame: u64, status: Status, asked_at: u64) -> FrameHeader {
+    /// Sends a frame without a picture, and counts it as sent.
+    pub(crate) fn send_nothing(&self, frame: u64, status: Status) -> Result<(), Failure> {
+        self.send_empty(frame, status)?;
+        self.service.health().sent(frame);
+        Ok(())
+    }
+
+    fn header(&self, frame: u64, status: Status, shot: Shot) -> FrameHeader {
         FrameHeader {
             stamp: Stamp {
                 session: self.service.session(),
                 frame,
-                captured_at_nanos: asked_at,
+                captured_at_nanos: shot.captured_at,
                 view: self.job.view as u32,
                 epoch: self.service.epoch(),
             },
             timing: Timing {
-                received_at_nanos: asked_at,
+                received_at_nanos: shot.asked_at,
                 sent_at_nanos: now_nanos(),
             },
             status,

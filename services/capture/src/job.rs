@@ -5,6 +5,7 @@ use core::time::Duration;
 use footage::SourceSpec;
 use geometry::Framing;
 
+use crate::live::LiveJob;
 use deployment::capture::{Faults, Mode, Pace};
 
 /// What one camera's process has to do.
@@ -14,6 +15,10 @@ pub struct Job {
     pub view: usize,
     /// The footage.
     pub source: SourceSpec,
+    /// The live camera, if it is one; of `source` only the choice of frames counts then.
+    pub live: Option<LiveJob>,
+    /// From the beginning of the run to the first frame in real time, nanoseconds, so that every process has started.
+    pub lead_nanos: u64,
     /// Faults that are simulated.
     pub faults: Faults,
     /// Repetitions from which on a picture counts as frozen; 0 for never.

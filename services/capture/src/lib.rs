@@ -7,6 +7,8 @@ mod feed;
 mod guard;
 mod info;
 mod job;
+mod live;
+mod live_service;
 mod service;
 mod supply;
 
@@ -14,4 +16,5 @@ pub use blank::{Blank, BlankError, BlankFeed};
 pub use feed::{Feed, FeedError, Stage};
 pub use info::FeedInfo;
 pub use job::Job;
+pub use live::{LiveCamera, LiveError, LiveJob, take_picture};
 pub use service::run;

@@ -2,8 +2,9 @@
 
 use runtime::{ExitKind, Failure, OrFail as _, Service, now_nanos};
 
-use crate::camera::Camera;
+use crate::camera::{Camera, Shot};
 use crate::job::Job;
+use crate::live_service;
 use crate::supply::{Step, Supply};
 use deployment::capture::Pace;
 
@@ -16,6 +17,9 @@ use deployment::capture::Pace;
 ///
 /// [`ExitKind::Input`] if the footage cannot be opened, and what the transport reports.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
+    if let Some(live) = &job.live {
+        return live_service::run(service, job, live);
+    }
     let is_live = job.pace == Pace::Realtime;
     let faults = job.faults.of_epoch(service.epoch());
     let supply = Supply::open(&job.source, &faults, is_live, job.frozen_after);
@@ -32,11 +36,14 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         let step = supply.step(asked_at);
         camera.log_trouble(index, step);
         match step {
-            Step::Picture => camera.send_frame(index, supply.pixels(), asked_at)?,
-            Step::Nothing(status) => {
-                camera.send_empty(index, status)?;
-                service.health().sent(index);
+            Step::Picture => {
+                let shot = Shot {
+                    captured_at: asked_at,
+                    asked_at,
+                };
+                camera.send_frame(index, supply.pixels(), shot)?;
             }
+            Step::Nothing(status) => camera.send_nothing(index, status)?,
             Step::End => return camera.end(at),
         }
         at += 1;

@@ -2,6 +2,7 @@
 
 mod advice;
 mod joints;
+mod live;
 mod maps;
 
 use std::borrow::Cow;
@@ -9,7 +10,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use capture::Feed;
 use consistency::{Appearance, Learned, Shape};
 use deployment::Deployment;
 use fmp::Model;
@@ -29,6 +29,8 @@ use crate::shipped::Shipped;
 use runtime::no_text;
 
 pub use joints::Joints;
+pub(crate) use live::footage;
+pub use live::{is_live, live_camera};
 pub(crate) use maps::{check_maps, network_card};
 pub use maps::{detector, pose_network, springs};
 pub use runtime::{in_file, read_text as text};
@@ -138,27 +140,6 @@ pub fn source(
         frame_rate_hz: config.frame_rate_hz,
         ..SourceSpec::new(camera.source.clone())
     }
-}
-
-/// Reads the metadata of every camera's footage.
-pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> {
-    deployment
-        .cameras
-        .iter()
-        .map(|camera| {
-            let info = Feed::look(&source(camera, &deployment.capture));
-            let info = info.map_err(|error| {
-                let hint = advice::on_footage(&error, &camera.name);
-                Failure::new(ExitKind::Input, error).with_hint(hint)
-            })?;
-            warn_of_orientation_tag(&format!("camera {:?}", camera.name), info.turn);
-            Ok(Footage {
-                size: [info.size.width as u32, info.size.height as u32],
-                n_frames: info.n_frames,
-                frame_rate_hz: info.frame_rate_hz,
-            })
-        })
-        .collect()
 }
 
 /// Warns if an image has an orientation tag: the pixels of a calibrated camera are used as they are stored.

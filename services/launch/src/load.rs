@@ -10,6 +10,8 @@ use deployment::{ConfigError, Deployment, Loaded, Machine};
 use runtime::{ExitKind, Fault};
 use scene::Address;
 
+use crate::inputs;
+
 /// Why a deployment could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
@@ -108,6 +110,10 @@ impl Machine for ThisMachine {
             return named.to_owned();
         }
         on_disk.to_string_lossy().into_owned()
+    }
+
+    fn is_live(&self, named: &str) -> bool {
+        inputs::is_live(named)
     }
 
     fn has(&self, precision: Precision) -> Result<(), String> {

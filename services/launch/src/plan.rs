@@ -73,7 +73,11 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
     if let Some(small) = resolved.search_size.as_ref().and_then(SearchSize::warning) {
         tracing::warn!("{small}");
     }
-    let n_frames = resolved.n_frames();
+    let n_frames = if resolved.is_endless() {
+        "frames until it is stopped".to_owned()
+    } else {
+        format!("{} frames", resolved.n_frames())
+    };
     let pairs = match prepared.settings.views {
         pipeline::Views::Pairs => format!("{} pairs", prepared.pairs.len()),
         pipeline::Views::All => "solved at once".to_owned(),
@@ -82,7 +86,7 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
     let size = resolved.search_size.as_ref();
     let size = size.map_or_else(String::new, |it| format!("\n{}", it.text()));
     Ok(format!(
-        "{} views, {pairs}, {n_frames} frames, a model of {} parts{size}",
+        "{} views, {pairs}, {n_frames}, a model of {} parts{size}",
         prepared.views.len(),
         prepared.model.n_parts()
     ))

@@ -1,5 +1,7 @@
 //! Runs one process of a deployment: builds the job of its service from the resolved deployment.
 
+mod live;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -159,6 +161,8 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
     let job = capture::Job {
         view,
         source: inputs::source(&deployment.cameras[view], &deployment.capture),
+        live: live::job(resolved, view),
+        lead_nanos: live::lead_nanos(deployment),
         faults: deployment.cameras[view].fault.clone(),
         frozen_after: deployment.capture.frozen_after,
         framing: framing(resolved, &rig, view)?,

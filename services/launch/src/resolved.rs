@@ -8,7 +8,7 @@ use deployment::{Deployment, RecordingPlan, Replay, Topology};
 use runtime::{Delivery, ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 
-use crate::inputs::Footage;
+use crate::inputs::{self, Footage};
 use crate::search_size::SearchSize;
 
 /// A deployment with the metadata of its footage, the input of every process.
@@ -54,10 +54,33 @@ impl Resolved {
         self.footage.iter().map(|it| it.n_frames).max().unwrap_or(0)
     }
 
+    /// Whether it runs until it is stopped: it has a live camera, and no number of frames.
+    pub fn is_endless(&self) -> bool {
+        self.deployment.capture.n_frames.is_none() && self.has_live()
+    }
+
+    /// Whether it has a live camera.
+    pub fn has_live(&self) -> bool {
+        let mut cameras = self.deployment.cameras.iter();
+        cameras.any(|it| inputs::is_live(&it.source))
+    }
+
+    /// Instants per second that live cameras are brought together at, before `frame_step`: as the deployment says, else the
+    /// rate of the slowest.
+    pub fn instants_hz(&self) -> f64 {
+        let step = self.deployment.capture.frame_step as f64;
+        let own = self.footage.iter().filter_map(|it| it.frame_rate_hz);
+        let slowest = own.fold(f64::INFINITY, f64::min) * step;
+        self.deployment.capture.frame_rate_hz.unwrap_or(slowest)
+    }
+
     /// Frames per second of the footage, before `frame_step`, if it is known.
     pub fn frame_rate_hz(&self) -> Option<f64> {
         let capture = &self.deployment.capture;
         let step = capture.frame_step as f64;
+        if self.has_live() {
+            return Some(self.instants_hz());
+        }
         let known = self.footage.iter().filter_map(|it| it.frame_rate_hz);
         let all: Vec<f64> = known.map(|it| it * step).collect();
         // If the files contradict each other, the setting of the deployment counts.

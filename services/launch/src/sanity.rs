@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use capture::{Blank, Feed};
 use deployment::Deployment;
-use footage::SourceSpec;
+use footage::{LiveAddress, SourceSpec};
 use geometry::Rig;
 use geometry::files::{Finding, Severity, check as check_rig};
 use runtime::{ExitKind, Failure};
@@ -63,6 +63,9 @@ fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
         let path = PathBuf::from(source);
         if Address::is_address(source) {
             return path;
+        }
+        if let Some(LiveAddress::Device(device)) = LiveAddress::parse(source) {
+            return device.canonicalize().unwrap_or(device);
         }
         path.canonicalize().unwrap_or(path)
     };
@@ -156,6 +159,9 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
         return Ok(None);
     };
     let rates = format!("{slow} has {low:.6} frames per second, {fast} {high:.6}");
+    if resolved.has_live() {
+        return of_live_rates(resolved, &rates, high / low);
+    }
     let drift = resolved.n_frames() as f64 * step * (high / low - 1.0);
     let text = format!(
         "{rates}: frames are paired by their numbers, so that in the end they are {drift:.1} frames apart"
@@ -170,8 +176,23 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     ))
 }
 
+/// The pictures of live cameras are paired by their times: another rate only means that some have none for an instant.
+fn of_live_rates(resolved: &Resolved, rates: &str, ratio: f64) -> Result<Option<String>, Failure> {
+    if ratio <= MAX_RATE_RATIO || resolved.deployment.capture.frame_rate_hz.is_some() {
+        return Ok(None);
+    }
+    let failure = Failure::new(ExitKind::Config, rates.to_owned());
+    Err(failure.with_hint(
+        "set one rate, `frame_rate_hz` of each [[camera]]; or say how often they are brought together, as \
+         `capture.frame_rate_hz`: a slower camera then has no picture at some of these instants",
+    ))
+}
+
 /// Warns if the footage of one camera is much shorter than that of another.
 fn check_lengths(resolved: &Resolved) -> Option<String> {
+    if resolved.has_live() {
+        return None;
+    }
     let names = resolved.deployment.cameras.iter().map(|it| &it.name);
     let all: Vec<_> = names
         .zip(resolved.footage.iter().map(|it| it.n_frames))
@@ -228,12 +249,13 @@ struct FirstImages {
 }
 
 impl FirstImages {
-    /// None for a synthetic camera, for one without pictures, for unreadable footage, and for a first image without contrast.
+    /// None for a live or a synthetic camera, for one without pictures, for unreadable footage, and for a first image without contrast.
     fn of(
         camera: &deployment::capture::Camera,
         capture: &deployment::capture::Config,
     ) -> Option<Self> {
-        if Address::is_address(&camera.source) || Blank::is_blank(&camera.source) {
+        let is_made = Address::is_address(&camera.source) || Blank::is_blank(&camera.source);
+        if is_made || inputs::is_live(&camera.source) {
             return None;
         }
         let spec = SourceSpec {

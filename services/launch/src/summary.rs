@@ -4,131 +4,30 @@ mod cameras;
 mod people;
 mod recorded;
 mod trust;
+mod watcher;
 
 use core::fmt::Write as _;
 use core::time::Duration;
 use std::collections::BTreeMap;
-use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressStyle};
 use messages::Refusal;
 use metrics::Reading;
 use runfiles::{CameraFit, Doubt, LatencyReport, Summary};
 use runtime::ExitKind;
 use serde_json::{Value, json};
-use supervise::{Event, Outcome};
+use supervise::Outcome;
 
 use crate::budget::{self, Budget};
 use crate::live;
 use crate::no_results;
-use crate::output;
 use crate::resolved::Resolved;
 use crate::search_size::SearchSize;
-use crate::views::ViewReport;
+use crate::views::{self, ViewReport};
 
 use people::Outside;
 
 pub use recorded::Recorded;
-
-/// Interval of progress messages if no bar can be drawn.
-const PERIOD: Duration = Duration::from_secs(5);
-
-/// Shows the progress of a run: a bar on a terminal, else a message every few seconds.
-#[derive(Debug)]
-pub struct Watcher {
-    bar: ProgressBar,
-    quiet: bool,
-    n_frames: u64,
-    start_frame: u64,
-    frame_step: u64,
-    n_done: u64,
-    printed_at: Instant,
-    begin: Instant,
-}
-
-impl Watcher {
-    /// Starts with no frame done.
-    pub fn new(resolved: &Resolved, quiet: bool) -> Self {
-        let n_frames = resolved.n_frames();
-        let bar = if quiet || !output::is_terminal() {
-            ProgressBar::hidden()
-        } else {
-            ProgressBar::new(n_frames)
-        };
-        if let Ok(style) = ProgressStyle::with_template(
-            "{elapsed_precise} {wide_bar} {pos}/{len} frames, {per_sec}, {eta} left{msg}",
-        ) {
-            bar.set_style(style);
-        }
-        Self {
-            bar,
-            quiet,
-            n_frames,
-            start_frame: resolved.deployment.capture.start_frame,
-            frame_step: resolved.deployment.capture.frame_step.max(1),
-            n_done: 0,
-            printed_at: Instant::now(),
-            begin: Instant::now(),
-        }
-    }
-
-    /// Updates the progress, and prints the events that concern the user.
-    pub fn handle(&mut self, event: &Event<'_>) {
-        match event {
-            Event::Health { process, health } if *process == "triangulate" => {
-                // By frame number: the counts of a process start at 0 after a restart.
-                if health.n_sent > 0 {
-                    let nth = health.last_frame.saturating_sub(self.start_frame) / self.frame_step;
-                    self.n_done = self.n_done.max(nth + 1);
-                }
-                self.bar.set_position(self.n_done);
-                self.print_progress();
-            }
-            Event::Line { text, .. } => self.print(text),
-            Event::Died { process, death } => self.print(&format!("{process} {death}")),
-            Event::Restarting { process, pause } if pause.is_zero() => {
-                self.print(&format!("{process} starts again"));
-            }
-            Event::Restarting { process, pause } => {
-                self.print(&format!(
-                    "{process} starts again in {} ms",
-                    pause.as_millis()
-                ));
-            }
-            Event::GivenUp { process, restarts } => {
-                self.print(&format!("{process} is given up after {restarts} restarts"));
-            }
-            Event::Dismissed { process } => {
-                self.print(&format!(
-                    "{process} is stopped: nothing is left that sends to it"
-                ));
-            }
-            _ => {}
-        }
-    }
-
-    /// Removes the bar.
-    pub fn finish(&self) {
-        self.bar.finish_and_clear();
-    }
-
-    /// Prints a line above the bar.
-    pub fn print(&self, text: &str) {
-        self.bar.suspend(|| output::message(text));
-    }
-
-    fn print_progress(&mut self) {
-        if self.quiet || output::is_terminal() || self.printed_at.elapsed() < PERIOD {
-            return;
-        }
-        self.printed_at = Instant::now();
-        let rate = self.n_done as f64 / self.begin.elapsed().as_secs_f64();
-        output::message(format_args!(
-            "{} of {} frames, {rate:.2} a second",
-            self.n_done, self.n_frames
-        ));
-    }
-}
+pub use watcher::Watcher;
 
 /// The report on a run.
 #[derive(Debug)]
@@ -156,6 +55,8 @@ pub struct Report {
     measured: BTreeMap<String, Value>,
     /// The summary of the process `results`: `summary.json`.
     recorded: Recorded,
+    /// What became of the pictures of live cameras, a line each.
+    live: Vec<String>,
 }
 
 impl Report {
@@ -176,7 +77,7 @@ impl Report {
         Self {
             name: resolved.deployment.name.clone(),
             folder: folder.display().to_string(),
-            n_frames: resolved.n_frames(),
+            n_frames: views::n_reached(resolved, outcome),
             seconds: elapsed.as_secs_f64(),
             interrupted: outcome.interrupted,
             given_up: given_up.map(|it| it.name.clone()).collect(),
@@ -204,6 +105,7 @@ impl Report {
                 .outside(resolved.deployment.capture.size.is_some())
                 .filter(|_| !resolved.deployment.has_maps()),
             measured: measured(outcome),
+            live: cameras::live(outcome),
             recorded,
         }
     }
@@ -357,6 +259,8 @@ impl Report {
             self.write_views(text, it)?;
             self.write_misplaced(text, it)?;
         }
+        let live = self.live.iter();
+        text.extend(live.map(|it| format!("  live camera   {it}\n")));
         if let Some(latency) = self.recorded.latency() {
             write_latency(text, latency)?;
         }
@@ -374,11 +278,8 @@ impl Report {
         }
         self.write_refused(text)?;
         self.write_memory(text)?;
-        let restarts: Vec<String> = self
-            .restarts
-            .iter()
-            .map(|(name, n)| format!("{name} {n}"))
-            .collect();
+        let restarts = self.restarts.iter();
+        let restarts: Vec<String> = restarts.map(|(name, n)| format!("{name} {n}")).collect();
         let none = || "none".to_owned();
         let restarts = if restarts.is_empty() {
             none()

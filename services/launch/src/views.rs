@@ -45,10 +45,16 @@ impl ViewReport {
             let found = outcome.processes.iter().find(|it| it.name == process);
             found.map_or_else(Counts::default, |it| it.counts)
         };
+        let n_reached = n_reached(resolved, outcome);
         let cameras = resolved.deployment.cameras.iter().zip(&resolved.footage);
         let views = cameras.enumerate().map(|(view, (camera, footage))| {
             let counts = ["capture", "pose"].map(|it| counts(format!("{it}-{view}")));
-            Self::new(&camera.name, footage.n_frames, counts, summary)
+            let n_frames = if resolved.is_endless() {
+                n_reached
+            } else {
+                footage.n_frames
+            };
+            Self::new(&camera.name, n_frames, counts, summary)
         });
         views.collect()
     }
@@ -102,6 +108,23 @@ impl ViewReport {
             .iter()
             .any(|(reason, n)| *n > 0 && !is_expected(reason))
     }
+}
+
+/// Frames of a run: of live cameras that ran until they were stopped, those that were sent.
+pub(crate) fn n_reached(resolved: &Resolved, outcome: &Outcome) -> u64 {
+    if !resolved.is_endless() {
+        return resolved.n_frames();
+    }
+    let capture = &resolved.deployment.capture;
+    let cameras = outcome
+        .processes
+        .iter()
+        .filter(|it| it.service == "capture");
+    let last = cameras.filter_map(|it| it.last.as_ref().filter(|it| it.n_sent > 0));
+    let last = last
+        .map(|it| it.last_frame.saturating_sub(capture.start_frame))
+        .max();
+    last.map_or(0, |it| it / capture.frame_step.max(1) + 1)
 }
 
 impl fmt::Display for ViewReport {

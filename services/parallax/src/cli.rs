@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    bench, calib, chaos, config, demo, deployments, detect, eval, fuse_frame, model, record,
-    replay, run, service, synth, top, train,
+    bench, calib, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame, model,
+    record, replay, run, service, synth, top, train,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -37,6 +37,7 @@ Examples:
     parallax model judge person.fmp PARSE --only 101-200    how good it is
     parallax eval HumanEva_I --model he.txt --out out/he    the paper's evaluation
     parallax synth out/walk --actions walking           synthetic pictures, with the truth
+    parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
     parallax calib show Calib.toml                      what a calibration file says
 ";
 
@@ -92,6 +93,8 @@ pub(crate) enum Command {
     /// Read, show, check and convert calibrations.
     #[command(subcommand)]
     Calib(calib::Command),
+    /// List the video devices of this machine, and take pictures of live cameras.
+    Cameras(cameras::Arguments),
     /// Show and check deployment files.
     #[command(subcommand)]
     Config(config::Command),

@@ -2,6 +2,7 @@
 
 pub(crate) mod bench;
 pub(crate) mod calib;
+pub(crate) mod cameras;
 pub(crate) mod chaos;
 pub(crate) mod config;
 pub(crate) mod demo;
@@ -48,6 +49,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Train(it) => train::run(it, cli.globals),
         Command::Model(it) => model::run(&it, cli.globals),
         Command::Calib(it) => calib::run(&it),
+        Command::Cameras(it) => cameras::run(&it),
         Command::Config(it) => config::run(&it),
         Command::Status(it) => deployments::status(&it),
         Command::Top(it) => top::run(&it),

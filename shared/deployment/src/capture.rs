@@ -1,5 +1,6 @@
 //! Section `[capture]` of a deployment file, and its `[[camera]]` entries.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
@@ -14,7 +15,8 @@ pub struct Camera {
     /// The camera of the rig, by its name there.
     pub name: String,
     /// A video, an image, a folder of images, a glob such as `frames/*.png`, or a scene that is made while it
-    /// runs: `synth://humaneva?camera=C1&action=walking&subject=3&seed=1`. With `keypoints` it may be left out.
+    /// runs: `synth://humaneva?camera=C1&action=walking&subject=3&seed=1`. Or a live camera: `/dev/video0`,
+    /// `/dev/v4l/by-id/...`, `rtsp://...`, `udp://...`, `http://...`. With `keypoints` it may be left out.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub source: String,
     /// Keypoints that another program found in the footage: a folder with a JSON file for every frame, in the layout of OpenPose,
@@ -30,10 +32,32 @@ pub struct Camera {
     /// Where the source's top-left pixel lies on the calibrated image, `[x, y]` pixels, for a source
     /// that lacks rows or columns of it. Without it the sizes must be equal.
     pub source_offset_px: Option<[u32; 2]>,
+    /// Video devices: the format of their pictures, such as `MJPG` or `YUYV`; without it the first of these and of `UYVY`,
+    /// `NV12`, `RGB3`, `BGR3`, `GREY` that the camera has.
+    pub format: Option<String>,
+    /// Live cameras: `[width, height]` of their pictures, pixels; without it as the camera is set.
+    pub size: Option<[u32; 2]>,
+    /// Live cameras: pictures per second; without it what the camera says.
+    pub frame_rate_hz: Option<f64>,
+    /// Video devices: what to set before the run, by the names that `parallax cameras` lists: `{ exposure_time_absolute = 100 }`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub controls: BTreeMap<String, i64>,
+    /// RTSP cameras: how packets travel, `tcp` or `udp`; without it as the camera and the reader agree.
+    pub transport: Option<Transport>,
     /// What is to go wrong with the camera, for a test: `freeze@30+20`.
     #[serde(default, skip_serializing_if = "Faults::is_empty")]
     #[schemars(with = "String")]
     pub fault: Faults,
+}
+
+/// How the packets of an RTSP camera travel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Transport {
+    /// None is lost, but one that is late delays the others.
+    Tcp,
+    /// Those that are late are lost.
+    Udp,
 }
 
 /// What happens when a stage is slower than its input.
@@ -63,9 +87,9 @@ pub enum Pace {
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Capture")]
 pub struct Config {
-    /// `lossless`: nothing is dropped; `realtime`: the latest frame wins.
+    /// `lossless`: nothing is dropped; `realtime`: the latest frame wins. With a live camera always `realtime`.
     pub mode: Mode,
-    /// `fast`: as fast as frames are taken; `realtime`: at the frame rate.
+    /// `fast`: as fast as frames are taken; `realtime`: at the frame rate. With a live camera always `realtime`.
     pub pace: Pace,
     /// `[width, height]` of the frames that the pipeline sees, pixels; in place of `scale`.
     pub size: Option<[usize; 2]>,
@@ -74,13 +98,14 @@ pub struct Config {
     pub scale: Option<f64>,
     /// Turn frames until the world's up points up.
     pub upright: bool,
-    /// Frames per second of images, and of a video that does not tell.
+    /// Frames per second of images, and of a video that does not tell; with live cameras how often all of them are
+    /// brought together: without it as often as the slowest has a picture.
     pub frame_rate_hz: Option<f64>,
     /// First frame to use, from 0.
     pub start_frame: u64,
     /// Use every n-th frame.
     pub frame_step: u64,
-    /// Most frames to use; all without it.
+    /// Most frames to use; all without it, and of live cameras until the run is stopped.
     pub n_frames: Option<u64>,
     /// Repetitions of a picture, bit for bit, from which on its camera is called frozen; 0: never.
     pub frozen_after: u32,

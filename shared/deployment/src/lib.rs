@@ -24,6 +24,7 @@ mod fields;
 mod keys;
 mod limits;
 mod lists;
+mod live;
 mod load;
 mod machine;
 mod older;

@@ -13,6 +13,11 @@ pub trait Machine {
     /// is: the run refuses it.
     fn footage(&self, named: &str, base: &Path) -> String;
 
+    /// Whether footage is a live camera.
+    ///
+    /// * `named`: as [`Self::footage`] returned it.
+    fn is_live(&self, named: &str) -> bool;
+
     /// Whether this machine computes with a precision.
     ///
     /// # Errors
@@ -32,6 +37,10 @@ impl Machine for AnyMachine {
 
     fn footage(&self, named: &str, base: &Path) -> String {
         base.join(named).to_string_lossy().into_owned()
+    }
+
+    fn is_live(&self, _named: &str) -> bool {
+        false
     }
 
     fn has(&self, _precision: Precision) -> Result<(), String> {

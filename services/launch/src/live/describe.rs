@@ -1,6 +1,6 @@
 //! A snapshot of a deployment as JSON.
 
-use messages::Cause;
+use messages::{CameraCounts, Cause};
 use metrics::{Reading, Timed};
 use serde_json::{Map, Value, json};
 
@@ -55,7 +55,24 @@ pub fn measured(reading: &Reading) -> Value {
         "peak_memory_bytes": reading.peak_memory_bytes,
         "evidence_bytes": reading.evidence_bytes,
         "people": reading.n_people,
+        "camera": reading.camera.as_ref().map(camera),
         "times": times,
+    })
+}
+
+/// What became of the pictures of a live camera.
+fn camera(it: &CameraCounts) -> Value {
+    json!({
+        "connections": it.n_connections,
+        "made": it.n_made,
+        "lost_by_camera": it.n_lost,
+        "delivered": it.n_delivered,
+        "used": it.n_used,
+        "surplus": it.n_surplus,
+        "overtaken": it.n_overtaken,
+        "refused": it.n_refused,
+        "rate_hz": (it.rate_microhertz > 0).then_some(it.rate_microhertz as f64 / 1e6),
+        "off_grid_ms": it.off_grid_nanos as f64 / 1e6,
     })
 }
 

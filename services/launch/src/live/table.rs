@@ -34,6 +34,7 @@ pub fn table(snapshot: &Snapshot) -> String {
     });
     text.extend(problems);
     text.push('\n');
+    text.push_str(&cameras(snapshot));
     let counted = snapshot.processes.iter().filter_map(|process| {
         let n = process.reading.as_ref()?.n_people?;
         Some(format!("people in view, of whom one is followed: {n}\n\n"))
@@ -44,6 +45,58 @@ pub fn table(snapshot: &Snapshot) -> String {
         .iter()
         .flat_map(|process| time_rows(snapshot, process));
     push_table(&mut text, &TIMES, &rows.collect::<Vec<_>>());
+    text
+}
+
+const CAMERAS: [&str; 10] = [
+    "<CAMERA",
+    "OPENED",
+    "MADE",
+    "LOST BY IT",
+    "USED",
+    "SURPLUS",
+    "OVERTAKEN",
+    "REFUSED",
+    "RATE Hz",
+    "OFF GRID ms",
+];
+
+/// What became of the pictures of live cameras; empty without any.
+fn cameras(snapshot: &Snapshot) -> String {
+    let rows: Vec<Vec<String>> = snapshot
+        .processes
+        .iter()
+        .filter_map(|process| {
+            let reading = process.reading.as_ref()?;
+            let it = reading.camera?;
+            let index = reading.view.as_ref().map(|it| it.index);
+            let mut row = vec![index.map_or_else(|| process.name.clone(), |it| view(snapshot, it))];
+            row.extend(
+                [
+                    it.n_connections,
+                    it.n_made,
+                    it.n_lost,
+                    it.n_used,
+                    it.n_surplus,
+                    it.n_overtaken,
+                    it.n_refused,
+                ]
+                .map(|it| it.to_string()),
+            );
+            row.push(if it.rate_microhertz > 0 {
+                format!("{:.3}", it.rate_microhertz as f64 / 1e6)
+            } else {
+                NONE.to_owned()
+            });
+            row.push(format!("{:+.1}", it.off_grid_nanos as f64 / 1e6));
+            Some(row)
+        })
+        .collect();
+    let mut text = String::new();
+    if !rows.is_empty() {
+        push_table(&mut text, &CAMERAS, &rows);
+        text.push('\n');
+    }
     text
 }
 

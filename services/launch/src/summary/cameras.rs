@@ -1,6 +1,8 @@
 //! Text on cameras that contradict each other.
 
+use metrics::Reading;
 use runfiles::{Contradicted, Exchanged};
+use supervise::Outcome;
 
 /// Text on two cameras whose footage seems to be exchanged.
 pub(super) fn exchanged(exchanged: &Exchanged) -> String {
@@ -32,4 +34,36 @@ pub(super) fn contradicted(contradicted: &Contradicted) -> String {
          footage, the frames are of one moment, and the overlays show one person\n",
         contradicted.degrees, contradicted.usual_degrees,
     )
+}
+
+/// What became of the pictures of every live camera, a line each; of a process that was restarted since then.
+pub(super) fn live(outcome: &Outcome) -> Vec<String> {
+    let readings = outcome
+        .processes
+        .iter()
+        .filter_map(|it| Reading::from_message(it.measured.as_ref()?).ok());
+    let lines = readings.filter_map(|reading| {
+        let it = reading.camera?;
+        let name = reading.view.map_or_else(String::new, |it| it.name);
+        let mut parts = vec![format!(
+            "{} pictures made, {} lost by the camera, {} used",
+            it.n_made, it.n_lost, it.n_used
+        )];
+        let more = [
+            (it.n_surplus, "surplus"),
+            (it.n_overtaken, "overtaken by newer ones"),
+            (it.n_refused, "refused"),
+        ];
+        let more = more.into_iter().filter(|it| it.0 > 0);
+        parts.extend(more.map(|(n, what)| format!("{n} {what}")));
+        if it.rate_microhertz > 0 {
+            parts.push(format!("{:.3} a second", it.rate_microhertz as f64 / 1e6));
+        }
+        if it.n_connections > 1 {
+            parts.push(format!("opened {} times", it.n_connections));
+        }
+        let line = format!("{name}: {}", parts.join(", "));
+        Some(line)
+    });
+    lines.collect()
 }

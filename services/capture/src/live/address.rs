@@ -1,0 +1,176 @@
+//! What live camera to open, and how.
+
+use std::collections::BTreeMap;
+
+use footage::{FootageError, LiveAddress, PixelFormat, Size, StreamSpec, Transport};
+use messages::Status;
+use runtime::{ExitKind, Fault, FourCc, VideoDevice, VideoError, VideoMode, VideoWish};
+
+/// A live camera, and what is wanted of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LiveCamera {
+    /// Where it is.
+    pub address: LiveAddress,
+    /// Format of the pixels, of a device; none for any that is read.
+    pub format: Option<String>,
+    /// Width and height, pixels; none for what the camera has.
+    pub size: Option<[u32; 2]>,
+    /// Pictures per second; none for what the camera has.
+    pub rate_hz: Option<f64>,
+    /// What to set of a device, by name.
+    pub controls: BTreeMap<String, i64>,
+    /// How packets of an RTSP camera travel.
+    pub transport: Option<Transport>,
+}
+
+/// Why a live camera cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum LiveError {
+    /// The stream.
+    #[error(transparent)]
+    Stream(#[from] FootageError),
+    /// The device.
+    #[error(transparent)]
+    Device(#[from] VideoError),
+    /// A format that is not read here.
+    #[error("the format {format:?} is not read; these are: {}", known())]
+    Format {
+        /// As asked for, or as the device is set.
+        format: String,
+    },
+    /// The stream does not tell its rate.
+    #[error(
+        "{address} does not tell how many pictures it has in a second: give it as `frame_rate_hz` of the camera"
+    )]
+    NoRate {
+        /// Without a password.
+        address: String,
+    },
+    /// Nothing came for some time.
+    #[error("{address} is silent")]
+    Silent {
+        /// Without a password.
+        address: String,
+    },
+    /// Another camera is where this one was.
+    #[error("{address} is another camera now: {found}, expected {expected}")]
+    Another {
+        /// Where.
+        address: String,
+        /// Which is there.
+        found: String,
+        /// Which was there.
+        expected: String,
+    },
+}
+
+impl Fault for LiveError {
+    fn kind(&self) -> ExitKind {
+        match self {
+            Self::Device(error) => error.kind(),
+            Self::Format { .. } | Self::NoRate { .. } => ExitKind::Config,
+            _ => ExitKind::Input,
+        }
+    }
+}
+
+impl LiveError {
+    /// Why there are no pictures, for the messages.
+    pub(crate) fn status(&self) -> Status {
+        match self {
+            Self::Stream(FootageError::SizeChanged { .. })
+            | Self::Device(VideoError::NotOffered { .. })
+            | Self::Format { .. } => Status::WRONG_SIZE,
+            Self::Silent { .. } => Status::NO_FRAME,
+            _ => Status::UNPLUGGED,
+        }
+    }
+}
+
+fn known() -> String {
+    let all = PixelFormat::ALL.map(|it| FourCc(it.letters()).to_string());
+    all.join(", ")
+}
+
+impl LiveCamera {
+    /// A camera as it is set.
+    pub fn new(address: LiveAddress) -> Self {
+        Self {
+            address,
+            format: None,
+            size: None,
+            rate_hz: None,
+            controls: BTreeMap::new(),
+            transport: None,
+        }
+    }
+
+    /// Size and rate of its pictures. A device is set as it is wanted, a stream is asked unless both are given.
+    ///
+    /// # Errors
+    ///
+    /// [`LiveError`].
+    pub fn look(&self) -> Result<(Size, f64), LiveError> {
+        let (size, rate_hz) = match &self.address {
+            LiveAddress::Device(path) => {
+                let mode = self.set(&VideoDevice::open(path)?, self.size)?.0;
+                (size_of(mode), mode.rate_hz)
+            }
+            LiveAddress::Stream(address) => match (self.size, self.rate_hz) {
+                (Some([width, height]), Some(rate)) => {
+                    (Size::new(width as usize, height as usize), Some(rate))
+                }
+                _ => self.stream(address).probe()?,
+            },
+        };
+        let rate_hz = self.rate_hz.or(rate_hz).ok_or_else(|| LiveError::NoRate {
+            address: self.address.to_string(),
+        })?;
+        Ok((size, rate_hz))
+    }
+
+    /// Sets a device as it is wanted.
+    pub(super) fn set(
+        &self,
+        device: &VideoDevice,
+        size: Option<[u32; 2]>,
+    ) -> Result<(VideoMode, PixelFormat), LiveError> {
+        let known = PixelFormat::ALL.map(|it| FourCc(it.letters()));
+        let formats = match &self.format {
+            None => known.to_vec(),
+            Some(text) => {
+                let format =
+                    FourCc::parse(text).filter(|it| PixelFormat::of_letters(it.0).is_some());
+                let unknown = || LiveError::Format {
+                    format: text.clone(),
+                };
+                vec![format.ok_or_else(unknown)?]
+            }
+        };
+        for (name, value) in &self.controls {
+            device.set_control(name, *value)?;
+        }
+        let mode = device.set(&VideoWish {
+            formats,
+            size,
+            rate_hz: self.rate_hz,
+        })?;
+        let pixels = PixelFormat::of_letters(mode.format.0);
+        let unknown = || LiveError::Format {
+            format: mode.format.to_string(),
+        };
+        Ok((mode, pixels.ok_or_else(unknown)?))
+    }
+
+    pub(super) fn stream(&self, address: &str) -> StreamSpec {
+        StreamSpec {
+            transport: self.transport,
+            ..StreamSpec::new(address)
+        }
+    }
+}
+
+pub(super) fn size_of(mode: VideoMode) -> Size {
+    let [width, height] = mode.size.map(|side| side as usize);
+    Size::new(width, height)
+}

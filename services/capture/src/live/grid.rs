@@ -1,0 +1,227 @@
+//! The instants that all cameras of a run have in common, and which picture belongs to which.
+
+use std::collections::VecDeque;
+
+use messages::Status;
+
+/// How far a picture may be from its instant beyond half a period, in periods: what jitters about the middle between two
+/// instants stays with one of them.
+const SLACK: f64 = 0.1;
+/// Intervals that the period of a camera is the median of, and how many are needed.
+const N_INTERVALS: usize = 15;
+const LEAST_INTERVALS: usize = 5;
+/// How far the clock of a camera may be from that of this machine, nanoseconds.
+const MAX_OFF_NANOS: u64 = 2_000_000_000;
+
+/// Instants `start + k / rate`. Reads no clock.
+#[derive(Debug)]
+pub(crate) struct Grid {
+    start_nanos: u64,
+    period: f64,
+    /// The time of the last picture, and the newest intervals between pictures, nanoseconds.
+    last: Option<u64>,
+    intervals: VecDeque<u64>,
+}
+
+impl Grid {
+    /// * `rate_hz`: instants per second.
+    pub(crate) fn new(start_nanos: u64, rate_hz: f64) -> Self {
+        Self {
+            start_nanos,
+            period: 1e9 / rate_hz,
+            last: None,
+            intervals: VecDeque::with_capacity(N_INTERVALS + 1),
+        }
+    }
+
+    /// From one instant to the next, nanoseconds.
+    pub(crate) fn period_nanos(&self) -> u64 {
+        self.period.round() as u64
+    }
+
+    /// When an instant is, nanoseconds.
+    pub(crate) fn due_nanos(&self, nth: u64) -> u64 {
+        self.start_nanos
+            .saturating_add((nth as f64 * self.period).round() as u64)
+    }
+
+    /// The latest instant that is not after `now_nanos`; 0 before all.
+    pub(crate) fn latest(&self, now_nanos: u64) -> u64 {
+        self.exact(now_nanos).max(0.0) as u64
+    }
+
+    /// Seconds since the first instant.
+    pub(crate) fn seconds(&self, at_nanos: u64) -> f64 {
+        self.exact(at_nanos) * self.period * 1e-9
+    }
+
+    /// How long after an instant a picture was taken, nanoseconds.
+    pub(crate) fn off_nanos(&self, at_nanos: u64, nth: u64) -> i64 {
+        ((self.exact(at_nanos) - nth as f64) * self.period).round() as i64
+    }
+
+    /// The place of a time among the instants.
+    fn exact(&self, at_nanos: u64) -> f64 {
+        at_nanos
+            .cast_signed()
+            .wrapping_sub(self.start_nanos.cast_signed()) as f64
+            / self.period
+    }
+
+    /// What is wrong with the time of a picture: equal to or before that of the one before, or not of this moment.
+    pub(crate) fn wrong_clock(&mut self, at_nanos: u64, arrived_at_nanos: u64) -> Option<Status> {
+        if at_nanos.abs_diff(arrived_at_nanos) > MAX_OFF_NANOS {
+            return Some(Status::CLOCK_JUMPED);
+        }
+        let last = self.last.replace(at_nanos);
+        let last = last.filter(|it| it.abs_diff(at_nanos) <= MAX_OFF_NANOS)?;
+        if at_nanos > last {
+            self.intervals.push_back(at_nanos - last);
+            if self.intervals.len() > N_INTERVALS {
+                self.intervals.pop_front();
+            }
+            return None;
+        }
+        // A clock that goes on from an earlier time is wrong once.
+        Some(if at_nanos == last {
+            Status::TIME_REPEATED
+        } else {
+            Status::TIME_WENT_BACK
+        })
+    }
+
+    /// The instant that a picture belongs to: `next`, or a later one; none if all that are near have one.
+    ///
+    /// A picture is at most half a period away, of a camera that is faster than the instants half a period of its own, and in
+    /// either case a tenth more. So cameras of one rate keep their phase, and of a faster camera the nearest is taken.
+    pub(crate) fn place(&self, at_nanos: u64, next: u64) -> Option<u64> {
+        let exact = self.exact(at_nanos);
+        let reach = 0.5 * self.own_period().min(1.0) + SLACK;
+        if (exact - next as f64).abs() <= reach {
+            return Some(next);
+        }
+        let nearest = exact.round();
+        let is_later = nearest > next as f64 && (exact - nearest).abs() <= reach;
+        is_later.then_some(nearest as u64)
+    }
+
+    /// The period of the camera, in periods of the grid.
+    fn own_period(&self) -> f64 {
+        if self.intervals.len() < LEAST_INTERVALS {
+            return 1.0;
+        }
+        let mut sorted: Vec<u64> = self.intervals.iter().copied().collect();
+        sorted.sort_unstable();
+        sorted[sorted.len() / 2] as f64 / self.period
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const START: u64 = 5_000_000_000;
+
+    /// The instants of pictures, in periods of 30 Hz after the first instant.
+    fn placed(times: impl IntoIterator<Item = f64>) -> Vec<Option<u64>> {
+        let mut grid = Grid::new(START, 30.0);
+        let mut next = 0;
+        let mut all = Vec::new();
+        for time in times {
+            let at = (START as f64 + time * 1e9 / 30.0) as u64;
+            assert_eq!(grid.wrong_clock(at, at), None);
+            let nth = grid.place(at, next);
+            next = nth.map_or(next, |it| it + 1);
+            all.push(nth);
+        }
+        all
+    }
+
+    fn n_surplus(all: &[Option<u64>]) -> usize {
+        all.iter().filter(|it| it.is_none()).count()
+    }
+
+    #[test]
+    fn a_camera_of_the_same_rate_keeps_its_phase_whatever_it_jitters() {
+        for phase in [0.0, 0.3, 0.5, -0.45] {
+            let jitter = |nth: u64| if nth.is_multiple_of(2) { 0.04 } else { -0.04 };
+            let all = placed((1..200).map(|nth| nth as f64 + phase + jitter(nth)));
+            let instants: Vec<u64> = all.iter().flatten().copied().collect();
+            assert_eq!(n_surplus(&all), 0, "{phase}");
+            assert!(
+                instants.windows(2).all(|it| it[1] == it[0] + 1),
+                "{phase}: {instants:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_camera_at_29_97_beside_30_leaves_out_one_instant_in_a_thousand() {
+        let all = placed((0..9990).map(|nth| f64::from(nth) * 30.0 / 29.97));
+        let last = all.iter().flatten().last().unwrap();
+        assert_eq!(n_surplus(&all), 0);
+        assert!((9998..=10_001).contains(last), "{last}");
+        let fast = placed((0..10_010).map(|nth| f64::from(nth) * 29.97 / 30.0));
+        assert!((9..=11).contains(&n_surplus(&fast)), "{}", n_surplus(&fast));
+    }
+
+    #[test]
+    fn of_a_camera_of_twice_the_rate_every_second_picture_is_taken_the_nearest() {
+        let all = placed((0..400).map(|nth| f64::from(nth) * 0.5));
+        let settled = &all[20..];
+        assert_eq!(n_surplus(settled), settled.len() / 2);
+        assert!(
+            settled.iter().step_by(2).all(Option::is_some),
+            "those on the instants"
+        );
+    }
+
+    #[test]
+    fn of_a_camera_of_half_the_rate_every_second_instant_is_left_out() {
+        let all = placed((0..100).map(|nth| f64::from(nth) * 2.0));
+        let expected: Vec<Option<u64>> = (0..100).map(|nth| Some(nth * 2)).collect();
+        assert_eq!(all, expected);
+    }
+
+    #[test]
+    fn pictures_before_the_first_instant_have_none() {
+        assert_eq!(
+            placed([-3.0, -0.9, -0.2, 1.0]),
+            [None, None, Some(0), Some(1)]
+        );
+    }
+
+    #[test]
+    fn clocks_that_repeat_go_back_or_are_of_another_day_are_wrong() {
+        let mut grid = Grid::new(START, 30.0);
+        let at = START + 7;
+        assert_eq!(grid.wrong_clock(at, at), None);
+        assert_eq!(grid.wrong_clock(at, at + 9), Some(Status::TIME_REPEATED));
+        assert_eq!(
+            grid.wrong_clock(at - 1, at + 9),
+            Some(Status::TIME_WENT_BACK)
+        );
+        assert_eq!(grid.wrong_clock(at, at + 9), None, "it goes on from there");
+        assert_eq!(grid.wrong_clock(7, at), Some(Status::CLOCK_JUMPED));
+    }
+
+    proptest! {
+        #[test]
+        fn instants_are_never_taken_twice_and_never_far(
+            times in prop::collection::vec(0.0..100.0, 1..100),
+        ) {
+            let mut times = times;
+            times.sort_by(f64::total_cmp);
+            times.dedup_by(|a, b| (*a - *b).abs() < 1e-3);
+            let all = placed(times.iter().copied());
+            let mut least = 0;
+            for (nth, time) in all.into_iter().zip(times) {
+                let Some(nth) = nth else { continue };
+                prop_assert!(nth >= least && (nth as f64 - time).abs() <= 0.6 + 1e-6);
+                least = nth + 1;
+            }
+        }
+    }
+}

@@ -1,0 +1,268 @@
+//! A live camera that is open: a video device, or a stream.
+
+use core::time::Duration;
+use std::path::{Path, PathBuf};
+
+use footage::{LiveAddress, LiveStream, PixelFormat, Size, StreamEnd};
+use runtime::{VideoAbout, VideoDevice, VideoStream, now_nanos, video_devices};
+
+use super::address::{LiveCamera, LiveError, size_of};
+use super::clock::ClockMap;
+
+/// Longest wait for a picture of a device, so that a stop is noticed.
+const PAUSE: Duration = Duration::from_millis(100);
+/// After this long without a picture a device is opened again, nanoseconds.
+const SILENCE_NANOS: u64 = 5_000_000_000;
+/// A gap between two times of a stream beyond which pictures are missing, in periods.
+const GAP: f64 = 1.5;
+
+/// What was read of a camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Taken {
+    /// When it was taken, `CLOCK_MONOTONIC`, nanoseconds.
+    pub at_nanos: u64,
+    /// When it was here.
+    pub arrived_at_nanos: u64,
+    /// Pictures before it that the camera lost.
+    pub n_lost: u64,
+    /// Pictures before it that were lost for want of a buffer, because this process was slow.
+    pub n_overtaken: u64,
+    /// Whether its pixels are good.
+    pub is_whole: bool,
+}
+
+/// A camera that is open.
+#[derive(Debug)]
+pub(super) enum Input {
+    Device(Box<Device>),
+    Stream(Box<Stream>),
+}
+
+impl Input {
+    /// * `before`: the device that was open before, which may have another number now.
+    pub(super) fn open(
+        camera: &LiveCamera,
+        size: Size,
+        before: Option<&VideoAbout>,
+    ) -> Result<Self, LiveError> {
+        match &camera.address {
+            LiveAddress::Device(path) => {
+                let device = Device::open(camera, path, size, before)?;
+                Ok(Self::Device(Box::new(device)))
+            }
+            LiveAddress::Stream(address) => Ok(Self::Stream(Box::new(Stream {
+                decoder: camera.stream(address).open(size)?,
+                clock: ClockMap::default(),
+                period_nanos: camera.rate_hz.map(|it| 1e9 / it),
+                last: None,
+            }))),
+        }
+    }
+
+    /// What to recognise the device by.
+    pub(super) fn about(&self) -> Option<VideoAbout> {
+        match self {
+            Self::Device(it) => Some(it.about.clone()),
+            Self::Stream(_) => None,
+        }
+    }
+
+    /// Ends the wait for a picture from another thread.
+    pub(super) fn end(&self) -> Option<StreamEnd> {
+        match self {
+            Self::Device(_) => None,
+            Self::Stream(it) => Some(it.decoder.end()),
+        }
+    }
+
+    /// Reads the next picture into `rgb`; none if there is none yet.
+    pub(super) fn next(&mut self, rgb: &mut [u8]) -> Result<Option<Taken>, LiveError> {
+        match self {
+            Self::Device(it) => it.next(rgb),
+            Self::Stream(it) => it.next(rgb).map(Some),
+        }
+    }
+}
+
+/// A video device that streams.
+#[derive(Debug)]
+pub(super) struct Device {
+    stream: VideoStream,
+    format: PixelFormat,
+    size: Size,
+    about: VideoAbout,
+    last_sequence: Option<u32>,
+    was_full: bool,
+    last_nanos: u64,
+}
+
+impl Device {
+    fn open(
+        camera: &LiveCamera,
+        path: &Path,
+        size: Size,
+        before: Option<&VideoAbout>,
+    ) -> Result<Self, LiveError> {
+        let device = match before {
+            None => VideoDevice::open(path)?,
+            Some(about) => again(path, about)?,
+        };
+        let wanted = [size.width as u32, size.height as u32];
+        let (mode, format) = camera.set(&device, Some(wanted))?;
+        let about = device.about()?;
+        Ok(Self {
+            stream: device.start()?,
+            format,
+            size: size_of(mode),
+            about,
+            last_sequence: None,
+            was_full: false,
+            last_nanos: now_nanos(),
+        })
+    }
+
+    fn next(&mut self, rgb: &mut [u8]) -> Result<Option<Taken>, LiveError> {
+        let stride = self.stream.mode().bytes_per_row as usize;
+        let Some(picture) = self.stream.next(PAUSE)? else {
+            if now_nanos() - self.last_nanos > SILENCE_NANOS {
+                let address = self.stream.device().path().display().to_string();
+                return Err(LiveError::Silent { address });
+            }
+            return Ok(None);
+        };
+        let arrived_at_nanos = now_nanos();
+        let n_missing = missing(self.last_sequence, picture.sequence);
+        let is_ours = self.was_full;
+        (self.last_sequence, self.was_full) = (Some(picture.sequence), picture.was_full);
+        self.last_nanos = arrived_at_nanos;
+        let is_whole =
+            !picture.is_damaged && self.format.to_rgb(picture.bytes, stride, self.size, rgb);
+        Ok(Some(Taken {
+            at_nanos: picture.at_nanos.unwrap_or(arrived_at_nanos),
+            arrived_at_nanos,
+            n_lost: if is_ours { 0 } else { n_missing },
+            n_overtaken: if is_ours { n_missing } else { 0 },
+            is_whole,
+        }))
+    }
+}
+
+/// How many numbers are missing between two; none if the camera began to count anew.
+fn missing(last: Option<u32>, now: u32) -> u64 {
+    let gap = last.map_or(1, |last| now.wrapping_sub(last));
+    let is_ahead = (1..1 << 31).contains(&gap);
+    if is_ahead { u64::from(gap - 1) } else { 0 }
+}
+
+/// Opens a camera that was open before: where it was, or under whatever number it has now.
+fn again(path: &Path, about: &VideoAbout) -> Result<VideoDevice, LiveError> {
+    let there = VideoDevice::open(path);
+    if let Ok(device) = &there
+        && device.about()? == *about
+    {
+        return Ok(there?);
+    }
+    let others: Vec<PathBuf> = video_devices().unwrap_or_default();
+    for other in others.into_iter().filter(|it| it != path) {
+        let Ok(device) = VideoDevice::open(&other) else {
+            continue;
+        };
+        if device.about().is_ok_and(|it| it == *about) {
+            tracing::warn!(was = %path.display(), now = %other.display(), "this camera has another number now");
+            return Ok(device);
+        }
+    }
+    let found = there?.about()?;
+    let shown = |it: &VideoAbout| format!("{} at {}", it.card, it.bus);
+    Err(LiveError::Another {
+        address: path.display().to_string(),
+        found: shown(&found),
+        expected: shown(about),
+    })
+}
+
+/// A stream of a network.
+#[derive(Debug)]
+pub(super) struct Stream {
+    decoder: LiveStream,
+    clock: ClockMap,
+    period_nanos: Option<f64>,
+    last: Option<i64>,
+}
+
+impl Stream {
+    fn next(&mut self, rgb: &mut [u8]) -> Result<Taken, LiveError> {
+        let frame = self.decoder.next_into(rgb)?;
+        let arrived_at_nanos = now_nanos();
+        let mut taken = Taken {
+            at_nanos: arrived_at_nanos,
+            arrived_at_nanos,
+            n_lost: 0,
+            n_overtaken: 0,
+            is_whole: true,
+        };
+        if let Some(presented) = frame.presented_nanos {
+            let last = self.last.replace(presented);
+            let gap = last.map_or(0, |last| presented.saturating_sub(last));
+            taken.n_lost = self.period_nanos.map_or(0, |it| missing_by_time(gap, it));
+            taken.at_nanos = self.clock.taken_at(presented, arrived_at_nanos);
+        }
+        Ok(taken)
+    }
+}
+
+/// How many pictures are missing in a gap between two, nanoseconds.
+fn missing_by_time(gap: i64, period: f64) -> u64 {
+    let periods = gap as f64 / period;
+    if periods > GAP {
+        (periods - 1.0).round() as u64
+    } else {
+        0
+    }
+}
+
+/// Opens a live camera, and returns one picture of it, RGB, row major: the first that is whole after `n_skipped`, by which
+/// exposure has settled.
+///
+/// # Errors
+///
+/// [`LiveError`]; also if nothing comes.
+pub fn take_picture(camera: &LiveCamera, n_skipped: usize) -> Result<(Size, Vec<u8>), LiveError> {
+    let (size, _) = camera.look()?;
+    let mut input = Input::open(camera, size, None)?;
+    let mut rgb = vec![0; size.rgb_bytes()];
+    let mut n_whole = 0;
+    loop {
+        let taken = input.next(&mut rgb)?;
+        n_whole += usize::from(taken.is_some_and(|it| it.is_whole));
+        if n_whole > n_skipped {
+            return Ok((size, rgb));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_that_is_passed_over_is_missing() {
+        assert_eq!(missing(None, 17), 0);
+        assert_eq!(missing(Some(17), 18), 0);
+        assert_eq!(missing(Some(17), 21), 3);
+        assert_eq!(missing(Some(u32::MAX), 1), 1, "beyond the last number");
+        assert_eq!(missing(Some(17), 0), 0, "it counts anew");
+        assert_eq!(missing(Some(17), 17), 0);
+    }
+
+    #[test]
+    fn gaps_of_a_stream_are_counted_in_periods() {
+        for (gap, expected) in [(0, 0), (33, 0), (45, 0), (66, 1), (100, 2), (-500, 0)] {
+            assert_eq!(
+                missing_by_time(gap * 1_000_000, 1e9 / 30.0),
+                expected,
+                "{gap}"
+            );
+        }
+    }
+}

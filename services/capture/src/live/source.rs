@@ -1,0 +1,354 @@
+//! The thread that keeps a live camera open, and its newest pictures.
+
+use core::time::Duration;
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+
+use footage::{Size, StreamEnd};
+use messages::Status;
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use super::address::{LiveCamera, LiveError};
+use super::input::{Input, Taken};
+
+/// Pictures that wait at most: an older one makes room for a newer one, so that nothing is ever late by more.
+const N_WAITING: usize = 4;
+/// Pictures from which on a rate is told.
+const LEAST_FOR_RATE: u64 = 30;
+/// Pause before a camera is opened again: the first, and the longest after further failures.
+const FIRST_PAUSE: Duration = Duration::from_millis(500);
+const LONGEST_PAUSE: Duration = Duration::from_secs(8);
+
+/// A picture that waits to be used.
+#[derive(Debug)]
+pub(crate) struct Picture {
+    /// Its pixels, row major.
+    pub rgb: Vec<u8>,
+    /// When it was taken, `CLOCK_MONOTONIC`, nanoseconds.
+    pub at_nanos: u64,
+    /// When it was here.
+    pub arrived_at_nanos: u64,
+    /// Pictures before it that it has overtaken: this process was slow.
+    pub n_overtaken: u64,
+}
+
+/// What became of the pictures up to here.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Tally {
+    pub n_connections: u64,
+    /// Lost by the camera; delivered by it, among them those that were overtaken or are damaged.
+    pub n_lost: u64,
+    pub n_delivered: u64,
+    pub n_overtaken: u64,
+    pub n_damaged: u64,
+    /// Pictures per second since the camera was opened.
+    pub rate_hz: Option<f64>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    waiting: VecDeque<Picture>,
+    spare: Vec<Vec<u8>>,
+    /// Overtaken since a picture was taken from here.
+    n_overtaken: u64,
+    tally: Tally,
+    /// Why there are no pictures; none while the camera is open, or is being opened for the first time.
+    trouble: Option<Status>,
+    /// Ends the wait for a stream.
+    end: Option<StreamEnd>,
+    is_over: bool,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    state: Mutex<State>,
+    news: Condvar,
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A camera that is opened, and opened again, by a thread of its own until this is dropped.
+#[derive(Debug)]
+pub(crate) struct Source {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Source {
+    /// * `size`: that of its pictures; with another it is in trouble.
+    pub(crate) fn start(camera: &LiveCamera, size: Size) -> Result<Self, Failure> {
+        let shared = Arc::new(Shared::default());
+        let keeper = Keeper {
+            shared: Arc::clone(&shared),
+            camera: camera.clone(),
+            size,
+        };
+        let thread = thread::Builder::new().name("live camera".to_owned());
+        let thread = thread
+            .spawn(move || keeper.keep_open())
+            .or_fail(ExitKind::Run)?;
+        Ok(Self {
+            shared,
+            thread: Some(thread),
+        })
+    }
+
+    /// The oldest picture that waits; none if none comes within `patience`.
+    pub(crate) fn next(&self, patience: Duration) -> Option<Picture> {
+        let state = self.shared.state();
+        let is_empty = |it: &mut State| it.waiting.is_empty();
+        let waited = self
+            .shared
+            .news
+            .wait_timeout_while(state, patience, is_empty);
+        let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let mut picture = state.waiting.pop_front()?;
+        picture.n_overtaken = core::mem::take(&mut state.n_overtaken);
+        Some(picture)
+    }
+
+    /// Its memory is used for a later picture.
+    pub(crate) fn give_back(&self, picture: Picture) {
+        self.shared.state().spare.push(picture.rgb);
+    }
+
+    /// Why there are no pictures, if the camera is known to be in trouble.
+    pub(crate) fn trouble(&self) -> Option<Status> {
+        self.shared.state().trouble
+    }
+
+    pub(crate) fn tally(&self) -> Tally {
+        self.shared.state().tally
+    }
+}
+
+impl Drop for Source {
+    fn drop(&mut self) {
+        let end = {
+            let mut state = self.shared.state();
+            state.is_over = true;
+            state.end.take()
+        };
+        self.shared.news.notify_all();
+        if let Some(end) = end {
+            end.end();
+        }
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::debug!("the thread of the camera has panicked");
+        }
+    }
+}
+
+/// What the thread has.
+struct Keeper {
+    shared: Arc<Shared>,
+    camera: LiveCamera,
+    size: Size,
+}
+
+impl Keeper {
+    fn keep_open(self) {
+        let (mut pause, mut before) = (FIRST_PAUSE, None);
+        let mut said: Option<Status> = None;
+        while !self.shared.state().is_over {
+            let mut n_read = 0;
+            let failed = match Input::open(&self.camera, self.size, before.as_ref()) {
+                Ok(mut input) => {
+                    before = input.about().or(before);
+                    self.read_all(&mut input, &mut n_read)
+                }
+                Err(error) => Some(error),
+            };
+            let Some(error) = failed else { return };
+            let status = error.status();
+            if n_read > 0 || said != Some(status) {
+                let error = causes::in_one_line(&error);
+                tracing::error!(camera = %self.camera.address, error, "no picture from this camera");
+            }
+            said = Some(status);
+            if n_read > 0 {
+                pause = FIRST_PAUSE;
+            }
+            self.rest(status, pause);
+            pause = (2 * pause).min(LONGEST_PAUSE);
+        }
+    }
+
+    /// Reads until the camera fails; no error if it is not wanted any more.
+    fn read_all(&self, input: &mut Input, n_read: &mut u64) -> Option<LiveError> {
+        {
+            let mut state = self.shared.state();
+            if state.is_over {
+                return None;
+            }
+            state.end = input.end();
+            state.tally.n_connections += 1;
+        }
+        let mut spare = None;
+        let mut pace = Pace::default();
+        loop {
+            let mut rgb = spare.take().unwrap_or_else(|| self.room());
+            let read = input.next(&mut rgb);
+            if self.shared.state().is_over {
+                return None;
+            }
+            match read {
+                Ok(None) => spare = Some(rgb),
+                Ok(Some(taken)) => {
+                    *n_read += 1;
+                    let made = 1 + taken.n_lost + taken.n_overtaken;
+                    let rate_hz = pace.rate_hz(made, taken.at_nanos);
+                    spare = self.post(taken, rgb, rate_hz);
+                }
+                Err(error) => return Some(error),
+            }
+        }
+    }
+
+    /// Memory for a picture.
+    fn room(&self) -> Vec<u8> {
+        let spare = self.shared.state().spare.pop();
+        let mut rgb = spare.unwrap_or_default();
+        rgb.resize(self.size.rgb_bytes(), 0);
+        rgb
+    }
+
+    /// Puts a picture where it is waited for; returns memory that is not needed.
+    fn post(&self, taken: Taken, rgb: Vec<u8>, rate_hz: Option<f64>) -> Option<Vec<u8>> {
+        let mut state = self.shared.state();
+        state.trouble = None;
+        let tally = &mut state.tally;
+        tally.n_delivered += 1 + taken.n_overtaken;
+        tally.n_lost += taken.n_lost;
+        tally.n_overtaken += taken.n_overtaken;
+        tally.rate_hz = rate_hz;
+        if !taken.is_whole {
+            tally.n_damaged += 1;
+            return Some(rgb);
+        }
+        state.waiting.push_back(Picture {
+            rgb,
+            at_nanos: taken.at_nanos,
+            arrived_at_nanos: taken.arrived_at_nanos,
+            n_overtaken: 0,
+        });
+        state.n_overtaken += taken.n_overtaken;
+        let overtaken = if state.waiting.len() > N_WAITING {
+            state.n_overtaken += 1;
+            state.tally.n_overtaken += 1;
+            state.waiting.pop_front().map(|it| it.rgb)
+        } else {
+            None
+        };
+        drop(state);
+        self.shared.news.notify_one();
+        overtaken
+    }
+
+    /// Says why there are no pictures, and waits before the next attempt.
+    fn rest(&self, status: Status, pause: Duration) {
+        let mut state = self.shared.state();
+        state.trouble = Some(status);
+        state.end = None;
+        let goes_on = |it: &mut State| !it.is_over;
+        let waited = self.shared.news.wait_timeout_while(state, pause, goes_on);
+        drop(waited);
+    }
+}
+
+/// The rate of a camera by its own times, since it was opened.
+#[derive(Debug, Default)]
+struct Pace {
+    first_nanos: Option<u64>,
+    n: u64,
+}
+
+impl Pace {
+    /// * `n_made`: pictures since the one before, with this one.
+    fn rate_hz(&mut self, n_made: u64, at_nanos: u64) -> Option<f64> {
+        let Some(first) = self.first_nanos else {
+            self.first_nanos = Some(at_nanos);
+            return None;
+        };
+        self.n += n_made;
+        if self.n < LEAST_FOR_RATE {
+            return None;
+        }
+        let seconds = at_nanos.checked_sub(first).filter(|it| *it > 0)? as f64 * 1e-9;
+        Some(self.n as f64 / seconds)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn taken(n_lost: u64, is_whole: bool) -> Taken {
+        Taken {
+            at_nanos: 1,
+            arrived_at_nanos: 2,
+            n_lost,
+            n_overtaken: 0,
+            is_whole,
+        }
+    }
+
+    fn keeper() -> Keeper {
+        let address = footage::LiveAddress::Device("/dev/null".into());
+        Keeper {
+            shared: Arc::default(),
+            camera: LiveCamera::new(address),
+            size: Size::new(1, 1),
+        }
+    }
+
+    #[test]
+    fn the_oldest_picture_makes_room_and_every_picture_is_counted() {
+        let keeper = keeper();
+        for nth in 0..N_WAITING as u8 + 3 {
+            keeper.post(taken(u64::from(nth % 2), true), vec![nth; 3], None);
+        }
+        keeper.post(taken(0, false), vec![99; 3], None);
+        let source = Source {
+            shared: Arc::clone(&keeper.shared),
+            thread: None,
+        };
+        let first = source.next(Duration::ZERO).unwrap();
+        assert_eq!((first.rgb[0], first.n_overtaken), (3, 3));
+        let mut n = 1;
+        while let Some(picture) = source.next(Duration::ZERO) {
+            assert_eq!(picture.n_overtaken, 0, "told once");
+            n += 1;
+        }
+        let tally = source.tally();
+        assert_eq!((tally.n_delivered, tally.n_lost), (N_WAITING as u64 + 4, 3));
+        assert_eq!(n + tally.n_overtaken + tally.n_damaged, tally.n_delivered);
+    }
+
+    #[test]
+    fn a_camera_that_is_not_there_is_trouble_and_the_thread_ends_when_it_is_dropped() {
+        let source = Source::start(&keeper().camera, Size::new(1, 1)).unwrap();
+        while source.trouble().is_none() {
+            assert!(source.next(Duration::from_millis(10)).is_none());
+        }
+        assert_eq!(source.trouble(), Some(Status::UNPLUGGED));
+        assert_eq!(source.tally().n_connections, 0);
+        drop(source);
+    }
+
+    #[test]
+    fn a_rate_is_told_once_there_are_pictures_enough() {
+        let mut pace = Pace::default();
+        let rates = (0..100_u64).map(|nth| pace.rate_hz(1, nth * 40_000_000));
+        let rates: Vec<Option<f64>> = rates.collect();
+        assert_eq!(rates[20], None);
+        assert!((rates[99].unwrap() - 25.0).abs() < 1e-9);
+    }
+}

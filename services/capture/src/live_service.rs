@@ -1,0 +1,221 @@
+//! Sends the pictures of a live camera.
+
+use core::time::Duration;
+
+use messages::{CameraCounts, Status};
+use runtime::{Failure, Service, now_nanos};
+
+use crate::camera::{Camera, Shot};
+use crate::guard::Guard;
+use crate::job::Job;
+use crate::live::{Grid, LiveJob, Picture, Source};
+
+/// How long after its instant a picture is still waited for: this long and two periods.
+const PATIENCE_NANOS: u64 = 250_000_000;
+/// Longest wait for a picture, so that a stop is noticed.
+const PAUSE: Duration = Duration::from_millis(20);
+/// Pictures from which on the rate of a camera is compared with that of the instants, and how far they may be apart.
+const N_FOR_RATE: u64 = 100;
+const RATE_TOLERANCE: f64 = 0.02;
+
+/// The pictures of a live camera on their way to the topic.
+struct Live<'a, 'b> {
+    camera: Camera<'a>,
+    job: &'b Job,
+    wanted: &'b LiveJob,
+    source: Source,
+    grid: Grid,
+    guard: Guard,
+    counts: CameraCounts,
+    /// The next instant.
+    at: u64,
+    /// Why pictures were refused since the last that was used.
+    refused: Option<Status>,
+    /// Why the last instant has no picture, if it has none; how often that began, by cause; and whether it was logged.
+    trouble: Option<Status>,
+    said: Vec<(Status, u64)>,
+    has_said: bool,
+    has_warned: bool,
+}
+
+/// Sends the pictures of a live camera until the run is stopped, or has its frames.
+///
+/// # Errors
+///
+/// What the transport reports. A camera that cannot be opened is opened again and again.
+pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Failure> {
+    let mut camera = Camera::live(service, job, live.size)?;
+    let step = job.source.step as f64;
+    let grid = Grid::new(service.session() + live.lead_nanos, live.rate_hz / step);
+    let noted = camera.wait_for_receivers();
+    // Instants that passed while the process was dead are lost.
+    let at = noted.map_or(0, |sent| sent.max(grid.latest(now_nanos()) + 1));
+    let mut it = Live {
+        camera,
+        job,
+        wanted: live,
+        source: Source::start(&live.camera, live.size)?,
+        grid,
+        guard: Guard::new(job.frozen_after, Some(live.rate_hz)),
+        counts: CameraCounts::default(),
+        at,
+        refused: None,
+        trouble: None,
+        said: Vec::new(),
+        has_said: false,
+        has_warned: false,
+    };
+    let n_frames = job.source.count.unwrap_or(u64::MAX);
+    while !it.camera.is_stopped()? && it.at < n_frames {
+        if let Some(picture) = it.source.next(PAUSE) {
+            it.take(&picture, n_frames)?;
+            it.source.give_back(picture);
+        }
+        it.give_up_overdue(n_frames)?;
+        it.count();
+    }
+    // What still waits has no place any more.
+    while let Some(picture) = it.source.next(Duration::ZERO) {
+        it.counts.n_surplus += 1;
+        it.source.give_back(picture);
+    }
+    it.count();
+    if it.at >= n_frames {
+        drop(it.source);
+        return it.camera.end(n_frames);
+    }
+    Ok(())
+}
+
+impl Live<'_, '_> {
+    fn index(&self, nth: u64) -> u64 {
+        self.job.source.start + nth.saturating_mul(self.job.source.step)
+    }
+
+    /// Sends a picture at its instant, and says of those before it that they were left out.
+    fn take(&mut self, picture: &Picture, n_frames: u64) -> Result<(), Failure> {
+        if let Some(why) = self
+            .grid
+            .wrong_clock(picture.at_nanos, picture.arrived_at_nanos)
+        {
+            (self.refused, self.counts.n_refused) = (Some(why), self.counts.n_refused + 1);
+            return Ok(());
+        }
+        let place = self.grid.place(picture.at_nanos, self.at);
+        let Some(nth) = place.filter(|it| *it < n_frames) else {
+            self.counts.n_surplus += 1;
+            return Ok(());
+        };
+        // What was overtaken is dropped, as footage that is behind its clock is.
+        let n_dropped = picture.n_overtaken.min(nth.saturating_sub(self.at));
+        if n_dropped > 0 {
+            self.camera.drop_frames(n_dropped);
+            self.at += n_dropped;
+        }
+        while self.at < nth {
+            let status = self.refused.unwrap_or(Status::LEFT_OUT);
+            self.send_nothing(self.source.trouble().unwrap_or(status))?;
+        }
+        let index = self.index(nth);
+        let time_s = self.grid.seconds(picture.at_nanos);
+        self.counts.off_grid_nanos = self.grid.off_nanos(picture.at_nanos, nth);
+        if let Some(status) = self.guard.check(index, Some(time_s), &picture.rgb) {
+            self.counts.n_refused += 1;
+            return self.send_nothing(status);
+        }
+        self.say_that_it_is_back(index);
+        let shot = Shot {
+            // Some drivers say when the picture will have been complete.
+            captured_at: picture.at_nanos.min(picture.arrived_at_nanos),
+            asked_at: picture.arrived_at_nanos,
+        };
+        self.camera.send_frame(index, &picture.rgb, shot)?;
+        self.counts.n_used += 1;
+        self.refused = None;
+        self.advance();
+        Ok(())
+    }
+
+    /// Says that there is no picture for the next instant.
+    fn send_nothing(&mut self, status: Status) -> Result<(), Failure> {
+        let index = self.index(self.at);
+        self.say_why(index, status);
+        self.camera.send_nothing(index, status)?;
+        self.advance();
+        Ok(())
+    }
+
+    /// Logs the first time that there is no picture for a reason, and then each time their number has doubled.
+    fn say_why(&mut self, index: u64, status: Status) {
+        let is_new = self.trouble.replace(status) != Some(status);
+        if !is_new {
+            return;
+        }
+        let known = self.said.iter_mut().find(|it| it.0 == status);
+        let n = if let Some((_, n)) = known {
+            *n += 1;
+            *n
+        } else {
+            self.said.push((status, 1));
+            1
+        };
+        if n.is_power_of_two() {
+            self.has_said = true;
+            let (view, cause) = (self.job.view, status.reason());
+            tracing::warn!(view, frame = index, cause, times = n, "without a picture");
+        }
+    }
+
+    /// Logs that there are pictures again, if it was logged that there were none.
+    fn say_that_it_is_back(&mut self, index: u64) {
+        if self.trouble.take().is_some() && core::mem::take(&mut self.has_said) {
+            tracing::info!(view = self.job.view, frame = index, "pictures again");
+        }
+    }
+
+    fn advance(&mut self) {
+        self.at += 1;
+        self.camera.note(self.at);
+    }
+
+    /// Gives up the instants whose picture should have been here: at once if the camera is known to be gone.
+    fn give_up_overdue(&mut self, n_frames: u64) -> Result<(), Failure> {
+        let trouble = self.source.trouble();
+        let patience = match trouble {
+            Some(_) => self.grid.period_nanos(),
+            None => PATIENCE_NANOS + 2 * self.grid.period_nanos(),
+        };
+        let status = trouble.or(self.refused).unwrap_or(Status::NO_FRAME);
+        while self.at < n_frames && self.grid.due_nanos(self.at) + patience < now_nanos() {
+            self.send_nothing(status)?;
+        }
+        Ok(())
+    }
+
+    /// Puts the counts together for those who watch.
+    fn count(&mut self) {
+        let tally = self.source.tally();
+        let counts = CameraCounts {
+            n_connections: tally.n_connections,
+            n_made: tally.n_lost + tally.n_delivered,
+            n_lost: tally.n_lost,
+            n_delivered: tally.n_delivered,
+            n_overtaken: tally.n_overtaken,
+            n_refused: self.counts.n_refused + tally.n_damaged,
+            rate_microhertz: tally.rate_hz.map_or(0, |it| (it * 1e6).round() as u64),
+            ..self.counts
+        };
+        self.camera.report(counts);
+        let rate_hz = tally.rate_hz.unwrap_or(self.wanted.rate_hz);
+        let is_off = (rate_hz / self.wanted.rate_hz - 1.0).abs() > RATE_TOLERANCE;
+        if is_off && !self.has_warned && tally.n_delivered > N_FOR_RATE {
+            self.has_warned = true;
+            tracing::warn!(
+                view = self.job.view,
+                rate_hz,
+                wanted_hz = self.wanted.rate_hz,
+                "this camera has another rate than the run"
+            );
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! `parallax cameras`: the video devices of this machine, and pictures of live cameras.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use capture::{LiveCamera, take_picture};
+use clap::{Args, Subcommand};
+use footage::{Canvas, LiveAddress};
+use launch::{inputs, load, output};
+use runtime::{
+    ExitKind, Failure, OrFail as _, VideoAbout, VideoControl, VideoDevice, VideoError, VideoFormat,
+    VideoMode, in_file, video_devices,
+};
+use serde_json::{Value, json};
+
+/// Options of `parallax cameras`.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Take a picture of a live camera.
+    View(ViewArguments),
+}
+
+/// Options of `parallax cameras view`.
+#[derive(Debug, Args)]
+struct ViewArguments {
+    /// The camera: a source such as `/dev/video0` or `rtsp://...`, or with --deployment its name there.
+    camera: String,
+    /// The deployment file whose camera it is, with its format, size, rate and controls.
+    #[arg(long, value_name = "FILE")]
+    deployment: Option<PathBuf>,
+    /// Where the picture goes, a PNG file.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Pictures before it that are passed over, so that exposure settles.
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    skip: usize,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    match &arguments.command {
+        Some(Command::View(it)) => view(it),
+        None => list(arguments.json),
+    }
+}
+
+fn view(arguments: &ViewArguments) -> Result<ExitCode, Failure> {
+    let camera = wanted(arguments)?;
+    let (size, rgb) = take_picture(&camera, arguments.skip).or_fail(ExitKind::Input)?;
+    let saved = Canvas::from_rgb(size, &rgb).save_png(&arguments.out);
+    saved.map_err(|error| in_file(&arguments.out, &error))?;
+    output::line(format!(
+        "{}: {size}, {}",
+        camera.address,
+        arguments.out.display()
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The camera that is asked for.
+fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
+    let name = &arguments.camera;
+    let Some(file) = &arguments.deployment else {
+        let address = LiveAddress::parse(name).ok_or_else(|| {
+            let message = format!("{name:?} is no live camera");
+            Failure::new(ExitKind::Usage, message).with_hint(
+                "a live camera is /dev/video0, rtsp://..., udp://... or http://...; for the name of a camera give its \
+                 deployment too: --deployment my.toml",
+            )
+        })?;
+        return Ok(LiveCamera::new(address));
+    };
+    let deployment = load::read(file, &[])?.deployment;
+    let entry = deployment.cameras.iter().find(|it| it.name == *name);
+    let live = entry.and_then(inputs::live_camera);
+    live.ok_or_else(|| {
+        let live = deployment
+            .cameras
+            .iter()
+            .filter(|it| inputs::is_live(&it.source));
+        let names: Vec<&str> = live.map(|it| it.name.as_str()).collect();
+        let message = format!("{} has no live camera {name:?}", file.display());
+        let hint = if names.is_empty() {
+            "it has none".to_owned()
+        } else {
+            format!("it has {}", names.join(", "))
+        };
+        Failure::new(ExitKind::Usage, message).with_hint(hint)
+    })
+}
+
+/// A video device with what it offers.
+struct Found {
+    path: PathBuf,
+    stable: Vec<PathBuf>,
+    about: VideoAbout,
+    formats: Vec<VideoFormat>,
+    controls: Vec<VideoControl>,
+    mode: VideoMode,
+}
+
+fn list(as_json: bool) -> Result<ExitCode, Failure> {
+    let paths = video_devices().or_fail(ExitKind::Input)?;
+    let (mut found, mut others) = (Vec::new(), Vec::new());
+    for path in &paths {
+        match look(path) {
+            Ok(it) => found.push(it),
+            Err(error) => others.push((path, causes::in_one_line(&error))),
+        }
+    }
+    if as_json {
+        let cameras: Vec<Value> = found.iter().map(described).collect();
+        let others: Vec<Value> = others
+            .iter()
+            .map(|(path, why)| json!({ "path": path, "why": why }))
+            .collect();
+        output::json(&json!({ "schema_version": 1, "cameras": cameras, "not_usable": others }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if found.is_empty() {
+        output::line(
+            "no video devices here (/dev/video*): plug in a camera; in a container, pass its device in. Cameras of a network \
+             are not listed: `parallax cameras view rtsp://... --out shot.png` takes a picture of one",
+        )?;
+    }
+    for it in &found {
+        output::line(text(it))?;
+    }
+    for (path, why) in others {
+        output::line(format!("{}: not usable: {why}", path.display()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn look(path: &Path) -> Result<Found, VideoError> {
+    let device = VideoDevice::open(path)?;
+    Ok(Found {
+        path: path.to_owned(),
+        stable: stable_names(path),
+        about: device.about()?,
+        formats: device.formats()?,
+        controls: device.controls(),
+        mode: device.mode()?,
+    })
+}
+
+/// The names of a device that stay when it is plugged in again.
+fn stable_names(path: &Path) -> Vec<PathBuf> {
+    let folders = ["/dev/v4l/by-id", "/dev/v4l/by-path"];
+    let entries = folders
+        .iter()
+        .filter_map(|it| std::fs::read_dir(it).ok())
+        .flatten();
+    let links = entries.filter_map(|it| Some(it.ok()?.path()));
+    let mut names: Vec<PathBuf> = links
+        .filter(|it| it.canonicalize().is_ok_and(|it| it == path))
+        .collect();
+    names.sort();
+    names
+}
+
+fn described(it: &Found) -> Value {
+    let formats = it.formats.iter().map(|format| {
+        let sizes = format.sizes.iter().map(
+            |size| json!({ "least": size.least, "most": size.most, "rates_hz": size.rates_hz }),
+        );
+        json!({
+            "format": format.format.to_string(),
+            "description": format.description,
+            "sizes": sizes.collect::<Vec<_>>(),
+        })
+    });
+    let controls = it.controls.iter().map(|control| {
+        let [least, most, step] = control.range;
+        json!({
+            "name": control.name, "least": least, "most": most, "step": step,
+            "default": control.default, "value": control.value, "fixed": control.is_fixed,
+            "choices": control.choices.iter().map(|(n, name)| json!({ "value": n, "name": name })).collect::<Vec<_>>(),
+        })
+    });
+    json!({
+        "path": it.path,
+        "stable": it.stable,
+        "card": it.about.card,
+        "driver": it.about.driver,
+        "bus": it.about.bus,
+        "now": { "format": it.mode.format.to_string(), "size": it.mode.size, "rate_hz": it.mode.rate_hz },
+        "formats": formats.collect::<Vec<_>>(),
+        "controls": controls.collect::<Vec<_>>(),
+    })
+}
+
+fn text(it: &Found) -> String {
+    let [width, height] = it.mode.size;
+    let rate = it
+        .mode
+        .rate_hz
+        .map_or_else(String::new, |it| format!(", {it:.2} a second"));
+    let about = &it.about;
+    let mut lines = vec![
+        format!(
+            "{}: {} ({}, {})",
+            it.path.display(),
+            about.card,
+            about.driver,
+            about.bus
+        ),
+        format!("  now           {} {width}x{height}{rate}", it.mode.format),
+    ];
+    lines.extend(
+        it.stable
+            .iter()
+            .map(|it| format!("  stable name   {}", it.display())),
+    );
+    for format in &it.formats {
+        let is_read = footage::PixelFormat::of_letters(format.format.0).is_some();
+        let note = if is_read { "" } else { " (not read)" };
+        lines.push(format!(
+            "  format        {}{note}: {}",
+            format.format, format.description
+        ));
+        for size in format.sizes.iter().filter(|_| is_read) {
+            let rates: Vec<String> = size.rates_hz.iter().map(|it| format!("{it:.2}")).collect();
+            lines.push(format!(
+                "    {} at {} a second",
+                size.text(),
+                rates.join(", ")
+            ));
+        }
+    }
+    lines.extend(it.controls.iter().map(|control| {
+        let value = control
+            .value
+            .map_or_else(|| "-".to_owned(), |it| it.to_string());
+        let fixed = if control.is_fixed {
+            ", cannot be set now"
+        } else {
+            ""
+        };
+        let (name, takes, default) = (&control.name, control.takes(), control.default);
+        format!("  control       {name} = {value}: {takes}, default {default}{fixed}")
+    }));
+    lines.join("\n")
+}

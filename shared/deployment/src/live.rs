@@ -1,0 +1,216 @@
+//! What a live camera means for a deployment: nothing waits, and nothing is read again.
+
+use toml::{Table, Value};
+
+use crate::capture::{Camera, Mode, Pace};
+use crate::complaint::demand;
+use crate::{Complaint, Deployment, Machine};
+
+/// Makes a deployment with a live camera one in real time, and checks the keys that only live cameras have.
+///
+/// * `given`: what the user says.
+///
+/// # Errors
+///
+/// The user asks for what a live camera cannot do, or gives keys of live cameras to footage.
+pub(crate) fn settle(
+    it: &mut Deployment,
+    given: &Table,
+    machine: &dyn Machine,
+) -> Result<(), Complaint> {
+    for camera in &it.cameras {
+        if machine.is_live(&camera.source) {
+            keys_of_live(camera)?;
+        } else {
+            no_keys_of_live(camera)?;
+        }
+    }
+    let mut cameras = it.cameras.iter();
+    let Some(camera) = cameras.find(|it| machine.is_live(&it.source)) else {
+        return Ok(());
+    };
+    let name = &camera.name;
+    let said = |key: &str| {
+        given
+            .get("capture")
+            .and_then(|it| it.get(key))
+            .and_then(Value::as_str)
+    };
+    let why = |word: &str| {
+        format!(
+            "\"realtime\", or nothing: camera {name:?} is live, and does not wait, so that a run of it is never {word}"
+        )
+    };
+    demand(
+        said("mode") != Some("lossless"),
+        "capture.mode",
+        "\"lossless\"",
+        &why("lossless"),
+    )?;
+    demand(
+        said("pace") != Some("fast"),
+        "capture.pace",
+        "\"fast\"",
+        &why("faster than the camera"),
+    )?;
+    demand(
+        it.capture.start_frame == 0,
+        "capture.start_frame",
+        &it.capture.start_frame.to_string(),
+        &format!("0: camera {name:?} is live, and has no frames of the past"),
+    )?;
+    (it.capture.mode, it.capture.pace) = (Mode::Realtime, Pace::Realtime);
+    Ok(())
+}
+
+/// Checks the values of a live camera.
+fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
+    let of = format!("given for the live camera {:?}", camera.name);
+    demand(
+        camera.fault.is_empty(),
+        "camera.fault",
+        &of,
+        "none: faults on purpose are for footage",
+    )?;
+    demand(
+        camera.keypoints.is_none(),
+        "camera.keypoints",
+        &of,
+        "none: they are found while it runs",
+    )?;
+    let sides = camera.size.unwrap_or([1, 1]);
+    demand(
+        sides.iter().all(|it| (1..=16_384).contains(it)),
+        "camera.size",
+        &format!("{sides:?}"),
+        "1 to 16384 each",
+    )?;
+    let rate = camera.frame_rate_hz.unwrap_or(1.0);
+    let is_rate = (0.1..=1000.0).contains(&rate);
+    demand(
+        is_rate,
+        "camera.frame_rate_hz",
+        &rate.to_string(),
+        "0.1 to 1000",
+    )?;
+    let is_device = camera.source.starts_with("/dev/") || camera.source.starts_with("v4l2:");
+    demand(
+        is_device || (camera.format.is_none() && camera.controls.is_empty()),
+        "camera.format",
+        &format!("given, or `controls`, for the stream {:?}", camera.name),
+        "neither: both are for video devices",
+    )?;
+    demand(
+        !is_device || camera.transport.is_none(),
+        "camera.transport",
+        &format!("given for the video device {:?}", camera.name),
+        "none: it is for RTSP cameras",
+    )
+}
+
+/// Refuses keys that mean nothing for footage.
+fn no_keys_of_live(camera: &Camera) -> Result<(), Complaint> {
+    let keys = [
+        ("camera.format", camera.format.is_some()),
+        ("camera.size", camera.size.is_some()),
+        ("camera.frame_rate_hz", camera.frame_rate_hz.is_some()),
+        ("camera.controls", !camera.controls.is_empty()),
+        ("camera.transport", camera.transport.is_some()),
+    ];
+    for (key, is_given) in keys {
+        demand(
+            !is_given,
+            key,
+            &format!("given for {:?}", camera.name),
+            "none: it is for live cameras, and the `source` of this one is footage",
+        )?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::{Path, PathBuf};
+
+    use super::*;
+    use crate::pose::Precision;
+    use crate::{ConfigError, Loaded};
+
+    /// A machine on which what begins with `/dev/` or `rtsp:` is live.
+    struct Room;
+
+    impl Machine for Room {
+        fn folder_of(&self, _file: &Path) -> PathBuf {
+            PathBuf::new()
+        }
+
+        fn footage(&self, named: &str, _base: &Path) -> String {
+            named.to_owned()
+        }
+
+        fn is_live(&self, named: &str) -> bool {
+            named.starts_with("/dev/") || named.starts_with("rtsp:")
+        }
+
+        fn has(&self, _precision: Precision) -> Result<(), String> {
+            Ok(())
+        }
+    }
+
+    /// * `top`: sections; `camera`: more keys of the live camera; `other`: more keys of the footage.
+    fn read([top, camera, other]: [&str; 3]) -> Result<Deployment, ConfigError> {
+        let text = format!(
+            "name = 'a'\nrig = 'r'\noutput = 'o'\n{top}\n[[camera]]\nname = 'b'\nsource = '/dev/video0'\n{camera}\n\
+             [[camera]]\nname = 'c'\nsource = 's.mp4'\n{other}\n"
+        );
+        Loaded::parse(&text, Path::new("d.toml"), &[], &Room).map(|it| it.deployment)
+    }
+
+    #[test]
+    fn a_live_camera_makes_a_run_one_in_real_time() {
+        let it = read(["", "", ""]).unwrap();
+        assert_eq!(
+            (it.capture.mode, it.capture.pace),
+            (Mode::Realtime, Pace::Realtime)
+        );
+        assert_eq!(it.deadline_ms(), 200);
+        read(["[capture]\nmode = 'realtime'", "", ""]).unwrap();
+    }
+
+    #[test]
+    fn what_a_live_camera_cannot_do_is_refused_with_the_reason() {
+        for (text, words) in [
+            (["[capture]\nmode = 'lossless'", "", ""], "never lossless"),
+            (["[capture]\npace = 'fast'", "", ""], "\"b\" is live"),
+            (
+                ["[capture]\nstart_frame = 3", "", ""],
+                "`capture.start_frame` is 3",
+            ),
+            (["", "fault = 'freeze@3+4'", ""], "`camera.fault`"),
+            (["", "size = [0, 480]", ""], "`camera.size` is [0, 480]"),
+            (
+                ["", "frame_rate_hz = 0.0", ""],
+                "`camera.frame_rate_hz` is 0",
+            ),
+            (["", "transport = 'tcp'", ""], "RTSP"),
+            (
+                ["", "", "format = 'MJPG'"],
+                "`camera.format` is given for \"c\"",
+            ),
+            (["", "", "controls = { gain = 3 }"], "`camera.controls`"),
+        ] {
+            let refused = read(text).unwrap_err().to_string();
+            assert!(refused.contains(words), "{text:?}: {refused}");
+        }
+    }
+
+    #[test]
+    fn controls_are_numbers_by_name() {
+        let it = read(["", "controls = { gain = 3, focus_absolute = 0 }", ""]).unwrap();
+        assert_eq!(it.cameras[0].controls["gain"], 3);
+        let refused = read(["", "controls = { gain = 'high' }", ""]).unwrap_err();
+        assert!(
+            refused.to_string().contains("gain") || refused.to_string().contains("whole number")
+        );
+    }
+}
