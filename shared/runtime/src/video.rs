@@ -6,6 +6,7 @@ mod device;
 mod error;
 mod list;
 mod raw;
+mod set;
 mod stream;
 
 use core::fmt;
