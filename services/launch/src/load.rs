@@ -106,7 +106,7 @@ impl Machine for ThisMachine {
             return named.to_owned();
         }
         let on_disk = base.join(named);
-        if named.is_empty() || (footage::is_live(named) && !on_disk.exists()) {
+        if named.is_empty() || (footage::is_address(named) && !on_disk.exists()) {
             return named.to_owned();
         }
         on_disk.to_string_lossy().into_owned()

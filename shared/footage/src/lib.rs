@@ -27,8 +27,8 @@ pub use pacer::Pacer;
 pub use pixels::PixelFormat;
 pub use size::Size;
 pub use source::{
-    FrameView, LiveAddress, Source, SourceInfo, SourceKind, Turn, is_image, is_live, read_image,
-    read_upright,
+    FrameView, LiveAddress, Source, SourceInfo, SourceKind, Turn, is_address, is_image, is_live,
+    read_image, read_upright,
 };
 pub use spec::SourceSpec;
 pub use stream::{LiveStream, StreamEnd, StreamFrame, StreamSpec, Transport};

@@ -15,7 +15,7 @@ pub(crate) use decode::{jpeg_into, jpeg_is_whole};
 use images::{Images, Still};
 pub use images::{is_image, read_image, read_upright};
 use listing::Listing;
-pub use live::{LiveAddress, is_live};
+pub use live::{LiveAddress, is_address, is_live};
 use video::Video;
 
 use crate::{FootageError, Size, SourceSpec};

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 /// For how long an offset counts, nanoseconds: long enough that some packet was quick, short enough that clocks do not part.
 const WINDOW_NANOS: u64 = 10_000_000_000;
 /// A change of the offset by which the camera's clock was set, nanoseconds.
-const JUMP_NANOS: i64 = 2_000_000_000;
+const JUMP_NANOS: u64 = 2_000_000_000;
 
 /// Moves presentation times to `CLOCK_MONOTONIC`: by the least delay of the last ten seconds, so that frames that were held up
 /// on the way keep their distances.
@@ -24,7 +24,7 @@ impl ClockMap {
         let offset = arrived_at_nanos
             .cast_signed()
             .saturating_sub(presented_nanos);
-        let is_jump = |&(_, least): &(u64, i64)| offset.saturating_sub(least).abs() > JUMP_NANOS;
+        let is_jump = |&(_, least): &(u64, i64)| offset.abs_diff(least) > JUMP_NANOS;
         if self.least.back().is_some_and(is_jump) {
             self.least.clear();
         }

@@ -138,7 +138,16 @@ pub(crate) fn check(arguments: &[String]) -> Result<(), String> {
     let mut help = help_of(&path)?;
     let mut rest = arguments;
     while help.lines().any(|line| line == "Commands:") {
-        let (name, others) = rest.split_first().ok_or("a subcommand is missing")?;
+        let Some((name, others)) = rest.split_first() else {
+            // One that may be left out stands on a line of its own.
+            let asks = |it: &str| it.starts_with("Usage: ") && it.ends_with("<COMMAND>");
+            let is_optional = !path.is_empty() && !help.lines().any(asks);
+            return if is_optional {
+                Ok(())
+            } else {
+                Err("a subcommand is missing".to_owned())
+            };
+        };
         if name.starts_with('-') {
             return Ok(()); // `parallax --version` and the like
         }

@@ -68,6 +68,11 @@ pub fn is_live(text: &str) -> bool {
     LiveAddress::parse(text).is_some()
 }
 
+/// Whether a text is an address of any kind, also of one that cannot be read: no path of a file.
+pub fn is_address(text: &str) -> bool {
+    what(text).is_some()
+}
+
 /// What a source is that is no footage: the kind that the scheme of an address stands for; `None` for a file.
 pub(super) fn what(text: &str) -> Option<&'static str> {
     match LiveAddress::parse(text) {
