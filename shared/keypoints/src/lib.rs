@@ -25,8 +25,8 @@ mod shipped;
 mod window;
 
 pub use card::{
-    Card, CardError, CardKind, Codec, Colour, Crop, Fit, Input, KeypointNames, Layout, ListField,
-    ListUnit, Numbers, Refine, Score, Sides,
+    Also, Card, CardError, CardKind, Codec, Colour, Crop, Fit, Input, KeypointNames, Layout,
+    ListField, ListUnit, Numbers, Refine, Score, Sides,
 };
 pub use decode::{HeatMaps, Keypoint, List, OutputError, SimCc};
 pub use detector::{Boxes, DetectorCard, PersonBox};

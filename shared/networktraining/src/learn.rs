@@ -9,7 +9,7 @@ use crate::network::{self, N_JOINTS, Shape};
 use crate::parameters::{Parameter, Role};
 use crate::settings::{Backend, Precision};
 
-/// Decay of the running means of gradients and of their squares (AdamW: Loshchilov and Hutter 2019).
+/// Decay of the running means of gradients and of their squares (`AdamW`: Loshchilov and Hutter 2019).
 const DECAYS: [f32; 2] = [0.9, 0.999];
 /// Added to the root of the mean square of a gradient.
 const EPSILON: f32 = 1e-8;
@@ -76,9 +76,9 @@ pub struct Cost {
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Memory {
     /// The parameters.
-    pub parameters: Vec<Parameter>,
-    /// Their mean over the last steps: what the network is used with.
-    pub averages: Vec<Parameter>,
+    parameters: Vec<Parameter>,
+    /// Their mean over the last steps.
+    averages: Vec<Parameter>,
     /// Running mean of the gradients.
     first: Vec<Vec<f32>>,
     /// Running mean of their squares.
@@ -103,6 +103,11 @@ impl Memory {
         }
     }
 
+    /// The mean of the parameters over the last steps: what the network is used with.
+    pub fn averages(&self) -> &[Parameter] {
+        &self.averages
+    }
+
     /// Begins anew from the averaged parameters.
     #[must_use]
     pub fn restarted(self) -> Self {
@@ -110,7 +115,7 @@ impl Memory {
     }
 }
 
-/// A network that learns by gradient descent (AdamW).
+/// A network that learns by gradient descent (`AdamW`).
 ///
 /// Its whole state is in its [`Memory`]; on one kind of machine, with one number of threads, equal states give equal bits.
 #[derive(Debug)]
@@ -198,7 +203,7 @@ impl Learner {
             .iter()
             .map(|it| it.grad_remove(&mut gradients).map(numbers))
             .collect();
-        self.change(gradients, step);
+        self.change(&gradients, step);
         let [maps, front, error] = [of_maps, of_front, of_error].map(|it| {
             let value = numbers(it.reshape([-1]));
             value.first().copied().unwrap_or(f32::NAN)
@@ -207,7 +212,7 @@ impl Learner {
     }
 
     /// Changes the parameters; a gradient that is not finite changes nothing.
-    fn change(&mut self, gradients: Vec<Option<Vec<f32>>>, step: Step) {
+    fn change(&mut self, gradients: &[Option<Vec<f32>>], step: Step) {
         let squared: f64 = gradients
             .iter()
             .flatten()
@@ -223,9 +228,8 @@ impl Learner {
         memory.steps += 1;
         let nth = memory.steps.min(1_000_000) as i32;
         let [first, second] = DECAYS.map(|it| 1.0 - it.powi(nth));
-        let n = memory.parameters.len();
-        for at in 0..n {
-            let Some(gradient) = &gradients[at] else {
+        for (at, gradient) in gradients.iter().enumerate() {
+            let Some(gradient) = gradient else {
                 continue;
             };
             let parameter = &mut memory.parameters[at];

@@ -4,7 +4,7 @@
 //!   teacher found.
 //! * [`varied`], [`plain`]: what the network is shown of a person, and what it should find.
 //! * `Trainer`: learns from people, step by step (with the feature `burn`; `libtorch` for real trainings).
-//! * [`write`]: the trained network as an ONNX file.
+//! * [`write()`]: the trained network as an ONNX file.
 //! * [`Score`]: how good it is on people.
 //!
 //! Labels are **as seen**: whoever is seen from behind has the joints of left and right exchanged, so that the label follows

@@ -73,7 +73,7 @@ pub(crate) trait Ops {
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Shape {
-    /// Width of the input, pixels: a multiple of [`MULTIPLE`].
+    /// Width of the input, pixels: a multiple of 32.
     pub width: usize,
     /// Its height.
     pub height: usize,

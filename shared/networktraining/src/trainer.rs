@@ -138,8 +138,8 @@ impl<'a> Trainer<'a> {
     }
 
     /// The averaged parameters.
-    pub fn parameters(&self) -> &[Parameter] {
-        &self.state.memory.averages
+    pub fn averages(&self) -> &[Parameter] {
+        self.state.memory.averages()
     }
 
     /// The state as bytes.
@@ -220,7 +220,7 @@ impl<'a> Trainer<'a> {
 
     /// The averaged network as an ONNX file.
     pub fn onnx(&self, metadata: &[(String, String)]) -> Vec<u8> {
-        onnx::write(&self.settings.shape, self.parameters(), metadata)
+        onnx::write(&self.settings.shape, self.averages(), metadata)
     }
 
     fn learner(&self, memory: Memory) -> Learner {

@@ -127,7 +127,7 @@ pub fn write(path: &Path, people: &Prepared) -> Result<(), Failure> {
     std::fs::rename(&partial, path).map_err(fail)
 }
 
-/// Reads what [`write`] wrote.
+/// Reads what [`write()`] wrote.
 ///
 /// # Errors
 ///

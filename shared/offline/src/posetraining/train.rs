@@ -136,26 +136,26 @@ pub fn train(
     };
     let card = networktraining::card(&settings.shape, &about);
     write(&job.out, &trainer.onnx(&[(METADATA_KEY.to_owned(), card)]))?;
-    let _ = std::fs::remove_file(&file);
+    std::fs::remove_file(&file).map_err(|error| runtime::in_file(&file, &error))?;
     Ok(passes)
 }
 
 /// What a pass came to, for people.
 fn line(pass: &Pass, of: usize, minutes: f64) -> String {
     let cost = pass.cost;
-    let mut line = format!(
+    let learnt = format!(
         "step {} of {of}: maps {:.4}, direction {:.3}, error {:.3}, {minutes:.0} minutes left",
         pass.step, cost.maps, cost.front, cost.error
     );
-    if let Some(score) = pass.score {
-        line += &format!(
-            "; {} people kept apart: limbs {:.1} / {:.1} %, direction {:.1} %, errors told by {:.3}",
-            score.people,
-            100.0 * score.mean_of_ends,
-            100.0 * score.both_ends,
-            100.0 * score.front,
-            score.area
-        );
-    }
-    line
+    let Some(score) = pass.score else {
+        return learnt;
+    };
+    format!(
+        "{learnt}; {} people kept apart: limbs {:.1} / {:.1} %, direction {:.1} %, errors told by {:.3}",
+        score.people,
+        100.0 * score.mean_of_ends,
+        100.0 * score.both_ends,
+        100.0 * score.front,
+        score.area
+    )
 }
