@@ -23,7 +23,7 @@ pub enum Precision {
     /// Single precision.
     #[default]
     F32,
-    /// Half as many bits: twice as fast where the processor has instructions for it, ten times slower elsewhere.
+    /// Half as many bits: faster where the processor has instructions for it (`avx512_bf16`), much slower elsewhere.
     Bf16,
 }
 

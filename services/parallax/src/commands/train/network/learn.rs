@@ -18,7 +18,7 @@ After every hundred steps everything that the training knows is in OUT.checkpoin
 --resume and ends with the same network, bit for bit, on the same kind of machine.
 
 A real training needs LibTorch: build with --features libtorch (docs/guide/train.md says how). The built-in backend is \
-some twenty times slower, and for small trainings.
+many times slower, and for small trainings.
 
 Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a setting is wrong; \
 4 the people or the checkpoint cannot be used; 130 stopped by Ctrl-C.
