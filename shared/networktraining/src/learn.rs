@@ -5,7 +5,7 @@ mod forward;
 use burn_tensor::{DType, Device, Tensor, TensorData, activation};
 
 use self::forward::Forward;
-use crate::network::{self, N_JOINTS, Shape};
+use crate::network::{self, N_JOINTS, STRIDE, Shape};
 use crate::parameters::{Parameter, Role};
 use crate::settings::{Backend, Precision};
 
@@ -19,6 +19,8 @@ const EPSILON: f32 = 1e-8;
 pub struct Batch {
     /// How many samples.
     pub n: usize,
+    /// Width and height of the pictures.
+    pub sides: [usize; 2],
     /// `[n, 3, height, width]`.
     pub pictures: Vec<f32>,
     /// Heat of every joint, 0 to 1: `[n, joints, rows, columns]`.
@@ -153,7 +155,8 @@ impl Learner {
     /// What the averaged network finds in pictures, `[n, 3, height, width]`.
     pub fn find(&self, n: usize, pictures: &[f32]) -> Found {
         let tensors = tensors(&self.memory.averages, &self.device);
-        let mut forward = self.forward(n, pictures, &tensors, &self.device);
+        let sides = [self.shape.width, self.shape.height];
+        let mut forward = self.forward((n, sides, pictures), &tensors, &self.device);
         let found = network::run(&mut forward, &self.shape);
         Found {
             maps: numbers(found.maps.map().cast(DType::F32).reshape([-1])),
@@ -181,14 +184,15 @@ impl Learner {
                 }
             })
             .collect();
-        let mut forward = self.forward(batch.n, &batch.pictures, &tensors, &device);
+        let pictures = (batch.n, batch.sides, batch.pictures.as_slice());
+        let mut forward = self.forward(pictures, &tensors, &device);
         let found = network::run(&mut forward, &self.shape);
         let maps = found.maps.map().cast(DType::F32);
         let places: Vec<f32> = numbers(maps.clone().detach().reshape([-1]));
         let targets = Targets {
             batch,
             device: &device,
-            cells: self.shape.cells(),
+            cells: batch.sides.map(|it| it / STRIDE),
         };
         let of_maps = targets.of_maps(maps);
         let of_front = targets.of_front(found.front.list());
@@ -255,15 +259,11 @@ impl Learner {
 
     fn forward<'a>(
         &'a self,
-        n: usize,
-        pictures: &[f32],
+        (n, [width, height], pictures): (usize, [usize; 2], &[f32]),
         tensors: &'a [Tensor<1>],
         device: &Device,
     ) -> Forward<'a> {
-        let data = TensorData::new(
-            pictures.to_vec(),
-            [n, 3, self.shape.height, self.shape.width],
-        );
+        let data = TensorData::new(pictures.to_vec(), [n, 3, height, width]);
         Forward {
             parameters: &self.memory.parameters,
             tensors,

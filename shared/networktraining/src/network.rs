@@ -101,6 +101,17 @@ impl Default for Shape {
 }
 
 impl Shape {
+    /// The same network for a smaller input, by 32 pixels across and down where that leaves anything.
+    #[must_use]
+    pub fn smaller(&self) -> Self {
+        let less = |side: usize| side.saturating_sub(MULTIPLE).max(MULTIPLE);
+        Self {
+            width: less(self.width),
+            height: less(self.height),
+            ..self.clone()
+        }
+    }
+
     /// Columns and rows of the maps.
     pub fn cells(&self) -> [usize; 2] {
         [self.width / STRIDE, self.height / STRIDE]

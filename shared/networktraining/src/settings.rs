@@ -41,6 +41,9 @@ pub struct Settings {
     pub batch: usize,
     /// Steps of the training.
     pub steps: usize,
+    /// Share of the steps, the first ones, that are shown inputs of 32 pixels less across and down: they take two thirds of the
+    /// time.
+    pub small: f32,
     /// Steps after them that learn the expected error alone, on people who are kept apart.
     pub error_steps: usize,
     /// Longest step: reached after a tenth of the training, from where it falls as a cosine.
@@ -104,6 +107,7 @@ impl Default for Settings {
             precision: Precision::F32,
             batch: 32,
             steps: 8000,
+            small: 0.65,
             error_steps: 400,
             rate: 2e-3,
             decay: 0.05,
@@ -158,6 +162,7 @@ impl Settings {
             });
         }
         let numbers = [
+            ("small", self.small, 1.0),
             ("rate", self.rate, 1.0),
             ("decay", self.decay, 1.0),
             ("longest", self.longest, 1e6),

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::learn::{Batch, Cost, Found, Learner, Memory, Step};
-use crate::network::N_JOINTS;
+use crate::network::{N_JOINTS, Shape};
 use crate::parameters::{Parameter, initial};
 use crate::person::Person;
 use crate::score::{Judged, Score};
@@ -16,7 +16,7 @@ use crate::{onnx, peak};
 
 const CHECKPOINT: Envelope = Envelope {
     magic: *b"PLXPOSNT",
-    version: 1,
+    version: 2,
 };
 /// People that are judged at once.
 const JUDGED_AT_ONCE: usize = 32;
@@ -253,6 +253,16 @@ impl<'a> Trainer<'a> {
         }
     }
 
+    /// The network with the size of the input at a step.
+    fn shown(&self, nth: usize) -> Shape {
+        let settings = self.settings;
+        if (nth as f32) < settings.small * settings.steps as f32 {
+            settings.shape.smaller()
+        } else {
+            settings.shape.clone()
+        }
+    }
+
     /// The samples of a step: they follow from its number alone.
     fn batch(&self, nth: usize) -> Batch {
         let people = if nth < self.settings.steps {
@@ -261,26 +271,22 @@ impl<'a> Trainer<'a> {
             self.kept
         };
         let n = self.settings.batch;
+        let shape = self.shown(nth);
         let seen: Vec<NetworkSample> = (0..n)
             .into_par_iter()
-            .filter_map(|at| self.sample(people, nth * n + at))
+            .filter_map(|at| self.sample(people, nth * n + at, &shape))
             .collect();
-        batch_of(&seen)
+        batch_of(&seen, &shape)
     }
 
     /// The sample with a number: everybody once before anybody twice.
-    fn sample(&self, people: &[Person], at: usize) -> Option<NetworkSample> {
+    fn sample(&self, people: &[Person], at: usize, shape: &Shape) -> Option<NetworkSample> {
         let (settings, seed) = (self.settings, self.settings.seed);
         let [pass, place] = [at / people.len(), at % people.len()];
         let person = shuffled(place, people.len(), seed.wrapping_add(pass as u64));
         let mut rng = Rng::with_seed(seed ^ (at as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let other = &people[rng.usize(0..people.len())];
-        varied(
-            &people[person],
-            other,
-            (&settings.shape, &settings.vary),
-            &mut rng,
-        )
+        varied(&people[person], other, (shape, &settings.vary), &mut rng)
     }
 }
 
@@ -307,9 +313,10 @@ fn shuffled(place: usize, n: usize, seed: u64) -> usize {
     }
 }
 
-fn batch_of(seen: &[NetworkSample]) -> Batch {
+fn batch_of(seen: &[NetworkSample], shape: &Shape) -> Batch {
     Batch {
         n: seen.len(),
+        sides: [shape.width, shape.height],
         pictures: seen
             .iter()
             .flat_map(|it| it.picture.iter().copied())
@@ -331,7 +338,7 @@ fn score(learner: &Learner, settings: &Settings, people: &[Person]) -> Score {
             .par_iter()
             .filter_map(|it| plain(it, &settings.shape))
             .collect();
-        let batch = batch_of(&seen);
+        let batch = batch_of(&seen, &settings.shape);
         let found = learner.find(batch.n, &batch.pictures);
         let each = (0..batch.n).map(|at| judged(&found, &seen[at], (at, columns, rows)));
         each.collect::<Vec<Judged>>()
