@@ -24,6 +24,10 @@ mod triangulate;
 
 mod rig_watch;
 
+pub mod skew;
+
+mod step_watch;
+
 pub mod files;
 
 #[cfg(test)]
@@ -35,6 +39,7 @@ pub use framing::{Framing, FramingError, OutSize, upright_roll};
 pub use lens::{Lens, LensModel};
 pub use rig::{NotARotation, PLAIN_NAME, Rig, RigError, is_plain_name, rotation_from_matrix};
 pub use rig_watch::{Contradiction, RigWatch, Suspect, Swap, SwapWatch};
+pub use step_watch::{OUT_OF_STEP_MS, Step, StepWatch};
 pub use triangulate::{
     MAX_VIEWS, Observation, Settings, TriangulateError, Triangulated, triangulate,
 };

@@ -290,6 +290,6 @@ fn median_offset(all: &[[f64; 2]]) -> Option<[f64; 2]> {
 }
 
 /// The lower of the two in the middle; none of nothing.
-fn median(all: Vec<f64>) -> Option<f64> {
+pub(crate) fn median(all: Vec<f64>) -> Option<f64> {
     Sorted::new(all).lower_median()
 }

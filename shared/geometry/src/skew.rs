@@ -1,0 +1,196 @@
+//! Pictures that were not taken at the instant of their frame: how fast points move in them, and where the points were at the
+//! instant.
+//!
+//! The *skew* of a picture is how long after the instant of its frame it was taken, seconds; negative for before. Two ways to take
+//! it into account: a point is moved to the instant by its own velocity ([`Tracks`], [`moved`]), or trusted less, by as much as it
+//! may have moved ([`widened_px`]). The test `clock` of the crate `pipeline` measures both: the first is far better, and best where a
+//! point whose velocity is not known, or that is moved beyond what was seen, is trusted less.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Point2, Vector2};
+
+/// How many frames are remembered: enough to see whether two velocities in a row agree.
+const N_NOTED: usize = 3;
+/// A point that is faster is another one: heights of the person per second. The foot of a jogger does 5.
+const MOST_SPEED: f64 = 9.0;
+/// A velocity that changes by more from one interval to the next is not believed, for one of the two tells of another point:
+/// heights per second.
+const MOST_CHANGE: f64 = 6.0;
+/// Pictures that are further apart say nothing of the velocity, seconds.
+const LONGEST_GAP_S: f64 = 0.15;
+/// How fast a point may be whose velocity is not known: heights per second.
+const UNKNOWN_SPEED: f64 = 1.0;
+
+/// Where the points of one view were in the last pictures.
+#[derive(Debug, Clone, Default)]
+pub struct Tracks {
+    /// The newest last.
+    noted: VecDeque<(f64, Vec<Option<Point2<f64>>>)>,
+}
+
+/// The velocity of a point in pictures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Velocity {
+    /// Pixels per second.
+    pub px_per_s: Vector2<f64>,
+    /// Between the two pictures that it was measured in, seconds.
+    pub gap_s: f64,
+}
+
+impl Velocity {
+    /// By how much the point moves in a time, pixels; `None` for more time than the velocity was measured over: nobody moves
+    /// evenly for so long.
+    pub fn shift(&self, seconds: f64) -> Option<Vector2<f64>> {
+        (seconds.abs() <= self.gap_s).then(|| self.px_per_s * seconds)
+    }
+}
+
+impl Tracks {
+    /// Adds a picture. One that is not later than the one before begins anew.
+    ///
+    /// * `taken_s`: when it was taken, seconds.
+    /// * `points_px`: in the same order in every picture; `None` for one that is unknown.
+    pub fn note(&mut self, taken_s: f64, points_px: Vec<Option<Point2<f64>>>) {
+        if self.noted.back().is_some_and(|it| taken_s <= it.0) {
+            self.noted.clear();
+        }
+        if !taken_s.is_finite() {
+            return;
+        }
+        self.noted.push_back((taken_s, points_px));
+        if self.noted.len() > N_NOTED {
+            self.noted.pop_front();
+        }
+    }
+
+    /// The velocity of a point from the last picture to this one, which is not noted yet.
+    ///
+    /// * `taken_s`: when this picture was taken, seconds.
+    /// * `height_px`: of the person, in pixels; the longer side of the rectangle around the points.
+    /// * Returns `None` for a point that is too fast, that was not seen before, or whose velocity was another one just before.
+    pub fn velocity(
+        &self,
+        nth: usize,
+        (taken_s, at): (f64, Point2<f64>),
+        height_px: f64,
+    ) -> Option<Velocity> {
+        let mut known = self.noted.iter().rev().map(|(seconds, points)| {
+            let point = points.get(nth).copied().flatten();
+            point.map(|at| (*seconds, at))
+        });
+        let before = known.next()??;
+        let velocity = between(before, (taken_s, at))?;
+        let earlier = known.next().flatten().and_then(|it| between(it, before));
+        let change = earlier.map_or(0.0, |it| (it.px_per_s - velocity.px_per_s).norm());
+        let is_person =
+            velocity.px_per_s.norm() <= MOST_SPEED * height_px && change <= MOST_CHANGE * height_px;
+        is_person.then_some(velocity)
+    }
+}
+
+fn between((from_s, from): (f64, Point2<f64>), (to_s, to): (f64, Point2<f64>)) -> Option<Velocity> {
+    let gap_s = to_s - from_s;
+    let px_per_s = (to - from) / gap_s;
+    let is_near = gap_s > 0.0 && gap_s <= LONGEST_GAP_S;
+    (is_near && px_per_s.iter().all(|it| it.is_finite())).then_some(Velocity { px_per_s, gap_s })
+}
+
+/// Where a point was at the instant of its frame, pixels, and the standard deviation that is to be added to its own.
+///
+/// A point that is moved is as good as one that was seen, as long as the instant lies between the two pictures that its velocity is
+/// from. Before the later picture by `-s`, `x + (x - x') s / gap` has `(1 + s / gap)^2 + (s / gap)^2` times the variance of `x`.
+///
+/// * `velocity`: of [`Tracks::velocity`]; a point without one, or with a skew that it does not reach, stays where it is, and is
+///   trusted less.
+/// * `sigma_px`: standard deviation of the point.
+/// * `height_px`: of the person.
+pub fn moved(
+    at: Point2<f64>,
+    velocity: Option<Velocity>,
+    skew_s: f64,
+    [sigma_px, height_px]: [f64; 2],
+) -> (Point2<f64>, f64) {
+    let known = velocity.and_then(|it| Some((it.shift(skew_s)?, it.gap_s)));
+    let Some((shift, gap_s)) = known else {
+        return (at, widened_px(0.0, UNKNOWN_SPEED * height_px, skew_s));
+    };
+    let share = skew_s / gap_s;
+    let variances = (1.0 - share).powi(2) + share.powi(2);
+    let more = sigma_px * (variances - 1.0).max(0.0).sqrt();
+    (at - shift, more)
+}
+
+/// The standard deviation of a point that stays where its picture shows it, pixels.
+///
+/// * `sigma_px`: at the time of the picture.
+/// * `px_per_s`: its speed.
+pub fn widened_px(sigma_px: f64, px_per_s: f64, skew_s: f64) -> f64 {
+    sigma_px.hypot(px_per_s * skew_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEIGHT: f64 = 200.0;
+
+    fn at(x: f64) -> Vec<Option<Point2<f64>>> {
+        vec![Some(Point2::new(x, 7.0)), None]
+    }
+
+    fn speed(tracks: &Tracks, taken_s: f64, x: f64) -> Option<f64> {
+        let found = tracks.velocity(0, (taken_s, Point2::new(x, 7.0)), HEIGHT);
+        found.map(|it| it.px_per_s.x)
+    }
+
+    #[test]
+    fn a_point_is_moved_back_by_its_own_velocity() {
+        let mut tracks = Tracks::default();
+        tracks.note(1.0, at(100.0));
+        let now = Point2::new(110.0, 7.0);
+        let velocity = tracks.velocity(0, (1.05, now), HEIGHT).unwrap();
+        let (late, more) = moved(now, Some(velocity), 0.01, [2.0, HEIGHT]);
+        assert!((late.x - 108.0).abs() < 1e-9 && more == 0.0);
+        let (early, more) = moved(now, Some(velocity), -0.01, [2.0, HEIGHT]);
+        assert!((early.x - 112.0).abs() < 1e-9);
+        assert!((more - 2.0 * (1.2_f64.powi(2) + 0.04 - 1.0).sqrt()).abs() < 1e-9);
+        assert_eq!(moved(now, Some(velocity), 0.0, [2.0, HEIGHT]), (now, 0.0));
+        assert_eq!(moved(now, None, -0.02, [2.0, HEIGHT]), (now, 4.0));
+        let far = moved(now, Some(velocity), 0.06, [2.0, HEIGHT]);
+        assert_eq!(
+            far,
+            (now, 0.06 * HEIGHT),
+            "more than the time between the pictures"
+        );
+    }
+
+    #[test]
+    fn another_point_has_no_velocity() {
+        let mut tracks = Tracks::default();
+        assert_eq!(speed(&tracks, 1.0, 0.0), None);
+        tracks.note(0.9, at(98.0));
+        tracks.note(1.0, at(100.0));
+        assert_eq!(speed(&tracks, 1.1, 102.0).map(f64::round), Some(20.0));
+        // 1400 pixels per second where it did 20; and 2000, which is too fast anyway.
+        assert_eq!(speed(&tracks, 1.1, 240.0), None);
+        tracks.note(1.1, at(240.0));
+        assert_eq!(speed(&tracks, 1.2, 242.0), None, "nor on its way back");
+        tracks.note(1.2, at(242.0));
+        assert_eq!(speed(&tracks, 1.3, 244.0).map(f64::round), Some(20.0));
+        assert_eq!(speed(&tracks, 1.4, 244.0), None, "too long ago");
+        assert_eq!(speed(&tracks, 1.2, 244.0), None, "not later");
+        assert_eq!(speed(&tracks, f64::NAN, 244.0), None);
+        assert_eq!(tracks.velocity(1, (1.3, Point2::origin()), HEIGHT), None);
+        assert_eq!(tracks.velocity(9, (1.3, Point2::origin()), HEIGHT), None);
+    }
+
+    #[test]
+    fn a_clock_that_goes_back_begins_anew() {
+        let mut tracks = Tracks::default();
+        tracks.note(5.0, at(0.0));
+        tracks.note(1.0, at(100.0));
+        tracks.note(f64::NAN, at(3.0));
+        assert_eq!(speed(&tracks, 1.1, 102.0).map(f64::round), Some(20.0));
+    }
+}
