@@ -18,6 +18,8 @@ use deployment::capture::{Mode, Pace};
 pub(crate) struct Shot {
     pub(crate) captured_at: u64,
     pub(crate) asked_at: u64,
+    /// How long after the instant of its frame it was taken.
+    pub(crate) skew: i64,
 }
 
 /// One camera, and the topic of its frames.
@@ -224,6 +226,7 @@ impl<'a> Camera<'a> {
         let shot = Shot {
             captured_at: now,
             asked_at: now,
+            skew: 0,
         };
         *loan.header_mut() = self.header(frame, status, shot);
         loan.send()?;
@@ -252,6 +255,7 @@ impl<'a> Camera<'a> {
             },
             status,
             n_dropped: self.n_dropped,
+            skew_nanos: shot.skew,
             ..FrameHeader::default()
         }
     }

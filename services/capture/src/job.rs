@@ -23,6 +23,9 @@ pub struct Job {
     pub faults: Faults,
     /// Repetitions from which on a picture counts as frozen; 0 for never.
     pub frozen_after: u32,
+    /// How long after the instants of their frames the pictures of footage were taken, nanoseconds; that of a live camera is
+    /// measured.
+    pub skew_nanos: i64,
     /// From the footage to the frames of the pipeline.
     pub framing: Framing,
     /// Whether frames may be dropped.

@@ -1,18 +1,21 @@
 //! A live camera: its pictures are brought to the instants that all cameras of a run have in common.
 //!
 //! Reading order: [`LiveCamera`] (what to open), `input` (a device or a stream that is open), `source` (the thread that keeps
-//! it open, and the newest pictures), `grid` (which instant a picture belongs to).
+//! it open, and the newest pictures), `grid` (which instant a picture belongs to), `phase` (how far
+//! pictures are from their instants).
 
 mod address;
 mod clock;
 mod grid;
 mod input;
+mod phase;
 mod source;
 
 pub use address::{LiveCamera, LiveError};
 pub use input::take_picture;
 
 pub(crate) use grid::Grid;
+pub(crate) use phase::Phase;
 pub(crate) use source::{Picture, Source};
 
 /// A live camera of a run.
@@ -24,6 +27,10 @@ pub struct LiveJob {
     pub size: footage::Size,
     /// Common instants per second, before `frame_step`.
     pub rate_hz: f64,
+    /// Its name.
+    pub name: String,
+    /// How far its pictures may be from the instants before a warning, nanoseconds.
+    pub max_skew_nanos: u64,
     /// From the beginning of the run to the first instant, nanoseconds: every camera of the run has the same.
     pub lead_nanos: u64,
 }

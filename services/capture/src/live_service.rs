@@ -2,13 +2,13 @@
 
 use core::time::Duration;
 
-use messages::{CameraCounts, Status};
+use messages::{CameraCounts, Status, UNMEASURED};
 use runtime::{Failure, Service, now_nanos};
 
 use crate::camera::{Camera, Shot};
 use crate::guard::Guard;
 use crate::job::Job;
-use crate::live::{Grid, LiveJob, Picture, Source};
+use crate::live::{Grid, LiveJob, Phase, Picture, Source};
 
 /// How long after its instant a picture is still waited for: this long and two periods.
 const PATIENCE_NANOS: u64 = 250_000_000;
@@ -25,6 +25,7 @@ struct Live<'a, 'b> {
     wanted: &'b LiveJob,
     source: Source,
     grid: Grid,
+    phase: Phase,
     guard: Guard,
     counts: CameraCounts,
     /// The next instant.
@@ -36,6 +37,7 @@ struct Live<'a, 'b> {
     said: Vec<(Status, u64)>,
     has_said: bool,
     has_warned: bool,
+    has_warned_of_skew: bool,
 }
 
 /// Sends the pictures of a live camera until the run is stopped, or has its frames.
@@ -55,6 +57,7 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
         job,
         wanted: live,
         source: Source::start(&live.camera, live.size)?,
+        phase: Phase::new(grid.period_nanos()),
         grid,
         guard: Guard::new(job.frozen_after, Some(live.rate_hz)),
         counts: CameraCounts::default(),
@@ -64,6 +67,7 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
         said: Vec::new(),
         has_said: false,
         has_warned: false,
+        has_warned_of_skew: false,
     };
     let n_frames = job.source.count.unwrap_or(u64::MAX);
     while !it.camera.is_stopped()? && it.at < n_frames {
@@ -119,6 +123,9 @@ impl Live<'_, '_> {
         let index = self.index(nth);
         let time_s = self.grid.seconds(picture.at_nanos);
         self.counts.off_grid_nanos = self.grid.off_nanos(picture.at_nanos, nth);
+        if self.phase.add(picture.at_nanos, self.counts.off_grid_nanos) {
+            self.warn_of_skew();
+        }
         if let Some(status) = self.guard.check(index, Some(time_s), &picture.rgb) {
             self.counts.n_refused += 1;
             return self.send_nothing(status);
@@ -128,6 +135,7 @@ impl Live<'_, '_> {
             // Some drivers say when the picture will have been complete.
             captured_at: picture.at_nanos.min(picture.arrived_at_nanos),
             asked_at: picture.arrived_at_nanos,
+            skew: self.counts.off_grid_nanos,
         };
         self.camera.send_frame(index, &picture.rgb, shot)?;
         self.counts.n_used += 1;
@@ -192,6 +200,24 @@ impl Live<'_, '_> {
         Ok(())
     }
 
+    /// Logs once that pictures are further from the instants than they may be.
+    fn warn_of_skew(&mut self) {
+        let Some(skew) = self.phase.skew_nanos() else {
+            return;
+        };
+        if self.has_warned_of_skew || skew.unsigned_abs() <= self.wanted.max_skew_nanos {
+            return;
+        }
+        self.has_warned_of_skew = true;
+        tracing::warn!(
+            camera = self.wanted.name,
+            skew_ms = skew as f64 * 1e-6,
+            max_skew_ms = self.wanted.max_skew_nanos as f64 * 1e-6,
+            drift_ppm = self.phase.drift_ppb().map(|it| it as f64 * 1e-3),
+            "the pictures of this camera are far from the instants of the frames"
+        );
+    }
+
     /// Puts the counts together for those who watch.
     fn count(&mut self) {
         let tally = self.source.tally();
@@ -202,6 +228,8 @@ impl Live<'_, '_> {
             n_delivered: tally.n_delivered,
             n_overtaken: tally.n_overtaken,
             n_refused: self.counts.n_refused + tally.n_damaged,
+            skew_nanos: self.phase.skew_nanos().unwrap_or(UNMEASURED),
+            drift_ppb: self.phase.drift_ppb().unwrap_or(UNMEASURED),
             rate_microhertz: tally.rate_hz.map_or(0, |it| (it * 1e6).round() as u64),
             ..self.counts
         };

@@ -40,6 +40,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
                 let shot = Shot {
                     captured_at: asked_at,
                     asked_at,
+                    skew: job.skew_nanos,
                 };
                 camera.send_frame(index, supply.pixels(), shot)?;
             }

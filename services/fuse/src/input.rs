@@ -8,9 +8,19 @@ use wire::WireError;
 /// A decoded message.
 #[derive(Debug, Clone)]
 pub(crate) enum Input {
-    /// Distinct poses, and what the picture says of the front of each.
-    Candidates(Vec<Pose>, Vec<FrontEvidence>),
+    Candidates(Candidates),
     Errors(Errors),
+}
+
+/// What was found in a picture.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidates {
+    /// Distinct poses, best first.
+    pub(crate) poses: Vec<Pose>,
+    /// What the picture says of the front of each.
+    pub(crate) front: Vec<FrontEvidence>,
+    /// How long after the instant of the frame it was taken, seconds.
+    pub(crate) skew_s: f64,
 }
 
 /// The expected errors of the parts, and the thresholds that came with them.

@@ -31,6 +31,9 @@ pub struct Job {
     pub quality_max_age: Duration,
     /// Distance between the frames used, at least 1.
     pub frame_step: u64,
+    /// Frames of the footage per second, if that is known: without it nothing is moved from the time of its picture to the instant
+    /// of its frame.
+    pub frame_rate_hz: Option<f64>,
     /// Processes that receive the poses of pairs.
     pub n_consumers: usize,
     /// How long a view may be silent.

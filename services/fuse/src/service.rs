@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::input::{Input, expected_errors};
+use crate::input::{Candidates, Input, expected_errors};
 use crate::job::Job;
 use crate::worker::Worker;
 use messages::{ViewPose, topic};
-use pipeline::Following;
+use pipeline::{Following, Motion};
 use runtime::{Failure, Service};
 use stage::Stage;
 
@@ -22,8 +22,11 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     for (view, plan) in job.plans.iter().enumerate() {
         stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
             let candidates = wire::candidates_from_message(pose, plan.model(), plan.layout())?;
-            let front = wire::front_from_message(pose, candidates.len())?;
-            Ok(Input::Candidates(candidates, front))
+            Ok(Input::Candidates(Candidates {
+                front: wire::front_from_message(pose, candidates.len())?,
+                poses: candidates,
+                skew_s: wire::skew_from_message(pose)?,
+            }))
         })?;
     }
     for view in (0..n_views).filter(|_| job.has_quality) {
@@ -51,5 +54,6 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         service.progress().follow(move || step.n_sweeps());
     }
     let mut following = Following::new(job.follow);
-    stage.run(|frame| worker.fuse(frame, &mut following))
+    let mut motion = Motion::default();
+    stage.run(|frame| worker.fuse(frame, (&mut following, &mut motion)))
 }

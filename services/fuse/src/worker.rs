@@ -4,7 +4,7 @@ use std::cell::Ref;
 
 use fmp::Responses;
 use messages::{EvidenceHeader, PairPose, Span, Status};
-use pipeline::{Following, Others, Support, ViewResult, Views};
+use pipeline::{Following, Motion, Others, Support, ViewResult, Views};
 use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, now_nanos};
 use stage::{Context, Frame, Held, Output, Turn};
 use wire::{EvidenceView, WireError};
@@ -43,11 +43,11 @@ pub(crate) struct Worker<'a> {
 impl Worker<'_> {
     /// Solves one frame.
     ///
-    /// * `following`: who was followed in the frames before.
+    /// * `following`: who was followed in the frames before; `motion`: how they moved.
     pub(crate) fn fuse(
         &self,
         frame: &mut Frame<'_, Input>,
-        following: &mut Following,
+        (following, motion): (&mut Following, &mut Motion),
     ) -> Result<(), Failure> {
         let (answers, sigma_ages) = self.answers(frame);
         let others = following.others(&self.job.plans, &answers);
@@ -68,7 +68,11 @@ impl Worker<'_> {
         };
         match self.job.views {
             Views::Pairs => self.pairs(&views),
-            Views::All | Views::Space => self.all_views(views),
+            Views::All | Views::Space => {
+                let rate = self.job.frame_rate_hz;
+                motion.begin(rate.map(|rate| frame.number() as f64 / rate));
+                self.all_views(views, motion)
+            }
         }
     }
 
@@ -86,20 +90,19 @@ impl Worker<'_> {
             let waited = now.saturating_sub(item.timing.sent_at_nanos);
             let health = self.service.health();
             health.spent(Span::WAITING, Some(view), waited);
-            let (candidates, front) = match item.value {
-                Input::Candidates(candidates, front) if !candidates.is_empty() => {
-                    (candidates, front)
-                }
+            let found = match item.value {
+                Input::Candidates(found) if !found.poses.is_empty() => found,
                 _ => {
                     answers.push(None);
                     continue;
                 }
             };
             let mut answer = ViewResult {
-                candidates,
-                front,
+                candidates: found.poses,
+                front: found.front,
                 sigma_px: None,
                 tau_px: None,
+                skew_s: found.skew_s,
             };
             let captured_at = item.stamp.captured_at_nanos;
             if let Some((frames, Input::Errors(errors))) = frame.latest(n_views + view, captured_at)
@@ -163,7 +166,7 @@ impl Worker<'_> {
     }
 
     /// Solves all views at once.
-    fn all_views(&self, mut frame: FrameViews<'_>) -> Result<(), Failure> {
+    fn all_views(&self, mut frame: FrameViews<'_>, motion: &mut Motion) -> Result<(), Failure> {
         frame.turn.restart(now_nanos());
         let evidence = frame.evidence.iter();
         let evidence = evidence.map(|view| view.as_ref().map(EvidenceView::responses));
@@ -174,7 +177,7 @@ impl Worker<'_> {
                 step.all_views(&frame.answers, &evidence, &frame.others, Support::Mean)
             }
             Some(step) => {
-                let found = step.run(&frame.answers, &evidence, &frame.others);
+                let found = step.run(&frame.answers, &evidence, &frame.others, motion);
                 found.map(|found| {
                     let views = found.views.views.iter();
                     for (view, sigma_px) in views.zip(found.sigma_px) {

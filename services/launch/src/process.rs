@@ -165,6 +165,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         lead_nanos: live::lead_nanos(deployment),
         faults: deployment.cameras[view].fault.clone(),
         frozen_after: deployment.capture.frozen_after,
+        skew_nanos: live::skew_nanos(resolved, view),
         framing: framing(resolved, &rig, view)?,
         mode: deployment.capture.mode,
         pace: deployment.capture.pace,
@@ -316,6 +317,7 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
         quality_deadline: Duration::from_millis(resolved.deployment.quality.deadline_ms),
         quality_max_age: Duration::from_millis(resolved.deployment.quality.max_age_ms),
         frame_step: resolved.deployment.capture.frame_step.max(1),
+        frame_rate_hz: resolved.frame_rate_hz(),
         n_consumers: topology.receivers_of(&topic::pair_pose(worker)),
         patience: resolved.patience(),
     };
@@ -339,6 +341,7 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let job = triangulate::Job {
         plans,
         extras,
+        frame_rate_hz: resolved.frame_rate_hz(),
         views: prepared.settings.views,
         n_workers: topology.n_workers(),
         n_consumers: topology.receivers_of(&topic::pose3d()),

@@ -116,7 +116,12 @@ fn rig() -> Rig {
 
 /// The joints in a frame, metres.
 fn joints(frame: usize) -> [Point3<f64>; N] {
-    let by = Vector3::new(0.005 * frame as f64, 0.15 * (0.5 * frame as f64).sin(), 0.0);
+    joints_at(frame as f64)
+}
+
+/// The joints at a time in frames, metres.
+fn joints_at(frame: f64) -> [Point3<f64>; N] {
+    let by = Vector3::new(0.005 * frame, 0.15 * (0.5 * frame).sin(), 0.0);
     STANDING.map(|it| Point3::from(it) + by)
 }
 
@@ -330,8 +335,8 @@ fn what_belongs_to_filters_is_refused_beside_a_network() {
 }
 
 /// Where a keypoint is in a frame: a joint of that name, or something at its ankle, between the hips, or at the head.
-fn place(name: &str, frame: usize) -> Point3<f64> {
-    let joints = joints(frame);
+fn place(name: &str, frame: f64) -> Point3<f64> {
+    let joints = joints_at(frame);
     let named = |name: &str| {
         let number = skeleton::PARSE14
             .joints
@@ -355,16 +360,28 @@ fn place(name: &str, frame: usize) -> Point3<f64> {
 ///
 /// * `names`: of a set, as the view calls them.
 fn with_keypoints(case: &Case, set: &str, names: impl Fn(usize) -> Vec<String>) {
+    with_skewed_keypoints(case, set, names, [0.0; 4]);
+}
+
+/// The same of cameras that take their pictures so many frames late.
+fn with_skewed_keypoints(
+    case: &Case,
+    set: &str,
+    names: impl Fn(usize) -> Vec<String>,
+    skews: [f64; 4],
+) {
     let rig = rig();
     let mut text = String::from("name = \"dots\"\nrig = \"rig.toml\"\noutput = \"out\"\n");
     text.push_str("[capture]\nframe_rate_hz = 30.0\n");
     for (view, camera) in rig.cameras().iter().enumerate() {
         let folder = case.path(&camera.name);
         for frame in 0..N_FRAMES {
-            std::fs::remove_file(folder.join(format!("{frame:04}.png"))).unwrap();
+            // None is there where this is not the first time.
+            let _gone = std::fs::remove_file(folder.join(format!("{frame:04}.png")));
             let names = names(view);
             let numbers = names.iter().map(|it| {
-                let at = camera.project(&place(it, frame)).unwrap();
+                let taken = frame as f64 + skews[view];
+                let at = camera.project(&place(it, taken)).unwrap();
                 format!("{:.2},{:.2},0.9", at.x, at.y)
             });
             let numbers: Vec<String> = numbers.collect();
@@ -379,6 +396,9 @@ fn with_keypoints(case: &Case, set: &str, names: impl Fn(usize) -> Vec<String>) 
             "[[camera]]\nname = {name:?}\nkeypoints = {name:?}\nkeypoint_names = {set:?}"
         )
         .unwrap();
+        if skews[view] != 0.0 {
+            writeln!(text, "skew_ms = {}", skews[view] * 1e3 / 30.0).unwrap();
+        }
     }
     let own = std::fs::read_to_string(case.path("deployment.toml")).unwrap();
     let name = own.lines().find(|it| it.starts_with("name")).unwrap();
@@ -426,7 +446,7 @@ fn what_keypoints_have_beside_the_joints_is_written_by_name() {
         for (name, it) in extra {
             let at = &it["position_m"];
             let at = [0, 1, 2].map(|axis| at[axis].as_f64().unwrap_or(f64::NAN));
-            let off = (Point3::from(at) - place(name, frame)).norm();
+            let off = (Point3::from(at) - place(name, frame as f64)).norm();
             assert!(off < 0.01, "frame {frame}, {name}: {off} m");
             assert_eq!(it["views"].as_array().unwrap().len(), 4, "{name}");
         }
@@ -434,4 +454,43 @@ fn what_keypoints_have_beside_the_joints_is_written_by_name() {
     assert_eq!(read("pose3d.csv").lines().count(), 1 + N_FRAMES * 26);
     let trc = read("pose3d.trc");
     assert!(trc.contains("\tleft_heel\t"), "{trc}");
+}
+
+/// Mean distance of the joints of all frames but the first from the truth, millimetres, and that of the extra keypoints.
+fn errors_mm(case: &Case) -> [f64; 2] {
+    let found = found(case);
+    let joints: f64 = found[1..].iter().map(|it| it.1).sum();
+    let (mut extras, mut n) = (0.0, 0.0);
+    for line in &case.lines("pose3d.jsonl")[1..] {
+        for (name, it) in line["keypoints"].as_object().unwrap() {
+            let at = [0, 1, 2].map(|axis| it["position_m"][axis].as_f64().unwrap());
+            let frame = line["frame"].as_f64().unwrap();
+            extras += (Point3::from(at) - place(name, frame)).norm();
+            n += 1.0;
+        }
+    }
+    [1e3 * joints / (found.len() - 1) as f64, 1e3 * extras / n]
+}
+
+#[test]
+fn pictures_of_other_moments_are_moved_to_the_instants_of_their_frames() {
+    let case = case("skews", [Some(as_it_is as Named); 4]);
+    let names = |_: usize| HALPE_26.map(str::to_owned).to_vec();
+    let mut errors = Vec::new();
+    for skews in [[0.0; 4], [0.0, -0.48, 0.25, 0.48]] {
+        with_skewed_keypoints(&case, "halpe-26", names, skews);
+        let ended = run(&case, &[]);
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        errors.push(errors_mm(&case));
+    }
+    let text = std::fs::read_to_string(case.path("deployment.toml")).unwrap();
+    let untold = text.lines().filter(|it| !it.starts_with("skew_ms"));
+    case.write("deployment.toml", untold.collect::<Vec<_>>().join("\n"));
+    run(&case, &[]);
+    errors.push(errors_mm(&case));
+    let (without, told, untold) = (errors[0], errors[1], errors[2]);
+    for which in 0..2 {
+        assert!(told[which] < without[which] + 5.0, "{errors:?}");
+        assert!(untold[which] > 2.0 * told[which], "{errors:?}");
+    }
 }

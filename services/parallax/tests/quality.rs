@@ -121,6 +121,7 @@ fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>>
             front: found.front,
             sigma_px: None,
             tau_px: None,
+            skew_s: 0.0,
         })
     };
     plans.iter().zip(frames).map(say).collect()

@@ -36,6 +36,7 @@ impl View<'_> {
     pub(crate) fn process(&self, frame: StreamFrame, memory: &mut Memory) -> Result<(), Failure> {
         let StreamFrame { nth, sample, turn } = frame;
         let outcome = self.solve(&sample, nth, memory)?;
+        let skew_nanos = sample.header().skew_nanos;
         // The frame is released before the process waits for any receiver.
         drop(sample);
         let message = match &outcome {
@@ -44,6 +45,10 @@ impl View<'_> {
                 status: *status,
                 ..ViewPose::default()
             },
+        };
+        let message = ViewPose {
+            skew_nanos,
+            ..message
         };
         let solved = now_nanos();
         let loan_nanos = outcome.as_ref().map_or(0, |found| found.loan_nanos);

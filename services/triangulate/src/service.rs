@@ -7,7 +7,8 @@ use fmp::Pose;
 use messages::{PairPose, ViewPose, topic};
 use multiview::{FrontEvidence, ViewPlan};
 use pipeline::{
-    ExtraKeypoint, ExtrasStep, FoundExtras, PairResult, Skeleton, SkeletonStep, ViewResult, Views,
+    ExtraKeypoint, ExtrasStep, FoundExtras, Motion, PairResult, Skeleton, SkeletonStep, ViewResult,
+    Views,
 };
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use stage::{Frame, Item, Stage};
@@ -25,6 +26,9 @@ pub struct Job {
     pub pairs: Vec<[usize; 2]>,
     /// Triangulates the extra keypoints.
     pub extras: ExtrasStep,
+    /// Frames of the footage per second, if that is known: without it nothing is moved from the time of its picture to the instant
+    /// of its frame.
+    pub frame_rate_hz: Option<f64>,
     /// Number of fusion workers.
     pub n_workers: usize,
     /// Processes that receive the result.
@@ -53,6 +57,7 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
                 candidates,
                 front,
                 extras,
+                skew_s: wire::skew_from_message(pose)?,
             }))
         })?;
     }
@@ -60,6 +65,8 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         decode_pair(job, pair).map(Box::new).map(Input::Pair)
     })?;
     let skeletons = stage.output(&topic::pose3d(), job.n_consumers)?;
+    // Of the extra keypoints.
+    let mut motion = Motion::default();
     stage.run(|frame| {
         let pairs: Vec<PairInput> = (pairs..pairs + job.pairs.len())
             .filter_map(|slot| match frame.take(slot)?.value {
@@ -70,13 +77,16 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         let (views, found) = view_answers(frame, n_views, &pairs);
         let present = (0..n_views).filter(|view| views[*view].is_some());
         let views_present = present.fold(0, |mask, view| mask | 1_u32 << view);
+        let rate = job.frame_rate_hz;
+        step.begin(rate.map(|rate| frame.number() as f64 / rate));
         let skeleton = skeleton(job.views, &views, pairs, &mut step);
         let n_people = skeleton.people.len() as u32;
         service.health().counted_people(n_people);
         let mut message =
             wire::skeleton_to_message(&skeleton, views_present).or_fail(ExitKind::Run)?;
         let found = found_extras(&views, &found);
-        let keypoints = job.extras.run(&skeleton, &found);
+        motion.begin(rate.map(|rate| frame.number() as f64 / rate));
+        let keypoints = job.extras.run(&skeleton, &found, &mut motion);
         wire::keypoints_to_message(&mut message, &keypoints).or_fail(ExitKind::Run)?;
         skeletons.send_and_account(frame.turn(), 0, message)
     })
@@ -97,6 +107,8 @@ struct Found {
     front: Vec<FrontEvidence>,
     /// The extra keypoints of one candidate after the other.
     extras: Vec<ExtraKeypoint>,
+    /// How long after the instant of the frame the picture was taken, seconds.
+    skew_s: f64,
 }
 
 /// The poses of a pair, and the expected errors of both views that its worker used.
@@ -147,6 +159,7 @@ fn view_answers(
             front: found.front,
             sigma_px: latest.map(|(_, sigma_px)| sigma_px.clone()),
             tau_px: None,
+            skew_s: found.skew_s,
         });
         (result, found.extras)
     };
@@ -162,6 +175,7 @@ fn found_extras<'a>(
         Some(FoundExtras {
             candidates: &view.as_ref()?.candidates,
             extras,
+            skew_s: view.as_ref()?.skew_s,
         })
     };
     views.iter().zip(extras).map(found).collect()

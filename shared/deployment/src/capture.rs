@@ -44,6 +44,9 @@ pub struct Camera {
     pub controls: BTreeMap<String, i64>,
     /// RTSP cameras: how packets travel, `tcp` or `udp`; without it as the camera and the reader agree.
     pub transport: Option<Transport>,
+    /// Footage: how long after the instants of the frames its pictures were taken, milliseconds, negative for before; without it 0, or
+    /// what a `synth://` source says. Joints are moved to the instants by it. For a live camera it is measured.
+    pub skew_ms: Option<f64>,
     /// What is to go wrong with the camera, for a test: `freeze@30+20`.
     #[serde(default, skip_serializing_if = "Faults::is_empty")]
     #[schemars(with = "String")]
@@ -107,6 +110,9 @@ pub struct Config {
     pub frame_step: u64,
     /// Most frames to use; all without it, and of live cameras until the run is stopped.
     pub n_frames: Option<u64>,
+    /// How far the pictures of a live camera may be from the instants of the frames before a warning, milliseconds; without it half
+    /// of the time from one instant to the next.
+    pub max_skew_ms: Option<f64>,
     /// Repetitions of a picture, bit for bit, from which on its camera is called frozen; 0: never.
     pub frozen_after: u32,
 }
@@ -123,6 +129,7 @@ impl Default for Config {
             start_frame: 0,
             frame_step: 1,
             n_frames: None,
+            max_skew_ms: None,
             frozen_after: 10,
         }
     }

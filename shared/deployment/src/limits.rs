@@ -49,6 +49,9 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
     if let Some(rate) = it.frame_rate_hz {
         between("capture.frame_rate_hz", rate)?;
     }
+    if let Some(skew) = it.max_skew_ms {
+        between("capture.max_skew_ms", skew)?;
+    }
     whole("capture.start_frame", it.start_frame)?;
     whole("capture.frame_step", it.frame_step)?;
     let n_frames = it.n_frames.unwrap_or(1);

@@ -78,6 +78,12 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
         &of,
         "none: they are found while it runs",
     )?;
+    demand(
+        camera.skew_ms.is_none(),
+        "camera.skew_ms",
+        &of,
+        "none: it is measured",
+    )?;
     let sides = camera.size.unwrap_or([1, 1]);
     demand(
         sides.iter().all(|it| (1..=16_384).contains(it)),
@@ -193,6 +199,7 @@ mod tests {
                 "`camera.frame_rate_hz` is 0",
             ),
             (["", "transport = 'tcp'", ""], "RTSP"),
+            (["", "skew_ms = 3", ""], "it is measured"),
             (
                 ["", "", "format = 'MJPG'"],
                 "`camera.format` is given for \"c\"",

@@ -18,13 +18,14 @@ const MOST_FRAMES: f64 = 1e12;
 /// `camera` the length of the list.
 ///
 /// Whole numbers are among them: all of these are exact.
-pub(crate) const RANGES: [(&str, f64, f64); 43] = [
+pub(crate) const RANGES: [(&str, f64, f64); 44] = [
     ("capture.size", 1.0, 16_384.0),
     ("capture.scale", 0.001, 8.0),
     ("capture.frame_rate_hz", 0.001, 1e5),
     ("capture.start_frame", 0.0, MOST_FRAMES),
     ("capture.frame_step", 1.0, 1e9),
     ("capture.n_frames", 1.0, MOST_FRAMES),
+    ("capture.max_skew_ms", 0.001, HOUR_MS),
     ("pose.candidates", 1.0, MAX_CANDIDATES as f64),
     ("pose.find_every", 1.0, 1e6),
     ("pose.least_heat", 0.0, 1.0),

@@ -77,6 +77,13 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
             geometry::PLAIN_NAME,
         )?;
         pictures(camera)?;
+        let skew_ms = camera.skew_ms.unwrap_or(0.0);
+        demand(
+            (-1000.0..=1000.0).contains(&skew_ms),
+            "camera.skew_ms",
+            &skew_ms.to_string(),
+            "-1000 to 1000: at most half the time between two frames is usual",
+        )?;
     }
     Ok(())
 }

@@ -212,6 +212,7 @@ impl Bench {
                 front: it.front.clone(),
                 tau_px: expected.as_ref().and_then(|it| it.tau.clone()),
                 sigma_px: expected.map(|it| it.sigma),
+                skew_s: 0.0,
             })
         };
         let evidence = |view: usize| {

@@ -28,6 +28,9 @@ pub struct FrameHeader {
     pub reserved: u32,
     /// Number of frames of this view that were due but never sent, since the session began.
     pub n_dropped: u64,
+    /// How long after the instant of the frame, which all views have in common, the picture was taken, nanoseconds;
+    /// negative for before, 0 if it is not known.
+    pub skew_nanos: i64,
     /// Explicit padding.
-    pub reserved_end: [u64; 7],
+    pub reserved_end: [u64; 6],
 }

@@ -23,7 +23,7 @@ pub use frame::FrameHeader;
 pub use health::Health;
 pub use metrics::{
     CameraCounts, Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE,
-    NO_VIEW, Span,
+    NO_VIEW, Span, UNMEASURED,
 };
 pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
 pub use pose3d::{FusedView, Joint3d, Kept, Pose3d, Sides};
@@ -53,7 +53,7 @@ const _: () = {
     assert!(size_of::<EvidenceHeader>() == 1088);
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<LocalMessage>() == 12);
-    assert!(size_of::<ViewPose>() == 1872 + MAX_VIEW_KEYPOINTS * 12);
+    assert!(size_of::<ViewPose>() == 1880 + MAX_VIEW_KEYPOINTS * 12);
     assert!(size_of::<ViewQuality>() == 344);
     assert!(size_of::<PairPose>() == 1064);
     assert!(size_of::<Joint3d>() == 88);
@@ -61,5 +61,5 @@ const _: () = {
     assert!(size_of::<Pose3d>() == 11640 + MAX_KEYPOINTS * 88);
     assert!(size_of::<Health>() == 152);
     assert!(size_of::<MetricsRow>() == 56);
-    assert!(size_of::<Metrics>() == 256 + MAX_ROWS * 56);
+    assert!(size_of::<Metrics>() == 272 + MAX_ROWS * 56);
 };

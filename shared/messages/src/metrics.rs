@@ -16,11 +16,14 @@ pub const NO_QUEUE: u32 = u32::MAX;
 /// Replaces the number of people of a process that does not count them.
 pub const NO_PEOPLE: u32 = u32::MAX;
 
+/// Replaces a measurement of a camera that there is not yet.
+pub const UNMEASURED: i64 = i64::MIN;
+
 /// The metrics of a process since its last start. Every process sends them about once a second,
 /// when a subscriber connects, and at its end. Percentiles are taken over the whole time, from a
 /// histogram with two significant digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("Metrics.v3")]
+#[type_name("Metrics.v4")]
 #[repr(C)]
 pub struct Metrics {
     /// Run of the deployment.
@@ -73,7 +76,7 @@ pub struct Metrics {
 /// Every picture that the camera made is lost by it or delivered; every one that was delivered is used, surplus, overtaken
 /// or refused, but for those under way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
-#[type_name("CameraCounts.v1")]
+#[type_name("CameraCounts.v2")]
 #[repr(C)]
 pub struct CameraCounts {
     /// How often the camera was opened; 0 for footage.
@@ -96,6 +99,11 @@ pub struct CameraCounts {
     pub rate_microhertz: u64,
     /// How long after its common instant the last picture that was used was taken, nanoseconds; negative for before.
     pub off_grid_nanos: i64,
+    /// The median of that over the last pictures, nanoseconds, or [`UNMEASURED`].
+    pub skew_nanos: i64,
+    /// By how much the camera falls behind the common instants, parts per billion, negative for one that is faster; or
+    /// [`UNMEASURED`].
+    pub drift_ppb: i64,
 }
 
 impl Default for Metrics {

@@ -65,7 +65,7 @@ impl Searched {
 
 /// The single-view result: distinct candidates, best first.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("ViewPose.v5")]
+#[type_name("ViewPose.v6")]
 #[repr(C)]
 pub struct ViewPose {
     /// The frame and the view.
@@ -82,6 +82,8 @@ pub struct ViewPose {
     pub height: u32,
     /// Size of the responses that were sent as evidence, bytes; 0 without a subscriber.
     pub evidence_bytes: u64,
+    /// How long after the instant of the frame the picture was taken ([`FrameHeader`](crate::FrameHeader)), nanoseconds.
+    pub skew_nanos: i64,
     /// What was searched.
     pub searched: Searched,
     /// Number of extra keypoints of a candidate, as many as all views of the deployment know together.

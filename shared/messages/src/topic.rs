@@ -12,7 +12,7 @@ pub fn frame(view: usize) -> String {
 /// Single-view candidates of a view: [`ViewPose`](crate::ViewPose).
 #[must_use]
 pub fn view_pose(view: usize) -> String {
-    format!("view-pose/v5/{view}")
+    format!("view-pose/v6/{view}")
 }
 
 /// Response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).

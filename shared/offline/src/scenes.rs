@@ -88,6 +88,7 @@ fn settings(scenes: &Scenes, nth: u32) -> Settings {
         rate_hz: 4.0 / 3.0,
         backdrop: scenes.backdrop.clone().filter(|_| is_photo),
         flaws: if is_bad { flaws } else { Flaws::default() },
+        skews_ms: Vec::new(),
     }
 }
 

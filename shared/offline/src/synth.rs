@@ -51,6 +51,8 @@ pub struct Job {
     pub live: bool,
     /// What is wrong with the cameras.
     pub flaws: Flaws,
+    /// How long after the instants of the frames every camera takes its pictures, milliseconds; at most one for each of the rig.
+    pub skews_ms: Vec<f64>,
 }
 
 /// All sequences that were written.
@@ -169,6 +171,7 @@ impl Job {
             rate_hz: self.rate_hz,
             backdrop: self.backdrop.as_deref().map(absolute_path),
             flaws: self.flaws,
+            skews_ms: self.skews_ms.clone(),
         }
     }
 }

@@ -6,6 +6,7 @@ use nalgebra::Point2;
 use skeleton::JointSet;
 
 use crate::bodies::NoJoint;
+use crate::motion::Motion;
 use crate::space::Space;
 use crate::view_result::ViewResult;
 
@@ -14,12 +15,15 @@ use crate::view_result::ViewResult;
 /// The poses that come from such a solution are its own projections: they agree with it whatever the views show. What a view found is the
 /// candidate that lies nearest, with its sides as they are or exchanged; of a view that was left out as well. The residuals of
 /// every joint are replaced, and with them their root mean square.
+///
+/// * `motion`: of what the views show, as the solution has it.
 pub(crate) fn measure(
     space: &Space,
+    motion: &mut Motion,
     answers: &[Option<ViewResult>],
-    set: &JointSet,
     joints: &mut [Result<Triangulated, NoJoint>],
 ) {
+    let set = space.settings.joints;
     for it in joints.iter_mut().flatten() {
         it.residuals_px.fill(f64::NAN);
     }
@@ -31,10 +35,16 @@ pub(crate) fn measure(
         let [width, height] = camera.intrinsics.size.map(f64::from);
         let inside =
             |at: &Point2<f64>| (0.0..width).contains(&at.x) && (0.0..height).contains(&at.y);
-        let projected: Vec<Option<Point2<f64>>> = joints
+        let mut projected: Vec<Option<Point2<f64>>> = joints
             .iter()
             .map(|it| camera.project(&it.as_ref().ok()?.in_world).filter(inside))
             .collect();
+        // A picture that was taken at another time shows them elsewhere.
+        if let Some(by) = motion.since_instant(view, [answer.skew_s, 0.0], projected.clone()) {
+            for (at, by) in projected.iter_mut().zip(by) {
+                *at = at.map(|at| at + by);
+            }
+        }
         let nearest = readings(space, view, answer, set)
             .map(|points| {
                 let both = projected.iter().zip(&points);

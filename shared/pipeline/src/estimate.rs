@@ -147,6 +147,7 @@ impl Estimator {
                     front: estimate.front.clone(),
                     sigma_px: sigma_px.get(view).cloned().flatten(),
                     tau_px: None,
+                    skew_s: 0.0,
                 });
                 (answer, Some(estimate))
             })

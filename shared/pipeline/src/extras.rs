@@ -14,6 +14,7 @@ use skeleton::{PARSE14, SIDES};
 
 use crate::bodies::NoJoint;
 use crate::fused_view::FusedView;
+use crate::motion::Motion;
 use crate::skeleton_step::Skeleton;
 use crate::space::by_view;
 use crate::view_result::ExtraKeypoint;
@@ -41,6 +42,8 @@ pub struct FoundExtras<'a> {
     pub candidates: &'a [Pose],
     /// The extra keypoints of one candidate after the other; those of the last ones may be missing.
     pub extras: &'a [ExtraKeypoint],
+    /// How long after the instant of the frame its picture was taken, seconds.
+    pub skew_s: f64,
 }
 
 /// An extra keypoint.
@@ -61,9 +64,10 @@ pub struct ExtrasStep {
 }
 
 /// The person's candidate in a view.
-struct Match<'a> {
+struct Match {
     view: usize,
-    extras: &'a [ExtraKeypoint],
+    /// At the instant of the frame.
+    extras: Vec<ExtraKeypoint>,
     /// Where the joints are in the candidate and after fusion, pixels of the frame.
     joints: [Vec<[f64; 2]>; 2],
     /// Longer side of the fused pose, pixels of the frame.
@@ -95,16 +99,21 @@ impl ExtrasStep {
     /// Triangulates the extra keypoints of a frame.
     ///
     /// * `views`: in the rig's order; `None` for a view without a result.
+    /// * `motion`: of the extra keypoints, after [`Motion::begin`]; brings them to the instant of the frame.
     /// * Returns one entry for every name.
     pub fn run(
         &self,
         skeleton: &Skeleton,
         views: &[Option<FoundExtras<'_>>],
+        motion: &mut Motion,
     ) -> Vec<Result<Triangulated, NoJoint>> {
         let each = views.iter().zip(&skeleton.views).enumerate();
-        let matches: Vec<Match<'_>> = each
+        let matches: Vec<Match> = each
             .filter_map(|(view, (found, fused))| {
-                self.person(view, *found.as_ref()?, fused.as_ref()?)
+                let found = *found.as_ref()?;
+                let mut it = self.person(view, found, fused.as_ref()?)?;
+                it.move_to_instant(found.skew_s, motion);
+                Some(it)
             })
             .collect();
         let of_extra = |extra: usize| {
@@ -118,12 +127,7 @@ impl ExtrasStep {
     }
 
     /// The candidate of a view that is the person.
-    fn person<'a>(
-        &self,
-        view: usize,
-        found: FoundExtras<'a>,
-        fused: &FusedView,
-    ) -> Option<Match<'a>> {
+    fn person(&self, view: usize, found: FoundExtras<'_>, fused: &FusedView) -> Option<Match> {
         if fused.pose.centres_px.len() != skeleton::N_PARTS {
             return None;
         }
@@ -142,13 +146,13 @@ impl ExtrasStep {
         let (distance, own, extras) = nearest?;
         (distance < SAME * longer_px).then_some(Match {
             view,
-            extras,
+            extras: extras.to_vec(),
             joints: [own, joints],
             longer_px,
         })
     }
 
-    fn triangulate(&self, extra: usize, matches: &[Match<'_>]) -> Result<Triangulated, NoJoint> {
+    fn triangulate(&self, extra: usize, matches: &[Match]) -> Result<Triangulated, NoJoint> {
         let Extra { mirror, sides } = &self.extras[extra];
         let mut views = Vec::with_capacity(matches.len());
         let mut observations = Vec::with_capacity(matches.len());
@@ -180,7 +184,19 @@ impl ExtrasStep {
     }
 }
 
-impl Match<'_> {
+impl Match {
+    /// Moves the keypoints of a picture that was taken at another time.
+    fn move_to_instant(&mut self, skew_s: f64, motion: &mut Motion) {
+        let points = self.extras.iter();
+        let points = points.map(|it| it.map(|it| Point2::from(it.0))).collect();
+        let moved = motion.since_instant(self.view, [skew_s; 2], points);
+        for (extra, by) in self.extras.iter_mut().zip(moved.into_iter().flatten()) {
+            if let Some((at, _)) = extra {
+                *at = [at[0] - by.x, at[1] - by.y];
+            }
+        }
+    }
+
     /// Whether what the view calls left is the right side of the person, by two pairs of joints.
     fn is_exchanged(&self, sides: &[[usize; 2]; 2]) -> bool {
         let [own, fused] = &self.joints;

@@ -11,6 +11,7 @@ mod following;
 mod fuse_step;
 mod fused;
 mod fused_view;
+mod motion;
 mod network_step;
 mod people;
 mod skeleton_settings;
@@ -30,6 +31,7 @@ pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, Views, all_pairs,
 };
 pub use fused_view::FusedView;
+pub use motion::Motion;
 pub use network_step::{Boxes, Eyes, MOST_VALUES, NetworkMemory, NetworkSettings, NetworkStep};
 pub use people::{Person, people};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};

@@ -17,6 +17,7 @@ use crate::bodies::{Bodies, Body, NoJoint};
 use crate::disagreement;
 use crate::fused::Fused;
 use crate::fused_view::{Candidate, Candidates, FusedView, fuse};
+use crate::motion::Motion;
 use crate::people::{Person, people};
 use crate::skeleton_settings::{Combine, SkeletonSettings};
 use crate::space::{Seen, Space};
@@ -70,6 +71,7 @@ pub struct SkeletonStep {
     bodies: Bodies,
     filter: FacingFilter,
     sides: SidesFilter,
+    motion: Motion,
 }
 
 impl SkeletonStep {
@@ -88,7 +90,16 @@ impl SkeletonStep {
             bodies: Bodies::default(),
             filter: FacingFilter::default(),
             sides: SidesFilter::default(),
+            motion: Motion::default(),
         }
+    }
+
+    /// Begins a frame whose pictures may have been taken at other times than its instant ([`ViewResult::skew_s`]): what the views
+    /// show is then moved there. Without it, or with all pictures of the instant, nothing is moved.
+    ///
+    /// * `instant_s`: of the frame, seconds; `None` where the rate of the frames is not known.
+    pub fn begin(&mut self, instant_s: Option<f64>) {
+        self.motion.begin(instant_s);
     }
 
     /// Computes the skeleton of one frame from pairs.
@@ -135,28 +146,26 @@ impl SkeletonStep {
         };
         let (views, kept) = self.better(solved, self.starts(&frame, exchanged));
         let n_joints = self.space.settings.joints.joints.len();
-        let expected_px = self.expected_errors(answers, exchanged, self.space.settings.joints);
+        let (at_instant, more_px) = self.at_instant(answers, &views);
+        let mut expected_px = self.expected_errors(answers, exchanged, self.space.settings.joints);
+        add(&mut expected_px, &more_px, self.space.settings.joints);
         // The check of the body knows nothing of expected errors, but of what was not seen.
-        let of_body_px = if self.space.settings.in_space && self.space.can_exchange() {
+        let mut of_body_px = if self.space.settings.in_space && self.space.can_exchange() {
             self.expected_errors(answers, exchanged, &PARSE14)
         } else {
             Vec::new()
         };
+        add(&mut of_body_px, &more_px, &PARSE14);
         let points = |centres: &[[f64; 2]]| match &self.space.settings.joint_map {
             Some(map) => Cow::from(map.from_parts(centres)),
             None => self.space.settings.joints.from_parts(centres).into(),
         };
         let joints = self
             .space
-            .triangulate(&views, n_joints, points, &expected_px);
-        let (mut joints, body) = self.as_body(joints, &views, &of_body_px);
+            .triangulate(&at_instant, n_joints, points, &expected_px);
+        let (mut joints, body) = self.as_body(joints, &at_instant, &of_body_px);
         if self.space.settings.in_space {
-            disagreement::measure(
-                &self.space,
-                answers,
-                self.space.settings.joints,
-                &mut joints,
-            );
+            disagreement::measure(&self.space, &mut self.motion, answers, &mut joints);
         }
         Skeleton {
             joints,
@@ -168,6 +177,24 @@ impl SkeletonStep {
             sides,
             kept,
         }
+    }
+
+    /// The poses of the views at the instant of the frame, and what is to be added to the deviations of their parts, pixels. What was
+    /// solved in space is there already.
+    fn at_instant<'a>(
+        &mut self,
+        answers: &[Option<ViewResult>],
+        views: &'a [Option<FusedView>],
+    ) -> (Cow<'a, [Option<FusedView>]>, Vec<Vec<f64>>) {
+        let settings = &self.space.settings;
+        if settings.in_space {
+            return (views.into(), Vec::new());
+        }
+        let moved = self.motion.at_instant(answers, views, settings.sigma_cells);
+        moved.map_or_else(
+            || (views.into(), Vec::new()),
+            |it| (it.views.into(), it.more_px),
+        )
     }
 
     /// The joints as a body.
@@ -398,6 +425,28 @@ impl SkeletonStep {
             camera: plan.camera(),
             sigma_px: cell_px * self.space.settings.sigma_cells,
             points_px: Vec::new(),
+        }
+    }
+}
+
+/// Adds the deviations of parts to the expected errors of joints, as variances.
+///
+/// * `more_px`: by view and part; empty for a view that was not moved.
+fn add(expected_px: &mut Vec<Vec<f64>>, more_px: &[Vec<f64>], joints: &JointSet) {
+    if more_px.is_empty() {
+        return;
+    }
+    expected_px.resize(more_px.len().max(expected_px.len()), Vec::new());
+    for (expected, more) in expected_px.iter_mut().zip(more_px) {
+        // The second number is only there because `from_parts` takes points.
+        let of_parts: Vec<[f64; 2]> = more.iter().map(|it| [*it, 0.0]).collect();
+        if of_parts.is_empty() {
+            continue;
+        }
+        let of_joints = joints.from_parts(&of_parts);
+        expected.resize(of_joints.len(), 0.0);
+        for (expected, [more, _]) in expected.iter_mut().zip(of_joints) {
+            *expected = expected.hypot(more);
         }
     }
 }

@@ -7,13 +7,14 @@ use multiview::{
     AllViewsEstimate, JointEvidence, SeenPerson, SolvedPerson, SpaceSettings, SpaceView, ViewPlan,
     same_person, solve_person,
 };
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3, Vector2};
 use posenetwork::springs::joint_of;
 use posenetwork::{MapSettings, expected_error, interpolate};
 use skeleton::{N_PARTS, PARENT, PARSE14};
 
 use crate::following::Others;
 use crate::fuse_step::{AllViewsHypothesis, AllViewsResult};
+use crate::motion::Motion;
 use crate::network_step::cell_at;
 use crate::view_result::ViewResult;
 
@@ -56,6 +57,8 @@ struct PersonEvidence<'a> {
     near: [f64; 4],
     floor: f32,
     maxima: Vec<Vec<([f64; 2], f32)>>,
+    /// By how much every joint had moved from the instant of the frame when the picture was taken, pixels; empty if that was then.
+    since_instant: Vec<Vector2<f64>>,
     /// Height of the window of a network about the person, pixels.
     window_px: f64,
 }
@@ -93,10 +96,23 @@ impl<'a> PersonEvidence<'a> {
             ],
             floor,
             maxima: Vec::new(),
+            since_instant: Vec::new(),
             window_px: WINDOW * longer,
         };
         evidence.maxima = (0..N).map(|joint| evidence.highest(joint)).collect();
         evidence
+    }
+
+    /// Moves all that it shows to the instant of the frame.
+    ///
+    /// * `since_instant`: by joint.
+    fn move_to_instant(&mut self, since_instant: Vec<Vector2<f64>>) {
+        for (maxima, by) in self.maxima.iter_mut().zip(&since_instant) {
+            for (at, _) in maxima {
+                *at = [at[0] - by.x, at[1] - by.y];
+            }
+        }
+        self.since_instant = since_instant;
     }
 
     /// The highest maxima of a joint's map near the person: pixels of the frame, and the evidence there.
@@ -157,7 +173,10 @@ fn first_cell(plan: &ViewPlan, level: usize, window: &Window) -> [f64; 2] {
 }
 
 impl JointEvidence for PersonEvidence<'_> {
-    fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
+    fn at(&self, joint: usize, mut point: [f64; 2]) -> f32 {
+        if let Some(by) = self.since_instant.get(joint) {
+            point = [point[0] + by.x, point[1] + by.y];
+        }
         if !self.is_near(point) {
             return self.floor;
         }
@@ -193,12 +212,14 @@ impl SpaceStep {
     ///
     /// * `answers`, `evidence`: of the views that have both.
     /// * `others`: candidates that are somebody else ([`Following::others`](crate::Following::others)).
+    /// * `motion`: of what the views found, after [`Motion::begin`]; brings pictures to the instant of the frame.
     /// * Returns `None` if fewer than two views show the person.
     pub fn run(
         &self,
         answers: &[Option<ViewResult>],
         evidence: &[Option<Responses<'_>>],
         others: &Others,
+        motion: &mut Motion,
     ) -> Option<SpaceResult> {
         let floor = self.maps.floor();
         let chosen = self.candidates(answers, evidence, others);
@@ -210,7 +231,11 @@ impl SpaceStep {
                 continue;
             };
             let pose = &answer.candidates[candidate];
-            let it = PersonEvidence::new(&self.plans[view], responses, pose, floor);
+            let mut it = PersonEvidence::new(&self.plans[view], responses, pose, floor);
+            let found = self.joints(view, pose);
+            if let Some(by) = motion.since_instant(view, [answer.skew_s; 2], found) {
+                it.move_to_instant(by);
+            }
             views.push((view, candidate, it));
         }
         let each: Vec<SpaceView<'_>> = views
@@ -226,6 +251,14 @@ impl SpaceStep {
         }
         let found = solve_person(&each, &self.settings)?;
         self.result(&found, &views, &each)
+    }
+
+    /// Where a pose has the joints, by what the view calls them.
+    fn joints(&self, view: usize, pose: &Pose) -> Vec<Option<Point2<f64>>> {
+        let centre = |joint: usize| self.plans[view].centre(pose, PARSE14.joints[joint].parts[0]);
+        (0..N)
+            .map(|joint| Some(Point2::from(centre(joint))))
+            .collect()
     }
 
     /// The candidate of every view that is the same person: the one who is followed where the view sees it, else among those who are

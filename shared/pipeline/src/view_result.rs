@@ -20,6 +20,8 @@ pub struct ViewResult {
     /// Thresholds that came with the prediction, pixels of the frame; used where the settings have
     /// none.
     pub tau_px: Option<Vec<f32>>,
+    /// How long after the instant of the frame the picture was taken, seconds; negative for before.
+    pub skew_s: f64,
 }
 
 impl ViewResult {

@@ -53,5 +53,5 @@ pub use motion::Action;
 pub use photo::photos_in;
 pub use recorded::{Posture, Recording};
 pub use rigs::{RigChoice, RigChoiceError};
-pub use scene::{Scene, SceneError, View, camera_of};
+pub use scene::{Scene, SceneError, View, camera_of, skew_ms_of};
 pub use settings::{Address, AddressError, Settings};

@@ -19,7 +19,7 @@ use crate::raster::SUB;
 use crate::recorded::{Recorded, Recording};
 use crate::rigs::{self, RigChoiceError};
 use crate::room::Room;
-use crate::settings::Settings;
+use crate::settings::{Address, Settings};
 use crate::subject::Subject;
 use crate::truth::{Header, N_JOINTS, View as ViewTruth};
 use crate::wear::Wear;
@@ -209,7 +209,12 @@ impl Scene {
             shown -= 1;
         }
         let late = flaws.late_s(self.random, camera);
-        (self.seconds(shown) + late, shown != frame)
+        let skew = self
+            .settings
+            .skews_ms
+            .get(camera)
+            .map_or(0.0, |it| it * 1e-3);
+        (self.seconds(shown) + skew + late, shown != frame)
     }
 }
 
@@ -228,6 +233,17 @@ pub fn camera_of(rig: &Rig, name: &str) -> Result<usize, SceneError> {
             name: name.to_owned(),
             known: cameras.iter().map(|it| it.name.clone()).collect(),
         })
+}
+
+/// How long after the instants of the frames the camera of an address takes its pictures, milliseconds; 0 for a camera that the rig
+/// does not have.
+pub fn skew_ms_of(address: &Address) -> f64 {
+    let Settings { rig, skews_ms, .. } = &address.settings;
+    let rig = (!skews_ms.is_empty()).then(|| rig.rig().ok()).flatten();
+    let nth = rig.and_then(|rig| camera_of(&rig, &address.camera).ok());
+    nth.and_then(|nth| skews_ms.get(nth))
+        .copied()
+        .unwrap_or(0.0)
 }
 
 /// One camera of a scene: makes its pictures, in buffers of its own.

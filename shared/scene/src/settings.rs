@@ -25,11 +25,25 @@ pub struct Settings {
     pub backdrop: Option<PathBuf>,
     /// The flaws of the cameras.
     pub flaws: Flaws,
+    /// How long after the instants of the frames every camera takes its pictures, milliseconds, in the order of the rig; those that
+    /// are not named take them then.
+    pub skews_ms: Vec<f64>,
 }
 
 impl Settings {
     /// Most other people.
     pub const MOST_OTHERS: u64 = 4;
+    /// Most milliseconds that a picture is taken before or after the instant of its frame.
+    pub const MOST_SKEW_MS: f64 = 1000.0;
+
+    /// Reads [`Self::skews_ms`]: numbers separated by commas.
+    pub fn parse_skews_ms(text: &str) -> Option<Vec<f64>> {
+        let one = |it: &str| {
+            let skew: f64 = it.trim().parse().ok()?;
+            (skew.abs() <= Self::MOST_SKEW_MS).then_some(skew)
+        };
+        text.split(',').map(one).collect()
+    }
 }
 
 impl Default for Settings {
@@ -44,6 +58,7 @@ impl Default for Settings {
             rate_hz: 30.0,
             backdrop: None,
             flaws: Flaws::default(),
+            skews_ms: Vec::new(),
         }
     }
 }
@@ -109,7 +124,7 @@ const SCHEME: &str = "synth://";
 
 impl Address {
     /// Keys of an address, those of the flaws last; `camera` is required.
-    pub const KEYS: [&'static str; 15] = [
+    pub const KEYS: [&'static str; 16] = [
         "camera",
         "action",
         "subject",
@@ -118,6 +133,7 @@ impl Address {
         "rate",
         "frames",
         "backdrop",
+        "skew-ms",
         "noise",
         "blur",
         "exposure",
@@ -208,6 +224,12 @@ impl Address {
             "seed" => settings.seed = count()?,
             "frames" => self.n_frames = count()?.max(1),
             "backdrop" => settings.backdrop = Some(value.into()),
+            "skew-ms" => {
+                let skews = Settings::parse_skews_ms(value);
+                settings.skews_ms = skews.ok_or_else(|| {
+                    wrong("milliseconds of the cameras, -1000 to 1000, separated by commas")
+                })?;
+            }
             "rate" => {
                 let rate: Option<f64> = value.parse().ok();
                 let rate = rate.filter(|it| (0.1..=1000.0).contains(it));
@@ -237,6 +259,7 @@ impl std::fmt::Display for Address {
             rate_hz,
             backdrop,
             mut flaws,
+            skews_ms,
         } = self.settings.clone();
         let (camera, action, n_frames) = (&self.camera, action.name(), self.n_frames);
         write!(
@@ -249,6 +272,10 @@ impl std::fmt::Display for Address {
         }
         if let Some(folder) = backdrop {
             write!(out, "&backdrop={}", folder.display())?;
+        }
+        if !skews_ms.is_empty() {
+            let all: Vec<String> = skews_ms.iter().map(f64::to_string).collect();
+            write!(out, "&skew-ms={}", all.join(","))?;
         }
         for name in Flaws::NAMES {
             if let Some(value) = flaws.by_name_mut(name).filter(|it| **it != 0.0) {
@@ -280,6 +307,8 @@ mod tests {
             ("synth://umpm?camera=l&rate=0", "frames a second"),
             ("synth://umpm?camera=l&noise=many", "a number"),
             ("synth://umpm?camera=l&drop=2", "flaw"),
+            ("synth://umpm?camera=l&skew-ms=1,,2", "milliseconds"),
+            ("synth://umpm?camera=l&skew-ms=NaN", "milliseconds"),
         ];
         for (text, expected) in cases {
             let error = Address::parse(text).unwrap_err().to_string();
@@ -304,6 +333,7 @@ mod tests {
             "(noise|blur|desync|calibration-degrees|calibration-mm)=[0-9](\\.[0-9]{1,6})?",
             "exposure=-?[1-7]",
             "drop=0(\\.[0-8])?",
+            "skew-ms=-?[0-9]{1,2}(,[0-9]{1,2}(\\.[0-9])?){0,3}",
         ]
     }
 
@@ -345,6 +375,7 @@ mod tests {
                     rate_hz: 29.97,
                     backdrop: Some("a folder/of it".into()),
                     flaws: Flaws { noise, desync_s: desync, ..Flaws::default() },
+                    skews_ms: vec![noise, -desync],
                 },
                 camera: "c1".to_owned(),
                 n_frames,

@@ -21,7 +21,7 @@ pub use pair::{check_views, pair_from_message, pair_to_message};
 pub use pose::{
     candidates_from_message, candidates_to_message, extras_from_message, extras_to_message,
     front_from_message, front_to_message, local_from_message, local_to_message, pose_from_message,
-    pose_to_message,
+    pose_to_message, skew_from_message,
 };
 pub use quality::{
     sigma_from_message, sigma_from_pair, sigma_to_message, sigma_to_pair, tau_from_message,

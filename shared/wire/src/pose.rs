@@ -10,6 +10,10 @@ use pipeline::ExtraKeypoint;
 
 use crate::WireError;
 use crate::error::{count, equal, finite, index};
+use crate::stamp::at_most;
+
+/// No picture is further from the instant of its frame: more than half a period of one frame in ten seconds.
+const MOST_SKEW_NANOS: u64 = 10_000_000_000;
 
 /// Writes a pose.
 ///
@@ -119,6 +123,20 @@ pub fn candidates_from_message(
         .iter()
         .map(|it| pose_from_message(it, model, layout))
         .collect()
+}
+
+/// How long after the instant of the frame the picture of a view was taken, seconds.
+///
+/// # Errors
+///
+/// [`WireError::Frame`] if it is more than ten seconds.
+pub fn skew_from_message(message: &ViewPose) -> Result<f64, WireError> {
+    at_most(
+        "skew_nanos",
+        message.skew_nanos.unsigned_abs(),
+        MOST_SKEW_NANOS,
+    )?;
+    Ok(message.skew_nanos as f64 * 1e-9)
 }
 
 /// Adds what the picture says about the direction in which the person of every candidate faces.

@@ -132,7 +132,7 @@ pub fn check_frame(
     )
 }
 
-fn at_most(field: &'static str, got: u64, limit: u64) -> Result<(), WireError> {
+pub(crate) fn at_most(field: &'static str, got: u64, limit: u64) -> Result<(), WireError> {
     if got > limit {
         return Err(WireError::Frame { field, got, limit });
     }

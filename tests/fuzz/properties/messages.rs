@@ -418,6 +418,7 @@ pub fn wire_fusion(input: &[u8]) {
         front: front.unwrap_or_default(),
         sigma_px: sigma.ok().flatten(),
         tau_px: None,
+        skew_s: 0.0,
     };
     let expected = wire::sigma_from_pair(&pair_pose(pairs), 1, model.n_parts());
     let whole = ViewResult {
@@ -425,6 +426,7 @@ pub fn wire_fusion(input: &[u8]) {
         front: vec![[0.5, -2.0]],
         sigma_px: expected.ok().flatten().map(|(_, sigma)| sigma),
         tau_px: None,
+        skew_s: 0.0,
     };
     let answers = [Some(changed), Some(whole)];
     let mut found = Vec::new();

@@ -1,6 +1,6 @@
 //! A snapshot of a deployment as JSON.
 
-use messages::{CameraCounts, Cause};
+use messages::{CameraCounts, Cause, UNMEASURED};
 use metrics::{Reading, Timed};
 use serde_json::{Map, Value, json};
 
@@ -73,7 +73,14 @@ fn camera(it: &CameraCounts) -> Value {
         "refused": it.n_refused,
         "rate_hz": (it.rate_microhertz > 0).then_some(it.rate_microhertz as f64 / 1e6),
         "off_grid_ms": it.off_grid_nanos as f64 / 1e6,
+        "skew_ms": measured_value(it.skew_nanos, 1e6),
+        "drift_ppm": measured_value(it.drift_ppb, 1e3),
     })
+}
+
+/// A measurement of a camera, in a larger unit; null where there is none yet.
+fn measured_value(value: i64, per: f64) -> Option<f64> {
+    (value != UNMEASURED).then_some(value as f64 / per)
 }
 
 fn timed(timed: &Timed) -> Value {

@@ -2,7 +2,7 @@
 
 use core::fmt::Write as _;
 
-use messages::Cause;
+use messages::{Cause, UNMEASURED};
 use metrics::{Reading, Timed};
 
 use super::snapshot::{ProcessSnapshot, Snapshot, State};
@@ -48,7 +48,7 @@ pub fn table(snapshot: &Snapshot) -> String {
     text
 }
 
-const CAMERAS: [&str; 10] = [
+const CAMERAS: [&str; 11] = [
     "<CAMERA",
     "OPENED",
     "MADE",
@@ -58,7 +58,8 @@ const CAMERAS: [&str; 10] = [
     "OVERTAKEN",
     "REFUSED",
     "RATE Hz",
-    "OFF GRID ms",
+    "SKEW ms",
+    "DRIFT ppm",
 ];
 
 /// What became of the pictures of live cameras; empty without any.
@@ -88,7 +89,13 @@ fn cameras(snapshot: &Snapshot) -> String {
             } else {
                 NONE.to_owned()
             });
-            row.push(format!("{:+.1}", it.off_grid_nanos as f64 / 1e6));
+            for (value, per) in [(it.skew_nanos, 1e6), (it.drift_ppb, 1e3)] {
+                row.push(if value == UNMEASURED {
+                    NONE.to_owned()
+                } else {
+                    format!("{:+.1}", value as f64 / per)
+                });
+            }
             Some(row)
         })
         .collect();
@@ -292,6 +299,21 @@ results  waiting     all       100   20.0  ";
             text.contains("people in view, of whom one is followed: 3\n"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn skew_and_drift_of_a_live_camera_are_shown_once_they_are_measured() {
+        let mut snapshot = snapshot();
+        let camera = messages::CameraCounts {
+            n_connections: 1,
+            skew_nanos: -3_200_000,
+            drift_ppb: UNMEASURED,
+            ..messages::CameraCounts::default()
+        };
+        snapshot.processes[2].reading.as_mut().unwrap().camera = Some(camera);
+        let text = table(&snapshot);
+        let line = text.lines().find(|it| it.starts_with("left")).unwrap();
+        assert!(line.ends_with("-3.2          -"), "{text}");
     }
 
     #[test]

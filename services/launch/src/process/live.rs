@@ -2,6 +2,7 @@
 
 use deployment::Deployment;
 use footage::{LiveAddress, Size};
+use scene::{Address, skew_ms_of};
 
 use crate::inputs;
 use crate::resolved::Resolved;
@@ -20,8 +21,27 @@ pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> 
         camera,
         size: Size::new(footage.size[0] as usize, footage.size[1] as usize),
         rate_hz: resolved.instants_hz(),
+        name: entry.name.clone(),
+        max_skew_nanos: max_skew_nanos(resolved),
         lead_nanos: lead_nanos(&resolved.deployment),
     })
+}
+
+/// How far pictures may be from the instants of the frames before a warning, nanoseconds.
+fn max_skew_nanos(resolved: &Resolved) -> u64 {
+    let capture = &resolved.deployment.capture;
+    let period_ms = 1e3 * capture.frame_step as f64 / resolved.instants_hz();
+    let max_ms = capture.max_skew_ms.unwrap_or(0.5 * period_ms);
+    (max_ms * 1e6).round() as u64
+}
+
+/// How long after the instants of the frames the pictures of footage were taken, nanoseconds: as the deployment says, or as the
+/// scene that is rendered has it.
+pub(super) fn skew_nanos(resolved: &Resolved, view: usize) -> i64 {
+    let camera = &resolved.deployment.cameras[view];
+    let of_scene = || Some(skew_ms_of(&Address::parse(&camera.source).ok()?));
+    let skew_ms = camera.skew_ms.or_else(of_scene).unwrap_or(0.0);
+    (skew_ms * 1e6).round() as i64
 }
 
 /// From the beginning of a run to its first frame in real time, nanoseconds: until every process has started, and streams

@@ -52,6 +52,7 @@ Examples:
     parallax model judge person.mat out/set/people-as-seen.jsonl
     parallax synth out/bad --noise 8 --blur 1 --desync 0.04 --drop 0.05 --calibration-degrees 1
     parallax synth out/punch --motion 02_05.c3d --motion-frames 1-600 --rig umpm
+    parallax synth out/skewed --rig ring:4 --actions jogging --skew-ms 0,5,11,16
     parallax synth out/live --live --frames 900 --rig umpm --actions gestures";
 
 /// The file format of pictures.
@@ -114,6 +115,10 @@ pub(crate) struct Arguments {
     /// Write no pictures: the capture processes of the deployment render them during the run.
     #[arg(long)]
     live: bool,
+    /// How long after the instants of the frames each camera takes its pictures, milliseconds, in the order of the rig: 0,5,11,16;
+    /// negative for before. The deployment says so too, and a run moves the joints to the instants.
+    #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = parse::skews)]
+    skew_ms: Skews,
     /// Recorded motion.
     #[command(flatten)]
     motion: MotionArguments,
@@ -130,6 +135,7 @@ pub(crate) struct Arguments {
 
 type Subjects = Vec<u64>;
 type Actions = Vec<Action>;
+type Skews = Vec<f64>;
 
 /// Flaws of the cameras; none by default.
 #[derive(Debug, Clone, Copy, Args)]
@@ -187,7 +193,13 @@ const N_FRAMES: u64 = 60;
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    arguments.rig.rig().map_err(synth::rig_failure)?;
+    let n_cameras = arguments
+        .rig
+        .rig()
+        .map_err(synth::rig_failure)?
+        .cameras()
+        .len();
+    let skews_ms = skews_of(&arguments.skew_ms, n_cameras)?;
     let recording = arguments.motion.recording()?;
     let job = Job {
         out: arguments.out.clone(),
@@ -210,6 +222,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         backdrop: arguments.backdrop.clone(),
         model: arguments.model.clone(),
         live: arguments.live,
+        skews_ms,
     };
     create_folder(&arguments.out)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
@@ -223,6 +236,23 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let done = pool.install(|| synth::write(&job, &stop, &terminal))?;
     report(arguments, globals, &done)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The skews of the cameras; none if all are 0.
+fn skews_of(skews_ms: &[f64], n_cameras: usize) -> Result<Skews, Failure> {
+    if skews_ms.len() > n_cameras {
+        let message = format!(
+            "--skew-ms names {}, the rig has {n_cameras} cameras",
+            skews_ms.len()
+        );
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    let is_off = skews_ms.iter().any(|it| *it != 0.0);
+    Ok(if is_off {
+        skews_ms.to_vec()
+    } else {
+        Skews::new()
+    })
 }
 
 /// Creates the folder; refuses one that is not empty.

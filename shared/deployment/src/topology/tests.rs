@@ -144,7 +144,7 @@ fn topics_have_this_room() {
     let of_last_view_and_later: [Numbers<'_>; 7] = [
         ("frame/v1/2", 3, 1, 4, 391_680, None),
         ("evidence/v3/2", 2, 1, 1, 10_000_000, Some(2)),
-        ("view-pose/v5/2", 7, 4, 2, 1, None),
+        ("view-pose/v6/2", 7, 4, 2, 1, None),
         ("view-quality/v2/2", 7, 4, 2, 1, None),
         ("pair-pose/v3/0", 4, 4, 2, 1, None),
         ("pair-pose/v3/1", 4, 4, 2, 1, None),
@@ -159,7 +159,7 @@ fn topics_have_this_room() {
     let of_last_view_and_later: [Numbers<'_>; 7] = [
         ("frame/v1/2", 4, 1, 1, 391_680, None),
         ("evidence/v3/2", 3, 1, 1, 10_000_000, Some(2)),
-        ("view-pose/v5/2", 8, 16, 2, 1, None),
+        ("view-pose/v6/2", 8, 16, 2, 1, None),
         ("view-quality/v2/2", 8, 16, 2, 1, None),
         ("pair-pose/v3/0", 5, 16, 2, 1, None),
         ("pair-pose/v3/1", 5, 16, 2, 1, None),

@@ -118,7 +118,7 @@ pub(super) fn deployment(
         scene.action(),
         quoted(&format!("synth-{name}-{seed}")),
     );
-    for camera in scene.rig().cameras() {
+    for (nth, camera) in scene.rig().cameras().iter().enumerate() {
         let source = if job.live {
             let address = Address {
                 settings: settings.clone(),
@@ -131,6 +131,14 @@ pub(super) fn deployment(
         };
         let (name, source) = (quoted(&camera.name), quoted(&source));
         write!(text, "\n[[camera]]\nname = {name}\nsource = {source}\n").or_fail(ExitKind::Run)?;
+        // The address of a scene has it.
+        let skew_ms = settings
+            .skews_ms
+            .get(nth)
+            .filter(|it| **it != 0.0 && !job.live);
+        if let Some(skew_ms) = skew_ms {
+            writeln!(text, "skew_ms = {skew_ms:?}").or_fail(ExitKind::Run)?;
+        }
     }
     text += if job.live {
         "\n[capture]\nmode = \"realtime\"\npace = \"realtime\"\n"

@@ -116,8 +116,16 @@ impl Scene {
 
     fn run(&self) -> Vec<Result<Triangulated, NoJoint>> {
         let each = self.candidates.iter().zip(&self.extras);
-        let found = each.map(|(candidates, extras)| Some(FoundExtras { candidates, extras }));
-        self.step.run(&self.skeleton, &found.collect::<Vec<_>>())
+        let found = each.map(|(candidates, extras)| {
+            Some(FoundExtras {
+                candidates,
+                extras,
+                skew_s: 0.0,
+            })
+        });
+        let found: Vec<Option<FoundExtras<'_>>> = found.collect();
+        self.step
+            .run(&self.skeleton, &found, &mut Motion::default())
     }
 }
 

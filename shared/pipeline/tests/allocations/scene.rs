@@ -48,6 +48,7 @@ impl Scene {
                 front: Vec::new(),
                 sigma_px: Some(vec![5.0; N_PARTS]),
                 tau_px: Some(vec![8.0; N_PARTS]),
+                skew_s: 0.0,
             })
         });
         let answers = answers.collect();

@@ -8,6 +8,16 @@ pub(super) fn rig(text: &str) -> Result<RigChoice, String> {
     RigChoice::parse(text).map_err(|it| it.to_string())
 }
 
+/// Parses skews, milliseconds: `0,5,11,16`.
+pub(super) fn skews(text: &str) -> Result<Vec<f64>, String> {
+    let skews = scene::Settings::parse_skews_ms(text);
+    skews.ok_or_else(|| {
+        format!(
+            "{text:?}: expected milliseconds, -1000 to 1000, with commas, for example 0,5,11,16"
+        )
+    })
+}
+
 /// Maximal number of subjects of one command.
 const MAX_SUBJECTS: usize = 10_000;
 

@@ -1,0 +1,153 @@
+//! How far the pictures of a camera are from the common instants, and whether that changes.
+
+use std::collections::VecDeque;
+
+/// Pictures whose median is one measurement, for how long such measurements count, nanoseconds, and how many there are at most.
+const N_PICTURES: usize = 15;
+const WINDOW_NANOS: u64 = 60_000_000_000;
+const MOST_MEASUREMENTS: usize = 240;
+/// For how long a camera must have been measured before its drift is told, nanoseconds.
+const LEAST_NANOS: u64 = 5_000_000_000;
+
+/// Follows the skew of a camera. Reads no clock.
+#[derive(Debug)]
+pub(crate) struct Phase {
+    period_nanos: u64,
+    /// Times and skews of pictures that are not in a measurement yet, nanoseconds.
+    newest: Vec<(u64, i64)>,
+    /// Times and skews, nanoseconds; whole periods are added where the camera passed from one instant to the next, so that
+    /// the skews of a camera that drifts do not jump.
+    measured: VecDeque<(u64, i64)>,
+    /// Periods that were added so far, nanoseconds.
+    added: i64,
+}
+
+impl Phase {
+    /// * `period_nanos`: from one instant to the next.
+    pub(crate) fn new(period_nanos: u64) -> Self {
+        Self {
+            period_nanos,
+            newest: Vec::with_capacity(N_PICTURES),
+            measured: VecDeque::new(),
+            added: 0,
+        }
+    }
+
+    /// Adds a picture. Returns whether there is a new measurement.
+    ///
+    /// * `skew_nanos`: how long after its instant it was taken.
+    pub(crate) fn add(&mut self, at_nanos: u64, skew_nanos: i64) -> bool {
+        self.newest.push((at_nanos, skew_nanos));
+        if self.newest.len() < N_PICTURES {
+            return false;
+        }
+        self.newest.sort_unstable_by_key(|it| it.1);
+        let (_, skew) = self.newest[N_PICTURES / 2];
+        self.newest.clear();
+        let period = self.period_nanos.max(1).cast_signed();
+        if let Some((_, last)) = self.measured.back() {
+            let jump = skew.saturating_add(self.added).saturating_sub(*last);
+            let n_periods = (jump as f64 / period as f64).round() as i64;
+            self.added = self.added.saturating_sub(n_periods.saturating_mul(period));
+        }
+        self.measured
+            .push_back((at_nanos, skew.saturating_add(self.added)));
+        let begin = at_nanos.saturating_sub(WINDOW_NANOS);
+        while self.measured.len() > MOST_MEASUREMENTS
+            || self.measured.front().is_some_and(|it| it.0 < begin)
+        {
+            self.measured.pop_front();
+        }
+        true
+    }
+
+    /// The median skew of the last pictures, nanoseconds; `None` before there are enough.
+    pub(crate) fn skew_nanos(&self) -> Option<i64> {
+        self.measured
+            .back()
+            .map(|it| it.1.saturating_sub(self.added))
+    }
+
+    /// By how much the camera falls behind the instants, parts per billion: negative for one that is faster. `None` while it was
+    /// measured for too short a time.
+    pub(crate) fn drift_ppb(&self) -> Option<i64> {
+        let ends = self.measured.front().zip(self.measured.back())?;
+        if ends.1.0.saturating_sub(ends.0.0) < LEAST_NANOS {
+            return None;
+        }
+        let n = self.measured.len() as f64;
+        let from = *ends.0;
+        let place = |it: &(u64, i64)| {
+            (
+                (it.0.wrapping_sub(from.0)) as f64,
+                it.1.wrapping_sub(from.1) as f64,
+            )
+        };
+        let sums = self.measured.iter().map(place);
+        let (x, y) = sums.fold((0.0, 0.0), |sum, it| (sum.0 + it.0, sum.1 + it.1));
+        let (x, y) = (x / n, y / n);
+        let products = self
+            .measured
+            .iter()
+            .map(place)
+            .map(|it| it.0 - x)
+            .zip(self.measured.iter().map(place).map(|it| it.1 - y));
+        let (above, below) =
+            products.fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x * y, sum.1 + x * x));
+        (below > 0.0).then(|| (1e9 * above / below).round() as i64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: u64 = 33_333_333;
+
+    /// The phase of a camera after some seconds.
+    ///
+    /// * `interval`: between its pictures, nanoseconds.
+    fn after(seconds: u64, interval: f64, jitter: i64) -> Phase {
+        let mut phase = Phase::new(PERIOD);
+        for nth in 0..30 * seconds {
+            let at = 4e9 + nth as f64 * interval;
+            let exact = (at - 4e9) / PERIOD as f64;
+            let skew = ((exact - exact.round()) * PERIOD as f64) as i64;
+            let jitter = if nth % 2 == 0 { jitter } else { -jitter };
+            phase.add(at as u64, skew + jitter);
+        }
+        phase
+    }
+
+    #[test]
+    fn a_camera_at_29_97_falls_behind_by_a_thousandth() {
+        let phase = after(100, PERIOD as f64 * 30.0 / 29.97, 2_000_000);
+        let ppm = phase.drift_ppb().unwrap() as f64 / 1e3;
+        assert!((ppm - 1000.0).abs() < 20.0, "{ppm}");
+        assert!(phase.skew_nanos().unwrap().unsigned_abs() <= PERIOD / 2 + 2_000_000);
+    }
+
+    #[test]
+    fn a_camera_whose_clock_is_a_little_fast_is_told_within_a_minute() {
+        let phase = after(60, PERIOD as f64 * (1.0 - 30e-6), 500_000);
+        let ppm = phase.drift_ppb().unwrap() as f64 / 1e3;
+        assert!((ppm + 30.0).abs() < 5.0, "{ppm}");
+    }
+
+    #[test]
+    fn nothing_is_told_before_enough_was_measured() {
+        assert_eq!(Phase::new(PERIOD).skew_nanos(), None);
+        let phase = after(3, PERIOD as f64, 0);
+        assert_eq!((phase.skew_nanos(), phase.drift_ppb()), (Some(0), None));
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_do_not_overflow() {
+        let mut phase = Phase::new(0);
+        for nth in 0..200_u64 {
+            let skew = if nth % 2 == 0 { i64::MAX } else { i64::MIN };
+            phase.add(nth.wrapping_mul(u64::MAX / 7), skew);
+        }
+        let _any = (phase.skew_nanos(), phase.drift_ppb());
+    }
+}

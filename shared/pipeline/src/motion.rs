@@ -1,0 +1,194 @@
+//! Pictures that were not taken at the instant of their frame: what views found is moved to the instant.
+
+use geometry::longer_side;
+use geometry::skew::{Tracks, Velocity, moved};
+use nalgebra::{Point2, Vector2};
+
+use crate::fused_view::FusedView;
+use crate::view_result::ViewResult;
+
+/// Points of a view; `None` for one that it does not show.
+type Points = Vec<Option<Point2<f64>>>;
+
+/// The poses of the views at the instant of a frame.
+#[derive(Debug, Clone)]
+pub(crate) struct AtInstant {
+    pub(crate) views: Vec<Option<FusedView>>,
+    /// What is to be added to the deviations of their parts, pixels.
+    pub(crate) more_px: Vec<Vec<f64>>,
+}
+
+/// How the points of every view move, from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct Motion {
+    views: Vec<Tracks>,
+    /// Of the frame, seconds.
+    instant_s: Option<f64>,
+}
+
+impl Motion {
+    /// Begins a frame.
+    ///
+    /// * `instant_s`: its instant, seconds; `None` where the rate of the frames is not known: then nothing is moved.
+    pub fn begin(&mut self, instant_s: Option<f64>) {
+        self.instant_s = instant_s;
+    }
+
+    /// The instant of the frame, if what was found is to be moved there: some picture was taken at another time.
+    fn instant(&self, answers: &[Option<ViewResult>]) -> Option<f64> {
+        let is_off = answers.iter().flatten().any(|it| it.skew_s != 0.0);
+        self.instant_s.filter(|_| is_off)
+    }
+
+    /// The poses of the views at the instant of the frame; `None` if all pictures were taken then.
+    ///
+    /// * `sigma_cells`: standard deviation of a part, cells.
+    pub(crate) fn at_instant(
+        &mut self,
+        answers: &[Option<ViewResult>],
+        views: &[Option<FusedView>],
+        sigma_cells: f64,
+    ) -> Option<AtInstant> {
+        let instant_s = self.instant(answers)?;
+        let mut at_instant = views.to_vec();
+        let mut more_px = vec![Vec::new(); views.len()];
+        for (view, fused) in at_instant.iter_mut().enumerate() {
+            let (Some(fused), Some(Some(answer))) = (fused, answers.get(view)) else {
+                continue;
+            };
+            let centres = &mut fused.pose.centres_px;
+            let points: Points = centres.iter().map(|it| Some(Point2::from(*it))).collect();
+            let height_px = height(&points);
+            let sizes = [fused.cell_px * sigma_cells, height_px];
+            let skew_s = answer.skew_s;
+            let velocities = self.velocities(view, instant_s + skew_s, points, height_px);
+            more_px[view] = centres
+                .iter_mut()
+                .zip(velocities)
+                .map(|(centre, velocity)| {
+                    let (at, more) = moved(Point2::from(*centre), velocity, skew_s, sizes);
+                    *centre = at.coords.into();
+                    more
+                })
+                .collect();
+        }
+        Some(AtInstant {
+            views: at_instant,
+            more_px,
+        })
+    }
+
+    /// By how much the points of a view had moved from the instant of the frame when its picture was taken, pixels; `None` if
+    /// that was then.
+    ///
+    /// * `skew_s`: of the picture; `taken_s`: when the points were there, seconds after the instant.
+    pub(crate) fn since_instant(
+        &mut self,
+        view: usize,
+        [skew_s, taken_s]: [f64; 2],
+        points: Points,
+    ) -> Option<Vec<Vector2<f64>>> {
+        let instant_s = self.instant_s.filter(|_| skew_s != 0.0)?;
+        let height_px = height(&points);
+        let velocities = self.velocities(view, instant_s + taken_s, points, height_px);
+        let by = |it: Option<Velocity>| {
+            it.and_then(|it| it.shift(skew_s))
+                .unwrap_or_else(Vector2::zeros)
+        };
+        Some(velocities.into_iter().map(by).collect())
+    }
+
+    /// The velocities of the points of a view, which are then remembered.
+    fn velocities(
+        &mut self,
+        view: usize,
+        taken_s: f64,
+        points: Points,
+        height_px: f64,
+    ) -> Vec<Option<Velocity>> {
+        if self.views.len() <= view {
+            self.views.resize_with(view + 1, Tracks::default);
+        }
+        let tracks = &mut self.views[view];
+        let of_point = |(nth, at): (usize, &Option<Point2<f64>>)| {
+            tracks.velocity(nth, (taken_s, (*at)?), height_px)
+        };
+        let velocities = points.iter().enumerate().map(of_point).collect();
+        tracks.note(taken_s, points);
+        velocities
+    }
+}
+
+/// How tall the person is in the picture, pixels.
+fn height(points: &Points) -> f64 {
+    longer_side(points.iter().flatten().map(|it| [it.x, it.y])).unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use multiview::FusedPose;
+
+    use super::*;
+
+    fn answer(skew_s: f64) -> Option<ViewResult> {
+        Some(ViewResult {
+            candidates: Vec::new(),
+            front: Vec::new(),
+            sigma_px: None,
+            tau_px: None,
+            skew_s,
+        })
+    }
+
+    fn view(x: f64) -> Option<FusedView> {
+        Some(FusedView {
+            pose: FusedPose {
+                centres_px: vec![[x, 0.0], [x, 200.0]],
+                n_pairs: 0,
+                energy: 0.0,
+            },
+            exchanged: false,
+            cell_px: 4.0,
+            single_score: 0.0,
+        })
+    }
+
+    #[test]
+    fn every_view_is_moved_by_its_own_velocity_and_its_own_time() {
+        let mut motion = Motion::default();
+        let answers = [answer(0.01), answer(-0.01), None];
+        motion.begin(Some(1.0));
+        motion.at_instant(&answers, &[view(10.0), view(30.0), None], 1.0);
+        motion.begin(Some(1.1));
+        let found = motion.at_instant(&answers, &[view(20.0), view(20.0), None], 1.0);
+        let AtInstant {
+            views,
+            more_px: more,
+        } = found.unwrap();
+        let x = |view: usize| views[view].as_ref().unwrap().pose.centres_px[1][0];
+        assert!(
+            (x(0) - 19.0).abs() < 1e-9 && (x(1) - 19.0).abs() < 1e-9,
+            "{views:?}"
+        );
+        assert_eq!((more[0][0], more[2].len()), (0.0, 0));
+        assert!(more[1][0] > 1.0);
+    }
+
+    #[test]
+    fn nothing_is_moved_where_all_pictures_are_of_the_instant_or_no_time_is_known() {
+        let mut motion = Motion::default();
+        let views = [view(10.0), view(30.0)];
+        motion.begin(Some(1.0));
+        assert!(
+            motion
+                .at_instant(&[answer(0.0), answer(0.0)], &views, 1.0)
+                .is_none()
+        );
+        motion.begin(None);
+        assert!(
+            motion
+                .at_instant(&[answer(0.01), answer(0.0)], &views, 1.0)
+                .is_none()
+        );
+    }
+}

@@ -1,0 +1,118 @@
+//! People who move, as cameras with noise and clocks of their own see their joints.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+
+use geometry::Camera;
+use nalgebra::{Point2, Point3, Vector2};
+use scene::{Action, RigChoice, Scene, Settings};
+use skeleton::PARSE14;
+
+/// Number of joints.
+pub(crate) const N: usize = PARSE14.joints.len();
+/// Frames per second.
+pub(crate) const RATE_HZ: f64 = 30.0;
+
+/// A person before a rig.
+pub(crate) struct Film {
+    scene: Arc<Scene>,
+    cameras: Vec<Camera>,
+    /// Standard deviation of a joint in a picture along each axis, pixels.
+    pub(crate) noise_px: f64,
+    random: Random,
+}
+
+impl Film {
+    /// * `seed`: of the person, the motion and the noise.
+    pub(crate) fn new(rig: &str, action: Action, seed: u64) -> Self {
+        let rig = RigChoice::parse(rig).expect("a rig");
+        let cameras = rig.rig().expect("a rig").cameras().to_vec();
+        Self {
+            scene: scene_of(rig, action, seed),
+            cameras,
+            noise_px: 2.5,
+            random: Random::new(seed),
+        }
+    }
+
+    /// Begins other noise.
+    pub(crate) fn reseed(&mut self, seed: u64) {
+        self.random = Random::new(seed);
+    }
+
+    pub(crate) fn cameras(&self) -> &[Camera] {
+        &self.cameras
+    }
+
+    /// Where the joints are at a time.
+    pub(crate) fn truth(&self, seconds: f64) -> [Point3<f64>; N] {
+        self.scene.joints(seconds).map(Point3::from)
+    }
+
+    /// The noise of a picture.
+    pub(crate) fn noise(&mut self) -> [Vector2<f64>; N] {
+        let mut one = || self.random.normal() * self.noise_px;
+        core::array::from_fn(|_| Vector2::new(one(), one()))
+    }
+
+    /// What a camera sees at a time.
+    pub(crate) fn see(
+        &self,
+        camera: &Camera,
+        seconds: f64,
+        noise: &[Vector2<f64>; N],
+    ) -> [Point2<f64>; N] {
+        let joints = self.truth(seconds);
+        core::array::from_fn(|joint| {
+            camera.project(&joints[joint]).expect("in view") + noise[joint]
+        })
+    }
+}
+
+/// Makes a scene, which takes a while, once. All rings stand around the same place.
+fn scene_of(rig: RigChoice, action: Action, seed: u64) -> Arc<Scene> {
+    static MADE: Mutex<BTreeMap<(bool, &str, u64), Arc<Scene>>> = Mutex::new(BTreeMap::new());
+    let is_ring = matches!(rig, RigChoice::Ring { .. });
+    let settings = Settings {
+        rig,
+        action,
+        seed,
+        subject: seed,
+        ..Settings::default()
+    };
+    let mut made = MADE.lock().expect("no test panics in here");
+    let make = || Arc::new(Scene::new(&settings).expect("a scene"));
+    let scene = made
+        .entry((is_ring, action.name(), seed))
+        .or_insert_with(make);
+    Arc::clone(scene)
+}
+
+/// Random numbers that are the same in every run.
+struct Random(u64);
+
+impl Random {
+    fn new(seed: u64) -> Self {
+        let mut random = Self(seed);
+        // The first numbers of neighbouring seeds are similar.
+        (0..20).for_each(|_| {
+            random.unit();
+        });
+        random
+    }
+
+    /// Between 0 and 1.
+    fn unit(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    }
+
+    /// Of mean 0 and standard deviation 1.
+    fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * self.unit().ln()).sqrt();
+        radius * (core::f64::consts::TAU * self.unit()).cos()
+    }
+}
