@@ -140,6 +140,13 @@ impl Report {
         suspected.map(|(camera, _)| camera.clone()).collect()
     }
 
+    /// The cameras whose pictures were taken at other times than they say.
+    pub fn out_of_step(&self) -> impl Iterator<Item = (&String, &CameraFit)> {
+        let summary = self.recorded.summary().into_iter();
+        let fits = summary.flat_map(|it| &it.calibration);
+        fits.filter(|(_, fit)| fit.out_of_step)
+    }
+
     fn suspected(&self) -> impl Iterator<Item = (&String, &CameraFit)> {
         let summary = self.recorded.summary().into_iter();
         let fits = summary.flat_map(|it| &it.calibration);
@@ -324,6 +331,9 @@ impl Report {
                 px(fit.residual_px),
                 px(fit.without_px),
             )?;
+        }
+        for (camera, fit) in self.out_of_step() {
+            text.push_str(&cameras::out_of_step(camera, fit));
         }
         Ok(())
     }

@@ -1,18 +1,20 @@
-//! Whether the cameras stand where the calibration says, from what every view found on its own.
+//! Whether the cameras stand where the calibration says, and took their pictures when their times say, from what every view found on
+//! its own.
 
 use std::collections::BTreeMap;
 
-use geometry::{RigWatch, SwapWatch};
+use geometry::{Camera, RigWatch, StepWatch, SwapWatch};
 use messages::Status;
 use runfiles::{CameraFit, Contradicted, Exchanged};
 
-use crate::{FrameRecord, Scene};
+use crate::{FrameRecord, Scene, ViewRecord};
 
 /// Follows all cameras over a run.
 #[derive(Debug)]
 pub(crate) struct Calibration {
     watch: RigWatch,
     swaps: SwapWatch,
+    steps: StepWatch,
     exchanged: Option<Exchanged>,
     is_contradiction_told: bool,
     fits: Vec<CameraFit>,
@@ -21,10 +23,12 @@ pub(crate) struct Calibration {
 impl Calibration {
     pub(crate) fn new(scene: &Scene) -> Self {
         let cameras = scene.views.iter().map(|it| it.framing.camera().clone());
+        let cameras: Vec<Camera> = cameras.collect();
         let framings = scene.views.iter().map(|it| it.framing.clone());
         let n = scene.views.len();
         Self {
-            watch: RigWatch::new(cameras.collect()),
+            steps: StepWatch::new(cameras.clone()),
+            watch: RigWatch::new(cameras),
             swaps: SwapWatch::new(framings.collect(), scene.model.spec().mirror.clone()),
             exchanged: None,
             is_contradiction_told: false,
@@ -45,12 +49,15 @@ impl Calibration {
         self.swaps.note(&points);
         self.find_exchanged(scene);
         self.tell_contradiction(scene);
+        self.follow_steps(scene, record, &points);
         for (view, fit) in self.fits.iter_mut().enumerate() {
             let scale = scene.views[view].source_scale();
             fit.residual_px = self.watch.residual_px(view).map(|it| it * scale);
             fit.without_px = self.watch.without_px(view).map(|it| it * scale);
-            // With the footage of another camera, every camera contradicts the calibration.
-            let is_named = self.watch.is_reported(view) && self.exchanged.is_none();
+            // With the footage of another camera, every camera contradicts the calibration; and one that is late sees a person
+            // who walks ahead of where the others do. One that was moved does not look late.
+            let is_named =
+                self.watch.is_reported(view) && self.exchanged.is_none() && !fit.out_of_step;
             if is_named && !fit.suspected {
                 tracing::warn!(
                     camera = scene.views[view].name,
@@ -60,6 +67,44 @@ impl Calibration {
                 );
             }
             fit.suspected = is_named;
+        }
+    }
+
+    /// Estimates by how much every camera is late, and logs once that one is out of step.
+    fn follow_steps(
+        &mut self,
+        scene: &Scene,
+        record: &FrameRecord,
+        points: &[Option<Vec<[f64; 2]>>],
+    ) {
+        let Some(instant_s) = scene.time_s(record.frame()) else {
+            return;
+        };
+        let skew_s = |view: &ViewRecord| {
+            let read = wire::skew_from_message(view.pose.as_ref()?);
+            read.ok()
+        };
+        let skews_s: Vec<f64> = record
+            .views
+            .iter()
+            .map(|view| skew_s(view).unwrap_or(0.0))
+            .collect();
+        self.steps.note(instant_s, points, &skews_s);
+        for (view, fit) in self.fits.iter_mut().enumerate() {
+            let step = self.steps.step(view);
+            fit.offset_ms = step.map(|it| it.offset_ms);
+            fit.offset_error_ms = step.map(|it| it.error_ms);
+            // With the footage of another camera, nothing fits.
+            let is_named = self.steps.is_reported(view) && self.exchanged.is_none();
+            if is_named && !fit.out_of_step {
+                tracing::warn!(
+                    camera = scene.views[view].name,
+                    offset_ms = fit.offset_ms,
+                    offset_error_ms = fit.offset_error_ms,
+                    "is out of step: its pictures were taken at other times than they say"
+                );
+            }
+            fit.out_of_step = is_named;
         }
     }
 

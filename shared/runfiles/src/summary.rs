@@ -124,6 +124,16 @@ impl People {
 /// How well a camera fits the others, over the last frames.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CameraFit {
+    /// Standard error of [`CameraFit::offset_ms`].
+    #[serde(default, deserialize_with = "nullable")]
+    pub offset_error_ms: Option<f64>,
+    /// How much later its pictures were taken than their times say, against the median of all cameras, milliseconds; negative for
+    /// earlier. Unknown while too little has moved.
+    #[serde(default, deserialize_with = "nullable")]
+    pub offset_ms: Option<f64>,
+    /// Whether it was found, at any time of the run, to be out of step with the others.
+    #[serde(default)]
+    pub out_of_step: bool,
     /// How far apart cameras see the same parts if it is one of them, pixels of its footage; unknown of
     /// fewer than three cameras, and while too little was seen.
     #[serde(deserialize_with = "nullable")]

@@ -1,7 +1,8 @@
 //! Text on cameras that contradict each other.
 
+use messages::UNMEASURED;
 use metrics::Reading;
-use runfiles::{Contradicted, Exchanged};
+use runfiles::{CameraFit, Contradicted, Exchanged};
 use supervise::Outcome;
 
 /// Text on two cameras whose footage seems to be exchanged.
@@ -36,6 +37,17 @@ pub(super) fn contradicted(contradicted: &Contradicted) -> String {
     )
 }
 
+/// Text on a camera whose pictures were taken at other times than they say.
+pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
+    let [offset, error] = [fit.offset_ms, fit.offset_error_ms].map(|it| it.unwrap_or(f64::NAN));
+    let how = if offset < 0.0 { "before" } else { "after" };
+    format!(
+        "  clock         {camera} is out of step: its pictures were taken {:.0} ms {how} the time that they say, +-{error:.0}, by how \
+         people move in them\n",
+        offset.abs(),
+    )
+}
+
 /// What became of the pictures of every live camera, a line each; of a process that was restarted since then.
 pub(super) fn live(outcome: &Outcome) -> Vec<String> {
     let readings = outcome
@@ -59,6 +71,19 @@ pub(super) fn live(outcome: &Outcome) -> Vec<String> {
         if it.rate_microhertz > 0 {
             parts.push(format!("{:.3} a second", it.rate_microhertz as f64 / 1e6));
         }
+        if it.skew_nanos != UNMEASURED {
+            let skew = format!("{:+.1} ms from the instants", it.skew_nanos as f64 / 1e6);
+            parts.push(skew);
+        }
+        if it.drift_ppb != UNMEASURED {
+            let ppm = it.drift_ppb as f64 / 1e3;
+            let (slow, what) = if ppm < 0.0 {
+                (-ppm, "fast")
+            } else {
+                (ppm, "slow")
+            };
+            parts.push(format!("{slow:.0} ppm {what}"));
+        }
         if it.n_connections > 1 {
             parts.push(format!("opened {} times", it.n_connections));
         }
@@ -66,4 +91,25 @@ pub(super) fn live(outcome: &Outcome) -> Vec<String> {
         Some(line)
     });
     lines.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_that_is_out_of_step_is_named_with_its_offset() {
+        let fit = CameraFit {
+            offset_error_ms: Some(1.2),
+            offset_ms: Some(-21.4),
+            out_of_step: true,
+            ..CameraFit::default()
+        };
+        let text = out_of_step("left", &fit);
+        assert!(text.contains("left is out of step"), "{text}");
+        assert!(
+            text.contains("21 ms before the time that they say, +-1,"),
+            "{text}"
+        );
+    }
 }
