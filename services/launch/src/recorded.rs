@@ -46,7 +46,9 @@ pub fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure
         version: env!("CARGO_PKG_VERSION").to_owned(),
         session: 0,
         began_unix_nanos: since.map_or(0, |it| it.as_nanos() as u64),
-        settings: serde_json::to_string(&settings).or_fail(ExitKind::Run)?,
+        settings: footage::without_passwords(
+            &serde_json::to_string(&settings).or_fail(ExitKind::Run)?,
+        ),
         without: Without {
             pixels: plan.without_pixels,
             evidence: plan.without_evidence,

@@ -89,9 +89,10 @@ impl Resolved {
         given.or_else(|| all.first().copied())
     }
 
-    /// Writes it to a file, for the user.
+    /// Writes it to a file, for the user, without passwords of cameras.
     pub(crate) fn write(&self, file: &Path) -> Result<(), Failure> {
-        std::fs::write(file, self.to_text()?).map_err(|error| runtime::in_file(file, &error))
+        let text = footage::without_passwords(&self.to_text()?);
+        std::fs::write(file, text).map_err(|error| runtime::in_file(file, &error))
     }
 
     /// The text that every process gets as standard input.

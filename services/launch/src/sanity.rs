@@ -82,7 +82,7 @@ fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
         let [a, b] = [first, nth].map(|it| &deployment.cameras[it].name);
         let message = format!(
             "cameras {a:?} and {b:?} have one source, {}",
-            source.display()
+            footage::without_passwords(&source.to_string_lossy())
         );
         let failure = Failure::new(ExitKind::Config, message);
         return Err(failure.with_hint("every [[camera]] needs the footage of its own camera"));

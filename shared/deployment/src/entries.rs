@@ -40,6 +40,24 @@ pub struct Entry {
     pub meaning: String,
 }
 
+impl Entry {
+    /// Changes every text in its value.
+    pub fn change_texts(&mut self, change: impl Fn(&str) -> String + Copy) {
+        if let Some(value) = &mut self.value {
+            change_texts(value, change);
+        }
+    }
+}
+
+fn change_texts(value: &mut Value, change: impl Fn(&str) -> String + Copy) {
+    match value {
+        Value::String(text) => *text = change(text),
+        Value::Array(all) => all.iter_mut().for_each(|it| change_texts(it, change)),
+        Value::Table(table) => table.iter_mut().for_each(|it| change_texts(it.1, change)),
+        _ => {}
+    }
+}
+
 impl Loaded {
     /// Every key with its value, in order.
     ///

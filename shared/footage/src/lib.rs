@@ -28,7 +28,7 @@ pub use pixels::PixelFormat;
 pub use size::Size;
 pub use source::{
     FrameView, LiveAddress, Source, SourceInfo, SourceKind, Turn, is_address, is_image, is_live,
-    read_image, read_upright,
+    read_image, read_upright, without_passwords,
 };
 pub use spec::SourceSpec;
 pub use stream::{LiveStream, StreamEnd, StreamFrame, StreamSpec, Transport};

@@ -5,6 +5,7 @@ mod images;
 mod listing;
 mod live;
 pub(crate) mod log;
+pub(crate) mod password;
 pub(crate) mod probe;
 mod video;
 
@@ -16,6 +17,7 @@ use images::{Images, Still};
 pub use images::{is_image, read_image, read_upright};
 use listing::Listing;
 pub use live::{LiveAddress, is_address, is_live};
+pub use password::without_passwords;
 use video::Video;
 
 use crate::{FootageError, Size, SourceSpec};

@@ -12,6 +12,7 @@ use serde_json::Value;
 
 use crate::source::LiveAddress;
 use crate::source::log::{Log, summary};
+use crate::source::password::without_password_of;
 use crate::source::probe::{fraction, has_fps_mode, missing};
 use crate::{FootageError, Size};
 
@@ -167,7 +168,7 @@ impl StreamSpec {
     fn failed(&self, message: &str) -> FootageError {
         failed(
             &self.shown(),
-            &message.replace(&self.address, &self.shown()),
+            &without_password_of(&self.address, message),
         )
     }
 
@@ -278,7 +279,7 @@ impl LiveStream {
             let message = if said.is_empty() {
                 format!("the stream has ended ({error})")
             } else {
-                said.replace(&self.address, &self.shown)
+                without_password_of(&self.address, &said)
             };
             return Err(failed(&self.shown, &message));
         }

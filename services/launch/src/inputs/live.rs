@@ -91,7 +91,8 @@ fn refused(error: LiveError, camera: &Camera) -> Failure {
     let hint = format!(
         "this is the live camera {:?}; `parallax cameras` lists the video devices of this machine with what they offer, and \
          `parallax cameras view {}` takes a picture",
-        camera.name, camera.source
+        camera.name,
+        footage::without_passwords(&camera.source)
     );
     Failure::new(error.kind(), error).with_hint(hint)
 }

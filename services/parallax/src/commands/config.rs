@@ -87,7 +87,10 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(file) => load::read(file, &arguments.set)?,
         None => load::defaults(&arguments.set)?,
     };
-    let entries = loaded.entries().or_fail(ExitKind::Run)?;
+    let mut entries = loaded.entries().or_fail(ExitKind::Run)?;
+    for entry in &mut entries {
+        entry.change_texts(footage::without_passwords);
+    }
     if arguments.json {
         output::json(&json!({ "schema_version": 1, "file": arguments.file, "keys": entries }))?;
     } else {

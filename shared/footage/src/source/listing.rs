@@ -7,6 +7,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::live;
+use super::password::without_passwords;
 use crate::FootageError;
 
 /// What a path stands for.
@@ -35,9 +36,9 @@ pub(super) fn list(path: &str) -> Result<Listing, FootageError> {
         .or_else(|| live::what(path))
     {
         return Err(FootageError::Live {
-            path: path.to_owned(),
+            path: without_passwords(path),
             what,
-            instead: live::instead(path),
+            instead: without_passwords(&live::instead(path)),
         });
     } else if let Some(numbered) = Numbered::parse(as_is) {
         numbered.files()?

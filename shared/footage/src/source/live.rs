@@ -5,6 +5,8 @@ use std::fs::FileType;
 use std::os::unix::fs::FileTypeExt as _;
 use std::path::PathBuf;
 
+use super::password::without_passwords;
+
 /// Where a live camera is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LiveAddress {
@@ -43,23 +45,13 @@ impl LiveAddress {
 }
 
 impl fmt::Display for LiveAddress {
-    /// Without the name and the password that an address may hold.
+    /// Without the name and the passwords that an address may hold.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Device(path) => write!(f, "{}", path.display()),
-            Self::Stream(address) => f.write_str(&without_password(address)),
+            Self::Stream(address) => f.write_str(&without_passwords(address)),
         }
     }
-}
-
-/// An address without what stands before the `@` of its host.
-fn without_password(address: &str) -> String {
-    let Some((scheme, rest)) = address.split_once("://") else {
-        return address.to_owned();
-    };
-    let end = rest.find('/').unwrap_or(rest.len());
-    let host = rest[..end].rsplit_once('@').map_or(0, |it| it.0.len() + 1);
-    format!("{scheme}://{}", &rest[host..])
 }
 
 /// Whether a text is the address of a camera or a stream: `rtsp://...`, `udp://...`, `http://...`, `v4l2:...`,
@@ -140,21 +132,6 @@ mod tests {
         ] {
             assert!(!is_live(text), "{text}");
         }
-    }
-
-    #[test]
-    fn passwords_are_not_shown() {
-        let shown = |text: &str| LiveAddress::parse(text).unwrap().to_string();
-        let [open, plain] = ["rtsp://10.0.0.5/a@b", "udp://@:5000"].map(shown);
-        assert_eq!(
-            (open.as_str(), plain.as_str()),
-            ("rtsp://10.0.0.5/a@b", "udp://:5000")
-        );
-        assert_eq!(
-            shown("rtsp://me:secret@10.0.0.5:554/a"),
-            "rtsp://10.0.0.5:554/a"
-        );
-        assert_eq!(shown("v4l2:/dev/video2"), "/dev/video2");
     }
 
     #[test]

@@ -1,0 +1,140 @@
+//! Names and passwords in the addresses of cameras, which belong in no message and in no file.
+
+/// What stands in the place of a password.
+const HIDDEN: &str = "***";
+/// Keys of an address whose values are secret.
+const SECRET_KEYS: [&str; 14] = [
+    "user",
+    "usr",
+    "username",
+    "login",
+    "pass",
+    "passwd",
+    "password",
+    "pwd",
+    "token",
+    "key",
+    "auth",
+    "secret",
+    "passphrase",
+    "loginpas",
+];
+
+/// A text with addresses in it, without the names and passwords in front of their hosts, and without the values of keys such as
+/// `password` behind their paths.
+///
+/// ```
+/// let text = footage::without_passwords("no picture from rtsp://me:secret@10.0.0.5/a?pwd=1&x=2");
+/// assert_eq!(text, "no picture from rtsp://10.0.0.5/a?pwd=***&x=2");
+/// ```
+pub fn without_passwords(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find("://") {
+        let (before, after) = rest.split_at(at + 3);
+        out.push_str(before);
+        let end = after.find(is_end).unwrap_or(after.len());
+        let (address, following) = after.split_at(end);
+        push_address(&mut out, address);
+        rest = following;
+    }
+    out.push_str(rest);
+    out
+}
+
+/// Where an address ends in a text.
+fn is_end(it: char) -> bool {
+    it.is_whitespace() || it == '"'
+}
+
+/// * `address`: what follows the scheme.
+fn push_address(out: &mut String, address: &str) {
+    let end = address.find(['/', '?', '#']).unwrap_or(address.len());
+    let (host, path) = address.split_at(end);
+    out.push_str(host.rsplit_once('@').map_or(host, |it| it.1));
+    let Some((path, query)) = path.split_once('?') else {
+        out.push_str(path);
+        return;
+    };
+    out.push_str(path);
+    for (nth, pair) in query.split('&').enumerate() {
+        out.push(if nth == 0 { '?' } else { '&' });
+        match pair.split_once('=') {
+            Some((key, _)) if SECRET_KEYS.contains(&&*key.to_ascii_lowercase()) => {
+                out.extend([key, "=", HIDDEN]);
+            }
+            _ => out.push_str(pair),
+        }
+    }
+}
+
+/// A message about one address, also where it repeats the password alone.
+pub(crate) fn without_password_of(address: &str, message: &str) -> String {
+    let shown = without_passwords(address);
+    let mut message = without_passwords(&message.replace(address, &shown));
+    let host = address.split_once("://").map_or("", |it| it.1);
+    let host = &host[..host.find(['/', '?', '#']).unwrap_or(host.len())];
+    let before = host.rsplit_once('@').map_or("", |it| it.0);
+    let password = before.split_once(':').map_or("", |it| it.1);
+    // What is as short as this stands in any text.
+    const SHORTEST: usize = 3;
+    for secret in [before, password] {
+        if secret.len() >= SHORTEST {
+            message = message.replace(secret, HIDDEN);
+        }
+    }
+    message
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn passwords_are_not_shown() {
+        for (text, expected) in [
+            ("rtsp://10.0.0.5/a@b", "rtsp://10.0.0.5/a@b"),
+            ("udp://@:5000", "udp://:5000"),
+            ("rtsp://me:secret@10.0.0.5:554/a", "rtsp://10.0.0.5:554/a"),
+            ("rtsp://me:s@cret@10.0.0.5", "rtsp://10.0.0.5"),
+            (
+                "http://c/v.cgi?user=me&PWD=888&res=1",
+                "http://c/v.cgi?user=***&PWD=***&res=1",
+            ),
+            (
+                r#"{"source":"rtsp://me:it's@a/b","other":"x@y"}"#,
+                r#"{"source":"rtsp://a/b","other":"x@y"}"#,
+            ),
+            ("a.mp4 and /dev/video0", "a.mp4 and /dev/video0"),
+            (
+                "rtsp://a:1@b/c, then http://d:2@e",
+                "rtsp://b/c, then http://e",
+            ),
+            ("://", "://"),
+        ] {
+            assert_eq!(without_passwords(text), expected);
+        }
+    }
+
+    #[test]
+    fn a_password_that_is_repeated_alone_is_hidden_too() {
+        let hidden = |message: &str| without_password_of("rtsp://me:secret@10.0.0.5/a", message);
+        assert_eq!(hidden("auth me:secret failed"), "auth *** failed");
+        assert_eq!(
+            hidden("rtsp://me:secret@10.0.0.5/a: no"),
+            "rtsp://10.0.0.5/a: no"
+        );
+        assert_eq!(hidden("tcp://secret"), "tcp://***");
+        assert_eq!(without_password_of("rtsp://a/b", "as it is"), "as it is");
+    }
+
+    proptest! {
+        #[test]
+        fn what_has_no_password_stays(text in "[a-z /.:@-]{0,40}") {
+            prop_assume!(!text.contains("://"));
+            prop_assert_eq!(without_passwords(&text), text);
+        }
+    }
+}
