@@ -7,6 +7,7 @@ use scene::{Address, AddressError, Scene, SceneError, View};
 
 use crate::blank::{Blank, BlankError, BlankFeed};
 use crate::info::FeedInfo;
+use crate::recorded::{Recorded, RecordedError, RecordedFeed};
 
 /// Why there are no pictures.
 #[derive(Debug, thiserror::Error)]
@@ -30,6 +31,14 @@ pub enum FeedError {
         /// What is wrong with it.
         source: BlankError,
     },
+    /// The pictures of a recording cannot be used.
+    #[error("{address}")]
+    Recorded {
+        /// As the user wrote it.
+        address: String,
+        /// What is wrong.
+        source: RecordedError,
+    },
     /// The scene of an address cannot be made.
     #[error("{address}")]
     Scene {
@@ -40,7 +49,8 @@ pub enum FeedError {
     },
 }
 
-/// The pictures of a camera, in order: footage, `synth://` (see [`Address`]), or `blank://` (see [`Blank`]).
+/// The pictures of a camera, in order: footage, `synth://` (see [`Address`]), `blank://` (see [`Blank`]), or `run.mcap#left` (see
+/// [`Recorded`]).
 #[derive(Debug)]
 pub enum Feed {
     /// Files.
@@ -49,6 +59,8 @@ pub enum Feed {
     Scene(Box<Stage>),
     /// Grey frames, of a camera whose pictures nobody needs.
     Blank(Box<BlankFeed>),
+    /// Those of a live camera, recorded as they came.
+    Recorded(Box<RecordedFeed>),
 }
 
 /// A camera of a scene.
@@ -73,6 +85,10 @@ impl Feed {
     pub fn look(spec: &SourceSpec) -> Result<FeedInfo, FeedError> {
         if let Some(blank) = blank(spec)? {
             return Ok(BlankFeed::look(&blank, spec)?);
+        }
+        if Recorded::is_recorded(&spec.path) {
+            let info = Recorded::parse(&spec.path).and_then(|it| RecordedFeed::look(&it, spec));
+            return info.map_err(|source| not_recorded(spec, source));
         }
         if !Address::is_address(&spec.path) {
             return Ok(Self::Footage(Box::new(Source::open(spec)?)).info());
@@ -100,6 +116,11 @@ impl Feed {
     pub fn open(spec: &SourceSpec) -> Result<Self, FeedError> {
         if let Some(blank) = blank(spec)? {
             return Ok(Self::Blank(Box::new(BlankFeed::open(&blank, spec)?)));
+        }
+        if Recorded::is_recorded(&spec.path) {
+            let feed = Recorded::parse(&spec.path).and_then(|it| RecordedFeed::open(&it, spec));
+            let feed = feed.map_err(|source| not_recorded(spec, source))?;
+            return Ok(Self::Recorded(Box::new(feed)));
         }
         if !Address::is_address(&spec.path) {
             return Ok(Self::Footage(Box::new(Source::open(spec)?)));
@@ -132,6 +153,7 @@ impl Feed {
             },
             Self::Scene(stage) => stage.info,
             Self::Blank(feed) => feed.info,
+            Self::Recorded(feed) => feed.info,
         }
     }
 
@@ -145,6 +167,7 @@ impl Feed {
             Self::Footage(source) => source.next_frame(),
             Self::Scene(stage) => Ok(stage.next_frame()),
             Self::Blank(feed) => Ok(feed.next_frame()),
+            Self::Recorded(feed) => feed.next_frame(),
         }
     }
 
@@ -154,6 +177,7 @@ impl Feed {
             Self::Footage(source) => source.pixels(),
             Self::Scene(stage) => &stage.rgb,
             Self::Blank(feed) => &feed.rgb,
+            Self::Recorded(feed) => &feed.rgb,
         }
     }
 
@@ -161,7 +185,7 @@ impl Feed {
     pub fn is_still(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Still,
-            Self::Scene(_) => false,
+            Self::Scene(_) | Self::Recorded(_) => false,
             Self::Blank(_) => true,
         }
     }
@@ -170,7 +194,7 @@ impl Feed {
     pub fn is_video(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Video,
-            Self::Scene(_) | Self::Blank(_) => false,
+            Self::Scene(_) | Self::Blank(_) | Self::Recorded(_) => false,
         }
     }
 
@@ -188,6 +212,7 @@ impl Feed {
                 Ok(n)
             }
             Self::Blank(feed) => Ok(feed.skip(n)),
+            Self::Recorded(feed) => Ok(feed.skip(n)),
         }
     }
 }
@@ -229,6 +254,16 @@ fn blank(spec: &SourceSpec) -> Result<Option<Blank>, FeedError> {
         source,
     })?;
     Ok(Some(blank))
+}
+
+fn not_recorded(spec: &SourceSpec, source: RecordedError) -> FeedError {
+    match source {
+        RecordedError::Choice(error) => FeedError::Footage(error),
+        source => FeedError::Recorded {
+            address: spec.path.clone(),
+            source,
+        },
+    }
 }
 
 fn address(spec: &SourceSpec) -> Result<Address, FeedError> {

@@ -7,8 +7,10 @@ mod feed;
 mod guard;
 mod info;
 mod job;
+mod kept;
 mod live;
 mod live_service;
+mod recorded;
 mod service;
 mod supply;
 
@@ -17,4 +19,5 @@ pub use feed::{Feed, FeedError, Stage};
 pub use info::FeedInfo;
 pub use job::Job;
 pub use live::{LiveCamera, LiveError, LiveJob, take_picture};
+pub use recorded::{Recorded, RecordedError};
 pub use service::run;

@@ -1,6 +1,7 @@
 //! A live camera: its pictures are brought to the instants that all cameras of a run have in common.
 //!
-//! Reading order: [`LiveCamera`] (what to open), `input` (a device or a stream that is open), `source` (the thread that keeps
+//! Reading order: [`LiveCamera`] (what to open), `input` (a device or a stream that is open), `originals` (its
+//! pictures as they came, for a recording), `source` (the thread that keeps
 //! it open, and the newest pictures), `grid` (which instant a picture belongs to), `phase` (how far
 //! pictures are from their instants).
 
@@ -8,6 +9,7 @@ mod address;
 mod clock;
 mod grid;
 mod input;
+mod originals;
 mod phase;
 mod source;
 
@@ -15,6 +17,7 @@ pub use address::{LiveCamera, LiveError};
 pub use input::take_picture;
 
 pub(crate) use grid::Grid;
+pub(crate) use originals::{Original, Originals};
 pub(crate) use phase::Phase;
 pub(crate) use source::{Picture, Source};
 
@@ -27,6 +30,8 @@ pub struct LiveJob {
     pub size: footage::Size,
     /// Common instants per second, before `frame_step`.
     pub rate_hz: f64,
+    /// Whether its pictures are recorded as they come.
+    pub is_kept: bool,
     /// Its name.
     pub name: String,
     /// How far its pictures may be from the instants before a warning, nanoseconds.

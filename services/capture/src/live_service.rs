@@ -8,6 +8,7 @@ use runtime::{Failure, Service, now_nanos};
 use crate::camera::{Camera, Shot};
 use crate::guard::Guard;
 use crate::job::Job;
+use crate::kept::Kept;
 use crate::live::{Grid, LiveJob, Phase, Picture, Source};
 
 /// How long after its instant a picture is still waited for: this long and two periods.
@@ -50,13 +51,14 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
     let step = job.source.step as f64;
     let grid = Grid::new(service.session() + live.lead_nanos, live.rate_hz / step);
     let noted = camera.wait_for_receivers();
+    let mut kept = Kept::open(service, job, live, &grid)?;
     // Instants that passed while the process was dead are lost.
     let at = noted.map_or(0, |sent| sent.max(grid.latest(now_nanos()) + 1));
     let mut it = Live {
         camera,
         job,
         wanted: live,
-        source: Source::start(&live.camera, live.size)?,
+        source: Source::start(&live.camera, live.size, kept.as_ref().map(Kept::originals))?,
         phase: Phase::new(grid.period_nanos()),
         grid,
         guard: Guard::new(job.frozen_after, Some(live.rate_hz)),
@@ -77,6 +79,12 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
         }
         it.give_up_overdue(n_frames)?;
         it.count();
+        if let Some(kept) = &mut kept {
+            kept.send_all()?;
+        }
+    }
+    if let Some(kept) = &mut kept {
+        kept.end()?;
     }
     // What still waits has no place any more.
     while let Some(picture) = it.source.next(Duration::ZERO) {

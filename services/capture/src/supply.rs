@@ -307,6 +307,7 @@ impl Supply {
             Err(
                 FeedError::Address { address, .. }
                 | FeedError::Blank { address, .. }
+                | FeedError::Recorded { address, .. }
                 | FeedError::Scene { address, .. },
             ) => {
                 return Err(FootageError::NotFound { path: address });

@@ -5,7 +5,9 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use deployment::{Content, Deployment, Process, Room, Stage, Topology, ViewSize};
-use messages::{EvidenceHeader, FrameHeader, PairPose, Pose3d, ViewPose, ViewQuality};
+use messages::{
+    EvidenceHeader, FrameHeader, PairPose, PictureHeader, Pose3d, ViewPose, ViewQuality,
+};
 use runtime::{
     Delivery, ExitKind, Failure, HEARTBEAT, Limits, Namespace, OrFail as _, TopicPlan, now_nanos,
     process_topics,
@@ -96,20 +98,25 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
 ///
 /// * `names`: the names of its processes.
 pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String]) -> Vec<TopicPlan> {
-    let sizes = prepared.views.iter().map(|it| ViewSize {
-        frame_bytes: it
-            .framing
-            .out_size()
-            .map(|side| side as usize)
-            .iter()
-            .product::<usize>()
-            * 3,
-        evidence_values: if resolved.deployment.has_maps() {
-            it.plan.layout().n_responses().min(pipeline::MOST_VALUES)
-        } else {
-            it.plan.layout().n_responses()
-        },
-    });
+    let sizes = prepared
+        .views
+        .iter()
+        .enumerate()
+        .map(|(view, it)| ViewSize {
+            picture_bytes: picture_bytes(resolved, view),
+            frame_bytes: it
+                .framing
+                .out_size()
+                .map(|side| side as usize)
+                .iter()
+                .product::<usize>()
+                * 3,
+            evidence_values: if resolved.deployment.has_maps() {
+                it.plan.layout().n_responses().min(pipeline::MOST_VALUES)
+            } else {
+                it.plan.layout().n_responses()
+            },
+        });
     let delivery = resolved.delivery();
     let held_frames = if resolved.deployment.has_network() && delivery == Delivery::Realtime {
         quality::HELD_REALTIME
@@ -124,12 +131,28 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
     between.chain(of_processes).collect()
 }
 
+/// The largest picture of a live camera as it comes, bytes, if it is recorded: no format is larger than RGB, and a small picture
+/// may carry tables.
+fn picture_bytes(resolved: &Resolved, view: usize) -> usize {
+    const TABLES: usize = 1 << 16;
+    let recording = resolved.recording.as_ref();
+    let is_kept = recording.is_some_and(|it| it.pictures.contains(&view));
+    let size = resolved.footage.get(view).filter(|_| is_kept);
+    size.map_or(0, |it| {
+        let [width, height] = it.size.map(|side| side as usize);
+        width * height * 3 + TABLES
+    })
+}
+
 /// The plan of a topic with the given limits and message sizes.
 fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
     let limits = Limits::new(room.receivers, room.queued, room.borrowed);
     let (topic, longest) = (room.topic, room.longest);
     let plan = match room.content {
         Content::Frame => TopicPlan::slices::<u8, FrameHeader>(topic, delivery, limits, longest),
+        Content::Picture => {
+            TopicPlan::slices::<u8, PictureHeader>(topic, delivery, limits, longest)
+        }
         Content::Evidence => {
             TopicPlan::slices::<f32, EvidenceHeader>(topic, delivery, limits, longest)
         }

@@ -397,6 +397,7 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
             n_views: prepared.views.len(),
             n_workers: topology.n_workers(),
             has_quality: resolved.deployment.has_quality(),
+            pictures: plan.pictures.clone(),
             processes: topology
                 .processes()
                 .iter()
@@ -458,6 +459,7 @@ mod tests {
             without_pixels: false,
             without_evidence: false,
             queue_mb: 1,
+            pictures: Vec::new(),
         };
         let topology = Topology::new(&loaded.deployment, Some(&recording), None);
         let services = topology.processes().iter().map(|it| it.service);

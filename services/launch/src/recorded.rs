@@ -133,7 +133,8 @@ pub fn damaged(
         Some(Kind::Evidence) => (Stage::Quality..=Stage::Fuse).contains(&from),
         Some(Kind::ViewQuality) => from > Stage::Quality,
         Some(Kind::PairPose) => from > Stage::Fuse,
-        Some(Kind::Pose3d | Kind::Health) | None => false,
+        // Pictures of cameras are checked as they are read.
+        Some(Kind::Pose3d | Kind::Health | Kind::Picture) | None => false,
     };
     let mut input = File::open(file).map_err(|error| runtime::in_file(file, &error))?;
     recording::check(&mut input, recording, is_replayed)

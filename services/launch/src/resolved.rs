@@ -65,6 +65,13 @@ impl Resolved {
         cameras.any(|it| inputs::is_live(&it.source))
     }
 
+    /// Views with a live camera.
+    pub fn live_views(&self) -> Vec<usize> {
+        let cameras = self.deployment.cameras.iter().enumerate();
+        let live = cameras.filter(|it| inputs::is_live(&it.1.source));
+        live.map(|it| it.0).collect()
+    }
+
     /// Instants per second that live cameras are brought together at, before `frame_step`: as the deployment says, else the
     /// rate of the slowest.
     pub fn instants_hz(&self) -> f64 {
@@ -91,8 +98,8 @@ impl Resolved {
 
     /// Writes it to a file, for the user, without passwords of cameras.
     pub(crate) fn write(&self, file: &Path) -> Result<(), Failure> {
-        let text = footage::without_passwords(&self.to_text()?);
-        std::fs::write(file, text).map_err(|error| runtime::in_file(file, &error))
+        std::fs::write(file, footage::without_passwords(&self.to_text()?))
+            .map_err(|error| runtime::in_file(file, &error))
     }
 
     /// The text that every process gets as standard input.

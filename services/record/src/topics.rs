@@ -12,6 +12,8 @@ pub struct Topics {
     pub n_workers: usize,
     /// Whether there are processes that send expected errors.
     pub has_quality: bool,
+    /// Views whose live cameras' pictures are kept as they came.
+    pub pictures: Vec<usize>,
     /// Names of all processes.
     pub processes: Vec<String>,
 }
@@ -35,6 +37,9 @@ impl Topics {
         }
         for view in 0..self.n_views {
             let from = |service: &str| Some(format!("{service}-{view}"));
+            if self.pictures.contains(&view) {
+                add(Kind::Picture, topic::picture(view), None);
+            }
             add(Kind::Frame, topic::frame(view), from("capture"));
             if !without.evidence {
                 add(Kind::Evidence, topic::evidence(view), None);
@@ -61,10 +66,12 @@ impl Topics {
     }
 }
 
-/// Indices of the topics whose messages a topic counts: heartbeats count the messages of their process, and poses announce
-/// their evidence.
+/// Indices of the topics whose messages a topic counts: heartbeats count the messages of their process, poses announce their
+/// evidence, and pictures are numbered.
 pub(crate) fn counted_by(counter: &Channel, channels: &[Channel]) -> Vec<usize> {
     let is_counted = |other: &Channel| match counter.kind {
+        // Their numbers count themselves.
+        Kind::Picture => other.name == counter.name,
         Kind::Health => {
             let sender = other.sender.as_ref();
             sender.is_some_and(|sender| topic::health(sender) == counter.name)
@@ -89,6 +96,7 @@ mod tests {
             n_views: 2,
             n_workers: 1,
             has_quality: true,
+            pictures: vec![1],
             processes: ["results", "pose-1", "fuse-0"].map(str::to_owned).into(),
         };
         topics.channels(without)
@@ -97,7 +105,7 @@ mod tests {
     #[test]
     fn every_topic_is_recorded_with_its_kind() {
         let all = channels(Without::default());
-        assert_eq!(all.len(), 3 + 2 * 4 + 1 + 1);
+        assert_eq!(all.len(), 3 + 2 * 4 + 1 + 1 + 1);
         for channel in &all {
             assert_eq!(Kind::of_topic(&channel.name), Some(channel.kind));
         }
@@ -122,6 +130,7 @@ mod tests {
         assert_eq!(counted(&topic::health("pose-1")), [topic::view_pose(1)]);
         assert_eq!(counted(&topic::health("fuse-0")), [topic::pair_pose(0)]);
         assert_eq!(counted(&topic::view_pose(1)), [topic::evidence(1)]);
+        assert_eq!(counted(&topic::picture(1)), [topic::picture(1)]);
         assert_eq!(counted(&topic::health("results")), Vec::<String>::new());
     }
 }

@@ -16,7 +16,8 @@ pub struct Camera {
     pub name: String,
     /// A video, an image, a folder of images, a glob such as `frames/*.png`, or a scene that is made while it
     /// runs: `synth://humaneva?camera=C1&action=walking&subject=3&seed=1`. Or a live camera: `/dev/video0`,
-    /// `/dev/v4l/by-id/...`, `rtsp://...`, `udp://...`, `http://...`. With `keypoints` it may be left out.
+    /// `/dev/v4l/by-id/...`, `rtsp://...`, `udp://...`, `http://...`; or one of a recording: `run.mcap#left`. With `keypoints`
+    /// it may be left out.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub source: String,
     /// Keypoints that another program found in the footage: a folder with a JSON file for every frame, in the layout of OpenPose,

@@ -82,7 +82,7 @@ pub(crate) fn process_name(service: &str, index: Option<usize>) -> String {
 }
 
 /// The file that every message of a run is recorded in.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RecordingPlan {
     /// Its name, absolute.
     pub file: PathBuf,
@@ -92,6 +92,9 @@ pub struct RecordingPlan {
     pub without_evidence: bool,
     /// Bytes that may wait to be written, in millions.
     pub queue_mb: u64,
+    /// Views whose live cameras' pictures are kept as they came, ascending.
+    #[serde(default)]
+    pub pictures: Vec<usize>,
 }
 
 /// A recording that stands in for the first stages of a run.
@@ -171,6 +174,7 @@ impl Topology {
             has_quality: deployment.has_quality(),
             has_network: deployment.has_network(),
             with_evidence: recording.is_some_and(|it| !it.without_evidence),
+            pictures: recording.map_or(&[], |it| &it.pictures),
         };
         let mut processes = builder.processes(recording.is_some());
         for it in &mut processes {
@@ -255,6 +259,8 @@ struct Builder<'a> {
     has_quality: bool,
     has_network: bool,
     with_evidence: bool,
+    /// Views whose pictures are recorded as they came.
+    pictures: &'a [usize],
 }
 
 impl Builder<'_> {
@@ -265,6 +271,7 @@ impl Builder<'_> {
         if is_recorded {
             let bulk = views().filter(|_| self.with_evidence).map(topic::evidence);
             let inputs = self.everything().into_iter().chain(bulk);
+            let inputs = inputs.chain(self.pictures.iter().copied().map(topic::picture));
             processes.push(process(
                 RECORD,
                 None,
@@ -304,16 +311,16 @@ impl Builder<'_> {
                 outputs,
             )
         }));
-        processes.extend(views().map(|view| {
-            process(
-                Stage::Capture.name(),
-                Some(view),
-                Role::Redundant,
-                vec![],
-                vec![topic::frame(view)],
-            )
-        }));
+        processes.extend(views().map(|view| self.capture(view)));
         processes
+    }
+
+    fn capture(&self, view: usize) -> Process {
+        let mut outputs = vec![topic::frame(view)];
+        let is_kept = self.pictures.contains(&view);
+        outputs.extend(is_kept.then(|| topic::picture(view)));
+        let service = Stage::Capture.name();
+        process(service, Some(view), Role::Redundant, vec![], outputs)
     }
 
     /// All topics but evidence.

@@ -10,7 +10,9 @@ mod size;
 mod source;
 mod spec;
 
+mod pieces;
 mod pixels;
+mod remade;
 mod stream;
 mod warp;
 
@@ -24,7 +26,9 @@ pub use overlay::{
     Tile, compose, draw_limbs, line_width, text_width,
 };
 pub use pacer::Pacer;
+pub use pieces::{Piece, PieceKind, Pieces};
 pub use pixels::PixelFormat;
+pub use remade::RemadeStream;
 pub use size::Size;
 pub use source::{
     FrameView, LiveAddress, Source, SourceInfo, SourceKind, Turn, is_address, is_image, is_live,

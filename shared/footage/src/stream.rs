@@ -2,11 +2,12 @@
 
 use core::fmt;
 use std::ffi::OsString;
-use std::io::{ErrorKind, Read as _};
+use std::io::{self, ErrorKind, Read, pipe};
 use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
-use std::process::{Child, ChildStdout, Command, Output, Stdio};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -14,14 +15,33 @@ use crate::source::LiveAddress;
 use crate::source::log::{Log, summary};
 use crate::source::password::without_password_of;
 use crate::source::probe::{fraction, has_fps_mode, missing};
-use crate::{FootageError, Size};
+use crate::{FootageError, Pieces, Size};
 
 /// How long a stream may be silent before it counts as gone, seconds.
 const SILENCE_S: u64 = 5;
+/// How long a stream may take to show what it is: longer than any time limit of the decoder.
+const PATIENCE: Duration = Duration::from_secs(20);
 /// Slowest and fastest rate that a header is believed, frames per second.
 const RATES_HZ: [f64; 2] = [1.0, 1000.0];
 /// What the decoder says the size of a frame by: rows of the eighth part of the picture in grey.
-const SHARE: usize = 8;
+pub(crate) const SHARE: usize = 8;
+/// The packets as they came, every picture a cluster of its own, to the pipe in place of the standard input.
+const AS_IT_CAME: [&str; 14] = [
+    "-map",
+    "0:v:0",
+    "-c:v",
+    "copy",
+    "-f",
+    "matroska",
+    "-cluster_time_limit",
+    "1",
+    "-flush_packets",
+    "1",
+    "-avoid_negative_ts",
+    "disabled",
+    "-y",
+    "pipe:0",
+];
 
 /// How the packets of an RTSP camera travel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +63,8 @@ pub struct StreamSpec {
     pub ffmpeg: PathBuf,
     /// The `ffprobe` executable.
     pub ffprobe: PathBuf,
+    /// Whether the packets are wanted as they came, beside the pictures.
+    pub keeps: bool,
 }
 
 /// One frame of a stream.
@@ -51,6 +73,9 @@ pub struct StreamFrame {
     /// Its presentation time on the clock of the camera, nanoseconds after any moment; none where the stream has no
     /// times of its own.
     pub presented_nanos: Option<i64>,
+    /// Its time as the decoder has it, nanoseconds, also where that is made up: [`Piece::nanos`](crate::Piece::nanos) to a
+    /// millisecond.
+    pub label_nanos: i64,
 }
 
 /// A running decoder of a stream. It is killed when this is dropped.
@@ -63,11 +88,12 @@ pub struct LiveStream {
     child: StreamEnd,
     stdout: ChildStdout,
     log: Log,
+    pieces: Option<Pieces>,
 }
 
 /// Ends a stream from another thread than the one that waits for its frames.
 #[derive(Debug, Clone)]
-pub struct StreamEnd(Arc<Mutex<Child>>);
+pub struct StreamEnd(pub(crate) Arc<Mutex<Child>>);
 
 impl StreamEnd {
     /// Ends the decoder.
@@ -87,6 +113,7 @@ impl StreamSpec {
             transport: None,
             ffmpeg: "ffmpeg".into(),
             ffprobe: "ffprobe".into(),
+            keeps: false,
         }
     }
 
@@ -97,19 +124,18 @@ impl StreamSpec {
     /// [`FootageError::Stream`] if nobody answers, or it is no video; [`FootageError::FfmpegMissing`].
     pub fn probe(&self) -> Result<(Size, Option<f64>), FootageError> {
         let entries = "stream=width,height,avg_frame_rate,r_frame_rate";
-        let run = Command::new(&self.ffprobe)
+        let mut command = Command::new(&self.ffprobe);
+        command
             .args(["-v", "error", "-select_streams", "v:0", "-of", "json"])
             .args(["-show_entries", entries])
             .args(self.input_options())
             .arg(&self.address)
-            .stdin(Stdio::null())
-            .process_group(0)
-            .output();
-        let Output {
-            status,
-            stdout,
-            stderr,
-        } = run.map_err(|source| missing(&self.ffprobe, self.shown().as_ref(), source))?;
+            .process_group(0);
+        let run = output_within(command, PATIENCE);
+        let run = run.map_err(|source| missing(&self.ffprobe, self.shown().as_ref(), source))?;
+        let Some((status, stdout, stderr)) = run else {
+            return Err(self.failed("nobody answers"));
+        };
         if !status.success() {
             return Err(self.failed(&summary(&stderr)));
         }
@@ -132,13 +158,21 @@ impl StreamSpec {
     /// [`FootageError::FfmpegMissing`]. Whether somebody answers shows at the first frame.
     pub fn open(&self, size: Size) -> Result<LiveStream, FootageError> {
         let not_started = |source| missing(&self.ffmpeg, self.shown().as_ref(), source);
+        // The third pipe that a child has is its standard input, which it can write to as to any other.
+        let (kept, to_keep) = if self.keeps {
+            let (reader, writer) = pipe().map_err(not_started)?;
+            (Some(reader), Some(writer))
+        } else {
+            (None, None)
+        };
         let mut child = Command::new(&self.ffmpeg)
             .args(["-nostdin", "-v", "error"])
             .args(self.input_options())
             .args(["-copyts", "-i"])
             .arg(&self.address)
-            .args(self.outputs())
-            .stdin(Stdio::null())
+            .args(outputs(&self.ffmpeg))
+            .args(to_keep.iter().flat_map(|_| AS_IT_CAME))
+            .stdin(to_keep.map_or_else(Stdio::null, Stdio::from))
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             // Signals of the terminal end the run, and the run ends the decoder.
@@ -148,7 +182,9 @@ impl StreamSpec {
         let no_pipe = || not_started(ErrorKind::BrokenPipe.into());
         let stdout = child.stdout.take().ok_or_else(no_pipe)?;
         let stderr = child.stderr.take().ok_or_else(no_pipe)?;
+        let pieces = kept.map(Pieces::follow).transpose().map_err(not_started)?;
         Ok(LiveStream {
+            pieces,
             address: self.address.clone(),
             shown: self.shown(),
             size,
@@ -166,10 +202,7 @@ impl StreamSpec {
 
     /// The error, without a password that the decoder repeats.
     fn failed(&self, message: &str) -> FootageError {
-        failed(
-            &self.shown(),
-            &without_password_of(&self.address, message),
-        )
+        failed(&self.shown(), &without_password_of(&self.address, message))
     }
 
     fn is(&self, scheme: &str) -> bool {
@@ -204,34 +237,74 @@ impl StreamSpec {
         }
         options.into_iter().map(OsString::from).collect()
     }
+}
 
-    /// The pixels; and time and size of each frame on standard error.
-    fn outputs(&self) -> Vec<String> {
-        let mode = if has_fps_mode(&version_of(&self.ffmpeg)) {
-            "-fps_mode"
-        } else {
-            "-vsync"
-        };
-        let common = ["-map", "0:v:0", mode, "passthrough", "-autoscale", "0"];
-        let shrink = format!("crop=iw:trunc(ih/{SHARE}):0:0:exact=1,format=gray");
-        let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
-        let times = [
-            "-vf",
-            &shrink,
-            "-enc_time_base",
-            "1:1000000",
-            "-flush_packets",
-            "1",
-        ];
-        let all = [
-            &common[..],
-            &pixels,
-            &common,
-            &times,
-            &["-f", "framecrc", "pipe:2"],
-        ];
-        all.concat().into_iter().map(str::to_owned).collect()
+/// The pixels; and time and size of each frame on standard error.
+pub(crate) fn outputs(ffmpeg: &PathBuf) -> Vec<String> {
+    let mode = if has_fps_mode(&version_of(ffmpeg)) {
+        "-fps_mode"
+    } else {
+        "-vsync"
+    };
+    let common = ["-map", "0:v:0", mode, "passthrough", "-autoscale", "0"];
+    let shrink = format!("crop=iw:trunc(ih/{SHARE}):0:0:exact=1,format=gray");
+    let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
+    let times = [
+        "-vf",
+        &shrink,
+        "-enc_time_base",
+        "1:1000000",
+        "-flush_packets",
+        "1",
+    ];
+    let all = [
+        &common[..],
+        &pixels,
+        &common,
+        &times,
+        &["-f", "framecrc", "pipe:2"],
+    ];
+    all.concat().into_iter().map(str::to_owned).collect()
+}
+
+/// Runs a program to its end, and returns what it wrote; none if it has to be killed because the time is over.
+fn output_within(
+    mut command: Command,
+    limit: Duration,
+) -> io::Result<Option<(ExitStatus, Vec<u8>, Vec<u8>)>> {
+    const PAUSE: Duration = Duration::from_millis(10);
+    let mut child = command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()?;
+    let pipes: [Option<Box<dyn Read + Send>>; 2] = [
+        child.stdout.take().map(|it| Box::new(it) as _),
+        child.stderr.take().map(|it| Box::new(it) as _),
+    ];
+    let read = |pipe: Option<Box<dyn Read + Send>>| {
+        std::thread::Builder::new().spawn(move || {
+            let mut bytes = Vec::new();
+            // What could be read up to an error counts.
+            pipe.map(|mut it| it.read_to_end(&mut bytes).ok());
+            bytes
+        })
+    };
+    let [stdout, stderr] = pipes.map(read);
+    let begin = Instant::now();
+    let status = loop {
+        match child.try_wait()? {
+            Some(status) => break Some(status),
+            None if begin.elapsed() > limit => break None,
+            None => std::thread::sleep(PAUSE),
+        }
+    };
+    if status.is_none() {
+        child.kill()?;
+        child.wait()?;
     }
+    let [stdout, stderr] = [stdout?, stderr?].map(|it| it.join().unwrap_or_default());
+    Ok(status.map(|it| (it, stdout, stderr)))
 }
 
 /// The version of `ffmpeg`; empty if it does not tell.
@@ -293,10 +366,17 @@ impl LiveStream {
                 expected: self.size,
             });
         }
+        // Not a number becomes 0.
         let nanos = (time.time_s * 1e9).round() as i64;
         Ok(StreamFrame {
+            label_nanos: nanos,
             presented_nanos: (self.has_times && time.time_s.is_finite()).then_some(nanos),
         })
+    }
+
+    /// The stream as it came, if that was asked for.
+    pub fn pieces(&self) -> Option<&Pieces> {
+        self.pieces.as_ref()
     }
 
     /// Ends this stream from another thread.
@@ -332,6 +412,21 @@ mod tests {
             .to_string();
         assert!(!said.contains("secret"), "{said}");
         assert!(said.contains("Connection refused"), "{said}");
+    }
+
+    #[test]
+    fn a_program_that_does_not_end_is_killed() {
+        let mut command = Command::new("sleep");
+        command.arg("1000");
+        assert!(
+            output_within(command, Duration::from_millis(50))
+                .unwrap()
+                .is_none()
+        );
+        let mut command = Command::new("echo");
+        command.arg("here");
+        let (status, stdout, _) = output_within(command, PATIENCE).unwrap().unwrap();
+        assert!(status.success() && stdout == b"here\n");
     }
 
     #[test]

@@ -5,5 +5,6 @@ mod clip;
 
 mod bad_input;
 mod conformance;
+mod kept;
 mod overlay;
 mod warp;

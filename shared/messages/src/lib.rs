@@ -11,6 +11,7 @@ mod evidence;
 mod frame;
 mod health;
 mod metrics;
+mod picture;
 mod pose;
 mod pose3d;
 mod quality;
@@ -25,6 +26,7 @@ pub use metrics::{
     CameraCounts, Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE,
     NO_VIEW, Span, UNMEASURED,
 };
+pub use picture::{NO_SEQUENCE, PictureHeader};
 pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
 pub use pose3d::{FusedView, Joint3d, Kept, Pose3d, Sides};
 pub use quality::ViewQuality;
@@ -50,6 +52,7 @@ const _: () = {
     assert!(size_of::<Stamp>() == 32);
     assert!(size_of::<Timing>() == 16);
     assert!(size_of::<FrameHeader>() == 128);
+    assert!(size_of::<PictureHeader>() == 192);
     assert!(size_of::<EvidenceHeader>() == 1088);
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<LocalMessage>() == 12);

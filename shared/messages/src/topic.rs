@@ -9,6 +9,12 @@ pub fn frame(view: usize) -> String {
     format!("frame/v1/{view}")
 }
 
+/// Pictures of the live camera of a view as they came, for recordings: `[u8]` with [`PictureHeader`](crate::PictureHeader).
+#[must_use]
+pub fn picture(view: usize) -> String {
+    format!("picture/v1/{view}")
+}
+
 /// Single-view candidates of a view: [`ViewPose`](crate::ViewPose).
 #[must_use]
 pub fn view_pose(view: usize) -> String {

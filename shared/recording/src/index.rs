@@ -99,9 +99,10 @@ impl Recording {
         self.extent.missing.values().sum()
     }
 
-    /// When the first and the last message with a time were sent, without heartbeats.
+    /// When the first and the last message with a time were sent, without heartbeats and pictures of cameras.
     pub fn span(&self) -> Option<[u64; 2]> {
-        let stamped = self.tracks.values().filter(|it| it.kind != Kind::Health);
+        let is_stamped = |it: &&Track| !matches!(it.kind, Kind::Health | Kind::Picture);
+        let stamped = self.tracks.values().filter(is_stamped);
         let times = stamped.flat_map(|it| &it.entries).map(|it| it.publish_time);
         let times = times.filter(|it| *it > 0);
         times.fold(None, |span, it| {

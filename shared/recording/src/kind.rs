@@ -1,7 +1,8 @@
 //! The message types of topics: their sizes and schemas.
 
 use messages::{
-    EvidenceHeader, FrameHeader, Health, PairPose, Pose3d, ViewPose, ViewQuality, topic,
+    EvidenceHeader, FrameHeader, Health, PairPose, PictureHeader, Pose3d, ViewPose, ViewQuality,
+    topic,
 };
 
 /// A type of message.
@@ -21,6 +22,8 @@ pub enum Kind {
     Pose3d,
     /// Heartbeats of a process.
     Health,
+    /// Pictures of a live camera as they came.
+    Picture,
 }
 
 /// The types that a schema may refer to.
@@ -36,7 +39,7 @@ const PARTS: [(&str, &str); 7] = [
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Frame,
         Self::Evidence,
         Self::ViewPose,
@@ -44,6 +47,7 @@ impl Kind {
         Self::PairPose,
         Self::Pose3d,
         Self::Health,
+        Self::Picture,
     ];
 
     /// The message type of a topic; none for an unknown one.
@@ -71,6 +75,7 @@ impl Kind {
             Self::PairPose => topic::pair_pose(0),
             Self::Pose3d => topic::pose3d(),
             Self::Health => topic::health("any"),
+            Self::Picture => topic::picture(0),
         }
     }
 
@@ -84,13 +89,14 @@ impl Kind {
             Self::PairPose => size_of::<PairPose>(),
             Self::Pose3d => size_of::<Pose3d>(),
             Self::Health => size_of::<Health>(),
+            Self::Picture => size_of::<PictureHeader>(),
         }
     }
 
     /// Size of an element of its array, bytes; none if it has no array.
     pub fn element_bytes(self) -> Option<usize> {
         match self {
-            Self::Frame => Some(size_of::<u8>()),
+            Self::Frame | Self::Picture => Some(size_of::<u8>()),
             Self::Evidence => Some(size_of::<f32>()),
             _ => None,
         }
@@ -105,6 +111,7 @@ impl Kind {
             Self::ViewQuality => Some(core::mem::offset_of!(ViewQuality, status)),
             Self::PairPose => Some(core::mem::offset_of!(PairPose, status)),
             Self::Pose3d => Some(core::mem::offset_of!(Pose3d, status)),
+            Self::Picture => Some(core::mem::offset_of!(PictureHeader, status)),
             Self::Health => None,
         }
     }
@@ -119,6 +126,7 @@ impl Kind {
             Self::PairPose => "parallax/msg/PairPose",
             Self::Pose3d => "parallax/msg/Pose3d",
             Self::Health => "parallax/msg/Health",
+            Self::Picture => "parallax/msg/Picture",
         }
     }
 
@@ -131,6 +139,7 @@ impl Kind {
             Self::PairPose => include_str!("../msg/PairPose.msg"),
             Self::Pose3d => include_str!("../msg/Pose3d.msg"),
             Self::Health => include_str!("../msg/Health.msg"),
+            Self::Picture => include_str!("../msg/Picture.msg"),
         }
     }
 

@@ -149,7 +149,9 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use bytemuck::{Zeroable as _, cast_slice};
-    use messages::{EvidenceHeader, FrameHeader, PairPose, Pose3d, ViewPose, ViewQuality};
+    use messages::{
+        EvidenceHeader, FrameHeader, PairPose, PictureHeader, Pose3d, ViewPose, ViewQuality,
+    };
     use proptest::prelude::*;
 
     use super::*;
@@ -176,6 +178,8 @@ mod tests {
         let (mut frame, mut evidence) = (FrameHeader::default(), EvidenceHeader::default());
         let (mut pose, mut quality) = (ViewPose::default(), ViewQuality::default());
         let (mut pair, mut pose3d) = (PairPose::default(), Pose3d::zeroed());
+        let mut picture = PictureHeader::default();
+        (picture.stamp, picture.timing, picture.status) = (it.stamp, it.timing, it.status);
         (frame.stamp, frame.timing, frame.status) = (it.stamp, it.timing, it.status);
         (evidence.stamp, evidence.timing, evidence.status) = (it.stamp, it.timing, it.status);
         (pose.stamp, pose.timing, pose.status) = (it.stamp, it.timing, it.status);
@@ -189,6 +193,7 @@ mod tests {
             (Kind::ViewQuality, bytes_of(&quality)),
             (Kind::PairPose, bytes_of(&pair)),
             (Kind::Pose3d, bytes_of(&pose3d)),
+            (Kind::Picture, bytes_of(&picture)),
         ];
         heads.map(|(kind, bytes)| (kind, bytes.to_vec())).into()
     }

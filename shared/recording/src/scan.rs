@@ -10,6 +10,7 @@ use crate::checks::{Checks, TAG};
 use crate::contents::Contents;
 use crate::cursor::{Cursor, Stop};
 use crate::mcap::{MAGIC, MAX_RECORD_BYTES, RECORD_HEAD_BYTES, metadata, op};
+use crate::message::PREAMBLE;
 use crate::seal::unseal;
 use crate::{Checked, Entry, Kind, Message, Recording, about, chunk, message, older};
 
@@ -94,6 +95,23 @@ pub fn read<'a, R: Read + Seek>(
         return Err(ReadError::Checksum { offset });
     }
     Message::parse(kind, buffer).map_err(|source| ReadError::Message { offset, source })
+}
+
+/// Reads the struct of a message into `buffer`, without its array, and so without its checksum.
+///
+/// # Errors
+///
+/// [`ReadError::Read`].
+pub fn read_head<'a, R: Read + Seek>(
+    input: &mut R,
+    kind: Kind,
+    entry: &Entry,
+    buffer: &'a mut Vec<u8>,
+) -> Result<&'a [u8], ReadError> {
+    input.seek(SeekFrom::Start(entry.offset + PREAMBLE.len() as u64))?;
+    buffer.resize(kind.head_bytes(), 0);
+    input.read_exact(buffer)?;
+    Ok(buffer)
 }
 
 /// A damaged message.

@@ -90,6 +90,14 @@ impl Grid {
         })
     }
 
+    /// Learns the period of the camera from the times of its first pictures, ascending.
+    pub(crate) fn learn(&mut self, times: impl Iterator<Item = u64>) {
+        for at_nanos in times.take(N_INTERVALS + 1) {
+            self.wrong_clock(at_nanos, at_nanos);
+        }
+        self.last = None;
+    }
+
     /// The instant that a picture belongs to: `next`, or a later one; none if all that are near have one.
     ///
     /// A picture is at most half a period away, of a camera that is faster than the instants half a period of its own, and in

@@ -2,12 +2,16 @@
 
 use core::time::Duration;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::thread;
 
-use footage::{LiveAddress, LiveStream, PixelFormat, Size, StreamEnd};
+use footage::{LiveAddress, LiveStream, PixelFormat, Size, StreamEnd, StreamSpec};
 use runtime::{VideoAbout, VideoDevice, VideoStream, now_nanos, video_devices};
 
 use super::address::{LiveCamera, LiveError, size_of};
 use super::clock::ClockMap;
+use super::originals::{KeptStream, Original, Originals};
 
 /// Longest wait for a picture of a device, so that a stop is noticed.
 const PAUSE: Duration = Duration::from_millis(100);
@@ -40,18 +44,25 @@ pub(super) enum Input {
 
 impl Input {
     /// * `before`: the device that was open before, which may have another number now.
+    /// * `originals`: takes what is to be kept as it comes, if anything is.
     pub(super) fn open(
         camera: &LiveCamera,
         size: Size,
         before: Option<&VideoAbout>,
+        originals: Option<&Arc<Originals>>,
     ) -> Result<Self, LiveError> {
         match &camera.address {
             LiveAddress::Device(path) => {
-                let device = Device::open(camera, path, size, before)?;
+                let device = Device::open(camera, path, size, before, originals)?;
                 Ok(Self::Device(Box::new(device)))
             }
             LiveAddress::Stream(address) => Ok(Self::Stream(Box::new(Stream {
-                decoder: camera.stream(address).open(size)?,
+                decoder: StreamSpec {
+                    keeps: originals.is_some(),
+                    ..camera.stream(address)
+                }
+                .open(size)?,
+                kept: originals.map(|it| KeptStream::new(Arc::clone(it), size)),
                 clock: ClockMap::default(),
                 period_nanos: camera.rate_hz.map(|it| 1e9 / it),
                 last: None,
@@ -94,6 +105,7 @@ pub(super) struct Device {
     last_sequence: Option<u32>,
     was_full: bool,
     last_nanos: u64,
+    originals: Option<Arc<Originals>>,
 }
 
 impl Device {
@@ -102,6 +114,7 @@ impl Device {
         path: &Path,
         size: Size,
         before: Option<&VideoAbout>,
+        originals: Option<&Arc<Originals>>,
     ) -> Result<Self, LiveError> {
         let device = match before {
             None => VideoDevice::open(path)?,
@@ -118,6 +131,7 @@ impl Device {
             last_sequence: None,
             was_full: false,
             last_nanos: now_nanos(),
+            originals: originals.cloned(),
         })
     }
 
@@ -137,8 +151,23 @@ impl Device {
         self.last_nanos = arrived_at_nanos;
         let is_whole =
             !picture.is_damaged && self.format.to_rgb(picture.bytes, stride, self.size, rgb);
+        let at_nanos = picture.at_nanos.unwrap_or(arrived_at_nanos);
+        if let Some(originals) = &self.originals {
+            originals.put(Original {
+                format: self.format.letters(),
+                bytes: picture.bytes.to_vec(),
+                at_nanos,
+                arrived_at_nanos,
+                sequence: u64::from(picture.sequence),
+                presented_nanos: 0,
+                bytes_per_row: stride as u32,
+                size: self.size,
+                is_whole,
+                connection: 0,
+            });
+        }
         Ok(Some(Taken {
-            at_nanos: picture.at_nanos.unwrap_or(arrived_at_nanos),
+            at_nanos,
             arrived_at_nanos,
             n_lost: if is_ours { 0 } else { n_missing },
             n_overtaken: if is_ours { n_missing } else { 0 },
@@ -185,6 +214,7 @@ fn again(path: &Path, about: &VideoAbout) -> Result<VideoDevice, LiveError> {
 #[derive(Debug)]
 pub(super) struct Stream {
     decoder: LiveStream,
+    kept: Option<KeptStream>,
     clock: ClockMap,
     period_nanos: Option<f64>,
     last: Option<i64>,
@@ -206,6 +236,10 @@ impl Stream {
             let gap = last.map_or(0, |last| presented.saturating_sub(last));
             taken.n_lost = self.period_nanos.map_or(0, |it| missing_by_time(gap, it));
             taken.at_nanos = self.clock.taken_at(presented, arrived_at_nanos);
+        }
+        if let (Some(kept), Some(pieces)) = (&mut self.kept, self.decoder.pieces()) {
+            kept.decoded(frame.label_nanos, taken.at_nanos);
+            kept.put_all(pieces, arrived_at_nanos);
         }
         Ok(taken)
     }
@@ -229,7 +263,8 @@ fn missing_by_time(gap: i64, period: f64) -> u64 {
 /// [`LiveError`]; also if nothing comes.
 pub fn take_picture(camera: &LiveCamera, n_skipped: usize) -> Result<(Size, Vec<u8>), LiveError> {
     let (size, _) = camera.look()?;
-    let mut input = Input::open(camera, size, None)?;
+    let mut input = Input::open(camera, size, None, None)?;
+    let _watched = input.end().map(Watched::new);
     let mut rgb = vec![0; size.rgb_bytes()];
     let mut n_whole = 0;
     loop {
@@ -238,6 +273,24 @@ pub fn take_picture(camera: &LiveCamera, n_skipped: usize) -> Result<(Size, Vec<
         if n_whole > n_skipped {
             return Ok((size, rgb));
         }
+    }
+}
+
+/// Ends a stream that is silent for too long, until this is dropped.
+#[derive(Debug)]
+#[expect(dead_code, reason = "its end is what is waited for")]
+struct Watched(Option<SyncSender<()>>);
+
+impl Watched {
+    fn new(end: StreamEnd) -> Self {
+        const LONGEST: Duration = Duration::from_secs(30);
+        let (done, over) = sync_channel(1);
+        let thread = thread::Builder::new().spawn(move || {
+            if over.recv_timeout(LONGEST) == Err(RecvTimeoutError::Timeout) {
+                end.end();
+            }
+        });
+        Self(thread.ok().map(|_detached| done))
     }
 }
 

@@ -4,6 +4,7 @@ use core::time::Duration;
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
+use std::time::Instant;
 
 use footage::{Size, StreamEnd};
 use messages::Status;
@@ -11,11 +12,14 @@ use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::address::{LiveCamera, LiveError};
 use super::input::{Input, Taken};
+use super::originals::Originals;
 
 /// Pictures that wait at most: an older one makes room for a newer one, so that nothing is ever late by more.
 const N_WAITING: usize = 4;
 /// Pictures from which on a rate is told.
 const LEAST_FOR_RATE: u64 = 30;
+/// After this long without a picture a decoder is ended that has no limit of its own, or does not keep it.
+const LONGEST_SILENCE: Duration = Duration::from_secs(15);
 /// Pause before a camera is opened again: the first, and the longest after further failures.
 const FIRST_PAUSE: Duration = Duration::from_millis(500);
 const LONGEST_PAUSE: Duration = Duration::from_secs(8);
@@ -55,8 +59,9 @@ struct State {
     tally: Tally,
     /// Why there are no pictures; none while the camera is open, or is being opened for the first time.
     trouble: Option<Status>,
-    /// Ends the wait for a stream.
+    /// Ends the wait for a stream; and since when it has lasted.
     end: Option<StreamEnd>,
+    waits_since: Option<Instant>,
     is_over: bool,
 }
 
@@ -81,12 +86,18 @@ pub(crate) struct Source {
 
 impl Source {
     /// * `size`: that of its pictures; with another it is in trouble.
-    pub(crate) fn start(camera: &LiveCamera, size: Size) -> Result<Self, Failure> {
+    /// * `originals`: takes its pictures as they come, if they are to be kept.
+    pub(crate) fn start(
+        camera: &LiveCamera,
+        size: Size,
+        originals: Option<Arc<Originals>>,
+    ) -> Result<Self, Failure> {
         let shared = Arc::new(Shared::default());
         let keeper = Keeper {
             shared: Arc::clone(&shared),
             camera: camera.clone(),
             size,
+            originals,
         };
         let thread = thread::Builder::new().name("live camera".to_owned());
         let thread = thread
@@ -107,6 +118,12 @@ impl Source {
             .news
             .wait_timeout_while(state, patience, is_empty);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let is_silent = |it: Instant| it.elapsed() > LONGEST_SILENCE;
+        if state.waits_since.is_some_and(is_silent)
+            && let Some(end) = state.end.take()
+        {
+            end.end();
+        }
         let mut picture = state.waiting.pop_front()?;
         picture.n_overtaken = core::mem::take(&mut state.n_overtaken);
         Some(picture)
@@ -151,6 +168,7 @@ struct Keeper {
     shared: Arc<Shared>,
     camera: LiveCamera,
     size: Size,
+    originals: Option<Arc<Originals>>,
 }
 
 impl Keeper {
@@ -159,7 +177,8 @@ impl Keeper {
         let mut said: Option<Status> = None;
         while !self.shared.state().is_over {
             let mut n_read = 0;
-            let failed = match Input::open(&self.camera, self.size, before.as_ref()) {
+            let originals = self.originals.as_ref();
+            let failed = match Input::open(&self.camera, self.size, before.as_ref(), originals) {
                 Ok(mut input) => {
                     before = input.about().or(before);
                     self.read_all(&mut input, &mut n_read)
@@ -189,7 +208,11 @@ impl Keeper {
                 return None;
             }
             state.end = input.end();
+            state.waits_since = Some(Instant::now());
             state.tally.n_connections += 1;
+        }
+        if let Some(originals) = &self.originals {
+            originals.connected();
         }
         let mut spare = None;
         let mut pace = Pace::default();
@@ -224,6 +247,7 @@ impl Keeper {
     fn post(&self, taken: Taken, rgb: Vec<u8>, rate_hz: Option<f64>) -> Option<Vec<u8>> {
         let mut state = self.shared.state();
         state.trouble = None;
+        state.waits_since = Some(Instant::now());
         let tally = &mut state.tally;
         tally.n_delivered += 1 + taken.n_overtaken;
         tally.n_lost += taken.n_lost;
@@ -306,6 +330,7 @@ mod tests {
             shared: Arc::default(),
             camera: LiveCamera::new(address),
             size: Size::new(1, 1),
+            originals: None,
         }
     }
 
@@ -334,7 +359,7 @@ mod tests {
 
     #[test]
     fn a_camera_that_is_not_there_is_trouble_and_the_thread_ends_when_it_is_dropped() {
-        let source = Source::start(&keeper().camera, Size::new(1, 1)).unwrap();
+        let source = Source::start(&keeper().camera, Size::new(1, 1), None).unwrap();
         while source.trouble().is_none() {
             assert!(source.next(Duration::from_millis(10)).is_none());
         }

@@ -28,12 +28,17 @@ not: messages that do not fit into the queue are left out, counted by topic in t
 A file whose end was not written, because of a full disk or a crash, contains everything up to there; a recording
 process that was restarted continues in FILE.1.mcap. If anything was lost the exit code is 7.
 
+Of a live camera the file also holds the pictures as they came, at the full rate of the camera: JPEG files, raw pixels,
+or the packets of a stream. `parallax replay FILE --from capture`, or `source = \"FILE#NAME\"` in a deployment, searches
+them later. No camera ever waits for the disk.
+
 Before the run it prints how much a frame and a second will take at most, and how much is free; it does not start
 if there is no space for ten frames (or for all, if they are fewer).
 
 Examples:
     parallax record my.toml --out run.mcap
-    parallax record my.toml --out run.mcap --without pixels --without evidence   small: poses and results")]
+    parallax record my.toml --out run.mcap --without pixels --without evidence   small: poses and results,
+                                                                                 and what live cameras sent")]
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
@@ -67,6 +72,8 @@ enum Bulk {
     Pixels,
     /// The response maps; without them a replay from fuse is impossible.
     Evidence,
+    /// The pictures of live cameras as they came; without them a replay from capture is impossible.
+    Camera,
 }
 
 /// Runs the deployment and records it.
@@ -81,10 +88,17 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         without_pixels: arguments.without.contains(&Bulk::Pixels),
         without_evidence: arguments.without.contains(&Bulk::Evidence),
         queue_mb: arguments.queue_mb,
+        pictures: Vec::new(),
+    };
+    let resolved = plan::resolve(&loaded.deployment)?;
+    let pictures = if arguments.without.contains(&Bulk::Camera) {
+        Vec::new()
+    } else {
+        resolved.live_views()
     };
     let resolved = Resolved {
-        recording: Some(plan),
-        ..plan::resolve(&loaded.deployment)?
+        recording: Some(RecordingPlan { pictures, ..plan }),
+        ..resolved
     };
     let planned = Planned::of(resolved, globals.level())?;
     let forecast = forecast(&planned, &file, arguments)?;
@@ -131,7 +145,7 @@ fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<For
     Ok(Forecast {
         per_frame: PerFrame::new(&planned.plan().topics),
         without: [Bulk::Pixels, Bulk::Evidence].map(|it| arguments.without.contains(&it)),
-        n_frames: resolved.n_frames(),
+        n_frames: (!resolved.is_endless()).then(|| resolved.n_frames()),
         rate_hz: resolved.footage.iter().find_map(|it| it.frame_rate_hz),
         free_bytes: disk_space::free_beside(file)? + replaced,
     })

@@ -12,6 +12,8 @@ use launch::{
 use recording::{Kind, Recording};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
+mod live;
+
 use crate::globals::Globals;
 use crate::stage;
 
@@ -74,8 +76,15 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if !globals.quiet {
         output::message(recorded::text(&file, &recording));
     }
-    let settings = settings(&file, &recording)?;
+    let mut settings = settings(&file, &recording)?;
     let from = arguments.from;
+    live::settle(
+        &mut settings.resolved,
+        &file,
+        &recording,
+        from,
+        &arguments.set,
+    )?;
     let refused = |key: &str| refused(key, from);
     let mut loaded = load::with_overrides(&settings.resolved.deployment, &arguments.set, refused)?;
     let name = file.file_stem().unwrap_or_default().to_string_lossy();

@@ -11,6 +11,8 @@ const SMALL_QUEUE_REALTIME: usize = 4;
 const SMALL_QUEUE_LOSSLESS: usize = 16;
 /// Queue of images or response maps of one receiver.
 const LARGE_QUEUE: usize = 1;
+/// Queue of pictures of live cameras, as they came: a second or less, which costs memory only where the recording lags.
+const PICTURE_QUEUE: usize = 16;
 /// Small messages that one receiver may borrow at the same time.
 const SMALL_BORROWED: usize = 2;
 /// Response maps of one view that one process may borrow at the same time.
@@ -23,6 +25,8 @@ const SPARE: usize = 2;
 pub enum Content {
     /// Pixels of a view, with their header.
     Frame,
+    /// Pictures of a live camera as they came, with their header.
+    Picture,
     /// Response maps of a view, with their header.
     Evidence,
     /// Single-view candidates of a view.
@@ -61,6 +65,8 @@ pub struct ViewSize {
     pub frame_bytes: usize,
     /// Longest response maps, values.
     pub evidence_values: usize,
+    /// Largest picture as it came from a live camera, bytes; 0 where none is recorded.
+    pub picture_bytes: usize,
 }
 
 impl Topology {
@@ -96,6 +102,9 @@ impl Topology {
                 longest: size.frame_bytes,
                 usual: None,
             });
+            if size.picture_bytes > 0 {
+                rooms.push(picture(view, size.picture_bytes));
+            }
             rooms.push(self.evidence(view, size.evidence_values));
             // Quality, triangulate, fusion and the recorders.
             let receivers = 2 + self.n_workers + n_recorders;
@@ -129,5 +138,18 @@ impl Topology {
             // memory again without saving time.
             usual: Some(1 + EVIDENCE_BORROWED),
         }
+    }
+}
+
+fn picture(view: usize, longest: usize) -> Room {
+    Room {
+        topic: topic::picture(view),
+        content: Content::Picture,
+        receivers: 1,
+        queued: PICTURE_QUEUE,
+        borrowed: 1,
+        longest,
+        // One to write while another is read.
+        usual: Some(2),
     }
 }

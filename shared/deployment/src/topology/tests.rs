@@ -26,6 +26,7 @@ fn recording(without_evidence: bool) -> RecordingPlan {
         without_pixels: false,
         without_evidence,
         queue_mb: 1,
+        pictures: Vec::new(),
     }
 }
 
@@ -114,6 +115,7 @@ fn the_receivers_of_a_recorded_deployment_with_a_network_are_these() {
 const SIZE: ViewSize = ViewSize {
     frame_bytes: 272 * 480 * 3,
     evidence_values: 10_000_000,
+    picture_bytes: 0,
 };
 
 /// What a test of numbers looks at: name, receivers, queue, borrowed, longest, usual.
@@ -313,4 +315,35 @@ proptest! {
         }
         prop_assert_eq!(topology.n_recorders(), 1 + usize::from(recording.is_some()));
     }
+}
+
+#[test]
+fn pictures_of_live_cameras_travel_where_they_are_recorded_only() {
+    let deployment = deployment(3, "");
+    let plan = RecordingPlan {
+        pictures: vec![1],
+        ..recording(false)
+    };
+    let recorded = Topology::new(&deployment, Some(&plan), None);
+    let n_receivers = |view| recorded.receivers_of(&topic::picture(view));
+    assert_eq!([0, 1, 2].map(n_receivers), [0, 1, 0]);
+    let has_output = |view: usize| {
+        let capture = recorded.process(&format!("capture-{view}")).unwrap();
+        capture.outputs.contains(&topic::picture(view))
+    };
+    assert_eq!([0, 1, 2].map(has_output), [false, true, false]);
+    let sizes = [0, 6_000_000, 0].map(|picture_bytes| ViewSize {
+        picture_bytes,
+        ..SIZE
+    });
+    let rooms = recorded.rooms(Mode::Realtime, &sizes, 1);
+    let of_pictures: Vec<&Room> = rooms
+        .iter()
+        .filter(|it| it.content == Content::Picture)
+        .collect();
+    assert_eq!(of_pictures.len(), 1);
+    assert_eq!(
+        (of_pictures[0].topic.as_str(), of_pictures[0].longest),
+        ("picture/v1/1", 6_000_000)
+    );
 }

@@ -5,7 +5,7 @@ use std::io;
 use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
 use std::path::{Path, PathBuf};
 
-use rustix::fs::{Mode, OFlags, open};
+use rustix::fs::{FileType, Mode, OFlags, major, open, stat};
 
 use super::raw::{self, Raw, Request};
 use super::{FourCc, VideoError};
@@ -45,6 +45,26 @@ pub struct VideoMode {
     pub rate_hz: Option<f64>,
 }
 
+/// Refuses what is no video device by its kind and number, before it is opened: opening some devices has an effect.
+fn check_kind(path: &Path) -> Result<(), VideoError> {
+    const VIDEO: u32 = 81;
+    let status = stat(path).map_err(|error| VideoError::Open {
+        path: path.to_owned(),
+        source: error.into(),
+    })?;
+    let why = match FileType::from_raw_mode(status.st_mode) {
+        FileType::CharacterDevice if major(status.st_rdev) == VIDEO => return Ok(()),
+        FileType::CharacterDevice | FileType::BlockDevice => "it is a device of another kind",
+        FileType::Directory => "it is a folder",
+        FileType::RegularFile => "it is a file",
+        _ => "it is no device",
+    };
+    Err(VideoError::NoCamera {
+        path: path.to_owned(),
+        why: why.to_owned(),
+    })
+}
+
 /// An open video device.
 #[derive(Debug)]
 pub struct VideoDevice {
@@ -59,7 +79,8 @@ impl VideoDevice {
     ///
     /// [`VideoError`]: it is not there, may not be opened, or is no camera.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
-        let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::CLOEXEC;
+        check_kind(path)?;
+        let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::CLOEXEC | OFlags::NOCTTY;
         let fd = open(path, flags, Mode::empty()).map_err(|error| VideoError::Open {
             path: path.to_owned(),
             source: error.into(),

@@ -2,7 +2,8 @@
 
 use bytemuck::{bytes_of, cast_slice};
 use messages::{
-    EvidenceHeader, FrameHeader, Health, PairPose, Pose3d, Status, ViewPose, ViewQuality,
+    EvidenceHeader, FrameHeader, Health, PairPose, PictureHeader, Pose3d, Status, ViewPose,
+    ViewQuality,
 };
 use recording::{Envelope, Kind, encode};
 use runtime::{Bus, PortError, ReceiveError, SliceSubscriber, Subscriber, Waiter};
@@ -18,7 +19,8 @@ pub struct Received {
     pub sent_at: u64,
     /// Whether it carries a result; heartbeats always do.
     pub status: Status,
-    /// Heartbeats only: the epoch of the process, and how many messages it has sent in this epoch.
+    /// Heartbeats, and pictures of cameras, which are numbered: the epoch of the process, and how many messages it has sent in this
+    /// epoch.
     pub life: Option<[u64; 2]>,
     /// Poses of a view: whether evidence was sent with them.
     pub has_evidence: bool,
@@ -44,6 +46,7 @@ enum Port {
     PairPose(Subscriber<PairPose>),
     Pose3d(Subscriber<Pose3d>),
     Health(Subscriber<Health>),
+    Picture(SliceSubscriber<u8, PictureHeader>),
 }
 
 impl Receiver {
@@ -69,6 +72,7 @@ impl Receiver {
             Kind::PairPose => Port::PairPose(bus.subscriber(topic, waiter)?),
             Kind::Pose3d => Port::Pose3d(bus.subscriber(topic, waiter)?),
             Kind::Health => Port::Health(bus.subscriber(topic, waiter)?),
+            Kind::Picture => Port::Picture(bus.slice_subscriber(topic, waiter)?),
         };
         Ok(Self {
             kind,
@@ -117,6 +121,17 @@ impl Receiver {
             Port::Pose3d(port) => port
                 .receive()?
                 .and_then(|message| of(bytes_of(&message), &[])),
+            Port::Picture(port) => port.receive()?.and_then(|sample| {
+                let head = sample.header();
+                let received = of(bytes_of(head), sample.payload())?;
+                // The end of the pictures has the number of all.
+                let is_one = head.status != Status::END;
+                let n_sent = head.stamp.frame.saturating_add(u64::from(is_one));
+                Some(Received {
+                    life: Some([u64::from(head.stamp.epoch), n_sent]),
+                    ..received
+                })
+            }),
             Port::Health(port) => port.receive()?.and_then(|heartbeat| {
                 let received = of(bytes_of(&heartbeat), &[])?;
                 Some(Received {

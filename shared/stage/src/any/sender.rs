@@ -1,7 +1,9 @@
 //! Sends bytes on a topic of any message type.
 
 use bytemuck::{Pod, cast_slice_mut, pod_read_unaligned};
-use messages::{EvidenceHeader, FrameHeader, PairPose, Pose3d, Status, ViewPose, ViewQuality};
+use messages::{
+    EvidenceHeader, FrameHeader, PairPose, PictureHeader, Pose3d, Status, ViewPose, ViewQuality,
+};
 use recording::{Envelope, Kind, Message};
 use runtime::{
     Bus, Element, Header, Message as PlainMessage, Patience, PortError, Publisher, SendError,
@@ -25,6 +27,7 @@ enum Port {
     ViewQuality(Publisher<ViewQuality>),
     PairPose(Publisher<PairPose>),
     Pose3d(Publisher<Pose3d>),
+    Picture(SlicePublisher<u8, PictureHeader>),
     /// Every process sends its own heartbeats.
     Health,
 }
@@ -43,6 +46,7 @@ impl Sender {
             Kind::ViewQuality => Port::ViewQuality(bus.publisher(topic)?),
             Kind::PairPose => Port::PairPose(bus.publisher(topic)?),
             Kind::Pose3d => Port::Pose3d(bus.publisher(topic)?),
+            Kind::Picture => Port::Picture(bus.slice_publisher(topic)?),
             Kind::Health => Port::Health,
         };
         Ok(Self { kind, port })
@@ -66,6 +70,7 @@ impl Sender {
             Port::ViewQuality(port) => Some(port),
             Port::PairPose(port) => Some(port),
             Port::Pose3d(port) => Some(port),
+            Port::Picture(port) => Some(port),
             Port::Health => None,
         }
     }
@@ -85,6 +90,7 @@ impl Sender {
             Port::ViewQuality(port) => plain(port, &head),
             Port::PairPose(port) => plain(port, &head),
             Port::Pose3d(port) => plain(port, &head),
+            Port::Picture(port) => array(port, &head, message.elements),
             Port::Health => Ok(()),
         }
     }
@@ -96,7 +102,7 @@ impl Sender {
     /// [`SendError`].
     pub fn end(&self, envelope: &Envelope) -> Result<(), SendError> {
         let head = match self.kind {
-            Kind::Evidence | Kind::Health => return Ok(()),
+            Kind::Evidence | Kind::Picture | Kind::Health => return Ok(()),
             kind => vec![0; kind.head_bytes()],
         };
         let end = Envelope {

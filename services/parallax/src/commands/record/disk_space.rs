@@ -18,6 +18,8 @@ const PERIOD: Duration = Duration::from_secs(10);
 pub(super) struct PerFrame {
     pub pixels: u64,
     pub evidence: u64,
+    /// Pictures of live cameras as they came, if they came raw.
+    pub camera: u64,
     /// All other messages.
     pub rest: u64,
 }
@@ -31,6 +33,7 @@ impl PerFrame {
             match Kind::of_topic(topic.topic()) {
                 Some(Kind::Frame) => sum.pixels += bytes,
                 Some(Kind::Evidence) => sum.evidence += bytes,
+                Some(Kind::Picture) => sum.camera += bytes,
                 // Health messages are few and small.
                 None | Some(Kind::Health) => {}
                 Some(_) => sum.rest += bytes,
@@ -44,7 +47,7 @@ impl PerFrame {
         let [pixels, evidence] = without;
         let pixels = if pixels { 0 } else { self.pixels };
         let evidence = if evidence { 0 } else { self.evidence };
-        pixels + evidence + self.rest
+        pixels + evidence + self.camera + self.rest
     }
 }
 
@@ -54,7 +57,8 @@ pub(super) struct Forecast {
     pub per_frame: PerFrame,
     /// Whether pixels and evidence are left out.
     pub without: [bool; 2],
-    pub n_frames: u64,
+    /// None for a run until it is stopped.
+    pub n_frames: Option<u64>,
     /// Used frames of the footage per second, if it is known.
     pub rate_hz: Option<f64>,
     pub free_bytes: u64,
@@ -88,14 +92,12 @@ impl Forecast {
             let second = (self.frame_bytes() as f64 * rate) as u64;
             write!(text, ", {} for a second of {rate:.0} frames", size(second))?;
         }
-        let all = size(self.frame_bytes().saturating_mul(self.n_frames));
-        write!(
-            text,
-            ", {all} for all {} frames; {} are free",
-            self.n_frames,
-            size(self.free_bytes)
-        )?;
-        if self.n_that_fit() < self.n_frames {
+        if let Some(n_frames) = self.n_frames {
+            let all = size(self.frame_bytes().saturating_mul(n_frames));
+            write!(text, ", {all} for all {n_frames} frames")?;
+        }
+        write!(text, "; {} are free", size(self.free_bytes))?;
+        if self.n_frames.is_none_or(|it| self.n_that_fit() < it) {
             write!(
                 text,
                 ", which may be full after {} frames",
@@ -124,7 +126,7 @@ impl Forecast {
 
     /// Checks that there is space for a few frames.
     pub(super) fn check(&self, file: &Path) -> Result<(), Failure> {
-        let n = MIN_FRAMES.min(self.n_frames);
+        let n = self.n_frames.map_or(MIN_FRAMES, |it| it.min(MIN_FRAMES));
         if self.n_that_fit() >= n {
             return Ok(());
         }
@@ -211,10 +213,11 @@ mod tests {
             per_frame: PerFrame {
                 pixels: 4_000_000,
                 evidence: 168_000_000,
+                camera: 0,
                 rest: 400_000,
             },
             without,
-            n_frames: 100,
+            n_frames: Some(100),
             rate_hz: Some(60.0),
             free_bytes,
         }
@@ -245,6 +248,15 @@ mod tests {
                 .text(Path::new("a"))
                 .contains("5.0 GB are free, which may be full after 29 frames")
         );
+        let endless = Forecast {
+            n_frames: None,
+            ..small
+        };
+        let text = endless.text(Path::new("a"));
+        assert!(
+            text.contains("frames; 5.0 GB are free, which may be full after 29 frames"),
+            "{text}"
+        );
         small.check(Path::new("a")).unwrap();
     }
 
@@ -264,7 +276,7 @@ mod tests {
             .check(Path::new("a"))
             .unwrap();
         let few = Forecast {
-            n_frames: 2,
+            n_frames: Some(2),
             ..forecast(400_000_000, [false; 2])
         };
         few.check(Path::new("a")).unwrap();

@@ -1,0 +1,260 @@
+//! The pictures of a live camera that were recorded as they came, as footage: `run.mcap#left`.
+//!
+//! Reading order: [`Recorded`] (the address), `table` (which picture belongs to which instant), `pieces` (a stream, to be decoded
+//! again), [`RecordedFeed`] (the pictures).
+
+mod pieces;
+mod table;
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use footage::{FootageError, FrameView, PixelFormat, RemadeStream, SourceSpec, Turn};
+use recording::{Kind, ReadError};
+
+use crate::info::FeedInfo;
+use table::{Picture, Table};
+
+/// What separates the file from the camera.
+const MARK: &str = ".mcap#";
+
+/// A camera of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Recorded {
+    /// The recording.
+    pub file: PathBuf,
+    /// Name of the camera.
+    pub camera: String,
+}
+
+/// Why a recording has no pictures of a camera.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordedError {
+    /// The address names no camera.
+    #[error("no camera is named: write run.mcap#NAME")]
+    NoName,
+    /// The file cannot be opened.
+    #[error("cannot open the recording")]
+    Open(#[from] std::io::Error),
+    /// It is no recording, or cannot be read.
+    #[error("cannot read the recording")]
+    Read(#[from] ReadError),
+    /// It has no pictures of this camera.
+    #[error("it holds no pictures of {camera:?} as they came; {}", others(.known))]
+    NoCamera {
+        /// As asked for.
+        camera: String,
+        /// The cameras of which it has some.
+        known: Vec<String>,
+    },
+    /// What it says of the camera cannot be.
+    #[error("its pictures of {camera:?} cannot be used: {what}")]
+    Malformed {
+        /// Which.
+        camera: String,
+        /// What is wrong.
+        what: &'static str,
+    },
+    /// The choice of frames.
+    #[error(transparent)]
+    Choice(#[from] FootageError),
+}
+
+fn others(known: &[String]) -> String {
+    if known.is_empty() {
+        "it holds none of any camera: only `parallax record` of live cameras keeps them".to_owned()
+    } else {
+        format!("it holds those of {}", known.join(", "))
+    }
+}
+
+impl Recorded {
+    /// Whether a source is meant to be a recording.
+    pub fn is_recorded(source: &str) -> bool {
+        let is_file = Path::new(source).extension().is_some_and(|it| it == "mcap");
+        source.contains(MARK) || is_file
+    }
+
+    /// Reads an address.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordedError::NoName`].
+    pub fn parse(source: &str) -> Result<Self, RecordedError> {
+        let at = source.find(MARK).ok_or(RecordedError::NoName)?;
+        let (file, camera) = source.split_at(at + MARK.len());
+        if camera.is_empty() {
+            return Err(RecordedError::NoName);
+        }
+        Ok(Self {
+            file: file.trim_end_matches('#').into(),
+            camera: camera.to_owned(),
+        })
+    }
+
+    /// The address of a camera of a recording.
+    pub fn address(file: &Path, camera: &str) -> String {
+        format!("{}#{camera}", file.display())
+    }
+}
+
+/// The pictures of a camera of a recording, at the instants of its run or of another rate.
+#[derive(Debug)]
+pub struct RecordedFeed {
+    pub(crate) info: FeedInfo,
+    pub(crate) rgb: Vec<u8>,
+    table: Table,
+    name: String,
+    path: PathBuf,
+    file: File,
+    buffer: Vec<u8>,
+    /// The next picture of the table, and the frames that are wanted.
+    at: usize,
+    next: u64,
+    step: u64,
+    n_left: u64,
+    stream: Option<Open>,
+}
+
+/// A stream that is decoded again.
+#[derive(Debug)]
+struct Open {
+    decoder: RemadeStream,
+    connection: [u32; 2],
+}
+
+impl RecordedFeed {
+    /// The properties of the frames that `spec` chooses.
+    pub(crate) fn look(recorded: &Recorded, spec: &SourceSpec) -> Result<FeedInfo, RecordedError> {
+        Ok(Self::open(recorded, spec)?.info)
+    }
+
+    pub(crate) fn open(recorded: &Recorded, spec: &SourceSpec) -> Result<Self, RecordedError> {
+        let mut file = File::open(&recorded.file)?;
+        let table = Table::read(&mut file, &recorded.camera, spec.frame_rate_hz)?;
+        let info = FeedInfo {
+            size: table.size,
+            n_frames: spec.n_delivered(table.n_frames())?,
+            frame_rate_hz: Some(table.rate_hz / spec.step as f64),
+            turn: Turn::default(),
+        };
+        Ok(Self {
+            info,
+            rgb: vec![0; table.size.rgb_bytes()],
+            name: Recorded::address(&recorded.file, &recorded.camera),
+            path: recorded.file.clone(),
+            file,
+            buffer: Vec::new(),
+            at: table.first_at(spec.start),
+            table,
+            next: spec.start,
+            step: spec.step,
+            n_left: info.n_frames,
+            stream: None,
+        })
+    }
+
+    /// The next frame that has a picture; `None` at the end. A damaged picture is left out.
+    pub(crate) fn next_frame(&mut self) -> Result<Option<FrameView<'_>>, FootageError> {
+        while self.n_left > 0 {
+            let Some(picture) = self.table.pictures.get(self.at).copied() else {
+                return Ok(None);
+            };
+            let past_last = self.next + (self.n_left - 1) * self.step;
+            if picture.instant > past_last {
+                return Ok(None);
+            }
+            let found = if picture.is_piece() {
+                self.next_of_stream(picture)?
+            } else {
+                self.at += 1;
+                let is_good = self.is_wanted(picture.instant) && self.decode(&picture)?;
+                is_good.then_some(picture)
+            };
+            let Some(picture) = found else { continue };
+            let n_passed = (picture.instant - self.next) / self.step + 1;
+            self.skip(n_passed);
+            return Ok(Some(FrameView {
+                index: picture.instant,
+                time_s: Some(self.table.seconds(&picture)),
+                rgb: &self.rgb,
+            }));
+        }
+        Ok(None)
+    }
+
+    fn is_wanted(&self, instant: u64) -> bool {
+        instant >= self.next && (instant - self.next).is_multiple_of(self.step)
+    }
+
+    /// Skips the next `n` frames; returns how many there were.
+    pub(crate) fn skip(&mut self, n: u64) -> u64 {
+        let n = n.min(self.n_left);
+        self.n_left -= n;
+        self.next = self.next.saturating_add(n.saturating_mul(self.step));
+        n
+    }
+
+    /// Decodes a picture that needs no other; `false` if it is damaged.
+    fn decode(&mut self, picture: &Picture) -> Result<bool, FootageError> {
+        let (file, buffer) = (&mut self.file, &mut self.buffer);
+        let message = match recording::read(file, Kind::Picture, &picture.entry, buffer) {
+            Ok(message) => message,
+            Err(ReadError::Read(source)) => {
+                let path = self.path.clone();
+                return Err(FootageError::Io { path, source });
+            }
+            Err(_) => return Ok(false),
+        };
+        let format = PixelFormat::of_letters(picture.format);
+        let (stride, size) = (picture.bytes_per_row as usize, self.table.size);
+        Ok(format.is_some_and(|it| it.to_rgb(message.elements, stride, size, &mut self.rgb)))
+    }
+
+    /// The next picture of a stream that is wanted; none if the next one is of another connection.
+    ///
+    /// * `first`: the next of the table.
+    fn next_of_stream(&mut self, first: Picture) -> Result<Option<Picture>, FootageError> {
+        let is_open = |it: &Open| it.connection == first.connection;
+        if !self.stream.as_ref().is_some_and(is_open) {
+            let wanted = self.table.first_at(self.next).max(self.at);
+            let wanted = self.table.pictures.get(wanted).copied();
+            let wanted = wanted.filter(|it| it.connection == first.connection);
+            let pieces = pieces::from(&self.path, &self.table, &wanted.unwrap_or(first));
+            let pieces = pieces.map_err(|source| FootageError::Io {
+                path: self.path.clone(),
+                source,
+            })?;
+            self.stream = Some(Open {
+                decoder: RemadeStream::open(&self.name, pieces, self.table.size)?,
+                connection: first.connection,
+            });
+        }
+        let Some(open) = &mut self.stream else {
+            return Ok(None);
+        };
+        let label = match open.decoder.next_into(&mut self.rgb) {
+            Ok(label) => label,
+            // The camera was set to another size: what follows is of no use until it was opened again.
+            Err(FootageError::SizeChanged { .. }) => None,
+            Err(error) => return Err(error),
+        };
+        let Some(label) = label else {
+            self.stream = None;
+            self.at = self.table.after_connection(self.at);
+            return Ok(None);
+        };
+        let Some(at) = self.table.of_label(first.connection, label) else {
+            return Ok(None);
+        };
+        let picture = self.table.pictures[at];
+        if at < self.at || !self.is_wanted(picture.instant) {
+            return Ok(None);
+        }
+        self.at = at + 1;
+        Ok(Some(picture))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,107 @@
+//! A recorded stream from a picture on, as it was.
+
+use std::fs::File;
+use std::io;
+use std::path::Path;
+
+use recording::Kind;
+
+use super::table::{Part, Picture, Table};
+
+/// The bytes of a head and of the pictures after it, from the last picture before `first` that needs no other, to the end of the
+/// connection.
+///
+/// After a gap, and after a damaged message, pictures are left out up to the next that needs no other.
+pub(super) fn from(
+    file: &Path,
+    table: &Table,
+    first: &Picture,
+) -> io::Result<impl Iterator<Item = Vec<u8>> + Send + 'static> {
+    let mut input = File::open(file)?;
+    let parts = &table.parts;
+    let is_of = |it: &Part| it.connection == first.connection;
+    let own: Vec<Part> = parts.iter().copied().filter(is_of).collect();
+    let here = own.iter().position(|it| it.entry == first.entry);
+    let head = |it: &Part| it.format == *b"MKV0";
+    let begin = own[..here.unwrap_or(0)].iter().rposition(head);
+    let mut state = State::Begin;
+    let mut last = None;
+    let mut buffer = Vec::new();
+    let from_begin = own.into_iter().skip(begin.unwrap_or(0));
+    Ok(from_begin.filter_map(move |part| {
+        let is_next = last.is_none_or(|it: u64| it.checked_add(1) == Some(part.number));
+        last = Some(part.number);
+        let read = recording::read(&mut input, Kind::Picture, &part.entry, &mut buffer);
+        let message = read.ok();
+        state = state.after(part.format, is_next, message.is_some());
+        let is_sent = match state {
+            State::Head => true,
+            State::Pictures => part.format != *b"MKV0",
+            State::Begin | State::Gap => false,
+        };
+        message.filter(|_| is_sent).map(|it| it.elements.to_vec())
+    }))
+}
+
+/// What may follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// Nothing was sent.
+    Begin,
+    /// The head was sent just now.
+    Head,
+    /// Pictures that follow one another.
+    Pictures,
+    /// Something is missing.
+    Gap,
+}
+
+impl State {
+    /// * `is_next`: it follows the one before it; `is_read`: it is not damaged.
+    fn after(self, format: [u8; 4], is_next: bool, is_read: bool) -> Self {
+        match (self, &format) {
+            (Self::Begin, b"MKV0") if is_read => Self::Head,
+            (Self::Begin, _) => Self::Begin,
+            (_, b"MKV1") if is_read => Self::Pictures,
+            (Self::Head | Self::Pictures, _) if is_next && is_read => Self::Pictures,
+            _ => Self::Gap,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn after_a_gap_nothing_is_decoded_up_to_a_picture_that_needs_no_other() {
+        let mut state = State::Begin;
+        let parts = [
+            (b"MKV2", true, true),
+            (b"MKV0", true, true),
+            (b"MKV1", true, true),
+            (b"MKV2", true, true),
+            (b"MKV2", false, true),
+            (b"MKV2", true, true),
+            (b"MKV1", true, false),
+            (b"MKV0", true, true),
+            (b"MKV1", true, true),
+        ];
+        let states = parts.map(|(format, is_next, is_read)| {
+            state = state.after(*format, is_next, is_read);
+            state
+        });
+        let expected = [
+            State::Begin,
+            State::Head,
+            State::Pictures,
+            State::Pictures,
+            State::Gap,
+            State::Gap,
+            State::Gap,
+            State::Gap,
+            State::Pictures,
+        ];
+        assert_eq!(states, expected);
+    }
+}

@@ -1,0 +1,249 @@
+//! Which recorded picture belongs to which common instant.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+
+use bytemuck::pod_read_unaligned;
+use footage::Size;
+use messages::{MAX_NAME, PictureHeader, Status};
+use recording::{Entry, Kind, Track};
+
+use super::RecordedError;
+use crate::live::Grid;
+
+/// A picture was sent at most this long after it was taken, nanoseconds; another time is damage.
+const MAX_AGE_NANOS: u64 = 60_000_000_000;
+/// Slowest and fastest common instants, hertz.
+const RATES_HZ: [f64; 2] = [0.01, 10_000.0];
+/// The time of a piece of a stream is rounded to milliseconds.
+const SAME_NANOS: i64 = 1_000_000;
+
+/// A picture at an instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Picture {
+    pub instant: u64,
+    pub at_nanos: u64,
+    pub entry: Entry,
+    pub format: [u8; 4],
+    pub bytes_per_row: u32,
+    /// Restarts of the process that recorded it, and how often it had opened the camera.
+    pub connection: [u32; 2],
+    label_nanos: i64,
+}
+
+impl Picture {
+    /// Whether it is a piece of a stream.
+    pub(super) fn is_piece(&self) -> bool {
+        is_stream(self.format)
+    }
+}
+
+fn is_stream(format: [u8; 4]) -> bool {
+    format.starts_with(b"MKV")
+}
+
+/// A message of a stream, in the order of its numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Part {
+    pub entry: Entry,
+    pub format: [u8; 4],
+    pub connection: [u32; 2],
+    pub number: u64,
+}
+
+/// The pictures of a camera.
+#[derive(Debug)]
+pub(super) struct Table {
+    pub size: Size,
+    pub rate_hz: f64,
+    grid: Grid,
+    /// By time: those that have an instant.
+    pub pictures: Vec<Picture>,
+    /// Everything of streams, by number.
+    pub parts: Vec<Part>,
+    labels: BTreeMap<([u32; 2], i64), usize>,
+}
+
+impl Table {
+    /// Reads the heads of all pictures of a camera.
+    ///
+    /// * `rate_hz`: common instants per second; none for those of the recorded run.
+    pub(super) fn read(
+        file: &mut File,
+        camera: &str,
+        rate_hz: Option<f64>,
+    ) -> Result<Self, RecordedError> {
+        let recording = recording::scan(file)?;
+        let mut input = BufReader::new(file);
+        let tracks = recording.tracks.values();
+        let tracks = tracks.filter(|it| it.kind == Kind::Picture);
+        let mut known = Vec::new();
+        for track in tracks {
+            let heads = heads(&mut input, track)?;
+            let Some(first) = heads.first().map(|it| it.1) else {
+                continue;
+            };
+            let name = name_of(&first);
+            if name == &camera[..camera.floor_char_boundary(MAX_NAME)] {
+                return Self::of(camera, &first, &heads, rate_hz);
+            }
+            known.push(name);
+        }
+        Err(RecordedError::NoCamera {
+            camera: camera.to_owned(),
+            known,
+        })
+    }
+
+    fn of(
+        camera: &str,
+        first: &PictureHeader,
+        heads: &[(Entry, PictureHeader)],
+        rate_hz: Option<f64>,
+    ) -> Result<Self, RecordedError> {
+        let malformed = |what| RecordedError::Malformed {
+            camera: camera.to_owned(),
+            what,
+        };
+        let rate_hz = rate_hz.unwrap_or(first.grid_rate_hz);
+        if !(RATES_HZ[0]..=RATES_HZ[1]).contains(&rate_hz) {
+            return Err(malformed("its rate cannot be"));
+        }
+        let size = Size::new(first.width as usize, first.height as usize);
+        if size.rgb_bytes() == 0 || size.width.max(size.height) > 1 << 16 {
+            return Err(malformed("its size cannot be"));
+        }
+        let mut table = Self {
+            size,
+            rate_hz,
+            grid: Grid::new(first.grid_start_nanos, rate_hz),
+            pictures: Vec::new(),
+            parts: Vec::new(),
+            labels: BTreeMap::new(),
+        };
+        table.parts.extend(heads.iter().filter_map(part));
+        table.parts.sort_by_key(|it| (it.connection[0], it.number));
+        table.place(heads);
+        if table.pictures.is_empty() {
+            return Err(malformed("none is whole and at an instant of the run"));
+        }
+        Ok(table)
+    }
+
+    /// Gives every instant its picture.
+    fn place(&mut self, heads: &[(Entry, PictureHeader)]) {
+        let is_picture = |it: &&(Entry, PictureHeader)| {
+            let header = &it.1;
+            header.status == Status::OK
+                && header.format != *b"MKV0"
+                && [header.width, header.height].map(|it| it as usize)
+                    == [self.size.width, self.size.height]
+        };
+        let mut by_time: Vec<_> = heads.iter().filter(is_picture).collect();
+        by_time.sort_by_key(|it| it.1.stamp.captured_at_nanos);
+        let times = by_time.iter().map(|it| it.1.stamp.captured_at_nanos);
+        self.grid.learn(times);
+        let mut next = 0;
+        for (entry, header) in by_time {
+            let at_nanos = header.stamp.captured_at_nanos;
+            if self.grid.wrong_clock(at_nanos, at_nanos).is_some() {
+                continue;
+            }
+            let Some(instant) = self.grid.place(at_nanos, next) else {
+                continue;
+            };
+            next = instant + 1;
+            let picture = Picture {
+                instant,
+                at_nanos,
+                entry: *entry,
+                format: header.format,
+                bytes_per_row: header.bytes_per_row,
+                connection: connection(header),
+                label_nanos: header.presented_nanos.cast_signed(),
+            };
+            if picture.is_piece() {
+                let label = (picture.connection, picture.label_nanos);
+                self.labels.insert(label, self.pictures.len());
+            }
+            self.pictures.push(picture);
+        }
+    }
+
+    /// Frames up to the last picture.
+    pub(super) fn n_frames(&self) -> u64 {
+        self.pictures.last().map_or(0, |it| it.instant + 1)
+    }
+
+    /// The first picture that is not before an instant.
+    pub(super) fn first_at(&self, instant: u64) -> usize {
+        self.pictures.partition_point(|it| it.instant < instant)
+    }
+
+    /// The first picture after those of the connection of another.
+    pub(super) fn after_connection(&self, at: usize) -> usize {
+        let rest = self.pictures.get(at..).unwrap_or_default();
+        let n = rest
+            .iter()
+            .take_while(|it| it.connection == rest[0].connection);
+        at + n.count()
+    }
+
+    /// The picture of that time in the stream.
+    pub(super) fn of_label(&self, connection: [u32; 2], label_nanos: i64) -> Option<usize> {
+        let from = (connection, label_nanos.saturating_sub(SAME_NANOS));
+        let to = (connection, label_nanos.saturating_add(SAME_NANOS));
+        let near = self.labels.range(from..=to);
+        let nearest = near.min_by_key(|it| it.0.1.abs_diff(label_nanos));
+        nearest.map(|it| *it.1)
+    }
+
+    /// Seconds from the first instant.
+    pub(super) fn seconds(&self, picture: &Picture) -> f64 {
+        self.grid.seconds(picture.at_nanos)
+    }
+}
+
+fn name_of(header: &PictureHeader) -> String {
+    let name = String::from_utf8_lossy(&header.name);
+    name.trim_end_matches('\0').to_owned()
+}
+
+fn connection(header: &PictureHeader) -> [u32; 2] {
+    [header.stamp.epoch, header.connection]
+}
+
+fn part(it: &(Entry, PictureHeader)) -> Option<Part> {
+    let (entry, header) = it;
+    is_stream(header.format).then(|| Part {
+        entry: *entry,
+        format: header.format,
+        connection: connection(header),
+        number: header.stamp.frame,
+    })
+}
+
+/// The heads of the messages of a topic, without the end, and without those that are damaged as far as that shows.
+fn heads(
+    input: &mut BufReader<&mut File>,
+    track: &Track,
+) -> Result<Vec<(Entry, PictureHeader)>, RecordedError> {
+    let mut buffer = Vec::new();
+    let mut all = Vec::with_capacity(track.entries.len());
+    for entry in &track.entries {
+        let head = recording::read_head(input, track.kind, entry, &mut buffer)?;
+        let header: PictureHeader = pod_read_unaligned(head);
+        // The number and the time of sending are told by the checked index of the file, too.
+        let is_same = entry.frame.is_none_or(|it| it == header.stamp.frame)
+            && entry.publish_time == header.timing.sent_at_nanos;
+        let age = header
+            .timing
+            .sent_at_nanos
+            .abs_diff(header.stamp.captured_at_nanos);
+        if is_same && age <= MAX_AGE_NANOS && header.status != Status::END {
+            all.push((*entry, header));
+        }
+    }
+    Ok(all)
+}

@@ -1,0 +1,60 @@
+//! A recorded run of live cameras: they are not asked again, their pictures are in the recording.
+
+use std::path::Path;
+
+use capture::Recorded;
+use deployment::Stage;
+use deployment::capture::{Mode, Pace};
+use launch::Resolved;
+use messages::topic;
+use recording::Recording;
+use runtime::{ExitKind, Failure};
+
+/// Puts the recording in the place of live cameras.
+///
+/// From capture on nothing is lost by default, because nothing is live any more.
+///
+/// * `set`: values that the user replaces.
+///
+/// # Errors
+///
+/// The replay begins with capture, and the recording lacks the pictures of a camera.
+pub(super) fn settle(
+    recorded: &mut Resolved,
+    file: &Path,
+    recording: &Recording,
+    from: Stage,
+    set: &[String],
+) -> Result<(), Failure> {
+    let live = recorded.live_views();
+    if live.is_empty() {
+        return Ok(());
+    }
+    let rate_hz = recorded.instants_hz();
+    let step = recorded.deployment.capture.frame_step as f64;
+    for &view in &live {
+        let camera = &mut recorded.deployment.cameras[view];
+        let track = recording.tracks.get(&topic::picture(view));
+        if from == Stage::Capture && track.is_none_or(|it| it.entries.is_empty()) {
+            let message = format!(
+                "{} lacks the pictures of the live camera {:?}, which --from capture needs",
+                file.display(),
+                camera.name
+            );
+            let failure = Failure::new(ExitKind::Input, message);
+            return Err(failure.with_hint(
+                "`--from pose` replays the frames that the run used; `parallax record` keeps the pictures unless it is told `--without camera`",
+            ));
+        }
+        camera.source = Recorded::address(file, &camera.name);
+        (camera.format, camera.size, camera.frame_rate_hz) = (None, None, None);
+        camera.transport = None;
+        camera.controls.clear();
+        recorded.footage[view].frame_rate_hz = Some(rate_hz / step);
+    }
+    let capture = &mut recorded.deployment.capture;
+    if from == Stage::Capture && !set.iter().any(|it| it.starts_with("capture.mode=")) {
+        (capture.mode, capture.pace) = (Mode::Lossless, Pace::Fast);
+    }
+    Ok(())
+}

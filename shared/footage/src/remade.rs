@@ -1,0 +1,111 @@
+//! The pictures of a stream that was kept as it came, decoded by an `ffmpeg` process.
+
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::os::unix::process::CommandExt as _;
+use std::path::PathBuf;
+use std::process::{ChildStdout, Command, Stdio};
+use std::sync::{Arc, Mutex};
+
+use crate::source::log::Log;
+use crate::source::probe::missing;
+use crate::stream::{SHARE, outputs};
+use crate::{FootageError, Size, StreamEnd};
+
+/// A running decoder of pieces. It is killed when this is dropped.
+#[derive(Debug)]
+pub struct RemadeStream {
+    name: String,
+    size: Size,
+    child: StreamEnd,
+    stdout: ChildStdout,
+    log: Log,
+}
+
+impl RemadeStream {
+    /// Starts a decoder.
+    ///
+    /// * `name`: for messages.
+    /// * `pieces`: the bytes of a head, and of the pictures after it, in order ([`Piece`](crate::Piece)); a thread takes them.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError::FfmpegMissing`].
+    pub fn open(
+        name: &str,
+        pieces: impl Iterator<Item = Vec<u8>> + Send + 'static,
+        size: Size,
+    ) -> Result<Self, FootageError> {
+        let ffmpeg = PathBuf::from("ffmpeg");
+        let not_started = |source| missing(&ffmpeg, name.as_ref(), source);
+        let mut child = Command::new(&ffmpeg)
+            .args([
+                "-nostdin", "-v", "error", "-copyts", "-f", "matroska", "-i", "pipe:0",
+            ])
+            .args(outputs(&ffmpeg))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .process_group(0)
+            .spawn()
+            .map_err(not_started)?;
+        let no_pipe = || not_started(ErrorKind::BrokenPipe.into());
+        let mut stdin = child.stdin.take().ok_or_else(no_pipe)?;
+        let stdout = child.stdout.take().ok_or_else(no_pipe)?;
+        let stderr = child.stderr.take().ok_or_else(no_pipe)?;
+        let thread = std::thread::Builder::new().name("pieces".to_owned());
+        let fed = thread.spawn(move || {
+            // A decoder that has ended takes no more.
+            let mut pieces = pieces;
+            pieces.all(|it| stdin.write_all(&it).is_ok());
+        });
+        fed.map_err(not_started)?;
+        Ok(Self {
+            name: name.to_owned(),
+            size,
+            child: StreamEnd(Arc::new(Mutex::new(child))),
+            stdout,
+            log: Log::follow(stderr).map_err(not_started)?,
+        })
+    }
+
+    /// Reads the next picture into `rgb`, and returns its time in the stream, nanoseconds; none at the end.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError::Video`] if it cannot be decoded; [`FootageError::SizeChanged`].
+    ///
+    /// # Panics
+    ///
+    /// If `rgb` has another length than a picture.
+    pub fn next_into(&mut self, rgb: &mut [u8]) -> Result<Option<i64>, FootageError> {
+        assert_eq!(
+            rgb.len(),
+            self.size.rgb_bytes(),
+            "a picture is {} in RGB",
+            self.size
+        );
+        let failed = |message: String| FootageError::Video {
+            path: self.name.clone().into(),
+            message,
+        };
+        if self.stdout.read_exact(rgb).is_err() {
+            self.child.end();
+            return Ok(None);
+        }
+        let time = self.log.next_time();
+        let time = time.ok_or_else(|| failed("the decoder tells no times".to_owned()))?;
+        if time.bytes != (self.size.width * (self.size.height / SHARE)) as u64 {
+            return Err(FootageError::SizeChanged {
+                path: self.name.clone().into(),
+                expected: self.size,
+            });
+        }
+        Ok(Some((time.time_s * 1e9).round() as i64))
+    }
+}
+
+impl Drop for RemadeStream {
+    fn drop(&mut self) {
+        self.child.end();
+    }
+}
