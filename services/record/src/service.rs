@@ -182,7 +182,7 @@ impl<'a> Recorder<'a> {
 
     fn take(&mut self, topic: usize, message: Received) {
         let kind = self.receivers[topic].kind();
-        self.note(topic, kind, &message);
+        self.note(topic, &message);
         let health = self.service.health();
         health.received(1);
         self.is_over |= kind == Kind::Pose3d && message.status == Status::END;
@@ -207,7 +207,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// Counts a message, and takes what it reports about other topics.
-    fn note(&mut self, topic: usize, kind: Kind, message: &Received) {
+    fn note(&mut self, topic: usize, message: &Received) {
         if let Some([epoch, n_sent]) = message.life {
             for &other in &self.counts[topic] {
                 self.sent[other].reported(epoch, n_sent);
@@ -219,11 +219,8 @@ impl<'a> Recorder<'a> {
                 self.sent[other].reported(0, self.n_evidence[topic]);
             }
         }
-        // Senders do not count the end of a stream, and cameras do not count what they could not read.
-        let counts = match kind {
-            Kind::Frame => message.status == Status::OK,
-            _ => message.status != Status::END,
-        };
+        // Senders count everything but the end of a stream: also frames without a picture.
+        let counts = message.status != Status::END;
         if counts {
             self.sent[topic].received();
         }
