@@ -219,6 +219,10 @@ impl StreamSpec {
         let limit = (SILENCE_S * 1_000_000).to_string();
         let mut options = vec!["-fflags", "nobuffer", "-flags", "low_delay"];
         options.extend(["-analyzeduration", "1000000", "-probesize", "1000000"]);
+        if !self.has_times() {
+            // A JPEG picture that is cut short is left out; otherwise its lower part would be grey.
+            options.extend(["-err_detect", "explode"]);
+        }
         let is_rtsp = self.is("rtsp") || self.is("rtsps");
         let listens = self.address.contains("listen");
         if is_rtsp {
@@ -321,6 +325,14 @@ fn version_of(ffmpeg: &PathBuf) -> String {
         .to_owned()
 }
 
+/// What is said of a stream that ends without a word of its decoder.
+fn ended(error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::UnexpectedEof => "the stream has ended".to_owned(),
+        _ => format!("the stream has ended ({error})"),
+    }
+}
+
 fn failed(shown: &str, message: &str) -> FootageError {
     FootageError::Stream {
         address: shown.to_owned(),
@@ -350,7 +362,7 @@ impl LiveStream {
             self.child.end();
             let said = self.log.finish();
             let message = if said.is_empty() {
-                format!("the stream has ended ({error})")
+                ended(&error)
             } else {
                 without_password_of(&self.address, &said)
             };
@@ -444,6 +456,9 @@ mod tests {
         };
         assert!(options("rtsp://a/b").contains("-rtsp_transport tcp -timeout 5000000"));
         assert!(options("http://a/b").contains("-rw_timeout 5000000"));
+        assert!(
+            options("http://a/b").contains("explode") && !options("udp://a").contains("explode")
+        );
         assert!(!options("udp://:5000").contains("rtsp"));
         assert!(
             !StreamSpec::new("http://a/b").has_times() && StreamSpec::new("rtsp://a").has_times()

@@ -209,7 +209,6 @@ impl Keeper {
             }
             state.end = input.end();
             state.waits_since = Some(Instant::now());
-            state.tally.n_connections += 1;
         }
         if let Some(originals) = &self.originals {
             originals.connected();
@@ -225,6 +224,10 @@ impl Keeper {
             match read {
                 Ok(None) => spare = Some(rgb),
                 Ok(Some(taken)) => {
+                    // A decoder that starts has not found its camera yet.
+                    if *n_read == 0 {
+                        self.shared.state().tally.n_connections += 1;
+                    }
                     *n_read += 1;
                     let made = 1 + taken.n_lost + taken.n_overtaken;
                     let rate_hz = pace.rate_hz(made, taken.at_nanos);
