@@ -112,8 +112,11 @@ impl<R: Read> Cutter<R> {
                 let begin = bytes.len();
                 let length = length.filter(|it| *it <= MAX_BYTES);
                 let length = length.ok_or(io::ErrorKind::InvalidData)?;
-                bytes.resize(begin + length as usize, 0);
-                self.input.read_exact(&mut bytes[begin..])?;
+                // Memory for what is there, whatever the length says.
+                let n = (&mut self.input).take(length).read_to_end(&mut bytes)?;
+                if n as u64 != length {
+                    return Ok(None);
+                }
                 if id == id::CLUSTER {
                     return Ok(Some(self.picture(begin, bytes)));
                 }
