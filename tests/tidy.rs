@@ -44,6 +44,7 @@ const LAYERS: &[&[&str]] = &[
         "scene",
         "deployment",
         "keypointfiles",
+        "synchronisation",
     ],
     &["runtime"],
     &["multiview", "viewquality", "posenetwork"],
