@@ -140,7 +140,11 @@ impl fmt::Display for Worded<'_> {
         let name = |it: &usize| self.names.get(*it).map_or("?", |it| it);
         let ms = |it: f64| 1e3 * it;
         match self.doubt {
-            Doubt::NoPeople { camera, seen_s, least_s } => write!(
+            Doubt::NoPeople {
+                camera,
+                seen_s,
+                least_s,
+            } => write!(
                 f,
                 "{}: someone is followed for {seen_s:.1} s, at least {least_s:.1} s are needed",
                 name(camera)
@@ -150,7 +154,14 @@ impl fmt::Display for Worded<'_> {
                 "{}: {n} joints are seen together with other cameras at these offsets, at least {least} are needed",
                 name(camera)
             ),
-            Doubt::Ambiguous { cameras, away_s, ratio, most_ratio, t, least_t } => {
+            Doubt::Ambiguous {
+                cameras,
+                away_s,
+                ratio,
+                most_ratio,
+                t,
+                least_t,
+            } => {
                 let named: Vec<&str> = cameras.iter().map(name).collect();
                 write!(
                     f,
@@ -162,19 +173,31 @@ impl fmt::Display for Worded<'_> {
                     100.0 * most_ratio
                 )
             }
-            Doubt::Edge { camera, offset_s, window_s } => write!(
+            Doubt::Edge {
+                camera,
+                offset_s,
+                window_s,
+            } => write!(
                 f,
                 "{}: the best offset, {offset_s:+.2} s, is at the edge of the search of {window_s:.1} s: search further",
                 name(camera)
             ),
-            Doubt::Flat { camera, error_s, most_s } => write!(
+            Doubt::Flat {
+                camera,
+                error_s,
+                most_s,
+            } => write!(
                 f,
                 "{}: the minimum is flat: standard error {:.1} ms, at most {:.1} ms is accepted",
                 name(camera),
                 ms(*error_s),
                 ms(*most_s)
             ),
-            Doubt::Still { camera, gain, least } => write!(
+            Doubt::Still {
+                camera,
+                gain,
+                least,
+            } => write!(
                 f,
                 "{}: the best offset costs {:.0} % less than the others do, at least {:.0} % is needed: too little movement, or the \
                  calibration does not fit",
@@ -182,13 +205,22 @@ impl fmt::Display for Worded<'_> {
                 100.0 * gain,
                 100.0 * least
             ),
-            Doubt::Misfit { camera, percent, most } => write!(
+            Doubt::Misfit {
+                camera,
+                percent,
+                most,
+            } => write!(
                 f,
                 "{}: joints are {percent:.1} % of a person's size off what the other cameras say (median; at most {most:.1} %): cameras \
                  exchanged, moved, or not of one scene",
                 name(camera)
             ),
-            Doubt::Pair { cameras: [a, b], away_s, share, least_share } => write!(
+            Doubt::Pair {
+                cameras: [a, b],
+                away_s,
+                share,
+                least_share,
+            } => write!(
                 f,
                 "{} and {}: by themselves sure of {:+.0} ms away from what all cameras say, which is {:.0} % as good (at least {:.0} %)",
                 name(a),
@@ -197,14 +229,22 @@ impl fmt::Display for Worded<'_> {
                 100.0 * share,
                 100.0 * least_share
             ),
-            Doubt::Speed { camera, drift, most } => write!(
+            Doubt::Speed {
+                camera,
+                drift,
+                most,
+            } => write!(
                 f,
                 "{}: its clock would run {:+.2} % off, at most {:.0} % is accepted: is the frame rate right?",
                 name(camera),
                 100.0 * drift,
                 100.0 * most
             ),
-            Doubt::Parts { camera, away_s, most_s } => write!(
+            Doubt::Parts {
+                camera,
+                away_s,
+                most_s,
+            } => write!(
                 f,
                 "{}: parts of the footage tell offsets {:.0} ms apart, at most {:.0} ms is accepted: frames missing, or another speed",
                 name(camera),

@@ -1,5 +1,7 @@
 //! The whole estimation.
 
+mod doubts;
+
 use geometry::Camera;
 
 use crate::curve::{Curve, Grid};
@@ -16,30 +18,12 @@ const SMOOTHING: [f64; 2] = [0.75, 0.015];
 const SEARCHED_S: f64 = 60.0;
 /// For how long someone has to be followed in a camera, seconds.
 const LEAST_SEEN_S: f64 = 0.5;
-/// Joints that a camera has to see together with others, both ways.
-const LEAST_JOINTS: usize = 200;
-/// Doubts: the second best as a share of the best, and by how many standard errors it is worse.
-const MOST_RATIO: f64 = 0.8;
-const LEAST_T: f64 = 4.0;
-/// The largest standard error of an offset, seconds, and intervals between pictures.
-const MOST_ERROR: [f64; 2] = [0.006, 0.25];
-/// By how much less the best offset costs than the mean, as a share.
-const LEAST_GAIN: f64 = 0.15;
-/// The largest median residual, expected errors.
-const MOST_RESIDUAL: f64 = 3.0;
-/// A pair that is sure by itself (its second best is worse than this share) agrees if the common offset has this share of its
-/// best gain.
-const SURE_PAIR: [f64; 2] = [0.6, 0.5];
-/// How far offsets of parts of the footage may be apart beyond their errors, seconds, and standard errors.
-const MOST_APART: [f64; 2] = [0.02, 4.0];
 /// Drifts are refined from this length on, seconds.
 const LEAST_DRIFT_S: f64 = 10.0;
 /// A drift is determined where its error makes less than this over the footage, seconds.
 const MOST_DRIFT_ERROR_S: f64 = 0.005;
 /// A drift is taken as such if it is so many standard errors away from none.
 const SURE_DRIFT: f64 = 4.0;
-/// The largest drift of a clock.
-const MOST_DRIFT: f64 = 0.01;
 
 /// How clocks are estimated.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,7 +105,10 @@ pub fn estimate(
     settings: &Settings,
 ) -> Result<Outcome, FilmError> {
     check(cameras, films, settings)?;
-    let interval_s = films.iter().filter_map(Film::interval_s).fold(0.0, f64::max);
+    let interval_s = films
+        .iter()
+        .filter_map(Film::interval_s)
+        .fold(0.0, f64::max);
     let sigma_s = (SMOOTHING[0] * interval_s).max(SMOOTHING[1]);
     let of_camera = |(film, camera)| tracks(film, camera, settings.n_joints, sigma_s);
     let tracks: Vec<Vec<Track>> = films.iter().zip(cameras).map(of_camera).collect();
@@ -130,7 +117,11 @@ pub fn estimate(
     for (camera, &seen_s) in seen.iter().enumerate() {
         if seen_s < LEAST_SEEN_S {
             let least_s = LEAST_SEEN_S;
-            doubts.push(Doubt::NoPeople { camera, seen_s, least_s });
+            doubts.push(Doubt::NoPeople {
+                camera,
+                seen_s,
+                least_s,
+            });
         }
     }
     let mut active: Vec<usize> = (0..cameras.len())
@@ -195,7 +186,14 @@ impl Study<'_> {
     fn outcome(&self, mut doubts: Vec<Doubt>) -> Outcome {
         let curves = self.curves();
         let found = search(self.cameras.len(), self.active, &curves);
-        let start: Vec<Clock> = found.offsets_s.iter().map(|&offset_s| Clock { offset_s, ..Clock::default() }).collect();
+        let start: Vec<Clock> = found
+            .offsets_s
+            .iter()
+            .map(|&offset_s| Clock {
+                offset_s,
+                ..Clock::default()
+            })
+            .collect();
         let problem = self.problem();
         let span = self.span(&start);
         let (fit, drift_errors) = self.fit(&problem, &start, span);
@@ -212,7 +210,10 @@ impl Study<'_> {
         };
         self.doubt_search(&found, &curves, &mut doubts);
         self.doubt_fit(&problem, &fit, span, &mut doubts);
-        let pairs = curves.iter().map(|it| pair_report(it, &fit.clocks)).collect();
+        let pairs = curves
+            .iter()
+            .map(|it| pair_report(it, &fit.clocks))
+            .collect();
         Outcome {
             cameras: (0..self.cameras.len()).map(camera).collect(),
             pairs,
@@ -249,9 +250,11 @@ impl Study<'_> {
     /// The part of the footage with most movement, by the clocks of the cameras; all of it if it is short.
     fn searched(&self) -> [f64; 2] {
         let spans = self.active.iter().flat_map(|it| &self.tracks[*it]);
-        let ends = spans.map(|it| it.span).fold([f64::INFINITY, f64::NEG_INFINITY], |all, it| {
-            [all[0].min(it[0]), all[1].max(it[1])]
-        });
+        let ends = spans
+            .map(|it| it.span)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |all, it| {
+                [all[0].min(it[0]), all[1].max(it[1])]
+            });
         if ends[1] - ends[0] <= SEARCHED_S || ends[1] < ends[0] {
             return if ends[1] < ends[0] { [0.0, 0.0] } else { ends };
         }
@@ -289,7 +292,11 @@ impl Study<'_> {
         Problem {
             tracks: self.tracks,
             pairs,
-            reference: self.active.first().copied().unwrap_or(self.settings.reference),
+            reference: self
+                .active
+                .first()
+                .copied()
+                .unwrap_or(self.settings.reference),
             mirror: self.settings.mirror.as_deref(),
             n_joints: self.settings.n_joints,
         }
@@ -316,7 +323,12 @@ impl Study<'_> {
     }
 
     /// The fit, and the errors of the drifts if these are determined.
-    fn fit(&self, problem: &Problem<'_>, start: &[Clock], span: [f64; 2]) -> (Fit, Option<Vec<f64>>) {
+    fn fit(
+        &self,
+        problem: &Problem<'_>,
+        start: &[Clock],
+        span: [f64; 2],
+    ) -> (Fit, Option<Vec<f64>>) {
         let searched = self.searched();
         let length_s = span[1] - span[0];
         let mut part = [searched[0].max(span[0]), searched[1].min(span[1])];
@@ -331,12 +343,16 @@ impl Study<'_> {
         fit = problem.refine(&plain, part, true);
         while part[0] > span[0] || part[1] < span[1] {
             let more_s = part[1] - part[0];
-            part = [(part[0] - more_s).max(span[0]), (part[1] + more_s).min(span[1])];
+            part = [
+                (part[0] - more_s).max(span[0]),
+                (part[1] + more_s).min(span[1]),
+            ];
             fit = problem.refine(&fit.clocks, part, true);
         }
         let others = self.active.iter().filter(|it| **it != problem.reference);
         let is_known = |it: &usize| fit.errors[*it][1] * length_s < MOST_DRIFT_ERROR_S;
-        let is_drifting = |it: &usize| fit.clocks[*it].drift.abs() > SURE_DRIFT * fit.errors[*it][1];
+        let is_drifting =
+            |it: &usize| fit.clocks[*it].drift.abs() > SURE_DRIFT * fit.errors[*it][1];
         let all_known = others.clone().all(is_known);
         let errors: Vec<f64> = fit.errors.iter().map(|it| it[1]).collect();
         if all_known && others.clone().any(is_drifting) {
@@ -359,122 +375,4 @@ fn pair_report(curve: &Curve, clocks: &[Clock]) -> PairReport {
         ratio,
         n: curve.n[best] as usize,
     }
-}
-
-/// The doubts.
-impl Study<'_> {
-    fn doubt_search(&self, found: &Found, curves: &[Curve], doubts: &mut Vec<Doubt>) {
-        let window_s = self.settings.window_s;
-        for it in found.rivals.iter().filter(|it| is_close(it)) {
-            let Rival { group, away_s, ratio, t } = it.clone();
-            let known = doubts.iter().flat_map(Doubt::cameras).collect::<Vec<_>>();
-            if group.iter().all(|it| known.contains(it)) {
-                continue;
-            }
-            doubts.push(Doubt::Ambiguous {
-                cameras: group,
-                away_s,
-                ratio,
-                most_ratio: MOST_RATIO,
-                t,
-                least_t: LEAST_T,
-            });
-        }
-        for &camera in self.active {
-            let offset_s = found.offsets_s[camera];
-            if offset_s.abs() > window_s - 0.05 {
-                doubts.push(Doubt::Edge { camera, offset_s, window_s });
-            }
-        }
-        for &camera in self.active {
-            let (mut gain, mut mean) = (0.0, 0.0);
-            for curve in curves.iter().filter(|it| it.cameras.contains(&camera)) {
-                let [a, b] = curve.cameras;
-                if let Some(nth) = curve.index(found.offsets_s[a] - found.offsets_s[b])
-                    && curve.n[nth] > 0.0
-                {
-                    gain += curve.gain[nth];
-                    mean += curve.gain[nth] + curve.cost[nth] * curve.n[nth];
-                }
-            }
-            let gain = if mean > 0.0 { gain / mean } else { 0.0 };
-            if gain < LEAST_GAIN {
-                let least = LEAST_GAIN;
-                doubts.push(Doubt::Still { camera, gain, least });
-            }
-        }
-        for curve in curves {
-            doubts.extend(doubt_pair(curve, &found.offsets_s));
-        }
-    }
-
-    fn doubt_fit(&self, problem: &Problem<'_>, fit: &Fit, span: [f64; 2], doubts: &mut Vec<Doubt>) {
-        let most_s = (MOST_ERROR[1] * self.interval_s).max(MOST_ERROR[0]);
-        for &camera in self.active {
-            let residuals = fit.residuals[camera];
-            if residuals.n < LEAST_JOINTS {
-                let (n, least) = (residuals.n, LEAST_JOINTS);
-                doubts.push(Doubt::Unconnected { camera, n, least });
-                continue;
-            }
-            let error_s = fit.errors[camera][0];
-            if error_s.is_nan() || error_s > most_s {
-                doubts.push(Doubt::Flat { camera, error_s, most_s });
-            }
-            if residuals.median > MOST_RESIDUAL {
-                doubts.push(Doubt::Misfit {
-                    camera,
-                    percent: residuals.median,
-                    most: MOST_RESIDUAL,
-                });
-            }
-            let drift = fit.clocks[camera].drift;
-            if drift.abs() > MOST_DRIFT {
-                doubts.push(Doubt::Speed {
-                    camera,
-                    drift,
-                    most: MOST_DRIFT,
-                });
-            }
-        }
-        self.doubt_parts(problem, fit, span, doubts);
-    }
-
-    /// Whether both halves of the footage tell the same.
-    fn doubt_parts(&self, problem: &Problem<'_>, fit: &Fit, span: [f64; 2], doubts: &mut Vec<Doubt>) {
-        let middle_s = f64::midpoint(span[0], span[1]);
-        let halves = [[span[0], middle_s], [middle_s, span[1]]];
-        let [first, second] = halves.map(|it| problem.refine(&fit.clocks, it, false));
-        for &camera in self.active {
-            let errors = [&first, &second].map(|it| it.errors[camera][0]);
-            let at_middle = [&first, &second].map(|it| it.clocks[camera].common(middle_s));
-            let away_s = (at_middle[0] - at_middle[1]).abs();
-            let most_s = MOST_APART[0].max(0.5 * self.interval_s) + MOST_APART[1] * errors[0].hypot(errors[1]);
-            if away_s > most_s {
-                doubts.push(Doubt::Parts { camera, away_s, most_s });
-            }
-        }
-    }
-}
-
-fn is_close(rival: &Rival) -> bool {
-    rival.ratio.is_nan() || rival.ratio > MOST_RATIO || rival.t.is_nan() || rival.t < LEAST_T
-}
-
-/// Whether a pair that is sure by itself contradicts the offsets of all.
-fn doubt_pair(curve: &Curve, offsets_s: &[f64]) -> Option<Doubt> {
-    let [a, b] = curve.cameras;
-    let (best, value) = peak(curve);
-    let (_, ratio) = second(curve)?;
-    let nth = curve.index(offsets_s[a] - offsets_s[b])?;
-    let share = curve.gain[nth] / curve.gain[best];
-    if value <= 0.0 || ratio > SURE_PAIR[0] || share > SURE_PAIR[1] {
-        return None;
-    }
-    Some(Doubt::Pair {
-        cameras: curve.cameras,
-        away_s: curve.offset_s(best) - curve.offset_s(nth),
-        share,
-        least_share: SURE_PAIR[1],
-    })
 }

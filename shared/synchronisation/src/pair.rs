@@ -42,7 +42,8 @@ impl Epipolar {
         let by_b = Vector2::new(in_b.x, in_b.y);
         let by_a = Vector2::new(in_a.x, in_a.y);
         let [of_a, of_b] = sizes.map(|it| NOISE * it);
-        let sigma = (of_b.powi(2) * by_b.norm_squared() + of_a.powi(2) * by_a.norm_squared()).sqrt();
+        let sigma =
+            (of_b.powi(2) * by_b.norm_squared() + of_a.powi(2) * by_a.norm_squared()).sqrt();
         let gradient = by_a.norm().hypot(by_b.norm());
         let value = b.dot(&in_b) / sigma;
         value.is_finite().then_some(Residual {

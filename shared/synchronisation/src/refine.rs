@@ -11,8 +11,9 @@ use crate::track::{LEAST_JOINTS, Place, Track};
 const MOST_TIMES: usize = 300;
 /// Length of the blocks of time whose errors are taken as independent, seconds.
 const BLOCK_S: f64 = 0.5;
-/// The errors of joints of one person are alike: how much larger than of independent ones the variance is.
-const ALIKE: f64 = 1.5;
+/// Errors are alike over joints and longer than a block, and smoothing has its own: how much larger the variance is, by what was
+/// measured on synthetic people and keypoints of real ones.
+const ALIKE: f64 = 6.0;
 /// The most that offsets change in a step, seconds.
 const LONGEST_STEP_S: f64 = 0.05;
 const MOST_STEPS: usize = 30;
@@ -73,6 +74,9 @@ pub(crate) struct Residuals {
     pub(crate) median: f64,
     pub(crate) median_px: f64,
 }
+
+/// Gradients by joint and block of time.
+type Blocks = BTreeMap<(usize, i64), DVector<f64>>;
 
 /// One joint in two cameras.
 struct Row {
@@ -205,11 +209,11 @@ impl Problem<'_> {
         rows: &[Row],
         [per_camera, n]: [usize; 2],
         scale_s: f64,
-    ) -> (DMatrix<f64>, DVector<f64>, Vec<DVector<f64>>) {
+    ) -> (DMatrix<f64>, DVector<f64>, Blocks) {
         let size = per_camera * n;
         let mut normal = DMatrix::zeros(size, size);
         let mut gradient = DVector::zeros(size);
-        let mut blocks = BTreeMap::<_, DVector<f64>>::new();
+        let mut blocks = Blocks::new();
         for row in rows {
             let [a, b] = row.cameras;
             let weight = row.weight / (1.0 + row.residual.powi(2));
@@ -249,7 +253,7 @@ impl Problem<'_> {
                 normal[(nth, nth)] = 1.0;
             }
         }
-        (normal, gradient, blocks.into_values().collect())
+        (normal, gradient, blocks)
     }
 
     /// Standard errors: from the curvature, and from how much the blocks of time disagree.
@@ -260,12 +264,26 @@ impl Problem<'_> {
         let Some(inverse) = normal.cholesky().map(|it| it.inverse()) else {
             return vec![[f64::INFINITY; 2]; n];
         };
-        let mut variance = DMatrix::zeros(per_camera * n, per_camera * n);
-        for it in &blocks {
-            variance += it * it.transpose();
+        let n_unknown = (per_camera * n) as f64;
+        let spread = |each: &mut dyn Iterator<Item = &DVector<f64>>| {
+            let (mut sum, mut count) = (DMatrix::zeros(per_camera * n, per_camera * n), 0.0);
+            for it in each {
+                sum += it * it.transpose();
+                count += 1.0;
+            }
+            &inverse * sum * &inverse * (count / (count - n_unknown).max(1.0))
+        };
+        let mut variance = spread(&mut blocks.values()) * ALIKE;
+        // Errors that all joints have in common, where there are enough blocks to see them.
+        let mut by_time = BTreeMap::<i64, DVector<f64>>::new();
+        for ((_, time), it) in &blocks {
+            *by_time
+                .entry(*time)
+                .or_insert_with(|| DVector::zeros(it.len())) += it;
         }
-        let share = blocks.len() as f64 / (blocks.len() as f64 - (per_camera * n) as f64).max(1.0);
-        let variance = &inverse * variance * &inverse * (ALIKE * share);
+        if by_time.len() as f64 > 2.0 * n_unknown {
+            variance = variance.sup(&(spread(&mut by_time.values()) * ALIKE));
+        }
         let of_camera = |camera: usize| {
             if !is_known(camera) {
                 return [f64::INFINITY; 2];

@@ -195,7 +195,8 @@ struct Joint<'a> {
 
 impl<'a> Joint<'a> {
     fn new(curves: &'a [Curve], group: &[usize], offsets_s: &[f64]) -> Self {
-        let crosses = |it: &&Curve| group.contains(&it.cameras[0]) != group.contains(&it.cameras[1]);
+        let crosses =
+            |it: &&Curve| group.contains(&it.cameras[0]) != group.contains(&it.cameras[1]);
         let crossing = curves.iter().filter(crosses);
         let crossing: Vec<_> = crossing
             .map(|it| {
@@ -254,7 +255,9 @@ impl<'a> Joint<'a> {
 /// The second-best offset of a group.
 fn rival(curves: &[Curve], group: &[usize], offsets_s: &[f64]) -> Rival {
     let joint = Joint::new(curves, group, offsets_s);
-    let values: Vec<f64> = (-joint.half..=joint.half).map(|it| joint.value(it)).collect();
+    let values: Vec<f64> = (-joint.half..=joint.half)
+        .map(|it| joint.value(it))
+        .collect();
     let now = joint.half as usize;
     let best = values.get(now).copied().unwrap_or(0.0);
     let other = other_peak(&values, now);
@@ -264,8 +267,16 @@ fn rival(curves: &[Curve], group: &[usize], offsets_s: &[f64]) -> Rival {
     Rival {
         group: group.to_vec(),
         away_s: by as f64 * STEP_S,
-        ratio: if best > 0.0 { (value / best).max(0.0) } else { 1.0 },
-        t: if other.is_some() { sum_in_errors(&differences) } else { f64::INFINITY },
+        ratio: if best > 0.0 {
+            (value / best).max(0.0)
+        } else {
+            1.0
+        },
+        t: if other.is_some() {
+            sum_in_errors(&differences)
+        } else {
+            f64::INFINITY
+        },
     }
 }
 

@@ -19,8 +19,10 @@ pub(crate) fn ring(n: usize) -> Vec<Camera> {
         let forward = (Vector3::new(0.0, 0.0, 0.9) - centre).normalize();
         let right = forward.cross(&Vector3::z()).normalize();
         let down = forward.cross(&right);
-        let rotation = Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        let rotation =
+            Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);
+        let rotation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
         Camera {
             name: format!("cam{nth}"),
             intrinsics: Intrinsics {
@@ -31,24 +33,40 @@ pub(crate) fn ring(n: usize) -> Vec<Camera> {
                 size: [1000, 1000],
                 lens: Lens::new(LensModel::Pinhole),
             },
-            camera_from_world: Isometry3::from_parts(Translation3::from(rotation * -centre), rotation),
+            camera_from_world: Isometry3::from_parts(
+                Translation3::from(rotation * -centre),
+                rotation,
+            ),
         }
     };
     (0..n).map(camera).collect()
 }
 
 /// Someone at a place, turned, in a phase of a step.
-pub(crate) fn stepping([x, y]: [f64; 2], turn: f64, phase: f64, stride: f64) -> [[f64; 3]; N_JOINTS] {
+pub(crate) fn stepping(
+    [x, y]: [f64; 2],
+    turn: f64,
+    phase: f64,
+    stride: f64,
+) -> [[f64; 3]; N_JOINTS] {
     let swing = stride * phase.sin();
     let lift = 0.03 * stride * (2.0 * phase).cos();
     // Forwards, to the left, up.
     let body = [
-        [-0.35 * swing, -0.1, 0.08 + 0.12 * stride * (-phase.cos()).max(0.0)],
+        [
+            -0.35 * swing,
+            -0.1,
+            0.08 + 0.12 * stride * (-phase.cos()).max(0.0),
+        ],
         [-0.15 * swing, -0.1, 0.5],
         [0.0, -0.1, 0.95 + lift],
         [0.0, 0.1, 0.95 + lift],
         [0.15 * swing, 0.1, 0.5],
-        [0.35 * swing, 0.1, 0.08 + 0.12 * stride * phase.cos().max(0.0)],
+        [
+            0.35 * swing,
+            0.1,
+            0.08 + 0.12 * stride * phase.cos().max(0.0),
+        ],
         [0.3 * swing + 0.1, -0.3, 0.9],
         [0.12 * swing, -0.28, 1.15],
         [0.0, -0.2, 1.42 + lift],
@@ -60,7 +78,11 @@ pub(crate) fn stepping([x, y]: [f64; 2], turn: f64, phase: f64, stride: f64) -> 
     ];
     body.map(|[forward, left, up]| {
         let (sin, cos) = turn.sin_cos();
-        [x + forward * cos - left * sin, y + forward * sin + left * cos, up]
+        [
+            x + forward * cos - left * sin,
+            y + forward * sin + left * cos,
+            up,
+        ]
     })
 }
 
@@ -143,9 +165,15 @@ impl Recording {
                         if dice.f64() < self.missing {
                             return None;
                         }
-                        let mut at = [at.x + self.noise_px * normal(), at.y + self.noise_px * normal()];
+                        let mut at = [
+                            at.x + self.noise_px * normal(),
+                            at.y + self.noise_px * normal(),
+                        ];
                         if dice.f64() < self.outliers {
-                            at = [at[0] + 200.0 * (dice.f64() - 0.5), at[1] + 200.0 * (dice.f64() - 0.5)];
+                            at = [
+                                at[0] + 200.0 * (dice.f64() - 0.5),
+                                at[1] + 200.0 * (dice.f64() - 0.5),
+                            ];
                         }
                         Some(Joint { at, score: 0.9 })
                     };

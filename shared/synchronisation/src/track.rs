@@ -9,8 +9,10 @@ use crate::film::{Film, Person};
 const LONGEST_GAP_S: f64 = 0.25;
 /// How far the joints of a person may move from one picture to the next, sizes of the person, and per second besides.
 const FARTHEST: [f64; 2] = [0.15, 4.0];
-/// A joint farther from the median of its neighbours in time than this, sizes of the person, is an outlier.
-const OUTLIER: f64 = 0.06;
+/// A joint farther from where its neighbours in time say than this, sizes of the person, is an outlier; where it moves, by this
+/// share of the way between them more.
+const OUTLIER: f64 = 0.03;
+const TURNING: f64 = 0.25;
 /// Neighbours to each side.
 const NEIGHBOURS: usize = 3;
 /// Joints of lower score are not used.
@@ -86,12 +88,8 @@ impl Track {
         if n < 2 || !before || !after || spread <= 1e-12 * s0 * s0 {
             return None;
         }
-        let line = moments.map(|[m0, m1]| {
-            [
-                (s2 * m0 - s1 * m1) / spread,
-                (s0 * m1 - s1 * m0) / spread,
-            ]
-        });
+        let line =
+            moments.map(|[m0, m1]| [(s2 * m0 - s1 * m1) / spread, (s0 * m1 - s1 * m0) / spread]);
         Some(Place {
             at: line.map(|it| it[0]),
             speed: line.map(|it| it[1]),
@@ -156,7 +154,9 @@ fn link(time_s: f64, people: &mut [Option<Seen>], open: &mut [Open]) {
     ties.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut is_taken = vec![false; open.len()];
     for (_, track, person) in ties {
-        if !is_taken[track] && let Some(seen) = people[person].take() {
+        if !is_taken[track]
+            && let Some(seen) = people[person].take()
+        {
             is_taken[track] = true;
             open[track].samples.push((time_s, seen));
         }
@@ -183,7 +183,9 @@ fn seen(person: &Person, camera: &Camera, n_joints: usize, least_size: f64) -> O
     let ideal = |joint: usize| {
         let it = (*person.joints.get(joint)?)?;
         let is_good = it.at.iter().all(|it| it.is_finite()) && it.score > LEAST_SCORE;
-        let at = camera.undistorted_px(&Point2::from(it.at)).filter(|_| is_good)?;
+        let at = camera
+            .undistorted_px(&Point2::from(it.at))
+            .filter(|_| is_good)?;
         Some(([at.x, at.y], it.score.min(1.0)))
     };
     let joints: Vec<Option<([f64; 2], f64)>> = (0..n_joints).map(ideal).collect();
@@ -237,22 +239,37 @@ impl Open {
     }
 }
 
-/// Leaves out samples that are far from the median of their neighbours in time, by more than these vary as well.
+/// Leaves out samples that are far from where those before and after them say: the line between the medians of both.
 fn without_outliers(samples: &[Sample], limit: f64) -> Vec<Sample> {
     let is_good = |nth: usize| {
-        let near = nth.saturating_sub(NEIGHBOURS)..(nth + NEIGHBOURS + 1).min(samples.len());
-        let away = |axis: usize| {
-            let mut each: Vec<f64> = samples[near.clone()].iter().map(|it| it.at[axis]).collect();
-            each.sort_by(f64::total_cmp);
-            let median = each[each.len() / 2];
-            for it in &mut each {
-                *it = (*it - median).abs();
-            }
-            each.sort_by(f64::total_cmp);
-            (samples[nth].at[axis] - median).abs() - 3.0 * each[each.len() / 2]
+        let before = &samples[nth.saturating_sub(NEIGHBOURS)..nth];
+        let after = &samples[nth + 1..(nth + 1 + NEIGHBOURS).min(samples.len())];
+        let (Some(before), Some(after)) = (middle(before), middle(after)) else {
+            return true;
         };
-        away(0) < limit && away(1) < limit
+        let it = samples[nth];
+        let share = (it.time_s - before.time_s) / (after.time_s - before.time_s);
+        [0, 1].into_iter().all(|axis| {
+            let way = after.at[axis] - before.at[axis];
+            let away = it.at[axis] - before.at[axis] - share * way;
+            away.abs() < limit + TURNING * way.abs()
+        })
     };
     let kept = (0..samples.len()).filter(|it| is_good(*it));
     kept.map(|it| samples[it]).collect()
+}
+
+/// The median of samples, each number for itself.
+fn middle(samples: &[Sample]) -> Option<Sample> {
+    let median = |of: fn(&Sample) -> f64| {
+        let mut each: Vec<f64> = samples.iter().map(of).collect();
+        each.sort_by(f64::total_cmp);
+        let n = each.len();
+        (n > 0).then(|| f64::midpoint(each[(n - 1) / 2], each[n / 2]))
+    };
+    Some(Sample {
+        time_s: median(|it| it.time_s)?,
+        at: [median(|it| it.at[0])?, median(|it| it.at[1])?],
+        score: 1.0,
+    })
 }
