@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
+use deployment::Timeline;
 use footage::{FootageError, FrameView, Size, Source, SourceKind, SourceSpec, Turn};
 use scene::{Address, AddressError, Scene, SceneError, View};
 
 use crate::blank::{Blank, BlankError, BlankFeed};
 use crate::info::FeedInfo;
 use crate::recorded::{Recorded, RecordedError, RecordedFeed};
+use crate::retimed::Retimed;
 
 /// Why there are no pictures.
 #[derive(Debug, thiserror::Error)]
@@ -61,6 +63,8 @@ pub enum Feed {
     Blank(Box<BlankFeed>),
     /// Those of a live camera, recorded as they came.
     Recorded(Box<RecordedFeed>),
+    /// Any of these, at common instants.
+    Retimed(Box<Retimed>),
 }
 
 /// A camera of a scene.
@@ -106,6 +110,27 @@ impl Feed {
             .size
             .map(|side| side as usize);
         info(spec, &address, Size::new(width, height))
+    }
+
+    /// As [`Self::look`], at common instants if there is a timeline.
+    ///
+    /// # Errors
+    ///
+    /// [`FeedError`].
+    pub fn look_on(spec: &SourceSpec, timeline: Option<&Timeline>) -> Result<FeedInfo, FeedError> {
+        timeline.map_or_else(|| Self::look(spec), |it| Retimed::look(spec, it))
+    }
+
+    /// As [`Self::open`], at common instants if there is a timeline.
+    ///
+    /// # Errors
+    ///
+    /// [`FeedError`].
+    pub fn open_on(spec: &SourceSpec, timeline: Option<&Timeline>) -> Result<Self, FeedError> {
+        let Some(timeline) = timeline else {
+            return Self::open(spec);
+        };
+        Ok(Self::Retimed(Box::new(Retimed::open(spec, timeline)?)))
     }
 
     /// Opens the source. Making a scene takes about a second.
@@ -154,6 +179,7 @@ impl Feed {
             Self::Scene(stage) => stage.info,
             Self::Blank(feed) => feed.info,
             Self::Recorded(feed) => feed.info,
+            Self::Retimed(it) => it.info(),
         }
     }
 
@@ -168,6 +194,7 @@ impl Feed {
             Self::Scene(stage) => Ok(stage.next_frame()),
             Self::Blank(feed) => Ok(feed.next_frame()),
             Self::Recorded(feed) => feed.next_frame(),
+            Self::Retimed(it) => it.next_frame(),
         }
     }
 
@@ -178,6 +205,7 @@ impl Feed {
             Self::Scene(stage) => &stage.rgb,
             Self::Blank(feed) => &feed.rgb,
             Self::Recorded(feed) => &feed.rgb,
+            Self::Retimed(it) => it.feed().pixels(),
         }
     }
 
@@ -187,6 +215,7 @@ impl Feed {
             Self::Footage(source) => source.info().kind == SourceKind::Still,
             Self::Scene(_) | Self::Recorded(_) => false,
             Self::Blank(_) => true,
+            Self::Retimed(it) => it.feed().is_still(),
         }
     }
 
@@ -195,6 +224,7 @@ impl Feed {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Video,
             Self::Scene(_) | Self::Blank(_) | Self::Recorded(_) => false,
+            Self::Retimed(it) => it.feed().is_video(),
         }
     }
 
@@ -213,6 +243,7 @@ impl Feed {
             }
             Self::Blank(feed) => Ok(feed.skip(n)),
             Self::Recorded(feed) => Ok(feed.skip(n)),
+            Self::Retimed(it) => Ok(it.skip(n)),
         }
     }
 }

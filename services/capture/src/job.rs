@@ -6,6 +6,7 @@ use footage::SourceSpec;
 use geometry::Framing;
 
 use crate::live::LiveJob;
+use deployment::Timeline;
 use deployment::capture::{Faults, Mode, Pace};
 
 /// What one camera's process has to do.
@@ -15,6 +16,8 @@ pub struct Job {
     pub view: usize,
     /// The footage.
     pub source: SourceSpec,
+    /// Which frame belongs to each common instant, where cameras have clocks of their own; `source` counts instants then.
+    pub timeline: Option<Timeline>,
     /// The live camera, if it is one; of `source` only the choice of frames counts then.
     pub live: Option<LiveJob>,
     /// From the beginning of the run to the first frame in real time, nanoseconds, so that every process has started.

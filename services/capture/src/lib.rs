@@ -11,6 +11,7 @@ mod kept;
 mod live;
 mod live_service;
 mod recorded;
+mod retimed;
 mod service;
 mod supply;
 
@@ -20,4 +21,5 @@ pub use info::FeedInfo;
 pub use job::Job;
 pub use live::{LiveCamera, LiveError, LiveJob, take_picture};
 pub use recorded::{Recorded, RecordedError};
+pub use retimed::Retimed;
 pub use service::run;

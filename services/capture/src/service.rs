@@ -22,7 +22,8 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     }
     let is_live = job.pace == Pace::Realtime;
     let faults = job.faults.of_epoch(service.epoch());
-    let supply = Supply::open(&job.source, &faults, is_live, job.frozen_after);
+    let footage = (&job.source, job.timeline.as_ref());
+    let supply = Supply::open(footage, &faults, is_live, job.frozen_after);
     let mut supply = supply.or_fail(ExitKind::Input)?;
     service.health().set_total(supply.info().n_frames);
     let mut camera = Camera::open(service, job, &supply)?;
@@ -38,7 +39,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         match step {
             Step::Picture => {
                 let shot = Shot {
-                    captured_at: asked_at,
+                    captured_at: asked_at.saturating_add_signed(supply.rest_nanos(index)),
                     asked_at,
                     skew: job.skew_nanos,
                 };

@@ -9,6 +9,7 @@ use messages::Status;
 use crate::feed::{Feed, FeedError};
 use crate::guard::Guard;
 use crate::info::FeedInfo;
+use deployment::Timeline;
 use deployment::capture::{Fault, FaultKind, Faults};
 
 /// Time between attempts to reopen a camera, nanoseconds.
@@ -31,6 +32,8 @@ pub(crate) enum Step {
 #[derive(Debug)]
 pub(crate) struct Supply {
     spec: SourceSpec,
+    /// Where the camera has a clock of its own: `spec` counts instants then.
+    timeline: Option<Timeline>,
     faults: Faults,
     info: FeedInfo,
     /// Whether frames follow a clock, so that a camera may come back.
@@ -60,17 +63,18 @@ impl Supply {
     ///
     /// [`FeedError`]: a camera that cannot be opened at the start is an error of the deployment.
     pub(crate) fn open(
-        spec: &SourceSpec,
+        (spec, timeline): (&SourceSpec, Option<&Timeline>),
         faults: &Faults,
         is_live: bool,
         frozen_after: u32,
     ) -> Result<Self, FeedError> {
-        let feed = Feed::open(spec)?;
+        let feed = Feed::open_on(spec, timeline)?;
         let info = feed.info();
         let rate_hz = info.frame_rate_hz.map(|rate_hz| rate_hz * spec.step as f64);
         let frozen_after = if feed.is_still() { 0 } else { frozen_after };
         Ok(Self {
             spec: spec.clone(),
+            timeline: timeline.copied(),
             faults: faults.clone(),
             info,
             is_live,
@@ -99,6 +103,11 @@ impl Supply {
     fn index_of(&self, nth: u64) -> u64 {
         let offset = nth.saturating_mul(self.spec.step);
         self.spec.start.saturating_add(offset)
+    }
+
+    /// How long after its instant the picture of a frame was taken, nanoseconds; 0 for cameras without a clock of their own.
+    pub(crate) fn rest_nanos(&self, index: u64) -> i64 {
+        self.timeline.map_or(0, |it| it.rest_nanos(index))
     }
 
     /// The picture of the last [`Self::step`], RGB, row major.
@@ -300,7 +309,7 @@ impl Supply {
             count: Some(self.info.n_frames - self.at),
             ..self.spec.clone()
         };
-        let feed = match Feed::open(&spec) {
+        let feed = match Feed::open_on(&spec, self.timeline.as_ref()) {
             Ok(feed) => feed,
             Err(FeedError::Footage(error)) => return Err(error),
             // A scene that was made once can be made again, unless its files are gone.

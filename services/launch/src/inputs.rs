@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use consistency::{Appearance, Learned, Shape};
-use deployment::Deployment;
+use deployment::{Deployment, Timeline};
 use fmp::Model;
 use footage::{SourceSpec, Turn};
 use geometry::Rig;
@@ -126,6 +126,10 @@ pub struct Footage {
     pub n_frames: u64,
     /// Used frames per second of the scene, if known.
     pub frame_rate_hz: Option<f64>,
+    /// Which frame belongs to each common instant, where cameras have clocks of their own; frames are instants then. Not in the
+    /// recordings of earlier versions.
+    #[serde(default)]
+    pub timeline: Option<Timeline>,
 }
 
 /// The footage of a camera, with the range of frames to use.

@@ -162,7 +162,9 @@ pub(crate) fn check_lengths(resolved: &Resolved, lengths: &[Option<u64>]) -> Vec
     let cameras = resolved.deployment.cameras.iter();
     let cameras = cameras.zip(&resolved.footage).zip(lengths);
     let odd = cameras.filter_map(|((camera, footage), n_frames)| {
-        let (used, known) = (footage.n_frames, used_of((*n_frames)?, capture));
+        let n_frames = (*n_frames)?;
+        let n_frames = footage.timeline.map_or(n_frames, |it| it.n_instants(n_frames));
+        let (used, known) = (footage.n_frames, used_of(n_frames, capture));
         let what = match used.cmp(&known) {
             core::cmp::Ordering::Equal => return None,
             core::cmp::Ordering::Greater => "the last frames have no keypoints",

@@ -161,6 +161,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
     let job = capture::Job {
         view,
         source: inputs::source(&deployment.cameras[view], &deployment.capture),
+        timeline: resolved.footage[view].timeline,
         live: live::job(resolved, view),
         lead_nanos: live::lead_nanos(deployment),
         faults: deployment.cameras[view].fault.clone(),
@@ -223,6 +224,7 @@ fn view_step(
         return Ok(pose::Step::Keypoints(Box::new(pose::Keypoints {
             step: NetworkStep::new(eyes, solver, layout, settings).with_extras(extras),
             source,
+            timeline: resolved.footage[view].timeline,
             frame_from_source,
         })));
     }

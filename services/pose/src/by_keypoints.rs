@@ -23,7 +23,9 @@ impl View<'_> {
             responses,
             has_failed,
         } = state;
-        if let Err(error) = keypoints.source.of_frame(stamp.frame, people) {
+        let timeline = keypoints.timeline.as_ref();
+        let frame = timeline.map_or(stamp.frame, |it| it.frame(stamp.frame));
+        if let Err(error) = keypoints.source.of_frame(frame, people) {
             if !*has_failed {
                 let error = causes::in_one_line(&error);
                 tracing::warn!(

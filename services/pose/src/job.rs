@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use std::sync::Arc;
 
+use deployment::Timeline;
 use fmp::Layout;
 use keypointfiles::KeypointSource;
 use pipeline::{NetworkStep, ViewStep};
@@ -15,6 +16,8 @@ pub struct Keypoints {
     pub step: NetworkStep,
     /// Where they are.
     pub source: KeypointSource,
+    /// Which frame of them belongs to each common instant, where cameras have clocks of their own.
+    pub timeline: Option<Timeline>,
     /// From pixels of the footage to pixels of the frame: `[[a, b, c], [d, e, f]]`.
     pub frame_from_source: [[f64; 3]; 2],
 }

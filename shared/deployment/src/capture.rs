@@ -33,6 +33,12 @@ pub struct Camera {
     /// Where the source's top-left pixel lies on the calibrated image, `[x, y]` pixels, for a source
     /// that lacks rows or columns of it. Without it the sizes must be equal.
     pub source_offset_px: Option<[u32; 2]>,
+    /// Footage: what is added to its times to have those that all cameras have in common, milliseconds: a camera that was started
+    /// 2 s after the reference has 2000. `parallax sync estimate` finds it. Frames are brought to common instants by it.
+    pub offset_ms: Option<f64>,
+    /// Footage: by how much a second of this camera's clock is too long, millionths, from its first frame on; `parallax sync estimate`
+    /// finds it where the footage is long enough.
+    pub drift_ppm: Option<f64>,
     /// Video devices: the format of their pictures, such as `MJPG` or `YUYV`; without it the first of these and of `UYVY`,
     /// `NV12`, `RGB3`, `BGR3`, `GREY` that the camera has.
     pub format: Option<String>,

@@ -17,6 +17,7 @@ pub mod triangulate;
 mod fault;
 mod processes;
 
+mod clocks;
 mod complaint;
 mod entries;
 mod error;
@@ -34,6 +35,7 @@ mod reference;
 mod rules;
 mod schema;
 mod shipped;
+mod timeline;
 mod topology;
 
 use std::path::{Path, PathBuf};
@@ -41,6 +43,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use clocks::{ClockKeys, ClocksError, with_clocks};
 pub use complaint::Complaint;
 pub use entries::{Entry, Origin};
 pub use error::ConfigError;
@@ -53,6 +56,7 @@ pub use reference::reference;
 pub use rules::fuse_numbers;
 pub use schema::{Key, schema};
 pub use shipped::{NONE, SHIPPED, is_none, is_shipped, relative_to};
+pub use timeline::{OwnClock, Timeline};
 pub use topology::{
     Content, Process, RecordingPlan, Replay, Role, Room, Stage, Topology, ViewSize,
 };

@@ -14,6 +14,10 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
             "a direction: three numbers, not all 0",
         )?;
     }
+    for camera in &it.cameras {
+        between("camera.offset_ms", camera.offset_ms.unwrap_or(0.0))?;
+        between("camera.drift_ppm", camera.drift_ppm.unwrap_or(0.0))?;
+    }
     capture(&it.capture)?;
     pose(&it.pose)?;
     let quality = &it.quality;

@@ -30,6 +30,12 @@ pub(crate) fn settle(
         return Ok(());
     };
     let name = &camera.name;
+    demand(
+        !it.has_clocks(),
+        "camera.offset_ms",
+        "given, or `drift_ppm`, for footage",
+        &format!("neither: camera {name:?} is live, and footage beside it begins with the run"),
+    )?;
     let said = |key: &str| {
         given
             .get("capture")
@@ -83,6 +89,15 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
         "camera.skew_ms",
         &of,
         "none: it is measured",
+    )?;
+    demand(
+        camera.offset_ms.is_none() && camera.drift_ppm.is_none(),
+        "camera.offset_ms",
+        &format!(
+            "given, or `drift_ppm`, for the live camera {:?}",
+            camera.name
+        ),
+        "neither: they are for footage; a live camera tells its times",
     )?;
     let sides = camera.size.unwrap_or([1, 1]);
     demand(
@@ -193,6 +208,7 @@ mod tests {
                 "`capture.start_frame` is 3",
             ),
             (["", "fault = 'freeze@3+4'", ""], "`camera.fault`"),
+            (["", "offset_ms = 3.0", ""], "`camera.offset_ms`"),
             (["", "size = [0, 480]", ""], "`camera.size` is [0, 480]"),
             (
                 ["", "frame_rate_hz = 0.0", ""],

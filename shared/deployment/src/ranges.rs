@@ -18,7 +18,7 @@ const MOST_FRAMES: f64 = 1e12;
 /// `camera` the length of the list.
 ///
 /// Whole numbers are among them: all of these are exact.
-pub(crate) const RANGES: [(&str, f64, f64); 44] = [
+pub(crate) const RANGES: [(&str, f64, f64); 46] = [
     ("capture.size", 1.0, 16_384.0),
     ("capture.scale", 0.001, 8.0),
     ("capture.frame_rate_hz", 0.001, 1e5),
@@ -62,6 +62,8 @@ pub(crate) const RANGES: [(&str, f64, f64); 44] = [
     ("supervise.latency_budget_ms", 1e-3, DAY_MS),
     ("runtime.cores", 0.0, (MAX_CORES - 1) as f64),
     ("runtime.priority", 1.0, 99.0),
+    ("camera.offset_ms", -HOUR_MS, HOUR_MS),
+    ("camera.drift_ppm", -1e4, 1e4),
     ("camera", 1.0, MAX_VIEWS as f64),
 ];
 

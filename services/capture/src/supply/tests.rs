@@ -46,7 +46,7 @@ fn all(supply: &mut Supply) -> Vec<String> {
 }
 
 fn open(spec: &SourceSpec, faults: &str, is_live: bool) -> Supply {
-    Supply::open(spec, &faults.parse().unwrap(), is_live, 2).unwrap()
+    Supply::open((spec, None), &faults.parse().unwrap(), is_live, 2).unwrap()
 }
 
 /// The outcomes of eight frames with faults.

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::thread;
 
 use capture::{Feed, LiveCamera, LiveError};
-use deployment::Deployment;
 use deployment::capture::{Camera, Config, Transport};
+use deployment::{Deployment, Timeline};
 use footage::LiveAddress;
 use runtime::{ExitKind, Failure, Fault as _};
 
@@ -62,7 +62,44 @@ pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> 
         );
         read.collect()
     });
-    all.into_iter().collect()
+    let all: Vec<Footage> = all.into_iter().collect::<Result<_, Failure>>()?;
+    if deployment.has_clocks() {
+        retimed(deployment, all)
+    } else {
+        Ok(all)
+    }
+}
+
+/// The footage at common instants.
+fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage>, Failure> {
+    let capture = &deployment.capture;
+    let mut clocks = Vec::new();
+    for (camera, found) in footage.iter().enumerate() {
+        let name = &deployment.cameras[camera].name;
+        let rate_hz = found.frame_rate_hz.ok_or_else(|| {
+            let message = format!("cameras have `offset_ms`, and nothing says how many frames per second camera {name:?} has");
+            Failure::new(ExitKind::Config, message).with_hint("give `capture.frame_rate_hz`")
+        })?;
+        clocks.push(deployment.clock(camera, rate_hz * capture.frame_step as f64));
+    }
+    let timelines = Timeline::all(&clocks);
+    let cameras = deployment.cameras.iter().zip(timelines).zip(footage);
+    let looked = cameras.map(|((camera, timeline), found)| {
+        let info = Feed::look_on(&source(camera, capture), Some(&timeline)).map_err(|error| {
+            let hint = format!(
+                "camera {:?} with `offset_ms` and `drift_ppm`: does its footage overlap with that of the others?",
+                camera.name
+            );
+            Failure::new(ExitKind::Input, error).with_hint(hint)
+        })?;
+        Ok(Footage {
+            n_frames: info.n_frames,
+            frame_rate_hz: info.frame_rate_hz,
+            timeline: Some(timeline),
+            ..found
+        })
+    });
+    looked.collect()
 }
 
 fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
@@ -76,6 +113,7 @@ fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
         size: [info.size.width as u32, info.size.height as u32],
         n_frames: info.n_frames,
         frame_rate_hz: info.frame_rate_hz,
+        timeline: None,
     })
 }
 
@@ -84,6 +122,7 @@ fn of_live((size, rate_hz): (footage::Size, f64), capture: &Config) -> Footage {
         size: [size.width as u32, size.height as u32],
         n_frames: capture.n_frames.unwrap_or(ENDLESS),
         frame_rate_hz: Some(rate_hz / capture.frame_step as f64),
+        timeline: None,
     }
 }
 

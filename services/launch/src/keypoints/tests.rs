@@ -84,6 +84,7 @@ fn footage_of_another_length_than_its_keypoints_is_told_with_both_numbers() {
             size: [640, 480],
             n_frames,
             frame_rate_hz: Some(50.0),
+            timeline: None,
         };
         let resolved = Resolved {
             deployment: deployment(folder.path(), "source = 'b.mp4'\n", set),

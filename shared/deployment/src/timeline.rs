@@ -1,0 +1,165 @@
+//! Which frame of a camera's footage belongs to each common instant.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Deployment;
+
+/// The clock of one camera's footage, and its frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnClock {
+    /// Frames per second, by its own clock.
+    pub rate_hz: f64,
+    /// What is added to its times at its first frame, seconds.
+    pub offset_s: f64,
+    /// By how much a second of it is too long, as a share.
+    pub drift: f64,
+}
+
+/// Which frame of a camera's footage belongs to each common instant: the nearest one.
+///
+/// Instants are counted from 0; instant 0 is where the footage that begins last has its first frame. They are as far apart as the
+/// frames of the slowest camera.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Timeline {
+    /// Frames per second, by the camera's own clock.
+    rate_hz: f64,
+    /// Instants per second.
+    instants_hz: f64,
+    /// The camera's own time of instant 0, seconds.
+    first_s: f64,
+    /// Seconds of the camera in one of the common clock.
+    pace: f64,
+}
+
+impl Timeline {
+    /// The timelines of all cameras.
+    pub fn all(clocks: &[OwnClock]) -> Vec<Self> {
+        let begin = clocks.iter().map(|it| it.offset_s);
+        let begin = begin.fold(f64::NEG_INFINITY, f64::max);
+        let rates = clocks.iter().map(|it| it.rate_hz / (1.0 + it.drift));
+        let instants_hz = rates.fold(f64::INFINITY, f64::min);
+        let of_camera = |it: &OwnClock| Self {
+            rate_hz: it.rate_hz,
+            instants_hz,
+            first_s: (begin - it.offset_s) / (1.0 + it.drift),
+            pace: 1.0 / (1.0 + it.drift),
+        };
+        clocks.iter().map(of_camera).collect()
+    }
+
+    /// Instants per second.
+    pub fn instants_hz(&self) -> f64 {
+        self.instants_hz
+    }
+
+    /// The frame of the footage that is nearest to an instant.
+    pub fn frame(&self, instant: u64) -> u64 {
+        // A frame before the first cannot be: instant 0 is at the first frame or after it.
+        (self.own_s(instant) * self.rate_hz).round().max(0.0) as u64
+    }
+
+    /// How long after the instant that frame was taken, nanoseconds; negative for before.
+    pub fn rest_nanos(&self, instant: u64) -> i64 {
+        let taken_s = self.frame(instant) as f64 / self.rate_hz;
+        ((taken_s - self.own_s(instant)) / self.pace * 1e9).round() as i64
+    }
+
+    /// How many instants footage of so many frames has.
+    pub fn n_instants(&self, n_frames: u64) -> u64 {
+        let end_s = n_frames as f64 / self.rate_hz - self.first_s;
+        let mut n = (end_s / self.pace * self.instants_hz).ceil().max(0.0) as u64;
+        while n > 0 && self.frame(n - 1) >= n_frames {
+            n -= 1;
+        }
+        while self.frame(n) < n_frames && n < n_frames {
+            n += 1;
+        }
+        n
+    }
+
+    fn own_s(&self, instant: u64) -> f64 {
+        self.first_s + self.pace * instant as f64 / self.instants_hz
+    }
+}
+
+impl Deployment {
+    /// Whether the footage of a camera has an offset or a drift, so that frames are brought to common instants.
+    pub fn has_clocks(&self) -> bool {
+        let is_other = |it: Option<f64>| it.is_some_and(|it| it != 0.0);
+        let mut cameras = self.cameras.iter();
+        cameras.any(|it| is_other(it.offset_ms) || is_other(it.drift_ppm))
+    }
+
+    /// The clock of a camera's footage.
+    ///
+    /// * `rate_hz`: its frames per second.
+    pub fn clock(&self, camera: usize, rate_hz: f64) -> OwnClock {
+        let it = &self.cameras[camera];
+        OwnClock {
+            rate_hz,
+            offset_s: it.offset_ms.unwrap_or(0.0) * 1e-3,
+            drift: it.drift_ppm.unwrap_or(0.0) * 1e-6,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clock(rate_hz: f64, offset_s: f64, drift: f64) -> OwnClock {
+        OwnClock {
+            rate_hz,
+            offset_s,
+            drift,
+        }
+    }
+
+    #[test]
+    fn cameras_in_step_keep_their_frames() {
+        for it in Timeline::all(&[clock(30.0, 0.0, 0.0), clock(30.0, 0.0, 0.0)]) {
+            for instant in [0, 1, 29, 100_000] {
+                assert_eq!((it.frame(instant), it.rest_nanos(instant)), (instant, 0));
+            }
+            assert_eq!(it.n_instants(70), 70);
+        }
+    }
+
+    #[test]
+    fn the_camera_that_was_started_first_leaves_out_its_beginning() {
+        // The second camera was started 0.35 s after the first: ten frames and a half.
+        let [first, second] = Timeline::all(&[clock(30.0, 0.0, 0.0), clock(30.0, 0.35, 0.0)])[..]
+        else {
+            panic!("two cameras");
+        };
+        assert_eq!((second.frame(0), second.rest_nanos(0)), (0, 0));
+        assert!([10, 11].contains(&first.frame(0)));
+        assert_eq!(first.rest_nanos(0).abs(), 16_666_667);
+        assert_eq!([100, 5].map(|it| first.n_instants(it)), [89, 0]);
+        assert_eq!(second.n_instants(100), 100);
+    }
+
+    #[test]
+    fn every_frame_is_the_nearest_one_also_with_drift_and_other_rates() {
+        let clocks = [
+            clock(25.0, 0.0, 0.0),
+            clock(30.0, -1.234, 2e-4),
+            clock(60.0, 0.02, -1e-3),
+        ];
+        for (it, clock) in Timeline::all(&clocks).iter().zip(&clocks) {
+            assert!((it.instants_hz() - 25.0).abs() < 1e-9);
+            let half = 0.5e9 / clock.rate_hz * (1.0 + clock.drift) + 1.0;
+            for instant in 0..5000 {
+                let common_s = 0.02 + instant as f64 / 25.0;
+                let own_s = it.frame(instant) as f64 / clock.rate_hz;
+                let taken_s = own_s * (1.0 + clock.drift) + clock.offset_s;
+                let rest = (taken_s - common_s) * 1e9;
+                assert!((rest - it.rest_nanos(instant) as f64).abs() < 2.0);
+                assert!(rest.abs() <= half, "{rest} of {half}");
+            }
+            let n = it.n_instants(3000);
+            assert!(it.frame(n - 1) < 3000 && it.frame(n) >= 3000);
+        }
+    }
+}
