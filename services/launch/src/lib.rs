@@ -9,6 +9,7 @@
 //! | plan processes and topics, and run them | [`Planned`] |
 //! | run one of its processes | [`process`] |
 //! | show progress, and report on the run | [`Watcher`], [`Report`] |
+//! | what the cameras see, so that their clocks can be compared | [`films`] |
 //! | observe a running deployment from another process | [`live`] |
 //! | read the settings in a recording, and report its flaws | [`recorded`] |
 //!
@@ -29,6 +30,7 @@ mod vertical;
 mod views;
 
 pub mod budget;
+pub mod films;
 pub mod inputs;
 pub mod keypoints;
 pub mod live;

@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands::{
     bench, calib, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame, model,
-    record, replay, run, service, synth, top, train,
+    record, replay, run, service, sync, synth, top, train,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -38,6 +38,7 @@ Examples:
     parallax eval HumanEva_I --model he.txt --out out/he    the paper's evaluation
     parallax synth out/walk --actions walking           synthetic pictures, with the truth
     parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
+    parallax sync estimate my.toml --write              how far the clocks of recorded cameras are apart
     parallax calib show Calib.toml                      what a calibration file says
 ";
 
@@ -95,6 +96,9 @@ pub(crate) enum Command {
     Calib(calib::Command),
     /// List the video devices of this machine, and take pictures of live cameras.
     Cameras(cameras::Arguments),
+    /// Find by how much the clocks of the cameras of recorded footage differ.
+    #[command(subcommand)]
+    Sync(sync::Command),
     /// Show and check deployment files.
     #[command(subcommand)]
     Config(config::Command),

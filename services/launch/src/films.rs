@@ -1,0 +1,363 @@
+//! What the cameras of a deployment see, as films whose clocks can be compared: keypoints of files, or what a network or the
+//! filters find in the footage.
+
+mod eyes;
+
+use core::ops::Range;
+
+use capture::Feed;
+use deployment::Deployment;
+use footage::SourceSpec;
+use geometry::Camera;
+use keypointfiles::KeypointSource;
+use keypoints::{Keypoint, joint_rows, mirrored};
+use offline::Console;
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use skeleton::{PARSE14, SIDES};
+use synchronisation::{Film, Joint, Person, Shot};
+
+use crate::inputs;
+use crate::keypoints as keypoint_files;
+use eyes::Eyes;
+
+/// Which pictures are looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    /// Every n-th frame.
+    pub every: u64,
+    /// Where to begin, seconds of each camera's footage.
+    pub from_s: f64,
+    /// For how long, seconds; to the end without it.
+    pub seconds: Option<f64>,
+}
+
+/// What all cameras see.
+#[derive(Debug)]
+pub struct Films {
+    /// The cameras, in the order of the deployment.
+    pub cameras: Vec<Camera>,
+    /// What each saw, by its own clock.
+    pub films: Vec<Film>,
+    /// Number of joints of a person.
+    pub n_joints: usize,
+    /// Of each joint the one on the other side, where sides follow the picture in some camera.
+    pub mirror: Option<Vec<usize>>,
+    /// Who found the joints of each camera.
+    pub finders: Vec<String>,
+}
+
+/// Who finds the joints of a camera.
+enum Finder {
+    Keypoints(KeypointSource),
+    Eyes(Box<Eyes>),
+}
+
+/// Reads or finds the people of all cameras.
+///
+/// # Errors
+///
+/// A camera is live or not in the rig; an input cannot be read; it was stopped.
+pub fn films(
+    deployment: &Deployment,
+    part: Part,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<Films, Failure> {
+    let cameras = cameras(deployment)?;
+    let finders = (0..cameras.len()).map(|it| finder(deployment, it));
+    let finders: Vec<Finder> = finders.collect::<Result<_, Failure>>()?;
+    let names: Vec<Vec<String>> = finders.iter().map(Finder::names).collect();
+    let extra = extra(&names);
+    let mut films = Vec::new();
+    for (nth, finder) in finders.iter().enumerate() {
+        let entry = &deployment.cameras[nth];
+        let reader = Reader {
+            rows: rows(&names[nth], &extra),
+            offset: entry.source_offset_px.unwrap_or([0, 0]).map(f64::from),
+            name: &entry.name,
+            stop,
+            console,
+        };
+        films.push(match finder {
+            Finder::Keypoints(source) => {
+                let rate_hz = keypoint_rate(deployment, nth)?;
+                reader.of_keypoints(source, rate_hz, part)?
+            }
+            Finder::Eyes(eyes) => reader.of_footage(deployment, nth, eyes, part)?,
+        });
+    }
+    console.finish();
+    Ok(Films {
+        cameras,
+        n_joints: PARSE14.joints.len() + extra.len(),
+        mirror: finders.iter().any(Finder::as_seen).then(|| mirror(&extra)),
+        finders: finders.iter().map(Finder::text).collect(),
+        films,
+    })
+}
+
+/// The cameras of the rig.
+fn cameras(deployment: &Deployment) -> Result<Vec<Camera>, Failure> {
+    let rig = inputs::rig_of(deployment)?;
+    let of_entry = |it: &deployment::capture::Camera| {
+        if inputs::is_live(&it.source) {
+            let message = format!(
+                "camera {:?} is live: nothing of it can be compared with others",
+                it.name
+            );
+            let failure = Failure::new(ExitKind::Config, message);
+            return Err(failure.with_hint("name footage that was recorded with it"));
+        }
+        rig.camera(&it.name).cloned().ok_or_else(|| {
+            let known: Vec<&str> = rig.cameras().iter().map(|it| it.name.as_str()).collect();
+            let file = deployment.rig.display();
+            let message = format!(
+                "{file} has no camera {:?}; it has {}",
+                it.name,
+                known.join(", ")
+            );
+            Failure::new(ExitKind::Calibration, message)
+        })
+    };
+    deployment.cameras.iter().map(of_entry).collect()
+}
+
+fn finder(deployment: &Deployment, camera: usize) -> Result<Finder, Failure> {
+    if let Some(source) = keypoint_files::of_camera(&deployment.cameras[camera])? {
+        return Ok(Finder::Keypoints(source));
+    }
+    Ok(Finder::Eyes(Box::new(Eyes::open(deployment, camera)?)))
+}
+
+impl Finder {
+    fn names(&self) -> Vec<String> {
+        match self {
+            Self::Keypoints(source) => source.names().names().to_vec(),
+            Self::Eyes(eyes) => eyes.names(),
+        }
+    }
+
+    fn as_seen(&self) -> bool {
+        matches!(self, Self::Eyes(eyes) if eyes.as_seen())
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Self::Keypoints(_) => "keypoints of files".to_owned(),
+            Self::Eyes(eyes) => eyes.text(),
+        }
+    }
+}
+
+/// Keypoints beside the joints that at least two cameras have.
+fn extra(names: &[Vec<String>]) -> Vec<String> {
+    let mut extra: Vec<String> = Vec::new();
+    for name in names.iter().flatten() {
+        let n = names.iter().filter(|it| it.contains(name)).count();
+        if n > 1 && !keypoints::is_joint(name) && !extra.contains(name) {
+            extra.push(name.clone());
+        }
+    }
+    extra
+}
+
+/// Joints as weighted sums of keypoints.
+type Rows = Vec<Option<Vec<(usize, f64)>>>;
+
+fn rows(names: &[String], extra: &[String]) -> Rows {
+    let of_extra = |wanted: &String| {
+        let at = names.iter().position(|it| it == wanted)?;
+        Some(vec![(at, 1.0)])
+    };
+    let mut rows = joint_rows(names);
+    rows.extend(extra.iter().map(of_extra));
+    rows
+}
+
+/// Of each joint the one on the other side.
+fn mirror(extra: &[String]) -> Vec<usize> {
+    let n = PARSE14.joints.len();
+    let mut mirror: Vec<usize> = (0..n + extra.len()).collect();
+    for [right, left] in SIDES {
+        (mirror[right], mirror[left]) = (left, right);
+    }
+    for (nth, name) in extra.iter().enumerate() {
+        let other = mirrored(name).and_then(|other| extra.iter().position(|it| *it == other));
+        mirror[n + nth] = n + other.unwrap_or(nth);
+    }
+    mirror
+}
+
+/// Frames per second of what keypoints were found in.
+fn keypoint_rate(deployment: &Deployment, camera: usize) -> Result<f64, Failure> {
+    let entry = &deployment.cameras[camera];
+    let of_footage = || {
+        let spec = whole(deployment, camera, 0, 1);
+        (!entry.source.is_empty()).then(|| Feed::look(&spec).ok()?.frame_rate_hz)
+    };
+    let rate_hz = of_footage().flatten().or(deployment.capture.frame_rate_hz);
+    rate_hz.ok_or_else(|| no_rate(&entry.name))
+}
+
+fn no_rate(name: &str) -> Failure {
+    let message = format!("nothing says how many frames per second camera {name:?} has");
+    Failure::new(ExitKind::Config, message)
+        .with_hint("give `capture.frame_rate_hz` in the deployment")
+}
+
+fn whole(deployment: &Deployment, camera: usize, start: u64, step: u64) -> SourceSpec {
+    SourceSpec {
+        start,
+        step,
+        count: None,
+        ..inputs::source(&deployment.cameras[camera], &deployment.capture)
+    }
+}
+
+/// Reads one camera.
+struct Reader<'a> {
+    rows: Rows,
+    /// From pixels of the footage to those of the calibrated picture.
+    offset: [f64; 2],
+    name: &'a str,
+    stop: &'a Stop,
+    console: &'a dyn Console,
+}
+
+impl Reader<'_> {
+    fn of_keypoints(
+        &self,
+        source: &KeypointSource,
+        rate_hz: f64,
+        part: Part,
+    ) -> Result<Film, Failure> {
+        let frames = part.frames(source.n_frames(), rate_hz);
+        self.begin(&frames, part);
+        let mut found = Vec::new();
+        let mut shots = Vec::new();
+        for frame in frames.step_by(part.every as usize) {
+            self.go_on()?;
+            let known = source
+                .of_frame(frame, &mut found)
+                .or_fail(ExitKind::Input)?;
+            self.console.advance(1);
+            if known.is_some() {
+                shots.push(Shot {
+                    time_s: frame as f64 / rate_hz,
+                    people: found.iter().map(|it| self.person(&it.keypoints)).collect(),
+                });
+            }
+        }
+        Ok(Film { shots })
+    }
+
+    fn of_footage(
+        &self,
+        deployment: &Deployment,
+        camera: usize,
+        eyes: &Eyes,
+        part: Part,
+    ) -> Result<Film, Failure> {
+        let info = Feed::look(&whole(deployment, camera, 0, 1)).or_fail(ExitKind::Input)?;
+        let rate_hz = info.frame_rate_hz.ok_or_else(|| no_rate(self.name))?;
+        let frames = part.frames(info.n_frames, rate_hz);
+        self.begin(&frames, part);
+        if frames.is_empty() {
+            return Ok(Film::default());
+        }
+        let spec = whole(deployment, camera, frames.start, part.every);
+        let mut feed = Feed::open(&spec).or_fail(ExitKind::Input)?;
+        let mut memory = eyes::Memory::default();
+        let mut shots = Vec::new();
+        loop {
+            self.go_on()?;
+            let Some(frame) = feed.next_frame().or_fail(ExitKind::Input)? else {
+                break;
+            };
+            if frame.index >= frames.end {
+                break;
+            }
+            let people = eyes.people(self.name, &frame, info.size, &mut memory)?;
+            self.console.advance(1);
+            shots.push(Shot {
+                time_s: frame.index as f64 / rate_hz,
+                people: people.iter().map(|it| self.person(it)).collect(),
+            });
+        }
+        Ok(Film { shots })
+    }
+
+    fn begin(&self, frames: &Range<u64>, part: Part) {
+        let n = (frames.end - frames.start).div_ceil(part.every);
+        self.console.begin(self.name, "");
+        self.console.set(0, n as usize);
+    }
+
+    fn go_on(&self) -> Result<(), Failure> {
+        if self.stop.is_requested() {
+            return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
+        }
+        Ok(())
+    }
+
+    fn person(&self, found: &[Option<Keypoint>]) -> Person {
+        let joint = |row: &Vec<(usize, f64)>| {
+            let (mut at, mut score) = ([0.0; 2], f64::INFINITY);
+            for &(keypoint, weight) in row {
+                let it = (*found.get(keypoint)?)?;
+                at = [0, 1].map(|axis| at[axis] + weight * it.at[axis]);
+                score = score.min(it.score);
+            }
+            let at = [0, 1].map(|axis| at[axis] + self.offset[axis]);
+            Some(Joint { at, score })
+        };
+        let joints = self.rows.iter().map(|row| joint(row.as_ref()?));
+        Person {
+            joints: joints.collect(),
+        }
+    }
+}
+
+impl Part {
+    /// The frames, of so many.
+    fn frames(self, n_frames: u64, rate_hz: f64) -> Range<u64> {
+        let start = ((self.from_s * rate_hz).round() as u64).min(n_frames);
+        let most = self.seconds.map(|it| (it * rate_hz).round() as u64);
+        let end = most.map_or(n_frames, |it| start.saturating_add(it).min(n_frames));
+        start..end
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_part_that_is_asked_for_is_within_the_footage() {
+        let part = |from_s, seconds| Part {
+            every: 1,
+            from_s,
+            seconds,
+        };
+        assert_eq!(part(0.0, None).frames(100, 25.0), 0..100);
+        assert_eq!(part(1.0, Some(2.0)).frames(100, 25.0), 25..75);
+        assert_eq!(part(3.0, Some(2.0)).frames(100, 25.0), 75..100);
+        assert!(part(9.0, None).frames(100, 25.0).is_empty());
+    }
+
+    #[test]
+    fn what_one_camera_alone_has_is_not_compared() {
+        let names = |all: &[&str]| -> Vec<String> { all.iter().map(|&it| it.to_owned()).collect() };
+        let each = [
+            names(&["left hip", "right hip", "left heel", "nose", "right heel"]),
+            names(&["left hip", "left heel", "right heel", "chin"]),
+        ];
+        let extra = extra(&each);
+        assert_eq!(extra, ["left heel", "right heel"]);
+        let rows = rows(&each[1], &extra);
+        assert_eq!(rows[3], Some(vec![(0, 1.0)]), "the left hip");
+        assert_eq!(rows[14..], [Some(vec![(1, 1.0)]), Some(vec![(2, 1.0)])]);
+        assert_eq!(mirror(&extra)[14..], [15, 14]);
+        assert_eq!(mirror(&extra)[..3], [5, 4, 3]);
+    }
+}

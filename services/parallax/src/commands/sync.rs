@@ -1,0 +1,355 @@
+//! `parallax sync`: the clocks of the cameras of recorded footage.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+use deployment::{ClockKeys, Deployment, with_clocks};
+use launch::films::{Films, Part, films};
+use launch::{load, output};
+use offline::Console as _;
+use offline::unless_stopped;
+use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
+use serde_json::{Value, json};
+use synchronisation::{Outcome, Settings, estimate};
+
+use crate::globals::Globals;
+use crate::terminal::Terminal;
+
+/// The progress bar.
+const BAR: &str =
+    "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left {prefix} {msg}";
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Estimate offset and drift of every camera from the movement of people.
+    Estimate(Box<Arguments>),
+}
+
+/// Options of `parallax sync estimate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The people are those of the `keypoints` of a camera where the deployment names some, else what its network finds in the footage, \
+else what the filters find. The calibration has to fit; nobody needs to be told from anybody else. A joint that two cameras see at \
+one instant fulfils their epipolar constraint: the offset of a pair is where that holds best, and all cameras together have to \
+agree. Offsets are against the first camera (--reference), and are found whatever `offset_ms` and `drift_ppm` the file has.
+
+An answer is refused, with exit code 7 and the reason, where another offset is nearly as good (people on a treadmill), the minimum \
+is flat (nobody moves), a pair or a part of the footage contradicts the rest, the views do not fit each other, or a camera sees \
+nobody. Nothing is written then. A drift is told apart from none only in footage that is long enough; the table says so.
+
+With --json one object:
+    {\"is_determined\", \"doubts\": [text], \"reference\", \"length_s\", \"second_best\",
+     \"cameras\": [{\"name\", \"offset_ms\", \"error_ms\", \"drift_ppm\", \"drift_error_ppm\", \"joints\", \"before_px\", \"after_px\",
+                  \"found_by\"}],
+     \"pairs\": [{\"cameras\", \"offset_ms\", \"best_ms\", \"second_best_ms\", \"ratio\", \"samples\"}]}
+
+Examples:
+    parallax sync estimate my.toml
+    parallax sync estimate my.toml --window 10 --write
+    parallax sync estimate my.toml --every 2 --seconds 30 --out clocks.html --json")]
+pub(crate) struct Arguments {
+    /// The deployment file.
+    config: PathBuf,
+    /// How far the clocks of two cameras may be apart, seconds; 10 for footage that was started by hand.
+    #[arg(long, value_name = "SECONDS", default_value_t = 2.0, value_parser = window)]
+    window: f64,
+    /// The camera whose clock is that of all; the first of the deployment if not given.
+    #[arg(long, value_name = "CAMERA")]
+    reference: Option<String>,
+    /// Look at every n-th picture.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    every: u64,
+    /// Where to begin in the footage of each camera, seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
+    from: f64,
+    /// How much of the footage to look at, seconds; all of it if not given.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    seconds: Option<f64>,
+    /// Write a page with the costs of all pairs over their offset.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write `offset_ms` and `drift_ppm` into the deployment file, and leave everything else there as it is.
+    #[arg(long)]
+    write: bool,
+    /// Replace a value of the deployment, for example `--set pose.network=other.onnx`; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn window(text: &str) -> Result<f64, String> {
+    within(text, [0.1, 60.0])
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    within(text, [0.0, 1e6])
+}
+
+fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|it| (least..=most).contains(it));
+    number.ok_or_else(|| format!("expected {least} to {most} seconds, got {text:?}"))
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failure> {
+    match command {
+        Command::Estimate(arguments) => run_estimate(arguments, globals),
+    }
+}
+
+fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
+    let reference = reference(arguments, &deployment)?;
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR).ticking();
+    let part = Part {
+        every: arguments.every,
+        from_s: arguments.from,
+        seconds: arguments.seconds,
+    };
+    let found = films(&deployment, part, &stop, &terminal)?;
+    terminal.begin("", "comparing");
+    let (outcome, finders) = compared(found, reference, arguments.window, &stop)?;
+    terminal.finish();
+    let names: Vec<&str> = deployment
+        .cameras
+        .iter()
+        .map(|it| it.name.as_str())
+        .collect();
+    if arguments.json {
+        output::json(&as_json(&outcome, &names, &finders, reference))?;
+    } else {
+        table(&outcome, &names, reference)?;
+    }
+    if let Some(file) = &arguments.out {
+        write_page(file, arguments, &outcome, &names, &finders)?;
+        output::message(format_args!("wrote {}", file.display()));
+    }
+    refuse(&outcome, &names)?;
+    if arguments.write {
+        write(&arguments.config, &outcome, &names)?;
+        output::message(format_args!(
+            "wrote the clocks into {}",
+            arguments.config.display()
+        ));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The number of the reference camera.
+fn reference(arguments: &Arguments, deployment: &Deployment) -> Result<usize, Failure> {
+    if let [_] | [] = &deployment.cameras[..] {
+        let message = "the deployment has one camera: there is no other clock to compare with";
+        return Err(Failure::new(ExitKind::Config, message));
+    }
+    let Some(name) = &arguments.reference else {
+        return Ok(0);
+    };
+    let found = deployment.cameras.iter().position(|it| it.name == *name);
+    found.ok_or_else(|| {
+        let known: Vec<&str> = deployment
+            .cameras
+            .iter()
+            .map(|it| it.name.as_str())
+            .collect();
+        let message = format!(
+            "--reference: no camera {name:?}; there are {}",
+            known.join(", ")
+        );
+        Failure::new(ExitKind::Usage, message)
+    })
+}
+
+/// Compares the clocks, which Ctrl-C ends.
+fn compared(
+    found: Films,
+    reference: usize,
+    window_s: f64,
+    stop: &Stop,
+) -> Result<(Outcome, Vec<String>), Failure> {
+    let Films {
+        cameras,
+        films,
+        n_joints,
+        mirror,
+        finders,
+    } = found;
+    let settings = Settings {
+        reference,
+        window_s,
+        mirror,
+        n_joints,
+    };
+    let outcome = unless_stopped(stop, move || estimate(&cameras, &films, &settings))?;
+    let interrupted = || Failure::new(ExitKind::Interrupted, "interrupted");
+    if stop.is_requested() {
+        return Err(interrupted());
+    }
+    let outcome = outcome.ok_or_else(interrupted)?.or_fail(ExitKind::Input)?;
+    Ok((outcome, finders))
+}
+
+fn table(outcome: &Outcome, names: &[&str], reference: usize) -> Result<(), Failure> {
+    output::line(format_args!(
+        "offsets against {} from {:.1} s of footage; what is added to a camera's times to have the common ones",
+        names[reference], outcome.length_s
+    ))?;
+    output::line(format_args!(
+        "{:<12} {:>12} {:>8} {:>11} {:>8} {:>8} {:>10} {:>9}",
+        "camera", "offset, ms", "+-", "drift, ppm", "+-", "joints", "before, px", "after, px"
+    ))?;
+    for (name, it) in names.iter().zip(&outcome.cameras) {
+        let drift = it
+            .drift_error
+            .map_or(["-".to_owned(), "-".to_owned()], |error| {
+                [
+                    format!("{:.1}", 1e6 * it.drift),
+                    format!("{:.1}", 1e6 * error),
+                ]
+            });
+        output::line(format_args!(
+            "{name:<12} {:>12.2} {:>8.2} {:>11} {:>8} {:>8} {:>10.2} {:>9.2}",
+            1e3 * it.offset_s,
+            1e3 * it.error_s,
+            drift[0],
+            drift[1],
+            it.n,
+            it.before_px,
+            it.after_px
+        ))?;
+    }
+    if outcome.cameras.iter().all(|it| it.drift_error.is_none()) {
+        output::line("drift: the footage is too short to determine it")?;
+    }
+    output::line(format_args!(
+        "{:<25} {:>9} {:>15} {:>12} {:>8}",
+        "pair by itself", "best, ms", "second best, ms", "as good, %", "samples"
+    ))?;
+    for it in &outcome.pairs {
+        let [a, b] = it.cameras.map(|it| names[it]);
+        output::line(format_args!(
+            "{:<25} {:>9.0} {:>15.0} {:>12.0} {:>8}",
+            format!("{a} - {b}"),
+            1e3 * it.best_s,
+            1e3 * it.second_s,
+            100.0 * it.ratio,
+            it.n
+        ))?;
+    }
+    Ok(())
+}
+
+fn as_json(outcome: &Outcome, names: &[&str], finders: &[String], reference: usize) -> Value {
+    let finite = |it: f64| it.is_finite().then_some(it);
+    let cameras = names.iter().zip(&outcome.cameras).zip(finders);
+    let cameras: Vec<Value> = cameras
+        .map(|((name, it), finder)| {
+            json!({
+                "name": name,
+                "offset_ms": 1e3 * it.offset_s,
+                "error_ms": finite(1e3 * it.error_s),
+                "drift_ppm": it.drift_error.map(|_| 1e6 * it.drift),
+                "drift_error_ppm": it.drift_error.map(|it| 1e6 * it).filter(|it| it.is_finite()),
+                "joints": it.n,
+                "before_px": finite(it.before_px),
+                "after_px": finite(it.after_px),
+                "found_by": finder,
+            })
+        })
+        .collect();
+    let pairs: Vec<Value> = outcome
+        .pairs
+        .iter()
+        .map(|it| {
+            json!({
+                "cameras": it.cameras.map(|it| names[it]),
+                "offset_ms": 1e3 * it.offset_s,
+                "best_ms": 1e3 * it.best_s,
+                "second_best_ms": 1e3 * it.second_s,
+                "ratio": finite(it.ratio),
+                "samples": it.n,
+            })
+        })
+        .collect();
+    let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
+    json!({
+        "schema_version": 1,
+        "is_determined": doubts.is_empty(),
+        "doubts": doubts,
+        "reference": names[reference],
+        "length_s": outcome.length_s,
+        "second_best": finite(outcome.second_best),
+        "cameras": cameras,
+        "pairs": pairs,
+    })
+}
+
+fn write_page(
+    file: &Path,
+    arguments: &Arguments,
+    outcome: &Outcome,
+    names: &[&str],
+    finders: &[String],
+) -> Result<(), Failure> {
+    let mut about = vec![
+        (
+            "deployment".to_owned(),
+            arguments.config.display().to_string(),
+        ),
+        ("footage".to_owned(), format!("{:.1} s", outcome.length_s)),
+        ("window".to_owned(), format!("+-{} s", arguments.window)),
+    ];
+    let each = names.iter().zip(finders);
+    about.extend(each.map(|(name, finder)| (format!("joints of {name}"), finder.clone())));
+    let page = report::clocks::html(&report::clocks::Page {
+        names,
+        outcome,
+        about: &about,
+    });
+    files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))
+}
+
+/// A failure where the answer is not to be used.
+fn refuse(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
+    if outcome.doubts.is_empty() {
+        return Ok(());
+    }
+    let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
+    let message = format!("the clocks are not determined:\n  {}", doubts.join("\n  "));
+    let failure = Failure::new(ExitKind::Degraded, message);
+    Err(failure.with_hint(
+        "footage in which people walk through the view of all cameras tells most; --window searches further; \
+         `parallax calib check` looks at the calibration",
+    ))
+}
+
+fn write(file: &Path, outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
+    let keys = |(name, it): (&&str, &synchronisation::CameraClock)| ClockKeys {
+        name: (*name).to_owned(),
+        offset_ms: 1e3 * it.offset_s,
+        drift_ppm: it
+            .drift_error
+            .map(|_| 1e6 * it.drift)
+            .filter(|it| *it != 0.0),
+    };
+    let keys: Vec<ClockKeys> = names.iter().zip(&outcome.cameras).map(keys).collect();
+    let text = runtime::read_text(file)?;
+    let changed = with_clocks(&text, &keys).map_err(|error| {
+        let lines = keys.iter().map(|it| {
+            let drift = it
+                .drift_ppm
+                .map_or(String::new(), |it| format!(", drift_ppm = {it:.3}"));
+            format!("{}: offset_ms = {:.3}{drift}", it.name, it.offset_ms)
+        });
+        let hint = format!(
+            "write them by hand: {}",
+            lines.collect::<Vec<_>>().join("; ")
+        );
+        Failure::new(ExitKind::Config, format!("{}: {error}", file.display())).with_hint(hint)
+    })?;
+    files::replace(file, changed.as_bytes()).map_err(|error| in_file(file, &error))
+}
