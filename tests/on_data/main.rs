@@ -13,6 +13,7 @@ mod annotations;
 mod balancing;
 mod bf16;
 mod calibration;
+mod clocks;
 mod footage;
 mod iterations;
 mod keypoint_files;

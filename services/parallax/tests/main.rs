@@ -29,5 +29,6 @@ mod resources;
 mod rogue;
 mod scheduling;
 mod search_size;
+mod sync;
 mod synth;
 mod train;

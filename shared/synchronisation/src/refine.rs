@@ -260,7 +260,11 @@ impl Problem<'_> {
     fn errors(&self, rows: &[Row], sizes: [usize; 2], scale_s: f64) -> Vec<[f64; 2]> {
         let [per_camera, n] = sizes;
         let (normal, _, blocks) = self.equations(rows, sizes, scale_s);
-        let is_known = |camera: usize| rows.iter().any(|it| it.cameras.contains(&camera));
+        let tells = |it: &Row| it.by_time != 0.0;
+        let is_known = |camera: usize| {
+            rows.iter()
+                .any(|it| it.cameras.contains(&camera) && tells(it))
+        };
         let Some(inverse) = normal.cholesky().map(|it| it.inverse()) else {
             return vec![[f64::INFINITY; 2]; n];
         };

@@ -10,9 +10,11 @@ use crate::search::{Found, Rival, peak, second};
 const LEAST_JOINTS: usize = 200;
 /// Doubts: the second best as a share of the best, and by how many standard errors it is worse.
 const MOST_RATIO: f64 = 0.8;
+/// A second best worse than this share of the best is no rival, however short the footage.
+const NO_RIVAL: f64 = 0.3;
 const LEAST_T: f64 = 4.0;
 /// The largest standard error of an offset, seconds, and intervals between pictures.
-const MOST_ERROR: [f64; 2] = [0.006, 0.25];
+const MOST_ERROR: [f64; 2] = [0.01, 0.3];
 /// By how much less the best offset costs than the mean, as a share.
 const LEAST_GAIN: f64 = 0.15;
 /// The largest median residual, expected errors.
@@ -155,7 +157,8 @@ impl Study<'_> {
 }
 
 fn is_close(rival: &Rival) -> bool {
-    rival.ratio.is_nan() || rival.ratio > MOST_RATIO || rival.t.is_nan() || rival.t < LEAST_T
+    let Rival { ratio, t, .. } = rival;
+    ratio.is_nan() || *ratio > MOST_RATIO || (*ratio > NO_RIVAL && (t.is_nan() || *t < LEAST_T))
 }
 
 /// Whether a pair that is sure by itself contradicts the offsets of all.

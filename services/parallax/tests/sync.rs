@@ -1,0 +1,142 @@
+//! Clocks of cameras that are known: found from keypoints, written into the deployment, and used by a run.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use core::fmt::Write as _;
+
+use geometry::Rig;
+use nalgebra::Point3;
+use scene::{RigChoice, Scene, Settings};
+use serde_json::Value;
+
+use crate::common::{Case, Ended};
+
+const RATE_HZ: f64 = 25.0;
+const N_FRAMES: usize = 150;
+/// When the first frame of every camera was taken, seconds: 13.4 frames apart at most.
+const BEGIN_S: [f64; 3] = [0.2, 0.736, 0.456];
+/// A comment that has to stay.
+const COMMENT: &str = "# the second camera hangs from the ceiling";
+
+fn scene() -> Scene {
+    let rig = RigChoice::Ring {
+        n: 3,
+        radius: 4.2,
+        height: 1.5,
+    };
+    Scene::new(&Settings {
+        rig,
+        ..Settings::default()
+    })
+    .unwrap()
+}
+
+/// A deployment of keypoints alone.
+///
+/// * `time_s`: when each frame of a camera shows the person.
+fn case(scene: &Scene, rig: &Rig, time_s: impl Fn(usize, usize) -> f64) -> Case {
+    let case = Case::with_rig(rig, "sync", &[0; 3], "");
+    let mut text = format!(
+        "name = {:?}\nrig = \"rig.toml\"\noutput = \"out\"\n[capture]\nframe_rate_hz = {RATE_HZ:?}\n[results]\noverlay_every = 0\n",
+        case.name
+    );
+    for (view, camera) in rig.cameras().iter().enumerate() {
+        let name = &camera.name;
+        for frame in 0..N_FRAMES {
+            let joints = scene.joints(time_s(view, frame)).into_iter();
+            let numbers = joints.map(|it| {
+                let at = camera.project(&Point3::from(it)).unwrap();
+                format!("{:.2},{:.2},0.9", at.x, at.y)
+            });
+            let person = numbers.collect::<Vec<String>>().join(",");
+            let json = format!("{{\"people\":[{{\"pose_keypoints_2d\":[{person}]}}]}}");
+            case.write(&format!("{name}/{name}_{frame:06}_keypoints.json"), json);
+        }
+        let comment = if view == 1 { COMMENT } else { "" };
+        writeln!(
+            text,
+            "[[camera]]\nname = {name:?} {comment}\nkeypoints = {name:?}\nkeypoint_names = \"lsp-14\""
+        )
+        .unwrap();
+    }
+    case.write("deployment.toml", text);
+    case
+}
+
+fn estimate(case: &Case, more: &[&str]) -> Ended {
+    let arguments = [&["sync", "estimate", "deployment.toml"], more].concat();
+    case.start(&arguments).wait()
+}
+
+#[test]
+fn clocks_are_found_written_and_used() {
+    let scene = scene();
+    let rig = scene.rig();
+    let case = case(&scene, rig, |view, frame| {
+        BEGIN_S[view] + frame as f64 / RATE_HZ
+    });
+    let ended = estimate(
+        &case,
+        &["--window", "1", "--out", "clocks.html", "--write", "--json"],
+    );
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let found: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(found["is_determined"], true);
+    for (camera, begin_s) in found["cameras"].as_array().unwrap().iter().zip(BEGIN_S) {
+        let off_ms = camera["offset_ms"].as_f64().unwrap() - 1e3 * (begin_s - BEGIN_S[0]);
+        assert!(off_ms.abs() < 2.0, "{found:#}");
+    }
+    let page = std::fs::read_to_string(case.path("clocks.html")).unwrap();
+    assert_eq!(page.matches("<svg").count(), 3, "a plot for every pair");
+    let text = std::fs::read_to_string(case.path("deployment.toml")).unwrap();
+    assert!(
+        text.contains(COMMENT) && text.matches("offset_ms = ").count() == 3,
+        "{text}"
+    );
+    let set = [
+        "--set",
+        "capture.frame_step=20",
+        "--set",
+        "capture.n_frames=6",
+    ];
+    let ended = case
+        .start(&[&["run", "deployment.toml"], &set[..]].concat())
+        .wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let lines = case.lines("pose3d.jsonl");
+    assert_eq!(lines.len(), 6);
+    for line in lines {
+        let instant = line["frame"].as_u64().unwrap() as f64;
+        // Instant 0 is where the second camera begins: without its clock, people would be half a metre apart.
+        let truth = scene.joints(BEGIN_S[1] + instant / RATE_HZ);
+        let head = &line["joints"]["head"]["position_m"];
+        let head = [0, 1, 2].map(|axis| head[axis].as_f64().unwrap_or(f64::NAN));
+        let off = (Point3::from(head) - Point3::from(truth[13])).norm();
+        assert!(off < 0.08, "instant {instant}: {off} m");
+    }
+}
+
+#[test]
+fn what_tells_nothing_is_refused_and_nothing_is_written() {
+    let scene = scene();
+    let rig = scene.rig();
+    let still = case(&scene, rig, |_, _| 0.5);
+    let before = std::fs::read_to_string(still.path("deployment.toml")).unwrap();
+    let ended = estimate(&still, &["--window", "0.5", "--write"]);
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    assert!(ended.stderr.contains("not determined"), "{}", ended.stderr);
+    let after = std::fs::read_to_string(still.path("deployment.toml")).unwrap();
+    assert_eq!(before, after);
+    for (arguments, code, words) in [
+        (&["--window", "nan"][..], 2, "0.1 to 60"),
+        (&["--reference", "nobody"], 2, "nobody"),
+        (&["--set", "capture.frame_rate_hz=0"], 3, "frame_rate_hz"),
+    ] {
+        let ended = estimate(&still, arguments);
+        assert_eq!(ended.status.code(), Some(code), "{}", ended.stderr);
+        assert!(ended.stderr.contains(words), "{}", ended.stderr);
+    }
+    still.edit("deployment.toml", "\nname = \"c2\"", "\nname = \"c7\"");
+    let ended = estimate(&still, &[]);
+    assert_eq!(ended.status.code(), Some(5), "{}", ended.stderr);
+    assert!(ended.stderr.contains("c7"), "{}", ended.stderr);
+}
