@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use deployment::Timeline;
 use footage::{FootageError, FrameView, Size, Source, SourceKind, SourceSpec, Turn};
 use scene::{Address, AddressError, Scene, SceneError, View};
 
@@ -112,27 +111,6 @@ impl Feed {
         info(spec, &address, Size::new(width, height))
     }
 
-    /// As [`Self::look`], at common instants if there is a timeline.
-    ///
-    /// # Errors
-    ///
-    /// [`FeedError`].
-    pub fn look_on(spec: &SourceSpec, timeline: Option<&Timeline>) -> Result<FeedInfo, FeedError> {
-        timeline.map_or_else(|| Self::look(spec), |it| Retimed::look(spec, it))
-    }
-
-    /// As [`Self::open`], at common instants if there is a timeline.
-    ///
-    /// # Errors
-    ///
-    /// [`FeedError`].
-    pub fn open_on(spec: &SourceSpec, timeline: Option<&Timeline>) -> Result<Self, FeedError> {
-        let Some(timeline) = timeline else {
-            return Self::open(spec);
-        };
-        Ok(Self::Retimed(Box::new(Retimed::open(spec, timeline)?)))
-    }
-
     /// Opens the source. Making a scene takes about a second.
     ///
     /// # Errors
@@ -215,7 +193,6 @@ impl Feed {
             Self::Footage(source) => source.info().kind == SourceKind::Still,
             Self::Scene(_) | Self::Recorded(_) => false,
             Self::Blank(_) => true,
-            Self::Retimed(it) => it.feed().is_still(),
         }
     }
 
@@ -225,6 +202,7 @@ impl Feed {
             Self::Footage(source) => source.info().kind == SourceKind::Video,
             Self::Scene(_) | Self::Blank(_) | Self::Recorded(_) => false,
             Self::Retimed(it) => it.feed().is_video(),
+            Self::Scene(_) | Self::Blank(_) => false,
         }
     }
 

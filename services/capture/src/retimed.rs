@@ -6,12 +6,17 @@ use footage::{FootageError, FrameView, SourceSpec};
 use crate::feed::{Feed, FeedError};
 use crate::info::FeedInfo;
 
-/// The frames of a camera at common instants.
+/// The frames of a camera: at common instants if it has a timeline, else as the footage has them.
 #[derive(Debug)]
 pub struct Retimed {
     feed: Feed,
+    times: Option<Times>,
+}
+
+/// Which instants are used, and where the footage is.
+#[derive(Debug)]
+struct Times {
     timeline: Timeline,
-    /// Which instants are used.
     start: u64,
     step: u64,
     n_instants: u64,
@@ -35,12 +40,15 @@ fn whole(spec: &SourceSpec, from: u64) -> SourceSpec {
 impl Retimed {
     /// The properties of the pictures.
     ///
-    /// * `spec`: which instants are used.
+    /// * `spec`: with a timeline it counts instants.
     ///
     /// # Errors
     ///
     /// As for [`Feed::look`].
-    pub fn look(spec: &SourceSpec, timeline: &Timeline) -> Result<FeedInfo, FeedError> {
+    pub fn look(spec: &SourceSpec, timeline: Option<&Timeline>) -> Result<FeedInfo, FeedError> {
+        let Some(timeline) = timeline else {
+            return Feed::look(spec);
+        };
         let found = Feed::look(&whole(spec, 0))?;
         let n_instants = spec.n_delivered(timeline.n_instants(found.n_frames))?;
         Ok(FeedInfo {
@@ -52,80 +60,121 @@ impl Retimed {
 
     /// Opens the footage.
     ///
+    /// * `spec`: with a timeline it counts instants.
+    ///
     /// # Errors
     ///
     /// As for [`Feed::open`].
-    pub fn open(spec: &SourceSpec, timeline: &Timeline) -> Result<Self, FeedError> {
-        let n_instants = Self::look(spec, timeline)?.n_frames;
+    pub fn open(spec: &SourceSpec, timeline: Option<&Timeline>) -> Result<Self, FeedError> {
+        let Some(timeline) = timeline else {
+            let feed = Feed::open(spec)?;
+            return Ok(Self { feed, times: None });
+        };
+        let n_instants = Self::look(spec, Some(timeline))?.n_frames;
         let first = timeline.frame(spec.start);
         Ok(Self {
             feed: Feed::open(&whole(spec, first))?,
-            timeline: *timeline,
-            start: spec.start,
-            step: spec.step,
-            n_instants,
-            at: 0,
-            next: first,
-            shown: None,
+            times: Some(Times {
+                timeline: *timeline,
+                start: spec.start,
+                step: spec.step,
+                n_instants,
+                at: 0,
+                next: first,
+                shown: None,
+            }),
         })
     }
 
     /// The properties of the pictures.
     pub fn info(&self) -> FeedInfo {
-        FeedInfo {
-            n_frames: self.n_instants,
-            frame_rate_hz: Some(self.timeline.instants_hz() / self.step as f64),
-            ..self.feed.info()
-        }
+        let info = self.feed.info();
+        self.times.as_ref().map_or(info, |it| FeedInfo {
+            n_frames: it.n_instants,
+            frame_rate_hz: Some(it.timeline.instants_hz() / it.step as f64),
+            ..info
+        })
     }
 
-    /// The footage itself.
-    pub(crate) fn feed(&self) -> &Feed {
-        &self.feed
+    /// The pixels of the last frame; see [`Feed::pixels`].
+    pub fn pixels(&self) -> &[u8] {
+        self.feed.pixels()
     }
 
-    /// Skips instants; returns how many there were.
-    pub(crate) fn skip(&mut self, n: u64) -> u64 {
-        let n = n.min(self.n_instants - self.at);
-        self.at += n;
-        n
+    /// As [`Feed::is_still`].
+    pub fn is_still(&self) -> bool {
+        self.feed.is_still()
     }
 
-    fn instant(&self, at: u64) -> u64 {
-        self.start.saturating_add(at.saturating_mul(self.step))
+    /// As [`Feed::is_video`].
+    pub fn is_video(&self) -> bool {
+        self.feed.is_video()
     }
 
-    /// The picture of the next instant; of a later one where the footage lacks frames. `None` at the end.
-    pub(crate) fn next_frame(&mut self) -> Result<Option<FrameView<'_>>, FootageError> {
-        if self.at >= self.n_instants {
+    /// Skips frames or instants; returns how many there were.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Feed::skip`].
+    pub fn skip(&mut self, n: u64) -> Result<u64, FootageError> {
+        let Some(times) = &mut self.times else {
+            return self.feed.skip(n);
+        };
+        let n = n.min(times.n_instants - times.at);
+        times.at += n;
+        Ok(n)
+    }
+
+    /// The next picture; of a later instant where the footage lacks frames. `None` at the end.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Feed::next_frame`].
+    pub fn next_frame(&mut self) -> Result<Option<FrameView<'_>>, FootageError> {
+        let Some(times) = &mut self.times else {
+            return self.feed.next_frame();
+        };
+        if times.at >= times.n_instants {
             return Ok(None);
         }
-        let wanted = self.timeline.frame(self.instant(self.at));
-        while self.shown.is_none_or(|it| it < wanted) {
-            if wanted > self.next {
-                self.feed.skip(wanted - self.next)?;
-                self.next = wanted;
+        let wanted = times.wanted();
+        while times.shown.is_none_or(|it| it < wanted) {
+            if wanted > times.next {
+                self.feed.skip(wanted - times.next)?;
+                times.next = wanted;
             }
             let Some(frame) = self.feed.next_frame()? else {
                 return Ok(None);
             };
-            self.shown = Some(frame.index);
-            self.next = frame.index + 1;
+            times.shown = Some(frame.index);
+            times.next = frame.index + 1;
         }
-        let shown = self.shown.unwrap_or(wanted);
-        while self.timeline.frame(self.instant(self.at)) < shown {
-            self.at += 1;
-            if self.at >= self.n_instants {
+        let shown = times.shown.unwrap_or(wanted);
+        while times.wanted() < shown {
+            times.at += 1;
+            if times.at >= times.n_instants {
                 return Ok(None);
             }
         }
-        let index = self.instant(self.at);
-        self.at += 1;
+        let index = times.instant();
+        times.at += 1;
         Ok(Some(FrameView {
             index,
-            time_s: Some(index as f64 / self.timeline.instants_hz()),
+            time_s: Some(index as f64 / times.timeline.instants_hz()),
             rgb: self.feed.pixels(),
         }))
+    }
+}
+
+impl Times {
+    /// The next instant.
+    fn instant(&self) -> u64 {
+        self.start.saturating_add(self.at.saturating_mul(self.step))
+    }
+
+    /// The frame that is nearest to it.
+    fn wanted(&self) -> u64 {
+        self.timeline.frame(self.instant())
     }
 }
 
@@ -138,8 +187,8 @@ mod tests {
     const PATH: &str = "synth://ring:2?camera=1&rate=20&frames=20";
 
     fn pictures(spec: &SourceSpec, timeline: Option<&Timeline>, skip: u64) -> Vec<(u64, Vec<u8>)> {
-        let mut feed = Feed::open_on(spec, timeline).unwrap();
-        assert_eq!(feed.info(), Feed::look_on(spec, timeline).unwrap());
+        let mut feed = Retimed::open(spec, timeline).unwrap();
+        assert_eq!(feed.info(), Retimed::look(spec, timeline).unwrap());
         feed.skip(skip).unwrap();
         let mut all = Vec::new();
         while let Some(frame) = feed.next_frame().unwrap() {

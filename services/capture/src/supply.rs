@@ -6,9 +6,10 @@ mod tests;
 use footage::{FootageError, Size, SourceSpec};
 use messages::Status;
 
-use crate::feed::{Feed, FeedError};
+use crate::feed::FeedError;
 use crate::guard::Guard;
 use crate::info::FeedInfo;
+use crate::retimed::Retimed;
 use deployment::Timeline;
 use deployment::capture::{Fault, FaultKind, Faults};
 
@@ -38,7 +39,7 @@ pub(crate) struct Supply {
     info: FeedInfo,
     /// Whether frames follow a clock, so that a camera may come back.
     is_live: bool,
-    feed: Option<Feed>,
+    feed: Option<Retimed>,
     /// Position of the next frame among those that are used.
     at: u64,
     /// Index of a frame that has been read before its turn, and its time.
@@ -68,7 +69,7 @@ impl Supply {
         is_live: bool,
         frozen_after: u32,
     ) -> Result<Self, FeedError> {
-        let feed = Feed::open_on(spec, timeline)?;
+        let feed = Retimed::open(spec, timeline)?;
         let info = feed.info();
         let rate_hz = info.frame_rate_hz.map(|rate_hz| rate_hz * spec.step as f64);
         let frozen_after = if feed.is_still() { 0 } else { frozen_after };
@@ -112,7 +113,7 @@ impl Supply {
 
     /// The picture of the last [`Self::step`], RGB, row major.
     pub(crate) fn pixels(&self) -> &[u8] {
-        let fresh = || self.feed.as_ref().map_or(&[][..], Feed::pixels);
+        let fresh = || self.feed.as_ref().map_or(&[][..], Retimed::pixels);
         self.held.as_deref().unwrap_or_else(fresh)
     }
 
@@ -155,14 +156,14 @@ impl Supply {
         match read {
             Read::Picture(time_s) => {
                 // Not `self.pixels()`, which would borrow the guard as well.
-                let fresh = self.feed.as_ref().map_or(&[][..], Feed::pixels);
+                let fresh = self.feed.as_ref().map_or(&[][..], Retimed::pixels);
                 let pixels = self.held.as_deref().unwrap_or(fresh);
                 let wrong = self.guard.check(index, time_s, pixels);
                 wrong.map_or(Step::Picture, Step::Nothing)
             }
             Read::LeftOut => {
                 // A camera leaves out frames when it is slow, a video decoder when it cannot decode them.
-                let is_video = self.feed.as_ref().is_some_and(Feed::is_video);
+                let is_video = self.feed.as_ref().is_some_and(Retimed::is_video);
                 let cause = if is_video {
                     Status::DAMAGED
                 } else {
@@ -309,7 +310,7 @@ impl Supply {
             count: Some(self.info.n_frames - self.at),
             ..self.spec.clone()
         };
-        let feed = match Feed::open_on(&spec, self.timeline.as_ref()) {
+        let feed = match Retimed::open(&spec, self.timeline.as_ref()) {
             Ok(feed) => feed,
             Err(FeedError::Footage(error)) => return Err(error),
             // A scene that was made once can be made again, unless its files are gone.

@@ -147,29 +147,34 @@ fn pair_plot(out: &mut Html, names: &[&str], curve: &Curve, pair: &PairReport) {
             "<path d=\"{}\" fill=\"none\" stroke=\"#3a86c8\" stroke-width=\"1.5\"/>",
             path(curve, x, y)
         );
-        let bottom = TOP + HEIGHT;
-        for (offset_s, style) in [
-            (
-                pair.offset_s,
-                "stroke=\"#808894\" stroke-width=\"4\" stroke-opacity=\"0.5\"",
-            ),
-            (pair.best_s, "stroke=\"#2f9e5b\" stroke-width=\"1.5\""),
-            (
-                pair.second_s,
-                "stroke=\"#d9503f\" stroke-width=\"1.5\" stroke-dasharray=\"4 3\"",
-            ),
-        ] {
-            put!(
-                out,
-                "<line x1=\"{:.1}\" x2=\"{:.1}\" y1=\"{TOP}\" y2=\"{bottom}\" {}/>",
-                [TOP, bottom],
-                x(offset_s),
-                x(offset_s),
-                Html::constant(style)
-            );
-        }
+        marks(out, pair, x);
     }
     put!(out, "</svg>\n");
+}
+
+/// The offsets of a pair: of all cameras together, its best and its second best.
+fn marks(out: &mut Html, pair: &PairReport, x: impl Fn(f64) -> f64) {
+    let bottom = TOP + HEIGHT;
+    for (offset_s, style) in [
+        (
+            pair.offset_s,
+            "stroke=\"#808894\" stroke-width=\"4\" stroke-opacity=\"0.5\"",
+        ),
+        (pair.best_s, "stroke=\"#2f9e5b\" stroke-width=\"1.5\""),
+        (
+            pair.second_s,
+            "stroke=\"#d9503f\" stroke-width=\"1.5\" stroke-dasharray=\"4 3\"",
+        ),
+    ] {
+        put!(
+            out,
+            "<line x1=\"{:.1}\" x2=\"{:.1}\" y1=\"{TOP}\" y2=\"{bottom}\" {}/>",
+            [TOP, bottom],
+            x(offset_s),
+            x(offset_s),
+            Html::constant(style)
+        );
+    }
 }
 
 fn axes(out: &mut Html, [low, high]: [f64; 2], [first, last]: [f64; 2]) {

@@ -138,7 +138,6 @@ struct Worded<'a> {
 impl fmt::Display for Worded<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = |it: &usize| self.names.get(*it).map_or("?", |it| it);
-        let ms = |it: f64| 1e3 * it;
         match self.doubt {
             Doubt::NoPeople {
                 camera,
@@ -168,7 +167,7 @@ impl fmt::Display for Worded<'_> {
                     "{}: ambiguous: {:+.0} ms away is {:.0} % as good (at most {:.0} % is accepted), the difference is {t:.1} standard \
                      errors (at least {least_t:.0}); movement that repeats itself, or too little of it",
                     named.join(", "),
-                    ms(*away_s),
+                    1e3 * *away_s,
                     100.0 * ratio,
                     100.0 * most_ratio
                 )
@@ -182,6 +181,16 @@ impl fmt::Display for Worded<'_> {
                 "{}: the best offset, {offset_s:+.2} s, is at the edge of the search of {window_s:.1} s: search further",
                 name(camera)
             ),
+            _ => self.fit(f),
+        }
+    }
+}
+
+impl Worded<'_> {
+    /// Too little that tells, or nothing that fits.
+    fn fit(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = |it: &usize| self.names.get(*it).map_or("?", |it| it);
+        match self.doubt {
             Doubt::Flat {
                 camera,
                 error_s,
@@ -190,8 +199,8 @@ impl fmt::Display for Worded<'_> {
                 f,
                 "{}: the minimum is flat: standard error {:.1} ms, at most {:.1} ms is accepted",
                 name(camera),
-                ms(*error_s),
-                ms(*most_s)
+                1e3 * *error_s,
+                1e3 * *most_s
             ),
             Doubt::Still {
                 camera,
@@ -215,6 +224,14 @@ impl fmt::Display for Worded<'_> {
                  exchanged, moved, or not of one scene",
                 name(camera)
             ),
+            _ => self.contradiction(f),
+        }
+    }
+
+    /// What contradicts itself.
+    fn contradiction(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = |it: &usize| self.names.get(*it).map_or("?", |it| it);
+        match self.doubt {
             Doubt::Pair {
                 cameras: [a, b],
                 away_s,
@@ -225,7 +242,7 @@ impl fmt::Display for Worded<'_> {
                 "{} and {}: by themselves sure of {:+.0} ms away from what all cameras say, which is {:.0} % as good (at least {:.0} %)",
                 name(a),
                 name(b),
-                ms(*away_s),
+                1e3 * *away_s,
                 100.0 * share,
                 100.0 * least_share
             ),
@@ -248,9 +265,10 @@ impl fmt::Display for Worded<'_> {
                 f,
                 "{}: parts of the footage tell offsets {:.0} ms apart, at most {:.0} ms is accepted: frames missing, or another speed",
                 name(camera),
-                ms(*away_s),
-                ms(*most_s)
+                1e3 * *away_s,
+                1e3 * *most_s
             ),
+            _ => Ok(()),
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::thread;
 
-use capture::{Feed, LiveCamera, LiveError};
+use capture::{Feed, LiveCamera, LiveError, Retimed};
 use deployment::capture::{Camera, Config, Transport};
 use deployment::{Deployment, Timeline};
 use footage::LiveAddress;
@@ -85,7 +85,7 @@ fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage
     let timelines = Timeline::all(&clocks);
     let cameras = deployment.cameras.iter().zip(timelines).zip(footage);
     let looked = cameras.map(|((camera, timeline), found)| {
-        let info = Feed::look_on(&source(camera, capture), Some(&timeline)).map_err(|error| {
+        let info = Retimed::look(&source(camera, capture), Some(&timeline)).map_err(|error| {
             let hint = format!(
                 "camera {:?} with `offset_ms` and `drift_ppm`: does its footage overlap with that of the others?",
                 camera.name
