@@ -19,8 +19,6 @@ pub(crate) struct Epipolar {
 pub(crate) struct Residual {
     /// Expected errors of the joints.
     pub(crate) value: f64,
-    /// By the place in the second camera, per ideal pixel.
-    pub(crate) by_b: [f64; 2],
     /// Ideal pixels per expected error.
     pub(crate) px: f64,
 }
@@ -48,7 +46,6 @@ impl Epipolar {
         let value = b.dot(&in_b) / sigma;
         value.is_finite().then_some(Residual {
             value,
-            by_b: [by_b.x / sigma, by_b.y / sigma],
             px: sigma / gradient,
         })
     }

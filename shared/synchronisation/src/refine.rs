@@ -11,9 +11,10 @@ use crate::track::{LEAST_JOINTS, Place, Track};
 const MOST_TIMES: usize = 300;
 /// Length of the blocks of time whose errors are taken as independent, seconds.
 const BLOCK_S: f64 = 0.5;
-/// Errors are alike over joints and longer than a block, and smoothing has its own: how much larger the variance is, by what was
-/// measured on synthetic people and keypoints of real ones.
-const ALIKE: f64 = 6.0;
+/// Errors are alike over joints and longer than a block: how much larger the variance is.
+const ALIKE: f64 = 3.0;
+/// The costs are compared at offsets this far to both sides, seconds: far where people move slowly, near where they move fast.
+const REACHES_S: [f64; 3] = [0.08, 0.04, 0.02];
 /// The most that offsets change in a step, seconds.
 const LONGEST_STEP_S: f64 = 0.05;
 const MOST_STEPS: usize = 30;
@@ -85,8 +86,9 @@ struct Row {
     residual: f64,
     px: f64,
     weight: f64,
-    /// By the own time of the second camera.
-    by_time: f64,
+    /// Slope and curvature of the cost over the own time of the second camera, from the costs at both sides.
+    slope: f64,
+    curvature: f64,
     /// Times of the first and the second camera from their centres.
     since: [f64; 2],
 }
@@ -97,6 +99,32 @@ impl Problem<'_> {
     /// * `span`: the part of the common time that is used, seconds.
     /// * `with_drift`: whether drifts are refined as well.
     pub(crate) fn refine(&self, start: &[Clock], span: [f64; 2], with_drift: bool) -> Fit {
+        let mut best: Option<(f64, Fit)> = None;
+        let mut from = start.to_vec();
+        for reach_s in REACHES_S {
+            let fit = self.refine_at(&from, span, (with_drift, reach_s));
+            let known = fit
+                .errors
+                .iter()
+                .map(|it| it[0])
+                .filter(|it| it.is_finite());
+            let error = known.fold(0.0, f64::max);
+            from.clone_from(&fit.clocks);
+            if best.as_ref().is_none_or(|it| error < it.0) {
+                best = Some((error, fit));
+            }
+        }
+        let (_, fit) =
+            best.unwrap_or_else(|| (0.0, self.refine_at(start, span, (with_drift, REACHES_S[0]))));
+        fit
+    }
+
+    fn refine_at(
+        &self,
+        start: &[Clock],
+        span: [f64; 2],
+        (with_drift, reach_s): (bool, f64),
+    ) -> Fit {
         let mut clocks = start.to_vec();
         let per_camera = if with_drift { 2 } else { 1 };
         let scale_s = (span[1] - span[0]).max(0.1) / 2.0;
@@ -108,7 +136,7 @@ impl Problem<'_> {
                 centre_s,
             };
         }
-        let mut rows = self.rows(&clocks, span);
+        let mut rows = self.rows(&clocks, span, reach_s);
         for _ in 0..MOST_STEPS {
             let (normal, gradient, _) = self.equations(&rows, [per_camera, clocks.len()], scale_s);
             let Some(step) = normal.cholesky().map(|it| it.solve(&-gradient)) else {
@@ -122,7 +150,7 @@ impl Problem<'_> {
                     clock.drift += share * step[per_camera * camera + 1] / scale_s;
                 }
             }
-            rows = self.rows(&clocks, span);
+            rows = self.rows(&clocks, span, reach_s);
             if longest < CLOSE_S {
                 break;
             }
@@ -137,12 +165,12 @@ impl Problem<'_> {
 
     /// The residuals of all cameras with the clocks as they are.
     pub(crate) fn residuals(&self, clocks: &[Clock], span: [f64; 2]) -> Vec<Residuals> {
-        let rows = self.rows(clocks, span);
+        let rows = self.rows(clocks, span, REACHES_S[0]);
         (0..clocks.len()).map(|it| residuals(&rows, it)).collect()
     }
 
     /// All joints in all pairs, at the times that the clocks tell.
-    fn rows(&self, clocks: &[Clock], span: [f64; 2]) -> Vec<Row> {
+    fn rows(&self, clocks: &[Clock], span: [f64; 2], reach_s: f64) -> Vec<Row> {
         let mut rows = Vec::new();
         let step_s = ((span[1] - span[0]) / MOST_TIMES as f64).max(0.01);
         for (cameras, epipolar) in &self.pairs {
@@ -152,7 +180,7 @@ impl Problem<'_> {
                 let common_s = span[0] + nth as f64 * step_s;
                 let times = [clocks[a].own(common_s), clocks[b].own(common_s)];
                 for track in alive(&self.tracks[a], times[0]) {
-                    let found = self.nearest(epipolar, track, &self.tracks[b], times);
+                    let found = self.nearest(epipolar, (track, &self.tracks[b]), times, reach_s);
                     for (joint, mut row) in found {
                         row.cameras = *cameras;
                         let block = (common_s / BLOCK_S).floor() as i64;
@@ -170,35 +198,63 @@ impl Problem<'_> {
     fn nearest(
         &self,
         epipolar: &Epipolar,
-        track: &Track,
-        others: &[Track],
+        (track, others): (&Track, &[Track]),
         times: [f64; 2],
+        reach_s: f64,
     ) -> Vec<(usize, Row)> {
         let places = |of: &Track, at: f64| -> Vec<Option<Place>> {
             (0..self.n_joints).map(|it| of.place(it, at)).collect()
         };
         let in_a = places(track, times[0]);
-        let mut best: Option<(f64, Vec<(usize, Row)>)> = None;
+        let mut best: Option<(f64, &Track, bool)> = None;
         for other in alive(others, times[1]) {
             let in_b = places(other, times[1]);
-            let sizes = [track.size, other.size];
-            let plain = joints(epipolar, [&in_a, &in_b], sizes, |it| it);
-            let exchanged = self
-                .mirror
-                .map(|mirror| joints(epipolar, [&in_a, &in_b], sizes, |it| mirror[it]));
-            for rows in [Some(plain), exchanged].into_iter().flatten() {
-                if rows.len() < LEAST_JOINTS {
+            for is_exchanged in [false, true] {
+                let Some(other_of) = self.sides(is_exchanged) else {
                     continue;
-                }
-                let costs = rows.iter().map(|it| it.1.weight * cost(it.1.residual));
-                let weights: f64 = rows.iter().map(|it| it.1.weight).sum();
-                let value = costs.sum::<f64>() / weights;
-                if best.as_ref().is_none_or(|it| value < it.0) {
-                    best = Some((value, rows));
+                };
+                let both = [&in_a[..], &in_b[..]];
+                let cost = mean_cost(epipolar, both, [track.size, other.size], other_of);
+                if let Some(cost) = cost.filter(|it| best.is_none_or(|best| *it < best.0)) {
+                    best = Some((cost, other, is_exchanged));
                 }
             }
         }
-        best.map(|it| it.1).unwrap_or_default()
+        let Some((_, other, is_exchanged)) = best else {
+            return Vec::new();
+        };
+        let Some(other_of) = self.sides(is_exchanged) else {
+            return Vec::new();
+        };
+        let sizes = [track.size, other.size];
+        let row = |(joint, a): (usize, &Option<Place>)| {
+            let a = (*a)?;
+            let at = |by: f64| {
+                let b = other.place(other_of(joint), times[1] + by)?;
+                Some((epipolar.residual(a.at, b.at, sizes)?, b.weight))
+            };
+            let (before, (now, weight), after) = (at(-reach_s)?, at(0.0)?, at(reach_s)?);
+            let costs = [before.0, now, after.0].map(|it| cost(it.value));
+            let row = Row {
+                cameras: [0; 2],
+                block: (0, 0),
+                residual: now.value,
+                px: now.px,
+                weight: a.weight * weight,
+                slope: (costs[2] - costs[0]) / (2.0 * reach_s),
+                curvature: (costs[2] + costs[0] - 2.0 * costs[1]) / reach_s.powi(2),
+                since: [0.0; 2],
+            };
+            Some((joint, row))
+        };
+        in_a.iter().enumerate().filter_map(row).collect()
+    }
+
+    /// Which joint of the second camera is which of the first; none where sides cannot be exchanged.
+    fn sides(&self, is_exchanged: bool) -> Option<impl Fn(usize) -> usize + Copy> {
+        let mirror = self.mirror.filter(|_| is_exchanged);
+        (mirror.is_some() || !is_exchanged)
+            .then_some(move |joint: usize| mirror.map_or(joint, |it| it[joint]))
     }
 
     /// Normal matrix, gradient, and the gradients of the blocks; without unknowns of the reference.
@@ -215,26 +271,23 @@ impl Problem<'_> {
         let mut gradient = DVector::zeros(size);
         let mut blocks = Blocks::new();
         for row in rows {
-            let [a, b] = row.cameras;
-            let weight = row.weight / (1.0 + row.residual.powi(2));
-            let mut entries = [(0, 0.0); 4];
-            let slopes = [row.by_time, -row.by_time];
-            for (side, camera) in [a, b].into_iter().enumerate() {
-                entries[2 * side] = (per_camera * camera, slopes[side]);
-                if per_camera == 2 {
-                    let by_drift = slopes[side] * row.since[side] / scale_s;
-                    entries[2 * side + 1] = (per_camera * camera + 1, by_drift);
-                }
-            }
             let block = blocks
                 .entry(row.block)
                 .or_insert_with(|| DVector::zeros(size));
+            let mut entries = [(0, 0.0); 4];
+            for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+                let unknown = per_camera * row.cameras[side];
+                entries[2 * side] = (unknown, sign);
+                if per_camera == 2 {
+                    entries[2 * side + 1] = (unknown + 1, sign * row.since[side] / scale_s);
+                }
+            }
             for &(i, of_i) in &entries {
-                let by = weight * of_i * row.residual;
+                let by = row.weight * of_i * row.slope;
                 gradient[i] += by;
                 block[i] += by;
                 for &(j, of_j) in &entries {
-                    normal[(i, j)] += weight * of_i * of_j;
+                    normal[(i, j)] += row.weight * of_i * of_j * row.curvature;
                 }
             }
         }
@@ -260,7 +313,7 @@ impl Problem<'_> {
     fn errors(&self, rows: &[Row], sizes: [usize; 2], scale_s: f64) -> Vec<[f64; 2]> {
         let [per_camera, n] = sizes;
         let (normal, _, blocks) = self.equations(rows, sizes, scale_s);
-        let tells = |it: &Row| it.by_time != 0.0;
+        let tells = |it: &Row| it.curvature != 0.0;
         let is_known = |camera: usize| {
             rows.iter()
                 .any(|it| it.cameras.contains(&camera) && tells(it))
@@ -309,27 +362,26 @@ fn alive(tracks: &[Track], time_s: f64) -> impl Iterator<Item = &Track> {
     tracks.iter().filter(is_there)
 }
 
-fn joints(
+/// The mean cost of the joints that two people have both; none where these are too few.
+fn mean_cost(
     epipolar: &Epipolar,
     [in_a, in_b]: [&[Option<Place>]; 2],
     sizes: [f64; 2],
     other: impl Fn(usize) -> usize,
-) -> Vec<(usize, Row)> {
-    let row = |(joint, a): (usize, &Option<Place>)| {
-        let (a, b) = ((*a)?, in_b[other(joint)]?);
-        let residual = epipolar.residual(a.at, b.at, sizes)?;
-        let row = Row {
-            cameras: [0; 2],
-            block: (0, 0),
-            residual: residual.value,
-            px: residual.px,
-            weight: a.weight * b.weight,
-            by_time: residual.by_b[0] * b.speed[0] + residual.by_b[1] * b.speed[1],
-            since: [0.0; 2],
+) -> Option<f64> {
+    let (mut sum, mut weights, mut n) = (0.0, 0.0, 0);
+    for (joint, a) in in_a.iter().enumerate() {
+        let Some((a, b)) = a.zip(in_b[other(joint)]) else {
+            continue;
         };
-        Some((joint, row))
-    };
-    in_a.iter().enumerate().filter_map(row).collect()
+        if let Some(residual) = epipolar.residual(a.at, b.at, sizes) {
+            let weight = a.weight * b.weight;
+            sum += weight * cost(residual.value);
+            weights += weight;
+            n += 1;
+        }
+    }
+    (n >= LEAST_JOINTS).then(|| sum / weights)
 }
 
 fn residuals(rows: &[Row], camera: usize) -> Residuals {
