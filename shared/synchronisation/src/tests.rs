@@ -34,13 +34,13 @@ fn check(outcome: &Outcome, truth_s: &[f64], most_s: f64) {
 }
 
 #[test]
-fn six_seconds_of_walking_tell_offsets_within_two_milliseconds() {
+fn six_seconds_of_walking_tell_offsets_within_four_milliseconds() {
     let cameras = ring(3);
     let plain = recording(6.0);
     check(
         &run(&cameras, &plain.films(&cameras, &walking)),
         &OFFSETS_S,
-        0.002,
+        0.004,
     );
     let mixed = Recording {
         rates_hz: vec![30.0, 25.0, 60.0],
@@ -50,7 +50,7 @@ fn six_seconds_of_walking_tell_offsets_within_two_milliseconds() {
     check(
         &run(&cameras, &mixed.films(&cameras, &two)),
         &OFFSETS_S,
-        0.002,
+        0.004,
     );
 }
 
