@@ -38,10 +38,11 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         camera.log_trouble(index, step);
         match step {
             Step::Picture => {
+                let rest = supply.rest_nanos(index);
                 let shot = Shot {
-                    captured_at: asked_at.saturating_add_signed(supply.rest_nanos(index)),
+                    captured_at: asked_at.saturating_add_signed(rest),
                     asked_at,
-                    skew: job.skew_nanos,
+                    skew: rest.saturating_add(job.skew_nanos),
                 };
                 camera.send_frame(index, supply.pixels(), shot)?;
             }

@@ -52,7 +52,8 @@ pub struct Camera {
     /// RTSP cameras: how packets travel, `tcp` or `udp`; without it as the camera and the reader agree.
     pub transport: Option<Transport>,
     /// Footage: how long after the instants of the frames its pictures were taken, milliseconds, negative for before; without it 0, or
-    /// what a `synth://` source says. Joints are moved to the instants by it. For a live camera it is measured.
+    /// what a `synth://` source says. Joints are moved to the instants by it, and by what `offset_ms` and `drift_ppm` leave after whole frames.
+    /// For a live camera it is measured.
     pub skew_ms: Option<f64>,
     /// What is to go wrong with the camera, for a test: `freeze@30+20`.
     #[serde(default, skip_serializing_if = "Faults::is_empty")]
