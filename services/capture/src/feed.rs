@@ -8,7 +8,6 @@ use scene::{Address, AddressError, Scene, SceneError, View};
 use crate::blank::{Blank, BlankError, BlankFeed};
 use crate::info::FeedInfo;
 use crate::recorded::{Recorded, RecordedError, RecordedFeed};
-use crate::retimed::Retimed;
 
 /// Why there are no pictures.
 #[derive(Debug, thiserror::Error)]
@@ -62,8 +61,6 @@ pub enum Feed {
     Blank(Box<BlankFeed>),
     /// Those of a live camera, recorded as they came.
     Recorded(Box<RecordedFeed>),
-    /// Any of these, at common instants.
-    Retimed(Box<Retimed>),
 }
 
 /// A camera of a scene.
@@ -157,7 +154,6 @@ impl Feed {
             Self::Scene(stage) => stage.info,
             Self::Blank(feed) => feed.info,
             Self::Recorded(feed) => feed.info,
-            Self::Retimed(it) => it.info(),
         }
     }
 
@@ -172,7 +168,6 @@ impl Feed {
             Self::Scene(stage) => Ok(stage.next_frame()),
             Self::Blank(feed) => Ok(feed.next_frame()),
             Self::Recorded(feed) => feed.next_frame(),
-            Self::Retimed(it) => it.next_frame(),
         }
     }
 
@@ -183,7 +178,6 @@ impl Feed {
             Self::Scene(stage) => &stage.rgb,
             Self::Blank(feed) => &feed.rgb,
             Self::Recorded(feed) => &feed.rgb,
-            Self::Retimed(it) => it.feed().pixels(),
         }
     }
 
@@ -201,8 +195,6 @@ impl Feed {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Video,
             Self::Scene(_) | Self::Blank(_) | Self::Recorded(_) => false,
-            Self::Retimed(it) => it.feed().is_video(),
-            Self::Scene(_) | Self::Blank(_) => false,
         }
     }
 
@@ -221,7 +213,6 @@ impl Feed {
             }
             Self::Blank(feed) => Ok(feed.skip(n)),
             Self::Recorded(feed) => Ok(feed.skip(n)),
-            Self::Retimed(it) => Ok(it.skip(n)),
         }
     }
 }
