@@ -76,6 +76,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
         (Shipped::Consistency, &deployment.fuse.consistency),
         (Shipped::Orientation, &orientation),
         (Shipped::Joints, &joint_map),
+        (Shipped::PoseNetwork, &deployment.pose.network),
     ] {
         let Some(file) = file else { continue };
         // The deployment calls all shipped files "shipped".

@@ -25,17 +25,20 @@ pub enum Shipped {
     Joints,
     /// The springs that hold the maps of a network together.
     Springs,
+    /// The network that finds joints.
+    PoseNetwork,
 }
 
 impl Shipped {
     /// All of them.
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 7] = [
         Self::Model,
         Self::Network,
         Self::Consistency,
         Self::Orientation,
         Self::Joints,
         Self::Springs,
+        Self::PoseNetwork,
     ];
 
     /// The content of the file.
@@ -47,6 +50,7 @@ impl Shipped {
             Self::Orientation => include_bytes!("../../../configs/models/person.orientation"),
             Self::Joints => include_bytes!("../../../configs/models/person.joints"),
             Self::Springs => include_bytes!("../../../configs/models/person.springs"),
+            Self::PoseNetwork => include_bytes!("../../../configs/models/person.pose.onnx"),
         }
     }
 
@@ -59,6 +63,7 @@ impl Shipped {
             Self::Orientation => "orientation",
             Self::Joints => "joints",
             Self::Springs => "springs",
+            Self::PoseNetwork => "pose-network",
         };
         format!("{SHIPPED}:{kind}").into()
     }
@@ -102,6 +107,7 @@ impl Shipped {
             Self::Orientation => ["pose.orientation", "train orientation"],
             Self::Joints => ["triangulate.joint_map", "train joints"],
             Self::Springs => ["pose.springs", "train springs"],
+            Self::PoseNetwork => ["pose.network", "train network"],
         };
         format!(
             "`{key}` is a file that `parallax {made_by}` made, or \"{SHIPPED}\": the one that is built in"
@@ -122,6 +128,9 @@ mod tests {
         consistency::Learned::parse(text).unwrap();
         orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
         crate::inputs::springs(Path::new(SHIPPED)).unwrap();
+        let library = offline::library::Library::BuiltIn;
+        let network = crate::inputs::open_network((Path::new(SHIPPED), None), &library);
+        network.unwrap().fitted().unwrap();
     }
 
     #[test]

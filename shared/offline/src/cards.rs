@@ -52,40 +52,57 @@ impl OnnxFile {
         card: Option<&Path>,
         library: &Library,
     ) -> Result<Self, Failure> {
-        let session = library.session(path)?;
-        let card = CardText::find(path, card, session.description())?;
+        let bytes = std::fs::read(path).map_err(|error| in_file(path, &error))?;
+        let session = library.session(path, bytes)?;
+        let card = match CardText::beside(path, card)? {
+            Some(card) => Some(card),
+            None => CardText::within(session.description()),
+        };
         Ok(Self {
             path: path.to_path_buf(),
             session,
             card,
         })
     }
+
+    /// A network that is built in, whose card is its own entry.
+    ///
+    /// * `name`: what it is called in errors.
+    pub(crate) fn built_in(name: &Path, bytes: &[u8], library: &Library) -> Result<Self, Failure> {
+        let session = library.session(name, bytes.to_vec())?;
+        Ok(Self {
+            path: name.to_path_buf(),
+            card: CardText::within(session.description()),
+            session,
+        })
+    }
 }
 
 impl CardText {
-    /// Finds the card of a network: the given file, a file beside it, or its own entry.
-    fn find(
-        network: &Path,
-        given: Option<&Path>,
-        description: &Description,
-    ) -> Result<Option<Self>, Failure> {
+    /// The card of a network in a file: the given one, or one beside it.
+    fn beside(network: &Path, given: Option<&Path>) -> Result<Option<Self>, Failure> {
         let instead = network.with_extension("toml");
         let mut after = network.as_os_str().to_owned();
         after.push(".toml");
         let beside = [instead, PathBuf::from(after)];
         let beside = beside.iter().find(|it| it.is_file()).map(PathBuf::as_path);
-        if let Some(file) = given.or(beside) {
-            return Ok(Some(Self {
-                text: read_text(file)?,
-                place: CardPlace::File(file.to_path_buf()),
-            }));
-        }
+        let Some(file) = given.or(beside) else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            text: read_text(file)?,
+            place: CardPlace::File(file.to_path_buf()),
+        }))
+    }
+
+    /// The card of a network in its own entry.
+    fn within(description: &Description) -> Option<Self> {
         let mut entries = description.metadata.iter().rev();
         let entry = entries.find(|it| it.0 == METADATA_KEY);
-        Ok(entry.map(|(_, text)| Self {
+        entry.map(|(_, text)| Self {
             text: text.clone(),
             place: CardPlace::Metadata,
-        }))
+        })
     }
 
     /// What it says that it is; `None` if it says neither.

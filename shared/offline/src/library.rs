@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use inference::Session;
-use runtime::{Failure, in_file};
+use runtime::Failure;
 
 use crate::failures::refused;
 
@@ -52,11 +52,12 @@ impl Library {
 
     /// Loads a network.
     ///
+    /// * `path`: what it is called in errors.
+    ///
     /// # Errors
     ///
-    /// The file cannot be read, or is no network that can be run.
-    pub(crate) fn session(&self, path: &Path) -> Result<Session, Failure> {
-        let bytes = std::fs::read(path).map_err(|error| in_file(path, &error))?;
+    /// It is no network that can be run.
+    pub(crate) fn session(&self, path: &Path, bytes: Vec<u8>) -> Result<Session, Failure> {
         let session = match self {
             Self::BuiltIn => Session::parse(bytes),
             #[cfg(feature = "ort")]

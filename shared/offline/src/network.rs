@@ -50,6 +50,17 @@ impl NetworkFile {
         Self::of(OnnxFile::open(path, card, library)?)
     }
 
+    /// A network that is built in, run by a library of choice.
+    ///
+    /// * `name`: what it is called in errors.
+    ///
+    /// # Errors
+    ///
+    /// It is no network that can be run, or its card is none.
+    pub fn built_in(name: &Path, bytes: &[u8], library: &Library) -> Result<Self, Failure> {
+        Self::of(OnnxFile::built_in(name, bytes, library)?)
+    }
+
     pub(crate) fn of(read: OnnxFile) -> Result<Self, Failure> {
         let OnnxFile {
             path,

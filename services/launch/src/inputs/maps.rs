@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use deployment::Deployment;
 use deployment::pose::Config;
+use deployment::{Deployment, is_shipped};
 use fmp::Model;
 use keypoints::Card;
 use offline::library::Library;
@@ -45,8 +45,25 @@ pub fn pose_network(
         return Ok(None);
     };
     let library = library(&deployment.pose)?;
-    let network = NetworkFile::open_with(file, card, &library)?;
-    network.fitted().map(Some)
+    open_network((file, card), &library)?.fitted().map(Some)
+}
+
+/// Reads a network that finds keypoints and its card; `shipped` stands for the one that ships.
+///
+/// * `card`: the file of the card, if that is not beside the network.
+///
+/// # Errors
+///
+/// A file cannot be read, is no network that can be run, or no card.
+pub fn open_network(
+    (file, card): (&Path, Option<&Path>),
+    library: &Library,
+) -> Result<NetworkFile, Failure> {
+    if is_shipped(file) {
+        let shipped = Shipped::PoseNetwork;
+        return NetworkFile::built_in(&shipped.name(), shipped.bytes(), library);
+    }
+    NetworkFile::open_with(file, card, library)
 }
 
 /// The card of a camera's network; none without a network or a card.
@@ -61,7 +78,7 @@ pub(crate) fn network_card(
     let Some((file, card)) = deployment.pose_network(camera) else {
         return Ok(None);
     };
-    let network = NetworkFile::open_with(file, card, &library(&deployment.pose)?)?;
+    let network = open_network((file, card), &library(&deployment.pose)?)?;
     Ok(network.card().map(|it| it.0.clone()))
 }
 
