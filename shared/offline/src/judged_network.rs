@@ -1,8 +1,8 @@
 //! A network on pictures of people whose joints are known: what it finds in their true boxes.
 
-use datasets::{People, Person, Picture};
+use datasets::{People, Person, Picture, Sides};
 use experiment::{Joints, Pictures};
-use fmp::{Layout, Pose, Solver};
+use fmp::{Layout, Pose, Search, Solver};
 use keypoints::Keypoint;
 use posenetwork::springs::joint_of;
 use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace, outline_of};
@@ -11,6 +11,7 @@ use skeleton::PARSE14;
 
 use crate::console::Console;
 use crate::judged::{go_on, pictures, truth};
+use crate::pictures::{BOXES_PX, Picture as Shown, Searched};
 
 /// Of the neck and the top of the head in `skeleton::PARSE14`.
 const NECK: usize = 12;
@@ -26,6 +27,10 @@ pub struct NetworkReader {
     pub network: PoseNetwork,
     /// Solves the tree of springs.
     pub springs: Solver,
+    /// What left and right mean in the marks.
+    pub sides: Sides,
+    /// Finds the boxes; the box around the marked joints is used without it.
+    pub finder: Option<Search>,
 }
 
 /// What a network found on people.
@@ -112,16 +117,23 @@ impl NetworkReader {
         workspace: &mut Workspace,
         maps: &mut JointMaps,
     ) -> Result<[Option<Joints>; 2], Failure> {
-        let Some(outline) = outline_of(truth(person)) else {
+        let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
+        let outline = match &self.finder {
+            None => outline_of(truth(person)),
+            Some(finder) => found_box(finder, person, &picture)?,
+        };
+        let Some(outline) = outline else {
             return Ok([None, None]);
         };
-        let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
         let sight = self.network.look(picture.view(), outline, workspace);
         let Some(sight) = sight.or_fail(ExitKind::Input)? else {
             return Ok([None, None]);
         };
         let settings = MapSettings::default();
         maps.read(&sight, &settings).or_fail(ExitKind::Input)?;
+        if self.sides == Sides::Marked {
+            maps.name_sides(&sight);
+        }
         let peaks = at_peaks(maps.peaks());
         let size = picture.size();
         let layout = Layout::new(self.springs.model(), size.width, size.height).ok();
@@ -148,6 +160,25 @@ impl NetworkReader {
         }
         joints
     }
+}
+
+/// The box of the best pose that the filters find in a picture; `None` if they find nobody.
+fn found_box(
+    finder: &Search,
+    person: &Person,
+    picture: &Picture,
+) -> Result<Option<[f64; 4]>, Failure> {
+    let picture = Shown {
+        path: person.image.clone(),
+        frame: None,
+        turn: footage::Turn::default(),
+        size: picture.size(),
+        rgb: picture.rgb().to_vec(),
+    };
+    let searched = Searched::new(&picture, Some(BOXES_PX), finder)?;
+    let image = searched.image(&picture)?;
+    let best = finder.on(image, searched.layout(), |it| finder.solver.best(it, None));
+    Ok(best.map(|it| searched.outline(&finder.model, &it)))
 }
 
 /// The joints at the maxima of their maps; not finite where the keypoints do not tell a joint.

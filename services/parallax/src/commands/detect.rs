@@ -153,7 +153,7 @@ impl Arguments {
     /// The longest side that is searched; none: all pixels.
     fn longest(&self) -> Option<usize> {
         let size = match self.network {
-            Some(_) => self.size.min(by_network::SIZE),
+            Some(_) => self.size.min(pictures::BOXES_PX),
             None => self.size,
         };
         (!self.full).then_some(size)

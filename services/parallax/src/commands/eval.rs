@@ -54,7 +54,7 @@ OUT holds report.html, report.json, report.tex, and poses/ with what was found i
 --resume frames that are there are not solved again; other settings are refused. --json prints the report's \
 numbers.
 
---network-evidence FILE --detector FILE judges the keypoints of a network (docs/networks.md): by plain \
+--network-evidence FILE [--detector FILE] judges the keypoints of a network (docs/networks.md): by plain \
 triangulation, with cameras left out, and in space over its maps, without and with the bones of a body. \
 --stress makes what goes wrong in real rooms. OUT then holds evidence.txt and evidence.json.
 
@@ -185,11 +185,9 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return pictures::run(arguments, globals, &stop);
     }
     let evidence = &arguments.evidence;
-    match (&evidence.network_evidence, &evidence.detector) {
-        (Some(network), Some(detector)) => {
-            evidence::run(arguments, [network, detector], globals, stop)
-        }
-        _ => run_versions(arguments, globals, stop),
+    match &evidence.network_evidence {
+        Some(network) => evidence::run(arguments, network, globals, stop),
+        None => run_versions(arguments, globals, stop),
     }
 }
 

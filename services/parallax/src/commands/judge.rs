@@ -80,6 +80,9 @@ pub(crate) struct Arguments {
     /// The tree of springs for the maps of a network; if not given, the one that ships.
     #[arg(long, value_name = "FILE")]
     springs: Option<PathBuf>,
+    /// A network is told nothing but the picture: it looks into the box of the best pose that the filters find.
+    #[arg(long)]
+    find_boxes: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -111,9 +114,9 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if is_network.is_some_and(|it| it.eq_ignore_ascii_case("onnx")) {
         return network::run(arguments, &stop, &terminal);
     }
-    if arguments.card.is_some() || arguments.springs.is_some() {
+    if arguments.card.is_some() || arguments.springs.is_some() || arguments.find_boxes {
         let message = format!(
-            "{}: --card and --springs are for networks, files that end in .onnx",
+            "{}: --card, --springs and --find-boxes are for networks, files that end in .onnx",
             arguments.model.display()
         );
         return Err(Failure::new(ExitKind::Usage, message));

@@ -5,11 +5,12 @@ use experiment::{
     Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
     projected,
 };
+use fmp::{Layout, Pose, Search};
 use geometry::Camera;
 use kernels::Rgb8View;
 use keypoints::Sides;
 use multiview::{SeenPerson, same_person};
-use posenetwork::{Detector, JointMaps, MapSettings, PoseNetwork, Workspace};
+use posenetwork::{Detector, JointMaps, MapSettings, PoseNetwork, Workspace, outline_of_parts};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
 use skeleton::PARSE14;
@@ -31,7 +32,7 @@ pub struct EvidenceJob<'a> {
     /// The network that finds keypoints.
     pub network: &'a PoseNetwork,
     /// What finds the boxes.
-    pub detector: &'a Detector,
+    pub boxes: Boxes<'a>,
     /// What goes wrong.
     pub stress: &'a [Stress],
     /// How the frames are derived.
@@ -40,6 +41,36 @@ pub struct EvidenceJob<'a> {
     pub bootstrap: Bootstrap,
     /// Ends the run.
     pub stop: Stop,
+}
+
+/// What finds boxes around people.
+#[derive(Debug, Clone, Copy)]
+pub enum Boxes<'a> {
+    /// A detector.
+    Detector(&'a Detector),
+    /// The filters, over the whole frame.
+    Filters(&'a Search),
+}
+
+impl Boxes<'_> {
+    /// The boxes in a frame, the best first: left, top, right, bottom, pixels.
+    fn find(&self, image: Rgb8View<'_>, values: &mut Vec<f32>) -> Result<Vec<[f64; 4]>, Failure> {
+        match self {
+            Self::Detector(detector) => {
+                let found = detector.people(image, values).or_fail(ExitKind::Input)?;
+                Ok(found.into_iter().map(|it| it.outline).collect())
+            }
+            Self::Filters(search) => {
+                let layout = Layout::new(&search.model, image.width(), image.height());
+                let layout = layout.or_fail(ExitKind::Input)?;
+                let found = search.on(image, &layout, |it| {
+                    search.solver.distinct(it, MOST_PEOPLE, SEPARATION)
+                });
+                let outline = |it: &Pose| outline_of_parts(it.bounding_box(&search.model, &layout));
+                Ok(found.iter().map(outline).collect())
+            }
+        }
+    }
 }
 
 /// The scores of one method under one stress.
@@ -182,21 +213,18 @@ impl EvidenceJob<'_> {
             }
             _ => image,
         };
-        let boxes = self
-            .detector
-            .people(image, values)
-            .or_fail(ExitKind::Input)?;
+        let boxes = self.boxes.find(image, values)?;
         let mut people = Vec::new();
-        for it in boxes.iter().take(MOST_PEOPLE) {
+        for outline in boxes.into_iter().take(MOST_PEOPLE) {
             let sight = self
                 .network
-                .look(image, it.outline, workspace)
+                .look(image, outline, workspace)
                 .or_fail(ExitKind::Input)?;
             let Some(sight) = sight else { continue };
             let mut maps = JointMaps::default();
             maps.read(&sight, &MapSettings::default())
                 .or_fail(ExitKind::Input)?;
-            let height = (it.outline[3] - it.outline[1]) / size[1] as f64;
+            let height = (outline[3] - outline[1]) / size[1] as f64;
             let view = NetworkView::new(maps).with_front(sight.front());
             people.push((view.person(height), view));
         }
@@ -238,6 +266,8 @@ impl EvidenceJob<'_> {
     }
 }
 
+/// Least mean distance of two poses of the filters, in box sides: that of a deployment (`pose.min_separation`).
+const SEPARATION: f64 = 1.0;
 /// Most people of a view that the network looks at.
 const MOST_PEOPLE: usize = 4;
 

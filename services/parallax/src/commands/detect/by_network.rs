@@ -1,6 +1,5 @@
 //! People in boxes, by a network that finds keypoints. The boxes are given, or found by a detector or by the filters.
 
-use fmp::Pose;
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use launch::output;
 use offline::pictures::{Picture, Searched};
@@ -8,7 +7,6 @@ use offline::sheet::{Sheet, Skeleton};
 use offline::{detector, network};
 use posenetwork::{
     Detector as BoxDetector, JointMaps, MapSettings, OF_FILTERS, PoseNetwork, Workspace,
-    outline_of_parts,
 };
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Map, Value, json};
@@ -16,9 +14,6 @@ use skeleton::PARSE14;
 
 use super::Detector;
 use crate::commands::network::keypoints_json;
-
-/// Longest side of a picture in which the filters search for boxes, pixels.
-pub(super) const SIZE: usize = 640;
 
 /// The network that finds keypoints, and the detector of the boxes if there is one.
 pub(super) struct Eyes {
@@ -106,20 +101,10 @@ impl Detector<'_> {
         }
         let searched = Searched::new(picture, self.arguments.longest(), &self.search)?;
         let found = self.detect(searched.image(picture)?, searched.layout());
-        let outlines = found.iter().map(|it| plain(self.outline(&searched, it)));
+        let model = &self.search.model;
+        let outlines = found.iter().map(|it| plain(searched.outline(model, it)));
         let size = searched.layout().image_size;
         Ok((outlines.collect(), From::Filters(size)))
-    }
-
-    /// The box of a pose: all boxes of its parts, widened; pixels of the picture.
-    fn outline(&self, searched: &Searched, pose: &Pose) -> [f64; 4] {
-        let (model, layout) = (&self.search.model, searched.layout());
-        let [left, top, right, bottom] = pose.bounding_box(model, layout);
-        let (first, last) = (
-            searched.in_picture([left, top]),
-            searched.in_picture([right, bottom]),
-        );
-        outline_of_parts([first[0], first[1], last[0], last[1]])
     }
 
     fn report_people(
@@ -221,6 +206,7 @@ impl Person {
         let mut maps = JointMaps::default();
         let settings = MapSettings::default();
         maps.read(&sight, &settings).or_fail(ExitKind::Input)?;
+        maps.name_sides(&sight);
         let scores: Vec<f64> = maps.peaks().iter().flatten().map(|it| it.score).collect();
         let joints = maps.peaks().iter();
         Ok(Self {

@@ -6,9 +6,10 @@ use std::process::ExitCode;
 use clap::Args;
 use evaluation::Bootstrap;
 use experiment::{FilmSettings, Stress};
-use launch::{Claim, no_results, output};
-use offline::eval::evidence::{EvidenceJob, EvidenceRow, evidence_text};
-use offline::network::NetworkFile;
+use fmp::Search;
+use launch::{Claim, inputs, no_results, output};
+use offline::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
+use offline::library::Library;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
 use super::Arguments;
@@ -18,18 +19,17 @@ use crate::terminal::Terminal;
 /// Options of the evaluation on a network.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// Judge the keypoints of this network (ONNX) in place of the filters; needs --detector.
+    /// Judge the keypoints of this network (ONNX) in place of the filters; "shipped": the one that ships.
     #[arg(
         long,
         value_name = "FILE",
-        requires = "detector",
         conflicts_with_all = ["model", "versions", "fuse", "consistency", "sigma", "network", "oracle", "resume", "only", "without"]
     )]
     pub(super) network_evidence: Option<PathBuf>,
     /// The card of the network; if not given, the one beside it, or in its metadata.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     card: Option<PathBuf>,
-    /// The network (ONNX) that finds the boxes of people.
+    /// The network (ONNX) that finds the boxes of people; without it the filters find them.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     pub(super) detector: Option<PathBuf>,
     /// The card of the detector; if not given, the one beside it, or in its metadata.
@@ -62,19 +62,25 @@ impl Options {
 /// Runs the evaluation.
 pub(super) fn run(
     arguments: &Arguments,
-    files: [&Path; 2],
+    file: &Path,
     globals: Globals,
     stop: Stop,
 ) -> Result<ExitCode, Failure> {
     let options = &arguments.evidence;
     let stress = options.stress()?;
     let sequences = super::sequences(arguments)?;
-    let network = NetworkFile::open(files[0], options.card.as_deref())?.fitted()?;
-    let detector = offline::detector::open(files[1], options.detector_card.as_deref())?;
+    let network = (file, options.card.as_deref());
+    let network = inputs::open_network(network, &Library::BuiltIn)?.fitted()?;
+    let detector = options.detector.as_deref();
+    let detector = detector.map(|it| offline::detector::open(it, options.detector_card.as_deref()));
+    let detector = detector.transpose()?;
+    let filters = Search::new(inputs::model_or_shipped(None)?);
     let _claim = Claim::of(&arguments.out, "eval")?;
     let job = EvidenceJob {
         network: &network,
-        detector: &detector,
+        boxes: detector
+            .as_ref()
+            .map_or(Boxes::Filters(&filters), Boxes::Detector),
         stress: &stress,
         film: FilmSettings {
             size: arguments.size,

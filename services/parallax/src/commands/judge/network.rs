@@ -6,12 +6,12 @@ use std::process::ExitCode;
 
 use evaluation::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
 use experiment::{Intervals, Judged, Pictures};
-use fmp::Solver;
+use fmp::{Search, Solver};
 use launch::{inputs, output};
 use offline::Console;
 use offline::judged;
 use offline::judged_network::{self, JointError, NetworkReader, Seen};
-use offline::network::NetworkFile;
+use offline::library::Library;
 use runtime::{ExitKind, Failure, Stop};
 use serde_json::{Value, json};
 
@@ -30,12 +30,19 @@ pub(super) fn run(
     console: &dyn Console,
 ) -> Result<ExitCode, Failure> {
     refuse(arguments)?;
-    let file = NetworkFile::open(&arguments.model, arguments.card.as_deref())?;
+    let named = (arguments.model.as_path(), arguments.card.as_deref());
+    let file = inputs::open_network(named, &Library::BuiltIn)?;
     let shipped = Path::new(deployment::SHIPPED);
     let springs = arguments.springs.as_deref().unwrap_or(shipped);
+    let finder = arguments.find_boxes.then(|| {
+        let model = inputs::model_or_shipped(None)?;
+        Ok::<_, Failure>(Search::new(model))
+    });
     let reader = NetworkReader {
         network: file.fitted()?,
         springs: Solver::new(inputs::springs(springs)?),
+        sides: arguments.sides,
+        finder: finder.transpose()?,
     };
     let people = arguments.people()?;
     let Seen { pictures, errors } = judged_network::judged(&reader, &people, stop, console)?;
