@@ -77,12 +77,8 @@ impl Deployment {
     /// What the views of a frame are solved in: what the file says; else all at once from three cameras on, if nothing is
     /// asked for that only pairs have.
     pub fn views(&self) -> Views {
-        let fuse = &self.fuse;
-        let needs_pairs = fuse.energy != Energy::Paper
-            || !fuse.pairs.is_empty()
-            || fuse.workers > 1
-            || self.triangulate.combine != triangulate::Combine::Mean;
-        match fuse.views {
+        let needs_pairs = self.needs_pairs();
+        match self.fuse.views {
             Some(views) => views,
             None if self.has_maps() && !needs_pairs => Views::Space,
             None if needs_pairs || !(3..=MOST_AT_ONCE).contains(&self.cameras.len()) => {
@@ -90,6 +86,15 @@ impl Deployment {
             }
             None => Views::All,
         }
+    }
+
+    /// Whether there is a setting that only pairs of views have.
+    pub(crate) fn needs_pairs(&self) -> bool {
+        let fuse = &self.fuse;
+        fuse.energy != Energy::Paper
+            || !fuse.pairs.is_empty()
+            || fuse.workers > 1
+            || self.triangulate.combine != triangulate::Combine::Mean
     }
 
     /// Most fusion processes that have something to do: all views at once are one piece of work.

@@ -19,6 +19,7 @@ mod processes;
 
 mod clocks;
 mod complaint;
+mod default_network;
 mod entries;
 mod error;
 mod fields;
@@ -225,13 +226,12 @@ impl Deployment {
             if !camera.source.is_empty() {
                 camera.source = machine.footage(&camera.source, base);
             }
-            let files = [
-                &mut camera.keypoints,
-                &mut camera.network,
-                &mut camera.network_card,
-            ];
+            let files = [&mut camera.keypoints, &mut camera.network_card];
             for file in files.into_iter().flatten() {
                 *file = base.join(&file);
+            }
+            if let Some(network) = &mut camera.network {
+                *network = relative_to(network, base);
             }
         }
         let quality = &mut self.quality;
@@ -244,8 +244,11 @@ impl Deployment {
             *file = relative_to(file, base);
         }
         let pose = &mut self.pose;
+        pose.network = pose.network.take().filter(|it| !is_none(it));
+        if let Some(network) = &mut pose.network {
+            *network = relative_to(network, base);
+        }
         let files = [
-            &mut pose.network,
             &mut pose.network_card,
             &mut pose.detector,
             &mut pose.detector_card,

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 use crate::lists::fits;
 use crate::older::{of_today, rename_older};
 use crate::places::{malformed, of_set, place, span_of, span_of_any};
-use crate::{Complaint, ConfigError, Deployment, Machine, live, rules};
+use crate::{Complaint, ConfigError, Deployment, Machine, default_network, live, rules};
 
 /// A deployment, and what of it was said by whom.
 #[derive(Debug)]
@@ -58,6 +58,7 @@ impl Loaded {
         };
         fits(&deployment, &given).map_err(placed)?;
         deployment.resolve(&machine.folder_of(file), machine);
+        default_network::settle(&mut deployment, &given);
         let checked = live::settle(&mut deployment, &given, machine)
             .and_then(|()| rules::check(&deployment))
             .and_then(|()| rules::fits_machine(&deployment, machine));

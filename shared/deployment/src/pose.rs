@@ -21,7 +21,10 @@ pub struct Config {
     /// What tells from the picture in which direction a person faces, for left and right: a file that
     /// `parallax train orientation` made; `"shipped"`: the one that ships; `"none"`: nothing.
     pub orientation: PathBuf,
-    /// An ONNX file of a network that finds keypoints, which takes the place of the filters.
+    /// An ONNX file of a network that finds keypoints, which takes the place of the filters; `"shipped"`: the one that ships;
+    /// `"none"`: the filters. Without it the one that ships, unless another setting is about the filters (`model`, `quality`,
+    /// `pose.search`, `pose.precision`, `pose.orientation`, `triangulate.joint_map`) or the paper's energy (`fuse.views`, `fuse.energy`,
+    /// `fuse.pairs`, `fuse.workers`, `fuse.consistency`, `fuse.compatibility`, `triangulate.combine`), or a camera has a network or keypoints.
     pub network: Option<PathBuf>,
     /// The card that describes the network; without it the file beside it (`.toml` for `.onnx`), or what its metadata say.
     pub network_card: Option<PathBuf>,

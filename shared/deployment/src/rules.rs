@@ -3,7 +3,7 @@
 use crate::complaint::{Complaint, demand, not_negative, positive, whole};
 use crate::older::OLDER;
 use crate::topology::{process_name, services};
-use crate::{Deployment, Machine, capture, fuse, limits, pose, quality, triangulate};
+use crate::{Deployment, Machine, capture, fuse, is_shipped, limits, pose, quality, triangulate};
 
 /// Checks the values that the types alone do not.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
@@ -175,6 +175,12 @@ fn maps(deployment: &Deployment) -> Result<(), Complaint> {
             "none without `pose.network`",
         )?;
     }
+    demand(
+        it.network_card.is_none() || !it.network.as_deref().is_some_and(is_shipped),
+        "pose.network_card",
+        "given",
+        "none with the network that ships, whose card is built in",
+    )?;
     demand(
         it.detector_card.is_none() || it.detector.is_some(),
         "pose.detector_card",
