@@ -9,7 +9,7 @@ use crate::doubt::Doubt;
 use crate::film::{Film, FilmError};
 use crate::pair::Epipolar;
 use crate::refine::{Clock, Fit, Problem};
-use crate::search::{Found, Rival, peak, search, second};
+use crate::search::{peak, search, second};
 use crate::track::{Track, tracks};
 
 /// Standard deviation of the kernel that smooths places over time: so many intervals between pictures, and seconds.
@@ -335,31 +335,42 @@ impl Study<'_> {
         if part[1] - part[0] < 1.0 {
             part = span;
         }
-        let mut fit = problem.refine(start, part, false);
+        let all = vec![true; start.len()];
+        let mut none = vec![false; start.len()];
+        let plain = problem.refine(start, part, &none).clocks;
         if length_s < LEAST_DRIFT_S {
-            return (problem.refine(&fit.clocks, span, false), None);
+            return (problem.refine(&plain, span, &none), None);
         }
-        let plain = fit.clocks.clone();
-        fit = problem.refine(&plain, part, true);
+        let mut fit = problem.refine(&plain, part, &all);
         while part[0] > span[0] || part[1] < span[1] {
             let more_s = part[1] - part[0];
             part = [
                 (part[0] - more_s).max(span[0]),
                 (part[1] + more_s).min(span[1]),
             ];
-            fit = problem.refine(&fit.clocks, part, true);
+            fit = problem.refine(&fit.clocks, part, &all);
         }
-        let others = self.active.iter().filter(|it| **it != problem.reference);
-        let is_known = |it: &usize| fit.errors[*it][1] * length_s < MOST_DRIFT_ERROR_S;
-        let is_drifting =
-            |it: &usize| fit.clocks[*it].drift.abs() > SURE_DRIFT * fit.errors[*it][1];
-        let all_known = others.clone().all(is_known);
         let errors: Vec<f64> = fit.errors.iter().map(|it| it[1]).collect();
-        if all_known && others.clone().any(is_drifting) {
-            return (fit, Some(errors));
+        let others = self.active.iter().filter(|it| **it != problem.reference);
+        let is_known = |it: &usize| errors[*it] * length_s < MOST_DRIFT_ERROR_S;
+        let all_known = others.clone().all(is_known);
+        for &it in others {
+            let drift = fit.clocks[it].drift.abs();
+            none[it] = all_known && drift > SURE_DRIFT * errors[it];
         }
-        let fit = problem.refine(&plain, span, false);
-        (fit, all_known.then_some(errors))
+        let drifting = none;
+        if !drifting.contains(&true) {
+            return (
+                problem.refine(&plain, span, &drifting),
+                all_known.then_some(errors),
+            );
+        }
+        let start = fit.clocks.iter().zip(&drifting).map(|(it, drifts)| Clock {
+            drift: if *drifts { it.drift } else { 0.0 },
+            ..*it
+        });
+        let start: Vec<Clock> = start.collect();
+        (problem.refine(&start, span, &drifting), Some(errors))
     }
 }
 

@@ -138,7 +138,8 @@ impl Study<'_> {
     ) {
         let middle_s = f64::midpoint(span[0], span[1]);
         let halves = [[span[0], middle_s], [middle_s, span[1]]];
-        let [first, second] = halves.map(|it| problem.refine(&fit.clocks, it, false));
+        let as_they_are = vec![false; fit.clocks.len()];
+        let [first, second] = halves.map(|it| problem.refine(&fit.clocks, it, &as_they_are));
         for &camera in self.active {
             let errors = [&first, &second].map(|it| it.errors[camera][0]);
             let at_middle = [&first, &second].map(|it| it.clocks[camera].common(middle_s));
