@@ -79,6 +79,10 @@ impl Costs {
 }
 
 /// What the offsets between the clocks of two cameras cost.
+#[expect(
+    clippy::partial_pub_fields,
+    reason = "the samples are what the search works with; all else is read outside"
+)]
 #[derive(Debug, Clone)]
 pub struct Curve {
     /// The cameras, by number.

@@ -1,7 +1,9 @@
 //! People who move, and what cameras with clocks of their own see of them.
 
 use geometry::{Camera, Intrinsics, Lens, LensModel};
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{
+    Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
+};
 
 use crate::{Film, Joint, Person, Settings, Shot};
 
@@ -16,8 +18,8 @@ pub(crate) fn ring(n: usize) -> Vec<Camera> {
     let camera = |nth: usize| {
         let angle = (0.3 + nth as f64) / n as f64 * core::f64::consts::TAU;
         let centre = Vector3::new(5.0 * angle.cos(), 5.0 * angle.sin(), 1.6);
-        let forward = (Vector3::new(0.0, 0.0, 0.9) - centre).normalize();
-        let right = forward.cross(&Vector3::z()).normalize();
+        let forward = Unit::new_normalize(Vector3::new(0.0, 0.0, 0.9) - centre);
+        let right = Unit::new_normalize(forward.cross(&Vector3::z()));
         let down = forward.cross(&right);
         let rotation =
             Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);

@@ -100,6 +100,45 @@ fn a_drift_is_told_where_the_footage_is_long_enough() {
     assert_eq!(outcome.cameras[1].drift_error, None);
 }
 
+/// Two people who work in place: slow arms, and hardly a step.
+fn working(time_s: f64) -> Vec<[[f64; 3]; N_JOINTS]> {
+    let person = |of: f64, [x, y]: [f64; 2]| {
+        let place = [
+            x + 0.15 * (0.31 * time_s + of).sin(),
+            y + 0.12 * (0.23 * time_s + 2.0 * of).sin(),
+        ];
+        let turn = 0.4 + 0.5 * (0.17 * time_s + of).sin();
+        let mut joints = stepping(place, turn, 0.0, 0.0);
+        for (joint, reach) in [(6, 0.25), (7, 0.12), (10, 0.12), (11, 0.25)] {
+            joints[joint][2] += reach * (0.9 * time_s + of + joint as f64).sin();
+        }
+        joints
+    };
+    vec![person(0.0, [0.8, 0.5]), person(1.7, [-0.9, -0.4])]
+}
+
+#[test]
+fn slow_people_tell_no_drift_and_no_offset_that_is_surer_than_right() {
+    let cameras = ring(3);
+    for seed in 0..2 {
+        let films = Recording {
+            rates_hz: vec![25.0; 3],
+            noise_px: 4.0,
+            ..Recording {
+                offsets_s: OFFSETS_S.to_vec(),
+                ..Recording::of(3, 20.0).flawed(seed)
+            }
+        };
+        let outcome = run(&cameras, &films.films(&cameras, &working));
+        for (it, truth_s) in outcome.cameras.iter().zip(OFFSETS_S) {
+            assert_eq!(it.drift, 0.0, "{it:?}");
+            let off_s = (it.offset_s - truth_s).abs();
+            let is_honest = off_s <= 4.0 * it.error_s;
+            assert!(is_honest || !outcome.doubts.is_empty(), "{off_s}: {it:?}");
+        }
+    }
+}
+
 #[test]
 fn what_tells_no_offset_is_refused() {
     let cameras = ring(3);

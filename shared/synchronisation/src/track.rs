@@ -78,9 +78,9 @@ impl Track {
             for (power, sum) in sums.iter_mut().enumerate() {
                 *sum += weight * dt.powi(power as i32);
             }
-            for axis in 0..2 {
-                moments[axis][0] += weight * it.at[axis];
-                moments[axis][1] += weight * dt * it.at[axis];
+            for (moments, at) in moments.iter_mut().zip(it.at) {
+                moments[0] += weight * at;
+                moments[1] += weight * dt * at;
             }
         }
         let [s0, s1, s2] = sums;

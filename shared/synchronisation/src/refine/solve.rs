@@ -191,19 +191,17 @@ impl<'a> Sums<'a> {
         };
         let of_camera = |camera: usize| {
             let [offset, drift] = [2 * camera, 2 * camera + 1];
-            let is_known = self.knows(camera);
-            [
-                if is_known && !is_flat(offset) {
-                    error(offset)
-                } else {
-                    f64::INFINITY
-                },
-                if is_known && !self.fixed[drift] {
-                    error(drift) / self.scale_s
-                } else {
-                    f64::INFINITY
-                },
-            ]
+            if !self.knows(camera) || is_flat(offset) {
+                return [f64::INFINITY; 2];
+            }
+            // The reference is what the others are measured against.
+            let has_drift = self.fixed[offset] || !self.fixed[drift];
+            let of_drift = if has_drift {
+                error(drift) / self.scale_s
+            } else {
+                f64::INFINITY
+            };
+            [error(offset), of_drift]
         };
         (0..size / 2).map(of_camera).collect()
     }
