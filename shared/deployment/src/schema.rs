@@ -29,7 +29,11 @@ pub fn schema() -> Value {
 fn numbers_of(schema: &Value, key: &str) -> Option<Vec<String>> {
     let mut at = String::new();
     for name in key.split('.') {
-        at = format!("{}/properties/{name}", resolved(schema, at)?);
+        at = resolved(schema, at)?;
+        if schema.pointer(&at)?["items"].is_object() {
+            at = resolved(schema, format!("{at}/items"))?;
+        }
+        at = format!("{at}/properties/{name}");
     }
     let mut found = Vec::new();
     let mut waiting = vec![at];
@@ -218,8 +222,9 @@ mod tests {
     #[test]
     fn the_ends_of_a_range_are_taken_and_what_is_beyond_is_refused() {
         let read = |key: &str, value: f64| {
-            let text = "name = 'two'\nrig = 'rig.toml'\noutput = 'out'\n\
-                        [[camera]]\nname = 'a'\nsource = 'a.mp4'\n";
+            let mut text = "name = 'two'\nrig = 'rig.toml'\noutput = 'out'\n\
+                            [[camera]]\nname = 'a'\nsource = 'a.mp4'\n"
+                .to_owned();
             let value = match key {
                 "capture.size" => format!("[{value}, {value}]"),
                 "fuse.tau" => format!("[{value:?}]"),
@@ -228,7 +233,14 @@ mod tests {
                 _ => value.to_string(),
             };
             let file = std::path::Path::new("deployment.toml");
-            crate::Loaded::parse(text, file, &[format!("{key}={value}")], &crate::AnyMachine)
+            let set = match key.strip_prefix("camera.") {
+                Some(of_camera) => {
+                    text += &format!("{of_camera} = {value}\n");
+                    Vec::new()
+                }
+                None => vec![format!("{key}={value}")],
+            };
+            crate::Loaded::parse(&text, file, &set, &crate::AnyMachine)
         };
         for (key, least, most) in RANGES {
             if key == "camera" {

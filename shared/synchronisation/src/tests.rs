@@ -34,13 +34,13 @@ fn check(outcome: &Outcome, truth_s: &[f64], most_s: f64) {
 }
 
 #[test]
-fn six_seconds_of_walking_tell_offsets_within_four_milliseconds() {
+fn six_seconds_of_walking_tell_offsets_within_three_milliseconds() {
     let cameras = ring(3);
     let plain = recording(6.0);
     check(
         &run(&cameras, &plain.films(&cameras, &walking)),
         &OFFSETS_S,
-        0.004,
+        0.003,
     );
     let mixed = Recording {
         rates_hz: vec![30.0, 25.0, 60.0],
@@ -50,7 +50,7 @@ fn six_seconds_of_walking_tell_offsets_within_four_milliseconds() {
     check(
         &run(&cameras, &mixed.films(&cameras, &two)),
         &OFFSETS_S,
-        0.004,
+        0.003,
     );
 }
 
@@ -120,22 +120,17 @@ fn working(time_s: f64) -> Vec<[[f64; 3]; N_JOINTS]> {
 #[test]
 fn slow_people_tell_no_drift_and_no_offset_that_is_surer_than_right() {
     let cameras = ring(3);
-    for seed in 0..2 {
-        let films = Recording {
-            rates_hz: vec![25.0; 3],
-            noise_px: 4.0,
-            ..Recording {
-                offsets_s: OFFSETS_S.to_vec(),
-                ..Recording::of(3, 20.0).flawed(seed)
-            }
-        };
-        let outcome = run(&cameras, &films.films(&cameras, &working));
-        for (it, truth_s) in outcome.cameras.iter().zip(OFFSETS_S) {
-            assert_eq!(it.drift, 0.0, "{it:?}");
-            let off_s = (it.offset_s - truth_s).abs();
-            let is_honest = off_s <= 4.0 * it.error_s;
-            assert!(is_honest || !outcome.doubts.is_empty(), "{off_s}: {it:?}");
-        }
+    let films = Recording {
+        rates_hz: vec![25.0; 3],
+        noise_px: 4.0,
+        ..recording(15.0)
+    };
+    let outcome = run(&cameras, &films.films(&cameras, &working));
+    for (it, truth_s) in outcome.cameras.iter().zip(OFFSETS_S) {
+        assert_eq!(it.drift, 0.0, "{it:?}");
+        let off_s = (it.offset_s - truth_s).abs();
+        let is_honest = off_s <= 4.0 * it.error_s;
+        assert!(is_honest || !outcome.doubts.is_empty(), "{off_s}: {it:?}");
     }
 }
 
