@@ -223,7 +223,9 @@ fn table(outcome: &Outcome, names: &[&str], reference: usize) -> Result<(), Fail
         ))?;
     }
     if outcome.cameras.iter().all(|it| it.drift_error.is_none()) {
-        output::line("drift: the footage is too short to determine it")?;
+        output::line("drift: the footage does not determine it, 0 is taken")?;
+    } else if outcome.cameras.iter().any(|it| it.drift == 0.0) {
+        output::line("drift: one that is not told from none is 0")?;
     }
     output::line(format_args!(
         "{:<25} {:>9} {:>15} {:>12} {:>8}",
