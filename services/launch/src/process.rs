@@ -255,7 +255,8 @@ fn filters(resolved: &Resolved, prepared: &Prepared, view: usize) -> Result<View
     let plan = pipeline::plan(&model, camera).or_fail(ExitKind::Input)?;
     let layout = Arc::new(plan.layout().clone());
     let settings = ViewSettings {
-        n_candidates: resolved.deployment.pose.people,
+        // More than people: several can be of one, whose boxes are then one.
+        n_candidates: resolved.deployment.pose.candidates,
         precision: prepared.settings.view.precision,
         ..ViewSettings::default()
     };

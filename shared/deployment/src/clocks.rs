@@ -102,14 +102,11 @@ fn edits_of(text: &str, table: &DeTable<'_>, clock: &ClockKeys) -> Vec<Edit> {
             let end = name.end + line.len();
             let end_of_line = if line.ends_with('\r') { "\r\n" } else { "\n" };
             let end = if line.ends_with('\r') { end - 1 } else { end };
-            let lines: String = added
-                .iter()
-                .map(|it| format!("{end_of_line}{it}"))
-                .collect();
-            edits.push((end..end, lines));
+            let lines = added.iter().flat_map(|it| [end_of_line, it]);
+            edits.push((end..end, lines.collect()));
         } else {
-            let entries: String = added.iter().map(|it| format!(", {it}")).collect();
-            edits.push((name.end..name.end, entries));
+            let entries = added.iter().flat_map(|it| [", ", it]);
+            edits.push((name.end..name.end, entries.collect()));
         }
     }
     edits

@@ -235,7 +235,7 @@ mod tests {
             let file = std::path::Path::new("deployment.toml");
             let set = match key.strip_prefix("camera.") {
                 Some(of_camera) => {
-                    text += &format!("{of_camera} = {value}\n");
+                    text.extend([of_camera, " = ", &value, "\n"]);
                     Vec::new()
                 }
                 None => vec![format!("{key}={value}")],

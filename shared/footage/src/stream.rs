@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use std::io::{self, ErrorKind, Read, pipe};
 use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
-use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -133,13 +133,13 @@ impl StreamSpec {
             .process_group(0);
         let run = output_within(command, PATIENCE);
         let run = run.map_err(|source| missing(&self.ffprobe, self.shown().as_ref(), source))?;
-        let Some((status, stdout, stderr)) = run else {
+        let Some(run) = run else {
             return Err(self.failed("nobody answers"));
         };
-        if !status.success() {
-            return Err(self.failed(&summary(&stderr)));
+        if !run.status.success() {
+            return Err(self.failed(&summary(&run.stderr)));
         }
-        let found: Value = serde_json::from_slice(&stdout).unwrap_or_default();
+        let found: Value = serde_json::from_slice(&run.stdout).unwrap_or_default();
         let stream = &found["streams"][0];
         let side = |key: &str| stream[key].as_u64().unwrap_or(0) as usize;
         let size = Size::new(side("width"), side("height"));
@@ -272,10 +272,7 @@ pub(crate) fn outputs(ffmpeg: &PathBuf) -> Vec<String> {
 }
 
 /// Runs a program to its end, and returns what it wrote; none if it has to be killed because the time is over.
-fn output_within(
-    mut command: Command,
-    limit: Duration,
-) -> io::Result<Option<(ExitStatus, Vec<u8>, Vec<u8>)>> {
+fn output_within(mut command: Command, limit: Duration) -> io::Result<Option<Output>> {
     const PAUSE: Duration = Duration::from_millis(10);
     let mut child = command
         .stdin(Stdio::null())
@@ -308,7 +305,11 @@ fn output_within(
         child.wait()?;
     }
     let [stdout, stderr] = [stdout?, stderr?].map(|it| it.join().unwrap_or_default());
-    Ok(status.map(|it| (it, stdout, stderr)))
+    Ok(status.map(|status| Output {
+        status,
+        stdout,
+        stderr,
+    }))
 }
 
 /// The version of `ffmpeg`; empty if it does not tell.
@@ -437,8 +438,8 @@ mod tests {
         );
         let mut command = Command::new("echo");
         command.arg("here");
-        let (status, stdout, _) = output_within(command, PATIENCE).unwrap().unwrap();
-        assert!(status.success() && stdout == b"here\n");
+        let ended = output_within(command, PATIENCE).unwrap().unwrap();
+        assert!(ended.status.success() && ended.stdout == b"here\n");
     }
 
     #[test]

@@ -130,18 +130,18 @@ mod tests {
 
     use super::*;
 
-    fn answer(skew_s: f64) -> Option<ViewResult> {
-        Some(ViewResult {
+    fn answer(skew_s: f64) -> ViewResult {
+        ViewResult {
             candidates: Vec::new(),
             front: Vec::new(),
             sigma_px: None,
             tau_px: None,
             skew_s,
-        })
+        }
     }
 
-    fn view(x: f64) -> Option<FusedView> {
-        Some(FusedView {
+    fn view(x: f64) -> FusedView {
+        FusedView {
             pose: FusedPose {
                 centres_px: vec![[x, 0.0], [x, 200.0]],
                 n_pairs: 0,
@@ -150,17 +150,17 @@ mod tests {
             exchanged: false,
             cell_px: 4.0,
             single_score: 0.0,
-        })
+        }
     }
 
     #[test]
     fn every_view_is_moved_by_its_own_velocity_and_its_own_time() {
         let mut motion = Motion::default();
-        let answers = [answer(0.01), answer(-0.01), None];
+        let answers = [Some(answer(0.01)), Some(answer(-0.01)), None];
         motion.begin(Some(1.0));
-        motion.at_instant(&answers, &[view(10.0), view(30.0), None], 1.0);
+        motion.at_instant(&answers, &[Some(view(10.0)), Some(view(30.0)), None], 1.0);
         motion.begin(Some(1.1));
-        let found = motion.at_instant(&answers, &[view(20.0), view(20.0), None], 1.0);
+        let found = motion.at_instant(&answers, &[Some(view(20.0)), Some(view(20.0)), None], 1.0);
         let AtInstant {
             views,
             more_px: more,
@@ -177,17 +177,17 @@ mod tests {
     #[test]
     fn nothing_is_moved_where_all_pictures_are_of_the_instant_or_no_time_is_known() {
         let mut motion = Motion::default();
-        let views = [view(10.0), view(30.0)];
+        let views = [Some(view(10.0)), Some(view(30.0))];
         motion.begin(Some(1.0));
         assert!(
             motion
-                .at_instant(&[answer(0.0), answer(0.0)], &views, 1.0)
+                .at_instant(&[Some(answer(0.0)), Some(answer(0.0))], &views, 1.0)
                 .is_none()
         );
         motion.begin(None);
         assert!(
             motion
-                .at_instant(&[answer(0.01), answer(0.0)], &views, 1.0)
+                .at_instant(&[Some(answer(0.01)), Some(answer(0.0))], &views, 1.0)
                 .is_none()
         );
     }

@@ -29,7 +29,7 @@ pub(super) struct Picture {
     pub bytes_per_row: u32,
     /// Restarts of the process that recorded it, and how often it had opened the camera.
     pub connection: [u32; 2],
-    label_nanos: i64,
+    pub label_nanos: i64,
 }
 
 impl Picture {
@@ -57,12 +57,12 @@ pub(super) struct Part {
 pub(super) struct Table {
     pub size: Size,
     pub rate_hz: f64,
-    grid: Grid,
+    pub grid: Grid,
     /// By time: those that have an instant.
     pub pictures: Vec<Picture>,
     /// Everything of streams, by number.
     pub parts: Vec<Part>,
-    labels: BTreeMap<([u32; 2], i64), usize>,
+    pub labels: BTreeMap<([u32; 2], i64), usize>,
 }
 
 impl Table {
@@ -85,7 +85,7 @@ impl Table {
                 continue;
             };
             let name = name_of(&first);
-            if name == &camera[..camera.floor_char_boundary(MAX_NAME)] {
+            if name == camera[..camera.floor_char_boundary(MAX_NAME)] {
                 return Self::of(camera, &first, &heads, rate_hz);
             }
             known.push(name);

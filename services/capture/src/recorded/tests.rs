@@ -1,3 +1,5 @@
+//! Pictures of live cameras that were recorded, as footage.
+
 use std::io::Write as _;
 
 use footage::Size;

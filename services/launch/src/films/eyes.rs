@@ -69,22 +69,11 @@ impl Eyes {
 
     /// The names of what is found.
     pub(super) fn names(&self) -> Vec<String> {
-        match &self.network {
-            Some(network) => network.names().to_vec(),
-            None => {
-                let joints = PARSE14.joints.iter();
-                joints
-                    .map(|it| {
-                        if it.name == "head" {
-                            "head top"
-                        } else {
-                            it.name
-                        }
-                        .to_owned()
-                    })
-                    .collect()
-            }
+        if let Some(network) = &self.network {
+            return network.names().to_vec();
         }
+        let named = |name: &str| if name == "head" { "head top" } else { name }.to_owned();
+        PARSE14.joints.iter().map(|it| named(it.name)).collect()
     }
 
     /// Whether sides follow the picture.

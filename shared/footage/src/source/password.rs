@@ -68,6 +68,9 @@ fn push_address(out: &mut String, address: &str) {
     }
 }
 
+/// Fewest characters of a secret that is looked for: what is shorter stands in any text.
+const SHORTEST: usize = 3;
+
 /// A message about one address, also where it repeats the password alone.
 pub(crate) fn without_password_of(address: &str, message: &str) -> String {
     let shown = without_passwords(address);
@@ -76,8 +79,6 @@ pub(crate) fn without_password_of(address: &str, message: &str) -> String {
     let host = &host[..host.find(['/', '?', '#']).unwrap_or(host.len())];
     let before = host.rsplit_once('@').map_or("", |it| it.0);
     let password = before.split_once(':').map_or("", |it| it.1);
-    // What is as short as this stands in any text.
-    const SHORTEST: usize = 3;
     for secret in [before, password] {
         if secret.len() >= SHORTEST {
             message = message.replace(secret, HIDDEN);

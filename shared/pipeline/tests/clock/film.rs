@@ -69,9 +69,12 @@ impl Film {
     }
 }
 
+/// Scenes that were made: whether the rig is a ring, the action, the seed.
+type Made = BTreeMap<(bool, &'static str, u64), Arc<Scene>>;
+
 /// Makes a scene, which takes a while, once. All rings stand around the same place.
 fn scene_of(rig: RigChoice, action: Action, seed: u64) -> Arc<Scene> {
-    static MADE: Mutex<BTreeMap<(bool, &str, u64), Arc<Scene>>> = Mutex::new(BTreeMap::new());
+    static MADE: Mutex<Made> = Mutex::new(Made::new());
     let is_ring = matches!(rig, RigChoice::Ring { .. });
     let settings = Settings {
         rig,
