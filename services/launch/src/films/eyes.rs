@@ -4,16 +4,14 @@ use deployment::Deployment;
 use fmp::{CandidateSettings, Search};
 use footage::{FrameView, Size, Turn};
 use keypoints::{Keypoint, Sides};
-use offline::pictures::{Picture, Searched};
+use offline::pictures::{BOXES_PX, Picture, Searched};
 use offline::{detector, network};
-use posenetwork::{Detector, PoseNetwork, Workspace, outline_of_parts};
+use posenetwork::{Detector, PoseNetwork, Workspace};
 use runtime::{ExitKind, Failure, OrFail as _};
 use skeleton::PARSE14;
 
 use crate::inputs;
 
-/// Longest side of a picture in which the filters search, pixels.
-const SEARCHED: usize = 640;
 /// Detections of the filters: the lowest score, and how much of a better one's boxes a worse one may cover.
 const THRESHOLD: f32 = -0.5;
 const OVERLAP: f64 = 0.1;
@@ -141,7 +139,7 @@ impl Eyes {
         let Some(search) = &self.search else {
             return Ok(Vec::new());
         };
-        let searched = Searched::new(picture, Some(SEARCHED), search)?;
+        let searched = Searched::new(picture, Some(BOXES_PX), search)?;
         let layout = searched.layout();
         let settings = CandidateSettings {
             threshold: THRESHOLD,
@@ -151,10 +149,7 @@ impl Eyes {
         let image = searched.image(picture)?;
         let found = search.on(image, layout, |it| search.solver.candidates(it, &settings));
         let person = |pose: &fmp::Pose| {
-            let [left, top, right, bottom] = pose.bounding_box(&search.model, layout);
-            let first = searched.in_picture([left, top]);
-            let last = searched.in_picture([right, bottom]);
-            let outline = outline_of_parts([first[0], first[1], last[0], last[1]]);
+            let outline = searched.outline(&search.model, pose);
             let centres = pose.centres(&search.model, layout);
             let joints = if centres.len() == skeleton::N_PARTS {
                 PARSE14.from_parts(&centres)
