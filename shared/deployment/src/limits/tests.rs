@@ -8,12 +8,8 @@ const SHORT: &str = "name = 'two'\nrig = 'rig.toml'\noutput = 'out'\n\
     [[camera]]\nname = 'a'\nsource = 'a.mp4'\n[[camera]]\nname = 'b'\nsource = 'b.mp4'\n";
 
 fn read(set: &str) -> Result<Loaded, ConfigError> {
-    Loaded::parse(
-        SHORT,
-        Path::new("deployment.toml"),
-        &[set.to_owned()],
-        &AnyMachine,
-    )
+    let file = Path::new("deployment.toml");
+    Loaded::parse(SHORT, file, &[set.to_owned()], &AnyMachine)
 }
 
 /// Key, values that are refused with what the message says; values that are taken.
