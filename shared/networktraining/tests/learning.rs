@@ -66,6 +66,7 @@ fn small() -> Settings {
         shape,
         batch: 8,
         steps: 60,
+        small: 0.0,
         error_steps: 4,
         rate: 1e-2,
         averaged: 0.05,
