@@ -41,8 +41,8 @@ pub struct Settings {
     pub batch: usize,
     /// Steps of the training.
     pub steps: usize,
-    /// Share of the steps, the first ones, that are shown inputs of 32 pixels less across and down: they take two thirds of the
-    /// time.
+    /// Share of the steps, the first ones, that are shown inputs of 32 pixels less across and down: three fifths of the pixels by
+    /// default.
     pub small: f32,
     /// Steps after them that learn the expected error alone, on people who are kept apart.
     pub error_steps: usize,
