@@ -1,5 +1,6 @@
 //! Runs one process of a deployment: builds the job of its service from the resolved deployment.
 
+mod boxes;
 mod live;
 
 use std::path::PathBuf;
@@ -12,7 +13,7 @@ use messages::topic;
 use multiview::SpaceSettings;
 use pipeline::{
     Boxes, ExtrasStep, Eyes, FuseStep, NetworkSettings, NetworkStep, SkeletonStep, SpaceStep,
-    ViewSettings, ViewStep, Views,
+    ViewStep, Views,
 };
 use posenetwork::MapSettings;
 use rayon::ThreadPoolBuilder;
@@ -209,9 +210,11 @@ fn view_step(
         )));
     }
     let config = &deployment.pose;
+    let find_every = boxes::find_every(resolved);
     let settings = NetworkSettings {
         n_people: config.people,
-        find_every: config.find_every,
+        find_every,
+        find_phase: view as u64 * find_every / deployment.cameras.len().max(1) as u64,
         least_heat: config.least_heat,
         keypoint_sigma: config.keypoint_sigma,
         ..NetworkSettings::default()
@@ -233,7 +236,7 @@ fn view_step(
         .or_fail(ExitKind::Config)?;
     let boxes = match inputs::detector(config)? {
         Some(detector) => Boxes::Detector(Box::new(detector)),
-        None => Boxes::Filters(Box::new(filters(resolved, &prepared, view)?)),
+        None => Boxes::Filters(Box::new(boxes::filters(resolved, &prepared, view)?)),
     };
     let extras = extras(resolved, network.names());
     let eyes = Eyes::Network(Box::new(network), boxes);
@@ -246,21 +249,6 @@ fn view_step(
 fn extras(resolved: &Resolved, names: &[String]) -> Vec<Option<usize>> {
     let number = |wanted: &String| names.iter().position(|it| it == wanted);
     resolved.extra_keypoints.iter().map(number).collect()
-}
-
-/// The search of the filters over the whole frame, which finds boxes for a network.
-fn filters(resolved: &Resolved, prepared: &Prepared, view: usize) -> Result<ViewStep, Failure> {
-    let model = inputs::model_or_shipped(resolved.deployment.model.as_deref())?;
-    let camera = prepared.views[view].framing.camera();
-    let plan = pipeline::plan(&model, camera).or_fail(ExitKind::Input)?;
-    let layout = Arc::new(plan.layout().clone());
-    let settings = ViewSettings {
-        // More than people: several can be of one, whose boxes are then one.
-        n_candidates: resolved.deployment.pose.candidates,
-        precision: prepared.settings.view.precision,
-        ..ViewSettings::default()
-    };
-    ViewStep::new(model, layout, settings).or_fail(ExitKind::Config)
 }
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {

@@ -35,7 +35,8 @@ pub struct Config {
     /// `network`: what holds its maps together: a file that `parallax train springs` made; `"shipped"`: the one that ships.
     pub springs: PathBuf,
     /// `network`: people are looked for in every n-th frame, and wherever nobody is seen; between, the network looks where they were.
-    pub find_every: u64,
+    /// Without it in every tenth with a `detector`; by the filters, which take longer, about once a second.
+    pub find_every: Option<u64>,
     /// `network`, keypoints: least mean heat (or confidence) of the joints of somebody who is seen, 0 to 1.
     pub least_heat: f64,
     /// Standard deviation of keypoints that another program found (`keypoints` of a `[[camera]]`), share of the height of the person's
@@ -103,7 +104,7 @@ impl Default for Config {
             detector: None,
             detector_card: None,
             springs: PathBuf::from(SHIPPED),
-            find_every: 10,
+            find_every: None,
             least_heat: 0.2,
             keypoint_sigma: 0.02,
             people: 3,

@@ -142,7 +142,9 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
 
 fn pose(it: &pose::Config) -> Result<(), Complaint> {
     whole("pose.candidates", it.candidates)?;
-    whole("pose.find_every", it.find_every)?;
+    if let Some(n) = it.find_every {
+        whole("pose.find_every", n)?;
+    }
     whole("pose.people", it.people)?;
     whole("pose.threads", it.threads)?;
     not_negative("pose.tracked_margin", it.tracked_margin)?;

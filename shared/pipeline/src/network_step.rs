@@ -44,6 +44,8 @@ pub struct NetworkSettings {
     pub n_people: usize,
     /// Boxes are looked for in every n-th frame, and in every one in which nobody is seen well.
     pub find_every: u64,
+    /// By how many frames the second of these comes sooner: views that look for boxes in turn do not keep one frame waiting.
+    pub find_phase: u64,
     /// Least mean heat of the joints of a person who is seen well, 0 to 1.
     pub least_heat: f64,
     /// How maps become evidence.
@@ -57,6 +59,7 @@ impl Default for NetworkSettings {
         Self {
             n_people: 3,
             find_every: 10,
+            find_phase: 0,
             least_heat: 0.2,
             maps: MapSettings::default(),
             keypoint_sigma: 0.02,
@@ -93,8 +96,10 @@ pub struct NetworkMemory {
     /// The people of this frame; those beyond `n_seen` are memory for more.
     seen: Vec<Seen>,
     n_seen: usize,
-    /// Frames since boxes were looked for; none if they never were.
-    since: Option<u64>,
+    /// Frames until boxes are looked for; none before the first frame.
+    until: Option<u64>,
+    /// Whether they were looked for in this frame.
+    has_searched: bool,
 }
 
 /// A person in a frame.
@@ -118,7 +123,7 @@ impl NetworkMemory {
 
     /// Whether boxes were looked for in this frame.
     pub fn has_searched(&self) -> bool {
-        self.since == Some(0)
+        self.has_searched
     }
 }
 
@@ -167,8 +172,10 @@ impl NetworkStep {
             memory.n_seen = 0;
             return Ok(None);
         };
-        memory.since = memory.since.map(|it| it + 1);
-        let is_due = memory.since.is_none_or(|it| it >= self.settings.find_every);
+        let first = self.settings.find_every - self.settings.find_phase % self.settings.find_every;
+        let next = memory.until.map_or(first, |_| self.settings.find_every);
+        let is_due = memory.until.is_none_or(|it| it == 0);
+        memory.has_searched = is_due;
         memory.n_seen = 0;
         let tracked = core::mem::take(&mut memory.outlines);
         let with = (&**network, image);
@@ -176,15 +183,20 @@ impl NetworkStep {
             let found = find(boxes, image, &mut memory.values)?;
             self.see_all(with, &found, memory)?;
             self.see_all(with, &tracked, memory)?;
-            memory.since = Some(0);
         } else {
             self.see_all(with, &tracked, memory)?;
-            if is_due || memory.n_seen == 0 {
+            memory.has_searched |= memory.n_seen == 0;
+            if memory.has_searched {
                 let found = find(boxes, image, &mut memory.values)?;
                 self.see_all(with, &found, memory)?;
-                memory.since = Some(0);
             }
         }
+        let until = if memory.has_searched {
+            Some(next)
+        } else {
+            memory.until
+        };
+        memory.until = until.map(|it| it.saturating_sub(1));
         let size = |it: &Seen| it.heat * (it.outline[3] - it.outline[1]);
         let n_seen = memory.n_seen;
         memory.seen[..n_seen].sort_by(|a, b| size(b).total_cmp(&size(a)));
