@@ -5,7 +5,7 @@ use experiment::{Joints, Pictures};
 use fmp::{Layout, Pose, Search, Solver};
 use keypoints::Keypoint;
 use posenetwork::springs::joint_of;
-use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace, outline_of};
+use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use skeleton::PARSE14;
 
@@ -19,6 +19,10 @@ const HEAD: usize = 13;
 /// A joint lies where its map is highest if the springs put it nearer than this, cells: between cells the maxima of the maps
 /// are more exact.
 const SAME: f64 = 1.5;
+/// Most boxes of the filters that the network looks into.
+const MOST_BOXES: usize = 8;
+/// Least mean distance of the parts of two poses whose boxes these are, box sides.
+const SEPARATION: f64 = 1.0;
 
 /// A network, and the tree of springs that holds its maps together.
 #[derive(Debug)]
@@ -75,11 +79,11 @@ pub fn judged(
     console: &dyn Console,
 ) -> Result<Seen, Failure> {
     let mut errors = Vec::new();
-    let mut workspace = Workspace::default();
+    let mut memory = LookMemory::default();
     let mut maps = JointMaps::default();
     let find = |person: &Person| {
         go_on(stop)?;
-        let found = reader.find(person, &mut workspace, &mut maps)?;
+        let found = reader.find(person, &mut memory, &mut maps)?;
         if found[0].is_some() {
             errors.push(errors_of(&maps, &truth(person)));
         }
@@ -114,33 +118,38 @@ impl NetworkReader {
     fn find(
         &self,
         person: &Person,
-        workspace: &mut Workspace,
+        memory: &mut LookMemory,
         maps: &mut JointMaps,
     ) -> Result<[Option<Joints>; 2], Failure> {
         let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
-        let outline = match &self.finder {
-            None => outline_of(truth(person)),
-            Some(finder) => found_box(finder, person, &picture)?,
-        };
-        let Some(outline) = outline else {
+        let size = picture.size();
+        let Ok(layout) = Layout::new(self.springs.model(), size.width, size.height) else {
             return Ok([None, None]);
         };
-        let sight = self.network.look(picture.view(), outline, workspace);
-        let Some(sight) = sight.or_fail(ExitKind::Input)? else {
+        let looker = Looker {
+            network: &self.network,
+            springs: &self.springs,
+            layout: &layout,
+            settings: &MapSettings::default(),
+        };
+        let image = picture.view();
+        let look = match (&self.finder, outline_of(truth(person))) {
+            (Some(finder), _) => {
+                let outlines = found_boxes(finder, person, &picture)?;
+                looker.best_of((image, &outlines), memory, maps)
+            }
+            (None, Some(outline)) => looker.look((image, outline), memory, maps),
+            (None, None) => Ok(None),
+        };
+        let Some(look) = look.or_fail(ExitKind::Input)? else {
             return Ok([None, None]);
         };
-        let settings = MapSettings::default();
-        maps.read(&sight, &settings).or_fail(ExitKind::Input)?;
         if self.sides == Sides::Marked {
-            maps.name_sides(&sight);
+            maps.name_sides(&self.network, look.front);
         }
         let peaks = at_peaks(maps.peaks());
-        let size = picture.size();
-        let layout = Layout::new(self.springs.model(), size.width, size.height).ok();
-        let held = layout.and_then(|layout| {
-            let pose = maps.pose(&self.springs, &layout, &mut Vec::new())?;
-            Some(self.joints(&layout, &pose, maps.peaks()))
-        });
+        let pose = maps.pose(&self.springs, &layout, &mut Vec::new());
+        let held = pose.map(|pose| self.joints(&layout, &pose, maps.peaks()));
         Ok([Some(peaks), held])
     }
 
@@ -162,12 +171,12 @@ impl NetworkReader {
     }
 }
 
-/// The box of the best pose that the filters find in a picture; `None` if they find nobody.
-fn found_box(
+/// The boxes of the distinct poses that the filters find in a picture, the best first.
+fn found_boxes(
     finder: &Search,
     person: &Person,
     picture: &Picture,
-) -> Result<Option<[f64; 4]>, Failure> {
+) -> Result<Vec<[f64; 4]>, Failure> {
     let picture = Shown {
         path: person.image.clone(),
         frame: None,
@@ -177,8 +186,11 @@ fn found_box(
     };
     let searched = Searched::new(&picture, Some(BOXES_PX), finder)?;
     let image = searched.image(&picture)?;
-    let best = finder.on(image, searched.layout(), |it| finder.solver.best(it, None));
-    Ok(best.map(|it| searched.outline(&finder.model, &it)))
+    let found = finder.on(image, searched.layout(), |it| {
+        finder.solver.distinct(it, MOST_BOXES, SEPARATION)
+    });
+    let outlines = found.iter().map(|it| searched.outline(&finder.model, it));
+    Ok(outlines.collect())
 }
 
 /// The joints at the maxima of their maps; not finite where the keypoints do not tell a joint.

@@ -12,7 +12,7 @@ use keypoints::Keypoint;
 use multiview::FrontEvidence;
 use posenetwork::springs::joint_of;
 use posenetwork::{
-    Detector, JointMaps, LookError, MapSettings, PoseNetwork, Workspace, outline_of,
+    Detector, JointMaps, LookError, LookMemory, Looker, MapSettings, PoseNetwork, outline_of,
     outline_of_parts, overlap,
 };
 
@@ -89,7 +89,7 @@ pub struct NetworkStep {
 /// What the step keeps from frame to frame: memory that is used again, and the boxes of the people it sees.
 #[derive(Debug, Default)]
 pub struct NetworkMemory {
-    workspace: Workspace,
+    look: LookMemory,
     values: Vec<f32>,
     /// The boxes for the next frame, pixels.
     outlines: Vec<[f64; 4]>,
@@ -181,14 +181,14 @@ impl NetworkStep {
         let with = (&**network, image);
         if is_due && matches!(boxes, Boxes::Detector(_)) {
             let found = find(boxes, image, &mut memory.values)?;
-            self.see_all(with, &found, memory)?;
-            self.see_all(with, &tracked, memory)?;
+            self.see_all(with, (&found, true), memory)?;
+            self.see_all(with, (&tracked, false), memory)?;
         } else {
-            self.see_all(with, &tracked, memory)?;
+            self.see_all(with, (&tracked, false), memory)?;
             memory.has_searched |= memory.n_seen == 0;
             if memory.has_searched {
                 let found = find(boxes, image, &mut memory.values)?;
-                self.see_all(with, &found, memory)?;
+                self.see_all(with, (&found, true), memory)?;
             }
         }
         let until = if memory.has_searched {
@@ -208,39 +208,57 @@ impl NetworkStep {
     }
 
     /// Looks into boxes in which nobody is known yet.
+    ///
+    /// * `are_found`: they are not those of the frame before.
     fn see_all(
         &self,
         with: (&PoseNetwork, Rgb8View<'_>),
-        outlines: &[[f64; 4]],
+        (outlines, are_found): (&[[f64; 4]], bool),
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
         for outline in outlines {
             let is_known = |it: &Seen| overlap(it.outline, *outline) > SAME;
             let has_room = memory.n_seen < 2 * self.settings.n_people;
             if has_room && !memory.people().iter().any(is_known) {
-                self.see(with, *outline, memory)?;
+                self.see(with, (*outline, are_found), memory)?;
             }
         }
         Ok(())
     }
 
     /// Looks at the person in a box, and keeps what is seen well.
+    ///
+    /// * `is_found`: the box is not that of the frame before: a better one may be around what is seen there.
     fn see(
         &self,
         (network, image): (&PoseNetwork, Rgb8View<'_>),
-        outline: [f64; 4],
+        (outline, is_found): ([f64; 4], bool),
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
-        let Some(sight) = network.look(image, outline, &mut memory.workspace)? else {
-            return Ok(());
-        };
         if memory.seen.len() == memory.n_seen {
             memory.seen.push(Seen::default());
         }
         let seen = &mut memory.seen[memory.n_seen];
-        seen.maps.read(&sight, &self.settings.maps)?;
-        seen.outline = outline;
-        seen.front = sight.front();
+        if is_found {
+            let looker = Looker {
+                network,
+                springs: &self.solver,
+                layout: &self.layout,
+                settings: &self.settings.maps,
+            };
+            let what = (image, outline);
+            let Some(first) = looker.look(what, &mut memory.look, &mut seen.maps)? else {
+                return Ok(());
+            };
+            let look = looker.look_closer((image, first), &mut memory.look, &mut seen.maps)?;
+            (seen.outline, seen.front) = (look.outline, look.front);
+        } else {
+            let Some(sight) = network.look(image, outline, memory.look.workspace())? else {
+                return Ok(());
+            };
+            seen.maps.read(&sight, &self.settings.maps)?;
+            (seen.outline, seen.front) = (outline, sight.front());
+        }
         let is_new = self.is_well_seen(seen) && !is_known(&memory.seen, memory.n_seen);
         memory.n_seen += usize::from(is_new);
         Ok(())

@@ -8,6 +8,7 @@
 
 mod alone;
 mod between;
+mod closer;
 mod detector;
 mod expected;
 mod found;
@@ -17,6 +18,7 @@ mod outline;
 pub mod springs;
 
 pub use between::interpolate;
+pub use closer::{Look, LookMemory, Looker};
 pub use detector::Detector;
 pub use expected::expected_error;
 pub use maps::{JointMaps, MapSettings};

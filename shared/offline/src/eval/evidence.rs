@@ -5,12 +5,14 @@ use experiment::{
     Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
     projected,
 };
-use fmp::{Layout, Pose, Search};
+use fmp::{Layout, Pose, Search, Solver};
 use geometry::Camera;
 use kernels::Rgb8View;
 use keypoints::Sides;
 use multiview::{SeenPerson, same_person};
-use posenetwork::{Detector, JointMaps, MapSettings, PoseNetwork, Workspace, outline_of_parts};
+use posenetwork::{
+    Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
+};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
 use skeleton::PARSE14;
@@ -33,6 +35,8 @@ pub struct EvidenceJob<'a> {
     pub network: &'a PoseNetwork,
     /// What finds the boxes.
     pub boxes: Boxes<'a>,
+    /// Solves the tree of springs, which tells better boxes.
+    pub springs: &'a Solver,
     /// What goes wrong.
     pub stress: &'a [Stress],
     /// How the frames are derived.
@@ -158,9 +162,9 @@ impl EvidenceJob<'_> {
 
     fn judge(&self, instant: &Instant<'_>, tallies: &mut [Vec<Tally>]) -> Result<(), Failure> {
         let n_views = instant.cameras.len();
-        let mut workspace = (Workspace::default(), Vec::new());
+        let mut memory = (LookMemory::default(), Vec::new());
         let plain = (0..n_views)
-            .map(|view| self.people(instant, view, None, &mut workspace))
+            .map(|view| self.people(instant, view, None, &mut memory))
             .collect::<Result<Vec<_>, Failure>>()?;
         for (stress, tallies) in self.stress.iter().zip(tallies) {
             let mut seen = Vec::with_capacity(n_views);
@@ -168,7 +172,7 @@ impl EvidenceJob<'_> {
                 let covers = matches!(stress, Stress::Covered(_));
                 let is_hit = stress.hits(instant.nth, view, n_views);
                 let people = if covers && is_hit {
-                    self.people(instant, view, Some(instant.nth + view), &mut workspace)?
+                    self.people(instant, view, Some(instant.nth + view), &mut memory)?
                 } else {
                     plain[view].clone()
                 };
@@ -198,7 +202,7 @@ impl EvidenceJob<'_> {
         instant: &Instant<'_>,
         view: usize,
         covered: Option<usize>,
-        (workspace, values): &mut (Workspace, Vec<f32>),
+        (memory, values): &mut (LookMemory, Vec<f32>),
     ) -> Result<Vec<Seen>, Failure> {
         let Some(image) = instant.images[view] else {
             return Ok(Vec::new());
@@ -213,19 +217,26 @@ impl EvidenceJob<'_> {
             }
             _ => image,
         };
+        let layout =
+            Layout::new(self.springs.model(), size[0], size[1]).or_fail(ExitKind::Input)?;
+        let looker = Looker {
+            network: self.network,
+            springs: self.springs,
+            layout: &layout,
+            settings: &MapSettings::default(),
+        };
         let boxes = self.boxes.find(image, values)?;
         let mut people = Vec::new();
         for outline in boxes.into_iter().take(MOST_PEOPLE) {
-            let sight = self
-                .network
-                .look(image, outline, workspace)
-                .or_fail(ExitKind::Input)?;
-            let Some(sight) = sight else { continue };
             let mut maps = JointMaps::default();
-            maps.read(&sight, &MapSettings::default())
-                .or_fail(ExitKind::Input)?;
-            let height = (outline[3] - outline[1]) / size[1] as f64;
-            let view = NetworkView::new(maps).with_front(sight.front());
+            let seen = looker.look((image, outline), memory, &mut maps);
+            let Some(seen) = seen.or_fail(ExitKind::Input)? else {
+                continue;
+            };
+            let look = looker.look_closer((image, seen), memory, &mut maps);
+            let look = look.or_fail(ExitKind::Input)?;
+            let height = (look.outline[3] - look.outline[1]) / size[1] as f64;
+            let view = NetworkView::new(maps).with_front(look.front);
             people.push((view.person(height), view));
         }
         Ok(people)

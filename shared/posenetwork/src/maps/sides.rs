@@ -1,7 +1,7 @@
 //! Left and right of maps: exchanged, or named by what one view tells.
 
 use super::JointMaps;
-use crate::network::Sight;
+use crate::network::PoseNetwork;
 
 impl JointMaps {
     /// Exchanges what the network calls left and right of the joints; [`Self::keypoint`] stays as it is.
@@ -21,10 +21,11 @@ impl JointMaps {
     /// Makes left and right those of the person, where they are those of the picture, by what the network alone tells of the direction
     /// of the trunk: whoever is seen from behind has them exchanged. Over several views more is known (`multiview`).
     ///
-    /// * `sight`: what the maps were read from.
-    pub fn name_sides(&mut self, sight: &Sight<'_>) {
-        let is_as_seen = sight.network().card().keypoints.sides == keypoints::Sides::Seen;
-        let is_from_behind = sight.front().is_some_and(|[_, towards]| towards < 0.0);
+    /// * `network`: what the maps were read from.
+    /// * `front`: what it told of the direction ([`Sight::front`](crate::Sight::front)).
+    pub fn name_sides(&mut self, network: &PoseNetwork, front: Option<[f32; 2]>) {
+        let is_as_seen = network.card().keypoints.sides == keypoints::Sides::Seen;
+        let is_from_behind = front.is_some_and(|[_, towards]| towards < 0.0);
         if is_as_seen && is_from_behind {
             self.exchange_sides();
         }

@@ -206,7 +206,7 @@ impl Person {
         let mut maps = JointMaps::default();
         let settings = MapSettings::default();
         maps.read(&sight, &settings).or_fail(ExitKind::Input)?;
-        maps.name_sides(&sight);
+        maps.name_sides(network, sight.front());
         let scores: Vec<f64> = maps.peaks().iter().flatten().map(|it| it.score).collect();
         let joints = maps.peaks().iter();
         Ok(Self {

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use evaluation::Bootstrap;
 use experiment::{FilmSettings, Stress};
-use fmp::Search;
+use fmp::{Search, Solver};
 use launch::{Claim, inputs, no_results, output};
 use offline::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
 use offline::library::Library;
@@ -75,12 +75,14 @@ pub(super) fn run(
     let detector = detector.map(|it| offline::detector::open(it, options.detector_card.as_deref()));
     let detector = detector.transpose()?;
     let filters = Search::new(inputs::model_or_shipped(None)?);
+    let springs = Solver::new(inputs::springs(Path::new(deployment::SHIPPED))?);
     let _claim = Claim::of(&arguments.out, "eval")?;
     let job = EvidenceJob {
         network: &network,
         boxes: detector
             .as_ref()
             .map_or(Boxes::Filters(&filters), Boxes::Detector),
+        springs: &springs,
         stress: &stress,
         film: FilmSettings {
             size: arguments.size,

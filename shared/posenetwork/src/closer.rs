@@ -1,0 +1,175 @@
+//! Looking at people in boxes that may not fit: into several, and closer where somebody is seen.
+
+use fmp::{Layout, Pose, Solver};
+use kernels::Rgb8View;
+
+use crate::maps::{JointMaps, MapSettings};
+use crate::network::{LookError, PoseNetwork, Workspace};
+use crate::outline::{outline_of, overlap};
+use crate::springs::joint_of;
+
+/// Boxes that cover each other by more show the same to a network: another look tells nothing new.
+const FITS: f64 = 0.8;
+/// Most looks at one person beside the first.
+const MOST_MORE: usize = 2;
+
+/// What looks at the people of a picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Looker<'a> {
+    /// The network.
+    pub network: &'a PoseNetwork,
+    /// Solves the tree of springs, which says where a whole person is.
+    pub springs: &'a Solver,
+    /// Of the picture, for that tree.
+    pub layout: &'a Layout,
+    /// How maps become evidence.
+    pub settings: &'a MapSettings,
+}
+
+/// Memory that is used again from person to person.
+#[derive(Debug, Default)]
+pub struct LookMemory {
+    workspace: Workspace,
+    /// What is seen in a box that may turn out the better one.
+    other: JointMaps,
+    responses: Vec<f32>,
+}
+
+/// What was seen in a box, beside the maps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// The box: left, top, right, bottom, pixels of the picture.
+    pub outline: [f64; 4],
+    /// In which direction the trunk faces ([`Sight::front`](crate::Sight::front)).
+    pub front: Option<[f32; 2]>,
+    /// Of the best pose of the springs on the maps: how much a person this is. Negative infinity where the maps lie beyond the
+    /// picture.
+    pub score: f32,
+    /// The box around that pose.
+    pub around: Option<[f64; 4]>,
+}
+
+impl LookMemory {
+    /// The memory of the network.
+    pub fn workspace(&mut self) -> &mut Workspace {
+        &mut self.workspace
+    }
+}
+
+impl Looker<'_> {
+    /// Looks into a box.
+    ///
+    /// * `outline`: left, top, right, bottom, pixels of the picture.
+    /// * `maps`: of the joints, filled.
+    /// * Returns `None` for a box without an extent.
+    ///
+    /// # Errors
+    ///
+    /// [`LookError`].
+    pub fn look(
+        &self,
+        what: (Rgb8View<'_>, [f64; 4]),
+        memory: &mut LookMemory,
+        maps: &mut JointMaps,
+    ) -> Result<Option<Look>, LookError> {
+        self.look_in(what, (&mut memory.workspace, &mut memory.responses), maps)
+    }
+
+    fn look_in(
+        &self,
+        (image, outline): (Rgb8View<'_>, [f64; 4]),
+        (workspace, responses): (&mut Workspace, &mut Vec<f32>),
+        maps: &mut JointMaps,
+    ) -> Result<Option<Look>, LookError> {
+        let Some(sight) = self.network.look(image, outline, workspace)? else {
+            return Ok(None);
+        };
+        maps.read(&sight, self.settings)?;
+        let front = sight.front();
+        let pose = maps.pose(self.springs, self.layout, responses);
+        Ok(Some(Look {
+            outline,
+            front,
+            score: pose.as_ref().map_or(f32::NEG_INFINITY, |it| it.score),
+            around: pose.and_then(|it| self.around(&it)),
+        }))
+    }
+
+    /// Looks into the box around the pose that was seen in another one, and so on, as long as that is another box and shows the person
+    /// better: a box that cuts off the feet, or in which a person is small, is left for a better one.
+    ///
+    /// * `seen`, `maps`: what was seen in the first box; the maps are replaced by better ones.
+    ///
+    /// # Errors
+    ///
+    /// [`LookError`].
+    pub fn look_closer(
+        &self,
+        (image, seen): (Rgb8View<'_>, Look),
+        memory: &mut LookMemory,
+        maps: &mut JointMaps,
+    ) -> Result<Look, LookError> {
+        let mut best = seen;
+        for _ in 0..MOST_MORE {
+            let next = best.around.filter(|it| overlap(*it, best.outline) <= FITS);
+            let Some(next) = next else {
+                break;
+            };
+            let more = self.look_beside((image, next), memory)?;
+            let Some(more) = more.filter(|it| it.score > best.score) else {
+                break;
+            };
+            core::mem::swap(maps, &mut memory.other);
+            best = more;
+        }
+        Ok(best)
+    }
+
+    /// Looks into several boxes, and closer at the person whom the springs fit best there.
+    ///
+    /// * `outlines`: of the boxes.
+    /// * `maps`: of the joints of that person, filled.
+    /// * Returns `None` if no box has an extent.
+    ///
+    /// # Errors
+    ///
+    /// [`LookError`].
+    pub fn best_of(
+        &self,
+        (image, outlines): (Rgb8View<'_>, &[[f64; 4]]),
+        memory: &mut LookMemory,
+        maps: &mut JointMaps,
+    ) -> Result<Option<Look>, LookError> {
+        let mut best: Option<Look> = None;
+        for outline in outlines {
+            let look = self.look_beside((image, *outline), memory)?;
+            if let Some(look) = look.filter(|it| best.is_none_or(|best| it.score > best.score)) {
+                core::mem::swap(maps, &mut memory.other);
+                best = Some(look);
+            }
+        }
+        best.map(|seen| self.look_closer((image, seen), memory, maps))
+            .transpose()
+    }
+
+    /// Looks into a box; the maps are `other` of the memory.
+    fn look_beside(
+        &self,
+        what: (Rgb8View<'_>, [f64; 4]),
+        memory: &mut LookMemory,
+    ) -> Result<Option<Look>, LookError> {
+        let LookMemory {
+            workspace,
+            other,
+            responses,
+        } = memory;
+        self.look_in(what, (workspace, responses), other)
+    }
+
+    /// The box around a pose of the springs.
+    fn around(&self, pose: &Pose) -> Option<[f64; 4]> {
+        let model = self.springs.model();
+        let joints = (0..pose.parts.len()).filter(|part| joint_of(*part).is_some());
+        outline_of(joints.map(|part| pose.centre(model, self.layout, part)))
+    }
+}
