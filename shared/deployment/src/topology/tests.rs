@@ -27,6 +27,7 @@ fn recording(without_evidence: bool) -> RecordingPlan {
         without_evidence,
         queue_mb: 1,
         pictures: Vec::new(),
+        without_foxglove: true,
     }
 }
 
