@@ -396,6 +396,7 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
                 .collect(),
         },
         queue_bytes: plan.queue_mb.saturating_mul(1_000_000),
+        foxglove: (!plan.without_foxglove).then(|| recorded::stage(&prepared)),
     };
     record::run(service, job)
 }
@@ -451,6 +452,7 @@ mod tests {
             without_evidence: false,
             queue_mb: 1,
             pictures: Vec::new(),
+            without_foxglove: true,
         };
         let topology = Topology::new(&loaded.deployment, Some(&recording), None);
         let services = topology.processes().iter().map(|it| it.service);

@@ -13,6 +13,7 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use crate::prepare::Prepared;
 use crate::resolved::Resolved;
 use crate::shipped::Shipped;
 
@@ -54,6 +55,15 @@ pub fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure
             evidence: plan.without_evidence,
         },
     })
+}
+
+/// The cameras and joints of what a recording holds for Foxglove.
+pub fn stage(prepared: &Prepared) -> record::Stage {
+    let views = prepared.views.iter();
+    record::Stage {
+        cameras: views.map(|it| it.framing.camera().clone()).collect(),
+        joints: prepared.settings.skeleton.joints,
+    }
 }
 
 /// Fingerprints (FNV-1a) of the input files of a deployment, without its footage.

@@ -1,12 +1,16 @@
 //! Writes every message of a deployment into one file.
 #![forbid(unsafe_code)]
 
+mod foxglove;
+mod onlooker;
 mod queue;
 mod sent;
 mod service;
 mod topics;
 mod writer;
 
+pub use foxglove::Stage;
+pub use onlooker::{Kept, look_on};
 pub use service::{Job, run};
 pub use topics::Topics;
 pub use writer::file_of_life;

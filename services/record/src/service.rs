@@ -8,11 +8,12 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use messages::{Cause, Status};
-use recording::{About, Entry, Kind, Without};
-use runtime::{Delivery, ExitKind, Failure, Service, Waiter, Woken, now_nanos};
+use recording::{About, Entry, Kind};
+use runtime::{Bus, Delivery, ExitKind, Failure, Service, Waiter, Woken, now_nanos};
 use stage::WriterThread;
 use stage::any::{Received, Receiver};
 
+use crate::foxglove::{Foxglove, Stage};
 use crate::queue::{Inlet, Item, queue};
 use crate::sent::Sent;
 use crate::topics::{Channel, Topics, counted_by};
@@ -34,6 +35,8 @@ pub struct Job {
     pub topics: Topics,
     /// Bytes that may wait to be written.
     pub queue_bytes: u64,
+    /// The cameras and joints of what is written for Foxglove besides; none for nothing.
+    pub foxglove: Option<Stage>,
 }
 
 /// Writes every message, until the last result has been received or a stop is requested.
@@ -60,7 +63,9 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     })?;
     let channels = job.topics.channels(job.about.without);
     let (inlet, outlet) = queue(channels.len(), job.queue_bytes);
-    let mut recorder = Recorder::open(service, &channels, job.about.without, &inlet, &mut waiter)?;
+    let mut recorder = Recorder::open(service.bus(), &channels, &job, &inlet, &mut waiter)?;
+    recorder.session = service.session();
+    recorder.service = Some(service);
     let task = Task {
         file,
         about: About {
@@ -71,6 +76,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
             .iter()
             .map(|channel| channel.name.clone())
             .collect(),
+        foxglove: job.foxglove.map(Foxglove::new),
     };
     let thread = WriterThread::start(move || write_all(task, &outlet))?;
     let mut over = None;
@@ -113,33 +119,40 @@ fn rest(service: &Service, waiter: &Waiter, receivers: &[Receiver]) -> Result<()
     Ok(())
 }
 
-struct Recorder<'a> {
-    service: &'a Service,
+/// Receives everything, and puts it into the queue.
+pub(crate) struct Recorder<'a> {
+    /// The process that it belongs to; none for an onlooker, whose senders do not wait.
+    service: Option<&'a Service>,
+    /// The run that is recorded.
+    pub(crate) session: u64,
     inlet: &'a Inlet,
     receivers: Vec<Receiver>,
     sent: Vec<Sent>,
     /// By topic: the topics whose messages it counts.
     counts: Vec<Vec<usize>>,
     n_evidence: Vec<u64>,
-    is_over: bool,
+    /// Whether the last result has been received.
+    pub(crate) is_over: bool,
 }
 
 impl<'a> Recorder<'a> {
-    fn open(
-        service: &'a Service,
+    /// Subscribes to all topics.
+    pub(crate) fn open(
+        bus: &Bus,
         channels: &[Channel],
-        without: Without,
+        job: &Job,
         inlet: &'a Inlet,
         waiter: &mut Waiter,
     ) -> Result<Self, Failure> {
         let mut receivers = Vec::new();
         for channel in channels {
-            let heads_only = without.pixels && channel.kind == Kind::Frame;
-            let (bus, name) = (service.bus(), &channel.name);
+            let heads_only = job.about.without.pixels && channel.kind == Kind::Frame;
+            let name = &channel.name;
             receivers.push(Receiver::open(bus, channel.kind, name, waiter, heads_only)?);
         }
         Ok(Self {
-            service,
+            service: None,
+            session: 0,
             inlet,
             receivers,
             sent: vec![Sent::default(); channels.len()],
@@ -152,10 +165,11 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    fn receive_all(&mut self) -> Result<(), Failure> {
+    /// Takes everything that waits.
+    pub(crate) fn receive_all(&mut self) -> Result<(), Failure> {
         for topic in 0..self.receivers.len() {
             while let Some(message) = self.receivers[topic].receive(|n| self.has_room(n))? {
-                if message.session == self.service.session() {
+                if message.session == self.session {
                     self.take(topic, message);
                 }
             }
@@ -165,16 +179,19 @@ impl<'a> Recorder<'a> {
 
     /// Whether there is room for a number of bytes; waits for it with lossless delivery.
     fn has_room(&self, n_bytes: usize) -> bool {
+        let Some(service) = self.service else {
+            return self.inlet.has_room(n_bytes);
+        };
         let begin = Instant::now();
         while !self.inlet.has_room(n_bytes) {
-            let may_wait = self.service.delivery() == Delivery::Lossless
+            let may_wait = service.delivery() == Delivery::Lossless
                 && !self.inlet.is_broken()
-                && !self.service.stop().is_requested()
+                && !service.stop().is_requested()
                 && begin.elapsed() < LONGEST_WAIT;
             if !may_wait {
                 return false;
             }
-            self.service.progress().tick();
+            service.progress().tick();
             std::thread::sleep(Duration::from_millis(1));
         }
         true
@@ -183,8 +200,10 @@ impl<'a> Recorder<'a> {
     fn take(&mut self, topic: usize, message: Received) {
         let kind = self.receivers[topic].kind();
         self.note(topic, &message);
-        let health = self.service.health();
-        health.received(1);
+        let health = self.service.map(Service::health);
+        if let Some(health) = health {
+            health.received(1);
+        }
         self.is_over |= kind == Kind::Pose3d && message.status == Status::END;
         let log_time = now_nanos();
         // Some ends of streams have no send time.
@@ -196,13 +215,19 @@ impl<'a> Recorder<'a> {
         };
         let Some(data) = message.data else {
             self.inlet.lost(topic, 1);
-            health.dropped(Cause::QueueFull, 1);
+            self.dropped(Cause::QueueFull, 1);
             return;
         };
-        if self.inlet.push(Item { topic, entry, data }) {
+        if !self.inlet.push(Item { topic, entry, data }) {
+            self.dropped(Cause::QueueFull, 1);
+        } else if let Some(health) = health {
             health.sent(message.frame);
-        } else {
-            health.dropped(Cause::QueueFull, 1);
+        }
+    }
+
+    fn dropped(&self, cause: Cause, n: u64) {
+        if let Some(service) = self.service {
+            service.health().dropped(cause, n);
         }
     }
 
@@ -227,12 +252,15 @@ impl<'a> Recorder<'a> {
     }
 
     /// Counts messages that were sent and not received, and logs how many messages of every topic are not in the file.
-    fn settle(&mut self, channels: &[Channel]) {
+    /// Returns the number of all.
+    pub(crate) fn settle(&mut self, channels: &[Channel]) -> u64 {
+        let mut n_lost = 0;
         for (topic, channel) in channels.iter().enumerate() {
             let missed = self.sent[topic].lost();
             self.inlet.lost(topic, missed);
-            self.service.health().dropped(Cause::Busy, missed);
+            self.dropped(Cause::Busy, missed);
             let lost = self.inlet.n_lost(topic);
+            n_lost += lost;
             if lost > 0 {
                 tracing::warn!(
                     topic = channel.name,
@@ -241,5 +269,6 @@ impl<'a> Recorder<'a> {
                 );
             }
         }
+        n_lost
     }
 }

@@ -7,8 +7,9 @@ use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use recording::{About, WriteError, Writer};
+use recording::{About, Kind, WriteError, Writer};
 
+use crate::foxglove::Foxglove;
 use crate::queue::Outlet;
 
 /// Longest time from a message's arrival until it is in the file.
@@ -42,11 +43,21 @@ pub(crate) struct Task {
     pub file: File,
     pub about: About,
     pub topics: Vec<String>,
+    /// What is written for Foxglove besides.
+    pub foxglove: Option<Foxglove>,
 }
 
 /// Writes messages until the queue is closed. After a write error, messages are counted as lost.
 pub(crate) fn write_all(task: Task, outlet: &Outlet) {
-    let begun = Writer::begin(task.file, &task.about, &task.topics);
+    let Task {
+        file,
+        about,
+        topics,
+        mut foxglove,
+    } = task;
+    let foreign = foxglove.as_ref().map_or_else(Vec::new, Foxglove::topics);
+    let begun = Writer::begin_with(file, &about, &topics, &foreign);
+    let kinds: Vec<Option<Kind>> = topics.iter().map(|it| Kind::of_topic(it)).collect();
     let mut writer = begun.inspect_err(log_error).ok();
     let mut flushed = Instant::now();
     while let Ok(item) = outlet.next(FLUSH_PERIOD) {
@@ -59,6 +70,13 @@ pub(crate) fn write_all(task: Task, outlet: &Outlet) {
         let mut outcome = Ok(());
         if let Some(item) = &item {
             outcome = open.write(item.topic, &item.entry, &item.data);
+            let kind = kinds.get(item.topic).copied().flatten();
+            if let Some((foxglove, kind)) = foxglove.as_mut().zip(kind) {
+                for (nth, json) in foxglove.messages(kind, &item.data) {
+                    let written = open.write(topics.len() + nth, &item.entry, json.as_bytes());
+                    outcome = outcome.and(written);
+                }
+            }
         }
         if outcome.is_ok() && flushed.elapsed() >= FLUSH_PERIOD {
             flushed = Instant::now();

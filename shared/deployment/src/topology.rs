@@ -95,6 +95,9 @@ pub struct RecordingPlan {
     /// Views whose live cameras' pictures are kept as they came, ascending.
     #[serde(default)]
     pub pictures: Vec<usize>,
+    /// Whether what Foxglove shows is left out.
+    #[serde(default)]
+    pub without_foxglove: bool,
 }
 
 /// A recording that stands in for the first stages of a run.

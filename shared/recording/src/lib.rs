@@ -31,4 +31,4 @@ pub use index::{Checked, Damage, Entry, Extent, Recording, Track, in_order};
 pub use kind::Kind;
 pub use message::{Envelope, Malformed, Message, encode};
 pub use scan::{Damaged, ReadError, check, read, read_head, scan};
-pub use write::{WriteError, Writer};
+pub use write::{Foreign, WriteError, Writer};

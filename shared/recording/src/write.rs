@@ -65,8 +65,20 @@ pub struct Writer<W: Write> {
 
 struct Topic {
     name: String,
-    kind: Kind,
+    /// None for one of other programs.
+    kind: Option<Kind>,
     n_recorded: u64,
+}
+
+/// A topic whose messages are for other programs: JSON, by a JSON schema. Readers of recordings leave it out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Foreign {
+    /// Its name.
+    pub topic: String,
+    /// The name of its schema, by which programs know what they can show.
+    pub schema_name: &'static str,
+    /// The JSON schema.
+    pub schema: &'static str,
 }
 
 /// Records that are not in the file yet.
@@ -96,6 +108,22 @@ impl<W: Write> Writer<W> {
     ///
     /// [`WriteError`].
     pub fn begin(out: W, about: &About, topics: &[String]) -> Result<Self, WriteError> {
+        Self::begin_with(out, about, topics, &[])
+    }
+
+    /// The same, with topics for other programs, whose numbers follow.
+    ///
+    /// # Errors
+    ///
+    /// [`WriteError`].
+    pub fn begin_with(
+        out: W,
+        about: &About,
+        topics: &[String],
+        foreign: &[Foreign],
+    ) -> Result<Self, WriteError> {
+        let names = foreign.iter().map(|it| &it.topic);
+        let names: Vec<String> = topics.iter().chain(names).cloned().collect();
         let mut writer = Self {
             out,
             n_bytes: 0,
@@ -103,7 +131,7 @@ impl<W: Write> Writer<W> {
             topics: Vec::new(),
             about: [
                 (about::NAME, about.to_map()),
-                (about::TOPICS, numbered(topics)),
+                (about::TOPICS, numbered(&names)),
             ],
             chunk: Chunk::default(),
             definitions: [Vec::new(), Vec::new()],
@@ -120,7 +148,7 @@ impl<W: Write> Writer<W> {
         header.finish(op::HEADER, &mut start);
         writer.put(&start)?;
         writer.say_about()?;
-        writer.introduce(topics)?;
+        writer.introduce(topics, foreign)?;
         writer.flush(&vec![0; topics.len()])?;
         Ok(writer)
     }
@@ -133,7 +161,7 @@ impl<W: Write> Writer<W> {
             .try_for_each(|(name, map)| self.describe(name, map))
     }
 
-    fn introduce(&mut self, names: &[String]) -> Result<(), WriteError> {
+    fn introduce(&mut self, names: &[String], foreign: &[Foreign]) -> Result<(), WriteError> {
         let mut known = BTreeSet::new();
         for (channel, name) in (1_u16..).zip(names) {
             let kind = Kind::of_topic(name).ok_or_else(|| WriteError::Topic(name.clone()))?;
@@ -150,11 +178,32 @@ impl<W: Write> Writer<W> {
             body.map(&BTreeMap::new()).finish(op::CHANNEL, channels);
             self.topics.push(Topic {
                 name: name.clone(),
-                kind,
+                kind: Some(kind),
                 n_recorded: 0,
             });
         }
-        self.n_schemas = known.len() as u16;
+        let mut strange: Vec<&str> = Vec::new();
+        for (channel, it) in (1 + names.len() as u16..).zip(foreign) {
+            let [schemas, channels] = &mut self.definitions;
+            let nth = strange.iter().position(|name| *name == it.schema_name);
+            let schema = 1 + (Kind::ALL.len() + nth.unwrap_or(strange.len())) as u16;
+            if nth.is_none() {
+                strange.push(it.schema_name);
+                let body = Body::default().u16(schema);
+                let body = body.bytes(it.schema_name.as_bytes());
+                let body = body.bytes(b"jsonschema").bytes(it.schema.as_bytes());
+                body.finish(op::SCHEMA, schemas);
+            }
+            let body = Body::default().u16(channel).u16(schema);
+            let body = body.bytes(it.topic.as_bytes()).bytes(b"json");
+            body.map(&BTreeMap::new()).finish(op::CHANNEL, channels);
+            self.topics.push(Topic {
+                name: it.topic.clone(),
+                kind: None,
+                n_recorded: 0,
+            });
+        }
+        self.n_schemas = (known.len() + strange.len()) as u16;
         for it in &self.definitions {
             self.chunk.records.extend_from_slice(it);
         }
@@ -165,7 +214,7 @@ impl<W: Write> Writer<W> {
     ///
     /// * `topic`: its number; a message of another is left out.
     /// * `entry`: when it came and when it was sent; where it lies is for the file to say.
-    /// * `data`: what [`encode`](crate::encode) made of it.
+    /// * `data`: what [`encode`](crate::encode) made of it; JSON where the topic is for other programs.
     ///
     /// # Errors
     ///
@@ -179,7 +228,8 @@ impl<W: Write> Writer<W> {
         let nth = it.n_recorded;
         let sequence = nth as u32;
         it.n_recorded += 1;
-        let envelope = Envelope::of(it.kind, data.get(message::PREAMBLE.len()..).unwrap_or(&[]));
+        let head = data.get(message::PREAMBLE.len()..).unwrap_or(&[]);
+        let envelope = it.kind.and_then(|kind| Envelope::of(kind, head));
         if self.chunk.records.len() >= CHUNK_BYTES {
             self.write_chunk()?;
         }

@@ -11,6 +11,10 @@ use serde_json::Value as Json;
 /// How all pages look: light or dark as the reader has it, and no wider than a telephone.
 pub const STYLE: &str = include_str!("style.css");
 
+/// The script that draws skeletons in space, a module: its `Stage` turns, comes nearer, and draws cameras, skeletons and
+/// their uncertainty. The pages of runs contain it; the live page loads it.
+pub const STAGE: &str = include_str!("stage.js");
+
 /// Markup: in it every text from outside is escaped.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Html(String);

@@ -17,4 +17,4 @@ pub mod evaluation;
 pub mod model;
 pub mod run;
 
-pub use html::STYLE;
+pub use html::{STAGE, STYLE};

@@ -1,7 +1,7 @@
 //! A run as one HTML page: limits that held or did not, the skeleton in space, who was there when, tables, pictures.
 //!
-//! The page forbids every request by its policy. The view of the skeleton is a canvas that a short script of ours draws
-//! (`space.js`): drag to turn, play, pause, step.
+//! The page forbids every request by its policy. The view of the skeleton is a canvas that short scripts of ours draw
+//! (`stage.js`, `space.js`): drag to turn, play, pause, step.
 
 mod space;
 mod timeline;
@@ -81,7 +81,7 @@ pub struct Picture {
 
 const POLICY: &str =
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
-const SCRIPT: &str = include_str!("run/space.js");
+const SCRIPT: &str = concat!(include_str!("stage.js"), include_str!("run/space.js"));
 
 /// One page that needs no other file and asks for none.
 pub fn html(page: &Page) -> String {
@@ -105,7 +105,7 @@ pub fn html(page: &Page) -> String {
     pictures(&mut out, page);
     put!(
         out,
-        "<script type=\"application/json\" id=\"data\">{}</script>\n<script>\n{}</script>\n</html>\n",
+        "<script type=\"application/json\" id=\"data\">{}</script>\n<script type=\"module\">\n{}</script>\n</html>\n",
         Html::in_script(&page.space.json()),
         Html::constant(SCRIPT)
     );

@@ -32,6 +32,9 @@ Of a live camera the file also holds the pictures as they came, at the full rate
 or the packets of a stream. `parallax replay FILE --from capture`, or `source = \"FILE#NAME\"` in a deployment, searches
 them later. No camera ever waits for the disk.
 
+Foxglove opens the file as it is, and shows skeletons with their uncertainty, cameras and pictures: beside its own topics it
+holds `foxglove.SceneUpdate`, `foxglove.FrameTransforms`, `foxglove.CameraCalibration` and `foxglove.CompressedImage`.
+
 Before the run it prints how much a frame and a second will take at most, and how much is free; it does not start
 if there is no space for ten frames (or for all, if they are fewer).
 
@@ -74,6 +77,8 @@ enum Bulk {
     Evidence,
     /// The pictures of live cameras as they came; without them a replay from capture is impossible.
     Camera,
+    /// What Foxglove shows: skeletons, cameras, and their pictures as JPEG.
+    Foxglove,
 }
 
 /// Runs the deployment and records it.
@@ -89,6 +94,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         without_evidence: arguments.without.contains(&Bulk::Evidence),
         queue_mb: arguments.queue_mb,
         pictures: Vec::new(),
+        without_foxglove: arguments.without.contains(&Bulk::Foxglove),
     };
     let resolved = plan::resolve(&loaded.deployment)?;
     let pictures = if arguments.without.contains(&Bulk::Camera) {
@@ -143,7 +149,10 @@ fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<For
         0
     };
     Ok(Forecast {
-        per_frame: PerFrame::new(&planned.plan().topics),
+        per_frame: PerFrame::new(
+            &planned.plan().topics,
+            !arguments.without.contains(&Bulk::Foxglove),
+        ),
         without: [Bulk::Pixels, Bulk::Evidence].map(|it| arguments.without.contains(&it)),
         n_frames: (!resolved.is_endless()).then(|| resolved.n_frames()),
         rate_hz: resolved.footage.iter().find_map(|it| it.frame_rate_hz),

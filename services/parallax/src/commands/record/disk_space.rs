@@ -10,6 +10,8 @@ use runtime::{ExitKind, Failure, OrFail as _, TopicPlan, free_space};
 
 /// A recording starts only if there is space for this many frames.
 const MIN_FRAMES: u64 = 10;
+/// A skeleton for Foxglove.
+const SCENE_BYTES: u64 = 24_000;
 /// Interval of messages about the size of the file.
 const PERIOD: Duration = Duration::from_secs(10);
 
@@ -18,6 +20,8 @@ const PERIOD: Duration = Duration::from_secs(10);
 pub(super) struct PerFrame {
     pub pixels: u64,
     pub evidence: u64,
+    /// The same pixels as JPEG for Foxglove, in text.
+    pub foxglove: u64,
     /// Pictures of live cameras as they came, if they came raw.
     pub camera: u64,
     /// All other messages.
@@ -26,12 +30,18 @@ pub(super) struct PerFrame {
 
 impl PerFrame {
     /// The sizes for the topics of a deployment.
-    pub(super) fn new(topics: &[TopicPlan]) -> Self {
+    ///
+    /// * `has_foxglove`: whether the recording holds what Foxglove shows.
+    pub(super) fn new(topics: &[TopicPlan], has_foxglove: bool) -> Self {
         let mut sum = Self::default();
         for topic in topics {
             let bytes = topic.message_bytes();
             match Kind::of_topic(topic.topic()) {
-                Some(Kind::Frame) => sum.pixels += bytes,
+                Some(Kind::Frame) => {
+                    sum.pixels += bytes;
+                    sum.foxglove += if has_foxglove { bytes / 2 } else { 0 };
+                }
+                Some(Kind::Pose3d) if has_foxglove => sum.rest += bytes + SCENE_BYTES,
                 Some(Kind::Evidence) => sum.evidence += bytes,
                 Some(Kind::Picture) => sum.camera += bytes,
                 // Health messages are few and small.
@@ -45,7 +55,11 @@ impl PerFrame {
     /// The sum without pixels or evidence, if they are left out.
     fn bytes(self, without: [bool; 2]) -> u64 {
         let [pixels, evidence] = without;
-        let pixels = if pixels { 0 } else { self.pixels };
+        let pixels = if pixels {
+            0
+        } else {
+            self.pixels + self.foxglove
+        };
         let evidence = if evidence { 0 } else { self.evidence };
         pixels + evidence + self.camera + self.rest
     }
@@ -213,6 +227,7 @@ mod tests {
             per_frame: PerFrame {
                 pixels: 4_000_000,
                 evidence: 168_000_000,
+                foxglove: 0,
                 camera: 0,
                 rest: 400_000,
             },

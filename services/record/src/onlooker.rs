@@ -1,0 +1,76 @@
+//! Records a deployment that runs already, from a process that is not part of it.
+
+use core::time::Duration;
+use std::time::Instant;
+
+use runtime::{Bus, ExitKind, Failure, OrFail as _};
+
+use crate::foxglove::Foxglove;
+use crate::queue::queue;
+use crate::service::{Job, Recorder};
+use crate::writer::{Task, create, write_all};
+
+/// How often messages are received: the queues of pictures hold one.
+const TURN: Duration = Duration::from_millis(4);
+/// How long the last heartbeats are waited for after the last result.
+const LAST_HEARTBEATS: Duration = Duration::from_millis(500);
+
+/// What became of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Kept {
+    /// Messages that were sent meanwhile and are not in the file.
+    pub n_lost: u64,
+}
+
+/// Writes every message of a deployment until its last result, or until it is told to end. No sender waits: what does not
+/// fit into the queues is missing in the file, and counted.
+///
+/// * `bus`: of an onlooker ([`Bus::as_onlooker`]).
+/// * `session`: the run.
+/// * `is_over`: whether to end.
+///
+/// # Errors
+///
+/// [`ExitKind::Input`] if the file cannot be created, and what the transport reports.
+pub fn look_on(
+    bus: &Bus,
+    session: u64,
+    job: Job,
+    is_over: impl Fn() -> bool,
+) -> Result<Kept, Failure> {
+    let file = create(&job.file).map_err(|error| {
+        let text = format!("cannot make the recording {}: {error}", job.file.display());
+        Failure::new(ExitKind::Input, text)
+    })?;
+    let channels = job.topics.channels(job.about.without);
+    let (inlet, outlet) = queue(channels.len(), job.queue_bytes);
+    let mut recorder = Recorder::open(bus, &channels, &job, &inlet, &mut bus.waiter())?;
+    recorder.session = session;
+    let names = channels.iter().map(|channel| channel.name.clone());
+    let mut about = job.about;
+    about.session = session;
+    let task = Task {
+        file,
+        about,
+        topics: names.collect(),
+        foxglove: job.foxglove.map(Foxglove::new),
+    };
+    let thread = std::thread::Builder::new().name("writer".to_owned());
+    let thread = thread.spawn(move || write_all(task, &outlet));
+    let thread = thread.or_fail(ExitKind::Run)?;
+    let mut ended = None;
+    while !is_over() {
+        recorder.receive_all()?;
+        if recorder.is_over && ended.get_or_insert_with(Instant::now).elapsed() > LAST_HEARTBEATS {
+            break;
+        }
+        std::thread::sleep(TURN);
+    }
+    recorder.receive_all()?;
+    let n_lost = recorder.settle(&channels);
+    drop(recorder);
+    drop(inlet);
+    let panicked = |_| Failure::new(ExitKind::Run, "the writing thread panicked");
+    thread.join().map_err(panicked)?;
+    Ok(Kept { n_lost })
+}
