@@ -147,6 +147,7 @@ fn picture_bytes(resolved: &Resolved, view: usize) -> usize {
 /// The plan of a topic with the given limits and message sizes.
 fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
     let limits = Limits::new(room.receivers, room.queued, room.borrowed);
+    let limits = limits.with_onlookers(room.onlookers);
     let (topic, longest) = (room.topic, room.longest);
     let plan = match room.content {
         Content::Frame => TopicPlan::slices::<u8, FrameHeader>(topic, delivery, limits, longest),
@@ -237,6 +238,7 @@ pub(crate) fn plan(
     Ok(Plan {
         executable: executable()?,
         given: resolved.to_text()?.into_bytes(),
+        description: footage::without_passwords(&resolved.to_text()?).into_bytes(),
         namespace: Namespace::new(&resolved.deployment.name)?,
         session: now_nanos(),
         delivery: resolved.delivery(),

@@ -14,6 +14,8 @@ pub struct Plan {
     pub executable: PathBuf,
     /// The standard input of every process, also after a restart: a file could be removed in the meantime.
     pub given: Vec<u8>,
+    /// What others of this user can read about the deployment while it runs ([`Namespace::description`]).
+    pub description: Vec<u8>,
     /// The location of the deployment.
     pub namespace: Namespace,
     /// The session, which goes into the stamp of every message.

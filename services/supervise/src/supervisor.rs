@@ -107,8 +107,9 @@ pub fn run(
 ) -> Result<Outcome, SuperviseError> {
     runtime::raise_file_limit();
     // Dropped in reverse: ports, topics, bus, and the lock last, which removes every file.
-    let _lock = plan.namespace.acquire()?;
+    let lock = plan.namespace.acquire()?;
     preflight(&plan.topics)?;
+    lock.describe(&plan.description)?;
     let bus = Bus::open(&plan.namespace, "supervisor", stop)?;
     let _topics = bus.create_topics(&plan.topics)?;
     let mut waiter = bus.waiter();

@@ -30,6 +30,7 @@ pub struct Bus {
     copies: Copies,
     patience: Duration,
     spins: bool,
+    looks_on: bool,
 }
 
 impl Bus {
@@ -68,6 +69,7 @@ impl Bus {
             copies: Copies::default(),
             patience: PATIENCE,
             spins: false,
+            looks_on: false,
         })
     }
 
@@ -85,6 +87,18 @@ impl Bus {
     pub fn with_spin(mut self, spins: bool) -> Self {
         self.spins = spins;
         self
+    }
+
+    /// Makes this process an onlooker: no sender wakes it, waits for room in its queues, or counts it among its receivers.
+    /// It polls, and with lossless delivery it misses what does not fit into its queues.
+    #[must_use]
+    pub fn as_onlooker(mut self) -> Self {
+        self.looks_on = true;
+        self
+    }
+
+    pub(crate) fn looks_on(&self) -> bool {
+        self.looks_on
     }
 
     /// The deployment.
@@ -177,6 +191,7 @@ impl BusParts {
             copies: Copies::default(),
             patience: PATIENCE,
             spins: false,
+            looks_on: false,
         }
     }
 }

@@ -13,7 +13,7 @@ pub enum Delivery {
 /// The number of ports of a topic and their buffers.
 ///
 /// Memory is reserved for the worst case, so that a sender always has some:
-/// `subscribers * (buffer + borrowed) + loaned` chunks for each publisher, unless
+/// `subscribers * (buffer + borrowed) + onlookers * (buffer + 1) + loaned` chunks for each publisher, unless
 /// [`TopicPlan::with_few_chunks`](crate::TopicPlan::with_few_chunks) is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
@@ -21,6 +21,9 @@ pub struct Limits {
     pub publishers: usize,
     /// Largest number of subscribers.
     pub subscribers: usize,
+    /// Largest number of subscribers that no publisher waits for ([`Bus::as_onlooker`](crate::Bus::as_onlooker)); one may
+    /// borrow one message at a time.
+    pub onlookers: usize,
     /// Queue length of a subscriber, messages.
     pub buffer: usize,
     /// Messages that one subscriber may borrow at the same time.
@@ -38,9 +41,16 @@ impl Limits {
         Self {
             publishers: 1,
             subscribers,
+            onlookers: 0,
             buffer,
             borrowed,
             loaned: 1,
         }
+    }
+
+    /// The same, and so many onlookers besides.
+    #[must_use]
+    pub fn with_onlookers(self, onlookers: usize) -> Self {
+        Self { onlookers, ..self }
     }
 }

@@ -15,6 +15,7 @@ mod lock;
 mod losses;
 mod mapped;
 mod memory;
+mod onlookers;
 mod payload;
 mod private;
 mod publisher;

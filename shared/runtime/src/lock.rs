@@ -15,7 +15,7 @@ use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 
 use crate::bus::prepare;
-use crate::private::{self, LOCK_FILE, Root};
+use crate::private::{self, DESCRIPTION_FILE, LOCK_FILE, Root};
 use crate::{BusError, ExitKind, Fault, Namespace, beneath};
 
 /// Tells observers that the deployment is ending.
@@ -127,6 +127,23 @@ impl DeploymentLock {
     /// The deployment.
     pub fn namespace(&self) -> &Namespace {
         &self.namespace
+    }
+
+    /// Writes the description of the deployment, which others of this user can read while it runs
+    /// ([`Namespace::description`]).
+    ///
+    /// # Errors
+    ///
+    /// [`LockError::File`].
+    pub fn describe(&self, text: &[u8]) -> Result<(), LockError> {
+        let failed = |source: io::Error| LockError::File {
+            path: self.namespace.root().join(DESCRIPTION_FILE),
+            source,
+        };
+        let file = beneath::file_in(&self.root, DESCRIPTION_FILE);
+        let mut file = file.map_err(|error| failed(error.into()))?;
+        file.set_len(0).map_err(failed)?;
+        file.write_all(text).map_err(failed)
     }
 
     /// Returns at once if there is no observer.

@@ -1,10 +1,12 @@
 //! The location of a deployment's shared memory and files, which keeps deployments apart.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString as _};
 
+use crate::private::DESCRIPTION_FILE;
 use crate::{ExitKind, Fault};
 
 /// The longest file name that iceoryx2 puts below the root: `/`, 39 digits, `.event`.
@@ -151,6 +153,15 @@ impl Namespace {
     /// The configuration file for iceoryx2, and for its command line tools when run in the root.
     pub fn config_file(&self) -> PathBuf {
         self.root.join("config").join("iceoryx2.toml")
+    }
+
+    /// What the deployment says about itself while it runs ([`crate::DeploymentLock::describe`]).
+    ///
+    /// # Errors
+    ///
+    /// It does not run, or the file cannot be read.
+    pub fn description(&self) -> io::Result<String> {
+        std::fs::read_to_string(self.root.join(DESCRIPTION_FILE))
     }
 
     /// The content of [`config_file`](Self::config_file).

@@ -107,7 +107,7 @@ impl Observer {
         let supervisor = running_supervisor(namespace).ok_or_else(not_running)?;
         let stop = Stop::new().map_err(ObserverError::Stop)?;
         let name = format!("observer-{}", std::process::id());
-        let bus = Bus::open(namespace, &name, &stop)?;
+        let bus = Bus::open(namespace, &name, &stop)?.as_onlooker();
         let mut processes = processes(namespace)?;
         processes.sort();
         let mut waiter = bus.waiter();

@@ -8,9 +8,7 @@ use rustix::process::{Resource, getrlimit};
 use crate::room::OVERHEAD_BYTES;
 use crate::{Delivery, ExitKind, Fault, Limits, TopicPlan, free_shared_memory};
 
-/// Subscribers of heartbeats beyond the supervisor: the command line tools.
-const SPARE: usize = 2;
-/// Observers at the same time, besides the supervisor.
+/// Onlookers at the same time.
 const ONLOOKERS: usize = 4;
 /// Open files of every process, besides those of its topics.
 const DESCRIPTORS: u64 = 40;
@@ -74,12 +72,12 @@ pub fn process_topics(process: &str) -> [TopicPlan; 2] {
     let health = TopicPlan::messages::<Health>(
         topic::health(process),
         Delivery::Realtime,
-        Limits::new(1 + SPARE, 2, 1),
+        Limits::new(2, 2, 1).with_onlookers(ONLOOKERS),
     );
     let metrics = TopicPlan::messages::<Metrics>(
         topic::metrics(process),
         Delivery::Realtime,
-        Limits::new(1 + ONLOOKERS, 1, 1),
+        Limits::new(1, 1, 1).with_onlookers(ONLOOKERS),
     );
     [health.without_wake_up(), metrics.without_wake_up()]
 }

@@ -10,13 +10,14 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher as IoxPublisher;
 use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::port::{BackpressureAction, LoanError as IoxLoanError, SendError as IoxSendError};
-use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, PortFactory as _, ipc};
+use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, ipc};
 use iceoryx2::sample_mut::SampleMut;
 
 use crate::bus::Bus;
 use crate::delivery::Delivery;
 use crate::losses::{Losses, Patience};
 use crate::memory;
+use crate::onlookers::{self, Onlookers};
 use crate::payload::{Element, Header, Message};
 use crate::service::{self, Messages, PortError};
 use crate::{Copies, ExitKind, Fault, Progress, Stop};
@@ -216,6 +217,8 @@ struct Port<E: Message, H: Header> {
     delivery: Delivery,
     publisher: IoxPublisher<ipc::Service, [E], H>,
     notifier: Option<Notifier<ipc::Service>>,
+    /// The subscribers that are not waited for.
+    onlookers: Onlookers,
     /// Receives the acknowledgements of subscribers.
     ready: Option<Listener<ipc::Service>>,
     n_ready: Cell<usize>,
@@ -269,6 +272,7 @@ impl<E: Message, H: Header> Port<E, H> {
         } else {
             None
         };
+        let onlookers = Onlookers::default();
         let publisher = messages
             .publisher_builder()
             .initial_max_slice_len(extras.max_len)
@@ -276,7 +280,7 @@ impl<E: Message, H: Header> Port<E, H> {
             .max_loaned_samples(extras.loaned)
             .override_sample_preallocation(move |_| extras.chunks)
             .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
-            .set_backpressure_handler(patience(bus))
+            .set_backpressure_handler(patience(bus, &onlookers))
             .create()
             .map_err(|source| match memory::refused(bus.namespace().prefix()) {
                 Some(source) => PortError::Memory {
@@ -300,6 +304,7 @@ impl<E: Message, H: Header> Port<E, H> {
             delivery: extras.delivery,
             publisher,
             notifier,
+            onlookers,
             ready,
             n_ready: Cell::new(0),
             messages,
@@ -342,6 +347,9 @@ impl<E: Message, H: Header> Port<E, H> {
     }
 
     fn deliver(&self, sample: SampleMut<ipc::Service, [E], H>) -> Result<usize, SendError> {
+        if self.delivery == Delivery::Lossless {
+            self.onlookers.update(&self.messages);
+        }
         let begin = Instant::now();
         let sent = sample.send();
         if let Some(notifier) = &self.notifier
@@ -369,7 +377,7 @@ impl<E: Message, H: Header> Port<E, H> {
     }
 
     fn n_connected(&self) -> usize {
-        self.messages.dynamic_config().number_of_subscribers()
+        onlookers::n_waited_for(&self.messages)
     }
 
     fn n_ready(&self) -> usize {
@@ -409,14 +417,20 @@ impl<E: Message, H: Header> Port<E, H> {
     }
 }
 
-/// What to do while a receiver has no room: wait, until the patience is over or stop is requested.
+/// What to do while a receiver has no room: wait, until the patience is over or stop is requested. An onlooker misses the
+/// message.
 fn patience(
     bus: &Bus,
+    onlookers: &Onlookers,
 ) -> impl Fn(&iceoryx2::port::BackpressureInfo) -> BackpressureAction + Send + 'static {
     let stop = bus.stop().clone();
     let progress = bus.progress().clone();
     let limit = bus.patience();
+    let onlookers = onlookers.clone();
     move |info| {
+        if onlookers.contain(info.receiver_port_id) {
+            return BackpressureAction::DiscardData;
+        }
         progress.tick();
         if stop.is_requested() || info.elapsed_time >= limit {
             BackpressureAction::DiscardDataAndFail

@@ -8,6 +8,7 @@ use iceoryx2::port::ReceiveError as IoxReceiveError;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::subscriber::Subscriber as IoxSubscriber;
 use iceoryx2::port::update_connections::UpdateConnections as _;
+use iceoryx2::port::port_name::PortName;
 use iceoryx2::prelude::{CallbackProgression, PortFactory as _, ipc};
 use iceoryx2::sample::Sample as IoxSample;
 
@@ -152,6 +153,12 @@ impl<E: Element, H: Header> Sample<E, H> {
     }
 }
 
+/// The name of every subscriber that senders do not wait for ([`Bus::as_onlooker`]).
+pub(crate) fn onlooker() -> PortName {
+    // The name is short and plain, so it cannot be refused.
+    PortName::new("onlooker").unwrap_or_else(|_| PortName::new_empty())
+}
+
 #[derive(Debug)]
 struct Port<E: Message, H: Header> {
     topic: Arc<str>,
@@ -200,23 +207,27 @@ impl<E: Message, H: Header> Port<E, H> {
         let messages = service::open_messages::<E, H>(bus.node(), topic)?;
         let extras = service::extras(&messages);
         let ready = match extras.delivery {
-            Delivery::Realtime => None,
-            Delivery::Lossless => Some(bus.notifier(&service::ready_name(topic))?),
+            Delivery::Lossless if !bus.looks_on() => {
+                Some(bus.notifier(&service::ready_name(topic))?)
+            }
+            Delivery::Realtime | Delivery::Lossless => None,
         };
-        if waiter.spins() {
+        if bus.looks_on() {
+            // It polls, so that no sender has to wake it.
+        } else if waiter.spins() {
             // A spinning waiter needs no wake-up.
             waiter.poll_without_pause();
         } else if extras.wakes {
             waiter.watch(bus.listener(topic)?);
         }
-        let subscriber =
-            messages
-                .subscriber_builder()
-                .create()
-                .map_err(|source| PortError::Subscriber {
-                    topic: topic.to_owned(),
-                    source,
-                })?;
+        let mut builder = messages.subscriber_builder();
+        if bus.looks_on() {
+            builder = builder.name(&onlooker());
+        }
+        let subscriber = builder.create().map_err(|source| PortError::Subscriber {
+            topic: topic.to_owned(),
+            source,
+        })?;
         let port = Self {
             topic: Arc::from(topic),
             subscriber,

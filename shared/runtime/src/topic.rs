@@ -121,15 +121,21 @@ impl TopicPlan {
     pub(crate) fn chunks(&self) -> usize {
         let limits = self.limits;
         let most = limits.subscribers * (limits.buffer + limits.borrowed) + limits.loaned;
-        match self.delivery {
+        let needed = match self.delivery {
             Delivery::Realtime => most,
             Delivery::Lossless => self.usual_chunks.map_or(most, |chunks| chunks.min(most)),
-        }
+        };
+        needed + self.onlooked_chunks()
+    }
+
+    /// Of these, those that onlookers may keep from their publisher.
+    fn onlooked_chunks(&self) -> usize {
+        self.limits.onlookers * (self.limits.buffer + 1)
     }
 
     /// Of these, those that are mapped ahead of use.
     pub(crate) fn mapped_chunks(&self) -> usize {
-        let chunks = self.chunks();
+        let chunks = self.chunks() - self.onlooked_chunks();
         self.usual_chunks.map_or(chunks, |it| it.min(chunks))
     }
 
@@ -213,7 +219,7 @@ fn create_messages<E: Message, H: Header>(
             .user_header::<H>()
             .enable_safe_overflow(plan.delivery() == Delivery::Realtime)
             .max_publishers(limits.publishers)
-            .max_subscribers(limits.subscribers)
+            .max_subscribers(limits.subscribers + limits.onlookers)
             .max_nodes(MAX_NODES)
             .subscriber_max_buffer_size(limits.buffer)
             .subscriber_max_borrowed_samples(limits.borrowed)

@@ -70,6 +70,7 @@ impl Case {
         let plan = Plan {
             executable: env!("CARGO_BIN_EXE_supervise-dummy").into(),
             given: Vec::new(),
+            description: Vec::new(),
             namespace: Namespace::below("t", base.path()).unwrap(),
             session: 42,
             delivery,

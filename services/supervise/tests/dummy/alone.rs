@@ -34,6 +34,7 @@ fn try_supervise(base: &Path) -> Result<(), Failure> {
     let plan = Plan {
         executable: "/proc/self/exe".into(),
         given: Vec::new(),
+        description: Vec::new(),
         namespace: Namespace::below("t", base)?,
         session: 1,
         delivery: Delivery::Realtime,

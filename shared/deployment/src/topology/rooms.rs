@@ -17,8 +17,11 @@ const PICTURE_QUEUE: usize = 16;
 const SMALL_BORROWED: usize = 2;
 /// Response maps of one view that one process may borrow at the same time.
 const EVIDENCE_BORROWED: usize = 1;
-/// Receivers of small messages beyond those of the deployment: the command line tools.
-const SPARE: usize = 2;
+/// Receivers of small messages beyond those of the deployment, which no sender waits for: a page, what it records, other
+/// programs.
+const ONLOOKERS: usize = 4;
+/// The same of images: fewer, as each costs memory for two.
+const ONLOOKERS_OF_IMAGES: usize = 3;
 
 /// What is sent on a topic between processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +51,8 @@ pub struct Room {
     pub content: Content,
     /// Processes that may receive it at the same time, at least those of the deployment.
     pub receivers: usize,
+    /// Onlookers that may receive it besides; no sender waits for them.
+    pub onlookers: usize,
     /// Messages that wait for one receiver.
     pub queued: usize,
     /// Messages that one receiver may borrow at the same time.
@@ -81,7 +86,8 @@ impl Topology {
         let small = |topic: String, content, receivers| Room {
             topic,
             content,
-            receivers: receivers + SPARE,
+            receivers,
+            onlookers: ONLOOKERS,
             queued: match mode {
                 Mode::Realtime => SMALL_QUEUE_REALTIME,
                 Mode::Lossless => SMALL_QUEUE_LOSSLESS,
@@ -97,6 +103,7 @@ impl Topology {
                 content: Content::Frame,
                 // Pose, quality and the recorders.
                 receivers: 2 + n_recorders,
+                onlookers: ONLOOKERS_OF_IMAGES,
                 queued: LARGE_QUEUE,
                 borrowed: held_frames,
                 longest: size.frame_bytes,
@@ -129,6 +136,7 @@ impl Topology {
         let topic = topic::evidence(view);
         Room {
             receivers: self.receivers_of(&topic).max(1),
+            onlookers: 0,
             topic,
             content: Content::Evidence,
             queued: LARGE_QUEUE,
@@ -146,6 +154,7 @@ fn picture(view: usize, longest: usize) -> Room {
         topic: topic::picture(view),
         content: Content::Picture,
         receivers: 1,
+        onlookers: 0,
         queued: PICTURE_QUEUE,
         borrowed: 1,
         longest,

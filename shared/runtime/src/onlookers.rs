@@ -1,0 +1,47 @@
+//! The subscribers of a topic that its publisher does not wait for.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use iceoryx2::prelude::{CallbackProgression, PortFactory as _};
+
+use crate::payload::{Header, Message};
+use crate::service::Messages;
+use crate::subscriber::onlooker;
+
+/// The onlookers of a topic, shared with the handler that decides what happens when a receiver has no room.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Onlookers {
+    ids: Arc<Mutex<Vec<u128>>>,
+}
+
+impl Onlookers {
+    /// Lists them again. One that comes after this has an empty queue, so that the next message fits.
+    pub(crate) fn update<E: Message, H: Header>(&self, messages: &Messages<E, H>) {
+        let name = onlooker();
+        let mut ids = self.ids.lock().unwrap_or_else(PoisonError::into_inner);
+        ids.clear();
+        messages.dynamic_config().list_subscribers(|details| {
+            if details.subscriber_name == name {
+                ids.push(details.subscriber_id.value());
+            }
+            CallbackProgression::Continue
+        });
+    }
+
+    /// Whether a subscriber is one of them.
+    pub(crate) fn contain(&self, subscriber: u128) -> bool {
+        let ids = self.ids.lock().unwrap_or_else(PoisonError::into_inner);
+        ids.contains(&subscriber)
+    }
+}
+
+/// Number of subscribers that are no onlookers.
+pub(crate) fn n_waited_for<E: Message, H: Header>(messages: &Messages<E, H>) -> usize {
+    let name = onlooker();
+    let mut n = 0;
+    messages.dynamic_config().list_subscribers(|details| {
+        n += usize::from(details.subscriber_name != name);
+        CallbackProgression::Continue
+    });
+    n
+}
