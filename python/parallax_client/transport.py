@@ -19,6 +19,10 @@ class TooManyHeld(ClientError):
     """Another message cannot be taken before one that is held is given back."""
 
 
+class NoSuchTopic(ClientError):
+    """The deployment has no such topic, or does not have it yet."""
+
+
 class _Owner:
     """Memory of a message. It is given back when nothing refers to it any more, not before: no view can outlive it."""
 
@@ -167,7 +171,7 @@ class Guest:
                 begin, _, rest = other.partition("/v")
                 if begin == about and rest.split("/")[0] != str(ours):
                     return VersionMismatch(self.name, about, rest.split("/")[0], ours)
-            return ClientError(f"deployment {self.name!r} has no topic {topic!r}")
+            return NoSuchTopic(f"deployment {self.name!r} has no topic {topic!r}")
         if "IncompatibleTypes" in str(error):
             return ClientError(
                 f"topic {topic!r} of deployment {self.name!r} has another layout than this package knows: "

@@ -1,9 +1,14 @@
 //! Publishing beside a run, in a process of its own.
 
+use core::time::Duration;
 use std::ffi::OsString;
 use std::path::Path;
+use std::time::Instant;
 
 use runtime::{Child, ExitKind, Failure};
+
+/// How long it may take to see that the deployment has ended.
+const LEAVING: Duration = Duration::from_secs(1);
 
 /// A process that publishes a deployment while it runs. Dropping it ends that.
 #[derive(Debug)]
@@ -40,9 +45,18 @@ impl Companion {
         Ok(Self { child })
     }
 
-    /// What it has said since it was asked before: why it ended, for example.
-    pub fn said(&mut self) -> Vec<String> {
-        self.child.read_lines().unwrap_or_default()
+    /// Waits for its end, which comes with that of the deployment, and gives what it said.
+    pub fn finish(mut self) -> Vec<String> {
+        let begin = Instant::now();
+        let mut said = Vec::new();
+        loop {
+            let has_ended = !matches!(self.child.try_wait(), Ok(None));
+            said.extend(self.child.read_lines().unwrap_or_default());
+            if has_ended || begin.elapsed() > LEAVING {
+                return said;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
     }
 }
 

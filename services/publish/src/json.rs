@@ -74,7 +74,14 @@ pub(crate) mod tests {
             deviation_m: 0.0123,
         };
         let joint = |(nth, name): (usize, &&'a str)| {
-            (*name, if nth % 3 == 2 { Err("too few views") } else { Ok(place) })
+            (
+                *name,
+                if nth % 3 == 2 {
+                    Err("too few views")
+                } else {
+                    Ok(place)
+                },
+            )
         };
         Frame {
             deployment: "walk",
@@ -94,15 +101,23 @@ pub(crate) mod tests {
         let text = json_datagram(&frame(&["head", "neck", "right \"wrist\""])).unwrap();
         assert!(text.ends_with("}}\n") && !text[..text.len() - 1].contains('\n'));
         let value: Value = serde_json::from_str(&text).unwrap();
-        assert_eq!(value["joints"]["head"], serde_json::json!([-1234.5679, 0.5, 1.25, 0.0123]));
+        assert_eq!(
+            value["joints"]["head"],
+            serde_json::json!([-1234.5679, 0.5, 1.25, 0.0123])
+        );
         assert_eq!(value["joints"]["right \"wrist\""], "too few views");
-        assert_eq!((&value["frame"], &value["sides"]), (&12.into(), &"unsure".into()));
+        assert_eq!(
+            (&value["frame"], &value["sides"]),
+            (&12.into(), &"unsure".into())
+        );
         assert_eq!(value["session"], u64::MAX);
     }
 
     #[test]
     fn names_are_left_out_where_they_do_not_fit_and_too_much_is_not_sent() {
-        let long: Vec<String> = (0..32).map(|it| format!("a joint with a very long name {it}")).collect();
+        let long: Vec<String> = (0..32)
+            .map(|it| format!("a joint with a very long name {it}"))
+            .collect();
         let names: Vec<&str> = long.iter().map(String::as_str).collect();
         let text = json_datagram(&frame(&names)).unwrap();
         assert!(text.len() <= MOST_BYTES);

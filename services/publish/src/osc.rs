@@ -23,7 +23,8 @@ pub fn osc_datagrams(frame: &Frame<'_>) -> Vec<Vec<u8>> {
         let message = match found {
             Ok(place) => {
                 let [x, y, z] = place.in_world;
-                let mut message = Message::new(&format!("/parallax/joint/{}", plain(name)), ",ffff");
+                let mut message =
+                    Message::new(&format!("/parallax/joint/{}", plain(name)), ",ffff");
                 for number in [x, y, z, place.deviation_m] {
                     message.0.extend((number as f32).to_be_bytes());
                 }
@@ -91,7 +92,9 @@ fn push(bundle: &mut Vec<u8>, message: &Message) {
 /// A name as part of an address: what has a meaning there, and what is not ASCII, is an underscore.
 fn plain(name: &str) -> String {
     let is_plain = |it: char| it.is_ascii_alphanumeric() || it == '-' || it == '_';
-    name.chars().map(|it| if is_plain(it) { it } else { '_' }).collect()
+    name.chars()
+        .map(|it| if is_plain(it) { it } else { '_' })
+        .collect()
 }
 
 #[cfg(test)]
@@ -125,7 +128,12 @@ mod tests {
         assert_eq!(datagrams.len(), 1);
         let messages = messages(&datagrams[0]);
         let addresses: Vec<&str> = messages.iter().map(|it| it.0.as_str()).collect();
-        let expected = ["/parallax/frame", "/parallax/joint/head", "/parallax/joint/right_wrist", "/parallax/absent"];
+        let expected = [
+            "/parallax/frame",
+            "/parallax/joint/head",
+            "/parallax/joint/right_wrist",
+            "/parallax/absent",
+        ];
         assert_eq!(addresses, expected);
         assert_eq!(messages[1].1.len(), 16);
         assert_eq!(messages[1].1[4..8], 0.5_f32.to_be_bytes());

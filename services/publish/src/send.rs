@@ -128,7 +128,10 @@ impl Outlet {
             if !self.has_warned {
                 self.has_warned = true;
                 let n_joints = frame.joints.len();
-                tracing::warn!(n_joints, "a skeleton does not fit into a datagram: it is not sent");
+                tracing::warn!(
+                    n_joints,
+                    "a skeleton does not fit into a datagram: it is not sent"
+                );
             }
             return;
         };

@@ -24,7 +24,9 @@ pub struct Target {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TargetError {
     /// It is not written as one.
-    #[error("{text:?} is no target: {why}; expected udp://127.0.0.1:9000, udp://127.0.0.1:9000?format=osc or osc://127.0.0.1:9000")]
+    #[error(
+        "{text:?} is no target: {why}; expected udp://127.0.0.1:9000, udp://127.0.0.1:9000?format=osc or osc://127.0.0.1:9000"
+    )]
     Malformed {
         /// What was written.
         text: String,
@@ -110,13 +112,24 @@ mod tests {
         let of = |text: &str| Target::parse(text).map(|it| (it.address.to_string(), it.form));
         let loopback = |form| Ok(("127.0.0.1:9000".to_owned(), form));
         assert_eq!(of("udp://127.0.0.1:9000"), loopback(Form::Json));
-        assert_eq!(of("udp://localhost:9000/?format=json"), loopback(Form::Json));
+        assert_eq!(
+            of("udp://localhost:9000/?format=json"),
+            loopback(Form::Json)
+        );
         assert_eq!(of("udp://127.0.0.1:9000?format=osc"), loopback(Form::Osc));
         assert_eq!(of("osc://localhost:9000"), loopback(Form::Osc));
         assert_eq!(of("osc://[::1]:7"), Ok(("[::1]:7".to_owned(), Form::Osc)));
         for wrong in [
-            "", "127.0.0.1:9000", "tcp://127.0.0.1:9000", "udp://127.0.0.1", "udp://:9000", "udp://a.b:9000",
-            "udp://127.0.0.1:0", "udp://127.0.0.1:70000", "udp://127.0.0.1:9000?format=xml", "osc://127.0.0.1:9000?a",
+            "",
+            "127.0.0.1:9000",
+            "tcp://127.0.0.1:9000",
+            "udp://127.0.0.1",
+            "udp://:9000",
+            "udp://a.b:9000",
+            "udp://127.0.0.1:0",
+            "udp://127.0.0.1:70000",
+            "udp://127.0.0.1:9000?format=xml",
+            "osc://127.0.0.1:9000?a",
         ] {
             let error = Target::parse(wrong).unwrap_err().to_string();
             assert!(error.contains("udp://127.0.0.1:9000"), "{wrong}: {error}");
@@ -128,8 +141,16 @@ mod tests {
         let of = |text: &str| Target::parse(text).unwrap().stays_here();
         assert_eq!(of("udp://127.0.0.2:9000"), Ok(()));
         assert_eq!(of("udp://[::1]:9000"), Ok(()));
-        for text in ["udp://10.0.0.1:9000", "udp://0.0.0.0:9000", "udp://255.255.255.255:9", "osc://[fe80::1]:9"] {
-            assert!(matches!(of(text), Err(TargetError::Beyond { .. })), "{text}");
+        for text in [
+            "udp://10.0.0.1:9000",
+            "udp://0.0.0.0:9000",
+            "udp://255.255.255.255:9",
+            "osc://[fe80::1]:9",
+        ] {
+            assert!(
+                matches!(of(text), Err(TargetError::Beyond { .. })),
+                "{text}"
+            );
         }
     }
 

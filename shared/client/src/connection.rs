@@ -1,5 +1,6 @@
 //! The ports of one run of a deployment.
 
+use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -15,6 +16,10 @@ use crate::wish::Wish;
 
 /// Messages that are taken from one port in one turn, so that a turn ends.
 const MOST_A_TURN: usize = 64;
+/// How long a deployment that is starting may be without topics.
+const STARTING: Duration = Duration::from_secs(5);
+/// Pause between two attempts.
+const PAUSE: Duration = Duration::from_millis(50);
 
 /// The ports of one run of a deployment. Its description stays the same, and so does its session.
 #[derive(Debug)]
@@ -46,10 +51,27 @@ pub(crate) enum Turn {
 }
 
 impl Connection {
+    /// Joins a deployment. One that is about to start has no topics yet: they are waited for.
     pub(crate) fn open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
+        let begin = Instant::now();
+        loop {
+            match Self::try_open(deployment, wish) {
+                Err(ClientError::Guest(GuestError::NoSuchTopic { .. }))
+                    if begin.elapsed() < STARTING =>
+                {
+                    std::thread::sleep(PAUSE);
+                }
+                opened => return opened,
+            }
+        }
+    }
+
+    fn try_open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
         let namespace = Namespace::new(deployment)?;
         let guest = Guest::open(&namespace)?;
-        let text = namespace.description().map_err(|_| not_running(deployment))?;
+        let text = namespace
+            .description()
+            .map_err(|_| not_running(deployment))?;
         let running = Running::read(&text)?;
         let skeletons = if wish.skeletons {
             Some(guest.port(&topic::pose3d())?)
@@ -246,6 +268,9 @@ mod tests {
         assert_eq!(of(&["right", "left", "right"]).unwrap(), [0, 1]);
         assert_eq!(numbers(&running(), &Wish::views()).unwrap(), [0, 1]);
         let error = of(&["middle"]).unwrap_err().to_string();
-        assert_eq!(error, "deployment \"walk\" has no camera \"middle\", but left, right");
+        assert_eq!(
+            error,
+            "deployment \"walk\" has no camera \"middle\", but left, right"
+        );
     }
 }

@@ -100,17 +100,14 @@ impl<P> Joiner<P> {
             self.n_late += 1;
         }
         let n_views = self.n_views;
-        let gathered = self
-            .pending
-            .entry(stamp.frame)
-            .or_insert_with(|| Gathered {
-                frame: stamp.frame,
-                captured_at_nanos: stamp.captured_at_nanos,
-                skeleton: None,
-                views: (0..n_views).map(|_| Parts::default()).collect(),
-                is_complete: false,
-                since: now,
-            });
+        let gathered = self.pending.entry(stamp.frame).or_insert_with(|| Gathered {
+            frame: stamp.frame,
+            captured_at_nanos: stamp.captured_at_nanos,
+            skeleton: None,
+            views: (0..n_views).map(|_| Parts::default()).collect(),
+            is_complete: false,
+            since: now,
+        });
         gathered.captured_at_nanos = gathered.captured_at_nanos.min(stamp.captured_at_nanos);
         Some(gathered)
     }
@@ -218,11 +215,19 @@ mod tests {
         assert_eq!(joiner.take(now).len(), 0);
         joiner.add_pose(0, pose(2), now);
         joiner.add_pose(1, pose(2), now);
-        let frames: Vec<_> = joiner.take(now).iter().map(|it| (it.frame, it.is_complete)).collect();
+        let frames: Vec<_> = joiner
+            .take(now)
+            .iter()
+            .map(|it| (it.frame, it.is_complete))
+            .collect();
         assert_eq!(frames, [(1, false), (2, true)]);
         joiner.add_pose(0, pose(3), now);
         let later = now + Duration::from_secs(1);
-        let frames: Vec<_> = joiner.take(later).iter().map(|it| (it.frame, it.is_complete)).collect();
+        let frames: Vec<_> = joiner
+            .take(later)
+            .iter()
+            .map(|it| (it.frame, it.is_complete))
+            .collect();
         assert_eq!(frames, [(3, false)]);
     }
 

@@ -94,7 +94,12 @@ mod tests {
             assert!(of_struct(layout.name).len() > 10, "{}", layout.name);
             for field in &layout.fields {
                 let comment = of_field(layout.name, field.name);
-                assert!(comment.ends_with('.'), "{}.{}: {comment:?}", layout.name, field.name);
+                assert!(
+                    comment.ends_with('.'),
+                    "{}.{}: {comment:?}",
+                    layout.name,
+                    field.name
+                );
                 assert!(!comment.contains("*/"), "{comment}");
             }
         }
@@ -106,7 +111,9 @@ mod tests {
     fn names_are_those_of_the_transport() {
         for layout in layouts() {
             let (source, _) = body(layout.name).unwrap();
-            let at = source.find(&format!("pub struct {} ", layout.name)).unwrap();
+            let at = source
+                .find(&format!("pub struct {} ", layout.name))
+                .unwrap();
             let before = source[..at].rfind("#[type_name(\"").unwrap();
             let name = source[before..at].split('"').nth(1);
             assert_eq!(name, Some(layout.type_name));
@@ -116,6 +123,9 @@ mod tests {
     #[test]
     fn links_and_code_are_plain_text() {
         let text = "See [`Status::OK`](crate::Status) or `x`, [`Kept`]: `[xx, xy]` and [a, b].";
-        assert_eq!(plain(text), "See Status::OK or x, Kept: [xx, xy] and [a, b].");
+        assert_eq!(
+            plain(text),
+            "See Status::OK or x, Kept: [xx, xy] and [a, b]."
+        );
     }
 }

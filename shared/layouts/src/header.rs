@@ -24,28 +24,53 @@ pub fn c_header() -> String {
 
 fn write_all(text: &mut String) -> core::fmt::Result {
     text.push_str(HEAD);
-    writeln!(text, "/* Topics: \"{{}}\" is the view, worker or process. */")?;
+    writeln!(
+        text,
+        "/* Topics: \"{{}}\" is the view, worker or process. */"
+    )?;
     for topic in topics() {
         let name = constant(&topic.about);
         writeln!(text, "#define PARALLAX_TOPIC_{name} \"{}\"", topic.name)?;
         writeln!(text, "#define PARALLAX_VERSION_{name} {}", topic.version)?;
     }
-    writeln!(text, "\n/* Lengths of arrays: counts are never above them. */")?;
+    writeln!(
+        text,
+        "\n/* Lengths of arrays: counts are never above them. */"
+    )?;
     for (name, value) in limits() {
         writeln!(text, "#define PARALLAX_{name} {value}")?;
     }
-    writeln!(text, "\n/* Whether a message carries a result, or why not: fields `status`. */")?;
+    writeln!(
+        text,
+        "\n/* Whether a message carries a result, or why not: fields `status`. */"
+    )?;
     for status in statuses() {
         let name = constant(status.reason());
         writeln!(text, "#define PARALLAX_STATUS_{name} {}", status.0)?;
     }
-    writeln!(text, "\n/* Whether left and right are decided: Pose3d.sides. */")?;
+    writeln!(
+        text,
+        "\n/* Whether left and right are decided: Pose3d.sides. */"
+    )?;
     for sides in [Sides::AS_SEEN, Sides::SURE, Sides::UNSURE] {
-        writeln!(text, "#define PARALLAX_SIDES_{} {}", constant(sides.name()), sides.0)?;
+        writeln!(
+            text,
+            "#define PARALLAX_SIDES_{} {}",
+            constant(sides.name()),
+            sides.0
+        )?;
     }
-    writeln!(text, "\n/* Which poses the joints come from: Pose3d.kept. */")?;
+    writeln!(
+        text,
+        "\n/* Which poses the joints come from: Pose3d.kept. */"
+    )?;
     for kept in [Kept::SOLVED, Kept::START] {
-        writeln!(text, "#define PARALLAX_KEPT_{} {}", constant(kept.name()), kept.0)?;
+        writeln!(
+            text,
+            "#define PARALLAX_KEPT_{} {}",
+            constant(kept.name()),
+            kept.0
+        )?;
     }
     for layout in layouts() {
         write_struct(text, &layout)?;
@@ -69,7 +94,11 @@ fn write_struct(text: &mut String, layout: &Layout) -> core::fmt::Result {
         writeln!(text, "    {align}{};", declaration(field))?;
     }
     writeln!(text, "}} Parallax{};", layout.name)?;
-    writeln!(text, "#define PARALLAX_TYPE_{} \"{}\"", layout.name, layout.type_name)?;
+    writeln!(
+        text,
+        "#define PARALLAX_TYPE_{} \"{}\"",
+        layout.name, layout.type_name
+    )?;
     let name = layout.name;
     writeln!(
         text,

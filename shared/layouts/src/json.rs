@@ -42,12 +42,7 @@ fn of_struct(layout: &Layout) -> (String, Value) {
 }
 
 fn of_field(field: &Field) -> Value {
-    value!([
-        field.name,
-        of_kind(field.kind),
-        field.lengths,
-        field.offset
-    ])
+    value!([field.name, of_kind(field.kind), field.lengths, field.offset])
 }
 
 /// A number as NumPy names it, a struct by its name.

@@ -49,10 +49,14 @@ pub enum RunningError {
     #[error("the description of the deployment cannot be read")]
     Malformed(#[source] serde_json::Error),
     /// It has no part for other programs: the deployment is of an earlier version.
-    #[error("the deployment does not describe itself to other programs: it is of an earlier version of Parallax")]
+    #[error(
+        "the deployment does not describe itself to other programs: it is of an earlier version of Parallax"
+    )]
     Absent,
     /// It is of another version.
-    #[error("the description of the deployment is of version {theirs}, this program reads version {ours}")]
+    #[error(
+        "the description of the deployment is of version {theirs}, this program reads version {ours}"
+    )]
     Version {
         /// The version of the deployment.
         theirs: u64,
@@ -126,14 +130,20 @@ mod tests {
         };
         let text = serde_json::json!({ "programs": other }).to_string();
         let error = Running::read(&text).unwrap_err().to_string();
-        assert!(error.contains("version 7") && error.contains("version 1"), "{error}");
+        assert!(
+            error.contains("version 7") && error.contains("version 1"),
+            "{error}"
+        );
         for text in ["{}", "{\"programs\": 3}", "[]", "{\"programs\": {}}"] {
             let error = Running::read(text).unwrap_err();
             assert!(matches!(error, RunningError::Absent), "{text}: {error}");
         }
         for text in ["", "{", "{\"programs\": {\"format\": 1}}"] {
             let error = Running::read(text).unwrap_err();
-            assert!(matches!(error, RunningError::Malformed(_)), "{text}: {error}");
+            assert!(
+                matches!(error, RunningError::Malformed(_)),
+                "{text}: {error}"
+            );
         }
     }
 }

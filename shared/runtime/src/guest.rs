@@ -1,5 +1,8 @@
 //! A program that is no part of a deployment and reads its topics: it can be moved between threads, and cannot send.
 
+#[cfg(test)]
+mod tests;
+
 use core::fmt::Debug;
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -21,9 +24,7 @@ use crate::observer::running_supervisor;
 use crate::payload::{Header, Message};
 use crate::service::patiently;
 use crate::subscriber::onlooker;
-use crate::{
-    ExitKind, Fault, LockError, Namespace, NamespaceError, ReceiveError, deployments,
-};
+use crate::{ExitKind, Fault, LockError, Namespace, NamespaceError, ReceiveError, deployments};
 
 /// Guests of one deployment at the same time.
 pub const MOST_GUESTS: usize = 4;
@@ -410,54 +411,4 @@ fn open_seat(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     let options = options.create(true).truncate(false).read(true).write(true);
     options.open(path)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_topic_is_told_apart_from_its_version() {
-        assert_eq!(parts_of("frame/v1/0"), Some(("frame", "1", "0")));
-        assert_eq!(parts_of("pose3d/v3"), Some(("pose3d", "3", "")));
-        assert_eq!(parts_of("else"), None);
-    }
-
-    #[test]
-    fn a_guest_can_be_moved_to_another_thread() {
-        fn moves<T: Send>() {}
-        moves::<Guest>();
-        moves::<GuestPort<u8, messages::FrameHeader>>();
-        moves::<Seen<u8, messages::FrameHeader>>();
-    }
-
-    #[test]
-    fn what_does_not_run_is_told_with_what_runs() {
-        let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
-        let namespace = Namespace::below("nobody", base.path()).unwrap();
-        let error = Guest::open(&namespace).unwrap_err();
-        assert!(
-            error.to_string().contains("\"nobody\" does not run"),
-            "{error}"
-        );
-        assert!(!namespace.root().exists(), "nothing is created");
-    }
-
-    #[test]
-    fn there_are_as_many_seats_as_guests_and_one_that_is_left_is_free() {
-        let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
-        let namespace = Namespace::below("full", base.path()).unwrap();
-        fs::create_dir(namespace.root()).unwrap();
-        let mut seats: Vec<File> = (0..MOST_GUESTS)
-            .map(|_| seat(&namespace).unwrap())
-            .collect();
-        let error = seat(&namespace).unwrap_err();
-        let pid = std::process::id().to_string();
-        assert!(
-            matches!(&error, GuestError::Full { most: MOST_GUESTS, guests, .. } if guests[0].contains(&pid)),
-            "{error}"
-        );
-        drop(seats.pop());
-        seat(&namespace).unwrap();
-    }
 }

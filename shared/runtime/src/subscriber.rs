@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use iceoryx2::port::ReceiveError as IoxReceiveError;
 use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::port_name::PortName;
 use iceoryx2::port::subscriber::Subscriber as IoxSubscriber;
 use iceoryx2::port::update_connections::UpdateConnections as _;
-use iceoryx2::port::port_name::PortName;
 use iceoryx2::prelude::{CallbackProgression, PortFactory as _, ipc};
 use iceoryx2::sample::Sample as IoxSample;
 

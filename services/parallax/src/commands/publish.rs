@@ -46,7 +46,9 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let name = namespace.name();
     if !globals.quiet {
         for target in &targets {
-            output::message(format_args!("publishing the skeletons of {name} to {target}"));
+            output::message(format_args!(
+                "publishing the skeletons of {name} to {target}"
+            ));
         }
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
@@ -86,6 +88,15 @@ fn usage(error: &publish::TargetError) -> Failure {
     Failure::new(ExitKind::Usage, error.to_string())
 }
 
+/// Waits for the end of what was started by [`beside`], and shows what it said.
+pub(crate) fn finish(companion: Option<Companion>, quiet: bool) {
+    let said = companion.map(Companion::finish).unwrap_or_default();
+    let first = "publishing the skeletons";
+    for line in said.iter().filter(|it| !quiet && !it.contains(first)) {
+        output::message(format_args!("publish: {line}"));
+    }
+}
+
 /// Starts publishing beside a run of a deployment, as `--publish` asks; nothing without targets.
 ///
 /// * `name`: of the deployment.
@@ -99,7 +110,9 @@ pub(crate) fn beside(
         return Ok(None);
     }
     for target in targets(texts, beyond)? {
-        output::message(format_args!("publishing the skeletons of {name} to {target}"));
+        output::message(format_args!(
+            "publishing the skeletons of {name} to {target}"
+        ));
     }
     let executable = std::env::current_exe().or_fail(ExitKind::Run)?;
     Companion::start(&executable, name, texts, beyond).map(Some)

@@ -87,7 +87,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let name = &loaded.deployment.name;
     let companion = publish::beside(name, &arguments.publish, arguments.beyond_this_machine)?;
     let report = planned.run(globals.quiet, &stop, &mut |_| None)?;
-    drop(companion);
+    publish::finish(companion, globals.quiet);
     if arguments.json {
         output::json(&report.json())?;
     } else if !globals.quiet {
