@@ -72,7 +72,7 @@ pub use progress::Progress;
 pub use publisher::{Loan, Publisher, SendError, SlicePublisher};
 pub use remains::{Remains, deployments};
 pub use scheduling::{
-    Denied, MAX_CORES, Policy, RealTime, Refusal, Scheduling, SchedulingError, own_cores,
+    Denied, MAX_CORES, Policy, RealTime, Refusal, Scheduling, SchedulingError, give_way, own_cores,
 };
 pub use service::PortError;
 pub use stop::Stop;

@@ -11,7 +11,7 @@ use std::io;
 use std::thread;
 
 use rustix::mm::{MlockAllFlags, mlockall};
-use rustix::process::{Resource, getrlimit};
+use rustix::process::{Resource, getrlimit, nice};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
 pub use denied::{Denied, Refusal};
@@ -180,6 +180,18 @@ fn has_capability(status: &str, capability: u32) -> bool {
     let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
     let mask = effective.and_then(|digits| u64::from_str_radix(digits.trim(), 16).ok());
     mask.is_some_and(|mask| mask >> capability & 1 == 1)
+}
+
+/// How much an onlooker gives way: two fifths of the share of a process that does not. With less it would see nothing of a
+/// run that takes all processors.
+const WAY: i32 = 4;
+
+/// Makes this thread, and those that it starts, give way to other processes where processors are scarce. Call it before threads
+/// are started; it cannot be taken back.
+pub fn give_way() {
+    if let Err(error) = nice(WAY) {
+        tracing::debug!(%error, "cannot give way to other processes");
+    }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod deployment;
 mod few_chunks;
 mod lock;
 mod observer;
+mod onlooker;
 mod ports;
 mod spin;
 mod zero_copy;
