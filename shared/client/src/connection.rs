@@ -1,6 +1,7 @@
 //! The ports of one run of a deployment.
 
 use core::time::Duration;
+use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -71,7 +72,7 @@ impl Connection {
         let guest = Guest::open(&namespace)?;
         let text = namespace
             .description()
-            .map_err(|_| not_running(deployment))?;
+            .map_err(|error| unreadable(deployment, error))?;
         let running = Running::read(&text)?;
         let skeletons = if wish.skeletons {
             Some(guest.port(&topic::pose3d())?)
@@ -245,10 +246,14 @@ fn numbers(running: &Running, wish: &Wish) -> Result<Vec<usize>, ClientError> {
     Ok(numbers)
 }
 
-fn not_running(name: &str) -> GuestError {
-    GuestError::NotRunning {
-        name: name.to_owned(),
-        running: running_deployments().unwrap_or_default(),
+/// Why there is no description: the deployment has ended in the meantime, or its file cannot be read.
+fn unreadable(name: &str, source: io::Error) -> GuestError {
+    let name = name.to_owned();
+    if source.kind() == io::ErrorKind::NotFound {
+        let running = running_deployments().unwrap_or_default();
+        GuestError::NotRunning { name, running }
+    } else {
+        GuestError::Directory { name, source }
     }
 }
 

@@ -120,8 +120,13 @@ fn declaration(field: &Field) -> String {
         Kind::Number { c, .. } => c.to_owned(),
         Kind::Struct(name) => format!("Parallax{name}"),
     };
-    let lengths: String = field.lengths.iter().map(|it| format!("[{it}]")).collect();
-    format!("{kind} {}{lengths}", field.name)
+    let mut text = format!("{kind} {}", field.name);
+    for length in &field.lengths {
+        text.push('[');
+        text.push_str(&length.to_string());
+        text.push(']');
+    }
+    text
 }
 
 /// A comment in lines of at most [`WIDTH`] characters.

@@ -45,7 +45,7 @@ fn of_field(field: &Field) -> Value {
     value!([field.name, of_kind(field.kind), field.lengths, field.offset])
 }
 
-/// A number as NumPy names it, a struct by its name.
+/// A number as `NumPy` names it, a struct by its name.
 fn of_kind(kind: Kind) -> &'static str {
     match kind {
         Kind::Number { numpy, .. } => numpy,

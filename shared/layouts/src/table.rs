@@ -11,13 +11,13 @@ use messages::{
 /// The type of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A number: its name in Rust, in C, and in NumPy.
+    /// A number: its name in Rust, in C, and in `NumPy`.
     Number {
         /// In Rust: `u32`.
         rust: &'static str,
         /// In C: `uint32_t`.
         c: &'static str,
-        /// In NumPy, little-endian: `<u4`.
+        /// In `NumPy`, little-endian: `<u4`.
         numpy: &'static str,
     },
     /// One of the structs.
