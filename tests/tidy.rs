@@ -241,6 +241,7 @@ fn only_the_agreed_entries_lie_at_the_top() {
         "README.md",
         "configs",
         "docs",
+        "python",
         "scripts",
         "services",
         "shared",

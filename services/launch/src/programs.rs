@@ -25,7 +25,7 @@ pub(crate) fn description(
 fn running(resolved: &Resolved, prepared: &Prepared, session: u64) -> Running {
     let joints = prepared.settings.skeleton.joints;
     let views = prepared.views.iter().map(|it| {
-        let [width, height] = it.framing.out_size().map(|side| side as u32);
+        let [width, height] = it.framing.out_size();
         RunningView {
             height,
             name: it.name.clone(),

@@ -45,12 +45,12 @@ fn line(frame: &Frame<'_>, with_names: bool) -> String {
             text.push(',');
         }
         if with_names {
-            text.push_str(&text_of(*name).to_string());
+            text.push_str(&text_of(name).to_string());
             text.push(':');
         }
         match found {
             Ok(place) => push_place(&mut text, place),
-            Err(why) => text.push_str(&text_of(*why).to_string()),
+            Err(why) => text.push_str(&text_of(why).to_string()),
         }
     }
     text.push_str(if with_names { "}}\n" } else { "]}\n" });

@@ -29,7 +29,7 @@ fn main() -> Result<(), ClientError> {
         match found.map(|it| it.found) {
             Some(Ok(place)) => {
                 let [x, y, z] = place.in_world;
-                let share = ((x / REACH_M + 1.0) / 2.0).clamp(0.0, 1.0);
+                let share = f64::midpoint(x / REACH_M, 1.0).clamp(0.0, 1.0);
                 let column = (share * (WIDTH - 1) as f64).round() as usize;
                 println!(
                     "{:>6} {}#{} {x:+.3} {y:+.3} {z:+.3} m, sure to {:.3} m, {} missed",

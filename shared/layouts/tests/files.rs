@@ -1,6 +1,5 @@
 //! The files of other languages are those that the layouts make, and a C compiler agrees with them.
 #![expect(clippy::print_stderr, reason = "a test that is skipped says so")]
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
