@@ -38,6 +38,7 @@ const LAYERS: &[&[&str]] = &[
         "inference",
     ],
     &[
+        "layouts",
         "metrics",
         "recording",
         "fmp",
@@ -47,7 +48,7 @@ const LAYERS: &[&[&str]] = &[
         "synchronisation",
     ],
     &["runtime"],
-    &["multiview", "viewquality", "posenetwork"],
+    &["client", "multiview", "viewquality", "posenetwork"],
     &["orientation"],
     &["pipeline", "evaluation", "datasets", "consistency"],
     &[
@@ -63,6 +64,7 @@ const LAYERS: &[&[&str]] = &[
     &[
         "capture",
         "pose",
+        "publish",
         "quality",
         "fuse",
         "triangulate",
@@ -239,6 +241,7 @@ fn only_the_agreed_entries_lie_at_the_top() {
         "README.md",
         "configs",
         "docs",
+        "python",
         "scripts",
         "services",
         "shared",

@@ -20,6 +20,7 @@ mod claim;
 mod padding;
 mod planned;
 mod prepare;
+mod programs;
 mod resolved;
 mod sanity;
 mod scheduling;

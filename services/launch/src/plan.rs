@@ -9,8 +9,8 @@ use messages::{
     EvidenceHeader, FrameHeader, PairPose, PictureHeader, Pose3d, ViewPose, ViewQuality,
 };
 use runtime::{
-    Delivery, ExitKind, Failure, HEARTBEAT, Limits, Namespace, OrFail as _, TopicPlan, now_nanos,
-    process_topics,
+    Delivery, ExitKind, Failure, HEARTBEAT, Limits, MOST_GUESTS, Namespace, OrFail as _, TopicPlan,
+    now_nanos, process_topics,
 };
 use supervise::{Plan, Policy, ProcessSpec, Role};
 use tracing::Level;
@@ -19,6 +19,7 @@ use crate::inputs;
 use crate::keypoints;
 use crate::prepare::Prepared;
 use crate::process::Name;
+use crate::programs;
 use crate::resolved::Resolved;
 use crate::sanity;
 use crate::scheduling;
@@ -147,7 +148,9 @@ fn picture_bytes(resolved: &Resolved, view: usize) -> usize {
 /// The plan of a topic with the given limits and message sizes.
 fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
     let limits = Limits::new(room.receivers, room.queued, room.borrowed);
-    let limits = limits.with_onlookers(room.onlookers);
+    // Where there are onlookers, programs of the user are among them.
+    let guests = if room.onlookers > 0 { MOST_GUESTS } else { 0 };
+    let limits = limits.with_onlookers(room.onlookers + guests);
     let (topic, longest) = (room.topic, room.longest);
     let plan = match room.content {
         Content::Frame => TopicPlan::slices::<u8, FrameHeader>(topic, delivery, limits, longest),
@@ -235,12 +238,13 @@ pub(crate) fn plan(
     let processes = processes(resolved, file);
     let names: Vec<String> = processes.iter().map(|it| it.name.clone()).collect();
     let settings = &resolved.deployment.supervise;
+    let session = now_nanos();
     Ok(Plan {
         executable: executable()?,
         given: resolved.to_text()?.into_bytes(),
-        description: footage::without_passwords(&resolved.to_text()?).into_bytes(),
+        description: programs::description(resolved, prepared, session)?.into_bytes(),
         namespace: Namespace::new(&resolved.deployment.name)?,
-        session: now_nanos(),
+        session,
         delivery: resolved.delivery(),
         topics: topics(resolved, prepared, &names),
         processes,

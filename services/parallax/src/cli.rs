@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    bench, calib, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame, model,
-    record, replay, run, service, sync, synth, top, train, view,
+    bench, calib, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame, messages,
+    model, publish, record, replay, run, service, sync, synth, top, train, view,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -26,6 +26,7 @@ Examples:
     parallax run my.toml --latency-budget-ms 150        fails if 1 frame in 100 takes longer
     parallax demo --view                                the same, watched in the browser
     parallax view my.toml                               a page about a deployment, while it runs
+    parallax publish my.toml udp://127.0.0.1:9000       its skeletons as datagrams, for programs of any language
     parallax top                                        where the time of a running deployment goes
     parallax record my.toml --out run.mcap              like run, and records every message
     parallax replay run.mcap --from fuse --set fuse.alpha=2     runs the later stages again, with another value
@@ -104,6 +105,10 @@ pub(crate) enum Command {
     /// Show and check deployment files.
     #[command(subcommand)]
     Config(config::Command),
+    /// Send the skeletons of a running deployment as datagrams: JSON lines or OSC.
+    Publish(publish::Arguments),
+    /// Print the layout of messages, for programs in other languages.
+    Messages(messages::Arguments),
     /// Make synthetic sequences of people, with the truth.
     Synth(Box<synth::Arguments>),
     /// List running deployments, and what dead ones have left in shared memory; or show the processes of one.

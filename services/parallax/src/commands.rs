@@ -11,8 +11,10 @@ pub(crate) mod detect;
 pub(crate) mod eval;
 pub(crate) mod fuse_frame;
 pub(crate) mod judge;
+pub(crate) mod messages;
 pub(crate) mod model;
 pub(crate) mod network;
+pub(crate) mod publish;
 pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod run;
@@ -53,6 +55,8 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Calib(it) => calib::run(&it),
         Command::Cameras(it) => cameras::run(&it),
         Command::Config(it) => config::run(&it),
+        Command::Messages(it) => messages::run(&it),
+        Command::Publish(it) => publish::run(&it, cli.globals),
         Command::Status(it) => deployments::status(&it),
         Command::Top(it) => top::run(&it),
         Command::View(it) => view::run(&it, cli.globals),

@@ -21,6 +21,7 @@ mod networks;
 mod nonsense;
 mod parity;
 mod processes;
+mod programs;
 mod quality;
 mod realtime;
 mod record;

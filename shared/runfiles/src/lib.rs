@@ -8,6 +8,8 @@
 //! | `latency.json` | [`LatencyReport`] | run |
 //! | `summary.json` | [`RunSummary`] | run; holds the version of all files |
 //!
+//! [`Running`] is no file of a run: a running deployment describes itself with it to other programs.
+//!
 //! Text in, types out: this crate opens no file. A field that is missing, unknown in its type or out of range is a
 //! [`ReadError`] that names the line and the field; only fields that were added later may be absent. Unknown fields are passed over, so that a
 //! program reads what a later one has written as long as [`VERSION`] is the same.
@@ -20,6 +22,7 @@ mod latency;
 mod missing;
 mod nullable;
 mod read;
+mod running;
 mod summary;
 mod times;
 mod trust;
@@ -29,6 +32,7 @@ pub use frame::{FrameLine, JointLine, Kept, PlacedJoint, Sides};
 pub use latency::{LatencyReport, Percentiles};
 pub use missing::Missing;
 pub use read::{Line, ReadError, lines, to_line};
+pub use running::{Running, RunningError, RunningView};
 pub use summary::{CameraFit, Contradicted, Exchanged, People, RunSummary, Summary, ViewSummary};
 pub use times::{CameraTimes, PoseTimes, TimesLine, ViewTimes};
 pub use trust::{Doubt, Trust};

@@ -177,7 +177,7 @@ impl Observer {
 }
 
 /// The supervisor of a deployment, unless it is ending.
-fn running_supervisor(namespace: &Namespace) -> Option<u32> {
+pub(crate) fn running_supervisor(namespace: &Namespace) -> Option<u32> {
     let root = namespace.root();
     if root.join(ENDING_FILE).exists() {
         return None;

@@ -9,7 +9,7 @@ use fmp::files::{describe, mat, own, text};
 use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisys, umpm};
 use keypoints::files::{NameSet, SeenKeypoints, coco, openpose};
 use multiview::Compatibility;
-use runfiles::{FrameLine, LatencyReport, Line, RunSummary, TimesLine, ViewLine};
+use runfiles::{FrameLine, LatencyReport, Line, RunSummary, Running, TimesLine, ViewLine};
 use scene::Address;
 use scene::truth::{Frame, Header};
 use training::Checkpoint;
@@ -360,5 +360,8 @@ pub fn run_files(input: &[u8]) {
         let written = report.to_text().expect("it was read");
         let again = LatencyReport::parse(&written).expect("it was written");
         assert_eq!(again, report);
+    }
+    if let Ok(running) = Running::read(input) {
+        assert_eq!(running.format, Running::VERSION);
     }
 }

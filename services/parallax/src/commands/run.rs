@@ -8,7 +8,7 @@ use launch::{Planned, load, output};
 use runtime::{ExitKind, Failure, OrFail as _, Stop, free_shared_memory, needed_bytes, preflight};
 use supervise::Plan;
 
-use super::view;
+use super::{publish, view};
 use crate::globals::Globals;
 
 /// Options of `parallax run`.
@@ -25,6 +25,7 @@ Examples:
     parallax run configs/pose2sim-balancing.toml
     parallax run my.toml --out /tmp/try --set capture.n_frames=20 --set fuse.workers=2
     parallax run my.toml --latency-budget-ms 150
+    parallax run my.toml --publish udp://127.0.0.1:9000
     parallax run my.toml --dry-run
 
 While it runs, `parallax top` and `parallax status NAME --json` show every process and where its time goes. With a
@@ -46,6 +47,13 @@ pub(crate) struct Arguments {
     /// Serve a page about the run on the loopback while it runs; `parallax view --help` says what it shows.
     #[arg(long, conflicts_with = "dry_run")]
     view: bool,
+    /// Send the skeletons as datagrams to udp://HOST:PORT (JSON lines) or osc://HOST:PORT while it runs; may be given several
+    /// times; `parallax publish --help` says what is sent.
+    #[arg(long, value_name = "TARGET", conflicts_with = "dry_run")]
+    publish: Vec<String>,
+    /// Allow --publish to other machines than this: skeletons leave it unencrypted.
+    #[arg(long, requires = "publish")]
+    beyond_this_machine: bool,
     /// Show the processes and the shared memory that they need, and start nothing; fails if the run could not start.
     #[arg(long)]
     dry_run: bool,
@@ -81,8 +89,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let name = &loaded.deployment.name;
     let page = arguments.view.then(|| view::beside(name)).transpose()?;
+    let companion = publish::beside(name, &arguments.publish, arguments.beyond_this_machine)?;
     let report = planned.run(globals.quiet, &stop, &mut |_| None)?;
     drop(page);
+    publish::finish(companion, globals.quiet);
     if arguments.json {
         output::json(&report.json())?;
     } else if !globals.quiet {

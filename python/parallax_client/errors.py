@@ -1,0 +1,35 @@
+"""Why a deployment or a file cannot be read."""
+
+
+class ClientError(Exception):
+    """A deployment or a file cannot be read; the text says what is missing."""
+
+
+class NotRunning(ClientError):
+    """The deployment does not run. `running` has the names of those that do."""
+
+    def __init__(self, name, running):
+        self.name, self.running = name, list(running)
+        ones = "running: " + ", ".join(self.running) if self.running else "none does"
+        super().__init__(f"deployment {name!r} does not run; {ones}")
+
+
+class VersionMismatch(ClientError):
+    """The deployment sends another version of a message than this package reads."""
+
+    def __init__(self, name, what, theirs, ours):
+        self.what, self.theirs, self.ours = what, theirs, ours
+        super().__init__(
+            f"deployment {name!r} sends {what!r} version {theirs}, this package reads version {ours}: "
+            "install the package of the same version of Parallax"
+        )
+
+
+class Full(ClientError):
+    """As many programs read the deployment as may."""
+
+    def __init__(self, name, most, guests):
+        self.most = most
+        super().__init__(
+            f"{most} programs read deployment {name!r} already, which is the most: {', '.join(guests)}"
+        )

@@ -1,0 +1,158 @@
+"""What a run leaves: folders as NumPy arrays or pandas tables, and recordings message by message."""
+
+import json
+import pathlib
+
+import numpy as np
+
+from . import layout
+from .errors import ClientError, VersionMismatch
+
+SCHEMA_VERSION = 1
+"""Version of the files of a run that this package reads."""
+
+
+class Run:
+    """A finished run.
+
+    frames      numbers of the frames, [frame]
+    time_s      their times in the footage, NaN where no frame rate is known, [frame]
+    status      "ok", or why there is no skeleton, or "no result", [frame]
+    joints      names of the joints
+    positions   metres in the world of the calibration, NaN where there is none, [frame, joint, axis]
+    covariance  square metres, NaN where there is no position, [frame, joint, axis, axis]
+    reprojection_px  NaN where there is no position, [frame, joint]
+    n_views     views that the joint was located with, [frame, joint]
+    summary     the contents of summary.json
+    """
+
+    def __init__(self, folder):
+        folder = pathlib.Path(folder)
+        if not folder.is_dir():
+            raise ClientError(f"{folder} is no folder")
+        self.folder = folder
+        self.summary = self._summary()
+        lines = self._lines()
+        self.joints = list(self.summary.get("joints") or _names(lines))
+        n, m = len(lines), len(self.joints)
+        self.frames = np.array([it["frame"] for it in lines], dtype=np.int64)
+        time = [it.get("time_s") for it in lines]
+        self.time_s = np.array([np.nan if it is None else it for it in time], dtype=float)
+        self.status = np.array([it["status"] for it in lines], dtype=object)
+        self.reason = np.array([it.get("reason") for it in lines], dtype=object)
+        self.sides = np.array([it.get("sides") for it in lines], dtype=object)
+        self.positions = np.full((n, m, 3), np.nan)
+        self.covariance = np.full((n, m, 3, 3), np.nan)
+        self.reprojection_px = np.full((n, m), np.nan)
+        self.n_views = np.zeros((n, m), dtype=int)
+        number = {name: at for at, name in enumerate(self.joints)}
+        for row, line in enumerate(lines):
+            for name, joint in line["joints"].items():
+                self._put(row, number.get(name), joint)
+
+    def _put(self, row, at, joint):
+        if at is None or "position_m" not in joint:
+            return
+        self.positions[row, at] = joint["position_m"]
+        xx, xy, xz, yy, yz, zz = joint["covariance_m2"]
+        self.covariance[row, at] = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        reprojection = joint.get("reprojection_px")
+        self.reprojection_px[row, at] = np.nan if reprojection is None else reprojection
+        self.n_views[row, at] = len(joint["views"])
+
+    @property
+    def deviation(self):
+        """Standard deviation of every joint along one axis, metres, NaN where there is no position: [frame, joint]."""
+        return np.sqrt(np.trace(self.covariance, axis1=2, axis2=3) / 3)
+
+    def joint(self, name):
+        """Positions of one joint, [frame, axis] in metres."""
+        if name not in self.joints:
+            raise KeyError(f"no joint {name!r}, but {', '.join(self.joints)}")
+        return self.positions[:, self.joints.index(name)]
+
+    def to_pandas(self):
+        """A table with one row for every frame and joint."""
+        try:
+            import pandas
+        except ImportError:
+            raise ClientError("tables need the package pandas: `pip install pandas`") from None
+        n, m = self.reprojection_px.shape
+        return pandas.DataFrame({
+            "frame": np.repeat(self.frames, m), "time_s": np.repeat(self.time_s, m),
+            "status": np.repeat(self.status, m), "joint": self.joints * n,
+            "x_m": self.positions[..., 0].ravel(), "y_m": self.positions[..., 1].ravel(),
+            "z_m": self.positions[..., 2].ravel(), "deviation_m": self.deviation.ravel(),
+            "reprojection_px": self.reprojection_px.ravel(), "n_views": self.n_views.ravel(),
+        })
+
+    def _summary(self):
+        path = self.folder / "summary.json"
+        if not path.exists():
+            part = (self.folder / "pose3d.jsonl.part").exists()
+            why = "the run has not ended, or was killed" if part else "it is no folder of a run"
+            raise ClientError(f"{path} does not exist: {why}")
+        summary = _json(path, path.read_text(encoding="utf-8"))
+        version = summary.get("schema_version") if isinstance(summary, dict) else None
+        if version != SCHEMA_VERSION:
+            raise VersionMismatch(str(self.folder), "files of a run", version, SCHEMA_VERSION)
+        return summary
+
+    def _lines(self):
+        path = self.folder / "pose3d.jsonl"
+        if not path.exists():
+            raise ClientError(f"{path} does not exist")
+        lines = []
+        with path.open(encoding="utf-8") as file:
+            for nth, text in enumerate(file, 1):
+                line = _json(f"{path}, line {nth}", text)
+                missing = {"frame", "status", "joints"} - set(line if isinstance(line, dict) else ())
+                if missing:
+                    raise ClientError(f"{path}, line {nth}: no {', '.join(sorted(missing))}")
+                lines.append(line)
+        return lines
+
+
+def _json(where, text):
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise ClientError(f"{where}: {error}") from None
+
+
+def _names(lines):
+    """The names of joints, where the summary has none."""
+    names = []
+    for line in lines:
+        names.extend(it for it in line["joints"] if it not in names)
+    return names
+
+
+def read_folder(folder):
+    """Reads the folder of a finished run as a `Run`."""
+    return Run(folder)
+
+
+def read_recording(file, about="pose3d"):
+    """The messages of one kind in a recording (MCAP), one after the other, as pairs of its topic and the message.
+
+    about: "pose3d", "view-pose", "pair-pose", "view-quality" or "health". Needs the package `mcap`.
+    """
+    try:
+        from mcap.reader import make_reader
+    except ImportError:
+        raise ClientError("recordings need the package mcap: `pip install mcap`") from None
+    kind = layout.TOPICS[about]
+    if kind["elements"] is not None:
+        raise ClientError(f"{about!r} carries arrays, which are not read from recordings here")
+    dtype = layout.dtype(kind["message"])
+    prefix = kind["name"].split("{}")[0]
+    with open(file, "rb") as opened:
+        for _, channel, message in make_reader(opened).iter_messages():
+            if not channel.topic.lstrip("/").startswith(prefix):
+                continue
+            # The head of CDR has four bytes; a struct without padding has the layout that CDR asks for.
+            data = message.data[4:]
+            if len(data) < dtype.itemsize:
+                raise ClientError(f"{file}: a message of {channel.topic} has {len(data)} bytes, {dtype.itemsize} are meant")
+            yield channel.topic, np.frombuffer(data, dtype, count=1)[0]

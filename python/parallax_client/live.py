@@ -1,0 +1,415 @@
+"""Live skeletons, poses and pictures of a running deployment."""
+
+import collections
+import threading
+import time
+
+import numpy as np
+
+from . import layout
+from .errors import ClientError, NotRunning
+from .place import running_deployments
+from .transport import Guest, NoSuchTopic, TooManyHeld
+
+__all__ = ["Client", "Joint", "Moment", "Picture", "Skeleton", "connect", "running_deployments"]
+
+_PAUSE_S = 0.002
+_CHECK_S = 0.1
+_RETRY_S = 0.2
+_MOST_PENDING = 32
+
+
+class Joint(collections.namedtuple("Joint", "name position covariance deviation reprojection_px n_views status")):
+    """One joint. `position` in metres, `covariance` 3x3 in square metres and `deviation`, the standard deviation along one
+    axis in metres, are None where there is no position: `reason` says why, and is None otherwise."""
+
+    __slots__ = ()
+
+    @property
+    def reason(self):
+        """Why there is no position; None if there is one."""
+        return None if self.position is not None else layout.reason(self.status)
+
+
+class Skeleton:
+    """The skeleton of one frame: a copy of the message `Pose3d`, which is `message`."""
+
+    def __init__(self, message, running):
+        self.message, self._running = message, running
+
+    @property
+    def status(self):
+        """"ok", or why there is no skeleton."""
+        return layout.reason(self.message["status"])
+
+    @property
+    def positions(self):
+        """Positions of all joints, `[joint, axis]` in metres; NaN where there is none."""
+        joints = self.message["joints"][: int(self.message["n_joints"])]
+        found = joints["status"] == layout.OK
+        return np.where(found[:, None], joints["in_world"], np.nan)
+
+    @property
+    def sides(self):
+        """Whether left and right are decided: "sure", "unsure" or "as seen"."""
+        number = int(self.message["sides"])
+        return layout.SIDES[number] if number < len(layout.SIDES) else "unknown"
+
+    def joint(self, name):
+        """The joint of a name; without a position, and with the reason, where the frame has none."""
+        try:
+            number = self._running["joints"].index(name)
+        except ValueError:
+            raise KeyError(f"no joint {name!r}, but {', '.join(self._running['joints'])}") from None
+        if number >= int(self.message["n_joints"]):
+            return Joint(name, None, None, None, None, 0, int(self.message["status"]))
+        return _joint(name, self.message["joints"][number])
+
+    def joints(self):
+        """All joints by name."""
+        return {name: self.joint(name) for name in self._running["joints"]}
+
+
+def _joint(name, joint):
+    if joint["status"] != layout.OK:
+        return Joint(name, None, None, None, None, 0, int(joint["status"]))
+    xx, xy, xz, yy, yz, zz = (float(it) for it in joint["covariance"])
+    covariance = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    deviation = float(np.sqrt(max(0.0, (xx + yy + zz) / 3)))
+    n_views = bin(int(joint["views_used"])).count("1")
+    position = np.array(joint["in_world"])
+    return Joint(name, position, covariance, deviation, float(joint["reprojection_px"]), n_views, layout.OK)
+
+
+class Picture:
+    """A picture of one view. `pixels` is `[row, column, RGB]`, or None where there is none: `status` says why."""
+
+    def __init__(self, header, pixels, sample=None):
+        self.header, self._sample = header, sample
+        status = int(header["status"])
+        self.status, self.pixels = layout.reason(status), None
+        self.frame = int(header["stamp"]["frame"])
+        height, width = int(header["height"]), int(header["width"])
+        if status == layout.OK:
+            self.pixels = pixels.reshape(height, width, 3)
+
+    def release(self):
+        """Gives the memory back to the sender, where this is no copy."""
+        sample, self._sample = self._sample, None
+        if sample is not None:
+            self.header = self.pixels = None
+            sample.release()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.release()
+
+
+class Moment:
+    """Everything about one frame that was asked for and is there.
+
+    `skeleton` is a `Skeleton`, `poses` and `pictures` are dictionaries by camera, `n_missed` is how many frames lie
+    between this one and the one given before.
+    """
+
+    def __init__(self, session, frame):
+        self.session, self.frame, self.captured_at_nanos = session, frame, None
+        self.skeleton, self.poses, self.pictures = None, {}, {}
+        self.n_missed, self.is_complete = 0, False
+        self._since = time.monotonic()
+
+
+def connect(name, *, skeletons=True, poses=False, pictures=False, cameras=None, every=False, most=256, wait=False):
+    """Joins a running deployment.
+
+    skeletons, poses, pictures: what is taken of every frame. Pictures of moments are copies: `Client.picture` gives
+    one in place. cameras: their names; all if it is None. every: every frame in order, at most `most` of them waiting,
+    instead of the newest. wait: do not fail if the deployment does not run, but join it when it does.
+    """
+    return Client(name, skeletons, poses, pictures, cameras, most if every else 1, wait)
+
+
+class Client:
+    """Reads a deployment; see `connect`. It leaves when the deployment ends, and joins the next of that name by itself."""
+
+    def __init__(self, name, skeletons, poses, pictures, cameras, most, wait):
+        if not (skeletons or poses or pictures):
+            raise ClientError("nothing is asked for: neither skeletons nor poses nor pictures")
+        self.name, self._wish = name, (skeletons, poses, pictures)
+        self._cameras, self._most = cameras, most
+        self._changed, self._ready = threading.Condition(), collections.deque()
+        self._problem, self._leaving, self._last = None, False, None
+        self.running, self.refused, self.passed_over = None, 0, 0
+        self._run = None
+        try:
+            self._run = self._join()
+        except NotRunning:
+            if not wait:
+                raise
+        self._thread = threading.Thread(target=self._read, name="parallax-client", daemon=True)
+        self._thread.start()
+
+    @property
+    def is_connected(self):
+        """Whether the deployment runs and is read."""
+        return self._run is not None
+
+    def next(self, patience=None):
+        """The next moment, or None if none came within so many seconds; None waits for ever."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._ready or self._problem or self._leaving, patience)
+            if not self._ready:
+                problem, self._problem = self._problem, None
+                if problem is not None:
+                    raise problem
+                return None
+            moment = self._ready.popleft()
+        step = max(1, int(self.running.get("frame_step", 1)))
+        if self._last is not None and self._last[0] == moment.session:
+            moment.n_missed = max(0, (moment.frame - self._last[1]) // step - 1)
+        self._last = (moment.session, moment.frame)
+        return moment
+
+    def moments(self, patience=None):
+        """Moments one after the other, until none comes for so many seconds."""
+        while (moment := self.next(patience)) is not None:
+            yield moment
+
+    def picture(self, camera, patience=1.0):
+        """The newest picture of a camera where its sender wrote it, to be used in a `with` statement; None if none came in
+        time. It must not be held for long: one of a camera can be held at a time."""
+        port = self._in_place("frame", camera)
+        return self._newest(port, lambda it: Picture(it.message, it.array, it), patience)
+
+    def latest_skeleton(self, patience=1.0):
+        """The newest message `Pose3d` as a `Sample` in place, to be used in a `with` statement; None if none came in time."""
+        return self._newest(self._in_place("pose3d", None), lambda it: it, patience)
+
+    def _in_place(self, about, camera):
+        run = self._run
+        if run is None:
+            raise NotRunning(self.name, running_deployments())
+        key = (about, camera)
+        if key not in run.in_place:
+            whose = None if camera is None else _number(run.guest, camera)
+            run.in_place[key] = run.guest.port(about, whose)
+        return run.in_place[key]
+
+    def _newest(self, port, made, patience):
+        end, newest = time.monotonic() + patience, None
+        while True:
+            while True:
+                try:
+                    sample = port.receive()
+                except TooManyHeld:
+                    if newest is None:
+                        raise
+                    # A newer one was sent since: this one makes room.
+                    newest.release()
+                    newest = None
+                    continue
+                if sample is None:
+                    break
+                if newest is not None:
+                    newest.release()
+                newest = sample if _is_ours(sample, self._run) else None
+            if newest is not None:
+                return made(newest)
+            if time.monotonic() > end:
+                return None
+            time.sleep(_PAUSE_S)
+
+    def close(self):
+        """Leaves the deployment."""
+        with self._changed:
+            self._leaving = True
+            self._changed.notify_all()
+        self._thread.join()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def _join(self):
+        """One that is about to start has no topics yet: they are waited for."""
+        end = time.monotonic() + 5
+        while True:
+            try:
+                return self._try_to_join()
+            except NoSuchTopic:
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.05)
+
+    def _try_to_join(self):
+        guest = Guest(self.name)
+        try:
+            run = _Run(guest, self._wish, self._cameras)
+        except BaseException:
+            guest.close()
+            raise
+        self.running = guest.running
+        return run
+
+    def _read(self):
+        while not self._leaving:
+            if self._run is None:
+                try:
+                    self._run = self._join()
+                except NotRunning:
+                    time.sleep(_RETRY_S)
+                    continue
+                except ClientError as error:
+                    self._tell(error)
+                    time.sleep(_RETRY_S)
+                    continue
+            try:
+                self._read_run(self._run)
+            except ClientError as error:
+                self._tell(error)
+            finally:
+                run, self._run = self._run, None
+                run.close()
+
+    def _read_run(self, run):
+        checked = time.monotonic()
+        while not self._leaving:
+            refused = run.refused
+            given = run.turn()
+            self.refused += run.refused - refused
+            if given:
+                with self._changed:
+                    for moment in given:
+                        while len(self._ready) >= self._most:
+                            self._ready.popleft()
+                            self.passed_over += 1
+                        self._ready.append(moment)
+                    self._changed.notify_all()
+            if time.monotonic() - checked > _CHECK_S:
+                checked = time.monotonic()
+                if run.guest.is_over():
+                    return
+            time.sleep(_PAUSE_S)
+
+    def _tell(self, error):
+        with self._changed:
+            self._problem = error
+            self._changed.notify_all()
+
+
+def _number(guest, camera):
+    names = [it["name"] for it in guest.running["views"]]
+    if camera not in names:
+        raise ClientError(f"deployment {guest.name!r} has no camera {camera!r}, but {', '.join(names)}")
+    return names.index(camera)
+
+
+def _is_ours(sample, run):
+    """Whether a message is of this run, and its counts and numbers can be; not those that only say that it ends."""
+    message = sample.message
+    if run is None or int(message["stamp"]["session"]) != run.guest.running["session"]:
+        return False
+    if int(message["status"]) == layout.END:
+        return False
+    if sample.array is not None:
+        n = int(message["width"]) * int(message["height"]) * 3
+        return int(message["status"]) != layout.OK or (n > 0 and n == len(sample.array))
+    if "n_joints" in message.dtype.names:
+        return _is_skeleton(message, run.guest.running)
+    return int(message["n_candidates"]) <= layout.LIMITS["MAX_CANDIDATES"]
+
+
+def _is_skeleton(message, running):
+    n_joints, n_views = int(message["n_joints"]), int(message["n_views"])
+    fits = n_joints == len(running["joints"]) and n_views == len(running["views"])
+    is_empty = n_joints == n_views == 0 and int(message["status"]) != layout.OK
+    if not (fits or is_empty):
+        return False
+    joints = message["joints"][:n_joints]
+    found = joints[joints["status"] == layout.OK]
+    return bool(np.isfinite(found["in_world"]).all() and np.isfinite(found["covariance"]).all())
+
+
+class _Run:
+    """The ports of one run of the deployment, and the frames that wait for their parts."""
+
+    def __init__(self, guest, wish, cameras):
+        self.guest, self._wish, self.in_place, self.refused = guest, wish, {}, 0
+        skeletons, poses, pictures = wish
+        names = [it["name"] for it in guest.running["views"]] if cameras is None else list(cameras)
+        views = {name: _number(guest, name) for name in names} if poses or pictures else {}
+        self._skeletons = guest.port("pose3d") if skeletons else None
+        self._poses = {name: guest.port("view-pose", view) for name, view in views.items()} if poses else {}
+        self._pictures = {name: guest.port("frame", view) for name, view in views.items()} if pictures else {}
+        self._pending, self._next = {}, 0
+
+    def close(self):
+        self.in_place.clear()
+        self.guest.close()
+
+    def turn(self):
+        """The moments that are whole, in order. A skeleton is the last that is sent about a frame."""
+        skeletons = list(self._drain(self._skeletons))
+        for name, port in self._poses.items():
+            for message, _ in self._drain(port):
+                self._put(message, lambda it, message=message, name=name: it.poses.__setitem__(name, message))
+        for name, port in self._pictures.items():
+            for message, pixels in self._drain(port):
+                picture = Picture(message, pixels)
+                self._put(message, lambda it, picture=picture, name=name: it.pictures.__setitem__(name, picture))
+        for message, _ in skeletons:
+            skeleton = Skeleton(message, self.guest.running)
+            self._put(message, lambda it, skeleton=skeleton: setattr(it, "skeleton", skeleton))
+        return self._take()
+
+    def _drain(self, port):
+        """Copies of the messages that wait."""
+        for _ in range(64):
+            sample = port.receive() if port is not None else None
+            if sample is None:
+                return
+            try:
+                if _is_ours(sample, self):
+                    array = None if sample.array is None else sample.array.copy()
+                    yield sample.message.copy(), array
+                elif int(sample.message["status"]) != layout.END:
+                    self.refused += 1
+            finally:
+                sample.release()
+
+    def _put(self, message, add):
+        stamp = message["stamp"]
+        frame = int(stamp["frame"])
+        if frame < self._next:
+            return
+        if len(self._pending) >= _MOST_PENDING and frame not in self._pending:
+            del self._pending[min(self._pending)]
+        moment = self._pending.setdefault(frame, Moment(self.guest.running["session"], frame))
+        captured = int(stamp["captured_at_nanos"])
+        moment.captured_at_nanos = min(captured, moment.captured_at_nanos or captured)
+        add(moment)
+
+    def _take(self):
+        over = [frame for frame, it in self._pending.items() if self._is_over(it)]
+        if not over:
+            return []
+        self._next = max(over) + 1
+        given = []
+        for frame in sorted(it for it in self._pending if it < self._next):
+            moment = self._pending.pop(frame)
+            moment.is_complete = self._has_views(moment)
+            if moment.skeleton is not None or not self._wish[0]:
+                given.append(moment)
+        return given
+
+    def _is_over(self, moment):
+        if self._wish[0]:
+            return moment.skeleton is not None
+        return self._has_views(moment) or time.monotonic() - moment._since > 0.5
+
+    def _has_views(self, moment):
+        return len(moment.poses) == len(self._poses) and len(moment.pictures) == len(self._pictures)

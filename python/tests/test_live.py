@@ -1,0 +1,99 @@
+"""A real deployment of synthetic cameras, read while it runs. Skipped without the executable or iceoryx2."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import parallax_client
+
+PATIENCE = 90
+
+
+def mapping_of(array):
+    """The line of /proc/self/maps that an array lies in."""
+    pointer = array.__array_interface__["data"][0]
+    with open("/proc/self/maps", encoding="ascii") as lines:
+        for line in lines:
+            begin, end = (int(it, 16) for it in line.split()[0].split("-"))
+            if begin <= pointer < end:
+                return line
+    raise AssertionError("the array lies nowhere")
+
+
+def test_skeletons_poses_and_pictures_of_a_frame_come_together_and_a_process_that_dies_comes_back(deploy):
+    deployment = deploy()
+    with pytest.raises(parallax_client.NotRunning, match="does not run"):
+        parallax_client.connect("no-such-deployment")
+    # Before it runs: the client joins it when it does.
+    with parallax_client.connect(deployment.name, poses=True, pictures=True, every=True, wait=True) as client:
+        moment = next(it for it in client.moments(PATIENCE) if it.is_complete)
+        assert set(moment.pictures) == set(moment.poses) == {it["name"] for it in client.running["views"]}
+        for name, picture in moment.pictures.items():
+            assert picture.frame == moment.frame and picture.pixels.shape == (240, 320, 3)
+            assert int(moment.poses[name]["stamp"]["frame"]) == moment.frame
+        joints = moment.skeleton.joints()
+        assert len(joints) == 14
+        for joint in joints.values():
+            assert (joint.position is None) == (joint.reason is not None)
+
+        # In place: read-only, in the memory of the sender, and never taken away from a view.
+        with client.picture("c1", PATIENCE) as picture:
+            assert not picture.pixels.flags.writeable and not picture.pixels.flags.owndata
+            with pytest.raises(ValueError):
+                picture.pixels.flags.writeable = True
+            assert "shm" in mapping_of(picture.pixels) or ".data" in mapping_of(picture.pixels)
+            kept = picture.pixels.copy()
+        assert kept.mean() > 0
+        with client.latest_skeleton(PATIENCE) as sample:
+            assert np.isfinite(sample.message["joints"]["in_world"]).all()
+
+        # A process that is killed comes back without a word.
+        pid = deployment.pids("triangulate")[0]
+        os.kill(pid, signal.SIGKILL)
+        killed = time.monotonic_ns()
+        moment = next(it for it in client.moments(PATIENCE) if it.captured_at_nanos > killed)
+        assert int(moment.skeleton.message["stamp"]["epoch"]) == 1
+        assert client.refused == 0
+
+
+def test_programs_that_are_killed_or_asleep_keep_no_place_and_hold_up_nobody(deploy):
+    deployment = deploy()
+    words = "import parallax_client, sys, time; c = parallax_client.connect(sys.argv[1], pictures=True, wait=True); " \
+            "c.next(90); print('there', flush=True); time.sleep(600)"
+    for _ in range(6):
+        program = subprocess.Popen([sys.executable, "-c", words, deployment.name], stdout=subprocess.PIPE, text=True)
+        assert program.stdout.readline() == "there\n"
+        program.kill()
+        program.wait()
+    asleep = subprocess.Popen([sys.executable, "-c", words, deployment.name], stdout=subprocess.PIPE, text=True)
+    assert asleep.stdout.readline() == "there\n"
+    with parallax_client.connect(deployment.name) as client:
+        frames = [client.next(PATIENCE).frame for _ in range(3)]
+        assert frames == sorted(set(frames))
+        # The deployment ends although one sleeps and one is connected.
+        deployment.stop()
+        again = deploy(name=deployment.name)
+        moment = client.next(PATIENCE)
+        while moment.session != client.running["session"] or moment.frame > 50:
+            moment = client.next(PATIENCE)
+        assert again.process.poll() is None
+    asleep.kill()
+    asleep.wait()
+
+
+def test_there_is_a_limit_which_is_named(deploy):
+    deployment = deploy()
+    clients = [parallax_client.connect(deployment.name, wait=True)]
+    assert clients[0].next(PATIENCE) is not None
+    with pytest.raises(parallax_client.Full, match="4 programs"):
+        for _ in range(20):
+            clients.append(parallax_client.connect(deployment.name))
+    assert len(clients) == 4
+    for client in clients:
+        client.close()
+    parallax_client.connect(deployment.name).close()

@@ -1,0 +1,119 @@
+//! `parallax publish`: the skeletons of a running deployment as datagrams.
+
+use std::process::ExitCode;
+
+use clap::Args;
+use launch::output;
+use publish::{Companion, Target};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+
+use super::top;
+use crate::globals::Globals;
+
+/// Options of `parallax publish`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Reads the deployment as any other program does: no process of it waits, and it may come and go at any time. Every frame is
+one datagram of at most 1400 bytes, JSON on one line, or OSC bundles. A joint without a position is sent with the reason,
+never as zeros. What nobody receives is lost. The manual describes both forms (docs/guide/programs.md).
+
+Examples:
+    parallax publish demo udp://127.0.0.1:9000
+    parallax publish demo osc://127.0.0.1:9001 udp://127.0.0.1:9000
+    parallax publish demo udp://192.168.1.20:9000 --beyond-this-machine
+    nc -klu 127.0.0.1 9000                              shows what arrives")]
+pub(crate) struct Arguments {
+    /// Name of the deployment, or its file. It need not run yet.
+    deployment: String,
+    /// Where to send: udp://HOST:PORT (JSON lines), udp://HOST:PORT?format=osc, osc://HOST:PORT.
+    #[arg(required = true, value_name = "TARGET")]
+    targets: Vec<String>,
+    /// Allow targets that are not this machine: skeletons leave it unencrypted.
+    #[arg(long)]
+    beyond_this_machine: bool,
+    /// End when the deployment ends, instead of waiting for its next run.
+    #[arg(long)]
+    until_end: bool,
+    /// Print the counts as JSON at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Publishes until Ctrl-C, or the end of the deployment.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let targets = targets(&arguments.targets, arguments.beyond_this_machine)?;
+    let namespace = top::namespace(Some(&arguments.deployment))?;
+    let name = namespace.name();
+    if !globals.quiet {
+        for target in &targets {
+            output::message(format_args!(
+                "publishing the skeletons of {name} to {target}"
+            ));
+        }
+    }
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let counts = publish::run(name, &targets, arguments.until_end, &stop)?;
+    if arguments.json {
+        output::json(&serde_json::json!({
+            "frames": counts.frames, "sent": counts.sent, "unsent": counts.unsent,
+            "too_large": counts.too_large, "missed": counts.missed,
+        }))?;
+    } else if !globals.quiet {
+        output::message(format_args!(
+            "{} frames in {} datagrams, {} not taken, {} frames too large, {} missed",
+            counts.frames, counts.sent, counts.unsent, counts.too_large, counts.missed
+        ));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Reads targets, and says which of them are other machines, or refuses those.
+fn targets(texts: &[String], beyond: bool) -> Result<Vec<Target>, Failure> {
+    let mut targets = Vec::new();
+    for text in texts {
+        let target = Target::parse(text).map_err(|error| usage(&error))?;
+        match target.stays_here() {
+            Ok(()) => {}
+            Err(error) if beyond => output::message(error),
+            Err(error) => {
+                return Err(usage(&error).with_hint("allow it with --beyond-this-machine"));
+            }
+        }
+        targets.push(target);
+    }
+    Ok(targets)
+}
+
+fn usage(error: &publish::TargetError) -> Failure {
+    Failure::new(ExitKind::Usage, error.to_string())
+}
+
+/// Waits for the end of what was started by [`beside`], and shows what it said.
+pub(crate) fn finish(companion: Option<Companion>, quiet: bool) {
+    let said = companion.map(Companion::finish).unwrap_or_default();
+    let first = "publishing the skeletons";
+    for line in said.iter().filter(|it| !quiet && !it.contains(first)) {
+        output::message(format_args!("publish: {line}"));
+    }
+}
+
+/// Starts publishing beside a run of a deployment, as `--publish` asks; nothing without targets.
+///
+/// * `name`: of the deployment.
+/// * `beyond`: whether targets may be other machines.
+pub(crate) fn beside(
+    name: &str,
+    texts: &[String],
+    beyond: bool,
+) -> Result<Option<Companion>, Failure> {
+    if texts.is_empty() {
+        return Ok(None);
+    }
+    for target in targets(texts, beyond)? {
+        output::message(format_args!(
+            "publishing the skeletons of {name} to {target}"
+        ));
+    }
+    let executable = std::env::current_exe().or_fail(ExitKind::Run)?;
+    Companion::start(&executable, name, texts, beyond).map(Some)
+}

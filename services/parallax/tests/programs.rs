@@ -1,0 +1,254 @@
+//! Other programs read a running deployment: through `client`, through datagrams, from Python.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use core::time::Duration;
+use std::collections::BTreeSet;
+use std::net::UdpSocket;
+use std::time::Instant;
+
+use client::{Client, ClientError, State, Wish};
+use common::started::signal;
+use common::{Case, PACED, PLAIN};
+use runtime::GuestError;
+use serde_json::Value;
+
+use crate::common;
+
+/// Anything that takes longer is stuck.
+const WATCHDOG: Duration = Duration::from_mins(2);
+
+/// The next moment.
+fn next(client: &mut Client) -> client::Moment {
+    client.next(WATCHDOG).unwrap().expect("nothing came")
+}
+
+/// Waits until something holds.
+fn until(mut holds: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !holds() {
+        assert!(begin.elapsed() < WATCHDOG, "waited in vain");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// The file that some bytes of this process are those of.
+fn mapped_file(bytes: &[u8]) -> String {
+    let at = bytes.as_ptr().addr();
+    let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
+    let of_line = |line: &str| {
+        let (range, _) = line.split_once(' ')?;
+        let (begin, end) = range.split_once('-')?;
+        let [begin, end] = [begin, end].map(|it| usize::from_str_radix(it, 16));
+        (begin.ok()?..end.ok()?)
+            .contains(&at)
+            .then(|| line.to_owned())
+    };
+    let line = maps.lines().find_map(of_line).unwrap_or_default();
+    line.split_ascii_whitespace()
+        .nth(5)
+        .unwrap_or_default()
+        .to_owned()
+}
+
+#[test]
+fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending() {
+    let live = PACED.replace("[capture]", "[capture]\nmode = \"realtime\"");
+    let case = Case::new("client", &[70; 2], &live);
+    let wish = Wish::skeletons()
+        .with_poses()
+        .with_pictures()
+        .every_frame(64);
+    // Before there is a deployment.
+    let refused = Client::open(&case.name, &wish).unwrap_err();
+    assert!(refused.is_not_running(), "{refused}");
+    let mut client = Client::wait_for(&case.name, &wish).unwrap();
+    assert_eq!(client.state(), State::Waiting);
+    let mut started = case.start(&["run", "deployment.toml", "--json"]);
+    let first = next(&mut client);
+    assert_eq!(first.running.name, case.name);
+    let refused = Client::open(
+        &case.name,
+        &Wish::views().with_poses().of_cameras(&["none"]),
+    );
+    let refused = refused.unwrap_err();
+    assert!(matches!(refused, ClientError::NoCamera { .. }), "{refused}");
+    let moment = loop {
+        let moment = next(&mut client);
+        if moment.is_complete {
+            break moment;
+        }
+    };
+    assert_eq!(moment.views.len(), 2);
+    for view in &moment.views {
+        let picture = view.picture.as_ref().unwrap();
+        let [width, height] = picture.size();
+        assert_eq!(picture.pixels().len() as u32, width * height * 3);
+        assert_eq!(view.pose.as_ref().unwrap().stamp.frame, moment.frame);
+    }
+    signal("KILL", started.pid_of("triangulate").into());
+    until(|| {
+        let moment = next(&mut client);
+        moment
+            .skeleton
+            .is_some_and(|it| it.message().stamp.epoch == 1)
+    });
+    // The run ends, and its files are removed, while the client is there.
+    let ended = started.wait();
+    // A process was lost on the way.
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    case.assert_nothing_left();
+    until(|| client.state() == State::Waiting);
+    assert_eq!(client.losses().refused, 0);
+}
+
+#[test]
+fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
+    let case = Case::new("asleep", &[40; 2], PLAIN);
+    // Holds a picture of each view, and never looks again.
+    let mut asleep = Client::wait_for(&case.name, &Wish::views().with_pictures()).unwrap();
+    let started = case.start(&["run", "deployment.toml", "--json"]);
+    let held = next(&mut asleep);
+    let prefix = runtime::Namespace::new(&case.name).unwrap();
+    let pictures = || held.views.iter().filter_map(|it| it.picture.as_ref());
+    assert_eq!(pictures().count(), 2);
+    for picture in pictures() {
+        assert!(picture.is_in_place());
+        let file = mapped_file(picture.pixels());
+        assert!(
+            file.contains(prefix.prefix()) && file.starts_with("/dev/shm/"),
+            "{file}"
+        );
+    }
+    let pixels = || {
+        pictures()
+            .map(|it| it.pixels().to_vec())
+            .collect::<Vec<_>>()
+    };
+    let before = pixels();
+    until(|| case.lines("pose3d.jsonl").len() > 25);
+    // Nobody has overwritten what is held.
+    assert!(before == pixels());
+    drop(held);
+    let ended = started.wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let lines = case.lines("pose3d.jsonl");
+    assert_eq!(lines.len(), 40);
+    assert!(
+        lines
+            .iter()
+            .all(|it| it["views_missing"] == serde_json::json!({}))
+    );
+    case.assert_nothing_left();
+}
+
+#[test]
+fn as_many_clients_as_there_are_places_and_no_more() {
+    let case = Case::new("full", &[80; 2], PACED);
+    let wish = Wish::skeletons();
+    let mut clients = vec![Client::wait_for(&case.name, &wish).unwrap()];
+    let started = case.start(&["run", "deployment.toml"]);
+    next(&mut clients[0]);
+    let refused = loop {
+        match Client::open(&case.name, &wish) {
+            Ok(client) => clients.push(client),
+            Err(error) => break error,
+        }
+        assert!(clients.len() < 20);
+    };
+    assert_eq!(clients.len(), runtime::MOST_GUESTS);
+    let is_full = matches!(&refused, ClientError::Guest(GuestError::Full { guests, .. }) if guests.len() == 4);
+    assert!(is_full, "{refused}");
+    clients.pop();
+    clients.push(Client::open(&case.name, &wish).unwrap());
+    signal("INT", started.id());
+    started.wait();
+    case.assert_nothing_left();
+}
+
+#[test]
+fn datagrams_say_where_joints_are_and_the_run_is_as_without() {
+    let case = Case::new("publish", &[30; 2], PACED);
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.set_read_timeout(Some(WATCHDOG)).unwrap();
+    let port = socket.local_addr().unwrap().port();
+    let target = format!("udp://127.0.0.1:{port}");
+    let beyond = case
+        .start(&["run", "deployment.toml", "--publish", "udp://192.0.2.1:9"])
+        .wait();
+    assert_eq!(beyond.status.code(), Some(2), "{}", beyond.stderr);
+    assert!(
+        beyond.stderr.contains("--beyond-this-machine"),
+        "{}",
+        beyond.stderr
+    );
+    // The other is a port that nobody listens on.
+    let arguments = [
+        "run",
+        "deployment.toml",
+        "--json",
+        "--publish",
+        &target,
+        "--publish",
+        "osc://127.0.0.1:9",
+    ];
+    let started = case.start(&arguments);
+    let mut frames = BTreeSet::new();
+    let mut datagram = [0; 2000];
+    while frames.len() < 5 {
+        let n = socket.recv(&mut datagram).unwrap();
+        assert!(n <= publish::MOST_BYTES);
+        let value: Value = serde_json::from_slice(&datagram[..n]).unwrap();
+        assert_eq!(value["deployment"], case.name);
+        for joint in value["joints"].as_object().unwrap().values() {
+            assert!(
+                joint.is_string() || joint.as_array().is_some_and(|it| it.len() == 4),
+                "{joint}"
+            );
+        }
+        frames.insert(value["frame"].as_u64().unwrap());
+    }
+    let ended = started.wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("publish: ") && ended.stderr.contains("publishing the skeletons"),
+        "{}",
+        ended.stderr
+    );
+    case.assert_nothing_left();
+}
+
+/// Tests that take long.
+#[cfg(feature = "long-tests")]
+mod long {
+    use std::path::Path;
+    use std::process::Command;
+
+    /// Whether a Python has all that its tests need.
+    fn is_able(python: &str) -> bool {
+        let imports = Command::new(python)
+            .args(["-c", "import iceoryx2, numpy, pytest"])
+            .output();
+        imports.is_ok_and(|it| it.status.success())
+    }
+
+    #[test]
+    fn the_python_package_reads_a_real_deployment() {
+        let python = std::env::var("PARALLAX_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+        if !is_able(&python) {
+            println!(
+                "skipped: {python} has no iceoryx2, numpy and pytest; name another by PARALLAX_PYTHON"
+            );
+            return;
+        }
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../python");
+        let run = Command::new(&python)
+            .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
+            .current_dir(folder)
+            .env("PARALLAX", env!("CARGO_BIN_EXE_parallax"))
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .output();
+        let run = run.unwrap();
+        let said = String::from_utf8_lossy(&run.stdout).into_owned();
+        assert!(run.status.success(), "{said}");
+    }
+}

@@ -1,0 +1,67 @@
+//! Publishing beside a run, in a process of its own.
+
+use core::time::Duration;
+use std::ffi::OsString;
+use std::path::Path;
+use std::time::Instant;
+
+use runtime::{Child, ExitKind, Failure};
+
+/// How long it may take to see that the deployment has ended.
+const LEAVING: Duration = Duration::from_secs(1);
+
+/// A process that publishes a deployment while it runs. Dropping it ends that.
+#[derive(Debug)]
+pub struct Companion {
+    child: Child,
+}
+
+impl Companion {
+    /// Starts `parallax publish` for a deployment that is about to run; it ends with the deployment.
+    ///
+    /// * `executable`: this program.
+    /// * `targets`: as the user wrote them.
+    /// * `beyond`: whether they may be other machines.
+    ///
+    /// # Errors
+    ///
+    /// The process cannot be started.
+    pub fn start(
+        executable: &Path,
+        deployment: &str,
+        targets: &[String],
+        beyond: bool,
+    ) -> Result<Self, Failure> {
+        let mut arguments: Vec<OsString> = vec!["publish".into(), deployment.into()];
+        arguments.extend(targets.iter().map(OsString::from));
+        arguments.push("--until-end".into());
+        if beyond {
+            arguments.push("--beyond-this-machine".into());
+        }
+        let child = Child::start(executable, &arguments).map_err(|error| {
+            let text = format!("cannot start the process that publishes: {error}");
+            Failure::new(ExitKind::Run, text)
+        })?;
+        Ok(Self { child })
+    }
+
+    /// Waits for its end, which comes with that of the deployment, and gives what it said.
+    pub fn finish(mut self) -> Vec<String> {
+        let begin = Instant::now();
+        let mut said = Vec::new();
+        loop {
+            let has_ended = !matches!(self.child.try_wait(), Ok(None));
+            said.extend(self.child.read_lines().unwrap_or_default());
+            if has_ended || begin.elapsed() > LEAVING {
+                return said;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+impl Drop for Companion {
+    fn drop(&mut self) {
+        self.child.terminate();
+    }
+}

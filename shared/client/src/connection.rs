@@ -1,0 +1,281 @@
+//! The ports of one run of a deployment.
+
+use core::time::Duration;
+use std::io;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use messages::{FrameHeader, Pose3d, Status, ViewPose, topic};
+use runfiles::Running;
+use runtime::{Guest, GuestError, GuestPort, Namespace, ReceiveError, running_deployments};
+
+use crate::check;
+use crate::error::ClientError;
+use crate::joiner::Joiner;
+use crate::moment::{Buffers, Picture};
+use crate::wish::Wish;
+
+/// Messages that are taken from one port in one turn, so that a turn ends.
+const MOST_A_TURN: usize = 64;
+/// How long a deployment that is starting may be without topics.
+const STARTING: Duration = Duration::from_secs(5);
+/// Pause between two attempts.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// The ports of one run of a deployment. Its description stays the same, and so does its session.
+#[derive(Debug)]
+pub(crate) struct Connection {
+    skeletons: Option<GuestPort<Pose3d, ()>>,
+    views: Vec<ViewPorts>,
+    pub(crate) running: Arc<Running>,
+    buffers: Option<Buffers>,
+    /// Messages that could not be of this run, or not be at all.
+    pub(crate) n_refused: u64,
+    // Dropped last: the ports are its.
+    guest: Guest,
+}
+
+#[derive(Debug)]
+struct ViewPorts {
+    view: usize,
+    poses: Option<GuestPort<ViewPose, ()>>,
+    pictures: Option<GuestPort<u8, FrameHeader>>,
+}
+
+/// What became of the pictures of a turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Turn {
+    /// All that was there was taken.
+    Done,
+    /// A picture waits until another is given back.
+    Held,
+}
+
+impl Connection {
+    /// Joins a deployment. One that is about to start has no topics yet: they are waited for.
+    pub(crate) fn open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
+        let begin = Instant::now();
+        loop {
+            match Self::try_open(deployment, wish) {
+                Err(ClientError::Guest(GuestError::NoSuchTopic { .. }))
+                    if begin.elapsed() < STARTING =>
+                {
+                    std::thread::sleep(PAUSE);
+                }
+                opened => return opened,
+            }
+        }
+    }
+
+    fn try_open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
+        let namespace = Namespace::new(deployment)?;
+        let guest = Guest::open(&namespace)?;
+        let text = namespace
+            .description()
+            .map_err(|error| unreadable(deployment, error))?;
+        let running = Running::read(&text)?;
+        let skeletons = if wish.skeletons {
+            Some(guest.port(&topic::pose3d())?)
+        } else {
+            None
+        };
+        let mut views = Vec::new();
+        if wish.has_views() {
+            for view in numbers(&running, wish)? {
+                views.push(ViewPorts::open(&guest, wish, view)?);
+            }
+        }
+        Ok(Self {
+            skeletons,
+            views,
+            running: Arc::new(running),
+            buffers: wish.skeletons.then(Buffers::default),
+            n_refused: 0,
+            guest,
+        })
+    }
+
+    /// The numbers of the views that were asked for.
+    pub(crate) fn views(&self) -> impl Iterator<Item = usize> + Clone {
+        self.views.iter().map(|it| it.view)
+    }
+
+    /// Whether the deployment is ending.
+    pub(crate) fn is_over(&self) -> bool {
+        self.guest.is_over()
+    }
+
+    /// Takes what is there.
+    pub(crate) fn turn(
+        &mut self,
+        joiner: &mut Joiner<Picture>,
+        now: Instant,
+    ) -> Result<Turn, ClientError> {
+        // Skeletons are sent last, so all that belongs to one of these is there when the views are looked at.
+        let skeletons = self.skeletons()?;
+        let mut turn = Turn::Done;
+        for nth in 0..self.views.len() {
+            self.poses(nth, joiner, now)?;
+            if self.pictures(nth, joiner, now)? == Turn::Held {
+                turn = Turn::Held;
+            }
+        }
+        for message in skeletons {
+            joiner.add_skeleton(message, now);
+        }
+        Ok(turn)
+    }
+
+    fn skeletons(&mut self) -> Result<Vec<Box<Pose3d>>, ClientError> {
+        let mut taken = Vec::new();
+        let Some(port) = &self.skeletons else {
+            return Ok(taken);
+        };
+        for _ in 0..MOST_A_TURN {
+            let Some(seen) = port.receive()? else { break };
+            let Some(message) = seen.payload().first() else {
+                continue;
+            };
+            let is_ours = message.stamp.session == self.running.session;
+            if is_ours && message.status == Status::END {
+                continue;
+            }
+            if is_ours && check::skeleton(message, &self.running) {
+                taken.push(Box::new(*message));
+            } else {
+                self.n_refused += 1;
+            }
+        }
+        Ok(taken)
+    }
+
+    fn poses(
+        &mut self,
+        nth: usize,
+        joiner: &mut Joiner<Picture>,
+        now: Instant,
+    ) -> Result<(), ClientError> {
+        let ports = &self.views[nth];
+        let Some(port) = &ports.poses else {
+            return Ok(());
+        };
+        for _ in 0..MOST_A_TURN {
+            let Some(seen) = port.receive()? else { break };
+            let Some(message) = seen.payload().first() else {
+                continue;
+            };
+            if !check::stamp(&message.stamp, &self.running, ports.view) || !check::pose(message) {
+                self.n_refused += 1;
+            } else if message.status != Status::END {
+                joiner.add_pose(nth, Box::new(*message), now);
+            }
+        }
+        Ok(())
+    }
+
+    fn pictures(
+        &mut self,
+        nth: usize,
+        joiner: &mut Joiner<Picture>,
+        now: Instant,
+    ) -> Result<Turn, ClientError> {
+        let ports = &self.views[nth];
+        let Some(port) = &ports.pictures else {
+            return Ok(Turn::Done);
+        };
+        for _ in 0..MOST_A_TURN {
+            let seen = match port.receive() {
+                Ok(Some(seen)) => seen,
+                Ok(None) => break,
+                Err(ReceiveError::TooManyHeld { .. }) => return Ok(Turn::Held),
+                Err(error) => return Err(error.into()),
+            };
+            let header = *seen.header();
+            let is_ours = check::stamp(&header.stamp, &self.running, ports.view);
+            if !is_ours || !check::picture(&header, seen.payload().len()) {
+                self.n_refused += 1;
+                continue;
+            }
+            if header.status == Status::END {
+                continue;
+            }
+            // One that waits for a skeleton would keep its memory from the sender for too long.
+            let picture = match &self.buffers {
+                Some(buffers) => Picture::copied(&seen, buffers),
+                None => Picture::in_place(seen),
+            };
+            joiner.add_picture(nth, &header.stamp, picture, now);
+        }
+        Ok(Turn::Done)
+    }
+}
+
+impl ViewPorts {
+    fn open(guest: &Guest, wish: &Wish, view: usize) -> Result<Self, GuestError> {
+        Ok(Self {
+            view,
+            poses: if wish.poses {
+                Some(guest.port(&topic::view_pose(view))?)
+            } else {
+                None
+            },
+            pictures: if wish.pictures {
+                Some(guest.port(&topic::frame(view))?)
+            } else {
+                None
+            },
+        })
+    }
+}
+
+fn numbers(running: &Running, wish: &Wish) -> Result<Vec<usize>, ClientError> {
+    let Some(cameras) = &wish.cameras else {
+        return Ok((0..running.views.len()).collect());
+    };
+    let mut numbers = Vec::new();
+    for camera in cameras {
+        let number = running.views.iter().position(|it| it.name == *camera);
+        numbers.push(number.ok_or_else(|| ClientError::NoCamera {
+            deployment: running.name.clone(),
+            camera: camera.clone(),
+            cameras: running.views.iter().map(|it| it.name.clone()).collect(),
+        })?);
+    }
+    numbers.sort_unstable();
+    numbers.dedup();
+    Ok(numbers)
+}
+
+/// Why there is no description: the deployment has ended in the meantime, or its file cannot be read.
+fn unreadable(name: &str, source: io::Error) -> GuestError {
+    let name = name.to_owned();
+    if source.kind() == io::ErrorKind::NotFound {
+        let running = running_deployments().unwrap_or_default();
+        GuestError::NotRunning { name, running }
+    } else {
+        GuestError::Directory { name, source }
+    }
+}
+
+/// A lock that a thread has panicked with is as good as any here: what it guards is whole after every step.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::tests::running;
+
+    #[test]
+    fn cameras_are_found_by_name_and_those_that_are_not_there_are_told() {
+        let of = |names: &[&str]| numbers(&running(), &Wish::views().of_cameras(names));
+        assert_eq!(of(&["right", "left", "right"]).unwrap(), [0, 1]);
+        assert_eq!(numbers(&running(), &Wish::views()).unwrap(), [0, 1]);
+        let error = of(&["middle"]).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "deployment \"walk\" has no camera \"middle\", but left, right"
+        );
+    }
+}

@@ -1,0 +1,255 @@
+//! Brings together what belongs to one frame. Reads no clock, knows no port.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use messages::{Pose3d, Stamp, ViewPose};
+
+use crate::wish::Wish;
+
+/// Frames that may be waiting for their parts at the same time.
+const MOST_PENDING: usize = 32;
+
+/// The parts of one frame.
+#[derive(Debug)]
+pub(crate) struct Gathered<P> {
+    pub(crate) frame: u64,
+    pub(crate) captured_at_nanos: u64,
+    pub(crate) skeleton: Option<Box<Pose3d>>,
+    /// One for each view that was asked for.
+    pub(crate) views: Vec<Parts<P>>,
+    pub(crate) is_complete: bool,
+    /// When its first part came.
+    since: Instant,
+}
+
+/// The parts of one view.
+#[derive(Debug)]
+pub(crate) struct Parts<P> {
+    pub(crate) pose: Option<Box<ViewPose>>,
+    pub(crate) picture: Option<P>,
+}
+
+impl<P> Default for Parts<P> {
+    fn default() -> Self {
+        Self {
+            pose: None,
+            picture: None,
+        }
+    }
+}
+
+/// Frames that wait for their parts.
+#[derive(Debug)]
+pub(crate) struct Joiner<P> {
+    wish: Wish,
+    n_views: usize,
+    pending: BTreeMap<u64, Gathered<P>>,
+    /// No frame before this one is given any more.
+    next: u64,
+    /// Parts that came after their frame, and frames that were given up.
+    pub(crate) n_late: u64,
+}
+
+impl<P> Joiner<P> {
+    /// * `n_views`: how many views are asked for.
+    pub(crate) fn new(wish: Wish, n_views: usize) -> Self {
+        Self {
+            wish,
+            n_views,
+            pending: BTreeMap::new(),
+            next: 0,
+            n_late: 0,
+        }
+    }
+
+    pub(crate) fn add_skeleton(&mut self, message: Box<Pose3d>, now: Instant) {
+        if let Some(frame) = self.frame(&message.stamp, now) {
+            frame.skeleton = Some(message);
+        }
+    }
+
+    pub(crate) fn add_pose(&mut self, nth: usize, message: Box<ViewPose>, now: Instant) {
+        let frame = self.frame(&message.stamp, now);
+        if let Some(parts) = frame.and_then(|it| it.views.get_mut(nth)) {
+            parts.pose = Some(message);
+        }
+    }
+
+    pub(crate) fn add_picture(&mut self, nth: usize, stamp: &Stamp, picture: P, now: Instant) {
+        let frame = self.frame(stamp, now);
+        if let Some(parts) = frame.and_then(|it| it.views.get_mut(nth)) {
+            parts.picture = Some(picture);
+        }
+    }
+
+    /// Gives up all that waits.
+    pub(crate) fn clear(&mut self) {
+        self.n_late += self.pending.len() as u64;
+        self.pending.clear();
+    }
+
+    /// The place of a frame; none if it has passed.
+    fn frame(&mut self, stamp: &Stamp, now: Instant) -> Option<&mut Gathered<P>> {
+        if stamp.frame < self.next {
+            self.n_late += 1;
+            return None;
+        }
+        if self.pending.len() >= MOST_PENDING && !self.pending.contains_key(&stamp.frame) {
+            self.pending.pop_first();
+            self.n_late += 1;
+        }
+        let n_views = self.n_views;
+        let gathered = self.pending.entry(stamp.frame).or_insert_with(|| Gathered {
+            frame: stamp.frame,
+            captured_at_nanos: stamp.captured_at_nanos,
+            skeleton: None,
+            views: (0..n_views).map(|_| Parts::default()).collect(),
+            is_complete: false,
+            since: now,
+        });
+        gathered.captured_at_nanos = gathered.captured_at_nanos.min(stamp.captured_at_nanos);
+        Some(gathered)
+    }
+
+    /// The frames that wait for nothing more, in order. What is older than one of them never comes.
+    ///
+    /// A skeleton is the last that is sent about a frame: it says that the rest is there, or will not be.
+    pub(crate) fn take(&mut self, now: Instant) -> Vec<Gathered<P>> {
+        let last = self
+            .pending
+            .values()
+            .rev()
+            .find(|it| self.is_over(it, now))
+            .map(|it| it.frame);
+        let Some(last) = last else {
+            return Vec::new();
+        };
+        let later = self.pending.split_off(&last.saturating_add(1));
+        let done = core::mem::replace(&mut self.pending, later);
+        self.next = last.saturating_add(1);
+        let mut given = Vec::new();
+        for mut it in done.into_values() {
+            if self.wish.skeletons && it.skeleton.is_none() {
+                self.n_late += 1;
+                continue;
+            }
+            it.is_complete = self.has_views(&it);
+            given.push(it);
+        }
+        given
+    }
+
+    fn is_over(&self, it: &Gathered<P>, now: Instant) -> bool {
+        if self.wish.skeletons {
+            return it.skeleton.is_some();
+        }
+        self.has_views(it) || now.saturating_duration_since(it.since) >= self.wish.patience
+    }
+
+    fn has_views(&self, it: &Gathered<P>) -> bool {
+        let (poses, pictures) = (self.wish.poses, self.wish.pictures);
+        it.views
+            .iter()
+            .all(|it| (!poses || it.pose.is_some()) && (!pictures || it.picture.is_some()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::time::Duration;
+
+    use bytemuck::Zeroable as _;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::check::tests::pose3d;
+
+    fn stamp(frame: u64) -> Stamp {
+        Stamp {
+            session: 7,
+            frame,
+            captured_at_nanos: 1000 * frame,
+            ..Stamp::default()
+        }
+    }
+
+    fn pose(frame: u64) -> Box<ViewPose> {
+        let mut message = ViewPose::zeroed();
+        message.stamp = stamp(frame);
+        Box::new(message)
+    }
+
+    #[test]
+    fn a_skeleton_says_that_the_frame_is_over() {
+        let now = Instant::now();
+        let mut joiner = Joiner::new(Wish::skeletons().with_poses().with_pictures(), 2);
+        for frame in [4, 5] {
+            joiner.add_pose(0, pose(frame), now);
+            joiner.add_picture(0, &stamp(frame), 'a', now);
+        }
+        joiner.add_pose(1, pose(5), now);
+        joiner.add_picture(1, &stamp(5), 'b', now);
+        assert_eq!(joiner.take(now).len(), 0, "no skeleton");
+        joiner.add_skeleton(Box::new(pose3d(5)), now);
+        let given = joiner.take(now);
+        // Frame 4 has no skeleton, and will not have one.
+        assert_eq!(given.len(), 1);
+        assert!(given[0].is_complete);
+        assert_eq!(given[0].views[1].picture, Some('b'));
+        joiner.add_skeleton(Box::new(pose3d(4)), now);
+        assert_eq!(joiner.take(now).len(), 0, "too late");
+        assert_eq!(joiner.n_late, 2);
+        // A view that is missing is said.
+        joiner.add_pose(1, pose(6), now);
+        joiner.add_skeleton(Box::new(pose3d(6)), now);
+        let given = joiner.take(now);
+        assert!(!given[0].is_complete && given[0].views[0].pose.is_none());
+    }
+
+    #[test]
+    fn without_skeletons_a_frame_waits_for_its_views_and_not_for_ever() {
+        let now = Instant::now();
+        let mut joiner = Joiner::<()>::new(Wish::views().with_poses(), 2);
+        joiner.add_pose(0, pose(1), now);
+        assert_eq!(joiner.take(now).len(), 0);
+        joiner.add_pose(0, pose(2), now);
+        joiner.add_pose(1, pose(2), now);
+        let frames: Vec<_> = joiner
+            .take(now)
+            .iter()
+            .map(|it| (it.frame, it.is_complete))
+            .collect();
+        assert_eq!(frames, [(1, false), (2, true)]);
+        joiner.add_pose(0, pose(3), now);
+        let later = now + Duration::from_secs(1);
+        let frames: Vec<_> = joiner
+            .take(later)
+            .iter()
+            .map(|it| (it.frame, it.is_complete))
+            .collect();
+        assert_eq!(frames, [(3, false)]);
+    }
+
+    proptest! {
+        #[test]
+        fn frames_come_once_in_order_and_what_waits_is_bounded(
+            parts in prop::collection::vec((0_u64..200, 0_usize..3), 1..400),
+            with_skeletons in any::<bool>(),
+        ) {
+            let now = Instant::now();
+            let wish = if with_skeletons { Wish::skeletons() } else { Wish::views() };
+            let mut joiner = Joiner::<()>::new(wish.with_poses(), 2);
+            let mut frames = Vec::new();
+            for (frame, part) in parts {
+                match part {
+                    2 => joiner.add_skeleton(Box::new(pose3d(frame)), now),
+                    nth => joiner.add_pose(nth, pose(frame), now),
+                }
+                frames.extend(joiner.take(now).iter().map(|it| it.frame));
+                prop_assert!(joiner.pending.len() <= MOST_PENDING);
+            }
+            prop_assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! What a program is given: everything about one frame.
+
+use std::sync::{Arc, Mutex};
+
+use messages::{FrameHeader, Joint3d, Pose3d, Status, ViewPose};
+use runfiles::Running;
+use runtime::Seen;
+
+use crate::connection::lock;
+
+/// Everything about one frame that was asked for and is there.
+#[derive(Debug)]
+pub struct Moment {
+    /// What the deployment says about itself: names of joints and cameras.
+    pub running: Arc<Running>,
+    /// Number of the frame, the same in all views.
+    pub frame: u64,
+    /// When it was captured, nanoseconds of `CLOCK_MONOTONIC`.
+    pub captured_at_nanos: u64,
+    /// The skeleton, if skeletons were asked for: there may be a reason in its place ([`Skeleton::status`]).
+    pub skeleton: Option<Skeleton>,
+    /// The views that were asked for, in the order of the deployment.
+    pub views: Vec<ViewMoment>,
+    /// Whether all that was asked for is there.
+    pub is_complete: bool,
+    /// Frames between this moment and the one given before that were not given: skipped by the pipeline, lost with a process, or
+    /// passed over because newer ones were there. 0 for the first of a run.
+    pub n_missed: u64,
+}
+
+/// What there is of one view.
+#[derive(Debug)]
+pub struct ViewMoment {
+    /// Number of the view.
+    pub view: usize,
+    /// What was found in it alone: the message, which holds positions in cells of the pyramid. Positions in pixels after fusion
+    /// are in [`Skeleton::centres_px`].
+    pub pose: Option<Box<ViewPose>>,
+    /// Its picture.
+    pub picture: Option<Picture>,
+}
+
+/// The skeleton of one frame.
+#[derive(Debug, Clone)]
+pub struct Skeleton {
+    message: Box<Pose3d>,
+    running: Arc<Running>,
+}
+
+/// One joint, and where it is or why it is nowhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joint<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Where it is; or why there is no place.
+    pub found: Result<Place, Status>,
+}
+
+/// Where a joint is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// In the world frame of the calibration, metres.
+    pub in_world: [f64; 3],
+    /// Covariance `[xx, xy, xz, yy, yz, zz]`, square metres.
+    pub covariance: [f64; 6],
+    /// Standard deviation along one axis, the mean over the three: `sqrt((xx + yy + zz) / 3)`, metres.
+    pub deviation_m: f64,
+    /// Root mean square distance from what the views saw, pixels.
+    pub reprojection_px: f64,
+    /// Number of views that it was located with.
+    pub n_views: u32,
+}
+
+impl Skeleton {
+    pub(crate) fn new(message: Box<Pose3d>, running: Arc<Running>) -> Self {
+        Self { message, running }
+    }
+
+    /// The message as it was sent.
+    pub fn message(&self) -> &Pose3d {
+        &self.message
+    }
+
+    /// [`Status::OK`] if there is a skeleton, or why there is none.
+    pub fn status(&self) -> Status {
+        self.message.status
+    }
+
+    /// The joints, in the order of the deployment; none if there is no skeleton.
+    pub fn joints(&self) -> impl Iterator<Item = Joint<'_>> {
+        let names = self.running.joints.iter();
+        names.zip(self.joint_slice()).map(named)
+    }
+
+    /// The joint of that name; none if the deployment has no such joint, or this frame no skeleton.
+    pub fn joint(&self, name: &str) -> Option<Joint<'_>> {
+        self.joints().find(|it| it.name == name)
+    }
+
+    /// What networks name beside the joints.
+    pub fn keypoints(&self) -> impl Iterator<Item = Joint<'_>> {
+        let n = (self.message.n_keypoints as usize).min(self.message.keypoints.len());
+        let names = self.running.keypoints.iter();
+        names.zip(&self.message.keypoints[..n]).map(named)
+    }
+
+    /// The centres of the parts in the frame of a view after fusion, `[column, row]` in pixels; empty where the view has no part in
+    /// the skeleton.
+    pub fn centres_px(&self, view: usize) -> &[[f64; 2]] {
+        let view = self.message.views.get(view);
+        let seen = view.filter(|it| it.status == Status::OK);
+        seen.map_or(&[], |it| {
+            let n = (it.n_parts as usize).min(it.centres_px.len());
+            &it.centres_px[..n]
+        })
+    }
+
+    fn joint_slice(&self) -> &[Joint3d] {
+        let n = (self.message.n_joints as usize).min(self.message.joints.len());
+        &self.message.joints[..n]
+    }
+}
+
+fn named<'a>((name, joint): (&'a String, &Joint3d)) -> Joint<'a> {
+    let [xx, _, _, yy, _, zz] = joint.covariance;
+    let found = if joint.status == Status::OK {
+        Ok(Place {
+            in_world: joint.in_world,
+            covariance: joint.covariance,
+            deviation_m: ((xx + yy + zz) / 3.0).max(0.0).sqrt(),
+            reprojection_px: joint.reprojection_px,
+            n_views: joint.views_used.count_ones(),
+        })
+    } else {
+        Err(joint.status)
+    };
+    Joint { name, found }
+}
+
+/// The picture of one view.
+///
+/// Without skeletons it lies where its sender wrote it, and no pixel is copied. Joined with a skeleton, which comes later, it is a
+/// copy, in memory that is used again: its sender cannot spare the memory for so long.
+#[derive(Debug)]
+pub struct Picture {
+    pixels: Pixels,
+}
+
+#[derive(Debug)]
+enum Pixels {
+    InPlace(Seen<u8, FrameHeader>),
+    Copied {
+        header: FrameHeader,
+        pixels: Vec<u8>,
+        home: Buffers,
+    },
+}
+
+/// Memory of pictures that were dropped, for those to come.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Buffers(Arc<Mutex<Vec<Vec<u8>>>>);
+
+impl Picture {
+    pub(crate) fn in_place(seen: Seen<u8, FrameHeader>) -> Self {
+        Self {
+            pixels: Pixels::InPlace(seen),
+        }
+    }
+
+    pub(crate) fn copied(seen: &Seen<u8, FrameHeader>, home: &Buffers) -> Self {
+        let mut pixels = lock(&home.0).pop().unwrap_or_default();
+        pixels.clear();
+        pixels.extend_from_slice(seen.payload());
+        Self {
+            pixels: Pixels::Copied {
+                header: *seen.header(),
+                pixels,
+                home: home.clone(),
+            },
+        }
+    }
+
+    /// The pixels, RGB, row major; empty if there is no picture ([`Self::status`]).
+    pub fn pixels(&self) -> &[u8] {
+        if self.status() != Status::OK {
+            return &[];
+        }
+        match &self.pixels {
+            Pixels::InPlace(seen) => seen.payload(),
+            Pixels::Copied { pixels, .. } => pixels,
+        }
+    }
+
+    /// Width and height, pixels; 0 if there is no picture.
+    pub fn size(&self) -> [u32; 2] {
+        let header = self.header();
+        [header.width, header.height]
+    }
+
+    /// [`Status::OK`], or what is wrong with the camera.
+    pub fn status(&self) -> Status {
+        self.header().status
+    }
+
+    /// The header as it was sent.
+    pub fn header(&self) -> &FrameHeader {
+        match &self.pixels {
+            Pixels::InPlace(seen) => seen.header(),
+            Pixels::Copied { header, .. } => header,
+        }
+    }
+
+    /// Whether it lies where its sender wrote it.
+    pub fn is_in_place(&self) -> bool {
+        matches!(self.pixels, Pixels::InPlace(_))
+    }
+}
+
+impl Drop for Picture {
+    fn drop(&mut self) {
+        if let Pixels::Copied { pixels, home, .. } = &mut self.pixels {
+            lock(&home.0).push(core::mem::take(pixels));
+        }
+    }
+}
+
+impl Moment {
+    /// Whether any of its pictures lies where its sender wrote it.
+    pub(crate) fn is_in_place(&self) -> bool {
+        let mut pictures = self.views.iter().filter_map(|it| it.picture.as_ref());
+        pictures.any(Picture::is_in_place)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::tests::{pose3d, running};
+
+    #[test]
+    fn a_joint_has_a_place_or_a_reason() {
+        let skeleton = Skeleton::new(Box::new(pose3d(0)), Arc::new(running()));
+        let head = skeleton.joint("head").unwrap().found.unwrap();
+        assert_eq!((head.in_world, head.n_views), ([0.0, 0.0, 1.7], 2));
+        assert!((head.deviation_m - 0.02_f64 / 2_f64.sqrt()).abs() < 1e-12);
+        let wrist = skeleton.joint("right wrist").unwrap();
+        assert_eq!(wrist.found, Err(Status::TOO_FEW_VIEWS));
+        assert_eq!(skeleton.joint("tail"), None);
+        assert_eq!(skeleton.centres_px(0).len(), 0);
+        assert_eq!(skeleton.centres_px(99).len(), 0);
+    }
+}

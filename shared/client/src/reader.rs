@@ -1,0 +1,317 @@
+//! The thread that reads a deployment, and what it hands to the caller.
+
+use core::time::Duration;
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use runfiles::Running;
+
+use crate::connection::{Connection, Turn, lock};
+use crate::error::ClientError;
+use crate::joiner::{Gathered, Joiner};
+use crate::moment::{Moment, Picture, Skeleton, ViewMoment};
+use crate::wish::Wish;
+
+/// Pause between two looks at the ports: no sender wakes a client.
+const PAUSE: Duration = Duration::from_millis(1);
+/// How often the reader looks whether the deployment still runs. It has a second to leave.
+const CHECK: Duration = Duration::from_millis(100);
+/// Pause between two attempts to join a deployment that does not run.
+const RETRY: Duration = Duration::from_millis(200);
+
+/// Reads a deployment.
+///
+/// Dropping it leaves the deployment.
+#[derive(Debug)]
+pub struct Client {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+    /// Session and frame of the last moment that was given.
+    last: Option<(u64, u64)>,
+}
+
+/// Whether the deployment is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// It runs, and is read.
+    Connected,
+    /// It does not run; the client joins it when it does.
+    Waiting,
+}
+
+/// What was not given to the caller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Losses {
+    /// Messages of another run, or with counts or numbers that cannot be.
+    pub refused: u64,
+    /// Parts that came after their frame, and frames without a skeleton where one was asked for.
+    pub late: u64,
+    /// Moments that were passed over, because newer ones came before the caller asked.
+    pub passed_over: u64,
+}
+
+#[derive(Debug)]
+struct Shared {
+    inner: Mutex<Inner>,
+    changed: Condvar,
+}
+
+#[derive(Debug)]
+struct Inner {
+    ready: VecDeque<Moment>,
+    losses: Losses,
+    running: Option<Arc<Running>>,
+    state: State,
+    problem: Option<ClientError>,
+    is_leaving: bool,
+}
+
+impl Client {
+    /// Joins a deployment that runs.
+    ///
+    /// # Errors
+    ///
+    /// [`ClientError`]; that no such deployment runs is told with the names of those that do.
+    pub fn open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
+        check_wish(wish)?;
+        let connection = Connection::open(deployment, wish)?;
+        Self::start(deployment, wish, Some(connection))
+    }
+
+    /// Joins a deployment now, or as soon as it runs.
+    ///
+    /// # Errors
+    ///
+    /// [`ClientError`], but not that it does not run.
+    pub fn wait_for(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
+        check_wish(wish)?;
+        match Connection::open(deployment, wish) {
+            Ok(connection) => Self::start(deployment, wish, Some(connection)),
+            Err(error) if error.is_not_running() => Self::start(deployment, wish, None),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn start(
+        deployment: &str,
+        wish: &Wish,
+        connection: Option<Connection>,
+    ) -> Result<Self, ClientError> {
+        let running = connection.as_ref().map(|it| Arc::clone(&it.running));
+        let shared = Arc::new(Shared {
+            inner: Mutex::new(Inner {
+                ready: VecDeque::new(),
+                losses: Losses::default(),
+                state: state_of(running.as_ref()),
+                running,
+                problem: None,
+                is_leaving: false,
+            }),
+            changed: Condvar::new(),
+        });
+        let reader = Reader {
+            deployment: deployment.to_owned(),
+            wish: wish.clone(),
+            shared: Arc::clone(&shared),
+        };
+        let thread = std::thread::Builder::new().name("parallax-client".to_owned());
+        let thread = thread.spawn(move || reader.run(connection));
+        Ok(Self {
+            shared,
+            thread: Some(thread.map_err(ClientError::Thread)?),
+            last: None,
+        })
+    }
+
+    /// The next moment; none if nothing came in time, or while the deployment does not run.
+    ///
+    /// # Errors
+    ///
+    /// The deployment that runs now cannot be read, for example because it is of another version; or a port failed. The client goes
+    /// on trying, so that the caller may ask again.
+    pub fn next(&mut self, patience: Duration) -> Result<Option<Moment>, ClientError> {
+        let inner = lock(&self.shared.inner);
+        let is_idle = |inner: &mut Inner| inner.ready.is_empty() && inner.problem.is_none();
+        let waited = self
+            .shared
+            .changed
+            .wait_timeout_while(inner, patience, is_idle);
+        let (mut inner, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let Some(mut moment) = inner.ready.pop_front() else {
+            return inner.problem.take().map_or(Ok(None), Err);
+        };
+        drop(inner);
+        let step = moment.running.frame_step.max(1);
+        let session = moment.running.session;
+        let before = self.last.filter(|it| it.0 == session).map(|it| it.1);
+        moment.n_missed = before.map_or(0, |before| {
+            (moment.frame.saturating_sub(before) / step).saturating_sub(1)
+        });
+        self.last = Some((session, moment.frame));
+        Ok(Some(moment))
+    }
+
+    /// Whether the deployment is there.
+    pub fn state(&self) -> State {
+        lock(&self.shared.inner).state
+    }
+
+    /// What the deployment says about itself; none before the first has run, and that of the last run after it.
+    pub fn running(&self) -> Option<Arc<Running>> {
+        lock(&self.shared.inner).running.clone()
+    }
+
+    /// What was not given, since the client was made.
+    pub fn losses(&self) -> Losses {
+        lock(&self.shared.inner).losses
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        lock(&self.shared.inner).is_leaving = true;
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            // It has said why on standard error.
+        }
+    }
+}
+
+fn check_wish(wish: &Wish) -> Result<(), ClientError> {
+    if wish.skeletons || wish.has_views() {
+        Ok(())
+    } else {
+        Err(ClientError::NoWish)
+    }
+}
+
+fn state_of(running: Option<&Arc<Running>>) -> State {
+    match running {
+        Some(_) => State::Connected,
+        None => State::Waiting,
+    }
+}
+
+struct Reader {
+    deployment: String,
+    wish: Wish,
+    shared: Arc<Shared>,
+}
+
+impl Reader {
+    fn run(&self, mut connection: Option<Connection>) {
+        while !lock(&self.shared.inner).is_leaving {
+            let Some(open) = connection.take().or_else(|| self.join()) else {
+                std::thread::sleep(RETRY);
+                continue;
+            };
+            self.read(open);
+        }
+    }
+
+    /// Tries to join the deployment. What fails for another reason than that it does not run is told to the caller.
+    fn join(&self) -> Option<Connection> {
+        match Connection::open(&self.deployment, &self.wish) {
+            Ok(connection) => {
+                let mut inner = lock(&self.shared.inner);
+                inner.running = Some(Arc::clone(&connection.running));
+                inner.state = State::Connected;
+                inner.problem = None;
+                Some(connection)
+            }
+            Err(error) => {
+                if !error.is_not_running() {
+                    self.tell(error);
+                }
+                None
+            }
+        }
+    }
+
+    fn tell(&self, error: ClientError) {
+        lock(&self.shared.inner).problem = Some(error);
+        self.shared.changed.notify_all();
+    }
+
+    /// Reads one run until it ends or the client leaves.
+    fn read(&self, mut connection: Connection) {
+        let views: Vec<usize> = connection.views().collect();
+        let mut joiner = Joiner::new(self.wish.clone(), views.len());
+        let before = lock(&self.shared.inner).losses;
+        let mut checked = Instant::now();
+        loop {
+            let now = Instant::now();
+            let turn = connection.turn(&mut joiner, now);
+            let given = joiner.take(now);
+            let is_new = !given.is_empty();
+            {
+                let mut inner = lock(&self.shared.inner);
+                if matches!(turn, Ok(Turn::Held)) && self.wish.newest_wins() && given.is_empty() {
+                    // What waits here keeps the newest from being taken.
+                    inner.losses.passed_over += inner.ready.len() as u64;
+                    inner.ready.clear();
+                    joiner.clear();
+                }
+                for it in given {
+                    inner.hand_over(moment(it, &views, &connection.running), self.wish.waiting);
+                }
+                inner.losses.refused = before.refused + connection.n_refused;
+                inner.losses.late = before.late + joiner.n_late;
+                if inner.is_leaving {
+                    return;
+                }
+            }
+            if is_new {
+                self.shared.changed.notify_all();
+            }
+            if let Err(error) = turn {
+                self.tell(error);
+            }
+            if now.saturating_duration_since(checked) >= CHECK {
+                checked = now;
+                if connection.is_over() {
+                    break;
+                }
+            }
+            std::thread::sleep(PAUSE);
+        }
+        let mut inner = lock(&self.shared.inner);
+        inner.state = State::Waiting;
+        // Pictures in place would keep the deployment from ending.
+        inner.ready.retain(|it| !it.is_in_place());
+    }
+}
+
+impl Inner {
+    /// Adds a moment to those that wait, of which there are at most so many.
+    fn hand_over(&mut self, moment: Moment, most: usize) {
+        while self.ready.len() >= most {
+            self.ready.pop_front();
+            self.losses.passed_over += 1;
+        }
+        self.ready.push_back(moment);
+    }
+}
+
+fn moment(gathered: Gathered<Picture>, views: &[usize], running: &Arc<Running>) -> Moment {
+    let skeleton = gathered.skeleton;
+    let parts = views.iter().zip(gathered.views);
+    Moment {
+        running: Arc::clone(running),
+        frame: gathered.frame,
+        captured_at_nanos: gathered.captured_at_nanos,
+        skeleton: skeleton.map(|it| Skeleton::new(it, Arc::clone(running))),
+        views: parts
+            .map(|(view, parts)| ViewMoment {
+                view: *view,
+                pose: parts.pose,
+                picture: parts.picture,
+            })
+            .collect(),
+        is_complete: gathered.is_complete,
+        n_missed: 0,
+    }
+}

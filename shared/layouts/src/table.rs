@@ -1,0 +1,257 @@
+//! The layouts as a table.
+
+use core::mem::offset_of;
+
+use messages::{
+    CameraCounts, EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, Kept, LocalMessage,
+    Metrics, MetricsRow, PairHypothesis, PairPose, PictureHeader, Pose3d, PoseMessage, Searched,
+    Sides, Span, Stamp, Status, Timing, ViewPose, ViewQuality, topic,
+};
+
+/// The type of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A number: its name in Rust, in C, and in `NumPy`.
+    Number {
+        /// In Rust: `u32`.
+        rust: &'static str,
+        /// In C: `uint32_t`.
+        c: &'static str,
+        /// In `NumPy`, little-endian: `<u4`.
+        numpy: &'static str,
+    },
+    /// One of the structs.
+    Struct(&'static str),
+}
+
+/// A field of a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Field {
+    /// Its name.
+    pub name: &'static str,
+    /// Where it begins in its struct, bytes.
+    pub offset: usize,
+    /// Bytes of the whole field.
+    pub size: usize,
+    /// Type of its elements.
+    pub kind: Kind,
+    /// Lengths of the array, outermost first; empty for a single value.
+    pub lengths: Vec<usize>,
+}
+
+/// The layout of a struct.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Layout {
+    /// Its name in the crate `messages`.
+    pub name: &'static str,
+    /// Its name for the transport, with its version.
+    pub type_name: &'static str,
+    /// Its size, bytes.
+    pub size: usize,
+    /// Its alignment, bytes.
+    pub align: usize,
+    /// Its fields, in order.
+    pub fields: Vec<Field>,
+}
+
+/// What is sent on the topics of one kind.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Topic {
+    /// Its name, with `{}` in place of the view, worker or process.
+    pub name: String,
+    /// What it is about: `frame`.
+    pub about: String,
+    /// The version in its name.
+    pub version: u32,
+    /// The message, or the header of an array.
+    pub message: &'static str,
+    /// The elements of the array behind the header; none for a message alone.
+    pub elements: Option<Kind>,
+}
+
+/// A type that a field may have.
+trait Shape {
+    /// The type of its elements, and the lengths of the array.
+    fn shape() -> (Kind, Vec<usize>);
+}
+
+macro_rules! numbers {
+    ($($rust:ty, $c:literal, $numpy:literal;)*) => {
+        $(impl Shape for $rust {
+            fn shape() -> (Kind, Vec<usize>) {
+                let rust = stringify!($rust);
+                (Kind::Number { rust, c: $c, numpy: $numpy }, Vec::new())
+            }
+        })*
+    };
+}
+
+numbers! {
+    u8, "uint8_t", "|u1";
+    u16, "uint16_t", "<u2";
+    u32, "uint32_t", "<u4";
+    u64, "uint64_t", "<u8";
+    i64, "int64_t", "<i8";
+    f32, "float", "<f4";
+    f64, "double", "<f8";
+}
+
+impl<T: Shape, const N: usize> Shape for [T; N] {
+    fn shape() -> (Kind, Vec<usize>) {
+        let (kind, mut lengths) = T::shape();
+        lengths.insert(0, N);
+        (kind, lengths)
+    }
+}
+
+/// Numbers with a name of their own are numbers in other languages.
+macro_rules! names_of_numbers {
+    ($($name:ty),*) => {
+        $(impl Shape for $name {
+            fn shape() -> (Kind, Vec<usize>) {
+                u32::shape()
+            }
+        })*
+    };
+}
+
+names_of_numbers!(Status, Searched, Sides, Kept, Span);
+
+/// The field that `of` leads to; the type is the compiler's.
+fn field<S, T: Shape>(name: &'static str, offset: usize, _of: fn(&S) -> &T) -> Field {
+    let (kind, lengths) = T::shape();
+    Field {
+        name,
+        offset,
+        size: size_of::<T>(),
+        kind,
+        lengths,
+    }
+}
+
+macro_rules! structs {
+    ($($name:ident, $type_name:literal: $($field:ident)*;)*) => {
+        $(impl Shape for $name {
+            fn shape() -> (Kind, Vec<usize>) {
+                (Kind::Struct(stringify!($name)), Vec::new())
+            }
+        })*
+
+        /// The layouts of all structs, each after those that it consists of.
+        pub fn layouts() -> Vec<Layout> {
+            vec![$(Layout {
+                name: stringify!($name),
+                type_name: $type_name,
+                size: size_of::<$name>(),
+                align: align_of::<$name>(),
+                fields: vec![$(field(
+                    stringify!($field),
+                    offset_of!($name, $field),
+                    |it: &$name| &it.$field,
+                )),*],
+            }),*]
+        }
+    };
+}
+
+structs! {
+    Stamp, "Stamp.v1": session frame captured_at_nanos view epoch;
+    Timing, "Timing.v1": received_at_nanos sent_at_nanos;
+    FrameHeader, "FrameHeader.v1":
+        stamp timing width height status reserved n_dropped skew_nanos reserved_end;
+    PictureHeader, "PictureHeader.v1":
+        stamp timing width height status format sequence presented_nanos grid_start_nanos grid_rate_hz bytes_per_row
+        connection name reserved;
+    PoseMessage, "PoseMessage.v1": score level n_parts x y mixture;
+    LocalMessage, "LocalMessage.v1": response contrast margin;
+    ViewPose, "ViewPose.v6":
+        stamp timing status n_candidates width height evidence_bytes skew_nanos searched n_keypoints candidates local
+        front keypoints;
+    EvidenceHeader, "EvidenceHeader.v3":
+        stamp timing width height status n_levels x y scope_levels levels best size reserved;
+    ViewQuality, "ViewQuality.v2":
+        stamp timing status n_parts sigma_px n_thresholds network tau_px tile took_nanos;
+    PairHypothesis, "PairHypothesis.v1":
+        energy n_iterations converged exchanged start reserved active_parts poses;
+    PairPose, "PairPose.v3":
+        stamp timing status n_hypotheses views hypotheses views_present sigma_age sigma_px;
+    Joint3d, "Joint3d.v1": in_world covariance reprojection_px views_used status;
+    FusedView, "FusedView.v1": energy n_pairs status exchanged n_parts centres_px single_score;
+    Pose3d, "Pose3d.v3":
+        stamp timing status n_joints n_views views_present views_used n_pairs facing_margin sides_margin stature_m
+        body_deviation sides kept n_people n_keypoints joints views keypoints;
+    Health, "Health.v4":
+        session pid epoch n_loops at_nanos n_received n_sent n_dropped last_frame p50_micros p99_micros
+        peak_memory_bytes finished cpu_millis n_total refused;
+    CameraCounts, "CameraCounts.v2":
+        n_connections n_made n_lost n_delivered n_used n_surplus n_overtaken n_refused rate_microhertz off_grid_nanos
+        skew_nanos drift_ppb;
+    MetricsRow, "MetricsRow.v1": span view count millihertz p50_nanos p99_nanos p99_9_nanos max_nanos;
+    Metrics, "Metrics.v4":
+        session pid epoch began_at_nanos at_nanos n_received n_sent sent_millihertz n_dropped evidence_bytes
+        memory_bytes peak_memory_bytes queue longest_queue view finished name n_rows n_people camera rows;
+}
+
+/// Replaces the view, worker or process in the name of a topic.
+const ANY: usize = 7_777_777;
+
+/// What is sent on which topic.
+pub fn topics() -> Vec<Topic> {
+    let number = |shape: (Kind, Vec<usize>)| Some(shape.0);
+    let any = ANY.to_string();
+    let all = [
+        (topic::frame(ANY), "FrameHeader", number(u8::shape())),
+        (topic::picture(ANY), "PictureHeader", number(u8::shape())),
+        (topic::view_pose(ANY), "ViewPose", None),
+        (topic::evidence(ANY), "EvidenceHeader", number(f32::shape())),
+        (topic::view_quality(ANY), "ViewQuality", None),
+        (topic::pair_pose(ANY), "PairPose", None),
+        (topic::pose3d(), "Pose3d", None),
+        (topic::health(&any), "Health", None),
+        (topic::metrics(&any), "Metrics", None),
+    ];
+    let topics = all.into_iter().map(|(name, message, elements)| {
+        let (about, rest) = name.split_once("/v").unwrap_or((&name, ""));
+        let version = rest.split('/').next().unwrap_or_default();
+        Topic {
+            about: about.to_owned(),
+            version: version.parse().unwrap_or(0),
+            name: name.replace(&any, "{}"),
+            message,
+            elements,
+        }
+    });
+    topics.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fields_fill_every_struct_without_a_gap() {
+        for layout in layouts() {
+            let mut end = 0;
+            for field in &layout.fields {
+                assert_eq!(field.offset, end, "{}.{}", layout.name, field.name);
+                end += field.size;
+            }
+            assert_eq!(end, layout.size, "{}: a field is missing here", layout.name);
+        }
+    }
+
+    #[test]
+    fn every_topic_has_a_version_and_a_message() {
+        let layouts = layouts();
+        for topic in topics() {
+            assert!(topic.version > 0, "{topic:?}");
+            assert!(
+                layouts.iter().any(|it| it.name == topic.message),
+                "{topic:?}"
+            );
+        }
+        let names: Vec<String> = topics().into_iter().map(|it| it.name).collect();
+        assert!(names.contains(&"frame/v1/{}".to_owned()), "{names:?}");
+        assert!(names.contains(&"pose3d/v3".to_owned()), "{names:?}");
+    }
+}

@@ -1,0 +1,149 @@
+//! What a running deployment says about itself to other programs.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+/// What a running deployment says about itself: the entry [`Running::KEY`] of the file `deployment.json` beside its sockets.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Running {
+    /// Version of this description, [`Running::VERSION`].
+    pub format: u64,
+    /// Every how many frames of the footage one is used: the numbers of frames go up by this.
+    pub frame_step: u64,
+    /// Names of the joints, in the order of the messages.
+    pub joints: Vec<String>,
+    /// Names of the extra keypoints, in the order of the messages.
+    pub keypoints: Vec<String>,
+    /// Pairs of joints that are connected, by their numbers.
+    pub limbs: Vec<[usize; 2]>,
+    /// Whether senders wait for slow receivers, so that no frame is lost in the pipeline.
+    pub lossless: bool,
+    /// Name of the deployment.
+    pub name: String,
+    /// Its folder of results.
+    pub output: PathBuf,
+    /// Version of Parallax that runs it.
+    pub parallax: String,
+    /// The session, as in the stamp of every message.
+    pub session: u64,
+    /// The views, in the order of their numbers.
+    pub views: Vec<RunningView>,
+}
+
+/// One view of a running deployment.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunningView {
+    /// Height of its frames, pixels.
+    pub height: u32,
+    /// Name of the camera.
+    pub name: String,
+    /// Width of its frames, pixels.
+    pub width: u32,
+}
+
+/// A description cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum RunningError {
+    /// It is not JSON, or not a description.
+    #[error("the description of the deployment cannot be read")]
+    Malformed(#[source] serde_json::Error),
+    /// It has no part for other programs: the deployment is of an earlier version.
+    #[error(
+        "the deployment does not describe itself to other programs: it is of an earlier version of Parallax"
+    )]
+    Absent,
+    /// It is of another version.
+    #[error(
+        "the description of the deployment is of version {theirs}, this program reads version {ours}"
+    )]
+    Version {
+        /// The version of the deployment.
+        theirs: u64,
+        /// The version of this program.
+        ours: u64,
+    },
+}
+
+impl Running {
+    /// Version of the description; it rises when a field changes its meaning or is removed.
+    pub const VERSION: u64 = 1;
+    /// The entry of `deployment.json` that holds it.
+    pub const KEY: &'static str = "programs";
+
+    /// Reads the description off the text of `deployment.json`.
+    ///
+    /// # Errors
+    ///
+    /// [`RunningError`].
+    pub fn read(text: &str) -> Result<Self, RunningError> {
+        let mut whole: serde_json::Value =
+            serde_json::from_str(text).map_err(RunningError::Malformed)?;
+        let own = whole.get_mut(Self::KEY).ok_or(RunningError::Absent)?.take();
+        let theirs = own.get("format").and_then(serde_json::Value::as_u64);
+        match theirs {
+            Some(Self::VERSION) => serde_json::from_value(own).map_err(RunningError::Malformed),
+            Some(theirs) => Err(RunningError::Version {
+                theirs,
+                ours: Self::VERSION,
+            }),
+            None => Err(RunningError::Absent),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn running() -> Running {
+        Running {
+            format: Running::VERSION,
+            frame_step: 2,
+            joints: vec!["head".to_owned(), "neck".to_owned()],
+            keypoints: Vec::new(),
+            limbs: vec![[0, 1]],
+            lossless: true,
+            name: "walk".to_owned(),
+            output: "out".into(),
+            parallax: "0.1.0".to_owned(),
+            session: u64::MAX,
+            views: vec![RunningView {
+                height: 480,
+                name: "left".to_owned(),
+                width: 272,
+            }],
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_among_other_entries() {
+        let text = serde_json::json!({ "deployment": {}, "programs": running() }).to_string();
+        assert_eq!(Running::read(&text).unwrap(), running());
+    }
+
+    #[test]
+    fn another_version_and_no_description_are_told_apart() {
+        let other = Running {
+            format: 7,
+            ..running()
+        };
+        let text = serde_json::json!({ "programs": other }).to_string();
+        let error = Running::read(&text).unwrap_err().to_string();
+        assert!(
+            error.contains("version 7") && error.contains("version 1"),
+            "{error}"
+        );
+        for text in ["{}", "{\"programs\": 3}", "[]", "{\"programs\": {}}"] {
+            let error = Running::read(text).unwrap_err();
+            assert!(matches!(error, RunningError::Absent), "{text}: {error}");
+        }
+        for text in ["", "{", "{\"programs\": {\"format\": 1}}"] {
+            let error = Running::read(text).unwrap_err();
+            assert!(
+                matches!(error, RunningError::Malformed(_)),
+                "{text}: {error}"
+            );
+        }
+    }
+}

@@ -1,0 +1,414 @@
+//! A program that is no part of a deployment and reads its topics: it can be moved between threads, and cannot send.
+
+#[cfg(test)]
+mod tests;
+
+use core::fmt::Debug;
+use std::fs::{self, File, OpenOptions};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
+use iceoryx2::port::ReceiveError as IoxReceiveError;
+use iceoryx2::port::subscriber::{Subscriber as IoxSubscriber, SubscriberCreateError};
+use iceoryx2::prelude::{
+    CallbackProgression, Node, NodeBuilder, NodeName, Service as _, ServiceName,
+    SignalHandlingMode, ipc_threadsafe,
+};
+use iceoryx2::sample::Sample as IoxSample;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
+use rustix::fs::{FlockOperation, flock};
+
+use crate::log::adopt_transport_log;
+use crate::observer::running_supervisor;
+use crate::payload::{Header, Message};
+use crate::service::patiently;
+use crate::subscriber::onlooker;
+use crate::{ExitKind, Fault, LockError, Namespace, NamespaceError, ReceiveError, deployments};
+
+/// Guests of one deployment at the same time.
+pub const MOST_GUESTS: usize = 4;
+/// The directory of the files that guests lock, one each.
+const SEATS: &str = "guests";
+
+type Transport = ipc_threadsafe::Service;
+
+/// A deployment cannot be looked at.
+#[derive(Debug, thiserror::Error)]
+pub enum GuestError {
+    /// It does not run, or is about to end.
+    #[error("deployment {name:?} does not run; {}", running_ones(.running))]
+    NotRunning {
+        /// Its name.
+        name: String,
+        /// The names of those that run.
+        running: Vec<String>,
+    },
+    /// As many programs as may be there at the same time are there.
+    #[error("{most} programs read deployment {name:?} already, which is the most: {}", .guests.join(", "))]
+    Full {
+        /// Its name.
+        name: String,
+        /// How many may be there.
+        most: usize,
+        /// The process ids of those that are there.
+        guests: Vec<String>,
+    },
+    /// It has no such topic.
+    #[error("deployment {name:?} has no topic {topic:?}")]
+    NoSuchTopic {
+        /// Its name.
+        name: String,
+        /// Name of the topic.
+        topic: String,
+    },
+    /// The messages of a topic are of another version than this program reads.
+    #[error(
+        "deployment {name:?} sends {topic:?} version {theirs}, this program reads version {ours}"
+    )]
+    Version {
+        /// Its name.
+        name: String,
+        /// What is sent, without the version.
+        topic: String,
+        /// The version of the deployment.
+        theirs: String,
+        /// The version of this program.
+        ours: String,
+    },
+    /// The topic carries another type of message, under the same version.
+    #[error("topic {topic:?} of deployment {name:?} does not carry {expected}")]
+    WrongType {
+        /// Its name.
+        name: String,
+        /// Name of the topic.
+        topic: String,
+        /// The type that was expected.
+        expected: &'static str,
+    },
+    /// The name cannot be that of a deployment.
+    #[error(transparent)]
+    Namespace(#[from] NamespaceError),
+    /// The other deployments cannot be listed.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// A file in its directory cannot be used.
+    #[error("cannot use the directory of deployment {name:?}")]
+    Directory {
+        /// Its name.
+        name: String,
+        /// Why.
+        #[source]
+        source: io::Error,
+    },
+    /// The transport failed.
+    #[error("cannot read deployment {name:?}: {what}")]
+    Transport {
+        /// Its name.
+        name: String,
+        /// What failed, and why.
+        what: String,
+    },
+}
+
+impl Fault for GuestError {
+    fn kind(&self) -> ExitKind {
+        match self {
+            Self::NotRunning { .. } | Self::Namespace(_) => ExitKind::Usage,
+            _ => ExitKind::Run,
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::Version { .. } | Self::WrongType { .. } => Some(
+                "build this program and the deployment of the same version of Parallax".to_owned(),
+            ),
+            Self::Full { .. } => {
+                Some("end one of them; a program that was killed leaves its place".to_owned())
+            }
+            _ => None,
+        }
+    }
+}
+
+fn running_ones(running: &[String]) -> String {
+    if running.is_empty() {
+        "none does".to_owned()
+    } else {
+        format!("running: {}", running.join(", "))
+    }
+}
+
+/// A program that reads the topics of a running deployment.
+///
+/// It has no way to send. No sender waits for it, wakes it, or counts it among its receivers. The deployment ends without
+/// asking it: drop the guest, its ports and what they gave within a second after [`Self::is_over`]. As long as it exists, the
+/// next run of the deployment cannot start.
+#[derive(Debug)]
+pub struct Guest {
+    node: Arc<Node<Transport>>,
+    namespace: Namespace,
+    supervisor: u32,
+    _seat: File,
+}
+
+impl Guest {
+    /// Connects to a running deployment.
+    ///
+    /// # Errors
+    ///
+    /// [`GuestError::NotRunning`], [`GuestError::Full`], [`GuestError::Directory`], [`GuestError::Transport`].
+    pub fn open(namespace: &Namespace) -> Result<Self, GuestError> {
+        let name = namespace.name();
+        // Checked before anything is opened, since opening creates files.
+        let Some(supervisor) = running_supervisor(namespace) else {
+            return Err(not_running(name));
+        };
+        let seat = seat(namespace)?;
+        let failed = |what: String| GuestError::Transport {
+            name: name.to_owned(),
+            what,
+        };
+        adopt_transport_log();
+        let config = namespace.config()?;
+        let node_name = NodeName::new(&format!("guest-{}", std::process::id()))
+            .map_err(|error| failed(format!("its name: {error:?}")))?;
+        let node = NodeBuilder::new()
+            .name(&node_name)
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<Transport>()
+            .map_err(|error| failed(format!("it cannot be registered: {error:?}")))?;
+        Ok(Self {
+            node: Arc::new(node),
+            namespace: namespace.clone(),
+            supervisor,
+            _seat: seat,
+        })
+    }
+
+    /// The deployment.
+    pub fn namespace(&self) -> &Namespace {
+        &self.namespace
+    }
+
+    /// Whether the deployment is ending: everything that came of this guest has to be dropped.
+    pub fn is_over(&self) -> bool {
+        running_supervisor(&self.namespace) != Some(self.supervisor)
+    }
+
+    /// Subscribes to a topic of messages, `[E]` of one, with the header `()`; or of arrays with a header.
+    ///
+    /// # Errors
+    ///
+    /// [`GuestError::NoSuchTopic`], [`GuestError::Version`], [`GuestError::WrongType`], [`GuestError::Full`],
+    /// [`GuestError::Transport`].
+    pub fn port<E: Message, H: Header>(&self, topic: &str) -> Result<GuestPort<E, H>, GuestError> {
+        let deployment = || self.namespace.name().to_owned();
+        let failed = |what: String| GuestError::Transport {
+            name: deployment(),
+            what,
+        };
+        let name = ServiceName::new(topic)
+            .map_err(|error| failed(format!("the name of topic {topic:?}: {error:?}")))?;
+        let attempt = || {
+            self.node
+                .service_builder(&name)
+                .publish_subscribe::<[E]>()
+                .user_header::<H>()
+                .open()
+        };
+        let in_flux = |error: &PublishSubscribeOpenError| {
+            matches!(
+                error,
+                PublishSubscribeOpenError::ServiceInCorruptedState
+                    | PublishSubscribeOpenError::HangsInCreation
+            )
+        };
+        let messages = patiently(attempt, in_flux).map_err(|error| match error {
+            PublishSubscribeOpenError::DoesNotExist => self.absent(topic),
+            PublishSubscribeOpenError::IncompatibleTypes => GuestError::WrongType {
+                name: deployment(),
+                topic: topic.to_owned(),
+                expected: core::any::type_name::<(H, [E; 0])>(),
+            },
+            error => failed(format!("topic {topic:?}: {error:?}")),
+        })?;
+        let subscriber = messages.subscriber_builder().name(&onlooker()).create();
+        let subscriber = subscriber.map_err(|error| match error {
+            SubscriberCreateError::ExceedsMaxSupportedSubscribers => GuestError::Full {
+                name: deployment(),
+                most: MOST_GUESTS,
+                guests: vec![format!("topic {topic:?} has no room for another receiver")],
+            },
+            error => failed(format!("topic {topic:?}: {error:?}")),
+        })?;
+        Ok(GuestPort {
+            topic: Arc::from(topic),
+            subscriber,
+        })
+    }
+
+    /// Why a topic is not there: the deployment has ended, or has another version of it.
+    fn absent(&self, topic: &str) -> GuestError {
+        let name = self.namespace.name();
+        if self.is_over() {
+            return not_running(name);
+        }
+        let (ours, all) = (parts_of(topic), self.topics());
+        let theirs = all.iter().filter_map(|it| parts_of(it));
+        let other = ours.and_then(|ours| {
+            let mut same = theirs.filter(|it| (it.0, it.2) == (ours.0, ours.2));
+            Some((ours, same.next()?))
+        });
+        match other {
+            Some((ours, theirs)) => GuestError::Version {
+                name: name.to_owned(),
+                topic: ours.0.to_owned(),
+                theirs: theirs.1.to_owned(),
+                ours: ours.1.to_owned(),
+            },
+            None => GuestError::NoSuchTopic {
+                name: name.to_owned(),
+                topic: topic.to_owned(),
+            },
+        }
+    }
+
+    /// The names of all topics; empty if they cannot be listed.
+    fn topics(&self) -> Vec<String> {
+        let mut topics = Vec::new();
+        let Ok(config) = self.namespace.config() else {
+            return topics;
+        };
+        let listed = Transport::list(&config, |service| {
+            topics.push(service.static_details.name().to_string());
+            CallbackProgression::Continue
+        });
+        if let Err(error) = listed {
+            tracing::debug!(?error, "cannot list the topics of the deployment");
+        }
+        topics
+    }
+}
+
+/// The receiving end of a topic.
+#[derive(Debug)]
+pub struct GuestPort<E: Message, H: Header> {
+    topic: Arc<str>,
+    subscriber: IoxSubscriber<Transport, [E], H>,
+}
+
+impl<E: Message, H: Header> GuestPort<E, H> {
+    /// Takes the oldest waiting message, if there is one. Its memory is held until it is dropped.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError::TooManyHeld`], [`ReceiveError::Transport`].
+    pub fn receive(&self) -> Result<Option<Seen<E, H>>, ReceiveError> {
+        let topic = || Arc::clone(&self.topic);
+        match self.subscriber.receive() {
+            Ok(sample) => Ok(sample.map(|sample| Seen { sample })),
+            Err(IoxReceiveError::ExceedsMaxBorrows) => {
+                Err(ReceiveError::TooManyHeld { topic: topic() })
+            }
+            Err(source) => Err(ReceiveError::Transport {
+                topic: topic(),
+                source,
+            }),
+        }
+    }
+}
+
+/// A message in shared memory, which its sender will not overwrite while this is held.
+#[derive(Debug)]
+pub struct Seen<E: Message, H: Header> {
+    sample: IoxSample<Transport, [E], H>,
+}
+
+impl<E: Message, H: Header> Seen<E, H> {
+    /// The array, or one message.
+    pub fn payload(&self) -> &[E] {
+        self.sample.payload()
+    }
+
+    /// The header. Check it against the array before use: it comes from another process.
+    pub fn header(&self) -> &H {
+        self.sample.user_header()
+    }
+}
+
+/// The names of the deployments of this user that run.
+///
+/// # Errors
+///
+/// [`LockError`].
+pub fn running_deployments() -> Result<Vec<String>, LockError> {
+    let all = deployments(&Namespace::usual_base())?.into_iter();
+    let running = all.filter(|it| it.supervisor.is_some());
+    Ok(running.map(|it| it.namespace.name().to_owned()).collect())
+}
+
+fn not_running(name: &str) -> GuestError {
+    GuestError::NotRunning {
+        name: name.to_owned(),
+        running: running_deployments().unwrap_or_default(),
+    }
+}
+
+/// A topic as what it is about, its version, and whose it is: `frame/v1/0`.
+fn parts_of(topic: &str) -> Option<(&str, &str, &str)> {
+    let (about, rest) = topic.split_once("/v")?;
+    let (version, whose) = rest.split_once('/').unwrap_or((rest, ""));
+    Some((about, version, whose))
+}
+
+/// Takes a free place among the guests: a locked file, which the system unlocks however this process ends.
+fn seat(namespace: &Namespace) -> Result<File, GuestError> {
+    let name = || namespace.name().to_owned();
+    let failed = |source| GuestError::Directory {
+        name: name(),
+        source,
+    };
+    let folder = namespace.root().join(SEATS);
+    if let Err(error) = fs::create_dir(&folder)
+        && error.kind() != io::ErrorKind::AlreadyExists
+    {
+        // The deployment may have ended in the meantime.
+        let is_gone = error.kind() == io::ErrorKind::NotFound;
+        return Err(if is_gone {
+            not_running(namespace.name())
+        } else {
+            failed(error)
+        });
+    }
+    let mut guests = Vec::new();
+    for nth in 0..MOST_GUESTS {
+        let path = folder.join(nth.to_string());
+        let file = open_seat(&path).map_err(failed)?;
+        match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => {
+                let written = fs::write(&path, std::process::id().to_string());
+                written.map_err(failed)?;
+                return Ok(file);
+            }
+            Err(rustix::io::Errno::WOULDBLOCK) => {
+                let pid = fs::read_to_string(&path).unwrap_or_default();
+                guests.push(format!("process {pid}"));
+            }
+            Err(error) => return Err(failed(error.into())),
+        }
+    }
+    Err(GuestError::Full {
+        name: name(),
+        most: MOST_GUESTS,
+        guests,
+    })
+}
+
+fn open_seat(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    let options = options.create(true).truncate(false).read(true).write(true);
+    options.open(path)
+}

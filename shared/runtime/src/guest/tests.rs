@@ -1,0 +1,108 @@
+//! Guests of a deployment: who is let in, and that nobody waits for them.
+
+use messages::Health;
+
+use super::*;
+use crate::{Bus, Delivery, DeploymentLock, Limits, Stop, Topic, TopicPlan};
+
+#[test]
+fn a_topic_is_told_apart_from_its_version() {
+    assert_eq!(parts_of("frame/v1/0"), Some(("frame", "1", "0")));
+    assert_eq!(parts_of("pose3d/v3"), Some(("pose3d", "3", "")));
+    assert_eq!(parts_of("else"), None);
+}
+
+#[test]
+fn a_guest_can_be_moved_to_another_thread() {
+    fn moves<T: Send>() {}
+    moves::<Guest>();
+    moves::<GuestPort<u8, messages::FrameHeader>>();
+    moves::<Seen<u8, messages::FrameHeader>>();
+}
+
+#[test]
+fn what_does_not_run_is_told_with_what_runs() {
+    let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+    let namespace = Namespace::below("nobody", base.path()).unwrap();
+    let error = Guest::open(&namespace).unwrap_err();
+    assert!(
+        error.to_string().contains("\"nobody\" does not run"),
+        "{error}"
+    );
+    assert!(!namespace.root().exists(), "nothing is created");
+}
+
+/// A deployment of one lossless topic, and its bus.
+fn deployment(base: &Path) -> (DeploymentLock, Bus, Vec<Topic>) {
+    let namespace = Namespace::below("here", base).unwrap();
+    let lock = namespace.acquire().unwrap();
+    let bus = Bus::open(&namespace, "supervisor", &Stop::new().unwrap()).unwrap();
+    let limits = Limits::new(1, 2, 1).with_onlookers(MOST_GUESTS);
+    let plan = TopicPlan::messages::<Health>("pose3d/v9".to_owned(), Delivery::Lossless, limits);
+    let topics = bus.create_topics(&[plan]).unwrap();
+    (lock, bus, topics)
+}
+
+#[test]
+fn no_sender_waits_for_a_guest_and_what_it_holds_stays() {
+    let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+    let (_lock, bus, _topics) = deployment(base.path());
+    let guest = Guest::open(bus.namespace()).unwrap();
+    let port = guest.port::<Health, ()>("pose3d/v9").unwrap();
+    let publisher = bus.publisher::<Health>("pose3d/v9").unwrap();
+    assert_eq!(publisher.n_connected(), 0, "it is no receiver");
+    let send = |n_loops| {
+        let message = Health {
+            n_loops,
+            ..Health::default()
+        };
+        publisher.send(&message).unwrap();
+    };
+    send(0);
+    let held = port.receive().unwrap().unwrap();
+    (1..100).for_each(send);
+    assert_eq!(held.payload()[0].n_loops, 0);
+    let refused = port.receive().map(drop);
+    assert!(matches!(refused, Err(ReceiveError::TooManyHeld { .. })));
+    drop(held);
+    // The queue kept the first of those for which there was room.
+    let n_loops = || port.receive().unwrap().map(|it| it.payload()[0].n_loops);
+    assert_eq!([n_loops(), n_loops(), n_loops()], [Some(1), Some(2), None]);
+    assert!(!guest.is_over());
+}
+
+#[test]
+fn another_version_and_another_type_are_told_apart() {
+    let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+    let (lock, bus, topics) = deployment(base.path());
+    let guest = Guest::open(bus.namespace()).unwrap();
+    let refused = |topic: &str| guest.port::<Health, ()>(topic).unwrap_err().to_string();
+    let version = refused("pose3d/v8");
+    assert!(
+        version.contains("version 9") && version.contains("version 8"),
+        "{version}"
+    );
+    assert!(refused("frame/v1/0").contains("has no topic \"frame/v1/0\""));
+    let other = guest.port::<u8, messages::FrameHeader>("pose3d/v9");
+    assert!(matches!(other, Err(GuestError::WrongType { .. })));
+    drop((topics, bus, lock));
+    assert!(guest.is_over());
+}
+
+#[test]
+fn there_are_as_many_seats_as_guests_and_one_that_is_left_is_free() {
+    let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+    let namespace = Namespace::below("full", base.path()).unwrap();
+    fs::create_dir(namespace.root()).unwrap();
+    let mut seats: Vec<File> = (0..MOST_GUESTS)
+        .map(|_| seat(&namespace).unwrap())
+        .collect();
+    let error = seat(&namespace).unwrap_err();
+    let pid = std::process::id().to_string();
+    assert!(
+        matches!(&error, GuestError::Full { most: MOST_GUESTS, guests, .. } if guests[0].contains(&pid)),
+        "{error}"
+    );
+    drop(seats.pop());
+    seat(&namespace).unwrap();
+}
