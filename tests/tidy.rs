@@ -45,6 +45,7 @@ const LAYERS: &[&[&str]] = &[
         "deployment",
         "keypointfiles",
         "synchronisation",
+        "exports",
     ],
     &["runtime"],
     &["multiview", "viewquality", "posenetwork"],
