@@ -117,13 +117,15 @@ pub fn export(
 ) -> Result<Vec<Written>, Failure> {
     let trial = &origin.trial;
     check(origin, job)?;
-    let cameras = match job.formats.iter().any(|it| it.needs_cameras()) {
-        true => origin.cameras()?,
-        false => Vec::new(),
+    let cameras = if job.formats.iter().any(|it| it.needs_cameras()) {
+        origin.cameras()?
+    } else {
+        Vec::new()
     };
-    let mut pictures = match job.formats.iter().any(|it| matches!(it, Format::Mp4)) {
-        true => Pictures::all(origin)?,
-        false => Vec::new(),
+    let mut pictures = if job.formats.iter().any(|it| matches!(it, Format::Mp4)) {
+        Pictures::all(origin)?
+    } else {
+        Vec::new()
     };
     let plan: Vec<(Format, Vec<PathBuf>)> = job
         .formats

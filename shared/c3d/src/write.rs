@@ -138,7 +138,7 @@ impl Heading<'_> {
 
 fn header(heading: &Heading<'_>, parameters: &[u8]) -> io::Result<Vec<u8>> {
     let n_points = u16::try_from(heading.labels.len());
-    let n_points = n_points.map_err(|_| refused("more than 65535 points"))?;
+    let n_points = n_points.map_err(|_error| refused("more than 65535 points"))?;
     let [first, last] = heading.range().map(clamped);
     let mut file = vec![2, 0x50];
     for word in [n_points, 0, first, last, 0] {
@@ -268,7 +268,8 @@ fn section(heading: &Heading<'_>, data_block: u16) -> Vec<u8> {
     all.word("USED", 0);
     all.parameter("LABELS", -1, &[0, 0], &[]);
     all.real("GEN_SCALE", 1.0);
-    all.real("RATE", heading.rate_hz);
+    // No samples for each frame, as the header says: one of the two alone is refused by some readers.
+    all.real("RATE", 0.0);
     all.parameter("SCALE", 4, &[0], &[]);
     all.parameter("OFFSET", 2, &[0], &[]);
     all.parameter("UNITS", -1, &[0, 0], &[]);

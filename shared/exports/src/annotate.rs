@@ -50,6 +50,12 @@ fn ellipse(canvas: &mut Canvas, seen: &Seen, width: f64, side: Side) {
     let Some([xx, xy, yy]) = seen.covariance else {
         return;
     };
+    // One that is larger than the picture tells nothing, and takes long to draw.
+    let size = canvas.size();
+    let longest = (size.width + size.height) as f64;
+    if (DEVIATIONS * (xx + yy).sqrt()).total_cmp(&longest).is_gt() {
+        return;
+    }
     // The lower triangle of the square root of the covariance.
     let a = xx.max(0.0).sqrt();
     let b = if a > 0.0 { xy / a } else { 0.0 };

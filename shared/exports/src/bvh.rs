@@ -1,9 +1,10 @@
 //! BVH: a skeleton whose bones have fixed lengths, and its rotations over time; centimetres, y up.
 
-use std::io::{self, Write};
+use std::io;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use crate::format::Sink;
 use crate::points::rate;
 use crate::tree::{N_NODES, NODES, Posed, Poser, lengths};
 use crate::{Notes, Trial};
@@ -16,7 +17,7 @@ const MAX_LISTED: usize = 5;
 /// Writes the tree, and a line for each frame.
 ///
 /// The lengths are medians. A bone that was never seen, with what hangs on it, is left out.
-pub(crate) fn write(trial: &Trial, out: &mut dyn Write) -> io::Result<Notes> {
+pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let lengths = lengths(trial);
     let is_there = is_there(&lengths);
     let mut poser = Poser::new(trial, &lengths);
@@ -75,7 +76,7 @@ fn has_channels(index: usize, is_there: &[bool; N_NODES]) -> bool {
 }
 
 fn node(
-    out: &mut dyn Write,
+    out: &mut Sink<'_>,
     index: usize,
     depth: usize,
     lengths: &[Option<f64>; N_NODES],
@@ -168,6 +169,12 @@ fn notes(
 ) -> Notes {
     let mut notes =
         vec!["how a bone is turned about itself is not seen: it turns with its parent".to_owned()];
+    if trial.first_frame > 0 {
+        let (frame, time_s) = (trial.first_frame, trial.time_s(0).unwrap_or_default());
+        notes.push(format!(
+            "the format begins at 0: its first line is frame {frame}, at {time_s:.3} s"
+        ));
+    }
     if held.n_frames > 0 {
         let named = held.runs.iter().take(MAX_LISTED).map(|run| {
             let [first, last] = run.map(|slot| trial.frame(slot));

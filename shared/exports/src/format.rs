@@ -7,6 +7,9 @@ use crate::{Trial, bvh, glb, points, tables};
 /// What a format cannot say in itself, for the user.
 pub type Notes = Vec<String>;
 
+/// Where a format is written.
+pub type Sink<'a> = dyn Write + Send + 'a;
+
 /// What a format needs to know of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Needs {
@@ -38,7 +41,7 @@ pub struct FileFormat {
     /// # Errors
     ///
     /// Those of the writer; a trial that the format has no room for, or that has nothing of what it holds.
-    pub write: fn(&Trial, &mut dyn Write) -> io::Result<Notes>,
+    pub write: fn(&Trial, &mut Sink<'_>) -> io::Result<Notes>,
 }
 
 const ALL: Needs = Needs {
@@ -46,8 +49,13 @@ const ALL: Needs = Needs {
     up: true,
 };
 
+const NOTHING: Needs = Needs {
+    rate: false,
+    up: false,
+};
+
 /// All of them.
-pub const FILES: [FileFormat; 6] = [
+pub const FILES: &[FileFormat] = &[
     FileFormat {
         name: "c3d",
         suffix: ".c3d",
@@ -95,10 +103,7 @@ pub const FILES: [FileFormat; 6] = [
         axes: "those of the rig",
         gaps: "empty cells",
         uncertainty: "standard deviation of the position, m",
-        needs: Needs {
-            rate: false,
-            up: false,
-        },
+        needs: NOTHING,
         write: tables::wide,
     },
     FileFormat {
@@ -108,10 +113,18 @@ pub const FILES: [FileFormat; 6] = [
         axes: "those of the rig",
         gaps: "empty cells, and the reason",
         uncertainty: "covariance, m^2, and standard deviation",
-        needs: Needs {
-            rate: false,
-            up: false,
-        },
+        needs: NOTHING,
         write: tables::long,
+    },
+    #[cfg(feature = "parquet")]
+    FileFormat {
+        name: "parquet",
+        suffix: ".parquet",
+        unit: "m",
+        axes: "those of the rig",
+        gaps: "null, and the reason",
+        uncertainty: "covariance, m^2, and standard deviation",
+        needs: NOTHING,
+        write: crate::parquet::write,
     },
 ];

@@ -8,11 +8,12 @@
 mod mesh;
 mod store;
 
-use std::io::{self, Write};
+use std::io;
 
 use nalgebra::{Isometry3, Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 
+use crate::format::Sink;
 use crate::points::rate;
 use crate::tree::{N_NODES, NODES, Poser, anchor, lengths};
 use crate::{Notes, Point, Trial};
@@ -45,7 +46,7 @@ enum Of {
 }
 
 /// Writes the file; its binary part is put together in memory, about 600 bytes for each frame.
-pub(crate) fn write(trial: &Trial, out: &mut dyn Write) -> io::Result<Notes> {
+pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let rate_hz = rate(trial)?;
     let lengths = lengths(trial);
     let rest = places_at_rest(&lengths);
@@ -273,12 +274,12 @@ impl Tracks {
         let mut last = [Quaternion::identity(); N_NODES];
         for slot in 0..trial.slots.len() {
             let posed = poser.pose(slot);
-            for index in 0..N_NODES {
+            for (index, last) in last.iter_mut().enumerate() {
                 // A quaternion and its negative are one turn; programs interpolate between numbers.
                 let turn = posed.turn[index].quaternion();
-                let is_far = turn.dot(&last[index]) < 0.0;
-                last[index] = if is_far { -turn } else { *turn };
-                tracks.turns[index].extend(real4(&UnitQuaternion::new_unchecked(last[index])));
+                let is_far = turn.dot(last) < 0.0;
+                *last = if is_far { -turn } else { *turn };
+                tracks.turns[index].extend(real4(&UnitQuaternion::new_unchecked(*last)));
                 tracks.places[index].extend(real3(posed.place[index]));
             }
             for (nth, piece) in pieces.iter().enumerate() {
@@ -379,13 +380,13 @@ fn extras(trial: &Trial) -> Value {
 }
 
 /// The container: a head, the document, the binary part.
-fn chunks(out: &mut dyn Write, document: &Value, binary: &[u8]) -> io::Result<()> {
+fn chunks(out: &mut Sink<'_>, document: &Value, binary: &[u8]) -> io::Result<()> {
     let mut text = serde_json::to_vec(document)?;
     text.resize(text.len().next_multiple_of(4), b' ');
     let padding = binary.len().next_multiple_of(4) - binary.len();
     let length = 12 + 8 + text.len() + 8 + binary.len() + padding;
     let size = |it: usize| {
-        u32::try_from(it).map_err(|_| io::Error::other("GLB has no room for more than 4 GB"))
+        u32::try_from(it).map_err(|_error| io::Error::other("GLB has no room for more than 4 GB"))
     };
     out.write_all(b"glTF")?;
     for word in [2, size(length)?, size(text.len())?] {

@@ -11,6 +11,7 @@
 //! | `glb` | m | y up | a bone that is not there (scale 0) |
 //! | `bvh` | cm | y up | the last rotation, and said: the format knows no gaps |
 //! | `csv`, `csv-long` | m | the rig's | empty cells |
+//! | `parquet` (a feature) | m | the rig's | null |
 //! | [`openpose`] | pixels of the footage | x right, y down | `0, 0, 0` |
 //!
 //! Nothing here opens a file. Nothing is smoothed or filled; what a format cannot say is said in its [`Notes`].
@@ -25,6 +26,8 @@ mod format;
 
 mod bvh;
 mod glb;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod points;
 mod tables;
 
@@ -33,7 +36,7 @@ mod view;
 pub mod annotate;
 pub mod openpose;
 
-pub use format::{FILES, FileFormat, Needs, Notes};
+pub use format::{FILES, FileFormat, Needs, Notes, Sink};
 pub use trial::{Gap, Gathering, Point, Slot, Trial, TrialError};
 pub use view::{Seen, ViewCamera};
 

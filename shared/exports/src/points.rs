@@ -1,9 +1,10 @@
 //! Points over time: C3D and TRC.
 
-use std::io::{self, Write};
+use std::io;
 
 use c3d::{Heading, Marker};
 
+use crate::format::Sink;
 use crate::{Notes, Point, Trial};
 
 /// Cameras that C3D has room for, for each point.
@@ -18,7 +19,7 @@ pub(crate) fn rate(trial: &Trial) -> io::Result<f64> {
 }
 
 /// C3D: millimetres, z up.
-pub(crate) fn c3d(trial: &Trial, mut out: &mut dyn Write) -> io::Result<Notes> {
+pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
     let all = (0..trial.slots.len()).flat_map(|slot| trial.points(slot).flatten());
     let deviations = all.filter_map(Point::deviation_m);
     let largest_mm = 1e3 * deviations.fold(0.0, f64::max);
@@ -62,7 +63,7 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut dyn Write) -> io::Result<Notes> {
 }
 
 /// TRC: metres, y up, as `pose3d.trc` of a run.
-pub(crate) fn trc(trial: &Trial, out: &mut dyn Write) -> io::Result<Notes> {
+pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let labels: Vec<String> = trial
         .labels()
         .iter()

@@ -1,7 +1,8 @@
 //! Tables: CSV with a row for each frame (wide), or for each point of each frame (long).
 
-use std::io::{self, Write};
+use std::io;
 
+use crate::format::Sink;
 use crate::{Notes, Point, Trial};
 
 /// The columns of the long table: those of `pose3d.csv`, and the standard deviation.
@@ -37,7 +38,7 @@ fn place(point: Option<&Point>) -> [String; 4] {
 }
 
 /// A row for each frame: four columns for each point.
-pub(crate) fn wide(trial: &Trial, out: &mut dyn Write) -> io::Result<Notes> {
+pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut table = csv::Writer::from_writer(out);
     let mut head = ["frame", "time_s", "status"].map(str::to_owned).to_vec();
     for name in trial.labels() {
@@ -58,24 +59,24 @@ pub(crate) fn wide(trial: &Trial, out: &mut dyn Write) -> io::Result<Notes> {
 }
 
 /// A row for each point of each frame.
-pub(crate) fn long(trial: &Trial, out: &mut dyn Write) -> io::Result<Notes> {
+pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut table = csv::Writer::from_writer(out);
     table.write_record(LONG)?;
     let names: Vec<&str> = trial.names().collect();
-    for (slot, content) in trial.slots.iter().enumerate() {
+    for slot in 0..trial.slots.len() {
         let [frame, time_s] = [trial.frame(slot).to_string(), cell(trial.time_s(slot))];
         for (nth, name) in names.iter().enumerate() {
             let point = trial.point(slot, nth);
-            let gap = || match content.points.get(nth) {
-                Some(Err(gap)) if !gap.0.is_empty() => &gap.0,
-                _ => status(trial, slot),
-            };
             let mut row = vec![frame.clone(), time_s.clone(), (*name).to_owned()];
             row.extend(place(point));
             row.extend((0..6).map(|it| cell(point.map(|point| point.covariance[it]))));
             row.push(cell(point.and_then(|it| it.reprojection_px)));
             row.push(point.map_or(String::new(), |it| views(trial, it)));
-            row.push(point.map_or_else(gap, |_| "ok").to_owned());
+            row.push(
+                point
+                    .map_or_else(|| gap(trial, slot, nth), |_| "ok")
+                    .to_owned(),
+            );
             table.write_record(&row)?;
         }
     }
@@ -89,7 +90,16 @@ fn status(trial: &Trial, slot: usize) -> &str {
     if status.is_empty() { "no line" } else { status }
 }
 
-fn views(trial: &Trial, point: &Point) -> String {
+/// Why a point has no position.
+pub(crate) fn gap(trial: &Trial, slot: usize, point: usize) -> &str {
+    match trial.slots[slot].points.get(point) {
+        Some(Err(gap)) if !gap.0.is_empty() => &gap.0,
+        _ => status(trial, slot),
+    }
+}
+
+/// The views that a point is from.
+pub(crate) fn views(trial: &Trial, point: &Point) -> String {
     let named = trial.views.iter().enumerate();
     let seen = named.filter(|it| it.0 < 32 && point.views >> it.0 & 1 == 1);
     seen.map(|it| it.1.as_str()).collect::<Vec<_>>().join("+")

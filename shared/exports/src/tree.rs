@@ -268,8 +268,9 @@ mod tests {
                 if let Some(seen) = posed.seen[node] {
                     assert!((seen - places[node]).norm() < 1e-9, "{}", NODES[node].name);
                     // A bone lies along its rest direction, since its parent turns towards it.
-                    let along = posed.place[node].normalize();
-                    let off = (along - Vector3::from(NODES[node].rest)).norm();
+                    let length = posed.place[node].norm();
+                    let along = Vector3::from(NODES[node].rest) * length;
+                    let off = (along - posed.place[node]).norm();
                     assert!(node == 0 || off < 1e-9, "{}: {off}", NODES[node].name);
                 }
             }

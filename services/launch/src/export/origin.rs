@@ -41,11 +41,11 @@ pub struct Origin {
     /// What of the run is missing or damaged, in words.
     pub flaws: Vec<String>,
     /// Why it is not known which way is up; none where the rig has been asked, even if it does not know.
-    pub(super) up_unknown: Option<String>,
+    pub up_unknown: Option<String>,
     /// The deployment and its rig, or why there is none.
-    pub(super) setup: Result<(Resolved, Rig), String>,
+    pub setup: Result<(Resolved, Rig), String>,
     /// The recording.
-    pub(super) recording: Option<Recording>,
+    pub recording: Option<Recording>,
 }
 
 impl Origin {
@@ -124,7 +124,7 @@ impl Origin {
     pub(super) fn cameras(&self) -> Result<Vec<ViewCamera>, Failure> {
         let (resolved, rig) = self.setup()?;
         (0..resolved.deployment.cameras.len())
-            .map(|nth| self.camera(resolved, rig, nth))
+            .map(|nth| camera(resolved, rig, nth))
             .collect()
     }
 
@@ -137,30 +137,26 @@ impl Origin {
             }
         }
     }
+}
 
-    pub(super) fn camera(
-        &self,
-        resolved: &Resolved,
-        rig: &Rig,
-        nth: usize,
-    ) -> Result<ViewCamera, Failure> {
-        let entry = &resolved.deployment.cameras[nth];
-        let refused = |why: String| {
-            Failure::new(
-                ExitKind::Calibration,
-                format!("camera {:?}: {why}", entry.name),
-            )
-        };
-        let camera = rig
-            .camera(&entry.name)
-            .ok_or_else(|| refused(format!("{} does not have it", rig.source())))?;
-        let footage = resolved.footage.get(nth);
-        let size = footage.map_or(camera.intrinsics.size, |it| it.size);
-        let whole = OutSize::Scale(1.0);
-        let framing = Framing::new(camera, size, entry.source_offset_px, whole, 0.0)
-            .map_err(|error| refused(error.to_string()))?;
-        Ok(super::of_footage(&entry.name, &framing, size))
-    }
+/// A camera as its footage shows it.
+pub(super) fn camera(resolved: &Resolved, rig: &Rig, nth: usize) -> Result<ViewCamera, Failure> {
+    let entry = &resolved.deployment.cameras[nth];
+    let refused = |why: String| {
+        Failure::new(
+            ExitKind::Calibration,
+            format!("camera {:?}: {why}", entry.name),
+        )
+    };
+    let camera = rig
+        .camera(&entry.name)
+        .ok_or_else(|| refused(format!("{} does not have it", rig.source())))?;
+    let footage = resolved.footage.get(nth);
+    let size = footage.map_or(camera.intrinsics.size, |it| it.size);
+    let whole = OutSize::Scale(1.0);
+    let framing = Framing::new(camera, size, entry.source_offset_px, whole, 0.0)
+        .map_err(|error| refused(error.to_string()))?;
+    Ok(super::of_footage(&entry.name, &framing, size))
 }
 
 fn views(resolved: Option<&Resolved>) -> Vec<String> {
@@ -197,16 +193,16 @@ fn lines(folder: &Path, views: Vec<String>, flaws: &mut Vec<String>) -> Result<G
         if n == 0 {
             break;
         }
-        if !text.ends_with('\n') {
-            flaws.push(format!(
-                "{}: line {number} is cut off, and left out",
-                path.display()
-            ));
-            break;
-        }
         let line = match runfiles::lines::<FrameLine>(&text).next() {
             Some(Ok(line)) => line,
             None => continue,
+            Some(Err(_)) if !text.ends_with('\n') => {
+                flaws.push(format!(
+                    "{}: line {number} is cut off, and left out",
+                    path.display()
+                ));
+                break;
+            }
             Some(Err(mut error)) => {
                 error.line = number;
                 return Err(in_file(&path, &error));

@@ -11,6 +11,7 @@ use messages::topic;
 use recording::{Entry, Kind, Recording};
 use runtime::{ExitKind, Failure, OrFail as _, in_file};
 
+use super::origin::camera as camera_of;
 use super::{Origin, of_footage};
 use crate::resolved::Resolved;
 use crate::{inputs, prepare};
@@ -55,7 +56,7 @@ impl Pictures {
                 recorded(origin, recording, nth)
             };
             let (from, view) = match (found, from_recording()) {
-                (Ok(from), _) => (from, origin.camera(resolved, rig, nth)?),
+                (Ok(from), _) => (from, camera_of(resolved, rig, nth)?),
                 (Err(_), Some(from)) => {
                     let framing = prepare::framing(resolved, rig, nth)?;
                     let size = framing.out_size();

@@ -21,19 +21,19 @@ fn names(n: usize) -> Vec<String> {
     (0..n).map(|it| format!("point {it}")).collect()
 }
 
-fn seen(position: [f64; 3]) -> Option<Marker> {
-    Some(Marker {
+fn seen(position: [f64; 3]) -> Marker {
+    Marker {
         position,
         residual: 1.0,
         cameras: 0b101,
-    })
+    }
 }
 
 #[test]
 fn more_frames_than_16_bits_count_are_read_back() {
     let (labels, n) = (names(1), 70_000_u32);
     let mut file = Vec::new();
-    let frames = (0..n).map(|it| vec![seen([f64::from(it), 0.0, 0.0])]);
+    let frames = (0..n).map(|it| vec![Some(seen([f64::from(it), 0.0, 0.0]))]);
     write(&mut file, &heading(&labels, n), frames).unwrap();
     let read = C3d::parse(&file).unwrap();
     assert_eq!(read.n_frames(), 70_000);
@@ -97,7 +97,7 @@ proptest! {
         let heading = Heading { first_frame, ..heading(&labels, frames.len() as u32) };
         let mut file = Vec::new();
         let points = frames.iter().map(|frame| {
-            frame.iter().map(|it| it.and_then(seen)).collect()
+            frame.iter().map(|it| it.map(seen)).collect()
         });
         write(&mut file, &heading, points).unwrap();
         prop_assert_eq!(file.len() % BLOCK, 0);
