@@ -46,6 +46,7 @@ const LAYERS: &[&[&str]] = &[
         "deployment",
         "keypointfiles",
         "synchronisation",
+        "exports",
     ],
     &["runtime"],
     &["client", "multiview", "viewquality", "posenetwork"],

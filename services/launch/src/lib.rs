@@ -12,6 +12,7 @@
 //! | what the cameras see, so that their clocks can be compared | [`films`] |
 //! | observe a running deployment from another process | [`live`] |
 //! | read the settings in a recording, and report its flaws | [`recorded`] |
+//! | write a finished run into the files of other tools | [`export`] |
 //!
 //! Data goes to standard output and messages to standard error, both through [`output`].
 #![forbid(unsafe_code)]
@@ -31,6 +32,7 @@ mod vertical;
 mod views;
 
 pub mod budget;
+pub mod export;
 pub mod films;
 pub mod inputs;
 pub mod keypoints;

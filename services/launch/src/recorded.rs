@@ -110,6 +110,23 @@ pub fn open(file: &Path) -> Result<Recording, Failure> {
     recording::scan(&mut input).map_err(|error| runtime::in_file(file, &error))
 }
 
+/// Reads the settings of the recorded run.
+///
+/// # Errors
+///
+/// The recording has none, or those of another version.
+pub fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure> {
+    let about = recording.about.as_ref();
+    let about = about.map_err(|error| runtime::in_file(file, error))?;
+    serde_json::from_str(&about.settings).map_err(|error| {
+        let failure = runtime::in_file(file, &error);
+        let (theirs, ours) = (&about.version, env!("CARGO_PKG_VERSION"));
+        failure.with_hint(format!(
+            "recorded by version {theirs}, this is version {ours}"
+        ))
+    })
+}
+
 /// Whether the file is undamaged and contains every message that was sent, as far as the file tells.
 pub fn is_whole(recording: &Recording) -> bool {
     is_undamaged(recording) && recording.n_lost() == 0

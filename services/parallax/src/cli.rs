@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    bench, calib, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame, messages,
-    model, publish, record, replay, run, service, sync, synth, top, train, view,
+    bench, calib, cameras, chaos, config, demo, deployments, detect, eval, export, fuse_frame,
+    messages, model, publish, record, replay, run, service, sync, synth, top, train, view,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -30,6 +30,7 @@ Examples:
     parallax top                                        where the time of a running deployment goes
     parallax record my.toml --out run.mcap              like run, and records every message
     parallax replay run.mcap --from fuse --set fuse.alpha=2     runs the later stages again, with another value
+    parallax export out/my --to c3d,glb,bvh             the run in the files of other tools
     parallax chaos                                      faults injected into a deployment, and what held
     parallax bench transport                            how long a message takes from process to process
     parallax config show my.toml                        every value, and where it comes from
@@ -77,6 +78,8 @@ pub(crate) enum Command {
     Record(record::Arguments),
     /// Run the later stages of a recorded run again.
     Replay(replay::Arguments),
+    /// Write a finished run, or a recording, in the formats of other tools.
+    Export(export::Arguments),
     /// Inject faults into a deployment: kill and stop processes, disturb cameras; and check limits.
     Chaos(chaos::Arguments),
     /// Measure how fast messages travel, and how fast whole deployments are.

@@ -9,6 +9,7 @@ pub(crate) mod demo;
 pub(crate) mod deployments;
 pub(crate) mod detect;
 pub(crate) mod eval;
+pub(crate) mod export;
 pub(crate) mod fuse_frame;
 pub(crate) mod judge;
 pub(crate) mod messages;
@@ -47,6 +48,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Run(it) => run::run(&it, cli.globals),
         Command::Record(it) => record::run(&it, cli.globals),
         Command::Replay(it) => replay::run(&it, cli.globals),
+        Command::Export(it) => export::run(&it, cli.globals),
         Command::Detect(it) => detect::run(&it),
         Command::FuseFrame(it) => fuse_frame::run(&it),
         Command::Eval(it) => eval::run(&it, cli.globals),

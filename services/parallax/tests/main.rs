@@ -11,6 +11,7 @@ mod detect;
 mod detectors;
 mod eval;
 mod eval_networks;
+mod export;
 mod faults;
 mod full;
 mod live;

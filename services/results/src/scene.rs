@@ -5,7 +5,7 @@ use std::sync::Arc;
 use deployment::person::Follow;
 use fmp::{Layout, Model};
 use geometry::Framing;
-use nalgebra::{Matrix3, Rotation3, UnitVector3, Vector3};
+use nalgebra::{Matrix3, UnitVector3};
 use skeleton::JointSet;
 
 /// One view of the deployment.
@@ -63,16 +63,9 @@ impl Scene {
     /// With the world's z up `(X, Y, Z) = (y, z, x)`; another up is turned to z first, the short way
     /// round. Without one the world's axes stay.
     pub fn opensim_from_world(&self) -> Matrix3<f64> {
-        let cyclic = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
-        let Some(up) = self.up_in_world else {
-            return Matrix3::identity();
-        };
-        let to_z = Rotation3::rotation_between(&up, &Vector3::z_axis())
-            // Only straight down has no short way; half a turn about x is one.
-            .unwrap_or_else(|| {
-                Rotation3::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI)
-            });
-        cyclic * to_z.matrix()
+        self.up_in_world.map_or_else(Matrix3::identity, |up| {
+            geometry::y_up_from_world(&up).into_inner()
+        })
     }
 }
 
@@ -93,6 +86,8 @@ impl View {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::testing::scene;
 

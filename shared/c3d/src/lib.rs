@@ -1,4 +1,5 @@
-//! Points over time from C3D files, in all six encodings: Intel, DEC and MIPS numbers, as integers or reals.
+//! Points over time from C3D files, in all six encodings: Intel, DEC and MIPS numbers, as integers or reals; and to files
+//! ([`write()`]), as Intel reals.
 //!
 //! A reader of its own because published ones refuse many files of old laboratories (a missing
 //! `POINT:UNITS` or `ANALOG:RATE`, an offset written as a real) that have all the data needed. Analog
@@ -25,10 +26,13 @@ mod numbers;
 mod header;
 mod parameters;
 
+mod write;
+
 #[cfg(test)]
 mod tests;
 
 pub use error::C3dError;
+pub use write::{Heading, Marker, write};
 
 use header::Header;
 use numbers::Bytes;

@@ -3,7 +3,7 @@
 
 use std::ffi::OsString;
 use std::fs::{self, File};
-use std::io::{self, Write as _};
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::process;
 
@@ -31,6 +31,31 @@ pub fn replace_unsynced(path: &Path, bytes: &[u8]) -> io::Result<()> {
     place(path, bytes, |_| Ok(()))
 }
 
+/// As [`replace`], for what is written bit by bit: the writer's own result is handed on.
+///
+/// # Errors
+///
+/// Those of [`replace`] and of `write`.
+pub fn replace_by<T>(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<T>,
+) -> io::Result<T> {
+    let beside = beside(path);
+    let written = File::create(&beside).and_then(|file| {
+        let mut out = BufWriter::new(file);
+        let made = write(&mut out)?;
+        out.flush()?;
+        out.get_ref().sync_all()?;
+        Ok(made)
+    });
+    let placed = written.and_then(|made| fs::rename(&beside, path).map(|()| made));
+    if placed.is_err() {
+        // The error that is reported came first; one of the removal could add nothing to it.
+        drop(fs::remove_file(&beside));
+    }
+    placed
+}
+
 fn place(path: &Path, bytes: &[u8], sync: fn(&File) -> io::Result<()>) -> io::Result<()> {
     let beside = beside(path);
     let written = File::create(&beside)
@@ -46,7 +71,8 @@ fn place(path: &Path, bytes: &[u8], sync: fn(&File) -> io::Result<()>) -> io::Re
     written
 }
 
-fn beside(path: &Path) -> PathBuf {
+/// Where a file or folder is written before it is renamed into its place: `.name.<process id>.part` beside it.
+pub fn beside(path: &Path) -> PathBuf {
     let mut name = OsString::from(".");
     name.push(path.file_name().unwrap_or_default());
     name.push(format!(".{}.part", process::id()));
@@ -75,6 +101,22 @@ mod tests {
             assert_eq!(fs::read_to_string(&path).unwrap(), text);
             assert_eq!(names(folder.path()), ["model.plx"]);
         }
+    }
+
+    #[test]
+    fn what_is_written_bit_by_bit_is_whole_or_not_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("long.csv");
+        let failed = replace_by(&path, |out| {
+            out.write_all(b"half")?;
+            Err::<(), _>(io::Error::other("full"))
+        });
+        assert_eq!(failed.unwrap_err().to_string(), "full");
+        assert!(names(folder.path()).is_empty());
+        let made = replace_by(&path, |out| out.write_all(b"whole").map(|()| 7));
+        assert_eq!(made.unwrap(), 7);
+        assert_eq!(fs::read(&path).unwrap(), b"whole");
+        assert_eq!(names(folder.path()), ["long.csv"]);
     }
 
     #[test]

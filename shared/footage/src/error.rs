@@ -146,6 +146,14 @@ pub enum FootageError {
         /// Why it did not start.
         source: std::io::Error,
     },
+    /// A video cannot be written.
+    #[error("cannot write the video {}: {message}", path.display())]
+    Encode {
+        /// Which.
+        path: PathBuf,
+        /// What the encoder said.
+        message: String,
+    },
     /// Not a video, or damaged.
     #[error("cannot decode the video {}: {message}", path.display())]
     Video {

@@ -1,4 +1,5 @@
-//! Reads image sequences and videos, warps images into a given buffer, draws overlays, paces frames.
+//! Reads image sequences and videos, warps images into a given buffer, draws overlays, writes videos, paces
+//! frames.
 //!
 //! Every image is 8-bit RGB, row major, `width * height * 3` bytes. A point is `[x, y]` in pixels with
 //! the centre of the top-left pixel at `(0, 0)`. This crate does not depend on cameras or skeletons: its
@@ -18,8 +19,11 @@ mod warp;
 
 mod pacer;
 
+mod encode;
+
 mod overlay;
 
+pub use encode::VideoWriter;
 pub use error::FootageError;
 pub use overlay::{
     ACCENT, CENTRE, Canvas, Colour, FAINT, LEFT, Limb, OverlayError, RIGHT, Side, TEXT_HEIGHT,

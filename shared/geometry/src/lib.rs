@@ -28,6 +28,8 @@ pub mod skew;
 
 mod step_watch;
 
+mod up;
+
 pub mod files;
 
 #[cfg(test)]
@@ -43,3 +45,4 @@ pub use step_watch::{OUT_OF_STEP_MS, Step, StepWatch};
 pub use triangulate::{
     MAX_VIEWS, Observation, Settings, TriangulateError, Triangulated, triangulate,
 };
+pub use up::{y_up_from_world, z_up_from_world};

@@ -4,6 +4,7 @@ use c3d::C3d;
 use consistency::{Appearance, JointFile, Learned};
 use datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use deployment::{AnyMachine, Loaded, Stage, Topology};
+use exports::{FILES, Gathering};
 use fmp::Model;
 use fmp::files::{describe, mat, own, text};
 use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisys, umpm};
@@ -335,6 +336,27 @@ pub fn scene_text(input: &[u8]) {
     }
 }
 
+/// Whatever lines a run has, every format is written, or refuses them.
+fn exported(input: &str) {
+    let mut all = Gathering::default();
+    for line in runfiles::lines::<FrameLine>(input).flatten().take(20) {
+        if all.push(&line).is_err() {
+            return;
+        }
+    }
+    let Ok(trial) = all.finish("x", Some(30.0)) else {
+        return;
+    };
+    // Frames may be as far apart as they like; what lies between is empty.
+    for format in FILES.iter().filter(|_| trial.slots.len() < 1000) {
+        let mut file = Vec::new();
+        if (format.write)(&trial, &mut file).is_ok() && format.name == "c3d" {
+            let read = C3d::parse(&file).expect("it was written");
+            assert_eq!(read.n_frames(), trial.slots.len());
+        }
+    }
+}
+
 /// The files that a run leaves behind: what was read is written so that it reads back to the same text.
 pub fn run_files(input: &[u8]) {
     fn lines<L: Line>(input: &str) {
@@ -349,6 +371,7 @@ pub fn run_files(input: &[u8]) {
         return;
     };
     lines::<FrameLine>(input);
+    exported(input);
     lines::<ViewLine>(input);
     lines::<TimesLine>(input);
     if let Ok(run) = RunSummary::parse(input) {

@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if !globals.quiet {
         output::message(recorded::text(&file, &recording));
     }
-    let mut settings = settings(&file, &recording)?;
+    let mut settings = recorded::settings(&file, &recording)?;
     let from = arguments.from;
     live::settle(
         &mut settings.resolved,
@@ -160,19 +160,6 @@ fn resolve(
             from,
             speed,
         }),
-    })
-}
-
-/// Reads the settings of the recorded run.
-fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure> {
-    let about = recording.about.as_ref();
-    let about = about.map_err(|error| runtime::in_file(file, error))?;
-    serde_json::from_str(&about.settings).map_err(|error| {
-        let failure = runtime::in_file(file, &error);
-        let (theirs, ours) = (&about.version, env!("CARGO_PKG_VERSION"));
-        failure.with_hint(format!(
-            "recorded by version {theirs}, this is version {ours}"
-        ))
     })
 }
 

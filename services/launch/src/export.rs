@@ -1,0 +1,285 @@
+//! A finished run in the files of other tools: what is read, what is written where, and what is said about it.
+//!
+//! What each format holds is the business of the crate `exports`; here are the files, the cameras and their pictures.
+
+mod origin;
+mod per_view;
+mod pictures;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use exports::{FILES, FileFormat, Notes, Trial, ViewCamera};
+use offline::Console;
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use serde_json::{Value, json};
+
+pub use origin::{Given, Origin};
+use pictures::Pictures;
+
+/// What can be asked for.
+#[derive(Debug, Clone, Copy)]
+pub enum Format {
+    /// A format of one file.
+    File(&'static FileFormat),
+    /// Keypoints of the reprojected pose, a file for every view and frame.
+    OpenPose,
+    /// A video of every view with the pose drawn on it.
+    Mp4,
+}
+
+impl Format {
+    /// All of them.
+    pub fn all() -> Vec<Self> {
+        let files = FILES.iter().map(Self::File);
+        files.chain([Self::OpenPose, Self::Mp4]).collect()
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::File(format) => format.name,
+            Self::OpenPose => "openpose",
+            Self::Mp4 => "mp4",
+        }
+    }
+
+    fn needs_rate(self) -> bool {
+        match self {
+            Self::File(format) => format.needs.rate,
+            Self::OpenPose => false,
+            Self::Mp4 => true,
+        }
+    }
+
+    fn needs_up(self) -> bool {
+        matches!(self, Self::File(format) if format.needs.up)
+    }
+
+    fn needs_cameras(self) -> bool {
+        matches!(self, Self::OpenPose | Self::Mp4)
+    }
+}
+
+/// What is written, and where.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Which formats.
+    pub formats: Vec<Format>,
+    /// The folder, made if it is not there.
+    pub out: PathBuf,
+    /// What the files are called, without what tells formats apart.
+    pub name: String,
+    /// Whether existing files are replaced.
+    pub force: bool,
+}
+
+/// Something that was written.
+#[derive(Debug, Clone)]
+pub struct Written {
+    /// The name of its format.
+    pub format: &'static str,
+    /// The file, or the folder of one format.
+    pub path: PathBuf,
+    /// Its unit, its axes, what a gap is, and how uncertainty is held.
+    pub about: [&'static str; 4],
+    /// What the format cannot say in itself.
+    pub notes: Notes,
+}
+
+impl Written {
+    /// As JSON.
+    fn json(&self) -> Value {
+        let [unit, axes, gaps, uncertainty] = self.about;
+        json!({
+            "format": self.format, "path": self.path, "unit": unit, "axes": axes, "gaps": gaps,
+            "uncertainty": uncertainty, "notes": self.notes,
+        })
+    }
+}
+
+/// Name of the file that tells what was exported: `pose3d.export.json`.
+const MANIFEST: &str = ".export.json";
+
+/// Writes all formats of a run.
+///
+/// Everything that can be refused is refused before anything is written. Files take their names when they are whole.
+///
+/// # Errors
+///
+/// A format needs what the run does not have; a file exists and is not to be replaced; the disk. `Interrupted` when a stop is
+/// requested; files that were whole by then stay.
+pub fn export(
+    origin: &Origin,
+    job: &Job,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<Vec<Written>, Failure> {
+    let trial = &origin.trial;
+    check(origin, job)?;
+    let cameras = if job.formats.iter().any(|it| it.needs_cameras()) {
+        origin.cameras()?
+    } else {
+        Vec::new()
+    };
+    let mut pictures = if job.formats.iter().any(|it| matches!(it, Format::Mp4)) {
+        Pictures::all(origin)?
+    } else {
+        Vec::new()
+    };
+    let plan: Vec<(Format, Vec<PathBuf>)> = job
+        .formats
+        .iter()
+        .map(|it| (*it, paths(*it, job, &pictures)))
+        .collect();
+    for path in plan.iter().flat_map(|it| &it.1) {
+        refuse_existing(path, job.force)?;
+    }
+    std::fs::create_dir_all(&job.out).map_err(|error| cannot_write(&job.out, &error))?;
+    let mut written = Vec::new();
+    for (format, paths) in plan {
+        if stop.is_requested() {
+            return Err(interrupted());
+        }
+        console.begin(format.name(), "");
+        match format {
+            Format::File(format) => written.push(file(trial, format, &paths[0])?),
+            Format::OpenPose => {
+                written.push(per_view::openpose(
+                    trial, &cameras, &paths[0], stop, console,
+                )?);
+            }
+            Format::Mp4 => {
+                for (path, pictures) in paths.iter().zip(&mut pictures) {
+                    written.push(per_view::video(trial, pictures, path, stop, console)?);
+                }
+            }
+        }
+    }
+    console.finish();
+    let manifest = job.out.join(format!("{}{MANIFEST}", job.name));
+    let text = serde_json::to_string_pretty(&as_json(origin, &written)).or_fail(ExitKind::Run)?;
+    files::replace(&manifest, (text + "\n").as_bytes())
+        .map_err(|error| cannot_write(&manifest, &error))?;
+    Ok(written)
+}
+
+/// What was exported, for programs.
+pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
+    let trial = &origin.trial;
+    let labels = trial.labels();
+    let gaps = labels
+        .iter()
+        .enumerate()
+        .map(|(nth, it)| (it.clone(), json!(trial.gaps(nth))));
+    json!({
+        "schema_version": 1,
+        "source": origin.source,
+        "frames": trial.slots.len(),
+        "frames_with_points": trial.n_with_points(),
+        "first_frame": trial.first_frame,
+        "frame_step": trial.frame_step,
+        "rate_hz": trial.rate_hz,
+        "irregular_times": trial.n_irregular,
+        "repeated_frames": trial.n_repeated,
+        "up_in_world": trial.up_in_world.map(|it| [it.x, it.y, it.z]),
+        "points": labels,
+        "gaps": gaps.collect::<serde_json::Map<String, Value>>(),
+        "flaws": origin.flaws,
+        "files": written.iter().map(Written::json).collect::<Vec<_>>(),
+    })
+}
+
+/// Refuses what the run does not tell.
+fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
+    let lacks = |needs: fn(Format) -> bool| {
+        let all = job.formats.iter().copied().filter(|it| needs(*it));
+        let names: Vec<&str> = all.map(Format::name).collect();
+        (!names.is_empty()).then(|| names.join(", "))
+    };
+    if origin.trial.rate_hz.is_none()
+        && let Some(formats) = lacks(Format::needs_rate)
+    {
+        let message = format!(
+            "the run does not tell how many frames a second it has, which {formats} must say"
+        );
+        return Err(Failure::new(ExitKind::Usage, message).with_hint("give it: --rate 30"));
+    }
+    if let (Some(why), Some(formats)) = (&origin.up_unknown, lacks(Format::needs_up)) {
+        let message = format!("which way is up is not known, which {formats} must say: {why}");
+        let failure = Failure::new(ExitKind::Input, message);
+        return Err(failure.with_hint("give it in the world of the rig: --up 0,0,1"));
+    }
+    Ok(())
+}
+
+/// Where a format is written.
+fn paths(format: Format, job: &Job, pictures: &[Pictures]) -> Vec<PathBuf> {
+    let name = |suffix: &str| job.out.join(format!("{}{suffix}", job.name));
+    match format {
+        Format::File(format) => vec![name(format.suffix)],
+        Format::OpenPose => vec![name("-openpose")],
+        Format::Mp4 => {
+            let views = pictures.iter();
+            views
+                .map(|it| name(&format!("-{}.mp4", it.view.name)))
+                .collect()
+        }
+    }
+}
+
+fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
+    let Ok(found) = std::fs::symlink_metadata(path) else {
+        return Ok(());
+    };
+    let name = path.display();
+    if !force {
+        let failure = Failure::new(ExitKind::Usage, format!("{name} exists"));
+        return Err(failure.with_hint("another folder with --out, or --force to replace it"));
+    }
+    let is_folder = path.extension().is_none();
+    if found.is_dir() != is_folder {
+        let kind = if found.is_dir() { "a folder" } else { "a file" };
+        let message = format!("{name} is {kind}, and is not replaced");
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    Ok(())
+}
+
+fn file(trial: &Trial, format: &'static FileFormat, path: &Path) -> Result<Written, Failure> {
+    let notes = files::replace_by(path, |out| (format.write)(trial, out));
+    Ok(Written {
+        format: format.name,
+        path: path.to_owned(),
+        about: [format.unit, format.axes, format.gaps, format.uncertainty],
+        notes: notes.map_err(|error| match error.kind() {
+            // What the format has no room for is no matter of the disk.
+            io::ErrorKind::InvalidInput => Failure::new(ExitKind::Degraded, error),
+            _ => cannot_write(path, &error),
+        })?,
+    })
+}
+
+pub(crate) fn cannot_write(path: &Path, error: &io::Error) -> Failure {
+    Failure::new(
+        ExitKind::Input,
+        format!("cannot write {}: {error}", path.display()),
+    )
+}
+
+pub(crate) fn interrupted() -> Failure {
+    Failure::new(ExitKind::Interrupted, "interrupted")
+}
+
+/// A camera as its footage shows it.
+pub(crate) fn of_footage(view: &str, framing: &geometry::Framing, size: [u32; 2]) -> ViewCamera {
+    ViewCamera {
+        name: view.to_owned(),
+        camera: framing.camera().clone(),
+        picture_from_camera: framing.source_from_output(),
+        size,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,317 @@
+//! What is exported: the folder of a run, or its recording.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+
+use exports::{Gathering, Trial, TrialError, ViewCamera};
+use geometry::{Framing, OutSize, Rig};
+use messages::{Joint3d, Pose3d, Status, topic};
+use nalgebra::UnitVector3;
+use recording::{Kind, Recording};
+use runfiles::{FrameLine, JointLine, PlacedJoint};
+use runtime::{ExitKind, Failure, OrFail as _, in_file};
+use skeleton::JointSet;
+
+use crate::resolved::Resolved;
+use crate::{inputs, recorded};
+
+/// The joints of a run, as they are found.
+const JOINTS: &str = "pose3d.jsonl";
+
+/// What the user says about a run.
+#[derive(Debug, Clone, Default)]
+pub struct Given {
+    /// What the files call it.
+    pub name: String,
+    /// Frames of the footage per second, where the run does not know.
+    pub rate_hz: Option<f64>,
+    /// Against gravity, in the world of the rig, instead of what the rig says.
+    pub up: Option<UnitVector3<f64>>,
+}
+
+/// A run to be exported.
+#[derive(Debug)]
+pub struct Origin {
+    /// What was found.
+    pub trial: Trial,
+    /// The folder or the recording.
+    pub source: PathBuf,
+    /// What of the run is missing or damaged, in words.
+    pub flaws: Vec<String>,
+    /// Why it is not known which way is up; none where the rig has been asked, even if it does not know.
+    pub up_unknown: Option<String>,
+    /// The deployment and its rig, or why there is none.
+    pub setup: Result<(Resolved, Rig), String>,
+    /// The recording.
+    pub recording: Option<Recording>,
+}
+
+impl Origin {
+    /// Reads a run.
+    ///
+    /// # Errors
+    ///
+    /// `source` is neither the folder of a run nor a recording; a line cannot be read; no frame has a joint (`Degraded`).
+    pub fn read(source: &Path, given: &Given) -> Result<Self, Failure> {
+        let mut flaws = Vec::new();
+        let (resolved, recording, gathering);
+        if source.is_dir() {
+            recording = None;
+            resolved = of_folder(source);
+            gathering = lines(source, views(resolved.as_ref().ok()), &mut flaws)?;
+        } else {
+            let found = recorded::open(source)?;
+            let settings = recorded::settings(source, &found)?.resolved;
+            gathering = messages(source, &found, &settings, &mut flaws)?;
+            recording = Some(found);
+            resolved = Ok(settings);
+        }
+        let n_lines = gathering.n_lines();
+        let mut trial = gathering
+            .finish(&given.name, given.rate_hz)
+            .map_err(|error| {
+                let kind = match error {
+                    TrialError::Empty | TrialError::NoPoint { .. } => ExitKind::Degraded,
+                    TrialError::Joints(_) | TrialError::Range { .. } => ExitKind::Input,
+                };
+                Failure::new(
+                    kind,
+                    format!("{}: {error}; nothing is written", source.display()),
+                )
+            })?;
+        if let Some(rate_hz) = given.rate_hz
+            && trial
+                .rate_hz
+                .is_some_and(|it| (it * trial.frame_step as f64 / rate_hz - 1.0).abs() > 1e-6)
+        {
+            let own = trial.rate_hz.unwrap_or_default();
+            let message = format!(
+                "--rate {rate_hz} contradicts the times of the run, which has {own} frames a second"
+            );
+            return Err(Failure::new(ExitKind::Usage, message));
+        }
+        if trial.n_repeated > 0 {
+            let n = trial.n_repeated;
+            flaws.push(format!("{n} of {n_lines} lines are about a frame that an earlier line is about, and are left out"));
+        }
+        if trial.n_irregular > 0 {
+            let n = trial.n_irregular;
+            flaws.push(format!("the times of {n} frames are a quarter of the frame interval or more off the frame rate"));
+        }
+        let setup = resolved.and_then(|it| {
+            let rig = inputs::rig_of(&it.deployment).map_err(|error| error.to_string())?;
+            Ok((it, rig))
+        });
+        trial.up_in_world = given.up.or_else(|| setup.as_ref().ok()?.1.up_in_world());
+        let up_unknown = setup.as_ref().err().filter(|_| given.up.is_none()).cloned();
+        Ok(Self {
+            trial,
+            source: source.to_owned(),
+            flaws,
+            up_unknown,
+            setup,
+            recording,
+        })
+    }
+
+    /// The cameras as their footage shows them.
+    ///
+    /// # Errors
+    ///
+    /// There is no deployment or no rig; the rig does not have the camera.
+    pub(super) fn cameras(&self) -> Result<Vec<ViewCamera>, Failure> {
+        let (resolved, rig) = self.setup()?;
+        (0..resolved.deployment.cameras.len())
+            .map(|nth| camera(resolved, rig, nth))
+            .collect()
+    }
+
+    pub(super) fn setup(&self) -> Result<(&Resolved, &Rig), Failure> {
+        match &self.setup {
+            Ok((resolved, rig)) => Ok((resolved, rig)),
+            Err(why) => {
+                let message = format!("the cameras of the run are not known: {why}");
+                Err(Failure::new(ExitKind::Input, message))
+            }
+        }
+    }
+}
+
+/// A camera as its footage shows it.
+pub(super) fn camera(resolved: &Resolved, rig: &Rig, nth: usize) -> Result<ViewCamera, Failure> {
+    let entry = &resolved.deployment.cameras[nth];
+    let refused = |why: String| {
+        Failure::new(
+            ExitKind::Calibration,
+            format!("camera {:?}: {why}", entry.name),
+        )
+    };
+    let camera = rig
+        .camera(&entry.name)
+        .ok_or_else(|| refused(format!("{} does not have it", rig.source())))?;
+    let footage = resolved.footage.get(nth);
+    let size = footage.map_or(camera.intrinsics.size, |it| it.size);
+    let whole = OutSize::Scale(1.0);
+    let framing = Framing::new(camera, size, entry.source_offset_px, whole, 0.0)
+        .map_err(|error| refused(error.to_string()))?;
+    Ok(super::of_footage(&entry.name, &framing, size))
+}
+
+fn views(resolved: Option<&Resolved>) -> Vec<String> {
+    let cameras = resolved.map_or(&[][..], |it| &it.deployment.cameras);
+    cameras.iter().map(|it| it.name.clone()).collect()
+}
+
+fn of_folder(folder: &Path) -> Result<Resolved, String> {
+    let file = folder.join("deployment.json");
+    let text = std::fs::read_to_string(&file);
+    let text = text.map_err(|error| format!("{}: {error}", file.display()))?;
+    serde_json::from_str(&text).map_err(|error| format!("{}: {error}", file.display()))
+}
+
+/// Reads `pose3d.jsonl`, line by line; of a run that has not ended, what is there.
+fn lines(folder: &Path, views: Vec<String>, flaws: &mut Vec<String>) -> Result<Gathering, Failure> {
+    let [whole, part] = [JOINTS.to_owned(), format!("{JOINTS}.part")].map(|it| folder.join(it));
+    let is_whole = whole.exists() || !part.exists();
+    let path = if is_whole { whole } else { part };
+    let file = File::open(&path).map_err(|error| {
+        in_file(&path, &error).with_hint("name the folder that a run has written, or an MCAP file")
+    })?;
+    if !is_whole {
+        flaws.push(format!("{} is of a run that has not ended", path.display()));
+    }
+    let mut gathering = Gathering::new(views);
+    let mut input = BufReader::new(file);
+    let mut text = String::new();
+    for number in 1_usize.. {
+        text.clear();
+        let n = input
+            .read_line(&mut text)
+            .map_err(|error| in_file(&path, &error))?;
+        if n == 0 {
+            break;
+        }
+        let line = match runfiles::lines::<FrameLine>(&text).next() {
+            Some(Ok(line)) => line,
+            None => continue,
+            Some(Err(_)) if !text.ends_with('\n') => {
+                flaws.push(format!(
+                    "{}: line {number} is cut off, and left out",
+                    path.display()
+                ));
+                break;
+            }
+            Some(Err(mut error)) => {
+                error.line = number;
+                return Err(in_file(&path, &error));
+            }
+        };
+        gathering
+            .push(&line)
+            .map_err(|error| in_file(&path, &error))?;
+    }
+    Ok(gathering)
+}
+
+/// Reads the results of a recording.
+fn messages(
+    file: &Path,
+    recording: &Recording,
+    resolved: &Resolved,
+    flaws: &mut Vec<String>,
+) -> Result<Gathering, Failure> {
+    if !recorded::is_undamaged(recording) {
+        flaws.push(recorded::text(file, recording));
+    }
+    let name = &resolved.deployment.triangulate.joints;
+    let joints = JointSet::by_name(name);
+    let joints = joints.ok_or_else(|| {
+        let message = format!("{}: no joint set is called {name:?}", file.display());
+        Failure::new(ExitKind::Input, message)
+    })?;
+    let mut input = File::open(file).map_err(|error| in_file(file, &error))?;
+    let mut gathering = Gathering::new(views(Some(resolved)));
+    let track = recording.tracks.get(&topic::pose3d());
+    let (mut buffer, mut n_damaged) = (Vec::new(), 0);
+    for entry in track.map_or(&[][..], |it| &it.entries) {
+        let message = match recording::read(&mut input, Kind::Pose3d, entry, &mut buffer) {
+            Ok(message) => message,
+            Err(error @ recording::ReadError::Read(_)) => return Err(in_file(file, &error)),
+            Err(_) => {
+                n_damaged += 1;
+                continue;
+            }
+        };
+        let Ok(pose) = bytemuck::try_pod_read_unaligned::<Pose3d>(message.head) else {
+            n_damaged += 1;
+            continue;
+        };
+        if pose.status != Status::END {
+            let line = line(&pose, joints, resolved);
+            gathering.push(&line).or_fail(ExitKind::Input)?;
+        }
+    }
+    if n_damaged > 0 {
+        flaws.push(format!(
+            "{}: {n_damaged} results are damaged, and left out",
+            file.display()
+        ));
+    }
+    Ok(gathering)
+}
+
+/// The line of a result, as far as an export needs it.
+fn line(pose: &Pose3d, joints: &JointSet, resolved: &Resolved) -> FrameLine {
+    let frame = pose.stamp.frame;
+    let joint = |it: &Joint3d| of_message(it, resolved);
+    let names = joints.joints.iter().map(|it| it.name.to_owned());
+    let has_joints = pose.n_joints as usize == joints.joints.len();
+    let known = pose
+        .joints
+        .iter()
+        .take(if has_joints { joints.joints.len() } else { 0 });
+    let extras = pose.keypoints.iter().take(pose.n_keypoints as usize);
+    FrameLine {
+        body_deviation: None,
+        facing_margin: None,
+        frame,
+        joints: names.zip(known.map(joint)).collect(),
+        keypoints: resolved
+            .extra_keypoints
+            .iter()
+            .cloned()
+            .zip(extras.map(joint))
+            .collect(),
+        kept: None,
+        pairs: pose.n_pairs,
+        people: None,
+        reason: None,
+        sides: None,
+        sides_margin: None,
+        stature_m: None,
+        status: pose.status.reason().to_owned(),
+        time_s: resolved
+            .frame_rate_hz()
+            .map(|rate_hz| frame as f64 / rate_hz),
+        views_missing: BTreeMap::new(),
+        views_present: Vec::new(),
+        views_used: Vec::new(),
+    }
+}
+
+fn of_message(it: &Joint3d, resolved: &Resolved) -> JointLine {
+    if it.status != Status::OK {
+        let status = it.status.reason().to_owned();
+        return JointLine::Missing { status };
+    }
+    let cameras = resolved.deployment.cameras.iter().enumerate();
+    let used = cameras.filter(|(view, _)| *view < 32 && it.views_used >> view & 1 == 1);
+    JointLine::Placed(PlacedJoint {
+        covariance_m2: it.covariance,
+        position_m: it.in_world,
+        reprojection_px: Some(it.reprojection_px),
+        views: used.map(|it| it.1.name.clone()).collect(),
+    })
+}

@@ -1,0 +1,161 @@
+//! Formats with a file for every view: keypoints, and videos.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use exports::{Trial, ViewCamera, annotate, openpose};
+use footage::{Canvas, FootageError, Size, VideoWriter};
+use offline::Console;
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+
+use super::pictures::Pictures;
+use super::{Written, cannot_write, interrupted};
+
+/// The file that says that a folder was made by Parallax, and may be replaced.
+const MARK: &str = ".parallax";
+
+/// A folder of keypoints: in it one for each view, with a file for each frame.
+pub(super) fn openpose(
+    trial: &Trial,
+    cameras: &[ViewCamera],
+    path: &Path,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<Written, Failure> {
+    let beside = files::beside(path);
+    let made = write_all(trial, cameras, &beside, stop, console);
+    let placed = made.and_then(|()| {
+        results::remove_pictures(path).or_fail(ExitKind::Usage)?;
+        fs::rename(&beside, path).map_err(|error| cannot_write(path, &error))
+    });
+    if placed.is_err() {
+        // The error that is reported came first.
+        drop(fs::remove_dir_all(&beside));
+    }
+    placed?;
+    let mut notes = vec![
+        "BODY_25 without what no joint is (nose, eyes, ears, toes, heels, unless a network names them)".to_owned(),
+        "the confidence is the share of the views that a joint was triangulated from; `pose_keypoints_sd_px` beside it is its \
+         standard deviation in the picture"
+            .to_owned(),
+    ];
+    if trial.joints.joints.iter().any(|it| it.name == "head") {
+        notes.push("the head is left out: BODY_25 has none".to_owned());
+    }
+    Ok(Written {
+        format: "openpose",
+        path: path.to_owned(),
+        about: [
+            "pixels of the footage",
+            "x right, y down, the centre of the top-left pixel at (0, 0)",
+            "0, 0, 0; nobody in a frame without a result",
+            "standard deviation, pixels, beside the format",
+        ],
+        notes,
+    })
+}
+
+fn write_all(
+    trial: &Trial,
+    cameras: &[ViewCamera],
+    folder: &Path,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<(), Failure> {
+    let at = |path: &Path, done: io::Result<()>| done.map_err(|error| cannot_write(path, &error));
+    if folder.exists() {
+        // Of a process that was killed.
+        at(folder, fs::remove_dir_all(folder))?;
+    }
+    at(folder, fs::create_dir_all(folder))?;
+    let mark = folder.join(MARK);
+    at(&mark, fs::write(&mark, "keypoints exported by parallax\n"))?;
+    console.set(0, cameras.len() * trial.slots.len());
+    for view in cameras {
+        let folder = folder.join(&view.name);
+        at(&folder, fs::create_dir_all(&folder))?;
+        for slot in 0..trial.slots.len() {
+            if stop.is_requested() {
+                return Err(interrupted());
+            }
+            let file = folder.join(openpose::file_name(&view.name, trial.frame(slot)));
+            at(&file, fs::write(&file, openpose::frame(trial, slot, view)))?;
+            console.advance(1);
+        }
+    }
+    Ok(())
+}
+
+/// The video of a view with the pose drawn on it.
+pub(super) fn video(
+    trial: &Trial,
+    pictures: &mut Pictures,
+    path: &Path,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<Written, Failure> {
+    let beside = files::beside(path);
+    let drawn = draw_all(trial, pictures, &beside, stop, console);
+    let placed = drawn.and_then(|n_without| {
+        fs::rename(&beside, path).map_err(|error| cannot_write(path, &error))?;
+        Ok(n_without)
+    });
+    if placed.is_err() {
+        // The error that is reported came first.
+        drop(fs::remove_file(&beside));
+    }
+    let n_without = placed?;
+    let mut notes = vec![format!(
+        "the ellipses are {} standard deviations of the joints, as the view sees them",
+        annotate::DEVIATIONS
+    )];
+    if n_without > 0 {
+        notes.push(format!("{n_without} frames have no picture, and are black"));
+    }
+    Ok(Written {
+        format: "mp4",
+        path: path.to_owned(),
+        about: [
+            "pixels of the pictures",
+            "x right, y down",
+            "a limb with a missing end is not drawn; frames without a result are labelled",
+            "ellipses",
+        ],
+        notes,
+    })
+}
+
+/// Returns how many frames have no picture.
+fn draw_all(
+    trial: &Trial,
+    pictures: &mut Pictures,
+    path: &Path,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<usize, Failure> {
+    let [width, height] = pictures.view.size.map(|it| it as usize);
+    let size = Size::new(width, height);
+    let rate_hz = trial.rate_hz.unwrap_or_default();
+    let failed = |error: FootageError| Failure::new(ExitKind::Input, error);
+    let mut video = VideoWriter::create(path, size, rate_hz, "ffmpeg".as_ref()).map_err(failed)?;
+    console.begin("mp4", &pictures.view.name);
+    console.set(0, trial.slots.len());
+    let mut n_without = 0;
+    for slot in 0..trial.slots.len() {
+        if stop.is_requested() {
+            return Err(interrupted());
+        }
+        let picture = pictures.at(trial.frame(slot))?;
+        n_without += usize::from(picture.is_none());
+        let mut canvas = picture.map_or_else(
+            || Canvas::new(size, [0; 3]),
+            |rgb| Canvas::from_rgb(size, rgb),
+        );
+        annotate::draw(&mut canvas, trial, slot, &pictures.view);
+        video.add(canvas.rgb()).map_err(failed)?;
+        console.advance(1);
+    }
+    video.finish().map_err(failed)?;
+    Ok(n_without)
+}

@@ -1,0 +1,166 @@
+//! The pictures of a view, frame by frame: of its footage, else of the recording.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::PathBuf;
+
+use capture::{Blank, Retimed};
+use exports::ViewCamera;
+use footage::SourceSpec;
+use messages::topic;
+use recording::{Entry, Kind, Recording};
+use runtime::{ExitKind, Failure, OrFail as _, in_file};
+
+use super::origin::camera as camera_of;
+use super::{Origin, of_footage};
+use crate::resolved::Resolved;
+use crate::{inputs, prepare};
+
+/// The pictures of a view. Frames are asked for in order.
+#[derive(Debug)]
+pub(super) struct Pictures {
+    /// The camera, as these pictures show it.
+    pub(super) view: ViewCamera,
+    from: From,
+}
+
+#[derive(Debug)]
+enum From {
+    Footage {
+        feed: Box<Retimed>,
+        /// The frame that the feed gave last.
+        at: Option<u64>,
+        is_over: bool,
+    },
+    Recording {
+        path: PathBuf,
+        file: File,
+        frames: BTreeMap<u64, Entry>,
+        buffer: Vec<u8>,
+    },
+}
+
+impl Pictures {
+    /// Those of all views.
+    ///
+    /// # Errors
+    ///
+    /// A view has none: it was live and was not recorded, or consists of keypoints alone; or its footage cannot be read.
+    pub(super) fn all(origin: &Origin) -> Result<Vec<Self>, Failure> {
+        let (resolved, rig) = origin.setup()?;
+        let cameras = resolved.deployment.cameras.iter().enumerate();
+        let all = cameras.map(|(nth, camera)| {
+            let found = footage(origin, resolved, nth);
+            let from_recording = || {
+                let recording = origin.recording.as_ref()?;
+                recorded(origin, recording, nth)
+            };
+            let (from, view) = match (found, from_recording()) {
+                (Ok(from), _) => (from, camera_of(resolved, rig, nth)?),
+                (Err(_), Some(from)) => {
+                    let framing = prepare::framing(resolved, rig, nth)?;
+                    let size = framing.out_size();
+                    let mut view = of_footage(&camera.name, &framing, size);
+                    view.picture_from_camera = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+                    (from, view)
+                }
+                (Err(why), None) => return Err(none(&camera.name, &why)),
+            };
+            Ok(Self { view, from })
+        });
+        all.collect()
+    }
+
+    /// The picture of a frame: RGB, row major, of the size of the view; none where there is none.
+    ///
+    /// # Errors
+    ///
+    /// The footage or the recording cannot be read.
+    pub(super) fn at(&mut self, frame: u64) -> Result<Option<&[u8]>, Failure> {
+        let n_bytes = 3 * self
+            .view
+            .size
+            .iter()
+            .map(|it| *it as usize)
+            .product::<usize>();
+        match &mut self.from {
+            From::Footage { feed, at, is_over } => {
+                while !*is_over && at.is_none_or(|it| it < frame) {
+                    let next = feed.next_frame().or_fail(ExitKind::Input)?;
+                    *is_over = next.is_none();
+                    *at = next.map(|it| it.index).or(*at);
+                }
+                let is_it = *at == Some(frame) && feed.pixels().len() == n_bytes;
+                Ok(is_it.then(|| feed.pixels()))
+            }
+            From::Recording {
+                path,
+                file,
+                frames,
+                buffer,
+            } => {
+                let Some(entry) = frames.get(&frame) else {
+                    return Ok(None);
+                };
+                match recording::read(file, Kind::Frame, entry, buffer) {
+                    Ok(message) if message.elements.len() == n_bytes => Ok(Some(message.elements)),
+                    Err(error @ recording::ReadError::Read(_)) => Err(in_file(path, &error)),
+                    // A damaged picture is none.
+                    Ok(_) | Err(_) => Ok(None),
+                }
+            }
+        }
+    }
+}
+
+fn none(camera: &str, why: &str) -> Failure {
+    let message = format!("camera {camera:?} has no pictures to draw on: {why}");
+    Failure::new(ExitKind::Input, message).with_hint(
+        "leave out mp4, or export the recording of `parallax record`, which holds pictures (without `--without pixels`)",
+    )
+}
+
+fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, String> {
+    let camera = &resolved.deployment.cameras[nth];
+    if camera.source.is_empty() || Blank::is_blank(&camera.source) {
+        return Err("it consists of keypoints".to_owned());
+    }
+    if inputs::is_live(&camera.source) {
+        return Err("it was live".to_owned());
+    }
+    let trial = &origin.trial;
+    let spec = SourceSpec {
+        start: trial.first_frame,
+        step: trial.frame_step,
+        count: Some(trial.slots.len() as u64),
+        ..inputs::source(camera, &resolved.deployment.capture)
+    };
+    let footage = resolved.footage.get(nth);
+    let feed = Retimed::open(&spec, footage.and_then(|it| it.timeline.as_ref()));
+    let feed = feed.map_err(|error| causes::in_one_line(&error))?;
+    let size = feed.info().size;
+    let due = footage.map_or([0; 2], |it| it.size.map(|it| it as usize));
+    if [size.width, size.height] != due {
+        return Err(format!(
+            "{} is {size}, and was {}x{} in the run",
+            camera.source, due[0], due[1]
+        ));
+    }
+    Ok(From::Footage {
+        feed: Box::new(feed),
+        at: None,
+        is_over: false,
+    })
+}
+
+fn recorded(origin: &Origin, recording: &Recording, nth: usize) -> Option<From> {
+    let track = recording.tracks.get(&topic::frame(nth))?;
+    let has_pixels = !recording.about.as_ref().is_ok_and(|it| it.without.pixels);
+    let frames = track.entries.iter().filter_map(|it| Some((it.frame?, *it)));
+    has_pixels.then_some(From::Recording {
+        path: origin.source.clone(),
+        file: File::open(&origin.source).ok()?,
+        frames: frames.collect(),
+        buffer: Vec::new(),
+    })
+}

@@ -1,0 +1,181 @@
+use std::fs;
+
+use super::*;
+
+/// A console that shows nothing.
+#[derive(Debug)]
+struct Silent;
+
+impl Console for Silent {
+    fn message(&self, _: &str) {}
+    fn event(&self, _: &Value) -> Result<(), Failure> {
+        Ok(())
+    }
+    fn result(&self, _: &str) -> Result<(), Failure> {
+        Ok(())
+    }
+    fn shows_bar(&self) -> bool {
+        false
+    }
+    fn begin(&self, _: &str, _: &str) {}
+    fn details(&self, _: &str) {}
+    fn set(&self, _: usize, _: usize) {}
+    fn advance(&self, _: usize) {}
+    fn finish(&self) {}
+}
+
+const LINE: &str = r#"{"facing_margin":null,"frame":0,"joints":{},"pairs":1,"status":"ok","time_s":0.0,"views_missing":{},"views_present":[],"views_used":[]}"#;
+
+/// Lines of frames in which all joints are at one place.
+fn lines(n: u64) -> String {
+    let joint = r#"{"covariance_m2":[1e-4,0,0,1e-4,0,1e-4],"position_m":[1.0,2.0,3.0],"reprojection_px":1.0,"views":["a"]}"#;
+    let joints = skeleton::PARSE14.joints.iter();
+    let joints = joints.map(|it| format!("\"{}\":{joint}", it.name));
+    let joints = joints.collect::<Vec<_>>().join(",");
+    let line = |frame: u64| {
+        LINE.replace("\"joints\":{}", &format!("\"joints\":{{{joints}}}"))
+            .replace("\"frame\":0", &format!("\"frame\":{frame}"))
+            .replace(
+                "\"time_s\":0.0",
+                &format!("\"time_s\":{}", frame as f64 / 50.0),
+            )
+            + "\n"
+    };
+    (0..n).map(line).collect()
+}
+
+fn run(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+fn job(folder: &Path, formats: &[&str]) -> Job {
+    let all = Format::all().into_iter();
+    Job {
+        formats: all.filter(|it| formats.contains(&it.name())).collect(),
+        out: folder.join("export"),
+        name: "x".to_owned(),
+        force: false,
+    }
+}
+
+fn given() -> Given {
+    Given {
+        up: Some(nalgebra::Vector3::z_axis()),
+        ..Given::default()
+    }
+}
+
+fn exported(origin: &Origin, job: &Job) -> Result<Vec<Written>, Failure> {
+    export(origin, job, &Stop::new().unwrap(), &Silent)
+}
+
+#[test]
+fn a_folder_is_written_once_and_again_only_by_force() {
+    let folder = run(&[("pose3d.jsonl", &lines(3))]);
+    let origin = Origin::read(folder.path(), &given()).unwrap();
+    let mut job = job(folder.path(), &["c3d", "csv", "csv-long", "trc"]);
+    assert_eq!(exported(&origin, &job).unwrap().len(), 4);
+    let read = fs::read(folder.path().join("export/x.c3d")).unwrap();
+    assert!(read.len() > 1024);
+    let manifest = fs::read_to_string(folder.path().join("export/x.export.json")).unwrap();
+    let manifest: Value = serde_json::from_str(&manifest).unwrap();
+    assert_eq!(
+        (&manifest["frames"], &manifest["rate_hz"]),
+        (&json!(3), &json!(50.0))
+    );
+    let error = exported(&origin, &job).unwrap_err();
+    assert_eq!(error.kind(), ExitKind::Usage);
+    job.force = true;
+    exported(&origin, &job).unwrap();
+    fs::remove_file(folder.path().join("export/x.c3d")).unwrap();
+    fs::create_dir(folder.path().join("export/x.c3d")).unwrap();
+    let error = exported(&origin, &job).unwrap_err().to_string();
+    assert!(error.contains("x.c3d is a folder"), "{error}");
+}
+
+#[test]
+fn what_a_run_does_not_tell_is_asked_for_before_anything_is_written() {
+    let timeless = lines(2).replace("\"time_s\":0.02", "\"time_s\":null");
+    let timeless = timeless.replace("\"time_s\":0,", "\"time_s\":null,");
+    let folder = run(&[("pose3d.jsonl", &timeless)]);
+    let origin = Origin::read(folder.path(), &Given::default()).unwrap();
+    let refused = |formats: &[&str]| {
+        exported(&origin, &job(folder.path(), formats))
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(refused(&["c3d", "csv"]).contains("how many frames a second"));
+    assert!(refused(&["openpose"]).contains("deployment.json"));
+    assert!(!folder.path().join("export").exists());
+    exported(&origin, &job(folder.path(), &["csv"])).unwrap();
+    let rate_hz = Some(25.0);
+    let origin = Origin::read(
+        folder.path(),
+        &Given {
+            rate_hz,
+            ..Given::default()
+        },
+    )
+    .unwrap();
+    let error = exported(&origin, &job(folder.path(), &["trc"])).unwrap_err();
+    assert!(error.to_string().contains("which way is up"), "{error}");
+    let folder = run(&[("pose3d.jsonl", &lines(2))]);
+    let error = Origin::read(
+        folder.path(),
+        &Given {
+            rate_hz,
+            ..Given::default()
+        },
+    )
+    .unwrap_err();
+    assert!(error.to_string().contains("contradicts"), "{error}");
+}
+
+#[test]
+fn runs_that_are_not_whole_say_so_and_those_without_a_joint_are_refused() {
+    let text = lines(3);
+    let cut = run(&[("pose3d.jsonl.part", &text[..text.len() - 9])]);
+    let origin = Origin::read(cut.path(), &given()).unwrap();
+    assert_eq!(origin.trial.slots.len(), 2);
+    let flaws = origin.flaws.join("\n");
+    assert!(
+        flaws.contains("has not ended") && flaws.contains("line 3 is cut off"),
+        "{flaws}"
+    );
+    for text in ["", LINE, &format!("{LINE}\n{LINE}\n")] {
+        let empty = run(&[("pose3d.jsonl", text)]);
+        let error = Origin::read(empty.path(), &given()).unwrap_err();
+        assert_eq!(error.kind(), ExitKind::Degraded, "{error}");
+    }
+    let wrong = run(&[(
+        "pose3d.jsonl",
+        &text.replace("\"frame\":1,", "\"frame\":-1,"),
+    )]);
+    let error = Origin::read(wrong.path(), &given())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("line 2") && error.contains("frame"),
+        "{error}"
+    );
+    let error = Origin::read(tempfile::tempdir().unwrap().path(), &given()).unwrap_err();
+    assert_eq!(error.kind(), ExitKind::Input);
+}
+
+#[test]
+fn a_stop_ends_it_and_leaves_no_half_file() {
+    let folder = run(&[("pose3d.jsonl", &lines(3))]);
+    let origin = Origin::read(folder.path(), &given()).unwrap();
+    let stop = Stop::new().unwrap();
+    stop.request();
+    let error = export(&origin, &job(folder.path(), &["csv"]), &stop, &Silent).unwrap_err();
+    assert_eq!(error.kind(), ExitKind::Interrupted);
+    assert_eq!(
+        fs::read_dir(folder.path().join("export")).unwrap().count(),
+        0
+    );
+}

@@ -1,0 +1,234 @@
+//! `parallax export`: a finished run in the files of other tools.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use launch::export::{Format, Given, Job, Origin, Written, as_json, export};
+use launch::output;
+use nalgebra::{UnitVector3, Vector3};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+
+use crate::globals::Globals;
+use crate::terminal::Terminal;
+
+/// The progress bar.
+const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
+
+/// Options of `parallax export`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Formats, what they are for, and what they hold:
+    c3d        motion capture        points, mm, z up; residual: standard deviation, mm; a gap: residual -1
+    trc        OpenSim               points, m, y up; a gap: empty cells
+    glb        viewers, Blender      skinned skeleton and animation, m, y up; a gap: a bone that is not there
+    bvh        animation             bones of fixed length (medians), cm, y up; in a gap the last rotation stays
+    csv        tables                a row for each frame, m, axes of the rig; standard deviations
+    csv-long   tables                a row for each joint of each frame: covariance, views, the reason of a gap
+    parquet    tables                the same, for builds with `--features parquet`
+    openpose   other pipelines       BODY_25 of the reprojected pose: a JSON file for each view and frame
+    mp4        people                every camera's pictures with the pose and its uncertainty; needs ffmpeg
+    all        all of these
+
+Nothing is filled or smoothed: a joint that was not found or was refused is a gap, and BVH, which knows none, says where it \
+holds. Frames stand on the grid of the frame rate; frames that were dropped are gaps. NAME.export.json says all of this \
+of what was written, with the gaps of every joint. Files take their names when they are whole.
+
+With --json one object, that of NAME.export.json: {\"schema_version\", \"source\", \"frames\", \"frames_with_points\", \
+\"first_frame\", \"frame_step\", \"rate_hz\", \"irregular_times\", \"repeated_frames\", \"up_in_world\", \"points\", \"gaps\", \
+\"flaws\", \"files\": [{\"format\", \"path\", \"unit\", \"axes\", \"gaps\", \"uncertainty\", \"notes\"}]}.
+
+Exit codes: 0 done; 2 the command line is wrong, or a file exists; 4 the run cannot be read, does not have what a format needs, \
+or the folder cannot be written; 5 the calibration does not fit; 7 no frame has a joint, or the run is not whole: cut off, \
+damaged, not ended; 130 stopped by Ctrl-C.
+
+Examples:
+    parallax export out/my --to c3d,trc
+    parallax export out/my --to all --out results/walk --name walk
+    parallax export run.mcap --to glb,mp4
+    parallax export out/photos --to bvh --rate 25 --up 0,0,1")]
+pub(crate) struct Arguments {
+    /// The folder that a run has written, or a recording (MCAP).
+    source: PathBuf,
+    /// The formats, separated by commas; or all.
+    #[arg(long, value_name = "LIST", value_parser = formats)]
+    to: Formats,
+    /// The folder for the files; if not given, `export` in the folder of the run, or the name of the recording with `-export` appended.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// What the files are called.
+    #[arg(long, default_value = "pose3d", value_parser = name)]
+    name: String,
+    /// Frames of the footage per second, for a run that does not know.
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    rate: Option<f64>,
+    /// Which way is up in the world of the rig, instead of what the calibration says: 0,0,1.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = up)]
+    up: Option<UnitVector3<f64>>,
+    /// Replace files that exist.
+    #[arg(long)]
+    force: bool,
+    /// Print what was written as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A list, as clap takes it from one argument.
+type Formats = Vec<Format>;
+
+fn formats(text: &str) -> Result<Formats, String> {
+    let all = Format::all();
+    let names: Vec<&str> = all.iter().map(|it| it.name()).collect();
+    let mut found: Formats = Vec::new();
+    for wanted in text.split(',').map(str::trim) {
+        let of_name = |it: &Format| wanted == "all" || it.name() == wanted;
+        let chosen: Formats = all.iter().copied().filter(of_name).collect();
+        if chosen.is_empty() && wanted == "parquet" {
+            let how = "this build writes no Parquet: cargo build --release --features parquet";
+            return Err(how.to_owned());
+        }
+        if chosen.is_empty() {
+            return Err(format!("{wanted:?} is none of {}, all", names.join(", ")));
+        }
+        for format in chosen {
+            if !found.iter().any(|it| it.name() == format.name()) {
+                found.push(format);
+            }
+        }
+    }
+    Ok(found)
+}
+
+fn name(text: &str) -> Result<String, String> {
+    let is_plain = !text.is_empty()
+        && !text.starts_with('.')
+        && !text.contains(|it: char| it == '/' || it.is_control());
+    let expected = "expected the name of a file, without a folder";
+    is_plain
+        .then(|| text.to_owned())
+        .ok_or_else(|| expected.to_owned())
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|it| (0.001..=1e5).contains(it));
+    number.ok_or_else(|| format!("expected 0.001 to 100000 frames a second, got {text:?}"))
+}
+
+fn up(text: &str) -> Result<UnitVector3<f64>, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|it| it.trim().parse().ok()).collect();
+    let [x, y, z] = numbers
+        .and_then(|it| it.try_into().ok())
+        .unwrap_or_default();
+    let up = UnitVector3::try_new(Vector3::new(x, y, z), 1e-9);
+    up.filter(|it| it.iter().all(|it| it.is_finite()))
+        .ok_or_else(|| format!("expected a direction such as 0,0,1, got {text:?}"))
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let origin = Origin::read(
+        &arguments.source,
+        &Given {
+            name: arguments.name.clone(),
+            rate_hz: arguments.rate,
+            up: arguments.up,
+        },
+    )?;
+    let job = Job {
+        formats: arguments.to.clone(),
+        out: arguments
+            .out
+            .clone()
+            .unwrap_or_else(|| beside(&arguments.source)),
+        name: arguments.name.clone(),
+        force: arguments.force,
+    };
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR);
+    let written = export(&origin, &job, &stop, &terminal)?;
+    if arguments.json {
+        output::json(&as_json(&origin, &written))?;
+    } else if !globals.quiet {
+        report(&origin, &written)?;
+    }
+    for flaw in &origin.flaws {
+        output::message(format_args!("warning: {flaw}"));
+    }
+    let kind = (!origin.flaws.is_empty()).then_some(ExitKind::Degraded);
+    Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
+}
+
+/// Where files go that are not told.
+fn beside(source: &Path) -> PathBuf {
+    if source.is_dir() {
+        return source.join("export");
+    }
+    let name = source.file_stem().unwrap_or_default().to_string_lossy();
+    source.with_file_name(format!("{name}-export"))
+}
+
+fn report(origin: &Origin, written: &[Written]) -> Result<(), Failure> {
+    let trial = &origin.trial;
+    let rate = trial.rate_hz.map_or_else(
+        || "of no known rate".to_owned(),
+        |rate_hz| format!("at {rate_hz} Hz"),
+    );
+    output::line(format_args!(
+        "{} frames {rate}, the first is number {}; {} of them have joints",
+        trial.slots.len(),
+        trial.first_frame,
+        trial.n_with_points()
+    ))?;
+    let turned = written.iter().any(|it| it.about[1].ends_with(" up"));
+    if turned && trial.up_in_world.is_none() {
+        output::line(
+            "the rig does not say which way is up: axes are those of the rig; --up 0,0,1 turns them",
+        )?;
+    }
+    for it in written {
+        let [unit, axes, gaps, _] = it.about;
+        output::line(format_args!(
+            "{:9} {}: {unit}; {axes}; a gap: {gaps}",
+            it.format,
+            it.path.display()
+        ))?;
+        for note in &it.notes {
+            output::line(format_args!("          {note}"))?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(text: &str) -> Result<Vec<&'static str>, String> {
+        formats(text).map(|all| all.into_iter().map(Format::name).collect())
+    }
+
+    #[test]
+    fn formats_are_named_once_each_and_others_are_refused() {
+        assert_eq!(names("glb, c3d,glb"), Ok(vec!["glb", "c3d"]));
+        assert_eq!(names("all,csv").unwrap().len(), Format::all().len());
+        let error = names("c3d,fbx").unwrap_err();
+        assert!(
+            error.contains("\"fbx\" is none of c3d, trc, glb"),
+            "{error}"
+        );
+        names("").unwrap_err();
+    }
+
+    #[test]
+    fn directions_and_names_that_are_none_are_refused() {
+        assert_eq!(up("0,0,2").unwrap(), Vector3::z_axis());
+        assert_eq!(up("0, -1, 0").unwrap(), -Vector3::y_axis());
+        for text in ["", "1,2", "0,0,0", "a,b,c", "1,2,3,4", "nan,0,0", "inf,0,0"] {
+            assert!(up(text).is_err(), "{text}");
+        }
+        for text in ["", "a/b", "..", ".x", "a\n"] {
+            assert!(name(text).is_err(), "{text:?}");
+        }
+        assert_eq!(name("walk, one").unwrap(), "walk, one");
+    }
+}

@@ -1,0 +1,161 @@
+//! The pose in space drawn on the picture of a view: limbs, and around every joint the ellipse of two standard deviations.
+
+use core::f64::consts::TAU;
+
+use footage::{CENTRE, Canvas, Limb, Side, draw_limbs, line_width};
+
+use crate::{Seen, Trial, ViewCamera};
+
+/// How many standard deviations the ellipses are wide.
+pub const DEVIATIONS: f64 = 2.0;
+/// Points of an ellipse.
+const N_POINTS: usize = 40;
+
+/// Draws a frame on the picture of a view.
+pub fn draw(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) {
+    let seen: Vec<Option<Seen>> = trial
+        .points(slot)
+        .map(|it| it.and_then(|it| view.see(it)))
+        .collect();
+    let names: Vec<&str> = trial.names().collect();
+    let n_joints = trial.joints.joints.len();
+    let width = line_width(canvas.size());
+    for (name, seen) in names.iter().zip(&seen).take(n_joints) {
+        if let Some(seen) = seen {
+            ellipse(canvas, seen, width / 2.0, side_of(name));
+        }
+    }
+    let places: Vec<[f64; 2]> = seen
+        .iter()
+        .map(|it| it.map_or([f64::NAN; 2], |it| it.at))
+        .collect();
+    draw_limbs(canvas, &places, &limbs(trial));
+    for (name, at) in names.iter().zip(&places).skip(n_joints) {
+        canvas.disc(*at, width, side_of(name).colour());
+    }
+    let status = &trial.slots[slot].status;
+    let time = trial
+        .time_s(slot)
+        .map_or(String::new(), |it| format!(" {it:.3} s"));
+    let what = match &**status {
+        "ok" => "",
+        "" => " no result",
+        other => other,
+    };
+    let text = format!("{} {}{time} {what}", view.name, trial.frame(slot));
+    canvas.label([2.0, 2.0], text.trim_end(), CENTRE);
+}
+
+fn ellipse(canvas: &mut Canvas, seen: &Seen, width: f64, side: Side) {
+    let Some([xx, xy, yy]) = seen.covariance else {
+        return;
+    };
+    // One that is larger than the picture tells nothing, and takes long to draw.
+    let size = canvas.size();
+    let longest = (size.width + size.height) as f64;
+    if (DEVIATIONS * (xx + yy).sqrt()).total_cmp(&longest).is_gt() {
+        return;
+    }
+    // The lower triangle of the square root of the covariance.
+    let a = xx.max(0.0).sqrt();
+    let b = if a > 0.0 { xy / a } else { 0.0 };
+    let c = (yy - b * b).max(0.0).sqrt();
+    let points: Vec<[f64; 2]> = (0..=N_POINTS)
+        .map(|nth| {
+            let (sin, cos) = (TAU * nth as f64 / N_POINTS as f64).sin_cos();
+            [
+                seen.at[0] + DEVIATIONS * a * cos,
+                seen.at[1] + DEVIATIONS * (b * cos + c * sin),
+            ]
+        })
+        .collect();
+    canvas.polyline(&points, width, side.colour());
+}
+
+/// The side of the body that a point is of, by its name.
+pub(crate) fn side_of(name: &str) -> Side {
+    let is = |side: &str, of: char| {
+        let own = |part: &str| {
+            let mut rest = part.chars();
+            rest.next() == Some(of) && rest.next().is_some_and(char::is_uppercase)
+        };
+        name.starts_with(side)
+            || ["upper", "lower"]
+                .iter()
+                .any(|it| name.strip_prefix(it).is_some_and(own))
+    };
+    if is("right", 'R') {
+        Side::Right
+    } else if is("left", 'L') {
+        Side::Left
+    } else {
+        Side::Centre
+    }
+}
+
+fn limbs(trial: &Trial) -> Vec<Limb> {
+    let side = |joint: usize| side_of(trial.joints.joints[joint].name);
+    let limbs = trial.joints.limbs.iter();
+    limbs
+        .map(|&(from, to)| Limb {
+            from,
+            to,
+            side: match side(from) {
+                Side::Centre => side(to),
+                own => own,
+            },
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use footage::Size;
+
+    use super::*;
+    use crate::testing::{camera, walker};
+
+    fn drawn(trial: &Trial, slot: usize) -> Vec<u8> {
+        let mut canvas = Canvas::new(Size::new(320, 240), [0; 3]);
+        draw(&mut canvas, trial, slot, &camera());
+        canvas.rgb().to_vec()
+    }
+
+    #[test]
+    fn the_pose_is_drawn_and_a_gap_is_named() {
+        let mut trial = walker(2);
+        let with = drawn(&trial, 0);
+        trial.slots[0] = crate::Slot::default();
+        let without = drawn(&trial, 0);
+        let lit = |rgb: &[u8]| rgb.iter().filter(|it| **it > 60).count();
+        assert!(lit(&with) > lit(&without) + 500 && lit(&without) > 100);
+    }
+
+    #[test]
+    fn an_unknown_covariance_has_no_ellipse_and_an_endless_one_does_no_harm() {
+        let mut trial = walker(1);
+        let with = drawn(&trial, 0);
+        for point in trial.slots[0].points.iter_mut().flatten() {
+            point.covariance = [f64::NAN; 6];
+        }
+        assert_ne!(drawn(&trial, 0), with);
+        for point in trial.slots[0].points.iter_mut().flatten() {
+            point.covariance = [1e300, 0.0, 0.0, 1e300, 0.0, 1e300];
+        }
+        drawn(&trial, 0);
+    }
+
+    #[test]
+    fn sides_are_told_by_the_names_of_all_sets() {
+        for (name, side) in [
+            ("right knee", Side::Right),
+            ("left heel", Side::Left),
+            ("upperLArmProximal", Side::Left),
+            ("lowerRLegDistal", Side::Right),
+            ("torsoProximal", Side::Centre),
+            ("neck", Side::Centre),
+        ] {
+            assert_eq!(side_of(name), side, "{name}");
+        }
+    }
+}

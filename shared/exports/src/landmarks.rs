@@ -1,0 +1,65 @@
+//! What the joints of every set are called in the body: the same names, whatever the set.
+
+use nalgebra::Point3;
+
+use crate::Trial;
+
+/// A landmark of the body, and the joints of the sets that are it: the first that a set has.
+const LANDMARKS: [(&str, &[&str]); 15] = [
+    ("pelvis", &["pelvis", "torsoDistal"]),
+    ("neck", &["neck", "thorax", "torsoProximal"]),
+    ("head", &["head", "headDistal"]),
+    ("left shoulder", &["left shoulder", "upperLArmProximal"]),
+    ("left elbow", &["left elbow", "upperLArmDistal"]),
+    ("left wrist", &["left wrist", "lowerLArmDistal"]),
+    ("right shoulder", &["right shoulder", "upperRArmProximal"]),
+    ("right elbow", &["right elbow", "upperRArmDistal"]),
+    ("right wrist", &["right wrist", "lowerRArmDistal"]),
+    ("left hip", &["left hip", "upperLLegProximal"]),
+    ("left knee", &["left knee", "upperLLegDistal"]),
+    ("left ankle", &["left ankle", "lowerLLegDistal"]),
+    ("right hip", &["right hip", "upperRLegProximal"]),
+    ("right knee", &["right knee", "upperRLegDistal"]),
+    ("right ankle", &["right ankle", "lowerRLegDistal"]),
+];
+
+/// Which points of a trial are the landmarks.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Landmarks {
+    points: Vec<(&'static str, Vec<usize>)>,
+}
+
+impl Landmarks {
+    pub(crate) fn of(trial: &Trial) -> Self {
+        let at = |name: &str| trial.names().position(|it| it == name);
+        let points = LANDMARKS.map(|(landmark, names)| {
+            let one = names.iter().find_map(|it| at(it));
+            (landmark, one.into_iter().collect())
+        });
+        let mut all = Self {
+            points: points.into(),
+        };
+        // A set without a pelvis has it in the middle of the hips.
+        let hips = ["left hip", "right hip"].map(|it| all.points_of(it).to_vec());
+        if all.points_of("pelvis").is_empty() && hips.iter().all(|it| it.len() == 1) {
+            all.points[0].1 = hips.concat();
+        }
+        all
+    }
+
+    /// The points whose mean is the landmark; none where there is none.
+    pub(crate) fn points_of(&self, landmark: &str) -> &[usize] {
+        let found = self.points.iter().find(|it| it.0 == landmark);
+        found.map_or(&[], |it| &it.1)
+    }
+
+    /// Where the landmark is, in the world; none in a gap.
+    pub(crate) fn at(&self, trial: &Trial, slot: usize, landmark: &str) -> Option<Point3<f64>> {
+        let points = self.points_of(landmark);
+        let mut sum = nalgebra::Vector3::zeros();
+        for &point in points {
+            sum += trial.point(slot, point)?.in_world.coords;
+        }
+        (!points.is_empty()).then(|| Point3::from(sum / points.len() as f64))
+    }
+}

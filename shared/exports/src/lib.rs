@@ -1,0 +1,44 @@
+//! What a run found, in the files of other tools: one module for each format.
+//!
+//! [`Gathering`] takes the lines of a run one by one, and makes a [`Trial`] of them: every frame in its place on the grid of the
+//! frame rate, gaps included. [`FILES`] is the table of formats that are one file each; two formats have a file for every view and
+//! frame ([`openpose`]) or pictures ([`annotate`]), and are given a [`ViewCamera`].
+//!
+//! | format | unit | axes | a gap is |
+//! |---|---|---|---|
+//! | [`c3d`](FILES) | mm | z up | residual -1 |
+//! | `trc` | m | y up | empty cells |
+//! | `glb` | m | y up | a bone that is not there (scale 0) |
+//! | `bvh` | cm | y up | the last rotation, and said: the format knows no gaps |
+//! | `csv`, `csv-long` | m | the rig's | empty cells |
+//! | `parquet` (a feature) | m | the rig's | null |
+//! | [`openpose`] | pixels of the footage | x right, y down | `0, 0, 0` |
+//!
+//! Nothing here opens a file. Nothing is smoothed or filled; what a format cannot say is said in its [`Notes`].
+#![forbid(unsafe_code)]
+
+mod trial;
+
+mod landmarks;
+mod tree;
+
+mod format;
+
+mod bvh;
+mod glb;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod points;
+mod tables;
+
+mod view;
+
+pub mod annotate;
+pub mod openpose;
+
+pub use format::{FILES, FileFormat, Needs, Notes, Sink};
+pub use trial::{Gap, Gathering, Point, Slot, Trial, TrialError};
+pub use view::{Seen, ViewCamera};
+
+#[cfg(test)]
+mod testing;

@@ -1,0 +1,119 @@
+//! The pose in space as each view sees it, as `OpenPose` writes keypoints: a file for every view and frame, `BODY_25`.
+//!
+//! The format has a confidence for every keypoint. Here it is the share of the views that the joint was triangulated from; the
+//! standard deviation of the place in the picture stands beside it, under a key that others pass over. What was not found, is
+//! behind the camera, or lies outside of the picture is `0, 0, 0`.
+
+use keypoints::BODY_25;
+use serde_json::{Value, json};
+
+use crate::landmarks::Landmarks;
+use crate::{Seen, Trial, ViewCamera};
+
+/// What files of a frame end in.
+pub const SUFFIX: &str = "_keypoints.json";
+
+/// The file of a view and a frame; nobody is in it where nothing was found.
+pub fn frame(trial: &Trial, slot: usize, view: &ViewCamera) -> String {
+    let landmarks = Landmarks::of(trial);
+    let (mut numbers, mut deviations) = (Vec::new(), Vec::new());
+    let mut is_any = false;
+    for name in BODY_25 {
+        let found = keypoint(trial, slot, view, &landmarks, name);
+        is_any |= found.is_some();
+        let [x, y, share, deviation] = found.map_or([0.0, 0.0, 0.0, f64::NAN], |(seen, share)| {
+            let deviation = seen.deviation_px().unwrap_or(f64::NAN);
+            [seen.at[0], seen.at[1], share, deviation]
+        });
+        numbers.extend([x, y, share].map(|it| (it * 1e4).round() / 1e4));
+        deviations.push((deviation * 1e2).round() / 1e2);
+    }
+    let person = json!({
+        "person_id": [-1],
+        "pose_keypoints_2d": numbers,
+        "pose_keypoints_sd_px": deviations,
+        "face_keypoints_2d": [],
+        "hand_left_keypoints_2d": [],
+        "hand_right_keypoints_2d": [],
+        "pose_keypoints_3d": [],
+        "face_keypoints_3d": [],
+        "hand_left_keypoints_3d": [],
+        "hand_right_keypoints_3d": [],
+    });
+    let people: Vec<Value> = is_any.then_some(person).into_iter().collect();
+    json!({ "version": 1.3, "people": people }).to_string()
+}
+
+/// A keypoint in the picture, and the share of the views that it is from.
+fn keypoint(
+    trial: &Trial,
+    slot: usize,
+    view: &ViewCamera,
+    landmarks: &Landmarks,
+    name: &str,
+) -> Option<(Seen, f64)> {
+    let points = match landmarks.points_of(name) {
+        [] => vec![trial.names().position(|it| it == name)?],
+        points => points.to_vec(),
+    };
+    let all: Option<Vec<_>> = points.iter().map(|&it| trial.point(slot, it)).collect();
+    let all = all?;
+    let n = all.len() as f64;
+    let mut mean = **all.first()?;
+    mean.in_world = landmarks.at(trial, slot, name).unwrap_or(mean.in_world);
+    if all.len() > 1 {
+        // The errors of its joints are taken as independent.
+        mean.covariance = core::array::from_fn(|it| {
+            all.iter().map(|point| point.covariance[it]).sum::<f64>() / (n * n)
+        });
+        mean.views = all.iter().fold(u32::MAX, |both, it| both & it.views);
+    }
+    let share = f64::from(mean.views.count_ones()) / trial.views.len().max(1) as f64;
+    let seen = view.see(&mean).filter(|it| view.holds(it.at))?;
+    // A joint of no view that is known is found nevertheless; zero would mean that it is not.
+    Some((seen, share.clamp(0.01, 1.0)))
+}
+
+/// What files of a frame are called: `cam01_000000000012_keypoints.json`.
+pub fn file_name(view: &str, frame: u64) -> String {
+    format!("{view}_{frame:012}{SUFFIX}")
+}
+
+#[cfg(test)]
+mod tests {
+    use keypoints::files::openpose;
+
+    use super::*;
+    use crate::testing::{camera, walker};
+
+    #[test]
+    fn what_was_written_is_read_by_our_reader_where_the_camera_sees_it() {
+        let (trial, view) = (walker(3), camera());
+        let text = frame(&trial, 1, &view);
+        let read = openpose::parse(text.as_bytes(), None).unwrap().people;
+        assert_eq!(read.len(), 1);
+        let knee = BODY_25.iter().position(|it| *it == "left knee").unwrap();
+        let index = trial.names().position(|it| it == "left knee").unwrap();
+        let due = view.see(trial.point(1, index).unwrap()).unwrap();
+        let found = read[0].keypoints[knee].unwrap();
+        for axis in 0..2 {
+            assert!((found.at[axis] - due.at[axis]).abs() < 1e-3);
+        }
+        assert!(read[0].keypoints[0].is_none(), "no joint set has a nose");
+    }
+
+    #[test]
+    fn a_gap_is_nobody_and_a_missing_joint_zeros() {
+        let (mut trial, view) = (walker(3), camera());
+        trial.slots[0].points.clear();
+        assert!(frame(&trial, 0, &view).contains("\"people\":[]"));
+        trial.slots[1].points[0] = Err(crate::Gap("implausible".into()));
+        let value: Value = serde_json::from_str(&frame(&trial, 1, &view)).unwrap();
+        let person = &value["people"][0];
+        // The right ankle.
+        for nth in 33..36 {
+            assert_eq!(person["pose_keypoints_2d"][nth], 0.0);
+        }
+        assert_eq!(person["pose_keypoints_sd_px"][11], Value::Null);
+    }
+}

@@ -1,0 +1,168 @@
+//! Parquet: the long table, a row for each point of each frame.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+
+use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::parser::parse_message_type;
+
+use crate::format::Sink;
+use crate::tables::{gap, views};
+use crate::{Notes, Point, Trial};
+
+/// The columns: those of the long CSV.
+const SCHEMA: &str = "message pose3d {
+    REQUIRED INT64 frame;
+    OPTIONAL DOUBLE time_s;
+    REQUIRED BYTE_ARRAY joint (UTF8);
+    OPTIONAL DOUBLE x_m;
+    OPTIONAL DOUBLE y_m;
+    OPTIONAL DOUBLE z_m;
+    OPTIONAL DOUBLE sd_m;
+    OPTIONAL DOUBLE cov_xx_m2;
+    OPTIONAL DOUBLE cov_xy_m2;
+    OPTIONAL DOUBLE cov_xz_m2;
+    OPTIONAL DOUBLE cov_yy_m2;
+    OPTIONAL DOUBLE cov_yz_m2;
+    OPTIONAL DOUBLE cov_zz_m2;
+    OPTIONAL DOUBLE reprojection_px;
+    REQUIRED BYTE_ARRAY views (UTF8);
+    REQUIRED BYTE_ARRAY status (UTF8);
+}";
+
+/// Frames of a group of rows, which is put together in memory.
+const GROUP: usize = 2000;
+
+pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
+    write_all(trial, out).map_err(|error| match error {
+        ParquetError::External(cause) => match cause.downcast::<io::Error>() {
+            Ok(error) => *error,
+            Err(other) => io::Error::other(other),
+        },
+        other => io::Error::other(other),
+    })?;
+    Ok(Notes::new())
+}
+
+fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
+    let schema = Arc::new(parse_message_type(SCHEMA)?);
+    let properties = Arc::new(WriterProperties::builder().build());
+    let mut file = SerializedFileWriter::new(out, schema, properties)?;
+    let names: Vec<&str> = trial.names().collect();
+    for begin in (0..trial.slots.len()).step_by(GROUP) {
+        let end = (begin + GROUP).min(trial.slots.len());
+        let places = (begin..end).flat_map(|slot| (0..names.len()).map(move |nth| (slot, nth)));
+        let places: Vec<(usize, usize)> = places.collect();
+        let mut group = file.next_row_group()?;
+        let frames: Vec<i64> = places
+            .iter()
+            .map(|it| i64::try_from(trial.frame(it.0)).unwrap_or(i64::MAX))
+            .collect();
+        column::<Int64Type, _>(&mut group, &frames, None)?;
+        numbers(&mut group, places.iter().map(|it| trial.time_s(it.0)))?;
+        texts(&mut group, places.iter().map(|it| names[it.1].to_owned()))?;
+        let point = |it: &(usize, usize)| trial.point(it.0, it.1);
+        for axis in 0..3 {
+            numbers(
+                &mut group,
+                places.iter().map(|it| Some(point(it)?.in_world[axis])),
+            )?;
+        }
+        numbers(&mut group, places.iter().map(|it| point(it)?.deviation_m()))?;
+        for entry in 0..6 {
+            numbers(
+                &mut group,
+                places.iter().map(|it| Some(point(it)?.covariance[entry])),
+            )?;
+        }
+        numbers(
+            &mut group,
+            places.iter().map(|it| point(it)?.reprojection_px),
+        )?;
+        let named = |it: &Point| views(trial, it);
+        texts(
+            &mut group,
+            places
+                .iter()
+                .map(|it| point(it).map_or(String::new(), named)),
+        )?;
+        let status = |it: &(usize, usize)| match point(it) {
+            Some(_) => "ok".to_owned(),
+            None => gap(trial, it.0, it.1).to_owned(),
+        };
+        texts(&mut group, places.iter().map(status))?;
+        group.close()?;
+    }
+    file.close()?;
+    Ok(())
+}
+
+/// * `levels`: 1 where there is a value, 0 where there is none; none for a column without gaps.
+fn column<T: DataType, W: Write + Send>(
+    group: &mut SerializedRowGroupWriter<'_, W>,
+    values: &[T::T],
+    levels: Option<&[i16]>,
+) -> Result<(), ParquetError> {
+    let missing = || ParquetError::General("a column too many".to_owned());
+    let mut column = group.next_column()?.ok_or_else(missing)?;
+    column.typed::<T>().write_batch(values, levels, None)?;
+    column.close()
+}
+
+fn numbers<W: Write + Send>(
+    group: &mut SerializedRowGroupWriter<'_, W>,
+    all: impl Iterator<Item = Option<f64>>,
+) -> Result<(), ParquetError> {
+    let all: Vec<Option<f64>> = all.map(|it| it.filter(|it| it.is_finite())).collect();
+    let levels: Vec<i16> = all.iter().map(|it| i16::from(it.is_some())).collect();
+    let values: Vec<f64> = all.into_iter().flatten().collect();
+    column::<DoubleType, _>(group, &values, Some(&levels))
+}
+
+fn texts<W: Write + Send>(
+    group: &mut SerializedRowGroupWriter<'_, W>,
+    all: impl Iterator<Item = String>,
+) -> Result<(), ParquetError> {
+    let values: Vec<ByteArray> = all.map(|it| ByteArray::from(it.into_bytes())).collect();
+    column::<ByteArrayType, _>(group, &values, None)
+}
+
+#[cfg(test)]
+mod tests {
+    use parquet::file::reader::{FileReader as _, SerializedFileReader};
+    use parquet::record::RowAccessor as _;
+
+    use super::*;
+    use crate::Gap;
+    use crate::testing::walker;
+
+    #[test]
+    fn what_was_written_is_read_back() {
+        let mut trial = walker(3);
+        trial.slots[1].points[4] = Err(Gap("implausible".into()));
+        let mut file = Vec::new();
+        write(&trial, &mut file).unwrap();
+        let mut on_disk = tempfile::tempfile().unwrap();
+        on_disk.write_all(&file).unwrap();
+        let reader = SerializedFileReader::new(on_disk).unwrap();
+        let rows: Vec<_> = reader
+            .get_row_iter(None)
+            .unwrap()
+            .map(Result::unwrap)
+            .collect();
+        assert_eq!(rows.len(), 3 * 14);
+        let due = trial.point(2, 13).unwrap().in_world;
+        let last = rows.last().unwrap();
+        assert_eq!(
+            (last.get_long(0).unwrap(), last.get_string(2).unwrap()),
+            (12, &"head".to_owned())
+        );
+        assert_eq!(last.get_double(5).unwrap(), due.z);
+        let gap = &rows[14 + 4];
+        assert_eq!(gap.get_string(15).unwrap(), "implausible");
+        assert!(gap.get_double(3).is_err(), "no number");
+    }
+}

@@ -1,0 +1,106 @@
+//! Tables: CSV with a row for each frame (wide), or for each point of each frame (long).
+
+use std::io;
+
+use crate::format::Sink;
+use crate::{Notes, Point, Trial};
+
+/// The columns of the long table: those of `pose3d.csv`, and the standard deviation.
+const LONG: [&str; 16] = [
+    "frame",
+    "time_s",
+    "joint",
+    "x_m",
+    "y_m",
+    "z_m",
+    "sd_m",
+    "cov_xx_m2",
+    "cov_xy_m2",
+    "cov_xz_m2",
+    "cov_yy_m2",
+    "cov_yz_m2",
+    "cov_zz_m2",
+    "reprojection_px",
+    "views",
+    "status",
+];
+
+/// A number as short as it can be and still be the same; empty where there is none.
+fn cell(number: Option<f64>) -> String {
+    let number = number.filter(|it| it.is_finite());
+    number.map_or(String::new(), |it| it.to_string())
+}
+
+fn place(point: Option<&Point>) -> [String; 4] {
+    let axis = |axis: usize| cell(point.map(|it| it.in_world[axis]));
+    let deviation = cell(point.and_then(Point::deviation_m));
+    [axis(0), axis(1), axis(2), deviation]
+}
+
+/// A row for each frame: four columns for each point.
+pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
+    let mut table = csv::Writer::from_writer(out);
+    let mut head = ["frame", "time_s", "status"].map(str::to_owned).to_vec();
+    for name in trial.labels() {
+        head.extend(["x_m", "y_m", "z_m", "sd_m"].map(|it| format!("{name}_{it}")));
+    }
+    table.write_record(&head)?;
+    for slot in 0..trial.slots.len() {
+        let mut row = vec![
+            trial.frame(slot).to_string(),
+            cell(trial.time_s(slot)),
+            status(trial, slot).to_owned(),
+        ];
+        row.extend(trial.points(slot).flat_map(place));
+        table.write_record(&row)?;
+    }
+    table.flush()?;
+    Ok(Notes::new())
+}
+
+/// A row for each point of each frame.
+pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
+    let mut table = csv::Writer::from_writer(out);
+    table.write_record(LONG)?;
+    let names: Vec<&str> = trial.names().collect();
+    for slot in 0..trial.slots.len() {
+        let [frame, time_s] = [trial.frame(slot).to_string(), cell(trial.time_s(slot))];
+        for (nth, name) in names.iter().enumerate() {
+            let point = trial.point(slot, nth);
+            let mut row = vec![frame.clone(), time_s.clone(), (*name).to_owned()];
+            row.extend(place(point));
+            row.extend((0..6).map(|it| cell(point.map(|point| point.covariance[it]))));
+            row.push(cell(point.and_then(|it| it.reprojection_px)));
+            row.push(point.map_or(String::new(), |it| views(trial, it)));
+            row.push(
+                point
+                    .map_or_else(|| gap(trial, slot, nth), |_| "ok")
+                    .to_owned(),
+            );
+            table.write_record(&row)?;
+        }
+    }
+    table.flush()?;
+    Ok(Notes::new())
+}
+
+/// What became of a frame.
+fn status(trial: &Trial, slot: usize) -> &str {
+    let status = &trial.slots[slot].status;
+    if status.is_empty() { "no line" } else { status }
+}
+
+/// Why a point has no position.
+pub(crate) fn gap(trial: &Trial, slot: usize, point: usize) -> &str {
+    match trial.slots[slot].points.get(point) {
+        Some(Err(gap)) if !gap.0.is_empty() => &gap.0,
+        _ => status(trial, slot),
+    }
+}
+
+/// The views that a point is from.
+pub(crate) fn views(trial: &Trial, point: &Point) -> String {
+    let named = trial.views.iter().enumerate();
+    let seen = named.filter(|it| it.0 < 32 && point.views >> it.0 & 1 == 1);
+    seen.map(|it| it.1.as_str()).collect::<Vec<_>>().join("+")
+}

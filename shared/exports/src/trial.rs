@@ -1,0 +1,354 @@
+//! What a run found, every frame in its place on the grid of the frame rate.
+
+use nalgebra::{Matrix3, Point3, Rotation3, UnitVector3};
+use runfiles::{FrameLine, JointLine};
+use skeleton::JointSet;
+
+/// Most places on the grid: a day at 50 Hz, and a number of a frame that is not one.
+const MAX_SLOTS: u64 = 5_000_000;
+/// A coordinate beyond this counts as missing, metres.
+const MAX_COORDINATE: f64 = 1e6;
+/// How far a time may be from the grid, as a share of its spacing.
+const TOLERANCE: f64 = 0.25;
+
+/// A point in space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// In the world of the rig, metres.
+    pub in_world: Point3<f64>,
+    /// Covariance, square metres: xx, xy, xz, yy, yz, zz; NaN where unknown.
+    pub covariance: [f64; 6],
+    /// Root mean square distance of its reprojections from what the views found, pixels of their frames.
+    pub reprojection_px: Option<f64>,
+    /// Bit `v` is set if it was triangulated from view `v` of [`Trial::views`].
+    pub views: u32,
+}
+
+impl Point {
+    /// The covariance as a matrix; none where it is not known.
+    pub fn covariance(&self) -> Option<Matrix3<f64>> {
+        let [xx, xy, xz, yy, yz, zz] = self.covariance;
+        let all = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        all.iter().all(|it| it.is_finite()).then_some(all)
+    }
+
+    /// Root mean square distance that it is expected to be off, metres; none where that is not known.
+    pub fn deviation_m(&self) -> Option<f64> {
+        let trace = self.covariance()?.trace();
+        (trace >= 0.0).then(|| trace.sqrt())
+    }
+}
+
+/// Why a point has no position.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Gap(pub Box<str>);
+
+/// A place on the grid.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Slot {
+    /// `ok`, or why there is no skeleton; empty where the run left no line.
+    pub status: Box<str>,
+    /// Joints, then extra keypoints; empty where there is no result.
+    pub points: Vec<Result<Point, Gap>>,
+}
+
+/// What a run found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// What the files call the run.
+    pub name: String,
+    /// The joints.
+    pub joints: &'static JointSet,
+    /// Names of the points after the joints: what networks name beside them.
+    pub extras: Vec<String>,
+    /// The views, as [`Point::views`] numbers them.
+    pub views: Vec<String>,
+    /// Places per second, where known.
+    pub rate_hz: Option<f64>,
+    /// Number of the first place's frame in the footage, and how far those of two places are apart.
+    pub first_frame: u64,
+    /// See [`Trial::first_frame`].
+    pub frame_step: u64,
+    /// Against gravity, where the rig knows.
+    pub up_in_world: Option<UnitVector3<f64>>,
+    /// The frames.
+    pub slots: Vec<Slot>,
+    /// Frames that stand a quarter of the spacing or more from where their time is.
+    pub n_irregular: usize,
+    /// Lines that were about a frame that another line was about, and were left out.
+    pub n_repeated: usize,
+}
+
+impl Trial {
+    /// Names of all points: joints, then extra keypoints.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        let joints = self.joints.joints.iter().map(|it| it.name);
+        joints.chain(self.extras.iter().map(String::as_str))
+    }
+
+    /// The same with underscores for blanks, as formats of motion capture want.
+    pub fn labels(&self) -> Vec<String> {
+        self.names().map(|it| it.replace(' ', "_")).collect()
+    }
+
+    /// How many points a place has.
+    pub fn n_points(&self) -> usize {
+        self.joints.joints.len() + self.extras.len()
+    }
+
+    /// A point of a place; none in a gap.
+    pub fn point(&self, slot: usize, point: usize) -> Option<&Point> {
+        self.slots.get(slot)?.points.get(point)?.as_ref().ok()
+    }
+
+    /// All points of a place.
+    pub fn points(&self, slot: usize) -> impl Iterator<Item = Option<&Point>> {
+        (0..self.n_points()).map(move |point| self.point(slot, point))
+    }
+
+    /// Number of a place's frame in the footage.
+    pub fn frame(&self, slot: usize) -> u64 {
+        self.first_frame + slot as u64 * self.frame_step
+    }
+
+    /// When that frame was taken, seconds after frame 0 of the footage.
+    pub fn time_s(&self, slot: usize) -> Option<f64> {
+        let rate_hz = self.rate_hz?;
+        Some(self.frame(slot) as f64 / self.frame_step as f64 / rate_hz)
+    }
+
+    /// Numbers of the first and the last frame of every run of frames in which a point has no position.
+    pub fn gaps(&self, point: usize) -> Vec<[u64; 2]> {
+        let mut gaps: Vec<[u64; 2]> = Vec::new();
+        for slot in (0..self.slots.len()).filter(|&it| self.point(it, point).is_none()) {
+            let frame = self.frame(slot);
+            match gaps.last_mut() {
+                Some(gap) if gap[1] + self.frame_step == frame => gap[1] = frame,
+                _ => gaps.push([frame; 2]),
+            }
+        }
+        gaps
+    }
+
+    /// Places with at least one point.
+    pub fn n_with_points(&self) -> usize {
+        let has = |slot: &&Slot| slot.points.iter().any(Result::is_ok);
+        self.slots.iter().filter(has).count()
+    }
+
+    /// The world turned so that z points up; not turned where up is unknown.
+    pub fn z_up_from_world(&self) -> Rotation3<f64> {
+        let turn = self.up_in_world.as_ref().map(geometry::z_up_from_world);
+        turn.unwrap_or_else(Rotation3::identity)
+    }
+
+    /// The world turned so that y points up; not turned where up is unknown.
+    pub fn y_up_from_world(&self) -> Rotation3<f64> {
+        let turn = self.up_in_world.as_ref().map(geometry::y_up_from_world);
+        turn.unwrap_or_else(Rotation3::identity)
+    }
+}
+
+/// The lines of a run are none that can be exported.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TrialError {
+    /// There is no line.
+    #[error("there is no frame")]
+    Empty,
+    /// There is no point in any frame.
+    #[error("none of {frames} frames has a joint in space")]
+    NoPoint {
+        /// Lines.
+        frames: usize,
+    },
+    /// The joints are those of no set.
+    #[error("the joints are none of a set that is known: {0}")]
+    Joints(String),
+    /// Two frames are farther apart than can be.
+    #[error(
+        "frames {first} and {last} lie {slots} frames apart, more than {MAX_SLOTS}: one of the numbers must be wrong"
+    )]
+    Range {
+        /// The first.
+        first: u64,
+        /// The last.
+        last: u64,
+        /// Places from one to the other.
+        slots: u64,
+    },
+}
+
+/// The lines of a run on their way into a [`Trial`]; one at a time, in any order.
+#[derive(Debug, Clone, Default)]
+pub struct Gathering {
+    joints: Option<&'static JointSet>,
+    extras: Vec<String>,
+    views: Vec<String>,
+    frames: Vec<(u64, Option<f64>, Slot)>,
+}
+
+impl Gathering {
+    /// * `views`: the cameras in the order of the run; others that lines name come after them.
+    pub fn new(views: Vec<String>) -> Self {
+        Self {
+            views,
+            ..Self::default()
+        }
+    }
+
+    /// Takes a line of `pose3d.jsonl`.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError::Joints`].
+    pub fn push(&mut self, line: &FrameLine) -> Result<(), TrialError> {
+        if self.joints.is_none() && !line.joints.is_empty() {
+            let is_named = |set: &&'static JointSet| {
+                let has = |name: &str| line.joints.contains_key(name);
+                set.joints.len() == line.joints.len() && set.joints.iter().all(|it| has(it.name))
+            };
+            let found = JointSet::ALL.into_iter().find(is_named);
+            let names = || line.joints.keys().cloned().collect::<Vec<_>>().join(", ");
+            self.joints = Some(found.ok_or_else(|| TrialError::Joints(names()))?);
+        }
+        let mut points = Vec::new();
+        if let Some(set) = self.joints.filter(|_| !line.joints.is_empty()) {
+            for joint in set.joints {
+                points.push(self.point(line.joints.get(joint.name)));
+            }
+            for name in line.keypoints.keys() {
+                if !self.extras.contains(name) {
+                    self.extras.push(name.clone());
+                }
+            }
+            for name in self.extras.clone() {
+                points.push(self.point(line.keypoints.get(&name)));
+            }
+        }
+        let status = match &line.reason {
+            Some(reason) => format!("{}: {reason}", line.status),
+            None => line.status.clone(),
+        };
+        let slot = Slot {
+            status: status.into(),
+            points,
+        };
+        self.frames.push((line.frame, line.time_s, slot));
+        Ok(())
+    }
+
+    fn point(&mut self, joint: Option<&JointLine>) -> Result<Point, Gap> {
+        let placed = match joint {
+            None => return Err(Gap("".into())),
+            Some(JointLine::Missing { status }) => return Err(Gap(status.as_str().into())),
+            Some(JointLine::Placed(placed)) => placed,
+        };
+        let is_place = |it: &f64| it.is_finite() && it.abs() <= MAX_COORDINATE;
+        if !placed.position_m.iter().all(is_place) {
+            return Err(Gap("out of range".into()));
+        }
+        let views = placed.views.iter().map(|name| self.view(name));
+        Ok(Point {
+            in_world: placed.position_m.into(),
+            covariance: placed.covariance_m2,
+            reprojection_px: placed.reprojection_px.filter(|it| it.is_finite()),
+            views: views.fold(0, |all, it| all | 1_u32.checked_shl(it).unwrap_or(0)),
+        })
+    }
+
+    /// The number of a view.
+    fn view(&mut self, name: &str) -> u32 {
+        let at = self.views.iter().position(|it| it == name);
+        let at = at.unwrap_or_else(|| {
+            self.views.push(name.to_owned());
+            self.views.len() - 1
+        });
+        at as u32
+    }
+
+    /// Lines so far.
+    pub fn n_lines(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// The trial.
+    ///
+    /// * `rate_hz`: frames of the footage per second, where no line has a time.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError`].
+    pub fn finish(mut self, name: &str, rate_hz: Option<f64>) -> Result<Trial, TrialError> {
+        let n_lines = self.frames.len();
+        // Of two lines about a frame the first one counts.
+        self.frames.sort_by_key(|it| it.0);
+        self.frames.dedup_by_key(|it| it.0);
+        let n_repeated = n_lines - self.frames.len();
+        let ends = self.frames.first().zip(self.frames.last());
+        let (first, last) = ends.map(|it| (it.0.0, it.1.0)).ok_or(TrialError::Empty)?;
+        let joints = self.joints.ok_or(TrialError::NoPoint { frames: n_lines })?;
+        let step = self
+            .frames
+            .iter()
+            .fold(0, |gcd, it| common(gcd, it.0 - first));
+        let step = step.max(1);
+        let slots = ((last - first) / step).saturating_add(1);
+        if slots > MAX_SLOTS {
+            return Err(TrialError::Range { first, last, slots });
+        }
+        let footage_hz = rate(&self.frames).or(rate_hz);
+        let n_irregular = footage_hz.map_or(0, |rate_hz| irregular(&self.frames, rate_hz, step));
+        let n_points = joints.joints.len() + self.extras.len();
+        let mut trial = Trial {
+            name: name.to_owned(),
+            joints,
+            extras: self.extras,
+            views: self.views,
+            rate_hz: footage_hz.map(|it| it / step as f64),
+            first_frame: first,
+            frame_step: step,
+            up_in_world: None,
+            slots: vec![Slot::default(); slots as usize],
+            n_irregular,
+            n_repeated,
+        };
+        for (frame, _, mut slot) in self.frames {
+            if !slot.points.is_empty() {
+                slot.points.resize_with(n_points, || Err(Gap("".into())));
+            }
+            trial.slots[((frame - first) / step) as usize] = slot;
+        }
+        if trial.n_with_points() == 0 {
+            return Err(TrialError::NoPoint { frames: n_lines });
+        }
+        Ok(trial)
+    }
+}
+
+/// The greatest common divisor.
+fn common(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { common(b, a % b) }
+}
+
+/// Frames of the footage per second, by the first and the last line with a time; to nine digits, since times are rounded.
+fn rate(frames: &[(u64, Option<f64>, Slot)]) -> Option<f64> {
+    let mut timed = frames.iter().filter_map(|it| Some((it.0, it.1?)));
+    let first = timed.next()?;
+    let last = timed.next_back();
+    let (frames, seconds) = match last {
+        Some(last) => (last.0 - first.0, last.1 - first.1),
+        None => (first.0, first.1),
+    };
+    let rate_hz = frames as f64 / seconds;
+    let is_rate = rate_hz.is_finite() && rate_hz > 0.0;
+    is_rate.then(|| format!("{rate_hz:.9e}").parse().unwrap_or(rate_hz))
+}
+
+fn irregular(frames: &[(u64, Option<f64>, Slot)], rate_hz: f64, step: u64) -> usize {
+    let off = |frame: u64, time_s: f64| (time_s * rate_hz - frame as f64).abs() / step as f64;
+    let timed = frames.iter().filter_map(|it| Some((it.0, it.1?)));
+    timed.filter(|it| off(it.0, it.1) >= TOLERANCE).count()
+}
+
+#[cfg(test)]
+mod tests;

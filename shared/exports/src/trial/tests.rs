@@ -1,0 +1,102 @@
+use super::*;
+use crate::testing::{line, walker};
+
+fn gathered(lines: &[FrameLine], rate_hz: Option<f64>) -> Result<Trial, TrialError> {
+    let mut all = Gathering::new(Vec::new());
+    for line in lines {
+        all.push(line)?;
+    }
+    all.finish("x", rate_hz)
+}
+
+#[test]
+fn frames_take_their_places_and_those_that_are_missing_are_gaps() {
+    let frames = [9, 3, 5, 13].map(|it| line(it, Some(60.0)));
+    let trial = gathered(&frames, None).unwrap();
+    assert_eq!((trial.first_frame, trial.frame_step), (3, 2));
+    assert_eq!((trial.rate_hz, trial.slots.len()), (Some(30.0), 6));
+    assert_eq!(trial.time_s(3), Some(0.15));
+    assert_eq!(trial.n_with_points(), 4);
+    assert_eq!(trial.gaps(0), [[7, 7], [11, 11]]);
+    assert_eq!((trial.n_irregular, trial.n_repeated), (0, 0));
+    assert_eq!(trial.views, ["left", "right"]);
+}
+
+#[test]
+fn refused_joints_and_numbers_that_are_none_are_gaps() {
+    let mut one = line(0, None);
+    let mut joints = one.joints.values_mut();
+    *joints.next().unwrap() = JointLine::Missing {
+        status: "implausible".to_owned(),
+    };
+    for value in [f64::NAN, f64::INFINITY, 1e9] {
+        let Some(JointLine::Placed(joint)) = joints.next() else {
+            panic!("a joint")
+        };
+        joint.position_m[1] = value;
+    }
+    let trial = gathered(&[one, line(1, None)], None).unwrap();
+    assert_eq!(trial.points(0).flatten().count(), 10);
+    assert_eq!(trial.points(1).flatten().count(), 14);
+    let head = trial.names().position(|it| it == "head").unwrap();
+    assert_eq!(trial.slots[0].points[head], Err(Gap("implausible".into())));
+    assert_eq!(trial.rate_hz, None);
+}
+
+#[test]
+fn times_off_the_grid_and_frames_twice_are_counted() {
+    let mut late = line(2, Some(30.0));
+    late.time_s = Some(0.08);
+    let lines = [0, 1, 3, 3, 4].map(|it| line(it, Some(30.0)));
+    let trial = gathered(&[&lines[..], &[late]].concat(), None).unwrap();
+    assert_eq!((trial.n_irregular, trial.n_repeated), (1, 1));
+    assert_eq!(trial.rate_hz, Some(30.0));
+}
+
+#[test]
+fn what_holds_nothing_is_refused() {
+    assert_eq!(gathered(&[], None), Err(TrialError::Empty));
+    let mut empty = line(0, None);
+    empty.joints.clear();
+    let missing = gathered(&[empty.clone(), empty.clone()], None);
+    assert_eq!(missing, Err(TrialError::NoPoint { frames: 2 }));
+    let mut all_missing = line(0, None);
+    for joint in all_missing.joints.values_mut() {
+        *joint = JointLine::Missing {
+            status: "too few views".to_owned(),
+        };
+    }
+    assert_eq!(
+        gathered(&[all_missing], None),
+        Err(TrialError::NoPoint { frames: 1 })
+    );
+    let far = gathered(&[line(0, None), line(1, None), line(u64::MAX, None)], None);
+    assert!(matches!(far, Err(TrialError::Range { .. })), "{far:?}");
+    let mut other = line(0, None);
+    other.joints.remove("head");
+    let other = gathered(&[other], None);
+    assert!(matches!(other, Err(TrialError::Joints(_))), "{other:?}");
+}
+
+#[test]
+fn one_frame_has_a_rate_only_if_its_time_tells() {
+    assert_eq!(
+        gathered(&[line(0, Some(30.0))], None).unwrap().rate_hz,
+        None
+    );
+    let one = gathered(&[line(6, Some(30.0))], None).unwrap();
+    assert_eq!((one.rate_hz, one.slots.len()), (Some(30.0), 1));
+    let given = gathered(&[line(0, None)], Some(25.0)).unwrap();
+    assert_eq!(given.rate_hz, Some(25.0));
+}
+
+#[test]
+fn keypoints_that_come_later_are_gaps_before() {
+    let mut second = line(11, Some(30.0));
+    let nose = second.joints["head"].clone();
+    second.keypoints.insert("nose, \"tip\"".to_owned(), nose);
+    let trial = gathered(&[line(10, Some(30.0)), second], None).unwrap();
+    assert_eq!(trial.extras, ["nose, \"tip\""]);
+    assert_eq!(trial.gaps(14), [[10, 10]]);
+    assert_eq!(walker(2).gaps(0), [[0_u64; 2]; 0]);
+}

@@ -1,0 +1,59 @@
+//! Points as a camera sees them.
+
+use geometry::Camera;
+use nalgebra::Matrix2;
+
+use crate::Point;
+
+/// A camera, and what its pictures are of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewCamera {
+    /// Name of the view.
+    pub name: String,
+    /// The camera of the calibration, or of frames that were turned and scaled.
+    pub camera: Camera,
+    /// From pixels of that camera to those of the pictures: two rows of an affine map.
+    pub picture_from_camera: [[f64; 3]; 2],
+    /// Width and height of the pictures, pixels.
+    pub size: [u32; 2],
+}
+
+/// A point in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Pixels; the centre of the top-left pixel is (0, 0).
+    pub at: [f64; 2],
+    /// Covariance of it: xx, xy, yy, square pixels; none where it is not known.
+    pub covariance: Option<[f64; 3]>,
+}
+
+impl Seen {
+    /// Root mean square distance that it is expected to be off, pixels.
+    pub fn deviation_px(&self) -> Option<f64> {
+        let [xx, _, yy] = self.covariance?;
+        (xx + yy >= 0.0).then(|| (xx + yy).sqrt())
+    }
+}
+
+impl ViewCamera {
+    /// Where a point is in the pictures of the camera; none behind it. It may lie outside of the picture.
+    pub fn see(&self, point: &Point) -> Option<Seen> {
+        let (pixel, jacobian) = self.camera.project_with_jacobian(&point.in_world)?;
+        let [[a, b, c], [d, e, f]] = self.picture_from_camera;
+        let at = [a * pixel.x + b * pixel.y + c, d * pixel.x + e * pixel.y + f];
+        let jacobian = Matrix2::new(a, b, d, e) * jacobian;
+        let covariance = point.covariance().map(|it| {
+            let it = jacobian * it * jacobian.transpose();
+            [it[(0, 0)], it[(0, 1)], it[(1, 1)]]
+        });
+        at.iter()
+            .all(|it| it.is_finite())
+            .then_some(Seen { at, covariance })
+    }
+
+    /// Whether a pixel lies in the picture.
+    pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
+        let [width, height] = self.size.map(f64::from);
+        (-0.5..width - 0.5).contains(&x) && (-0.5..height - 0.5).contains(&y)
+    }
+}

@@ -1,0 +1,201 @@
+//! Pictures to a video, by an `ffmpeg` process that they are written to.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+
+use crate::source::log::Log;
+use crate::source::probe::missing;
+use crate::{FootageError, Size};
+
+/// Quality of H.264, of 0 (lossless) to 51; and of MPEG-4, of 1 (best) to 31.
+const H264_CRF: &str = "20";
+const MPEG4_QUALITY: &str = "3";
+
+/// A video that is being written: MP4, H.264 where `ffmpeg` has it, else MPEG-4.
+///
+/// The file is not whole before [`finish`](Self::finish) has returned. The process is killed when this is dropped before.
+#[derive(Debug)]
+pub struct VideoWriter {
+    path: PathBuf,
+    size: Size,
+    child: Child,
+    /// Closed at the end, which the encoder waits for.
+    stdin: Option<ChildStdin>,
+    log: Log,
+}
+
+impl VideoWriter {
+    /// Starts the encoder. An existing file is replaced.
+    ///
+    /// * `path`: the file, of any name: it becomes an MP4.
+    /// * `size`: of the pictures; a side of an odd number of pixels grows by a black row or column, which the format wants.
+    /// * `ffmpeg`: the executable.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError::FfmpegMissing`]; [`FootageError::BadRate`].
+    pub fn create(
+        path: &Path,
+        size: Size,
+        rate_hz: f64,
+        ffmpeg: &Path,
+    ) -> Result<Self, FootageError> {
+        if !(rate_hz.is_finite() && rate_hz > 0.0) {
+            return Err(FootageError::BadRate { rate_hz });
+        }
+        let not_started = |source| missing(ffmpeg, path, source);
+        let encoders = Command::new(ffmpeg)
+            .args(["-v", "error", "-encoders"])
+            .output()
+            .map_err(not_started)?;
+        let has_h264 = String::from_utf8_lossy(&encoders.stdout).contains("libx264");
+        let codec = if has_h264 {
+            ["-c:v", "libx264", "-preset", "veryfast", "-crf", H264_CRF].as_slice()
+        } else {
+            &["-c:v", "mpeg4", "-q:v", MPEG4_QUALITY]
+        };
+        let mut child = Command::new(ffmpeg)
+            .args([
+                "-nostdin", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24",
+            ])
+            .args(["-video_size", &format!("{}x{}", size.width, size.height)])
+            .args(["-framerate", &rate_hz.to_string(), "-i", "pipe:0"])
+            .args([
+                "-vf",
+                "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+                "-pix_fmt",
+                "yuv420p",
+            ])
+            .args(codec)
+            .args(["-movflags", "+faststart", "-f", "mp4"])
+            .arg(path)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(not_started)?;
+        let no_pipe = || not_started(std::io::ErrorKind::BrokenPipe.into());
+        let stdin = child.stdin.take().ok_or_else(no_pipe)?;
+        let stderr = child.stderr.take().ok_or_else(no_pipe)?;
+        Ok(Self {
+            path: path.to_path_buf(),
+            size,
+            child,
+            stdin: Some(stdin),
+            log: Log::follow(stderr).map_err(not_started)?,
+        })
+    }
+
+    /// Adds a picture: RGB, row major.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError::Encode`]: the encoder has ended, with what it said.
+    ///
+    /// # Panics
+    ///
+    /// If `rgb` is not `width * height * 3` bytes.
+    pub fn add(&mut self, rgb: &[u8]) -> Result<(), FootageError> {
+        assert_eq!(
+            rgb.len(),
+            self.size.rgb_bytes(),
+            "a picture is {}",
+            self.size
+        );
+        let stdin = self.stdin.as_mut();
+        match stdin.map(|it| it.write_all(rgb)) {
+            Some(Ok(())) => Ok(()),
+            Some(Err(error)) => Err(self.failed(&error.to_string())),
+            None => Err(self.failed("it has ended")),
+        }
+    }
+
+    /// Ends the video, and waits until the file is whole.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError::Encode`].
+    pub fn finish(mut self) -> Result<(), FootageError> {
+        drop(self.stdin.take());
+        match self.child.wait() {
+            Ok(status) if status.success() => Ok(()),
+            Ok(status) => Err(self.failed(&status.to_string())),
+            Err(error) => Err(self.failed(&error.to_string())),
+        }
+    }
+
+    /// What the encoder said, else `why`.
+    fn failed(&mut self, why: &str) -> FootageError {
+        drop(self.stdin.take());
+        let said = self.log.finish();
+        FootageError::Encode {
+            path: self.path.clone(),
+            message: if said.is_empty() {
+                why.to_owned()
+            } else {
+                said
+            },
+        }
+    }
+}
+
+impl Drop for VideoWriter {
+    fn drop(&mut self) {
+        // After the end both fail, and nothing is left to do.
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Source, SourceSpec};
+
+    fn has_ffmpeg() -> bool {
+        Command::new("ffmpeg").arg("-version").output().is_ok()
+    }
+
+    #[test]
+    fn what_was_written_is_read_back_with_an_even_size() {
+        if !has_ffmpeg() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.part");
+        let size = Size::new(65, 48);
+        let mut video = VideoWriter::create(&path, size, 12.5, Path::new("ffmpeg")).unwrap();
+        for nth in 0..5_u8 {
+            video.add(&vec![50 * nth; size.rgb_bytes()]).unwrap();
+        }
+        video.finish().unwrap();
+        let mut source = Source::open(&SourceSpec::new(path.to_string_lossy())).unwrap();
+        assert_eq!(source.info().size, Size::new(66, 48));
+        assert_eq!(
+            (source.info().n_frames, source.info().frame_rate_hz),
+            (5, Some(12.5))
+        );
+        for nth in 0..5_u8 {
+            let frame = source.next_frame().unwrap().unwrap();
+            let grey = i32::from(frame.rgb[3 * (66 * 20 + 20)]);
+            assert!((grey - i32::from(50 * nth)).abs() < 4, "{grey}");
+        }
+    }
+
+    #[test]
+    fn a_place_that_cannot_be_written_is_named_with_the_reason() {
+        if !has_ffmpeg() {
+            return;
+        }
+        let (path, size) = (Path::new("/nowhere/at/all.mp4"), Size::new(16, 16));
+        let mut video = VideoWriter::create(path, size, 25.0, Path::new("ffmpeg")).unwrap();
+        let picture = vec![0; size.rgb_bytes()];
+        let added = (0..1000).try_for_each(|_| video.add(&picture));
+        let error = added.and_then(|()| video.finish()).unwrap_err().to_string();
+        assert!(error.contains("/nowhere/at/all.mp4"), "{error}");
+        assert!(error.contains("No such file"), "{error}");
+        let none = VideoWriter::create(path, size, 25.0, Path::new("no-such-ffmpeg"));
+        assert!(matches!(none, Err(FootageError::FfmpegMissing { .. })));
+    }
+}

@@ -1,0 +1,41 @@
+//! Worlds turned so that a given axis points up, for files whose readers expect that.
+
+use nalgebra::{Matrix3, Rotation3, UnitVector3, Vector3};
+
+/// Turns the world so that z points up: the short way round, and not at all where it does already.
+///
+/// * `up`: against gravity, in the world.
+pub fn z_up_from_world(up: &UnitVector3<f64>) -> Rotation3<f64> {
+    Rotation3::rotation_between(up, &Vector3::z_axis())
+        // Only straight down has no short way; half a turn about x is one.
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI))
+}
+
+/// Turns the world so that y points up: z up, then `(X, Y, Z) = (y, z, x)`.
+///
+/// * `up`: against gravity, in the world.
+pub fn y_up_from_world(up: &UnitVector3<f64>) -> Rotation3<f64> {
+    let cyclic = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
+    Rotation3::from_matrix_unchecked(cyclic * z_up_from_world(up).matrix())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_up_becomes_the_axis_that_is_asked_for() {
+        for up in [
+            [0.0, 0.0, 1.0],
+            [0.0, -1.0, 0.0],
+            [0.0, 0.0, -1.0],
+            [0.6, 0.0, 0.8],
+        ] {
+            let up = UnitVector3::new_normalize(Vector3::from(up));
+            assert!((z_up_from_world(&up) * *up - Vector3::z()).norm() < 1e-12);
+            assert!((y_up_from_world(&up) * *up - Vector3::y()).norm() < 1e-12);
+            let determinant = y_up_from_world(&up).matrix().determinant();
+            assert!((determinant - 1.0).abs() < 1e-12, "no mirror image");
+        }
+    }
+}
