@@ -44,6 +44,7 @@ const LAYERS: &[&[&str]] = &[
         "scene",
         "deployment",
         "keypointfiles",
+        "motion",
         "synchronisation",
     ],
     &["runtime"],
