@@ -45,6 +45,7 @@ const LAYERS: &[&[&str]] = &[
         "scene",
         "deployment",
         "keypointfiles",
+        "motion",
         "synchronisation",
         "exports",
     ],

@@ -366,6 +366,7 @@ fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let job = results::Job {
         scene,
         config: deployment.results.clone(),
+        smooth: deployment.smooth.clone(),
         output: deployment.output.clone(),
         start_frame: deployment.capture.start_frame,
         n_workers: topology.n_workers(),

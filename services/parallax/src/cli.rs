@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands::{
     bench, calib, cameras, chaos, config, demo, deployments, detect, eval, export, fuse_frame,
-    messages, model, publish, record, replay, run, service, sync, synth, top, train, view,
+    messages, model, publish, record, replay, run, service, smooth, sync, synth, top, train, view,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -40,6 +40,7 @@ Examples:
     parallax train fmp PARSE --only 1-100 --negatives neg/ --out person.fmp   a model of one's own
     parallax model judge person.fmp PARSE --only 101-200    how good it is
     parallax eval HumanEva_I --model he.txt --out out/he    the paper's evaluation
+    parallax smooth out/run                             smoothed trajectories and joint angles of a run
     parallax synth out/walk --actions walking           synthetic pictures, with the truth
     parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
     parallax sync estimate my.toml --write              how far the clocks of recorded cameras are apart
@@ -102,6 +103,8 @@ pub(crate) enum Command {
     Calib(calib::Command),
     /// List the video devices of this machine, and take pictures of live cameras.
     Cameras(cameras::Arguments),
+    /// Smooth the trajectories of a finished run, and compute joint angles.
+    Smooth(Box<smooth::Arguments>),
     /// Find by how much the clocks of the cameras of recorded footage differ.
     #[command(subcommand)]
     Sync(sync::Command),

@@ -20,6 +20,7 @@ pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod run;
 pub(crate) mod service;
+pub(crate) mod smooth;
 pub(crate) mod sync;
 pub(crate) mod synth;
 pub(crate) mod top;
@@ -64,6 +65,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::View(it) => view::run(&it, cli.globals),
         Command::Clean(it) => deployments::clean(&it),
         Command::Synth(it) => synth::run(&it, cli.globals),
+        Command::Smooth(it) => smooth::run(&it, cli.globals),
         Command::Sync(it) => sync::run(&it, cli.globals),
         Command::Service(it) => service::run(&it),
     }

@@ -31,6 +31,7 @@ mod resources;
 mod rogue;
 mod scheduling;
 mod search_size;
+mod smooth;
 mod sync;
 mod synth;
 mod train;

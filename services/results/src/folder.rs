@@ -4,7 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use runfiles::RunSummary;
+use runfiles::{Line as _, RunSummary, SmoothLine, SmoothReport};
 
 /// The file that says that a folder of pictures was made by a run.
 const MARK: &str = ".parallax";
@@ -118,6 +118,18 @@ impl Folder {
         let mut file = OpenOptions::new().write(true).open(self.part(name))?;
         file.write_all(text.as_bytes())?;
         file.set_len(text.len() as u64)
+    }
+
+    /// Removes what a smoother made of an earlier run: it is not of this one.
+    pub(crate) fn remove_smoothed(&self) {
+        if !self.dir.join(SmoothReport::FILE).exists() {
+            return;
+        }
+        for name in [SmoothLine::FILE, SmoothReport::FILE, "angles.csv"] {
+            if let Err(error) = fs::remove_file(self.dir.join(name)) {
+                tracing::debug!(%error, name, "an earlier run's file stays");
+            }
+        }
     }
 
     /// Leaves a file the name of a part.

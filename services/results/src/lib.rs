@@ -21,6 +21,7 @@ mod lines;
 
 mod calibration;
 mod people;
+mod smooth;
 mod summary;
 mod trust;
 

@@ -5,10 +5,12 @@ use std::io;
 use std::path::PathBuf;
 
 use runfiles::{
-    FrameLine, LatencyReport, Line, RunSummary, Summary, TimesLine, VERSION, ViewLine, ViewSummary,
+    FrameLine, LatencyReport, Line, RunSummary, SmoothLine, SmoothReport, Summary, TimesLine,
+    VERSION, ViewLine, ViewSummary,
 };
 
 use crate::lines::Lines;
+use crate::smooth::Smoothing;
 use crate::summary::Tally;
 use deployment::results::Config;
 
@@ -34,6 +36,7 @@ pub struct Output {
     epipolar_part: usize,
     latency: Latency,
     tally: Tally,
+    smoothing: Option<Smoothing>,
 }
 
 /// The output cannot be begun.
@@ -94,7 +97,23 @@ impl Output {
             tally: Tally::resume(&scene, &folder.part(FrameLine::FILE)),
             scene,
             folder,
+            smoothing: None,
         })
+    }
+
+    /// Also writes smoothed joints, if the settings ask for them.
+    ///
+    /// # Errors
+    ///
+    /// [`OutputError`].
+    pub fn smooth(&mut self, settings: &deployment::smooth::Config) -> Result<(), OutputError> {
+        let (scene, folder) = (&self.scene, &mut self.folder);
+        let file = || folder.file(SmoothLine::FILE).map_err(io::Error::other);
+        self.smoothing = Smoothing::begin(scene, settings, file)?;
+        if self.smoothing.is_some() {
+            self.folder.reserve(SmoothReport::FILE, RESERVED_BYTES)?;
+        }
+        Ok(())
     }
 
     /// The first frame that has no line yet; none if there is no line.
@@ -130,7 +149,9 @@ impl Output {
         let line = pose3d::absent_line(scene, it);
         let rows = pose3d::csv_rows(scene, &nothing);
         let row = trc::row(scene, self.tally.n_lines(), &nothing);
+        let smoothed = self.smoothing.as_mut().map_or(Ok(()), |it| it.frame(&line));
         let outcomes = [
+            smoothed,
             append(&mut self.pose3d_jsonl, [line]),
             self.pose3d_csv.append(&rows),
             self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row)),
@@ -149,7 +170,9 @@ impl Output {
         let line = pose3d::line(scene, record);
         let rows = pose3d::csv_rows(scene, pose);
         let row = trc::row(scene, self.tally.n_lines(), pose);
+        let smoothed = self.smoothing.as_mut().map_or(Ok(()), |it| it.frame(&line));
         let outcomes = [
+            smoothed,
             append(&mut self.pose3d_jsonl, [line]),
             self.pose3d_csv.append(&rows),
             append(&mut self.pose2d_jsonl, pose2d::lines(scene, record)),
@@ -207,8 +230,12 @@ impl Output {
             self.note(outcome);
         }
         self.fill(LatencyReport::FILE, report.to_text());
+        if let Some(smoothing) = self.smoothing.take() {
+            self.fill(SmoothReport::FILE, smoothing.report().to_text());
+        }
         let whole = self.whole(self.summary(), report, session);
         self.fill(RunSummary::FILE, whole.to_text());
+        self.folder.remove_smoothed();
         for error in self.folder.finish() {
             let is_first = self.tally.failed(&error);
             tracing::error!(%error, is_first, "a file keeps the name of a part");

@@ -4,13 +4,14 @@ use crate::fields::fields_of;
 use crate::older::OLDER;
 use crate::schema::{Key, Shapes, schema};
 use crate::{
-    Deployment, Runtime, Supervision, capture, fuse, person, pose, quality, results, triangulate,
+    Deployment, Runtime, Supervision, capture, fuse, person, pose, quality, results, smooth,
+    triangulate,
 };
 
 /// A section, and its keys in order.
 type Section = (&'static str, fn() -> &'static [&'static str]);
 
-const SECTIONS: [Section; 9] = [
+const SECTIONS: [Section; 10] = [
     ("capture", fields_of::<capture::Config>),
     ("person", fields_of::<person::Config>),
     ("pose", fields_of::<pose::Config>),
@@ -18,6 +19,7 @@ const SECTIONS: [Section; 9] = [
     ("fuse", fields_of::<fuse::Config>),
     ("triangulate", fields_of::<triangulate::Config>),
     ("results", fields_of::<results::Config>),
+    ("smooth", fields_of::<smooth::Config>),
     ("supervise", fields_of::<Supervision>),
     ("runtime", fields_of::<Runtime>),
 ];

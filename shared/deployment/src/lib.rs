@@ -12,6 +12,7 @@ pub mod person;
 pub mod pose;
 pub mod quality;
 pub mod results;
+pub mod smooth;
 pub mod triangulate;
 
 mod fault;
@@ -105,6 +106,9 @@ pub struct Deployment {
     /// What is left behind.
     #[serde(default, alias = "record")]
     pub results: results::Config,
+    /// Smoothed trajectories.
+    #[serde(default)]
+    pub smooth: smooth::Config,
     /// Deadlines and restarts.
     #[serde(default)]
     pub supervise: Supervision,

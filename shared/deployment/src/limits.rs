@@ -29,6 +29,11 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     between("triangulate.loss_px", triangulate.loss_px)?;
     between("triangulate.error_weight", triangulate.error_weight)?;
     whole("results.epipolar_part", it.results.epipolar_part)?;
+    let smooth = &it.smooth;
+    between("smooth.cutoff_hz", smooth.cutoff_hz)?;
+    between("smooth.fill_s", smooth.fill_s)?;
+    between("smooth.min_cutoff_hz", smooth.min_cutoff_hz)?;
+    between("smooth.beta", smooth.beta)?;
     supervise(it)
 }
 

@@ -17,6 +17,7 @@
 //! * [`network`]: networks that find keypoints, with their cards; [`detector`]: detectors of people; [`described`]: whichever a
 //!   file is; [`library`]: what runs them.
 //! * [`pictures`]: pictures and videos that are searched; [`sheet`]: thumbnails with what was found.
+//! * [`smooth`]: the trajectories of a finished run smoothed, with angles, and against the truth.
 //! * [`synth`]: sequences of people who do not exist, with the truth.
 #![forbid(unsafe_code)]
 
@@ -46,6 +47,7 @@ pub mod pictures;
 pub mod posetraining;
 pub mod quality;
 pub mod sheet;
+pub mod smooth;
 pub mod springs;
 pub mod synth;
 

@@ -5,6 +5,8 @@
 //! | `pose3d.jsonl` | [`FrameLine`] | frame, with a result or without |
 //! | `pose2d.jsonl` | [`ViewLine`] | view of a frame that has a result |
 //! | `times.jsonl` | [`TimesLine`] | frame that has a result |
+//! | `pose3d-smooth.jsonl` | [`SmoothLine`] | frame of a run that was smoothed |
+//! | `smooth.json` | [`SmoothReport`] | run that was smoothed |
 //! | `latency.json` | [`LatencyReport`] | run |
 //! | `summary.json` | [`RunSummary`] | run; holds the version of all files |
 //!
@@ -23,6 +25,7 @@ mod missing;
 mod nullable;
 mod read;
 mod running;
+mod smooth;
 mod summary;
 mod times;
 mod trust;
@@ -33,6 +36,7 @@ pub use latency::{LatencyReport, Percentiles};
 pub use missing::Missing;
 pub use read::{Line, ReadError, lines, to_line};
 pub use running::{Running, RunningError, RunningView};
+pub use smooth::{SmoothLine, SmoothReport, SmoothedJoint, Unsure};
 pub use summary::{CameraFit, Contradicted, Exchanged, People, RunSummary, Summary, ViewSummary};
 pub use times::{CameraTimes, PoseTimes, TimesLine, ViewTimes};
 pub use trust::{Doubt, Trust};

@@ -10,7 +10,10 @@ use fmp::files::{describe, mat, own, text};
 use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisys, umpm};
 use keypoints::files::{NameSet, SeenKeypoints, coco, openpose};
 use multiview::Compatibility;
-use runfiles::{FrameLine, LatencyReport, Line, RunSummary, Running, TimesLine, ViewLine};
+use runfiles::{
+    FrameLine, LatencyReport, Line, RunSummary, Running, SmoothLine, SmoothReport, TimesLine,
+    ViewLine,
+};
 use scene::Address;
 use scene::truth::{Frame, Header};
 use training::Checkpoint;
@@ -374,6 +377,12 @@ pub fn run_files(input: &[u8]) {
     exported(input);
     lines::<ViewLine>(input);
     lines::<TimesLine>(input);
+    lines::<SmoothLine>(input);
+    if let Ok(report) = SmoothReport::parse(input) {
+        let written = report.to_text().expect("it was read");
+        let again = SmoothReport::parse(&written).expect("it was written");
+        assert_eq!(again, report);
+    }
     if let Ok(run) = RunSummary::parse(input) {
         let written = run.to_text().expect("it was read");
         let again = RunSummary::parse(&written).expect("it was written");

@@ -1,8 +1,11 @@
 //! Every numeric key of a deployment with values that cannot be: the message that each gets.
 
+mod others;
+
 use std::path::Path;
 
 use crate::{AnyMachine, ConfigError, Loaded, keys};
+use others::OTHERS;
 
 const SHORT: &str = "name = 'two'\nrig = 'rig.toml'\noutput = 'out'\n\
     [[camera]]\nname = 'a'\nsource = 'a.mp4'\n[[camera]]\nname = 'b'\nsource = 'b.mp4'\n";
@@ -30,6 +33,10 @@ const ROWS: &[Row] = &[
         &["[0, -1, 0]"],
     ),
     ("capture.max_skew_ms", &[("0", "is 0")], &["20"]),
+    ("smooth.cutoff_hz", &[("0", "is 0")], &["6"]),
+    ("smooth.fill_s", &[("-1", "is -1")], &["0", "0.5"]),
+    ("smooth.min_cutoff_hz", &[("0", "is 0")], &["1"]),
+    ("smooth.beta", &[("-1", "is -1")], &["0", "4"]),
     (
         "capture.size",
         &[
@@ -361,53 +368,6 @@ const ROWS: &[Row] = &[
         ],
         &["{ pose = 10 }"],
     ),
-];
-
-/// Keys without a number.
-const OTHERS: &[&str] = &[
-    "data",
-    "name",
-    "rig",
-    "unit",
-    "model",
-    "output",
-    "camera",
-    "capture.mode",
-    "capture.pace",
-    "capture.upright",
-    "pose.precision",
-    "pose.search",
-    "pose.network",
-    "pose.network_card",
-    "pose.detector",
-    "pose.detector_card",
-    "pose.springs",
-    "pose.onnx_runtime",
-    "quality.network",
-    "quality.onnx_runtime",
-    "quality.device",
-    "quality.table",
-    "quality.subject",
-    "quality.action",
-    "quality.views",
-    "fuse.energy",
-    "fuse.views",
-    "fuse.consistency",
-    "pose.orientation",
-    "fuse.consistency_rig",
-    "fuse.compatibility",
-    "fuse.switch",
-    "fuse.facing",
-    "fuse.pairs",
-    "person.follow",
-    "triangulate.joints",
-    "triangulate.joint_map",
-    "triangulate.combine",
-    "triangulate.bodies",
-    "results.trc",
-    "runtime.spin",
-    "runtime.policy",
-    "runtime.lock_memory",
 ];
 
 #[test]

@@ -1,0 +1,264 @@
+//! `parallax smooth`: smooths the trajectories of a finished run.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{ArgGroup, Args};
+use deployment::smooth::{Config, Method};
+use launch::output;
+use nalgebra::{UnitVector3, Vector3};
+use offline::smooth::trial::{self, Trial};
+use offline::smooth::{self, Comparison, Outcome, Request, Row};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use serde_json::{Value, json};
+
+use crate::globals::Globals;
+use crate::terminal::Terminal;
+
+/// The progress bar.
+const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} motions, {eta} left {prefix} {msg}";
+
+/// Options of `parallax smooth`.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("what").required(true).args(["folder", "trial"]))]
+#[command(after_help = "\
+FOLDER holds the results of a run; nothing in it is changed. Beside them are written
+    pose3d-smooth.jsonl   as pose3d.jsonl; `states` says of every joint whether it is measured, exchanged, filled or rejected
+    angles.csv            hips, knees, ankles, shoulders, elbows and trunk, degrees, with standard deviations
+    smooth.json           the method and its numbers, and what became of how many measurements
+
+Everything has a default: how restless each joint is, and how far its covariances can be believed, is found from the measurements.
+Defaults of the options are those of the section [smooth] of the deployment that the run is of. docs/guide/smooth.md explains.
+
+With --truth all methods are compared with the true joints, at the instants that all of them have; what `parallax eval` takes is a
+TRUTH: a folder of `parallax synth`, or a file as configs/sequences/pose2sim-balancing.toml. With --trial the same is done on motions and
+errors that are made up: every action of `parallax synth` with each seed.
+
+Exit codes: 0 done; 7 done, but something speaks against the result (`doubts`: the file is cut off, nothing was measured, many
+measurements contradict each other); 2 an option is wrong, or a cutoff too high for the rate; 4 the folder or the truth cannot be read, a
+line is wrong, times do not ascend.
+
+With --json one object:
+    {\"report\": what smooth.json holds, \"files\": [path], \"has_up\", \"truth\": {\"compared\", \"methods\": [{\"method\", \"position_mm\", \
+\"velocity_m_s\", \"acceleration_m_s2\", \"jitter_mm\", \"lag_ms\", \"filled_mm\": {\"mean\", \"interval\"}}]}}
+and with --trial {\"cells\": [{\"rate_hz\", \"noise_mm\", \"motions\", \"methods\"}]}.
+
+Examples:
+    parallax smooth out/run
+    parallax smooth out/run --constant-bones --fill-s 0.5
+    parallax smooth out/run --method butterworth --cutoff-hz 6
+    parallax smooth out/walk/out --truth out/walk --json
+    parallax smooth --trial --seeds 101,102 --rates-hz 30,120")]
+pub(crate) struct Arguments {
+    /// The results of a run.
+    folder: Option<PathBuf>,
+    /// How: `rts` looks ahead, on the measured covariances; `butterworth` is a zero-phase low-pass filter; `one-euro` and `kalman` are
+    /// what would have been seen live; `none` only computes angles.
+    #[arg(long, value_name = "METHOD", value_parser = method)]
+    method: Option<Method>,
+    /// Cutoff of `butterworth`, Hz; 6 if nothing says otherwise.
+    #[arg(long, value_name = "HZ", value_parser = cutoff)]
+    cutoff_hz: Option<f64>,
+    /// The longest time between two measurements that is filled, seconds; 0.25 if nothing says otherwise.
+    #[arg(long, value_name = "SECONDS", value_parser = fill)]
+    fill_s: Option<f64>,
+    /// Keep the lengths of the limbs' bones constant (`rts`).
+    #[arg(long)]
+    constant_bones: bool,
+    /// Frames per second, in place of the times in the file.
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    rate_hz: Option<f64>,
+    /// Direction against gravity in the world of the run, in place of that of its calibration.
+    #[arg(long, value_name = "X,Y,Z", value_parser = up, allow_hyphen_values = true)]
+    up: Option<UnitVector3<f64>>,
+    /// Compare all methods with the true joints.
+    #[arg(long, value_name = "TRUTH", conflicts_with = "trial")]
+    truth: Option<PathBuf>,
+    /// Compare all methods on motions and errors that are made up.
+    #[arg(long)]
+    trial: bool,
+    /// Seeds of the motions of --trial.
+    #[arg(long, value_name = "SEEDS", value_delimiter = ',', requires = "trial", default_values_t = Trial::default().seeds)]
+    seeds: Vec<u64>,
+    /// Rates of --trial.
+    #[arg(long, value_name = "HZ", value_delimiter = ',', requires = "trial", value_parser = rate, default_values_t = Trial::default().rates_hz)]
+    rates_hz: Vec<f64>,
+    /// Errors of --trial, standard deviations in mm.
+    #[arg(long, value_name = "MM", value_delimiter = ',', requires = "trial", value_parser = noise, default_values_t = Trial::default().noises_mm)]
+    noises_mm: Vec<f64>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn method(text: &str) -> Result<Method, String> {
+    let known = Method::ALL.into_iter().find(|it| it.name() == text);
+    known.ok_or_else(|| {
+        format!(
+            "expected one of {}",
+            Method::ALL.map(Method::name).join(", ")
+        )
+    })
+}
+
+fn cutoff(text: &str) -> Result<f64, String> {
+    within(text, [0.1, 1000.0])
+}
+
+fn fill(text: &str) -> Result<f64, String> {
+    within(text, [0.0, 10.0])
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    within(text, [0.001, 1e5])
+}
+
+fn noise(text: &str) -> Result<f64, String> {
+    within(text, [0.01, 1000.0])
+}
+
+fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|it| (least..=most).contains(it));
+    number.ok_or_else(|| format!("expected {least} to {most}"))
+}
+
+fn up(text: &str) -> Result<UnitVector3<f64>, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|it| it.trim().parse().ok()).collect();
+    let direction = numbers.filter(|it| it.len() == 3).map(Vector3::from_vec);
+    let direction = direction.and_then(|it| UnitVector3::try_new(it, 1e-9));
+    direction.ok_or_else(|| "expected three numbers, not all 0, as 0,0,1".to_owned())
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR);
+    let Some(folder) = &arguments.folder else {
+        return run_trial(arguments, &stop, &terminal);
+    };
+    let request = Request {
+        folder: folder.clone(),
+        settings: settings(arguments, smooth::settings(folder)),
+        rate_hz: arguments.rate_hz,
+        up: arguments.up,
+    };
+    let outcome = smooth::run(&request, &terminal)?;
+    let truth = arguments.truth.as_ref();
+    let truth = truth
+        .map(|it| smooth::against(&outcome, &request.settings, it))
+        .transpose()?;
+    if arguments.json {
+        output::json(&as_json(&request, &outcome, truth.as_ref()))?;
+    } else if !globals.quiet {
+        tell(&request, &outcome, truth.as_ref())?;
+    }
+    for it in &outcome.report.doubts {
+        output::message(format_args!("doubtful: {it}"));
+    }
+    if outcome.report.doubts.is_empty() {
+        Ok(ExitCode::SUCCESS)
+    } else {
+        Ok(ExitCode::from(ExitKind::Degraded.status()))
+    }
+}
+
+/// What the deployment says, replaced by what the command line says.
+fn settings(arguments: &Arguments, of_run: Config) -> Config {
+    Config {
+        method: arguments.method.unwrap_or(of_run.method),
+        cutoff_hz: arguments.cutoff_hz.unwrap_or(of_run.cutoff_hz),
+        fill_s: arguments.fill_s.unwrap_or(of_run.fill_s),
+        constant_bones: arguments.constant_bones || of_run.constant_bones,
+        ..of_run
+    }
+}
+
+fn as_json(request: &Request, outcome: &Outcome, truth: Option<&Comparison>) -> Value {
+    let files = smooth::FILES.map(|it| request.folder.join(it));
+    let truth = truth.map(|it| {
+        let methods: Vec<Value> = it.rows.iter().map(Row::to_json).collect();
+        json!({ "compared": it.n_compared, "methods": methods })
+    });
+    json!({
+        "report": outcome.report,
+        "files": files,
+        "has_up": outcome.has_up,
+        "truth": truth,
+    })
+}
+
+fn tell(request: &Request, outcome: &Outcome, truth: Option<&Comparison>) -> Result<(), Failure> {
+    let report = &outcome.report;
+    output::line(format_args!(
+        "{} over {} frames of {} joints, {:.0} ms late",
+        report.method,
+        report.n_frames,
+        report.joints.len(),
+        report.delay_ms
+    ))?;
+    let counts: Vec<String> = smooth::totals(report)
+        .iter()
+        .map(|(name, n)| format!("{n} {name}"))
+        .collect();
+    output::line(format_args!("positions: {}", counts.join(", ")))?;
+    let scales = report.joints.values().filter_map(|it| it.covariance_scale);
+    let scales: Vec<f64> = scales.collect();
+    let scale = statistics::Sorted::new(scales).interpolated(0.5);
+    if let Some(scale) = scale {
+        let sd = scale.sqrt();
+        output::line(format_args!(
+            "errors are {sd:.2} times what the covariances say (median of the joints)"
+        ))?;
+    }
+    if !report.frames_of_breaks.is_empty() {
+        let frames = &report.frames_of_breaks;
+        output::line(format_args!(
+            "somebody else begins in {} frames: {frames:?}",
+            frames.len()
+        ))?;
+    }
+    if !outcome.has_up {
+        output::line(
+            "angles with the vertical are missing: the calibration does not say which way is up; --up X,Y,Z does",
+        )?;
+    }
+    for name in smooth::FILES {
+        output::message(format_args!(
+            "wrote {}",
+            request.folder.join(name).display()
+        ));
+    }
+    if let Some(truth) = truth {
+        output::line(format_args!(
+            "\nagainst the truth, {} positions that every method has, means and 95 % intervals:\n{}",
+            truth.n_compared,
+            smooth::table(&truth.rows)
+        ))?;
+    }
+    Ok(())
+}
+
+fn run_trial(arguments: &Arguments, stop: &Stop, terminal: &Terminal) -> Result<ExitCode, Failure> {
+    let trial = Trial {
+        seeds: arguments.seeds.clone(),
+        rates_hz: arguments.rates_hz.clone(),
+        noises_mm: arguments.noises_mm.clone(),
+        ..Trial::default()
+    };
+    let cells = trial::run(&trial, stop, terminal)?;
+    if arguments.json {
+        let cells: Vec<Value> = cells.iter().map(trial::Cell::to_json).collect();
+        output::json(&json!({ "cells": cells }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    for cell in cells {
+        output::line(format_args!(
+            "\n{} Hz, errors of {} mm, {} motions\n{}",
+            cell.rate_hz,
+            cell.noise_mm,
+            cell.n_motions,
+            smooth::table(&cell.rows)
+        ))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

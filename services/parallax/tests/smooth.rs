@@ -1,0 +1,245 @@
+//! A run from keypoints with errors, smoothed live and afterwards, against the truth; and folders that nothing can be made of.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use core::fmt::Write as _;
+use std::collections::BTreeMap;
+use std::fs;
+
+use nalgebra::Point3;
+use runfiles::{FrameLine, JointLine, PlacedJoint, SmoothLine, SmoothReport};
+use scene::{RigChoice, Scene, Settings};
+use serde_json::Value;
+
+use crate::common::{Case, Ended};
+
+const RATE_HZ: f64 = 30.0;
+const N_FRAMES: usize = 75;
+
+/// A deployment of keypoints that are off by some pixels, with the truth beside it.
+fn case() -> Case {
+    let rig = RigChoice::Ring {
+        n: 3,
+        radius: 4.2,
+        height: 1.5,
+    };
+    let settings = Settings {
+        rig,
+        rate_hz: RATE_HZ,
+        ..Settings::default()
+    };
+    let scene = Scene::new(&settings).unwrap();
+    let case = Case::with_rig(scene.rig(), "smooth", &[0; 3], "");
+    let mut text = format!(
+        "name = {:?}\nrig = \"rig.toml\"\noutput = \"out\"\n[capture]\nframe_rate_hz = {RATE_HZ:?}\n\
+         [smooth]\nlive = \"kalman\"\n[results]\noverlay_every = 0\n",
+        case.name
+    );
+    let mut random = fastrand::Rng::with_seed(3);
+    for camera in scene.rig().cameras() {
+        let name = &camera.name;
+        for frame in 0..N_FRAMES {
+            let joints = scene.joints(frame as f64 / RATE_HZ).into_iter();
+            let numbers = joints.map(|it| {
+                let at = camera.project(&Point3::from(it)).unwrap();
+                let mut off = || (0..6).map(|_| random.f64() - 0.5).sum::<f64>() * 8.0;
+                format!("{:.2},{:.2},0.9", at.x + off(), at.y + off())
+            });
+            let person = numbers.collect::<Vec<String>>().join(",");
+            let json = format!("{{\"people\":[{{\"pose_keypoints_2d\":[{person}]}}]}}");
+            case.write(&format!("{name}/{name}_{frame:06}_keypoints.json"), json);
+        }
+        writeln!(
+            text,
+            "[[camera]]\nname = {name:?}\nkeypoints = {name:?}\nkeypoint_names = \"lsp-14\""
+        )
+        .unwrap();
+    }
+    case.write("deployment.toml", text);
+    let mut header = scene.header();
+    header.frame_rate_hz = RATE_HZ;
+    let mut truth = header.to_line().unwrap() + "\n";
+    for frame in 0..N_FRAMES {
+        let joints = serde_json::to_string(&scene.joints(frame as f64 / RATE_HZ)).unwrap();
+        writeln!(truth, "{{\"frame\":{frame},\"joints\":{joints}}}").unwrap();
+    }
+    case.write("truth.jsonl", truth);
+    case
+}
+
+fn smooth(case: &Case, arguments: &[&str]) -> Ended {
+    case.start(&[&["smooth"], arguments].concat()).wait()
+}
+
+fn lines(case: &Case, name: &str) -> Vec<SmoothLine> {
+    let text = fs::read_to_string(case.path(name)).unwrap();
+    runfiles::lines(&text).map(Result::unwrap).collect()
+}
+
+fn mean(row: &Value, name: &str) -> f64 {
+    row[name]["mean"].as_f64().unwrap()
+}
+
+#[test]
+fn a_run_is_smoothed_live_and_better_afterwards() {
+    let case = case();
+    assert_eq!(case.run().status.code(), Some(0));
+    let live = lines(&case, "out/pose3d-smooth.jsonl");
+    assert_eq!(live.len(), N_FRAMES);
+    let text = fs::read_to_string(case.path("out/smooth.json")).unwrap();
+    let report = SmoothReport::parse(&text).unwrap();
+    assert_eq!(
+        (report.method.as_str(), report.n_frames),
+        ("kalman", N_FRAMES as u64)
+    );
+    let raw = fs::read(case.path("out/pose3d.jsonl")).unwrap();
+    let ended = smooth(&case, &["out", "--truth", ".", "--json"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let said: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let rows = said["truth"]["methods"].as_array().unwrap();
+    let [raw_row, rts] =
+        ["raw", "rts"].map(|name| rows.iter().find(|it| it["method"] == name).unwrap());
+    assert!(
+        mean(rts, "position_mm") < 0.85 * mean(raw_row, "position_mm"),
+        "{said:#}"
+    );
+    assert!(
+        mean(rts, "acceleration_m_s2") < 0.4 * mean(raw_row, "acceleration_m_s2"),
+        "{said:#}"
+    );
+    assert!(mean(rts, "lag_ms").abs() < 5.0, "{said:#}");
+    assert_eq!(
+        raw,
+        fs::read(case.path("out/pose3d.jsonl")).unwrap(),
+        "what was measured stays"
+    );
+    let smoothed = lines(&case, "out/pose3d-smooth.jsonl");
+    assert_eq!(smoothed.len(), N_FRAMES);
+    assert!(
+        smoothed[40]
+            .states
+            .values()
+            .filter(|it| *it == "measured")
+            .count()
+            > 10
+    );
+    let angles = fs::read_to_string(case.path("out/angles.csv")).unwrap();
+    let knee = angles
+        .lines()
+        .find(|it| it.starts_with("40,") && it.contains("right knee flexion"));
+    let cells: Vec<&str> = knee.unwrap().split(',').collect();
+    assert!(
+        cells[3].parse::<f64>().is_ok() && cells[4].parse::<f64>().is_ok(),
+        "{cells:?}"
+    );
+    assert_eq!(
+        angles.lines().count() % N_FRAMES,
+        1,
+        "the same rows for every frame"
+    );
+    // Without `live` the next run has nothing smoothed, not what an earlier one has left.
+    let off = ["run", "deployment.toml", "--set", "smooth.live=off"];
+    assert_eq!(case.start(&off).wait().status.code(), Some(0));
+    assert!(
+        !case.path("out/pose3d-smooth.jsonl").exists() && !case.path("out/smooth.json").exists()
+    );
+}
+
+/// A line with one joint.
+fn line(frame: u64, time_s: Option<f64>, joint: JointLine) -> FrameLine {
+    FrameLine {
+        body_deviation: None,
+        facing_margin: None,
+        frame,
+        joints: BTreeMap::from([("right wrist".to_owned(), joint)]),
+        kept: None,
+        keypoints: BTreeMap::new(),
+        pairs: 0,
+        people: None,
+        reason: None,
+        sides: None,
+        sides_margin: None,
+        stature_m: None,
+        status: FrameLine::OK.to_owned(),
+        time_s,
+        views_missing: BTreeMap::new(),
+        views_present: Vec::new(),
+        views_used: Vec::new(),
+    }
+}
+
+fn placed(x: f64, covariance: f64) -> JointLine {
+    JointLine::Placed(PlacedJoint {
+        covariance_m2: [covariance, 0.0, 0.0, covariance, 0.0, covariance],
+        position_m: [x, 0.0, 1.0],
+        reprojection_px: None,
+        views: Vec::new(),
+    })
+}
+
+fn missing() -> JointLine {
+    JointLine::Missing {
+        status: "too few views".to_owned(),
+    }
+}
+
+fn text(lines: impl IntoIterator<Item = FrameLine>) -> String {
+    lines
+        .into_iter()
+        .map(|it| runfiles::to_line(&it).unwrap())
+        .collect()
+}
+
+#[test]
+fn what_a_folder_lacks_is_said_and_by_exit_code() {
+    let case = Case::new("smooth-attack", &[0], "");
+    fs::create_dir(case.path("run")).unwrap();
+    let at = |it: u64| Some(it as f64 / 60.0);
+    let whole = |it: u64| line(it, at(it), placed(it as f64 * 0.01, 1e-4));
+    let whole_text = text((0..50).map(whole));
+    let cut = whole_text[..whole_text.len() - 30].to_owned();
+    let torn = whole_text.replacen("\"frame\":20", "\"frame\":\"x\"", 1);
+    let nothing = text((0..9).map(|it| line(it, at(it), missing())));
+    let nan = text((0..50).map(|it| line(it, at(it), placed(it as f64 * 0.01, f64::NAN))));
+    let back = text([0, 1, 3, 2, 4].map(whole));
+    let no_times = text((0..50).map(|it| line(it, None, placed(0.0, 1e-4))));
+    let rows: [(&str, &[&str], i32, &str); 11] = [
+        (&whole_text, &[], 0, ""),
+        (
+            &whole_text,
+            &["--method", "butterworth", "--cutoff-hz", "29"],
+            2,
+            "60.000 Hz",
+        ),
+        (&text([whole(7)]), &[], 0, ""),
+        (&nothing, &[], 7, "no joint was measured"),
+        (&nan, &[], 0, ""),
+        (&back, &[], 4, "line 4 is at"),
+        (&back, &["--rate-hz", "60"], 4, "line 4 is at"),
+        (&cut, &[], 7, "line 50 of pose3d.jsonl is cut off"),
+        (&torn, &[], 4, "line 21, column"),
+        (&no_times, &[], 4, "--rate-hz"),
+        (&no_times, &["--rate-hz", "60"], 0, ""),
+    ];
+    for (text, more, code, words) in rows {
+        case.write("run/pose3d.jsonl", text);
+        let ended = smooth(&case, &[&["run", "-q"], more].concat());
+        assert_eq!(ended.status.code(), Some(code), "{words}: {}", ended.stderr);
+        assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+        if code == 0 || code == 7 {
+            let n = lines(&case, "run/pose3d-smooth.jsonl").len();
+            let cut = usize::from(words.contains("cut off"));
+            assert_eq!(n, text.lines().count() - cut, "{words}");
+        }
+    }
+    for (arguments, code, words) in [
+        (&["nowhere"][..], 4, "nowhere"),
+        (&[], 2, "FOLDER"),
+        (&["run", "--method", "magic"], 2, "rts, butterworth"),
+        (&["run", "--truth", "nowhere"], 4, "nowhere"),
+        (&["run", "--up", "0,0,0"], 2, "not all 0"),
+    ] {
+        let ended = smooth(&case, arguments);
+        assert_eq!(ended.status.code(), Some(code), "{}", ended.stderr);
+        assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+    }
+}

@@ -1,0 +1,147 @@
+//! Limbs whose bones keep their lengths.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use crate::recorded::{Recorded, median};
+use crate::role::{RIGID, Role};
+use crate::track::{Estimate, Smoothed, State};
+
+/// Steps of the projection; it converges quadratically from a few centimetres off.
+const N_STEPS: usize = 6;
+/// A bone that is further off is not what it should be, and stays, as a share of its length.
+const MOST_OFF: f64 = 0.5;
+/// Standard deviation of a position whose covariance is not known, metres.
+const UNKNOWN_SD_M: f64 = 0.02;
+/// Frames that a length needs.
+const LEAST_FRAMES: usize = 10;
+
+/// Moves joints so that the limbs' bones have the median of their lengths, as little as their covariances allow.
+///
+/// At every instant the most likely joints on the constraint are found by Gauss-Newton steps: with the covariances `P` and
+/// the derivatives `J` of the lengths, `x -= P J' (J P J')^-1 (lengths - constant)`, and `P` loses what the lengths tell. The lengths
+/// are constant over the run, and the input is smooth, so the result is.
+///
+/// * Returns the bones and their lengths.
+pub(crate) fn constant(
+    recorded: &Recorded,
+    tracks: &mut [Vec<Smoothed>],
+) -> Vec<([usize; 2], f64)> {
+    let at_role = |role: Role| recorded.joints.iter().position(|it| it.role == Some(role));
+    let mut bones = Vec::new();
+    for [a, b] in RIGID {
+        let (Some(a), Some(b)) = (at_role(a), at_role(b)) else {
+            continue;
+        };
+        let measured = |it: &Smoothed| it.ok().filter(|it| it.state == State::Measured);
+        let lengths: Vec<f64> = tracks[a]
+            .iter()
+            .zip(&tracks[b])
+            .filter_map(|(a, b)| Some((measured(a)?.position - measured(b)?.position).norm()))
+            .collect();
+        if lengths.len() >= LEAST_FRAMES {
+            bones.push(([a, b], median(lengths)));
+        }
+    }
+    for at in 0..recorded.times.len() {
+        project(tracks, at, &bones);
+    }
+    // Twins of a joint (HumanEva names some twice) stay where the first is.
+    bones
+}
+
+/// Projects one instant.
+fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)]) {
+    let here: Vec<([usize; 2], f64)> = bones
+        .iter()
+        .filter(|([a, b], length)| {
+            let (Ok(a), Ok(b)) = (tracks[*a][at], tracks[*b][at]) else {
+                return false;
+            };
+            ((a.position - b.position).norm() - length).abs() < MOST_OFF * length
+        })
+        .copied()
+        .collect();
+    let mut joints: Vec<usize> = here.iter().flat_map(|it| it.0).collect();
+    joints.sort_unstable();
+    joints.dedup();
+    let found: Vec<Estimate> = joints
+        .iter()
+        .filter_map(|&it| tracks[it][at].ok())
+        .collect();
+    if found.is_empty() {
+        return;
+    }
+    let places: Vec<([usize; 2], f64)> = here
+        .iter()
+        .filter_map(|(ends, length)| {
+            let [a, b] = ends.map(|it| joints.binary_search(&it).ok());
+            Some(([a?, b?], *length))
+        })
+        .collect();
+    let Some((positions, covariances)) = projected(&found, &places) else {
+        return;
+    };
+    for ((joint, old), (position, covariance)) in joints
+        .iter()
+        .zip(found)
+        .zip(positions.into_iter().zip(covariances))
+    {
+        tracks[*joint][at] = Ok(Estimate {
+            position,
+            covariance: old.covariance.map(|_| covariance),
+            ..old
+        });
+    }
+}
+
+/// The most likely positions with bones of the given lengths, and their covariances; `None` if the numbers do not allow it.
+fn projected(
+    found: &[Estimate],
+    bones: &[([usize; 2], f64)],
+) -> Option<(Vec<Vector3<f64>>, Vec<Matrix3<f64>>)> {
+    let n = found.len();
+    let unknown = Matrix3::identity() * UNKNOWN_SD_M.powi(2);
+    let covariances: Vec<Matrix3<f64>> = found
+        .iter()
+        .map(|it| it.covariance.unwrap_or(unknown))
+        .collect();
+    let mut positions: Vec<Vector3<f64>> = found.iter().map(|it| it.position).collect();
+    let mut last = None;
+    for _ in 0..N_STEPS {
+        // P J': a column for every bone, which moves two joints.
+        let mut spread = DMatrix::zeros(3 * n, bones.len());
+        let mut derivative = DMatrix::zeros(bones.len(), 3 * n);
+        let mut off = DVector::zeros(bones.len());
+        for (nth, ([a, b], length)) in bones.iter().enumerate() {
+            let bone = positions[*b] - positions[*a];
+            let now = bone.norm();
+            if now < 1e-6 {
+                return None;
+            }
+            let along = bone / now;
+            // The start of the linearisation is the unprojected position: least squares from there.
+            let moved = (positions[*b] - found[*b].position) - (positions[*a] - found[*a].position);
+            off[nth] = now - length - along.dot(&moved);
+            for (joint, sign) in [(*a, -1.0), (*b, 1.0)] {
+                let column: Vector3<f64> = covariances[joint] * along * sign;
+                spread
+                    .fixed_view_mut::<3, 1>(3 * joint, nth)
+                    .copy_from(&column);
+                derivative
+                    .fixed_view_mut::<1, 3>(nth, 3 * joint)
+                    .copy_from(&(along * sign).transpose());
+            }
+        }
+        let root = (&derivative * &spread).cholesky()?;
+        let step = &spread * root.solve(&off);
+        for (joint, it) in positions.iter_mut().enumerate() {
+            *it = found[joint].position - step.fixed_rows::<3>(3 * joint);
+        }
+        last = Some((spread, root));
+    }
+    let (spread, root) = last?;
+    let told = &spread * root.solve(&spread.transpose());
+    let reduced =
+        (0..n).map(|joint| covariances[joint] - told.fixed_view::<3, 3>(3 * joint, 3 * joint));
+    Some((positions, reduced.collect()))
+}

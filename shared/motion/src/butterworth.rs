@@ -1,0 +1,263 @@
+//! The low-pass filter of gait laboratories: Butterworth, forwards and backwards, without delay.
+
+use core::f64::consts::PI;
+
+use nalgebra::Vector3;
+
+use crate::recorded::{Counts, Motion, Recorded, Report, median};
+use crate::track::{Absent, Estimate, Smoothed, State};
+
+/// Cutoff in use for gait, Hz.
+pub const CUTOFF_HZ: f64 = 6.0;
+/// Twice through a filter of second order lowers its cutoff by this (Winter, *Biomechanics and Motor Control of Human Movement*,
+/// 4th ed., section 3.4.4.2): (sqrt(2) - 1)^(1/4).
+const TWICE: f64 = 0.802;
+
+/// The cutoff is not below half of the rate.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "a cutoff of {cutoff_hz} Hz needs instants at a rate above {} Hz, these are at {rate_hz:.3} Hz",
+    needed_hz(*cutoff_hz)
+)]
+pub struct CutoffError {
+    /// The cutoff.
+    pub cutoff_hz: f64,
+    /// Of the instants.
+    pub rate_hz: f64,
+}
+
+/// The bilinear transform is of use up to 0.45 of the rate.
+fn needed_hz(cutoff_hz: f64) -> f64 {
+    cutoff_hz / TWICE / 0.45
+}
+
+/// Filters every joint: a Butterworth filter of second order forwards and backwards, of fourth order together and without delay,
+/// which passes half of the power at the cutoff.
+///
+/// Gaps between measurements up to `fill_s` are filled by cubic curves before; longer ones cut a track into pieces, filtered
+/// each by itself. Instants that are not uniform are interpolated (cubic) to a uniform grid and back;
+/// [`Report::resampled_s`] says how far off they are. Nothing is rejected but joints with a side where sides are not certain. There are no
+/// covariances.
+///
+/// The times must be [checked](Recorded::check).
+///
+/// # Errors
+///
+/// [`CutoffError`].
+pub fn filter(recorded: &Recorded, cutoff_hz: f64, fill_s: f64) -> Result<Motion, CutoffError> {
+    let times = &recorded.times;
+    let step = median(times.windows(2).map(|it| it[1] - it[0]).collect());
+    let rate_hz = if step > 0.0 {
+        1.0 / step
+    } else {
+        f64::INFINITY
+    };
+    if !(cutoff_hz > 0.0) || rate_hz < needed_hz(cutoff_hz) {
+        return Err(CutoffError { cutoff_hz, rate_hz });
+    }
+    let breaks = recorded.breaks();
+    let withheld = recorded.withheld();
+    let mut joints = Vec::new();
+    for (joint, it) in recorded.joints.iter().enumerate() {
+        let known: Vec<(usize, Vector3<f64>)> = (0..times.len())
+            .filter(|&at| !withheld(joint, at))
+            .filter_map(|at| Some((at, it.position(at)?)))
+            .collect();
+        let absent = |at: usize| Err(it.absent(at));
+        let mut track: Vec<Smoothed> = (0..times.len()).map(absent).collect();
+        for piece in pieces(&known, times, &breaks, fill_s) {
+            if step > 0.0 {
+                fill(&mut track, piece, times, step, cutoff_hz);
+            }
+        }
+        joints.push(track);
+    }
+    let counts = joints.iter().map(|it| Counts::of(it)).collect();
+    let report = Report {
+        noise: vec![None; joints.len()],
+        counts,
+        breaks,
+        unsure: recorded.unsure(),
+        resampled_s: Some(off_grid(times, step)).filter(|it| *it > 0.01 * step),
+        ..Report::default()
+    };
+    Ok(Motion { joints, report })
+}
+
+/// How far the instants are from a uniform grid, at most; missing ones leave it uniform.
+fn off_grid(times: &[f64], step: f64) -> f64 {
+    let first = times.first().copied().unwrap_or(0.0);
+    let off = |time: &f64| {
+        let at = (time - first) / step;
+        (at - at.round()).abs() * step
+    };
+    times.iter().map(off).fold(0.0, f64::max)
+}
+
+/// The runs of measurements without long gaps and breaks.
+fn pieces<'a>(
+    known: &'a [(usize, Vector3<f64>)],
+    times: &[f64],
+    breaks: &[usize],
+    fill_s: f64,
+) -> Vec<&'a [(usize, Vector3<f64>)]> {
+    let step = median(times.windows(2).map(|it| it[1] - it[0]).collect());
+    let goes_on = |a: &(usize, Vector3<f64>), b: &(usize, Vector3<f64>)| {
+        let is_near = times[b.0] - times[a.0] <= fill_s.max(1.5 * step);
+        is_near && !breaks.iter().any(|it| (a.0 + 1..=b.0).contains(it))
+    };
+    known.chunk_by(goes_on).collect()
+}
+
+/// Filters a piece, and fills all instants from its first to its last.
+fn fill(
+    track: &mut [Smoothed],
+    piece: &[(usize, Vector3<f64>)],
+    times: &[f64],
+    step: f64,
+    cutoff_hz: f64,
+) {
+    let [Some(first), Some(last)] = [piece.first(), piece.last()] else {
+        return;
+    };
+    let (begin, end) = (times[first.0], times[last.0]);
+    let n = ((end - begin) / step).round() as usize + 1;
+    // The step of the grid ends on the last instant.
+    let step = if n > 1 {
+        (end - begin) / (n - 1) as f64
+    } else {
+        step
+    };
+    let grid: Vec<f64> = (0..n).map(|at| begin + step * at as f64).collect();
+    let at: Vec<f64> = piece.iter().map(|it| times[it.0]).collect();
+    let mut filtered = vec![Vector3::zeros(); last.0 - first.0 + 1];
+    for axis in 0..3 {
+        let values: Vec<f64> = piece.iter().map(|it| it.1[axis]).collect();
+        let uniform: Vec<f64> = grid.iter().map(|&time| cubic(&at, &values, time)).collect();
+        let smooth = twice(&uniform, 1.0 / step, cutoff_hz);
+        for (nth, it) in filtered.iter_mut().enumerate() {
+            it[axis] = cubic(&grid, &smooth, times[first.0 + nth]);
+        }
+    }
+    let mut known = piece.iter().map(|it| it.0).peekable();
+    for (nth, position) in filtered.into_iter().enumerate() {
+        let here = first.0 + nth;
+        let state = if known.next_if_eq(&here).is_some() {
+            State::Measured
+        } else if track[here] == Err(Absent::Rejected) {
+            State::Rejected
+        } else {
+            State::Filled
+        };
+        track[here] = Ok(Estimate {
+            position,
+            covariance: None,
+            state,
+        });
+    }
+}
+
+/// The value at a time of the cubic curve through all values, with slopes from the neighbours (Catmull & Rom 1974).
+fn cubic(times: &[f64], values: &[f64], time: f64) -> f64 {
+    let after = times.partition_point(|it| *it <= time);
+    if after == 0 || times.len() < 2 {
+        return values.first().copied().unwrap_or(f64::NAN);
+    }
+    let a = after - 1;
+    if after >= times.len() {
+        return values[a];
+    }
+    let slope = |at: usize| {
+        let (from, to) = (at.saturating_sub(1), (at + 1).min(times.len() - 1));
+        (values[to] - values[from]) / (times[to] - times[from])
+    };
+    let width = times[after] - times[a];
+    let u = (time - times[a]) / width;
+    let (one, two, three) = (u, u * u, u * u * u);
+    values[a] * (2.0 * three - 3.0 * two + 1.0)
+        + width * slope(a) * (three - 2.0 * two + one)
+        + values[after] * (3.0 * two - 2.0 * three)
+        + width * slope(after) * (three - two)
+}
+
+/// Once forwards and once backwards; both ends are continued by their point reflection for a period of the cutoff.
+fn twice(values: &[f64], rate_hz: f64, cutoff_hz: f64) -> Vec<f64> {
+    let n = values.len();
+    if n < 2 {
+        return values.to_vec();
+    }
+    let n_around = ((2.0 * rate_hz / cutoff_hz).ceil() as usize).clamp(1, n - 1);
+    let before = (1..=n_around).rev().map(|it| 2.0 * values[0] - values[it]);
+    let after = (1..=n_around).map(|it| 2.0 * values[n - 1] - values[n - 1 - it]);
+    let mut all: Vec<f64> = before.chain(values.iter().copied()).chain(after).collect();
+    for _ in 0..2 {
+        once(&mut all, rate_hz, cutoff_hz / TWICE);
+        all.reverse();
+    }
+    all[n_around..n_around + n].to_vec()
+}
+
+/// A Butterworth low-pass filter of second order (bilinear transform, prewarped), begun as if the first value had always been.
+fn once(values: &mut [f64], rate_hz: f64, cutoff_hz: f64) {
+    let warped = (PI * cutoff_hz / rate_hz).tan();
+    let (root, square) = (2.0_f64.sqrt() * warped, warped * warped);
+    let norm = 1.0 / (1.0 + root + square);
+    let b = square * norm;
+    let a = [2.0 * (square - 1.0) * norm, (1.0 - root + square) * norm];
+    let first = values.first().copied().unwrap_or(0.0);
+    let (mut x, mut y) = ([first; 2], [first; 2]);
+    for value in values {
+        let input = *value;
+        let output = b * (input + 2.0 * x[0] + x[1]) - a[0] * y[0] - a[1] * y[1];
+        (x, y) = ([input, x[0]], [output, y[0]]);
+        *value = output;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The share of a sine's amplitude that is left, and its delay in seconds.
+    fn passed(hz: f64) -> f64 {
+        let rate = 120.0;
+        let wave: Vec<f64> = (0..1200)
+            .map(|it| (2.0 * PI * hz * f64::from(it) / rate).sin())
+            .collect();
+        let got = twice(&wave, rate, 6.0);
+        let (mut same, mut all) = (0.0, 0.0);
+        for at in 300..900 {
+            same += got[at] * wave[at];
+            all += wave[at] * wave[at];
+        }
+        same / all
+    }
+
+    #[test]
+    fn half_of_the_power_passes_at_the_cutoff_and_slow_movement_passes_whole() {
+        assert!(
+            (passed(6.0) - 0.5_f64.sqrt()).abs() < 0.005,
+            "{}",
+            passed(6.0)
+        );
+        assert!((passed(0.5) - 1.0).abs() < 1e-3);
+        assert!(passed(20.0) < 0.02);
+    }
+
+    #[test]
+    fn a_straight_line_stays_to_its_ends() {
+        let line: Vec<f64> = (0..50).map(|it| 0.3 * f64::from(it) - 2.0).collect();
+        for (got, want) in twice(&line, 60.0, 6.0).iter().zip(&line) {
+            assert!((got - want).abs() < 1e-2, "{got} {want}");
+        }
+    }
+
+    #[test]
+    fn a_cubic_curve_goes_through_its_points_and_along_lines() {
+        let times = [0.0, 0.1, 0.25, 0.3, 0.5];
+        let values = times.map(|it| 3.0 * it + 1.0);
+        for time in [0.0, 0.05, 0.1, 0.2, 0.31, 0.5] {
+            assert!((cubic(&times, &values, time) - (3.0 * time + 1.0)).abs() < 1e-12);
+        }
+    }
+}

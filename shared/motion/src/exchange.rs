@@ -1,0 +1,112 @@
+//! Joints of the other side of the body, taken for those of this one.
+
+use crate::recorded::{Recorded, Sides};
+use crate::rts::{GATE, Usable, distance2};
+use crate::smoother::Track;
+use crate::track::usable;
+
+/// What speaks for one of two sides must be this much likelier, natural logarithm of the odds.
+const LEAST_ODDS: f64 = 3.0;
+/// A measurement contradicts what others say by at most this: it may be wrong for many reasons.
+const MOST_DISTANCE2: f64 = 40.0;
+
+/// Takes exchanged joints for what they are, and decides instants whose sides are not certain.
+///
+/// * `others`: of every joint that on the other side.
+/// * Returns the joints whose measurements changed, and how many instants with uncertain sides were kept, exchanged and left out.
+pub(crate) fn settle(
+    recorded: &Recorded,
+    others: &[Option<usize>],
+    tracks: &mut [Track],
+) -> (Vec<usize>, [usize; 3]) {
+    let pairs: Vec<[usize; 2]> = others
+        .iter()
+        .enumerate()
+        .filter_map(|(a, b)| b.filter(|b| a < *b).map(|b| [a, b]))
+        .collect();
+    let mut is_changed = vec![false; tracks.len()];
+    let mut counts = [0; 3];
+    let is_some_sure = recorded.sides.contains(&Sides::Sure);
+    for at in 0..recorded.times.len() {
+        if is_some_sure && recorded.sides[at] == Sides::Unsure {
+            counts[unsure(recorded, &pairs, tracks, at, &mut is_changed)] += 1;
+            continue;
+        }
+        for &pair in &pairs {
+            if exchange_pair(tracks, pair, at) {
+                for joint in pair {
+                    is_changed[joint] = true;
+                }
+            }
+        }
+    }
+    let changed = (0..tracks.len()).filter(|&it| is_changed[it]).collect();
+    (changed, counts)
+}
+
+/// How far a measurement is from what a track says without it.
+fn away(track: &Track, at: usize, measured: &Usable) -> Option<f64> {
+    let known = track.known[at].as_ref()?;
+    Some(distance2(known, measured.as_ref()?, 0.0, track.noise.scale))
+}
+
+/// Exchanges two joints of which neither fits and each fits the other.
+fn exchange_pair(tracks: &mut [Track], [a, b]: [usize; 2], at: usize) -> bool {
+    let is_out = |it: &Track| it.used[at].is_some() && it.weights[at] == 0.0;
+    // One of them may fit by chance, where the limbs cross.
+    if !is_out(&tracks[a]) || !is_out(&tracks[b]) {
+        return false;
+    }
+    let of_a = away(&tracks[a], at, &tracks[b].used[at]);
+    let of_b = away(&tracks[b], at, &tracks[a].used[at]);
+    let fits = |it: Option<f64>| it.is_some_and(|it| it <= GATE);
+    if !fits(of_a) || !fits(of_b) {
+        return false;
+    }
+    let (first, second) = (tracks[a].used[at], tracks[b].used[at]);
+    for (track, measured) in [(a, second), (b, first)] {
+        tracks[track].used[at] = measured;
+        tracks[track].is_exchanged[at] = true;
+    }
+    true
+}
+
+/// Decides an instant whose sides are not certain, from all pairs together.
+///
+/// * Returns 0 if it was kept as measured, 1 if exchanged, 2 if left out.
+fn unsure(
+    recorded: &Recorded,
+    pairs: &[[usize; 2]],
+    tracks: &mut [Track],
+    at: usize,
+    is_changed: &mut [bool],
+) -> usize {
+    let measured =
+        |joint: usize| -> Usable { usable(recorded.joints[joint].measured[at].as_ref()?) };
+    let sum = |is_exchanged: bool| -> f64 {
+        let one = |&[a, b]: &[usize; 2]| {
+            let (own, other) = if is_exchanged { (b, a) } else { (a, b) };
+            let of_a = away(&tracks[a], at, &measured(own));
+            let of_b = away(&tracks[b], at, &measured(other));
+            // A pair counts whole or not at all: both sums are then over the same measurements.
+            let both = of_a.zip(of_b);
+            both.map_or(0.0, |(a, b)| a.min(MOST_DISTANCE2) + b.min(MOST_DISTANCE2))
+        };
+        pairs.iter().map(one).sum()
+    };
+    // The likelihood of a Gaussian is half the squared distance.
+    let odds = 0.5 * (sum(true) - sum(false));
+    if odds.abs() < LEAST_ODDS {
+        return 2;
+    }
+    let is_exchanged = odds < 0.0;
+    for &[a, b] in pairs {
+        for (joint, from) in [(a, b), (b, a)] {
+            let from = if is_exchanged { from } else { joint };
+            tracks[joint].used[at] = measured(from);
+            tracks[joint].is_exchanged[at] = is_exchanged;
+            is_changed[joint] = true;
+        }
+    }
+    usize::from(is_exchanged)
+}

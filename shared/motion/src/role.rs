@@ -1,0 +1,175 @@
+//! What a joint is, by its name in the results.
+
+/// A side of the body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Side {
+    /// The person's right.
+    Right,
+    /// The person's left.
+    Left,
+}
+
+impl Side {
+    /// Both.
+    pub const BOTH: [Self; 2] = [Self::Right, Self::Left];
+
+    /// The word in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Left => "left",
+        }
+    }
+
+    fn other(self) -> Self {
+        match self {
+            Self::Right => Self::Left,
+            Self::Left => Self::Right,
+        }
+    }
+}
+
+/// What a joint is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "the names of joints")]
+pub enum Role {
+    Head,
+    Neck,
+    Pelvis,
+    Shoulder(Side),
+    Elbow(Side),
+    Wrist(Side),
+    Hip(Side),
+    Knee(Side),
+    Ankle(Side),
+    Heel(Side),
+    BigToe(Side),
+    SmallToe(Side),
+}
+
+/// Names that do not say the side first: those of `skeleton::HUMANEVA20`, and words of networks. The twins of `HumanEva`, one
+/// joint as an end of two limbs, have the role once.
+const NAMES: [(&str, Role); 19] = [
+    ("head", Role::Head),
+    ("neck", Role::Neck),
+    ("thorax", Role::Neck),
+    ("pelvis", Role::Pelvis),
+    ("hip", Role::Pelvis),
+    ("headDistal", Role::Head),
+    ("torsoProximal", Role::Neck),
+    ("torsoDistal", Role::Pelvis),
+    ("upperLArmProximal", Role::Shoulder(Side::Left)),
+    ("upperLArmDistal", Role::Elbow(Side::Left)),
+    ("lowerLArmDistal", Role::Wrist(Side::Left)),
+    ("upperRArmProximal", Role::Shoulder(Side::Right)),
+    ("upperRArmDistal", Role::Elbow(Side::Right)),
+    ("lowerRArmDistal", Role::Wrist(Side::Right)),
+    ("upperLLegProximal", Role::Hip(Side::Left)),
+    ("upperLLegDistal", Role::Knee(Side::Left)),
+    ("lowerLLegDistal", Role::Ankle(Side::Left)),
+    ("upperRLegProximal", Role::Hip(Side::Right)),
+    ("upperRLegDistal", Role::Knee(Side::Right)),
+];
+
+impl Role {
+    /// The role of a joint by its name; `None` for what has none here, as a finger.
+    pub fn of(name: &str) -> Option<Self> {
+        let whole = NAMES.iter().find(|it| it.0 == name);
+        if let Some((_, role)) = whole {
+            return Some(*role);
+        }
+        if name == "lowerRLegDistal" {
+            return Some(Self::Ankle(Side::Right));
+        }
+        let (side, joint) = name.split_once(' ')?;
+        let side = Side::BOTH.into_iter().find(|it| it.name() == side)?;
+        let role = match joint {
+            "shoulder" => Self::Shoulder(side),
+            "elbow" => Self::Elbow(side),
+            "wrist" => Self::Wrist(side),
+            "hip" => Self::Hip(side),
+            "knee" => Self::Knee(side),
+            "ankle" => Self::Ankle(side),
+            "heel" => Self::Heel(side),
+            "big toe" | "toes" | "foot index" => Self::BigToe(side),
+            "small toe" => Self::SmallToe(side),
+            _ => return None,
+        };
+        Some(role)
+    }
+
+    /// The same on the other side; `None` for what has no side.
+    pub fn mirrored(self) -> Option<Self> {
+        Some(match self {
+            Self::Head | Self::Neck | Self::Pelvis => return None,
+            Self::Shoulder(it) => Self::Shoulder(it.other()),
+            Self::Elbow(it) => Self::Elbow(it.other()),
+            Self::Wrist(it) => Self::Wrist(it.other()),
+            Self::Hip(it) => Self::Hip(it.other()),
+            Self::Knee(it) => Self::Knee(it.other()),
+            Self::Ankle(it) => Self::Ankle(it.other()),
+            Self::Heel(it) => Self::Heel(it.other()),
+            Self::BigToe(it) => Self::BigToe(it.other()),
+            Self::SmallToe(it) => Self::SmallToe(it.other()),
+        })
+    }
+}
+
+/// The name of a joint on the other side, for any name that says its side as a word of its own or in `HumanEva`'s way.
+pub fn mirrored_name(name: &str) -> Option<String> {
+    if let Some(rest) = name.strip_prefix("left ") {
+        return Some(format!("right {rest}"));
+    }
+    if let Some(rest) = name.strip_prefix("right ") {
+        return Some(format!("left {rest}"));
+    }
+    let limb = ["upper", "lower"]
+        .iter()
+        .find_map(|it| Some((*it, name.strip_prefix(*it)?)));
+    let (part, rest) = limb?;
+    if let Some(rest) = rest.strip_prefix('L') {
+        return Some(format!("{part}R{rest}"));
+    }
+    rest.strip_prefix('R').map(|rest| format!("{part}L{rest}"))
+}
+
+/// Pairs of joints whose distance a body keeps: the limbs' segments.
+///
+/// The distances across the trunk change by centimetres as shoulders move and the back bends, and are no part of it.
+pub const RIGID: [[Role; 2]; 9] = [
+    [Role::Hip(Side::Right), Role::Knee(Side::Right)],
+    [Role::Knee(Side::Right), Role::Ankle(Side::Right)],
+    [Role::Hip(Side::Left), Role::Knee(Side::Left)],
+    [Role::Knee(Side::Left), Role::Ankle(Side::Left)],
+    [Role::Hip(Side::Right), Role::Hip(Side::Left)],
+    [Role::Shoulder(Side::Right), Role::Elbow(Side::Right)],
+    [Role::Elbow(Side::Right), Role::Wrist(Side::Right)],
+    [Role::Shoulder(Side::Left), Role::Elbow(Side::Left)],
+    [Role::Elbow(Side::Left), Role::Wrist(Side::Left)],
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_sides_of_a_name_are_each_others() {
+        for name in [
+            "left ankle",
+            "right big toe",
+            "upperLArmDistal",
+            "lowerRLegDistal",
+            "left ring finger",
+        ] {
+            let other = mirrored_name(name).unwrap();
+            assert_ne!(other, name);
+            assert_eq!(mirrored_name(&other).as_deref(), Some(name));
+            if let Some(role) = Role::of(name) {
+                assert_eq!(Role::of(&other), role.mirrored());
+            }
+        }
+        for name in ["head", "neck", "torsoProximal", "upper", "left", ""] {
+            assert_eq!(mirrored_name(name), None, "{name}");
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! The Rauch-Tung-Striebel smoother over one stretch of a track, with weights that outliers lose.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::model::{Belief, Innovation};
+use crate::tune::Noise;
+
+/// A measurement that can be worked with.
+pub(crate) type Usable = Option<(Vector3<f64>, Matrix3<f64>)>;
+
+/// Degrees of freedom of the heavy-tailed (Student) noise that measurements are weighted for.
+pub(crate) const FREEDOM: f64 = 4.0;
+/// A measurement whose squared Mahalanobis distance from what all others say is larger is rejected: 1 of 10 000 good ones.
+pub(crate) const GATE: f64 = 21.11;
+/// By how much movement may be less predictable at times than over the whole track, as a factor of the covariance of what
+/// others say: a punch is no outlier. At high rates it hardly counts, the measurement's own covariance is most of the sum.
+const SURPRISE: f64 = 9.0;
+/// Times that weights are found anew; they have settled by then.
+const N_ROUNDS: usize = 4;
+
+/// Where a joint is, with its covariance in the unit of those of the measurements, unscaled.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known {
+    pub(crate) position: Vector3<f64>,
+    pub(crate) covariance: Matrix3<f64>,
+}
+
+/// What everything says of the instants of a stretch.
+#[derive(Debug)]
+pub(crate) struct Stretch {
+    /// At every instant; none if there is no measurement.
+    pub(crate) known: Vec<Known>,
+    /// Of every instant the weight that its measurement has, 0..1; 0 where it is rejected or there is none.
+    pub(crate) weights: Vec<f64>,
+}
+
+/// The weight of a measurement in noise with heavy tails (Lange, Little & Taylor 1989).
+///
+/// * `distance2`: squared Mahalanobis distance, scaled.
+pub(crate) fn weight(distance2: f64) -> f64 {
+    ((FREEDOM + 3.0) / (FREEDOM + distance2)).min(1.0)
+}
+
+/// Runs forwards; `each` sees every measurement before it is used and says its weight, 0 to leave it out.
+///
+/// * Returns what is known at every instant up to the last; instants before the first measurement that is used repeat it.
+pub(crate) fn forwards(
+    times: &[f64],
+    measured: &[Usable],
+    noise: Noise,
+    mut each: impl FnMut(usize, Option<Innovation>) -> f64,
+) -> Vec<Belief> {
+    let mut beliefs: Vec<Belief> = Vec::with_capacity(times.len());
+    let jerk = noise.jerk / noise.scale;
+    let mut n_before = 0;
+    for (at, it) in measured.iter().enumerate() {
+        let Some(last) = beliefs.last() else {
+            let first = it.filter(|_| each(at, None) > 0.0);
+            if let Some((position, covariance)) = first {
+                beliefs.push(Belief::first(position, covariance, noise.scale));
+            } else {
+                n_before += 1;
+            }
+            continue;
+        };
+        let expected = last.after(times[at] - times[at - 1], jerk);
+        let known = it.map_or(expected, |(position, covariance)| {
+            let weight = each(at, expected.innovation(&position, &covariance));
+            if weight > 0.0 {
+                expected.with(&position, &(covariance / weight))
+            } else {
+                expected
+            }
+        });
+        beliefs.push(known);
+    }
+    // Before the first measurement nothing is known; the smoother goes back through it.
+    let Some(first) = beliefs.first().copied() else {
+        return beliefs;
+    };
+    let mut all = vec![first; n_before];
+    all.append(&mut beliefs);
+    all
+}
+
+/// Runs backwards over what [`forwards`] has found.
+fn backwards(times: &[f64], forwards: &[Belief], noise: Noise) -> Vec<Known> {
+    let jerk = noise.jerk / noise.scale;
+    let known = |it: &Belief| Known {
+        position: it.position(),
+        covariance: it.position_covariance(),
+    };
+    let mut all: Vec<Known> = forwards.iter().map(known).collect();
+    let Some(mut next) = forwards.last().copied() else {
+        return all;
+    };
+    for at in (0..forwards.len() - 1).rev() {
+        let dt = times[at + 1] - times[at];
+        let predicted = forwards[at].after(dt, jerk);
+        next = forwards[at].smoothed(&predicted, &next, dt);
+        all[at] = known(&next);
+    }
+    all
+}
+
+/// Squared Mahalanobis distance of a measurement from what all *other* measurements say, scaled; infinity where the numbers do
+/// not allow to tell.
+///
+/// * `weight`: that the measurement had in what is known; 0 if it had no part in it.
+pub(crate) fn distance2(
+    known: &Known,
+    (position, covariance): &(Vector3<f64>, Matrix3<f64>),
+    weight: f64,
+    scale: f64,
+) -> f64 {
+    if weight <= 0.0 {
+        let difference = position - known.position;
+        return solved(&(known.covariance * SURPRISE + covariance), &difference) / scale;
+    }
+    // What the others say: the information of all less that of the measurement.
+    let (Some(all), Some(own)) = (known.covariance.try_inverse(), covariance.try_inverse()) else {
+        return f64::INFINITY;
+    };
+    let own = own * weight;
+    let is_known = |it: &Matrix3<f64>| it.diagonal().iter().all(|it| *it > 0.0);
+    let Some(others) = (all - own).try_inverse().filter(is_known) else {
+        return 0.0; // Nothing but this measurement is known here.
+    };
+    let mean = others * (all * known.position - own * position);
+    solved(&(others * SURPRISE + covariance), &(position - mean)) / scale
+}
+
+fn solved(total: &Matrix3<f64>, difference: &Vector3<f64>) -> f64 {
+    let root = total.cholesky();
+    root.map_or(f64::INFINITY, |root| {
+        difference.dot(&root.solve(difference))
+    })
+}
+
+/// Smooths a stretch: outliers lose their weight, and those that contradict all others are left out.
+pub(crate) fn smooth(times: &[f64], measured: &[Usable], noise: Noise) -> Stretch {
+    let mut weights: Vec<f64> = vec![0.0; times.len()];
+    let known = forwards(times, measured, noise, |at, innovation| {
+        let distance2 = innovation.map_or(0.0, |it| it.distance2 / noise.scale);
+        weights[at] = weight(distance2);
+        weights[at]
+    });
+    let mut known = backwards(times, &known, noise);
+    for round in 0..N_ROUNDS {
+        let is_last = round + 1 == N_ROUNDS;
+        let mut next = weights.clone();
+        for ((at, it), known) in measured.iter().enumerate().zip(&known) {
+            if let Some(it) = it {
+                let distance2 = distance2(known, it, weights[at], noise.scale);
+                let is_out = is_last && distance2 > GATE;
+                next[at] = if is_out { 0.0 } else { weight(distance2) };
+            }
+        }
+        if next.iter().all(|it| *it == 0.0) {
+            break; // Nothing would be left.
+        }
+        weights = next;
+        known = backwards(
+            times,
+            &forwards(times, measured, noise, |at, _| weights[at]),
+            noise,
+        );
+    }
+    Stretch { known, weights }
+}
+
+#[cfg(test)]
+mod tests;

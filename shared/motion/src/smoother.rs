@@ -1,0 +1,233 @@
+//! The offline smoother over all joints of a person: noise, outliers, exchanged sides, gaps, bones.
+
+use crate::bones;
+use crate::exchange;
+use crate::prior::prior;
+use crate::recorded::{Counts, Joint, Motion, Recorded, Report};
+use crate::rts::{self, Known, Usable};
+use crate::track::{Absent, Estimate, Measured, Smoothed, State, usable};
+use crate::tune::{self, Noise};
+
+/// A joint that was not measured for longer is smoothed anew, seconds: what was before says nothing of what is after.
+const SPLIT_S: f64 = 1.0;
+
+/// How to smooth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The longest time between two measurements that is filled, seconds.
+    pub fill_s: f64,
+    /// Keep the lengths of the limbs' bones constant.
+    pub constant_bones: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            fill_s: 0.25,
+            constant_bones: false,
+        }
+    }
+}
+
+/// A joint on its way.
+#[derive(Debug)]
+pub(crate) struct Track {
+    /// What is used of every instant.
+    pub(crate) used: Vec<Usable>,
+    /// The measurement is that of the other side.
+    pub(crate) is_exchanged: Vec<bool>,
+    /// There is a measurement.
+    pub(crate) is_measured: Vec<bool>,
+    pub(crate) noise: Noise,
+    /// What everything says; none outside stretches.
+    pub(crate) known: Vec<Option<Known>>,
+    /// The weight of the measurement.
+    pub(crate) weights: Vec<f64>,
+}
+
+/// Smooths a person's joints with everything before and after.
+///
+/// 1. Where the person is suddenly somebody else, everything begins anew.
+/// 2. Of every joint the jerk density and the scale of the covariances are found from the measurements.
+/// 3. Every joint is smoothed; measurements that contradict all others are rejected. Joints with a side are left out where sides
+///    are not certain.
+/// 4. Where left and right fit better exchanged, they are exchanged; instants whose sides are not certain are taken as what fits,
+///    or left out; the joints that this changes are smoothed again.
+/// 5. Gaps are filled as far as they are short, and marked.
+/// 6. If asked for, the limbs' bones get the median of their lengths.
+///
+/// The times must be [checked](Recorded::check).
+pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
+    let breaks = recorded.breaks();
+    let stretches = |used: &[Usable]| stretches(&recorded.times, used, &breaks, settings.fill_s);
+    let withheld = recorded.withheld();
+    let mut tracks: Vec<Track> = recorded
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(nth, joint)| {
+            let all: Vec<Usable> = joint
+                .measured
+                .iter()
+                .map(|it| usable(it.as_ref()?))
+                .collect();
+            let mut track = Track::new(all);
+            for at in (0..track.used.len()).filter(|&at| withheld(nth, at)) {
+                track.used[at] = None;
+            }
+            track.noise = track.tuned(&recorded.times, &stretches(&track.used), prior(joint.role));
+            track.smooth(&recorded.times, &stretches(&track.used));
+            track
+        })
+        .collect();
+    let (changed, unsure) = exchange::settle(recorded, &recorded.other_sides(), &mut tracks);
+    for joint in changed {
+        let track = &mut tracks[joint];
+        track.smooth(&recorded.times, &stretches(&track.used));
+    }
+    let mut motion = Motion {
+        joints: tracks
+            .iter()
+            .map(|it| it.filled(&recorded.times, settings.fill_s))
+            .collect(),
+        report: Report {
+            noise: tracks.iter().map(Track::known_noise).collect(),
+            breaks,
+            unsure,
+            ..Report::default()
+        },
+    };
+    if settings.constant_bones {
+        motion.report.bones = bones::constant(recorded, &mut motion.joints);
+    }
+    motion.report.counts = motion.joints.iter().map(|it| Counts::of(it)).collect();
+    motion
+}
+
+impl Track {
+    fn new(used: Vec<Usable>) -> Self {
+        let n = used.len();
+        Self {
+            is_measured: used.iter().map(Option::is_some).collect(),
+            used,
+            is_exchanged: vec![false; n],
+            noise: Noise {
+                jerk: 1.0,
+                scale: 1.0,
+            },
+            known: vec![None; n],
+            weights: vec![0.0; n],
+        }
+    }
+
+    fn tuned(&self, times: &[f64], stretches: &[[usize; 2]], prior: tune::Prior) -> Noise {
+        let parts: Vec<(&[f64], &[Usable])> = stretches
+            .iter()
+            .map(|&[from, to]| (&times[from..to], &self.used[from..to]))
+            .collect();
+        tune::tune(&parts, prior)
+    }
+
+    /// Smooths every stretch.
+    fn smooth(&mut self, times: &[f64], stretches: &[[usize; 2]]) {
+        self.known.fill(None);
+        self.weights.fill(0.0);
+        for &[from, to] in stretches {
+            let stretch = rts::smooth(&times[from..to], &self.used[from..to], self.noise);
+            for (at, known) in (from..to).zip(stretch.known) {
+                self.known[at] = Some(known);
+            }
+            self.weights[from..to].copy_from_slice(&stretch.weights);
+        }
+    }
+
+    fn known_noise(&self) -> Option<Noise> {
+        let is_any = self.known.iter().any(Option::is_some);
+        is_any.then_some(self.noise)
+    }
+
+    /// The positions, with gaps filled as far as they are short.
+    fn filled(&self, times: &[f64], fill_s: f64) -> Vec<Smoothed> {
+        let absent = |at: usize| {
+            let is_measured = self.is_measured[at];
+            Err(if is_measured {
+                Absent::Rejected
+            } else {
+                Absent::Gap
+            })
+        };
+        let mut all: Vec<Smoothed> = (0..times.len()).map(absent).collect();
+        let mut last: Option<usize> = None;
+        for at in (0..times.len()).filter(|&at| self.weights[at] > 0.0) {
+            let is_near = |from: usize| times[at] - times[from] <= fill_s;
+            if let Some(from) = last.filter(|&from| is_near(from)) {
+                for between in from + 1..at {
+                    let is_measured = self.is_measured[between];
+                    let state = if is_measured {
+                        State::Rejected
+                    } else {
+                        State::Filled
+                    };
+                    self.put(&mut all[between], between, state);
+                }
+            }
+            let state = if self.is_exchanged[at] {
+                State::Exchanged
+            } else {
+                State::Measured
+            };
+            self.put(&mut all[at], at, state);
+            last = Some(at);
+        }
+        all
+    }
+
+    fn put(&self, place: &mut Smoothed, at: usize, state: State) {
+        if let Some(known) = self.known[at] {
+            *place = Ok(Estimate {
+                position: known.position,
+                covariance: Some(known.covariance * self.noise.scale),
+                state,
+            });
+        }
+    }
+}
+
+/// Where a track can be smoothed as a whole: from the first to after the last measurement, without long gaps and breaks.
+fn stretches(times: &[f64], used: &[Usable], breaks: &[usize], fill_s: f64) -> Vec<[usize; 2]> {
+    let mut stretches: Vec<[usize; 2]> = Vec::new();
+    for at in (0..used.len()).filter(|&at| used[at].is_some()) {
+        let goes_on = stretches.last().is_some_and(|&[_, end]| {
+            let is_near = times[at] - times[end - 1] <= SPLIT_S.max(fill_s);
+            is_near && !breaks.iter().any(|it| (end..=at).contains(it))
+        });
+        match stretches.last_mut() {
+            Some(last) if goes_on => last[1] = at + 1,
+            _ => stretches.push([at, at + 1]),
+        }
+    }
+    stretches
+}
+
+/// What was measured, as it is: joints with a side too where sides are not certain.
+pub fn as_measured(recorded: &Recorded) -> Motion {
+    let estimate = |it: &Option<Measured>| -> Smoothed {
+        let it = it
+            .as_ref()
+            .filter(|it| usable(it).is_some())
+            .ok_or(Absent::Gap)?;
+        Ok(Estimate {
+            position: it.position,
+            covariance: it.covariance,
+            state: State::Measured,
+        })
+    };
+    let of = |joint: &Joint| joint.measured.iter().map(estimate).collect();
+    let joints: Vec<Vec<Smoothed>> = recorded.joints.iter().map(of).collect();
+    let report = Report {
+        noise: vec![None; joints.len()],
+        counts: joints.iter().map(|it| Counts::of(it)).collect(),
+        ..Report::default()
+    };
+    Motion { joints, report }
+}

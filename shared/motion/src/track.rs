@@ -1,0 +1,150 @@
+//! One joint over time: what was measured of it, and what a smoother makes of that.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// Where a joint was measured at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// In the world, metres.
+    pub position: Vector3<f64>,
+    /// Of the position, square metres; none where it is not known.
+    pub covariance: Option<Matrix3<f64>>,
+}
+
+/// What a position of a smoothed track stands on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// A measurement, and those around it.
+    Measured,
+    /// The measurement of the joint on the other side of the body, which fits while its own does not: left and right were exchanged.
+    Exchanged,
+    /// Only what was measured before and after: there was no measurement.
+    Filled,
+    /// Only what was measured before and after: the measurement contradicts them, or its side is not certain.
+    Rejected,
+}
+
+impl State {
+    /// The word in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Exchanged => "exchanged",
+            Self::Filled => "filled",
+            Self::Rejected => "rejected",
+        }
+    }
+}
+
+/// Where a joint is at one instant, as a smoother sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// In the world, metres.
+    pub position: Vector3<f64>,
+    /// Of the position, square metres; none where the method does not tell.
+    pub covariance: Option<Matrix3<f64>>,
+    /// What it stands on.
+    pub state: State,
+}
+
+/// Why there is no position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Absent {
+    /// No measurement, and the gap is longer than may be filled, or open at one end.
+    Gap,
+    /// The measurement contradicts the others, and the gap without it is longer than may be filled.
+    Rejected,
+}
+
+impl Absent {
+    /// The word in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gap => "gap",
+            Self::Rejected => "rejected",
+        }
+    }
+}
+
+/// One instant of a smoothed track.
+pub type Smoothed = Result<Estimate, Absent>;
+
+/// Standard deviation that a measurement without a covariance is given before its scale is estimated, metres.
+const UNKNOWN_SD_M: f64 = 0.02;
+/// Standard deviations of a measurement are taken for at least this and at most that, metres: smaller ones are rounding,
+/// larger ones say nothing.
+const SD_M: [f64; 2] = [1e-5, 10.0];
+/// Farther from the origin there is no measurement, metres.
+const FARTHEST_M: f64 = 1e6;
+
+/// A measurement that can be worked with: a finite position and a positive definite covariance; `None` if the position is not one.
+pub(crate) fn usable(it: &Measured) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+    let is_near = |x: &f64| x.abs() < FARTHEST_M;
+    if !it.position.iter().all(is_near) {
+        return None;
+    }
+    let unknown = Matrix3::identity() * UNKNOWN_SD_M.powi(2);
+    let Some(covariance) = it.covariance else {
+        return Some((it.position, unknown));
+    };
+    let is_finite = covariance.iter().all(|x| x.is_finite());
+    let covariance = if is_finite {
+        bounded(covariance)
+    } else {
+        unknown
+    };
+    Some((it.position, covariance))
+}
+
+/// The covariance with standard deviations within [`SD_M`] along its own axes.
+fn bounded(covariance: Matrix3<f64>) -> Matrix3<f64> {
+    let symmetric = (covariance + covariance.transpose()) * 0.5;
+    let [least, most] = SD_M.map(|it| it * it);
+    let trace = symmetric.trace();
+    // Most are far from both limits: the determinant over the square of the trace bounds the smallest eigenvalue from below.
+    if trace < most && symmetric.determinant() > least * trace * trace {
+        return symmetric;
+    }
+    let mut axes = symmetric.symmetric_eigen();
+    axes.eigenvalues.apply(|it| *it = it.clamp(least, most));
+    axes.recompose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn measured(position: [f64; 3], covariance: Option<Matrix3<f64>>) -> Measured {
+        Measured {
+            position: position.into(),
+            covariance,
+        }
+    }
+
+    #[test]
+    fn a_position_that_is_not_finite_is_no_measurement() {
+        for x in [f64::NAN, f64::INFINITY, -1e7] {
+            assert_eq!(usable(&measured([x, 0.0, 0.0], None)), None);
+        }
+    }
+
+    #[test]
+    fn every_covariance_becomes_positive_definite() {
+        let nan = Matrix3::from_element(f64::NAN);
+        let minus = Matrix3::identity() * -1.0;
+        let flat = Matrix3::from_diagonal(&Vector3::new(1e-3, 0.0, 1e-3));
+        let huge = Matrix3::identity() * 1e12;
+        for covariance in [nan, minus, flat, huge, Matrix3::zeros()] {
+            let (_, got) = usable(&measured([0.0; 3], Some(covariance))).unwrap();
+            assert!(got.cholesky().is_some(), "{covariance} became {got}");
+            assert!(got.trace() <= 3.0 * 100.0 * 1.001, "{got}");
+        }
+    }
+
+    #[test]
+    fn a_usual_covariance_stays_as_it_is() {
+        let usual = Matrix3::new(4e-4, 1e-4, 0.0, 1e-4, 9e-4, 2e-5, 0.0, 2e-5, 1e-4);
+        let (_, got) = usable(&measured([0.0; 3], Some(usual))).unwrap();
+        assert!((got - usual).norm() < 1e-12);
+    }
+}

@@ -1,0 +1,181 @@
+//! How restless a joint is and how far the covariances of its measurements can be believed: both from the measurements alone.
+
+use statistics::Sorted;
+
+use crate::rts::{FREEDOM, Usable, forwards, weight};
+
+/// The two numbers of a track.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Spectral density of the jerk, m²/s⁵: the restlessness of the joint.
+    pub jerk: f64,
+    /// What covariances are multiplied by: 1 where they are right, above where they are too small.
+    pub scale: f64,
+}
+
+/// What is expected of the jerk density of a joint before anything is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// Mean of the common logarithm of the density in m²/s⁵.
+    pub log10_jerk: f64,
+    /// Standard deviation of that logarithm.
+    pub sd: f64,
+}
+
+/// Jerk densities that are tried, common logarithms: the least, the most and the step.
+const LEAST: f64 = -1.0;
+const MOST: f64 = 5.5;
+const STEP: f64 = 0.5;
+/// Standard deviation of the natural logarithm of the scale before anything is measured: covariances are right within a factor of 3.
+const SCALE_SD: f64 = 1.0;
+/// Share of the likelihood that counts: people do not move as the model says, so that the innovations tell less than they would.
+/// Without it, fast movement at a low rate is taken for noise.
+const SHARE: f64 = 0.1;
+/// Scales that are believed.
+const SCALES: [f64; 2] = [1e-4, 1e4];
+/// Fewer measurements say nothing of both numbers.
+const LEAST_MEASURED: usize = 12;
+/// Windows that are looked at of a long track, and their instants.
+const N_WINDOWS: usize = 6;
+const WINDOW: usize = 250;
+/// Innovations after the beginning of a window that are not counted: they are about what was assumed.
+const SKIPPED: usize = 3;
+
+/// Finds the numbers of a track by maximum likelihood of the innovations, in noise with heavy tails, on a grid of
+/// jerk densities with the scale found for each.
+///
+/// A filter depends on the ratio of both numbers alone, so for every ratio one run gives all innovations, and the scale that
+/// explains them best. Of a long track a number of windows is used.
+///
+/// * `stretches`: of the track, each with its times, ascending.
+pub(crate) fn tune(stretches: &[(&[f64], &[Usable])], prior: Prior) -> Noise {
+    let windows = windows(stretches);
+    let n: usize = windows.iter().map(|it| it.1.iter().flatten().count()).sum();
+    let expected = Noise {
+        jerk: 10.0_f64.powf(prior.log10_jerk),
+        scale: 1.0,
+    };
+    if n < LEAST_MEASURED {
+        return expected;
+    }
+    let mut scale = 1.0;
+    let mut tried = Vec::new();
+    let n_steps = ((MOST - LEAST) / STEP) as usize;
+    for step in 0..=n_steps {
+        let log10_jerk = MOST - STEP * step as f64;
+        let (score, found) = score(&windows, 10.0_f64.powf(log10_jerk), scale);
+        scale = found;
+        let unlikely =
+            ((log10_jerk - prior.log10_jerk) / prior.sd).powi(2) + (found.ln() / SCALE_SD).powi(2);
+        tried.push((log10_jerk, SHARE * score - 0.5 * unlikely, found));
+    }
+    let best = (0..tried.len()).max_by(|&a, &b| tried[a].1.total_cmp(&tried[b].1));
+    let Some(best) = best else {
+        return expected;
+    };
+    let offset = vertex(&tried, best);
+    Noise {
+        jerk: 10.0_f64.powf(tried[best].0 - STEP * offset),
+        scale: tried[best].2,
+    }
+}
+
+/// Where the parabola through the best and its neighbours is highest, in steps after the best.
+fn vertex(tried: &[(f64, f64, f64)], best: usize) -> f64 {
+    if best == 0 || best + 1 >= tried.len() {
+        return 0.0;
+    }
+    let [before, at, after] = [best - 1, best, best + 1].map(|it| tried[it].1);
+    let bend = before - 2.0 * at + after;
+    if bend < 0.0 {
+        (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    }
+}
+
+/// All of a short track, parts of a long one.
+fn windows<'a>(stretches: &[(&'a [f64], &'a [Usable])]) -> Vec<(&'a [f64], &'a [Usable])> {
+    let n: usize = stretches.iter().map(|it| it.0.len()).sum();
+    if n <= N_WINDOWS * WINDOW {
+        return stretches.to_vec();
+    }
+    let chunks = stretches
+        .iter()
+        .flat_map(|(times, measured)| times.chunks(WINDOW).zip(measured.chunks(WINDOW)));
+    let chunks: Vec<_> = chunks
+        .filter(|it| it.1.iter().flatten().count() * 2 > it.1.len().min(WINDOW / 2))
+        .collect();
+    let every = chunks.len().div_ceil(N_WINDOWS).max(1);
+    chunks.into_iter().step_by(every).collect()
+}
+
+/// The logarithm of the likelihood of the innovations, and the scale that makes it highest.
+///
+/// * `jerk`: density in m²/s⁵; the ratio to the scale decides what the filter does, so it is run again with the scale found.
+fn score(windows: &[(&[f64], &[Usable])], jerk: f64, scale: f64) -> (f64, f64) {
+    let mut scale = scale;
+    let mut score = f64::NEG_INFINITY;
+    for _ in 0..3 {
+        let noise = Noise { jerk, scale };
+        let (mut distances, mut log_determinants) = (Vec::new(), 0.0);
+        for (times, measured) in windows {
+            let mut n_seen = 0;
+            forwards(times, measured, noise, |_, innovation| {
+                n_seen += 1;
+                let Some(it) = innovation else { return 1.0 };
+                if n_seen > SKIPPED {
+                    distances.push(it.distance2);
+                    log_determinants += it.log_determinant;
+                }
+                weight(it.distance2 / scale)
+            });
+        }
+        let found = scale_of(&distances).clamp(SCALES[0], SCALES[1]);
+        let student = found * GAUSSIAN_SHARE;
+        let n = distances.len() as f64;
+        let tails: f64 = distances
+            .iter()
+            .map(|it| (1.0 + it / (FREEDOM * student)).ln())
+            .sum();
+        score = -0.5 * (log_determinants + 3.0 * n * student.ln() + (FREEDOM + 3.0) * tails);
+        let is_settled = (found / scale).ln().abs() < 0.02;
+        scale = found;
+        if is_settled {
+            break;
+        }
+    }
+    (score, scale)
+}
+
+/// By how much [`student_scale`] is smaller than the variance of noise that is Gaussian after all, in three dimensions.
+const GAUSSIAN_SHARE: f64 = 0.757;
+
+/// The scale of squared distances that is right for Gaussian noise and hardly moved by outliers.
+fn scale_of(distances: &[f64]) -> f64 {
+    student_scale(distances) / GAUSSIAN_SHARE
+}
+
+/// The most likely scale of squared distances in three-dimensional Student noise.
+fn student_scale(distances: &[f64]) -> f64 {
+    let sorted = Sorted::new(distances.to_vec());
+    // The median of a chi-squared number with 3 degrees of freedom is 2.366.
+    let Some(median) = sorted.interpolated(0.5) else {
+        return 1.0;
+    };
+    let mut scale = (median / 2.366).max(1e-12);
+    let n = distances.len() as f64;
+    for _ in 0..30 {
+        let sum: f64 = distances
+            .iter()
+            .map(|it| it * (FREEDOM + 3.0) / (FREEDOM + it / scale))
+            .sum();
+        let next = (sum / (3.0 * n)).max(1e-12);
+        let is_settled = (next / scale).ln().abs() < 1e-4;
+        scale = next;
+        if is_settled {
+            break;
+        }
+    }
+    scale
+}

@@ -1,0 +1,235 @@
+//! Methods beside each other, against the truth, at the same instants.
+
+use deployment::smooth::Config;
+use evaluation::{Bootstrap, Share};
+use motion::judge::{self, Errors, Sum};
+use motion::live;
+use motion::{Motion, Recorded, Settings, butterworth};
+use nalgebra::Vector3;
+use serde_json::{Value, json};
+
+use super::one_euro;
+
+/// What is compared, in the order of tables.
+pub(super) const METHODS: [&str; 6] = [
+    "raw",
+    "rts",
+    "rts, constant bones",
+    "butterworth",
+    "one-euro",
+    "kalman",
+];
+
+/// A mean and its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mean {
+    /// The mean.
+    pub mean: f64,
+    /// Of the mean.
+    pub interval: [f64; 2],
+}
+
+/// How far a method is from the truth. The numbers are means over joints and instants that every method has, but for those of
+/// filled positions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Its name.
+    pub method: &'static str,
+    /// Distance from the true position, mm.
+    pub position_mm: Option<Mean>,
+    /// Error of the velocity by central differences, m/s.
+    pub velocity_m_s: Option<Mean>,
+    /// Error of the acceleration by second differences, m/s².
+    pub acceleration_m_s2: Option<Mean>,
+    /// Change of the error from instant to instant, mm.
+    pub jitter_mm: Option<Mean>,
+    /// By how much it is late, ms.
+    pub lag_ms: Option<Mean>,
+    /// Distance from the true position where nothing was measured and it has a position, mm.
+    pub filled_mm: Option<Mean>,
+}
+
+/// All methods against the truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// Joints times instants that are compared.
+    pub n_compared: usize,
+    /// A row for every method that has positions.
+    pub rows: Vec<Row>,
+}
+
+/// The errors of a method at an instant, and the distances where it filled.
+pub(super) type Tried = (Errors, Sum);
+
+/// Compares all methods.
+///
+/// Intervals are found by drawing blocks of one second.
+///
+/// * `truth`: of every joint and instant.
+pub fn compare(
+    recorded: &Recorded,
+    settings: &Config,
+    truth: &[Vec<Option<Vector3<f64>>>],
+) -> Comparison {
+    let tried = tried(recorded, settings, truth);
+    let length_s = recorded.times.last().zip(recorded.times.first());
+    let length_s = length_s.map_or(0.0, |(last, first)| last - first);
+    let rate_hz = recorded.times.len() as f64 / length_s.max(1e-9);
+    let bootstrap = Bootstrap {
+        block: rate_hz.round().max(1.0) as usize,
+        ..Bootstrap::default()
+    };
+    let n = tried
+        .first()
+        .map_or(0.0, |it| it.iter().map(|it| it.0.position_m.n).sum());
+    Comparison {
+        n_compared: n as usize,
+        rows: rows(&tried, &bootstrap),
+    }
+}
+
+/// The errors of every method at every instant.
+pub(super) fn tried(
+    recorded: &Recorded,
+    settings: &Config,
+    truth: &[Vec<Option<Vector3<f64>>>],
+) -> Vec<Vec<Tried>> {
+    let fill_s = settings.fill_s;
+    let rts = |constant_bones: bool| {
+        let settings = Settings {
+            fill_s,
+            constant_bones,
+        };
+        Some(motion::smooth(recorded, &settings))
+    };
+    let one_euro = live::Method::OneEuro(one_euro(settings));
+    let tracks: [Option<Motion>; 6] = [
+        Some(motion::as_measured(recorded)),
+        rts(false),
+        rts(true),
+        butterworth::filter(recorded, settings.cutoff_hz, fill_s).ok(),
+        Some(live::over(recorded, one_euro, fill_s)),
+        Some(live::over(recorded, live::Method::Kalman, fill_s)),
+    ];
+    let n = recorded.times.len();
+    let mut all = vec![vec![Tried::default(); n]; tracks.len()];
+    for (joint, truth) in truth.iter().enumerate() {
+        let path = |track: &Option<Motion>| -> Option<Vec<Option<Vector3<f64>>>> {
+            let track = &track.as_ref()?.joints[joint];
+            Some(
+                track
+                    .iter()
+                    .map(|it| it.ok().map(|it| it.position))
+                    .collect(),
+            )
+        };
+        let paths: Vec<_> = tracks.iter().map(path).collect();
+        let has_all = |at: usize| paths.iter().flatten().all(|it| it[at].is_some());
+        let counted: Vec<bool> = (0..n)
+            .map(|at| truth[at].is_some() && has_all(at))
+            .collect();
+        for (path, tried) in paths.iter().zip(&mut all) {
+            let Some(path) = path else { continue };
+            let mut errors = vec![Errors::default(); n];
+            judge::add(&mut errors, &recorded.times, path, truth, &counted);
+            for (at, it) in errors.iter().enumerate() {
+                tried[at].0.add(it);
+                let is_filled = recorded.joints[joint].measured[at].is_none();
+                if let Some((it, truth)) = path[at].zip(truth[at]).filter(|_| is_filled) {
+                    tried[at].1.sum += (it - truth).norm();
+                    tried[at].1.n += 1.0;
+                }
+            }
+        }
+    }
+    all
+}
+
+/// The row of every method that has positions.
+///
+/// * `tried`: of every method the errors of what is drawn: instants, or whole motions.
+pub(super) fn rows(tried: &[Vec<Tried>], bootstrap: &Bootstrap) -> Vec<Row> {
+    let row = |(method, tried): (&&'static str, &Vec<Tried>)| {
+        let mean = |factor: f64, of: &dyn Fn(&Tried) -> Sum| {
+            let shares: Vec<Share> = tried
+                .iter()
+                .map(of)
+                .map(|it| Share {
+                    sum: it.sum,
+                    n: it.n,
+                })
+                .collect();
+            let interval = bootstrap.interval(&shares)?;
+            Some(Mean {
+                mean: Share::mean(&shares)? * factor,
+                interval: interval.map(|it| it * factor),
+            })
+        };
+        Row {
+            method,
+            position_mm: mean(1e3, &|it| it.0.position_m),
+            velocity_m_s: mean(1.0, &|it| it.0.velocity_m_s),
+            acceleration_m_s2: mean(1.0, &|it| it.0.acceleration_m_s2),
+            jitter_mm: mean(1e3, &|it| it.0.jitter_m),
+            lag_ms: mean(1e3, &|it| Sum {
+                sum: it.0.late[0],
+                n: it.0.late[1],
+            }),
+            filled_mm: mean(1e3, &|it| it.1),
+        }
+    };
+    let rows = METHODS.iter().zip(tried).map(row);
+    rows.filter(|it| it.position_mm.is_some()).collect()
+}
+
+impl Row {
+    /// Its numbers with their names and units.
+    pub fn numbers(&self) -> [(&'static str, Option<Mean>); 6] {
+        [
+            ("position_mm", self.position_mm),
+            ("velocity_m_s", self.velocity_m_s),
+            ("acceleration_m_s2", self.acceleration_m_s2),
+            ("jitter_mm", self.jitter_mm),
+            ("lag_ms", self.lag_ms),
+            ("filled_mm", self.filled_mm),
+        ]
+    }
+
+    /// For programs.
+    pub fn to_json(&self) -> Value {
+        let mut value = json!({ "method": self.method });
+        for (name, mean) in self.numbers() {
+            value[name] = mean.map_or(
+                Value::Null,
+                |it| json!({ "mean": it.mean, "interval": it.interval }),
+            );
+        }
+        value
+    }
+}
+
+/// A table of rows for people.
+pub fn table(rows: &[Row]) -> String {
+    let mut text = format!("{:<20}", "");
+    for title in [
+        "position mm",
+        "velocity m/s",
+        "acceleration m/s²",
+        "jitter mm",
+        "lag ms",
+        "filled mm",
+    ] {
+        text += &format!(" {title:>24}");
+    }
+    for row in rows {
+        text += &format!("\n{:<20}", row.method);
+        for (_, mean) in row.numbers() {
+            let cell = mean.map_or("-".to_owned(), |it| {
+                let [low, high] = it.interval;
+                format!("{:.2} ({low:.2} to {high:.2})", it.mean)
+            });
+            text += &format!(" {cell:>24}");
+        }
+    }
+    text
+}

@@ -1,0 +1,108 @@
+//! `pose3d-smooth.jsonl` and `smooth.json`: trajectories that were smoothed, and how.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::read::{Line, parse, to_text};
+use crate::{FrameLine, ReadError};
+
+/// A line of `pose3d-smooth.jsonl`: a line of `pose3d.jsonl` whose joints were smoothed, so whatever reads that file reads this one.
+///
+/// Its status is [`FrameLine::OK`] where any joint has a position, measured or not. Positions have no `reprojection_px`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SmoothLine {
+    /// The frame.
+    #[serde(flatten)]
+    pub frame: FrameLine,
+    /// Of every joint and keypoint with a position what it stands on: `measured`, `exchanged`, `filled` or `rejected`.
+    pub states: BTreeMap<String, String>,
+}
+
+impl Line for SmoothLine {
+    const FILE: &'static str = "pose3d-smooth.jsonl";
+}
+
+/// The file `smooth.json`: how `pose3d-smooth.jsonl` was made.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct SmoothReport {
+    /// Lengths of bones that were kept constant, by the names of both joints, metres.
+    pub bones: BTreeMap<String, f64>,
+    /// Cutoff of the low-pass filter, Hz, where there is one.
+    pub cutoff_hz: Option<f64>,
+    /// By how much the positions are late, milliseconds; 0 for methods that look ahead.
+    pub delay_ms: f64,
+    /// What speaks against trusting the result, in words; none is good.
+    pub doubts: Vec<String>,
+    /// The longest time between measurements that was filled, seconds.
+    pub fill_s: f64,
+    /// Frames in which somebody else begins: nothing was smoothed across.
+    pub frames_of_breaks: Vec<u64>,
+    /// Every joint and keypoint, by name.
+    pub joints: BTreeMap<String, SmoothedJoint>,
+    /// `rts`, `butterworth`, `one-euro`, `kalman` or `none`.
+    pub method: String,
+    /// Lines.
+    pub n_frames: u64,
+    /// Frames per second: the inverse of the median time between two.
+    pub rate_hz: Option<f64>,
+    /// By how much the instants are off the uniform grid that they were interpolated to, at most, milliseconds.
+    pub resampled_ms: Option<f64>,
+    /// [`crate::VERSION`].
+    pub schema_version: u64,
+    /// Frames whose sides were not certain.
+    pub unsure: Unsure,
+}
+
+/// What became of frames whose left and right were not certain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Unsure {
+    /// Exchanged: that fits what is before and after.
+    pub exchanged: usize,
+    /// Kept as measured.
+    pub kept: usize,
+    /// Joints with a side were left out.
+    pub left_out: usize,
+}
+
+/// One joint over the run.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct SmoothedJoint {
+    /// Frames without a position.
+    pub absent: usize,
+    /// What its covariances were multiplied by; none where the method does not ask.
+    pub covariance_scale: Option<f64>,
+    /// Frames in which it was measured as the joint of the other side.
+    pub exchanged: usize,
+    /// Frames that were filled.
+    pub filled: usize,
+    /// Spectral density of its jerk, m²/s⁵; none where the method does not ask.
+    pub jerk_m2_s5: Option<f64>,
+    /// Frames that were measured.
+    pub measured: usize,
+    /// Frames whose measurement was rejected and filled.
+    pub rejected: usize,
+}
+
+impl SmoothReport {
+    /// Name of the file.
+    pub const FILE: &'static str = "smooth.json";
+
+    /// Reads the file.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadError`].
+    pub fn parse(text: &str) -> Result<Self, ReadError> {
+        parse(text)
+    }
+
+    /// The file.
+    ///
+    /// # Errors
+    ///
+    /// None; those of `serde_json`.
+    pub fn to_text(&self) -> Result<String, serde_json::Error> {
+        to_text(self)
+    }
+}
