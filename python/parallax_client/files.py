@@ -33,7 +33,8 @@ class Run:
         self.folder = folder
         self.summary = self._summary()
         lines = self._lines()
-        self.joints = list(self.summary.get("joints") or _names(lines))
+        known = layout.JOINT_SETS.get(self.summary.get("joints"))
+        self.joints = list(known or _names(lines))
         n, m = len(lines), len(self.joints)
         self.frames = np.array([it["frame"] for it in lines], dtype=np.int64)
         time = [it.get("time_s") for it in lines]
@@ -121,7 +122,7 @@ def _json(where, text):
 
 
 def _names(lines):
-    """The names of joints, where the summary has none."""
+    """The names of joints, of a set that this package does not know."""
     names = []
     for line in lines:
         names.extend(it for it in line["joints"] if it not in names)

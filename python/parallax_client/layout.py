@@ -22,6 +22,8 @@ STATUSES = _ALL["statuses"]
 """The reasons by the number of a status; 0 is "ok"."""
 SIDES = _ALL["sides"]
 KEPT = _ALL["kept"]
+JOINT_SETS = _ALL["joint_sets"]
+"""The names of the joints of every set, in order."""
 
 OK, END = STATUSES.index("ok"), STATUSES.index("end of footage")
 

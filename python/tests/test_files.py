@@ -8,14 +8,14 @@ import pytest
 from parallax_client import ClientError, VersionMismatch, read_folder
 
 
-def folder(path, version=1):
+def folder(path, version=1, joints="of-my-own"):
     joint = {"position_m": [1, 2, 3], "covariance_m2": [1, 0, 0, 4, 0, 4], "reprojection_px": 1.5, "views": ["a", "b"]}
     lines = [
         {"frame": 0, "time_s": 0.0, "status": "ok", "joints": {"head": joint, "neck": {"status": "too few views"}}},
         {"frame": 1, "time_s": 0.5, "status": "no result", "reason": "dropped", "joints": {}},
     ]
     (path / "pose3d.jsonl").write_text("".join(json.dumps(it) + "\n" for it in lines))
-    (path / "summary.json").write_text(json.dumps({"schema_version": version, "joints": ["head", "neck"]}))
+    (path / "summary.json").write_text(json.dumps({"schema_version": version, "joints": joints}))
     return path
 
 
@@ -29,6 +29,12 @@ def test_a_folder_is_arrays_with_nan_where_there_is_nothing(tmp_path):
     assert run.status.tolist() == ["ok", "no result"] and run.reason[1] == "dropped"
     with pytest.raises(KeyError, match="head, neck"):
         run.joint("tail")
+
+
+def test_joints_are_in_the_order_of_their_set(tmp_path):
+    run = read_folder(folder(tmp_path, joints="parse14"))
+    assert len(run.joints) == 14 and run.joints[0] == "right ankle"
+    assert run.joint("head")[0].tolist() == [1, 2, 3] and np.isnan(run.joint("left knee")).all()
 
 
 def test_a_table_has_a_row_for_every_frame_and_joint(tmp_path):

@@ -97,3 +97,13 @@ def test_there_is_a_limit_which_is_named(deploy):
     for client in clients:
         client.close()
     parallax_client.connect(deployment.name).close()
+
+
+def test_the_folder_of_a_run_is_arrays(deploy):
+    deployment = deploy(seconds=10)
+    deployment.process.wait(PATIENCE * 2)
+    run = parallax_client.read_folder(deployment.folder / "run")
+    assert run.positions.shape == (len(run.frames), 14, 3) and len(run.frames) > 10
+    seen = run.status == "ok"
+    assert seen.any() and np.isfinite(run.positions[seen]).any()
+    assert np.isnan(run.positions[run.status == "no result"]).all()

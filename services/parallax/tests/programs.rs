@@ -19,7 +19,9 @@ const WATCHDOG: Duration = Duration::from_mins(2);
 
 /// The next moment.
 fn next(client: &mut Client) -> client::Moment {
-    client.next(WATCHDOG).unwrap().expect("nothing came")
+    let moment = client.next(WATCHDOG).unwrap();
+    assert!(moment.is_some(), "nothing came");
+    moment.unwrap()
 }
 
 /// Waits until something holds.

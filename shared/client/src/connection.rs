@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 use std::io;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Instant;
 
 use messages::{FrameHeader, Pose3d, Status, ViewPose, topic};
@@ -255,11 +255,6 @@ fn unreadable(name: &str, source: io::Error) -> GuestError {
     } else {
         GuestError::Directory { name, source }
     }
-}
-
-/// A lock that a thread has panicked with is as good as any here: what it guards is whole after every step.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

@@ -37,6 +37,7 @@ mod check;
 mod connection;
 mod error;
 mod joiner;
+mod lock;
 mod moment;
 mod reader;
 mod wish;

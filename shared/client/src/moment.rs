@@ -6,7 +6,7 @@ use messages::{FrameHeader, Joint3d, Pose3d, Status, ViewPose};
 use runfiles::Running;
 use runtime::Seen;
 
-use crate::connection::lock;
+use crate::lock::lock;
 
 /// Everything about one frame that was asked for and is there.
 #[derive(Debug)]

@@ -8,9 +8,10 @@ use std::time::Instant;
 
 use runfiles::Running;
 
-use crate::connection::{Connection, Turn, lock};
+use crate::connection::{Connection, Turn};
 use crate::error::ClientError;
 use crate::joiner::{Gathered, Joiner};
+use crate::lock::lock;
 use crate::moment::{Moment, Picture, Skeleton, ViewMoment};
 use crate::wish::Wish;
 

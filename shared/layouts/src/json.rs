@@ -2,11 +2,12 @@
 
 use messages::{Kept, Sides};
 use serde_json::{Map, Value, json as value};
+use skeleton::JointSet;
 
 use crate::header::{limits, statuses};
 use crate::table::{Field, Kind, Layout, layouts, topics};
 
-/// Structs with sizes, offsets and types, topics with versions, statuses and limits.
+/// Structs with sizes, offsets and types, topics with versions, statuses, limits, and the names of joints.
 pub fn json() -> String {
     let structs: Map<String, Value> = layouts().iter().map(of_struct).collect();
     let topics: Map<String, Value> = topics()
@@ -26,11 +27,17 @@ pub fn json() -> String {
         .into_iter()
         .map(|(name, it)| (name.to_owned(), it.into()))
         .collect();
+    let joint_sets: Map<String, Value> = JointSet::ALL.into_iter().map(of_joints).collect();
     let whole = value!({
-        "kept": kept, "limits": limits, "sides": sides, "statuses": statuses,
+        "joint_sets": joint_sets, "kept": kept, "limits": limits, "sides": sides, "statuses": statuses,
         "structs": structs, "topics": topics,
     });
     format!("{whole:#}\n")
+}
+
+fn of_joints(set: &JointSet) -> (String, Value) {
+    let names: Vec<&str> = set.joints.iter().map(|it| it.name).collect();
+    (set.name.to_owned(), names.into())
 }
 
 fn of_struct(layout: &Layout) -> (String, Value) {
