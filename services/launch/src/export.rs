@@ -14,7 +14,7 @@ use offline::Console;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::{Value, json};
 
-pub use origin::{Given, Origin};
+pub use origin::{Given, Lines, Origin};
 use pictures::Pictures;
 
 /// What can be asked for.
@@ -132,8 +132,10 @@ pub fn export(
         .iter()
         .map(|it| (*it, paths(*it, job, &pictures)))
         .collect();
-    for path in plan.iter().flat_map(|it| &it.1) {
-        refuse_existing(path, job.force)?;
+    for (format, paths) in &plan {
+        for path in paths {
+            refuse_existing(*format, path, job.force)?;
+        }
     }
     std::fs::create_dir_all(&job.out).map_err(|error| cannot_write(&job.out, &error))?;
     let mut written = Vec::new();
@@ -168,13 +170,15 @@ pub fn export(
 pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
     let trial = &origin.trial;
     let labels = trial.labels();
-    let gaps = labels
-        .iter()
-        .enumerate()
-        .map(|(nth, it)| (it.clone(), json!(trial.gaps(nth))));
+    let by_label = |runs: &dyn Fn(usize) -> Vec<[u64; 2]>| {
+        let all = labels.iter().enumerate();
+        let all = all.map(|(nth, it)| (it.clone(), json!(runs(nth))));
+        Value::Object(all.collect())
+    };
     json!({
         "schema_version": 1,
         "source": origin.source,
+        "trajectories": origin.lines.file(),
         "frames": trial.slots.len(),
         "frames_with_points": trial.n_with_points(),
         "first_frame": trial.first_frame,
@@ -184,7 +188,8 @@ pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
         "repeated_frames": trial.n_repeated,
         "up_in_world": trial.up_in_world.map(|it| [it.x, it.y, it.z]),
         "points": labels,
-        "gaps": gaps.collect::<serde_json::Map<String, Value>>(),
+        "gaps": by_label(&|nth| trial.gaps(nth)),
+        "filled": by_label(&|nth| trial.filled(nth)),
         "flaws": origin.flaws,
         "files": written.iter().map(Written::json).collect::<Vec<_>>(),
     })
@@ -228,7 +233,7 @@ fn paths(format: Format, job: &Job, pictures: &[Pictures]) -> Vec<PathBuf> {
     }
 }
 
-fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
+fn refuse_existing(format: Format, path: &Path, force: bool) -> Result<(), Failure> {
     let Ok(found) = std::fs::symlink_metadata(path) else {
         return Ok(());
     };
@@ -237,7 +242,7 @@ fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
         let failure = Failure::new(ExitKind::Usage, format!("{name} exists"));
         return Err(failure.with_hint("another folder with --out, or --force to replace it"));
     }
-    let is_folder = path.extension().is_none();
+    let is_folder = matches!(format, Format::OpenPose);
     if found.is_dir() != is_folder {
         let kind = if found.is_dir() { "a folder" } else { "a file" };
         let message = format!("{name} is {kind}, and is not replaced");

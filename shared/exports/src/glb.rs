@@ -367,7 +367,7 @@ fn extras(trial: &Trial) -> Value {
             .map(|slot| trial.point(slot, nth).and_then(Point::deviation_m))
             .map(|it| it.map(|it| (it * 1e5).round() / 1e5))
             .collect();
-        let value = json!({ "standard_deviation_m": deviations, "gaps": trial.gaps(nth) });
+        let value = json!({ "standard_deviation_m": deviations, "gaps": trial.gaps(nth), "filled": trial.filled(nth) });
         (label, value)
     };
     let points: serde_json::Map<String, Value> = trial

@@ -10,7 +10,7 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
 
 use crate::format::Sink;
-use crate::tables::{gap, views};
+use crate::tables::{state, views};
 use crate::{Notes, Point, Trial};
 
 /// The columns: those of the long CSV.
@@ -89,11 +89,8 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
                 .iter()
                 .map(|it| point(it).map_or(String::new(), named)),
         )?;
-        let status = |it: &(usize, usize)| match point(it) {
-            Some(_) => "ok".to_owned(),
-            None => gap(trial, it.0, it.1).to_owned(),
-        };
-        texts(&mut group, places.iter().map(status))?;
+        let states = places.iter().map(|it| state(trial, it.0, it.1).to_owned());
+        texts(&mut group, states)?;
         group.close()?;
     }
     file.close()?;

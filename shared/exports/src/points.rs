@@ -41,7 +41,12 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
     let turn = trial.z_up_from_world();
     let marker = |it: &Point| Marker {
         position: (turn * it.in_world * 1e3).into(),
-        residual: 1e3 * it.deviation_m().unwrap_or(0.0),
+        // The format says that a residual of 0 is a point that was not measured.
+        residual: if it.is_filled {
+            0.0
+        } else {
+            1e3 * it.deviation_m().unwrap_or(0.0)
+        },
         cameras: (it.views & C3D_CAMERAS) as u8,
     };
     let frames = (0..trial.slots.len()).map(|slot| {

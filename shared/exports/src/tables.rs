@@ -72,11 +72,7 @@ pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
             row.extend((0..6).map(|it| cell(point.map(|point| point.covariance[it]))));
             row.push(cell(point.and_then(|it| it.reprojection_px)));
             row.push(point.map_or(String::new(), |it| views(trial, it)));
-            row.push(
-                point
-                    .map_or_else(|| gap(trial, slot, nth), |_| "ok")
-                    .to_owned(),
-            );
+            row.push(state(trial, slot, nth).to_owned());
             table.write_record(&row)?;
         }
     }
@@ -90,9 +86,11 @@ fn status(trial: &Trial, slot: usize) -> &str {
     if status.is_empty() { "no line" } else { status }
 }
 
-/// Why a point has no position.
-pub(crate) fn gap(trial: &Trial, slot: usize, point: usize) -> &str {
+/// What became of a point: `ok`, `filled`, or why it has no position.
+pub(crate) fn state(trial: &Trial, slot: usize, point: usize) -> &str {
     match trial.slots[slot].points.get(point) {
+        Some(Ok(point)) if point.is_filled => "filled",
+        Some(Ok(_)) => "ok",
         Some(Err(gap)) if !gap.0.is_empty() => &gap.0,
         _ => status(trial, slot),
     }

@@ -1,5 +1,7 @@
 //! What a run found, every frame in its place on the grid of the frame rate.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Point3, Rotation3, UnitVector3};
 use runfiles::{FrameLine, JointLine};
 use skeleton::JointSet;
@@ -8,6 +10,8 @@ use skeleton::JointSet;
 const MAX_SLOTS: u64 = 5_000_000;
 /// A coordinate beyond this counts as missing, metres.
 const MAX_COORDINATE: f64 = 1e6;
+/// States of smoothed points that were not measured.
+const FILLED: [&str; 2] = ["filled", "rejected"];
 /// How far a time may be from the grid, as a share of its spacing.
 const TOLERANCE: f64 = 0.25;
 
@@ -22,6 +26,8 @@ pub struct Point {
     pub reprojection_px: Option<f64>,
     /// Bit `v` is set if it was triangulated from view `v` of [`Trial::views`].
     pub views: u32,
+    /// Whether it was not measured in this frame: smoothing has filled it in.
+    pub is_filled: bool,
 }
 
 impl Point {
@@ -119,15 +125,24 @@ impl Trial {
 
     /// Numbers of the first and the last frame of every run of frames in which a point has no position.
     pub fn gaps(&self, point: usize) -> Vec<[u64; 2]> {
-        let mut gaps: Vec<[u64; 2]> = Vec::new();
-        for slot in (0..self.slots.len()).filter(|&it| self.point(it, point).is_none()) {
+        self.runs(|slot| self.point(slot, point).is_none())
+    }
+
+    /// The same of frames in which it was filled in by smoothing.
+    pub fn filled(&self, point: usize) -> Vec<[u64; 2]> {
+        self.runs(|slot| self.point(slot, point).is_some_and(|it| it.is_filled))
+    }
+
+    fn runs(&self, is_in: impl Fn(usize) -> bool) -> Vec<[u64; 2]> {
+        let mut runs: Vec<[u64; 2]> = Vec::new();
+        for slot in (0..self.slots.len()).filter(|&it| is_in(it)) {
             let frame = self.frame(slot);
-            match gaps.last_mut() {
-                Some(gap) if gap[1] + self.frame_step == frame => gap[1] = frame,
-                _ => gaps.push([frame; 2]),
+            match runs.last_mut() {
+                Some(run) if run[1] + self.frame_step == frame => run[1] = frame,
+                _ => runs.push([frame; 2]),
             }
         }
-        gaps
+        runs
     }
 
     /// Places with at least one point.
@@ -202,6 +217,21 @@ impl Gathering {
     ///
     /// [`TrialError::Joints`].
     pub fn push(&mut self, line: &FrameLine) -> Result<(), TrialError> {
+        self.push_smoothed(line, &BTreeMap::new())
+    }
+
+    /// Takes a line of smoothed trajectories.
+    ///
+    /// * `states`: what points stand on, by name: those that are `filled` or `rejected` were not measured in this frame.
+    ///
+    /// # Errors
+    ///
+    /// [`TrialError::Joints`].
+    pub fn push_smoothed(
+        &mut self,
+        line: &FrameLine,
+        states: &BTreeMap<String, String>,
+    ) -> Result<(), TrialError> {
         if self.joints.is_none() && !line.joints.is_empty() {
             let is_named = |set: &&'static JointSet| {
                 let has = |name: &str| line.joints.contains_key(name);
@@ -214,7 +244,7 @@ impl Gathering {
         let mut points = Vec::new();
         if let Some(set) = self.joints.filter(|_| !line.joints.is_empty()) {
             for joint in set.joints {
-                points.push(self.point(line.joints.get(joint.name)));
+                points.push(self.point(joint.name, line.joints.get(joint.name), states));
             }
             for name in line.keypoints.keys() {
                 if !self.extras.contains(name) {
@@ -222,7 +252,7 @@ impl Gathering {
                 }
             }
             for name in self.extras.clone() {
-                points.push(self.point(line.keypoints.get(&name)));
+                points.push(self.point(&name, line.keypoints.get(&name), states));
             }
         }
         let status = match &line.reason {
@@ -237,7 +267,12 @@ impl Gathering {
         Ok(())
     }
 
-    fn point(&mut self, joint: Option<&JointLine>) -> Result<Point, Gap> {
+    fn point(
+        &mut self,
+        name: &str,
+        joint: Option<&JointLine>,
+        states: &BTreeMap<String, String>,
+    ) -> Result<Point, Gap> {
         let placed = match joint {
             None => return Err(Gap("".into())),
             Some(JointLine::Missing { status }) => return Err(Gap(status.as_str().into())),
@@ -253,6 +288,9 @@ impl Gathering {
             covariance: placed.covariance_m2,
             reprojection_px: placed.reprojection_px.filter(|it| it.is_finite()),
             views: views.fold(0, |all, it| all | 1_u32.checked_shl(it).unwrap_or(0)),
+            is_filled: states
+                .get(name)
+                .is_some_and(|it| FILLED.contains(&it.as_str())),
         })
     }
 

@@ -17,14 +17,40 @@ use skeleton::JointSet;
 use crate::resolved::Resolved;
 use crate::{inputs, recorded};
 
-/// The joints of a run, as they are found.
-const JOINTS: &str = "pose3d.jsonl";
+/// Which trajectories of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Lines {
+    /// As they were found.
+    #[default]
+    Raw,
+    /// As `parallax smooth` has smoothed them.
+    Smooth,
+}
+
+impl Lines {
+    /// The file.
+    pub fn file(self) -> &'static str {
+        match self {
+            Self::Raw => "pose3d.jsonl",
+            Self::Smooth => "pose3d-smooth.jsonl",
+        }
+    }
+}
+
+/// What only smoothed lines have.
+#[derive(serde::Deserialize)]
+struct States {
+    #[serde(default)]
+    states: BTreeMap<String, String>,
+}
 
 /// What the user says about a run.
 #[derive(Debug, Clone, Default)]
 pub struct Given {
     /// What the files call it.
     pub name: String,
+    /// Which trajectories.
+    pub lines: Lines,
     /// Frames of the footage per second, where the run does not know.
     pub rate_hz: Option<f64>,
     /// Against gravity, in the world of the rig, instead of what the rig says.
@@ -38,6 +64,8 @@ pub struct Origin {
     pub trial: Trial,
     /// The folder or the recording.
     pub source: PathBuf,
+    /// Which trajectories of it.
+    pub lines: Lines,
     /// What of the run is missing or damaged, in words.
     pub flaws: Vec<String>,
     /// Why it is not known which way is up; none where the rig has been asked, even if it does not know.
@@ -60,7 +88,14 @@ impl Origin {
         if source.is_dir() {
             recording = None;
             resolved = of_folder(source);
-            gathering = lines(source, views(resolved.as_ref().ok()), &mut flaws)?;
+            let views = views(resolved.as_ref().ok());
+            gathering = lines(source, given.lines, views, &mut flaws)?;
+        } else if given.lines == Lines::Smooth {
+            let message = format!(
+                "{} is no folder: recordings hold what was measured",
+                source.display()
+            );
+            return Err(Failure::new(ExitKind::Usage, message));
         } else {
             let found = recorded::open(source)?;
             let settings = recorded::settings(source, &found)?.resolved;
@@ -109,6 +144,7 @@ impl Origin {
         Ok(Self {
             trial,
             source: source.to_owned(),
+            lines: given.lines,
             flaws,
             up_unknown,
             setup,
@@ -172,12 +208,21 @@ fn of_folder(folder: &Path) -> Result<Resolved, String> {
 }
 
 /// Reads `pose3d.jsonl`, line by line; of a run that has not ended, what is there.
-fn lines(folder: &Path, views: Vec<String>, flaws: &mut Vec<String>) -> Result<Gathering, Failure> {
-    let [whole, part] = [JOINTS.to_owned(), format!("{JOINTS}.part")].map(|it| folder.join(it));
+fn lines(
+    folder: &Path,
+    which: Lines,
+    views: Vec<String>,
+    flaws: &mut Vec<String>,
+) -> Result<Gathering, Failure> {
+    let name = which.file();
+    let [whole, part] = [name.to_owned(), format!("{name}.part")].map(|it| folder.join(it));
     let is_whole = whole.exists() || !part.exists();
     let path = if is_whole { whole } else { part };
     let file = File::open(&path).map_err(|error| {
-        in_file(&path, &error).with_hint("name the folder that a run has written, or an MCAP file")
+        in_file(&path, &error).with_hint(match which {
+            Lines::Raw => "name the folder that a run has written, or an MCAP file",
+            Lines::Smooth => "`parallax smooth` writes it",
+        })
     })?;
     if !is_whole {
         flaws.push(format!("{} is of a run that has not ended", path.display()));
@@ -208,8 +253,13 @@ fn lines(folder: &Path, views: Vec<String>, flaws: &mut Vec<String>) -> Result<G
                 return Err(in_file(&path, &error));
             }
         };
+        let states = match which {
+            Lines::Raw => BTreeMap::new(),
+            Lines::Smooth => serde_json::from_str(&text)
+                .map_or_else(|_error| BTreeMap::new(), |it: States| it.states),
+        };
         gathering
-            .push(&line)
+            .push_smoothed(&line, &states)
             .map_err(|error| in_file(&path, &error))?;
     }
     Ok(gathering)

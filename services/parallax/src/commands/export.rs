@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::Args;
-use launch::export::{Format, Given, Job, Origin, Written, as_json, export};
+use clap::{Args, ValueEnum};
+use launch::export::{Format, Given, Job, Lines, Origin, Written, as_json, export};
 use launch::output;
 use nalgebra::{UnitVector3, Vector3};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
@@ -30,13 +30,13 @@ Formats, what they are for, and what they hold:
     mp4        people                every camera's pictures with the pose and its uncertainty; needs ffmpeg
     all        all of these
 
-Nothing is filled or smoothed: a joint that was not found or was refused is a gap, and BVH, which knows none, says where it \
+With --from raw nothing is filled or smoothed: a joint that was not found or was refused is a gap, and BVH, which knows none, says where it \
 holds. Frames stand on the grid of the frame rate; frames that were dropped are gaps. NAME.export.json says all of this \
 of what was written, with the gaps of every joint. Files take their names when they are whole.
 
-With --json one object, that of NAME.export.json: {\"schema_version\", \"source\", \"frames\", \"frames_with_points\", \
+With --json one object, that of NAME.export.json: {\"schema_version\", \"source\", \"trajectories\", \"frames\", \"frames_with_points\", \
 \"first_frame\", \"frame_step\", \"rate_hz\", \"irregular_times\", \"repeated_frames\", \"up_in_world\", \"points\", \"gaps\", \
-\"flaws\", \"files\": [{\"format\", \"path\", \"unit\", \"axes\", \"gaps\", \"uncertainty\", \"notes\"}]}.
+\"filled\", \"flaws\", \"files\": [{\"format\", \"path\", \"unit\", \"axes\", \"gaps\", \"uncertainty\", \"notes\"}]}.
 
 Exit codes: 0 done; 2 the command line is wrong, or a file exists; 4 the run cannot be read, does not have what a format needs, \
 or the folder cannot be written; 5 the calibration does not fit; 7 no frame has a joint, or the run is not whole: cut off, \
@@ -53,6 +53,9 @@ pub(crate) struct Arguments {
     /// The formats, separated by commas; or all.
     #[arg(long, value_name = "LIST", value_parser = formats)]
     to: Formats,
+    /// Which trajectories of the run: as they were found, or as `parallax smooth` has smoothed them.
+    #[arg(long, value_enum, default_value_t = Trajectories::Raw)]
+    from: Trajectories,
     /// The folder for the files; if not given, `export` in the folder of the run, or the name of the recording with `-export` appended.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -71,6 +74,15 @@ pub(crate) struct Arguments {
     /// Print what was written as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// Which trajectories.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Trajectories {
+    /// As they were found.
+    Raw,
+    /// Smoothed: pose3d-smooth.jsonl.
+    Smooth,
 }
 
 /// A list, as clap takes it from one argument.
@@ -131,6 +143,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         &arguments.source,
         &Given {
             name: arguments.name.clone(),
+            lines: match arguments.from {
+                Trajectories::Raw => Lines::Raw,
+                Trajectories::Smooth => Lines::Smooth,
+            },
             rate_hz: arguments.rate,
             up: arguments.up,
         },

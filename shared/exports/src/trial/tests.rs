@@ -91,6 +91,24 @@ fn one_frame_has_a_rate_only_if_its_time_tells() {
 }
 
 #[test]
+fn what_smoothing_has_filled_in_is_marked_in_every_format_that_can() {
+    let mut all = Gathering::new(Vec::new());
+    let states = ["measured", "filled", "rejected", "exchanged"];
+    for (frame, state) in (0..).zip(states) {
+        let states = [("head".to_owned(), state.to_owned())].into();
+        all.push_smoothed(&line(frame, Some(30.0)), &states)
+            .unwrap();
+    }
+    let trial = all.finish("x", None).unwrap();
+    assert_eq!(trial.filled(13), [[1, 2]]);
+    assert_eq!(trial.gaps(13), [[0_u64; 2]; 0]);
+    let mut table = Vec::new();
+    crate::tables::long(&trial, &mut table).unwrap();
+    let table = String::from_utf8(table).unwrap();
+    assert_eq!(table.matches(",filled\n").count(), 2);
+}
+
+#[test]
 fn keypoints_that_come_later_are_gaps_before() {
     let mut second = line(11, Some(30.0));
     let nose = second.joints["head"].clone();
