@@ -13,7 +13,7 @@ use serde_json::Value;
 use crate::common::{Case, Ended};
 
 const RATE_HZ: f64 = 30.0;
-const N_FRAMES: usize = 75;
+const N_FRAMES: usize = 50;
 
 /// A deployment of keypoints that are off by some pixels, with the truth beside it.
 fn case() -> Case {
@@ -137,7 +137,14 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
         "the same rows for every frame"
     );
     // Without `live` the next run has nothing smoothed, not what an earlier one has left.
-    let off = ["run", "deployment.toml", "--set", "smooth.live=off"];
+    let off = [
+        "run",
+        "deployment.toml",
+        "--set",
+        "smooth.live=off",
+        "--set",
+        "capture.n_frames=3",
+    ];
     assert_eq!(case.start(&off).wait().status.code(), Some(0));
     assert!(
         !case.path("out/pose3d-smooth.jsonl").exists() && !case.path("out/smooth.json").exists()
@@ -231,6 +238,7 @@ fn what_a_folder_lacks_is_said_and_by_exit_code() {
             assert_eq!(n, text.lines().count() - cut, "{words}");
         }
     }
+    case.write("run/pose3d.jsonl", &whole_text);
     for (arguments, code, words) in [
         (&["nowhere"][..], 4, "nowhere"),
         (&[], 2, "FOLDER"),

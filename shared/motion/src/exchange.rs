@@ -1,8 +1,8 @@
 //! Joints of the other side of the body, taken for those of this one.
 
+use crate::joint_track::Track;
 use crate::recorded::{Recorded, Sides};
 use crate::rts::{GATE, Usable, distance2};
-use crate::smoother::Track;
 use crate::track::usable;
 
 /// What speaks for one of two sides must be this much likelier, natural logarithm of the odds.

@@ -20,7 +20,9 @@ pub mod live;
 
 mod bones;
 mod exchange;
+mod joint_track;
 mod model;
+mod noise;
 mod prior;
 mod recorded;
 mod role;
@@ -29,9 +31,9 @@ mod smoother;
 mod track;
 mod tune;
 
+pub use noise::{Noise, Prior};
 pub use prior::prior;
 pub use recorded::{Counts, Joint, Motion, Recorded, Report, Sides, TimesError};
 pub use role::{RIGID, Role, Side, mirrored_name};
 pub use smoother::{Settings, as_measured, smooth};
 pub use track::{Absent, Estimate, Measured, Smoothed, State};
-pub use tune::{Noise, Prior};

@@ -1,7 +1,7 @@
 //! How restless joints of people are.
 
+use crate::noise::Prior;
 use crate::role::Role;
-use crate::tune::Prior;
 
 /// What is expected of a joint by its role.
 ///

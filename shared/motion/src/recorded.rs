@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
+use crate::noise::Noise;
 use crate::role::{Role, mirrored_name};
 use crate::track::{Absent, Measured, Smoothed, State, usable};
-use crate::tune::Noise;
 
 /// Whether left and right of a measured skeleton are certain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::model::{Belief, Innovation};
-use crate::tune::Noise;
+use crate::noise::Noise;
 
 /// A measurement that can be worked with.
 pub(crate) type Usable = Option<(Vector3<f64>, Matrix3<f64>)>;

@@ -2,11 +2,11 @@
 
 use crate::bones;
 use crate::exchange;
+use crate::joint_track::Track;
 use crate::prior::prior;
 use crate::recorded::{Counts, Joint, Motion, Recorded, Report};
-use crate::rts::{self, Known, Usable};
+use crate::rts::Usable;
 use crate::track::{Absent, Estimate, Measured, Smoothed, State, usable};
-use crate::tune::{self, Noise};
 
 /// A joint that was not measured for longer is smoothed anew, seconds: what was before says nothing of what is after.
 const SPLIT_S: f64 = 1.0;
@@ -27,22 +27,6 @@ impl Default for Settings {
             constant_bones: false,
         }
     }
-}
-
-/// A joint on its way.
-#[derive(Debug)]
-pub(crate) struct Track {
-    /// What is used of every instant.
-    pub(crate) used: Vec<Usable>,
-    /// The measurement is that of the other side.
-    pub(crate) is_exchanged: Vec<bool>,
-    /// There is a measurement.
-    pub(crate) is_measured: Vec<bool>,
-    pub(crate) noise: Noise,
-    /// What everything says; none outside stretches.
-    pub(crate) known: Vec<Option<Known>>,
-    /// The weight of the measurement.
-    pub(crate) weights: Vec<f64>,
 }
 
 /// Smooths a person's joints with everything before and after.
@@ -102,95 +86,6 @@ pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
     }
     motion.report.counts = motion.joints.iter().map(|it| Counts::of(it)).collect();
     motion
-}
-
-impl Track {
-    fn new(used: Vec<Usable>) -> Self {
-        let n = used.len();
-        Self {
-            is_measured: used.iter().map(Option::is_some).collect(),
-            used,
-            is_exchanged: vec![false; n],
-            noise: Noise {
-                jerk: 1.0,
-                scale: 1.0,
-            },
-            known: vec![None; n],
-            weights: vec![0.0; n],
-        }
-    }
-
-    fn tuned(&self, times: &[f64], stretches: &[[usize; 2]], prior: tune::Prior) -> Noise {
-        let parts: Vec<(&[f64], &[Usable])> = stretches
-            .iter()
-            .map(|&[from, to]| (&times[from..to], &self.used[from..to]))
-            .collect();
-        tune::tune(&parts, prior)
-    }
-
-    /// Smooths every stretch.
-    fn smooth(&mut self, times: &[f64], stretches: &[[usize; 2]]) {
-        self.known.fill(None);
-        self.weights.fill(0.0);
-        for &[from, to] in stretches {
-            let stretch = rts::smooth(&times[from..to], &self.used[from..to], self.noise);
-            for (at, known) in (from..to).zip(stretch.known) {
-                self.known[at] = Some(known);
-            }
-            self.weights[from..to].copy_from_slice(&stretch.weights);
-        }
-    }
-
-    fn known_noise(&self) -> Option<Noise> {
-        let is_any = self.known.iter().any(Option::is_some);
-        is_any.then_some(self.noise)
-    }
-
-    /// The positions, with gaps filled as far as they are short.
-    fn filled(&self, times: &[f64], fill_s: f64) -> Vec<Smoothed> {
-        let absent = |at: usize| {
-            let is_measured = self.is_measured[at];
-            Err(if is_measured {
-                Absent::Rejected
-            } else {
-                Absent::Gap
-            })
-        };
-        let mut all: Vec<Smoothed> = (0..times.len()).map(absent).collect();
-        let mut last: Option<usize> = None;
-        for at in (0..times.len()).filter(|&at| self.weights[at] > 0.0) {
-            let is_near = |from: usize| times[at] - times[from] <= fill_s;
-            if let Some(from) = last.filter(|&from| is_near(from)) {
-                for between in from + 1..at {
-                    let is_measured = self.is_measured[between];
-                    let state = if is_measured {
-                        State::Rejected
-                    } else {
-                        State::Filled
-                    };
-                    self.put(&mut all[between], between, state);
-                }
-            }
-            let state = if self.is_exchanged[at] {
-                State::Exchanged
-            } else {
-                State::Measured
-            };
-            self.put(&mut all[at], at, state);
-            last = Some(at);
-        }
-        all
-    }
-
-    fn put(&self, place: &mut Smoothed, at: usize, state: State) {
-        if let Some(known) = self.known[at] {
-            *place = Ok(Estimate {
-                position: known.position,
-                covariance: Some(known.covariance * self.noise.scale),
-                state,
-            });
-        }
-    }
 }
 
 /// Where a track can be smoothed as a whole: from the first to after the last measurement, without long gaps and breaks.

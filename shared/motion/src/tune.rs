@@ -2,25 +2,8 @@
 
 use statistics::Sorted;
 
+use crate::noise::{Noise, Prior};
 use crate::rts::{FREEDOM, Usable, forwards, weight};
-
-/// The two numbers of a track.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
-    /// Spectral density of the jerk, m²/s⁵: the restlessness of the joint.
-    pub jerk: f64,
-    /// What covariances are multiplied by: 1 where they are right, above where they are too small.
-    pub scale: f64,
-}
-
-/// What is expected of the jerk density of a joint before anything is measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prior {
-    /// Mean of the common logarithm of the density in m²/s⁵.
-    pub log10_jerk: f64,
-    /// Standard deviation of that logarithm.
-    pub sd: f64,
-}
 
 /// Jerk densities that are tried, common logarithms: the least, the most and the step.
 const LEAST: f64 = -1.0;

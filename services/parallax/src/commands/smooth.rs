@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{ArgGroup, Args};
+use clap::Args;
 use deployment::smooth::{Config, Method};
 use launch::output;
 use nalgebra::{UnitVector3, Vector3};
@@ -20,7 +20,6 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} motions, {eta} left {p
 
 /// Options of `parallax smooth`.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("what").required(true).args(["folder", "trial"]))]
 #[command(after_help = "\
 FOLDER holds the results of a run; nothing in it is changed. Beside them are written
     pose3d-smooth.jsonl   as pose3d.jsonl; `states` says of every joint whether it is measured, exchanged, filled or rejected
@@ -50,7 +49,8 @@ Examples:
     parallax smooth out/walk/out --truth out/walk --json
     parallax smooth --trial --seeds 101,102 --rates-hz 30,120")]
 pub(crate) struct Arguments {
-    /// The results of a run.
+    /// The results of a run; none with --trial.
+    #[arg(conflicts_with = "trial")]
     folder: Option<PathBuf>,
     /// How: `rts` looks ahead, on the measured covariances; `butterworth` is a zero-phase low-pass filter; `one-euro` and `kalman` are
     /// what would have been seen live; `none` only computes angles.
@@ -134,6 +134,11 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let terminal = Terminal::with_bar(globals.quiet, false, BAR);
     let Some(folder) = &arguments.folder else {
+        if !arguments.trial {
+            let what = "a FOLDER with the results of a run is missing";
+            let hint = "parallax smooth FOLDER, with the folder that `output` of the deployment names; or --trial";
+            return Err(Failure::new(ExitKind::Usage, what).with_hint(hint));
+        }
         return run_trial(arguments, &stop, &terminal);
     };
     let request = Request {
@@ -207,7 +212,7 @@ fn tell(request: &Request, outcome: &Outcome, truth: Option<&Comparison>) -> Res
     if let Some(scale) = scale {
         let sd = scale.sqrt();
         output::line(format_args!(
-            "errors are {sd:.2} times what the covariances say (median of the joints)"
+            "errors from frame to frame are {sd:.2} times what the covariances say (median of the joints)"
         ))?;
     }
     if !report.frames_of_breaks.is_empty() {

@@ -8,9 +8,9 @@ use core::f64::consts::PI;
 use nalgebra::{Complex, Matrix3, RowVector3, Vector3};
 
 use crate::model::Belief;
+use crate::noise::Prior;
 use crate::rts::{FREEDOM, GATE, weight};
 use crate::track::{Absent, Estimate, Measured, Smoothed, State, usable};
-use crate::tune::Prior;
 
 /// Filters, and of which jerk density the calmest and the next are, common logarithms beyond what is expected of the joint:
 /// most people run a hundred times more restlessly than they stand.

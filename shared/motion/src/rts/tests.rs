@@ -93,6 +93,14 @@ fn what_the_covariances_say_is_how_far_off_the_smoothed_positions_are() {
 }
 
 #[test]
+fn what_varies_too_slowly_to_be_seen_stays_in_the_covariances() {
+    let recorded = recorded(60.0, 0.002, 0.02, 5.0);
+    let got = crate::smooth(&recorded, &Settings::default());
+    let told = got.joints[0][150].unwrap().covariance.unwrap();
+    assert!((0.015..0.0205).contains(&told.m11.sqrt()), "{told}");
+}
+
+#[test]
 fn outliers_are_rejected_and_short_gaps_filled_and_both_are_marked() {
     let mut recorded = recorded(60.0, 0.005, 0.005, 5.0);
     let track = &mut recorded.joints[0].measured;

@@ -1,0 +1,115 @@
+//! One joint on its way from measurements to a smoothed track.
+
+use crate::noise::{Noise, Prior};
+use crate::rts::{self, Known, Usable};
+use crate::track::{Absent, Estimate, Smoothed, State};
+use crate::tune;
+
+/// A joint on its way.
+#[derive(Debug)]
+pub(crate) struct Track {
+    /// What is used of every instant.
+    pub(crate) used: Vec<Usable>,
+    /// The measurement is that of the other side.
+    pub(crate) is_exchanged: Vec<bool>,
+    /// There is a measurement.
+    pub(crate) is_measured: Vec<bool>,
+    pub(crate) noise: Noise,
+    /// What everything says; none outside stretches.
+    pub(crate) known: Vec<Option<Known>>,
+    /// The weight of the measurement.
+    pub(crate) weights: Vec<f64>,
+}
+
+impl Track {
+    pub(crate) fn new(used: Vec<Usable>) -> Self {
+        let n = used.len();
+        Self {
+            is_measured: used.iter().map(Option::is_some).collect(),
+            used,
+            is_exchanged: vec![false; n],
+            noise: Noise {
+                jerk: 1.0,
+                scale: 1.0,
+            },
+            known: vec![None; n],
+            weights: vec![0.0; n],
+        }
+    }
+
+    pub(crate) fn tuned(&self, times: &[f64], stretches: &[[usize; 2]], prior: Prior) -> Noise {
+        let parts: Vec<(&[f64], &[Usable])> = stretches
+            .iter()
+            .map(|&[from, to]| (&times[from..to], &self.used[from..to]))
+            .collect();
+        tune::tune(&parts, prior)
+    }
+
+    /// Smooths every stretch.
+    pub(crate) fn smooth(&mut self, times: &[f64], stretches: &[[usize; 2]]) {
+        self.known.fill(None);
+        self.weights.fill(0.0);
+        for &[from, to] in stretches {
+            let stretch = rts::smooth(&times[from..to], &self.used[from..to], self.noise);
+            for (at, known) in (from..to).zip(stretch.known) {
+                self.known[at] = Some(known);
+            }
+            self.weights[from..to].copy_from_slice(&stretch.weights);
+        }
+    }
+
+    pub(crate) fn known_noise(&self) -> Option<Noise> {
+        let is_any = self.known.iter().any(Option::is_some);
+        is_any.then_some(self.noise)
+    }
+
+    /// The positions, with gaps filled as far as they are short.
+    pub(crate) fn filled(&self, times: &[f64], fill_s: f64) -> Vec<Smoothed> {
+        let absent = |at: usize| {
+            let is_measured = self.is_measured[at];
+            Err(if is_measured {
+                Absent::Rejected
+            } else {
+                Absent::Gap
+            })
+        };
+        let mut all: Vec<Smoothed> = (0..times.len()).map(absent).collect();
+        let mut last: Option<usize> = None;
+        for at in (0..times.len()).filter(|&at| self.weights[at] > 0.0) {
+            let is_near = |from: usize| times[at] - times[from] <= fill_s;
+            if let Some(from) = last.filter(|&from| is_near(from)) {
+                for between in from + 1..at {
+                    let is_measured = self.is_measured[between];
+                    let state = if is_measured {
+                        State::Rejected
+                    } else {
+                        State::Filled
+                    };
+                    self.put(&mut all[between], [between, from], state);
+                }
+            }
+            let state = if self.is_exchanged[at] {
+                State::Exchanged
+            } else {
+                State::Measured
+            };
+            self.put(&mut all[at], [at, at], state);
+            last = Some(at);
+        }
+        all
+    }
+
+    /// Where covariances are larger than what is seen to vary, the rest may vary too slowly to be seen: smoothing does not reduce it.
+    ///
+    /// * `measured`: the instant of the measurement whose covariance that is.
+    fn put(&self, place: &mut Smoothed, [at, measured]: [usize; 2], state: State) {
+        if let Some((known, (_, own))) = self.known[at].zip(self.used[measured]) {
+            let slow = (1.0 - self.noise.scale).max(0.0);
+            *place = Ok(Estimate {
+                position: known.position,
+                covariance: Some(known.covariance * self.noise.scale + own * slow),
+                state,
+            });
+        }
+    }
+}
