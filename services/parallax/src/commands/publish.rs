@@ -3,11 +3,10 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::output;
+use launch::{live, output};
 use publish::{Companion, Target};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
-use super::top;
 use crate::globals::Globals;
 
 /// Options of `parallax publish`.
@@ -42,7 +41,7 @@ pub(crate) struct Arguments {
 /// Publishes until Ctrl-C, or the end of the deployment.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let targets = targets(&arguments.targets, arguments.beyond_this_machine)?;
-    let namespace = top::namespace(Some(&arguments.deployment))?;
+    let namespace = live::namespace(Some(&arguments.deployment))?;
     let name = namespace.name();
     if !globals.quiet {
         for target in &targets {
