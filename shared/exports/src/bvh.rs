@@ -4,10 +4,10 @@ use std::io;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::format::Sink;
+use crate::Trial;
 use crate::points::rate;
+use crate::sink::{Notes, Sink};
 use crate::tree::{N_NODES, NODES, Posed, Poser, lengths};
-use crate::{Notes, Trial};
 
 /// Centimetres in a metre.
 const CM: f64 = 100.0;

@@ -1,14 +1,9 @@
 //! The table of formats that are one file each.
 
-use std::io::{self, Write};
+use std::io;
 
+use crate::sink::{Notes, Sink};
 use crate::{Trial, bvh, glb, points, tables};
-
-/// What a format cannot say in itself, for the user.
-pub type Notes = Vec<String>;
-
-/// Where a format is written.
-pub type Sink<'a> = dyn Write + Send + 'a;
 
 /// What a format needs to know of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -13,10 +13,10 @@ use std::io;
 use nalgebra::{Isometry3, Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 
-use crate::format::Sink;
 use crate::points::rate;
+use crate::sink::{Notes, Sink};
 use crate::tree::{N_NODES, NODES, Poser, anchor, lengths};
-use crate::{Notes, Point, Trial};
+use crate::{Point, Trial};
 use mesh::Mesh;
 use store::Store;
 

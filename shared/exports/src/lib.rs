@@ -23,6 +23,7 @@ mod landmarks;
 mod tree;
 
 mod format;
+mod sink;
 
 mod bvh;
 mod glb;
@@ -36,7 +37,8 @@ mod view;
 pub mod annotate;
 pub mod openpose;
 
-pub use format::{FILES, FileFormat, Needs, Notes, Sink};
+pub use format::{FILES, FileFormat, Needs};
+pub use sink::{Notes, Sink};
 pub use trial::{Gap, Gathering, Point, Slot, Trial, TrialError};
 pub use view::{Seen, ViewCamera};
 

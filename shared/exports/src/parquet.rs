@@ -9,9 +9,9 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
 
-use crate::format::Sink;
+use crate::sink::{Notes, Sink};
 use crate::tables::{state, views};
-use crate::{Notes, Point, Trial};
+use crate::{Point, Trial};
 
 /// The columns: those of the long CSV.
 const SCHEMA: &str = "message pose3d {

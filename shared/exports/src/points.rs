@@ -4,8 +4,8 @@ use std::io;
 
 use c3d::{Heading, Marker};
 
-use crate::format::Sink;
-use crate::{Notes, Point, Trial};
+use crate::sink::{Notes, Sink};
+use crate::{Point, Trial};
 
 /// Cameras that C3D has room for, for each point.
 const C3D_CAMERAS: u32 = 0x7f;

@@ -2,8 +2,8 @@
 
 use std::io;
 
-use crate::format::Sink;
-use crate::{Notes, Point, Trial};
+use crate::sink::{Notes, Sink};
+use crate::{Point, Trial};
 
 /// The columns of the long table: those of `pose3d.csv`, and the standard deviation.
 const LONG: [&str; 16] = [

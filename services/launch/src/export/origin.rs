@@ -116,25 +116,8 @@ impl Origin {
                     format!("{}: {error}; nothing is written", source.display()),
                 )
             })?;
-        if let Some(rate_hz) = given.rate_hz
-            && trial
-                .rate_hz
-                .is_some_and(|it| (it * trial.frame_step as f64 / rate_hz - 1.0).abs() > 1e-6)
-        {
-            let own = trial.rate_hz.unwrap_or_default();
-            let message = format!(
-                "--rate {rate_hz} contradicts the times of the run, which has {own} frames a second"
-            );
-            return Err(Failure::new(ExitKind::Usage, message));
-        }
-        if trial.n_repeated > 0 {
-            let n = trial.n_repeated;
-            flaws.push(format!("{n} of {n_lines} lines are about a frame that an earlier line is about, and are left out"));
-        }
-        if trial.n_irregular > 0 {
-            let n = trial.n_irregular;
-            flaws.push(format!("the times of {n} frames are a quarter of the frame interval or more off the frame rate"));
-        }
+        check_rate(&trial, given)?;
+        flaws.extend(of_times(&trial, n_lines));
         let setup = resolved.and_then(|it| {
             let rig = inputs::rig_of(&it.deployment).map_err(|error| error.to_string())?;
             Ok((it, rig))
@@ -173,6 +156,38 @@ impl Origin {
             }
         }
     }
+}
+
+/// Refuses a frame rate that is not that of the run.
+fn check_rate(trial: &Trial, given: &Given) -> Result<(), Failure> {
+    if let Some(rate_hz) = given.rate_hz
+        && trial
+            .rate_hz
+            .is_some_and(|it| (it * trial.frame_step as f64 / rate_hz - 1.0).abs() > 1e-6)
+    {
+        let own = trial.rate_hz.unwrap_or_default();
+        let message = format!(
+            "--rate {rate_hz} contradicts the times of the run, which has {own} frames a second"
+        );
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    Ok(())
+}
+
+/// What is wrong with the frames and their times.
+fn of_times(trial: &Trial, n_lines: usize) -> Vec<String> {
+    let mut flaws = Vec::new();
+    if trial.n_repeated > 0 {
+        let n = trial.n_repeated;
+        flaws.push(format!("{n} of {n_lines} lines are about a frame that an earlier line is about, and are left out"));
+    }
+    if trial.n_irregular > 0 {
+        let n = trial.n_irregular;
+        flaws.push(format!(
+            "the times of {n} frames are a quarter of the frame interval or more off the frame rate"
+        ));
+    }
+    flaws
 }
 
 /// A camera as its footage shows it.

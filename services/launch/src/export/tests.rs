@@ -1,3 +1,5 @@
+//! Folders that are written once, runs that are not whole, and what a run does not tell.
+
 use std::fs;
 
 use super::*;

@@ -1,3 +1,5 @@
+//! What was written is read by the reader of this crate.
+
 use proptest::prelude::*;
 
 use super::*;

@@ -1,3 +1,5 @@
+//! The files read by a reader of these tests, and their forward kinematics.
+
 use nalgebra::{Point3, Rotation3};
 
 use super::*;

@@ -1,3 +1,5 @@
+//! The files taken apart, and where their nodes and skin are.
+
 use nalgebra::Vector4;
 
 use super::*;

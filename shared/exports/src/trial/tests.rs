@@ -1,3 +1,5 @@
+//! Places on the grid, gaps, and what is refused.
+
 use super::*;
 use crate::testing::{line, walker};
 
