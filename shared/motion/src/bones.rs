@@ -94,11 +94,11 @@ fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)])
     }
 }
 
+/// Positions, and their covariances.
+type Projected = (Vec<Vector3<f64>>, Vec<Matrix3<f64>>);
+
 /// The most likely positions with bones of the given lengths, and their covariances; `None` if the numbers do not allow it.
-fn projected(
-    found: &[Estimate],
-    bones: &[([usize; 2], f64)],
-) -> Option<(Vec<Vector3<f64>>, Vec<Matrix3<f64>>)> {
+fn projected(found: &[Estimate], bones: &[([usize; 2], f64)]) -> Option<Projected> {
     let n = found.len();
     let unknown = Matrix3::identity() * UNKNOWN_SD_M.powi(2);
     let covariances: Vec<Matrix3<f64>> = found

@@ -52,7 +52,8 @@ pub fn filter(recorded: &Recorded, cutoff_hz: f64, fill_s: f64) -> Result<Motion
     } else {
         f64::INFINITY
     };
-    if !(cutoff_hz > 0.0) || rate_hz < needed_hz(cutoff_hz) {
+    let is_possible = cutoff_hz > 0.0 && rate_hz >= needed_hz(cutoff_hz);
+    if !is_possible {
         return Err(CutoffError { cutoff_hz, rate_hz });
     }
     let breaks = recorded.breaks();

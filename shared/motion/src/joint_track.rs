@@ -78,14 +78,15 @@ impl Track {
         for at in (0..times.len()).filter(|&at| self.weights[at] > 0.0) {
             let is_near = |from: usize| times[at] - times[from] <= fill_s;
             if let Some(from) = last.filter(|&from| is_near(from)) {
-                for between in from + 1..at {
+                let gap = all.iter_mut().enumerate().take(at).skip(from + 1);
+                for (between, place) in gap {
                     let is_measured = self.is_measured[between];
                     let state = if is_measured {
                         State::Rejected
                     } else {
                         State::Filled
                     };
-                    self.put(&mut all[between], [between, from], state);
+                    self.put(place, [between, from], state);
                 }
             }
             let state = if self.is_exchanged[at] {

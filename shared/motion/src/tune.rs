@@ -119,7 +119,7 @@ fn score(windows: &[(&[f64], &[Usable])], jerk: f64, scale: f64) -> (f64, f64) {
         let n = distances.len() as f64;
         let tails: f64 = distances
             .iter()
-            .map(|it| (1.0 + it / (FREEDOM * student)).ln())
+            .map(|it| (it / (FREEDOM * student)).ln_1p())
             .sum();
         score = -0.5 * (log_determinants + 3.0 * n * student.ln() + (FREEDOM + 3.0) * tails);
         let is_settled = (found / scale).ln().abs() < 0.02;

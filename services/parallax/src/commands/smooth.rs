@@ -143,7 +143,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     };
     let request = Request {
         folder: folder.clone(),
-        settings: settings(arguments, smooth::settings(folder)),
+        settings: settings(arguments, &smooth::settings(folder)),
         rate_hz: arguments.rate_hz,
         up: arguments.up,
     };
@@ -168,13 +168,13 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 }
 
 /// What the deployment says, replaced by what the command line says.
-fn settings(arguments: &Arguments, of_run: Config) -> Config {
+fn settings(arguments: &Arguments, of_run: &Config) -> Config {
     Config {
         method: arguments.method.unwrap_or(of_run.method),
         cutoff_hz: arguments.cutoff_hz.unwrap_or(of_run.cutoff_hz),
         fill_s: arguments.fill_s.unwrap_or(of_run.fill_s),
         constant_bones: arguments.constant_bones || of_run.constant_bones,
-        ..of_run
+        ..of_run.clone()
     }
 }
 

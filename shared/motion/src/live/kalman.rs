@@ -34,7 +34,7 @@ const DELAY_HZ: f64 = 1.0;
 #[derive(Debug)]
 pub(super) struct Models {
     prior: Prior,
-    models: Option<[Model; N_MODELS]>,
+    filters: Option<[Model; N_MODELS]>,
     time_s: f64,
     measured_s: f64,
     n_rejected: u32,
@@ -54,7 +54,7 @@ impl Models {
     pub(super) fn new(prior: Prior) -> Self {
         Self {
             prior,
-            models: None,
+            filters: None,
             time_s: f64::NEG_INFINITY,
             measured_s: f64::NEG_INFINITY,
             n_rejected: 0,
@@ -71,11 +71,11 @@ impl Models {
         let dt = time_s - self.time_s;
         let is_old = time_s - self.measured_s > FORGET_S.max(fill_s);
         if dt <= 0.0 || !dt.is_finite() || is_old {
-            self.models = None;
+            self.filters = None;
         }
         let measured = measured.and_then(usable);
         self.time_s = time_s;
-        let Some(models) = &mut self.models else {
+        let Some(models) = &mut self.filters else {
             return (self.begin(measured), None);
         };
         for it in models.iter_mut() {
@@ -141,7 +141,7 @@ impl Models {
                 score: -0.5 * (away / self.prior.sd).powi(2),
             }
         };
-        self.models = Some(core::array::from_fn(model));
+        self.filters = Some(core::array::from_fn(model));
         self.measured_s = self.time_s;
         self.n_rejected = 0;
         Ok(Estimate {

@@ -1,5 +1,7 @@
 //! Methods beside each other, against the truth, at the same instants.
 
+use core::fmt::Write as _;
+
 use deployment::smooth::Config;
 use evaluation::{Bootstrap, Share};
 use motion::judge::{self, Errors, Sum};
@@ -210,6 +212,7 @@ impl Row {
 
 /// A table of rows for people.
 pub fn table(rows: &[Row]) -> String {
+    // Writing to a string cannot fail.
     let mut text = format!("{:<20}", "");
     for title in [
         "position mm",
@@ -219,16 +222,16 @@ pub fn table(rows: &[Row]) -> String {
         "lag ms",
         "filled mm",
     ] {
-        text += &format!(" {title:>24}");
+        let _infallible = write!(text, " {title:>24}");
     }
     for row in rows {
-        text += &format!("\n{:<20}", row.method);
+        let _infallible = write!(text, "\n{:<20}", row.method);
         for (_, mean) in row.numbers() {
             let cell = mean.map_or("-".to_owned(), |it| {
                 let [low, high] = it.interval;
                 format!("{:.2} ({low:.2} to {high:.2})", it.mean)
             });
-            text += &format!(" {cell:>24}");
+            let _infallible = write!(text, " {cell:>24}");
         }
     }
     text

@@ -85,7 +85,7 @@ fn measured(
 ) -> Vec<Option<Measured>> {
     // Twice as uncertain in one direction, as of cameras that stand to one side.
     let size = flaws.sd_m * (0.7 + 0.6 * random.f64()) / 2.0_f64.sqrt();
-    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 3.14 * random.f64());
+    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), core::f64::consts::PI * random.f64());
     let axes = turn.matrix() * Matrix3::from_diagonal(&Vector3::new(2.0, 1.0, 1.0)) * size;
     let kept = (-dt / flaws.slow_s).exp();
     let [slow, fast] = [flaws.slow_share.sqrt(), (1.0 - flaws.slow_share).sqrt()];
