@@ -47,7 +47,7 @@ const LAYERS: &[&[&str]] = &[
         "synchronisation",
     ],
     &["runtime"],
-    &["multiview", "viewquality", "posenetwork"],
+    &["multiview", "viewquality", "posenetwork", "calibration"],
     &["orientation"],
     &["pipeline", "evaluation", "datasets", "consistency"],
     &[

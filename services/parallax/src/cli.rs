@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    bench, calib, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame, model,
-    record, replay, run, service, sync, synth, top, train,
+    bench, calib, calibrate, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame,
+    model, record, replay, run, service, sync, synth, top, train,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -94,6 +94,9 @@ pub(crate) enum Command {
     /// Read, show, check and convert calibrations.
     #[command(subcommand)]
     Calib(calib::Command),
+    /// Find where cameras stand, from what they see.
+    #[command(subcommand)]
+    Calibrate(calibrate::Command),
     /// List the video devices of this machine, and take pictures of live cameras.
     Cameras(cameras::Arguments),
     /// Find by how much the clocks of the cameras of recorded footage differ.
