@@ -11,6 +11,10 @@ use crate::{Camera, Lens, LensModel};
 const NO_IMAGE: f64 = 1e3;
 
 /// Which numbers of a camera are free; the others are held.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each number is free or held by itself"
+)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Free {
     /// Rotation (radians about the axes of the camera) and centre (metres in the world).
@@ -48,6 +52,7 @@ enum Number {
 }
 
 /// Cameras, and which of their numbers are the shared parameters from 0 on.
+#[expect(clippy::struct_field_names, reason = "a list of cameras is that")]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cameras {
     cameras: Vec<Camera>,
@@ -141,6 +146,10 @@ impl Cameras {
     ///
     /// * `seen`: pixels of the recorded picture; `sigma_px`: standard deviation along each axis.
     /// * Returns the derivative by the point, for the caller to hand on by the coordinates of its local block.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "what is seen, by whom, and where it goes"
+    )]
     pub fn observe(
         &self,
         camera: usize,

@@ -85,14 +85,13 @@ fn terms<P: Problem>(
 ) -> Vec<f64> {
     let mut all = Vec::new();
     let mut take = |term: &Term| all.extend(of(term));
-    match local {
-        Some(local) => problem.terms_of(local, &mut take),
-        None => {
-            for local in 0..problem.locals().len() {
-                problem.terms_of(local, &mut take);
-            }
-            problem.priors(&mut take);
+    if let Some(local) = local {
+        problem.terms_of(local, &mut take);
+    } else {
+        for local in 0..problem.locals().len() {
+            problem.terms_of(local, &mut take);
         }
+        problem.priors(&mut take);
     }
     all
 }

@@ -34,6 +34,8 @@ impl Loss {
 pub struct Term {
     pub(super) residuals: Vec<f64>,
     pub(super) loss: Loss,
+    /// What it counts as.
+    share: f64,
     /// Shared parameters, and their columns one after the other.
     pub(super) shared: Vec<usize>,
     pub(super) by_shared: Vec<f64>,
@@ -48,10 +50,16 @@ impl Term {
         self.residuals.clear();
         self.residuals.extend_from_slice(residuals);
         self.loss = loss;
+        self.share = 1.0;
         self.shared.clear();
         self.by_shared.clear();
         self.local.clear();
         self.by_local.clear();
+    }
+
+    /// Lets the term count as this share of one: where several err alike, each has a part. The loss knows nothing of it.
+    pub fn counts(&mut self, share: f64) {
+        self.share = share;
     }
 
     /// The derivative of all residuals by a shared parameter. A parameter that is given twice counts with the sum.
@@ -86,9 +94,10 @@ impl Term {
         self.residuals.iter().map(|it| it * it).sum()
     }
 
-    /// The cost, and the weight, by the loss.
+    /// The cost, and the weight, by the loss and by what the term counts as.
     pub fn cost(&self) -> (f64, f64) {
-        self.loss.of(self.square())
+        let (cost, weight) = self.loss.of(self.square());
+        (self.share * cost, self.share * weight)
     }
 
     pub(super) fn shared_columns(&self) -> impl Iterator<Item = (usize, &[f64])> {
