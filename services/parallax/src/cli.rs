@@ -39,6 +39,7 @@ Examples:
     parallax synth out/walk --actions walking           synthetic pictures, with the truth
     parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
     parallax sync estimate my.toml --write              how far the clocks of recorded cameras are apart
+    parallax calibrate people my.toml --height-m 1.78 --out rig.toml   where the cameras stand, from someone who walks about
     parallax calib show Calib.toml                      what a calibration file says
 ";
 

@@ -2,6 +2,7 @@
 
 mod people;
 mod refine;
+mod walk;
 
 use std::process::ExitCode;
 
