@@ -283,3 +283,39 @@ fn in_space(
         Html::constant(SCRIPT)
     );
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_break_the_page_and_reasons_stand_on_it() {
+        let outcome = people::Outcome {
+            cameras: Vec::new(),
+            up: None,
+            vertical: people::Vertical::Leaning,
+            scale_sd: f64::NAN,
+            stature_m: None,
+            reports: Vec::new(),
+            doubts: vec![people::Doubt::NoPeople {
+                camera: 0,
+                seen_s: 0.0,
+                least_s: 0.5,
+            }],
+            n_instants: 0,
+            span_s: [0.0; 2],
+            n_exchanged: 0,
+            skeletons: Vec::new(),
+        };
+        let about = [("a<b".to_owned(), "c&d\"".to_owned())];
+        let page = of_people(&outcome, &["<script>alert(1)"], &about);
+        assert!(
+            !page.contains("<script>") && page.contains("&lt;script&gt;alert"),
+            "{page}"
+        );
+        assert!(
+            page.contains("a&lt;b") && page.contains("not to be used"),
+            "{page}"
+        );
+    }
+}
