@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 mod align;
+mod median;
 
 pub mod people;
 

@@ -14,13 +14,14 @@ use geometry::Camera;
 use geometry::bundle::{Cameras, Free, covariance};
 
 use crate::align::Difference;
+use crate::median::median;
 use crate::people::adjust::{Beliefs, PosePrior};
 use crate::people::begin::{Choice, Study};
 use crate::people::estimate::{
     LEAST_INSTANTS, LEAST_SEEN_S, MOST_HALVES, MOST_RESIDUAL, check_joints, half_of, instants,
     interval_s,
 };
-use crate::people::measure::{fits, median};
+use crate::people::measure::fits;
 use crate::people::sightings::{Chain, chains, ideal};
 use crate::people::solve::{Solved, rounds};
 use crate::people::{Doubt, PeopleError, Recording};

@@ -134,7 +134,7 @@ impl Adjustment {
     /// A joint errs alike wherever it is in one place: all its instants there count as one.
     fn find_shares(&mut self) {
         let mut sizes: Vec<f64> = self.instants.iter().map(Instant::size).collect();
-        let near = PLACE * super::measure::median(&mut sizes).unwrap_or(0.0);
+        let near = PLACE * crate::median::median(&mut sizes).unwrap_or(0.0);
         let n_joints = self.instants.iter().flat_map(|it| &it.joints).max();
         for joint in 0..n_joints.map_or(0, |it| it + 1) {
             let each = self.instants.iter().enumerate();

@@ -10,11 +10,12 @@ use synchronisation::Film;
 use super::begin::{Choice, Study, choices};
 use super::doubt::Doubt;
 use super::frame::{Scale, Vertical, World, bone_spread, stature_of, world};
-use super::measure::{CELLS, Fit, fits, median};
+use super::measure::{CELLS, Fit, fits};
 use super::sightings::{Chain, chains, ideal};
 use super::solve::{Solved, Wanted, solved};
 use super::{Recording, Settings};
 use crate::align::{aligned, differences};
+use crate::median::median;
 
 /// A camera sees people for at least so long, seconds.
 pub(crate) const LEAST_SEEN_S: f64 = 0.5;

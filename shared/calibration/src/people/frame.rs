@@ -4,8 +4,8 @@ use body::{BONES, Joints, N_JOINTS, stature};
 use geometry::Camera;
 use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, UnitQuaternion, UnitVector3, Vector3};
 
-use super::measure::median;
 use crate::align::{Similarity, aligned};
+use crate::median::median;
 
 /// Ankles slower than this stand, metres per second.
 const STANDING_M_S: f64 = 0.25;

@@ -1,6 +1,7 @@
 //! How well joints fit, and where in the picture they are.
 
 use super::adjust::Adjustment;
+use crate::median::median;
 
 /// Fewer joints of a kind have the expected error of all.
 const LEAST: usize = 30;
@@ -32,12 +33,6 @@ pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) ->
     let shares: Vec<f64> = all.iter().map(share).collect();
     let of_camera = |size: &f64| shares.iter().map(|it| (it * size).max(LEAST_PX)).collect();
     sizes_px.iter().map(of_camera).collect()
-}
-
-/// The median; none of nothing.
-pub(crate) fn median(all: &mut [f64]) -> Option<f64> {
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied()
 }
 
 /// How the joints of a camera fit.

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use geometry::Camera;
 
 use super::Outcome;
+use crate::median::median;
 use crate::people::begin::{Choice, Study};
 use crate::people::estimate::BLOCK_S;
-use crate::people::measure::median;
 use crate::people::sides::{exchange, of_pair, point};
 
 /// A rig is better only where the distance becomes less by this share.
