@@ -50,7 +50,13 @@ const LAYERS: &[&[&str]] = &[
         "exports",
     ],
     &["runtime"],
-    &["client", "multiview", "viewquality", "posenetwork"],
+    &[
+        "client",
+        "multiview",
+        "viewquality",
+        "posenetwork",
+        "calibration",
+    ],
     &["orientation"],
     &["pipeline", "evaluation", "datasets", "consistency"],
     &[

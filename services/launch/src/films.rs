@@ -42,6 +42,8 @@ pub struct Films {
     pub n_joints: usize,
     /// Of each joint the one on the other side, where sides follow the picture in some camera.
     pub mirror: Option<Vec<usize>>,
+    /// Of each joint the one on the other side.
+    pub sides: Vec<usize>,
     /// Who found the joints of each camera.
     pub finders: Vec<String>,
 }
@@ -91,6 +93,7 @@ pub fn films(
         cameras,
         n_joints: PARSE14.joints.len() + extra.len(),
         mirror: finders.iter().any(Finder::as_seen).then(|| mirror(&extra)),
+        sides: mirror(&extra),
         finders: finders.iter().map(Finder::text).collect(),
         films,
     })

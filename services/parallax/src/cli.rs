@@ -3,8 +3,9 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    bench, calib, cameras, chaos, config, demo, deployments, detect, eval, export, fuse_frame,
-    messages, model, publish, record, replay, run, service, smooth, sync, synth, top, train, view,
+    bench, calib, calibrate, cameras, chaos, config, demo, deployments, detect, eval, export,
+    fuse_frame, messages, model, publish, record, replay, run, service, smooth, sync, synth, top,
+    train, view,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -44,6 +45,7 @@ Examples:
     parallax synth out/walk --actions walking           synthetic pictures, with the truth
     parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
     parallax sync estimate my.toml --write              how far the clocks of recorded cameras are apart
+    parallax calibrate people my.toml --height-m 1.78 --out rig.toml   where the cameras stand, from someone who walks about
     parallax calib show Calib.toml                      what a calibration file says
 ";
 
@@ -101,6 +103,9 @@ pub(crate) enum Command {
     /// Read, show, check and convert calibrations.
     #[command(subcommand)]
     Calib(calib::Command),
+    /// Find where cameras stand, from what they see.
+    #[command(subcommand)]
+    Calibrate(calibrate::Command),
     /// List the video devices of this machine, and take pictures of live cameras.
     Cameras(cameras::Arguments),
     /// Smooth the trajectories of a finished run, and compute joint angles.

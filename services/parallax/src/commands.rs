@@ -2,6 +2,7 @@
 
 pub(crate) mod bench;
 pub(crate) mod calib;
+pub(crate) mod calibrate;
 pub(crate) mod cameras;
 pub(crate) mod chaos;
 pub(crate) mod config;
@@ -56,6 +57,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Train(it) => train::run(it, cli.globals),
         Command::Model(it) => model::run(&it, cli.globals),
         Command::Calib(it) => calib::run(&it),
+        Command::Calibrate(it) => calibrate::run(&it, cli.globals),
         Command::Cameras(it) => cameras::run(&it),
         Command::Config(it) => config::run(&it),
         Command::Messages(it) => messages::run(&it),

@@ -157,6 +157,32 @@ impl LensModel {
         }
     }
 
+    /// The derivative of the distorted point by a coefficient, numbered as [`coefficients`](Self::coefficients) lists them.
+    pub(crate) fn by_coefficient(&self, v: &Vector2<f64>, nth: usize) -> Vector2<f64> {
+        let s = v.norm_squared();
+        let power = |nth: usize| s.powi(nth as i32 + 1);
+        match self {
+            Self::Pinhole => Vector2::zeros(),
+            Self::BrownConrady { k, .. } => {
+                let (factor, _) = rational(k, s);
+                let under = 1.0 + s * (k[3] + s * (k[4] + s * k[5]));
+                match nth {
+                    0..3 => v * (power(nth) / under),
+                    3..6 => v * (-factor * power(nth - 3) / under),
+                    6 => Vector2::new(2.0 * v.x * v.y, s + 2.0 * v.y * v.y),
+                    _ => Vector2::new(s + 2.0 * v.x * v.x, 2.0 * v.x * v.y),
+                }
+            }
+            Self::KannalaBrandt { .. } => {
+                let r = s.sqrt();
+                if r < 1e-12 {
+                    return Vector2::zeros();
+                }
+                v * (r.atan().powi(2 * nth as i32 + 3) / r)
+            }
+        }
+    }
+
     /// The radius at which a ray of undistorted radius `r` falls, tangential terms left out, and its derivative.
     fn radius(&self, r: f64) -> (f64, f64) {
         match self {

@@ -18,6 +18,8 @@ pub mod epipolar;
 
 mod framing;
 
+pub mod bundle;
+
 pub mod search_size;
 
 mod triangulate;

@@ -1,4 +1,4 @@
-//! Pages for people: of a run, of a model, of an evaluation. One look, one way to escape.
+//! Pages for people: of a run, of a model, of an evaluation, of a rig. One look, one way to escape.
 //!
 //! Every page is one HTML file that needs nothing but itself: no font, no picture, no style from elsewhere, and no
 //! script but the one of [`run`] that draws the skeleton in space.
@@ -16,5 +16,6 @@ pub mod curves;
 pub mod evaluation;
 pub mod model;
 pub mod run;
+pub mod walk;
 
 pub use html::{STAGE, STYLE};

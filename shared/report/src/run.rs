@@ -81,7 +81,7 @@ pub struct Picture {
 
 const POLICY: &str =
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
-const SCRIPT: &str = concat!(include_str!("stage.js"), include_str!("run/space.js"));
+pub(crate) const SCRIPT: &str = concat!(include_str!("stage.js"), include_str!("run/space.js"));
 
 /// One page that needs no other file and asks for none.
 pub fn html(page: &Page) -> String {

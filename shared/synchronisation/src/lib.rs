@@ -36,3 +36,4 @@ pub use curve::Curve;
 pub use doubt::Doubt;
 pub use estimate::{CameraClock, Outcome, PairReport, Settings, estimate};
 pub use film::{Film, FilmError, Joint, Person, Shot};
+pub use track::{Place, Track, tracks};

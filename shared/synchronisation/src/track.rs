@@ -24,13 +24,13 @@ pub(crate) const LEAST_JOINTS: usize = 3;
 
 /// A joint at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Place {
+pub struct Place {
     /// Ideal pixels.
-    pub(crate) at: [f64; 2],
+    pub at: [f64; 2],
     /// Ideal pixels per second.
-    pub(crate) speed: [f64; 2],
+    pub speed: [f64; 2],
     /// Share of the score.
-    pub(crate) weight: f64,
+    pub weight: f64,
 }
 
 /// A sample of a joint.
@@ -43,7 +43,7 @@ struct Sample {
 
 /// One person over time, in one camera.
 #[derive(Debug, Clone)]
-pub(crate) struct Track {
+pub struct Track {
     /// First and last time, seconds by the clock of the camera.
     pub(crate) span: [f64; 2],
     /// Size of the person, ideal pixels.
@@ -55,8 +55,18 @@ pub(crate) struct Track {
 }
 
 impl Track {
+    /// First and last time, seconds by the clock of the camera.
+    pub fn span(&self) -> [f64; 2] {
+        self.span
+    }
+
+    /// Size of the person, ideal pixels.
+    pub fn size(&self) -> f64 {
+        self.size
+    }
+
     /// Where a joint is at a time: a line through its samples nearby, weighted by a Gaussian in time.
-    pub(crate) fn place(&self, joint: usize, time_s: f64) -> Option<Place> {
+    pub fn place(&self, joint: usize, time_s: f64) -> Option<Place> {
         let samples = &self.joints[joint];
         let reach = KERNEL_END * self.sigma_s;
         let from = samples.partition_point(|it| it.time_s < time_s - reach);
@@ -112,7 +122,7 @@ struct Open {
 /// The tracks of a film.
 ///
 /// * `sigma_s`: standard deviation of the kernel that smooths them, seconds.
-pub(crate) fn tracks(film: &Film, camera: &Camera, n_joints: usize, sigma_s: f64) -> Vec<Track> {
+pub fn tracks(film: &Film, camera: &Camera, n_joints: usize, sigma_s: f64) -> Vec<Track> {
     let [width, height] = camera.intrinsics.size;
     let least_size = 0.03 * f64::from(width.max(height));
     let (mut open, mut done) = (Vec::<Open>::new(), Vec::new());

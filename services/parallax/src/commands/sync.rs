@@ -177,6 +177,7 @@ fn compared(
         n_joints,
         mirror,
         finders,
+        ..
     } = found;
     let settings = Settings {
         reference,

@@ -1,0 +1,303 @@
+//! `parallax calibrate people`: where cameras stand, from people walking about.
+
+use std::process::ExitCode;
+
+use calibration::people::{Outcome, Recording, Scale, Settings, Vertical, estimate};
+use clap::Args;
+use launch::output;
+use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
+use serde_json::{Value, json};
+
+use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
+use crate::globals::Globals;
+
+/// What to try where the answer is refused.
+const HINT: &str = "let one person walk through the whole volume, in view of at least two cameras at every moment, for half a minute, \
+with arms and turns; check that the intrinsics are those of the pictures (`parallax calib show`); if the cameras were not started \
+together, search their clocks with --window 2; if there is no telling, calibrate with a board";
+
+/// Options of `parallax calibrate people`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The people are those of the `keypoints` of a camera where the deployment names some, else what its network finds in the footage, \
+else what the filters find: the same as `parallax sync estimate` looks at. One person is enough; the one that is seen longest is \
+used. Of the deployment's rig the intrinsics and the names count; its poses are used with `--scale rig` alone.
+
+Pictures tell no lengths. The scale is that of a person's standing height by the lengths of the bones (--height-m, right to 2 or 3 \
+percent for someone of usual proportions), of the distance of two cameras (--distance), or of the rig that is there (--scale rig, \
+which keeps its world as well). Otherwise the world has its floor at z = 0, under the middle of where the person was, and z against \
+gravity: by the feet that stand, or else by upright bodies.
+
+An answer is refused, with exit code 7 and every reason, where two halves of the recording give different rigs, a camera has too \
+little in common with the others, its pose is known too badly, or what was found is no person. Nothing is written then.
+
+With --json one object:
+    {\"is_determined\", \"doubts\": [text], \"instants\", \"span_s\", \"vertical\", \"scale_error\", \"stature_metres\", \"exchanged\",
+     \"cameras\": [{\"name\", \"found_by\", \"centre_metres\", \"joints\", \"residual_px\", \"inliers\", \"rotation_sd_degrees\",
+                  \"centre_sd_metres\", \"focal_px\", \"focal_sd_px\", \"halves_degrees\", \"halves_metres\", \"offset_ms\",
+                  \"offset_sd_ms\"}]}
+
+Examples:
+    parallax calibrate people my.toml --height-m 1.78 --out rig.toml
+    parallax calibrate people my.toml --distance cam01:cam03=4.27 --out rig.toml --report rig.html
+    parallax calibrate people my.toml --height-m 1.78 --window 2 --json")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    walk: WalkArguments,
+    /// Standing height of the person, metres.
+    #[arg(long, value_name = "METRES", value_parser = height, conflicts_with_all = ["distance", "scale"])]
+    height_m: Option<f64>,
+    /// The distance of two cameras, metres: `cam01:cam03=4.27`.
+    #[arg(long, value_name = "A:B=METRES", value_parser = distance, conflicts_with = "scale")]
+    distance: Option<(String, String, f64)>,
+    /// Take scale and world from the rig of the deployment.
+    #[arg(long, value_name = "rig", value_parser = ["rig"])]
+    scale: Option<String>,
+    /// Estimate focal lengths, too: less certain.
+    #[arg(long)]
+    focal: bool,
+    /// How far the clocks of two cameras may be apart, seconds. A few pictures are found without.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = window)]
+    window: f64,
+    /// Number of the random samples; another one shows how much depends on them.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+fn height(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|it| (0.8..=2.4).contains(it));
+    number.ok_or_else(|| format!("expected 0.8 to 2.4 metres, got {text:?}"))
+}
+
+fn window(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|it| (0.0..=10.0).contains(it));
+    number.ok_or_else(|| format!("expected 0 to 10 seconds, got {text:?}"))
+}
+
+fn distance(text: &str) -> Result<(String, String, f64), String> {
+    let expected = || format!("expected CAMERA:CAMERA=METRES, got {text:?}");
+    let (pair, metres) = text.rsplit_once('=').ok_or_else(expected)?;
+    let (a, b) = pair.split_once(':').ok_or_else(expected)?;
+    let metres = metres
+        .parse()
+        .ok()
+        .filter(|it| (0.01..=1000.0).contains(it));
+    Ok((a.to_owned(), b.to_owned(), metres.ok_or_else(expected)?))
+}
+
+pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    if arguments.height_m.is_none() && arguments.distance.is_none() && arguments.scale.is_none() {
+        let message = "pictures tell no lengths: say how tall the person is (--height-m), how far apart two cameras are (--distance), \
+                       or that the rig of the deployment is to be kept (--scale rig)";
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let walk = walk(&arguments.walk, globals, &stop)?;
+    let settings = settings(arguments, &walk)?;
+    let (cameras, films) = (walk.found.cameras.clone(), walk.found.films.clone());
+    let estimated = move || {
+        let recording = Recording {
+            cameras: &cameras,
+            films: &films,
+        };
+        estimate(&recording, &settings)
+    };
+    let outcome = computed(&stop, estimated)?.or_fail(ExitKind::Input)?;
+    let names = walk.names();
+    if arguments.walk.json {
+        output::json(&as_json(&outcome, &names, &walk.found.finders))?;
+    } else {
+        table(&outcome, &names)?;
+    }
+    if let Some(file) = &arguments.walk.report {
+        write_page(file, arguments, &outcome, &walk)?;
+        output::message(format_args!("wrote {}", file.display()));
+    }
+    refuse(&outcome.doubts, &names, HINT)?;
+    if let Some(file) = &arguments.walk.out {
+        let source = format!(
+            "calibrated from a person walking about, {} instants{}",
+            outcome.n_instants,
+            source_of_scale(arguments)
+        );
+        write_rig(file, outcome.cameras.clone(), outcome.up, &source)?;
+        output::message(format_args!("wrote {}", file.display()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn source_of_scale(arguments: &Arguments) -> String {
+    match (&arguments.height_m, &arguments.distance) {
+        (Some(metres), _) => format!(", scale by a height of {metres} m"),
+        (None, Some((a, b, metres))) => format!(", scale by {metres} m from {a} to {b}"),
+        (None, None) => ", scale and world of the rig before".to_owned(),
+    }
+}
+
+fn settings(arguments: &Arguments, walk: &Walk) -> Result<Settings, Failure> {
+    let number = |name: &String| {
+        let names = walk.names();
+        names.iter().position(|it| it == name).ok_or_else(|| {
+            let message = format!(
+                "--distance: no camera {name:?}; there are {}",
+                names.join(", ")
+            );
+            Failure::new(ExitKind::Usage, message)
+        })
+    };
+    let scale = match (arguments.height_m, &arguments.distance) {
+        (Some(metres), _) => Scale::Height(metres),
+        (None, Some((a, b, metres))) => {
+            let (a, b) = (number(a)?, number(b)?);
+            if a == b {
+                let message = "--distance: of a camera to itself";
+                return Err(Failure::new(ExitKind::Usage, message));
+            }
+            Scale::Distance(a, b, *metres)
+        }
+        (None, None) => Scale::Rig,
+    };
+    Ok(Settings {
+        n_joints: walk.found.n_joints,
+        sides: walk.found.sides.clone(),
+        as_seen: walk.found.mirror.is_some(),
+        offsets_s: walk.offsets_s.clone(),
+        window_s: arguments.window,
+        scale,
+        focal: arguments.focal,
+        most_instants: arguments.walk.instants as usize,
+        seed: arguments.seed,
+    })
+}
+
+/// Where the vertical comes from.
+fn vertical(outcome: &Outcome) -> &'static str {
+    match outcome.vertical {
+        Vertical::Feet => "the feet that stand",
+        Vertical::Bodies => "bodies that stand upright",
+        Vertical::Leaning => {
+            "bodies in the mean: nobody stood upright, it may be off by many degrees"
+        }
+        Vertical::Rig => "the rig before",
+    }
+}
+
+fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
+    let [from, to] = outcome.span_s;
+    output::line(format_args!(
+        "{} instants over {:.1} s; vertical by {}; scale to {:.1} %; a person of {:.3} m by the bones; sides of {} views exchanged",
+        outcome.n_instants,
+        to - from,
+        vertical(outcome),
+        100.0 * outcome.scale_sd,
+        outcome.stature_m.unwrap_or(f64::NAN),
+        outcome.n_exchanged
+    ))?;
+    output::line(format_args!(
+        "{:<12} {:>24} {:>8} {:>9} {:>9} {:>8} {:>8} {:>19} {:>16}",
+        "camera",
+        "centre, m",
+        "joints",
+        "resid, px",
+        "fit, %",
+        "+- deg",
+        "+- mm",
+        "halves, deg and mm",
+        "offset, ms"
+    ))?;
+    for ((name, camera), it) in names.iter().zip(&outcome.cameras).zip(&outcome.reports) {
+        let centre = camera.centre_in_world();
+        let halves = it.halves.map_or("-".to_owned(), |[degrees, metres]| {
+            format!("{degrees:.2} {:.0}", 1e3 * metres)
+        });
+        output::line(format_args!(
+            "{name:<12} {:>24} {:>8} {:>9.2} {:>9.0} {:>8.2} {:>8.0} {halves:>19} {:>16}",
+            format!("{:.3} {:.3} {:.3}", centre.x, centre.y, centre.z),
+            it.joints,
+            it.residual_px,
+            100.0 * it.inliers,
+            it.sd[0],
+            1e3 * it.sd[1],
+            format!("{:.1} +- {:.1}", 1e3 * it.offset_s[0], 1e3 * it.offset_s[1]),
+        ))?;
+    }
+    for ((name, camera), it) in names.iter().zip(&outcome.cameras).zip(&outcome.reports) {
+        if let Some(sd) = it.focal_sd_px {
+            let focal = camera.intrinsics.fx;
+            output::line(format_args!(
+                "{name}: focal length {focal:.1} +- {sd:.1} px"
+            ))?;
+        }
+    }
+    Ok(())
+}
+
+fn as_json(outcome: &Outcome, names: &[&str], finders: &[String]) -> Value {
+    let finite = |it: f64| it.is_finite().then_some(it);
+    let each = names
+        .iter()
+        .zip(&outcome.cameras)
+        .zip(&outcome.reports)
+        .zip(finders);
+    let cameras: Vec<Value> = each
+        .map(|(((name, camera), it), finder)| {
+            let centre = camera.centre_in_world();
+            json!({
+                "name": name,
+                "found_by": finder,
+                "centre_metres": [centre.x, centre.y, centre.z],
+                "joints": it.joints,
+                "residual_px": finite(it.residual_px),
+                "inliers": finite(it.inliers),
+                "rotation_sd_degrees": finite(it.sd[0]),
+                "centre_sd_metres": finite(it.sd[1]),
+                "focal_px": camera.intrinsics.fx,
+                "focal_sd_px": it.focal_sd_px.and_then(finite),
+                "halves_degrees": it.halves.map(|it| it[0]),
+                "halves_metres": it.halves.map(|it| it[1]),
+                "offset_ms": 1e3 * it.offset_s[0],
+                "offset_sd_ms": finite(1e3 * it.offset_s[1]),
+            })
+        })
+        .collect();
+    let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
+    json!({
+        "schema_version": 1,
+        "is_determined": doubts.is_empty(),
+        "doubts": doubts,
+        "instants": outcome.n_instants,
+        "span_s": outcome.span_s,
+        "vertical": vertical(outcome),
+        "scale_error": finite(outcome.scale_sd),
+        "stature_metres": outcome.stature_m,
+        "exchanged": outcome.n_exchanged,
+        "cameras": cameras,
+    })
+}
+
+fn write_page(
+    file: &std::path::Path,
+    arguments: &Arguments,
+    outcome: &Outcome,
+    walk: &Walk,
+) -> Result<(), Failure> {
+    let mut about = vec![(
+        "deployment".to_owned(),
+        format!(
+            "{} ({})",
+            walk.deployment.name,
+            arguments.walk.config.display()
+        ),
+    )];
+    let found = walk.names().into_iter().zip(&walk.found.finders);
+    about.extend(found.map(|(name, finder)| (format!("joints of {name}"), finder.clone())));
+    about.push((
+        "scale".to_owned(),
+        source_of_scale(arguments)
+            .trim_start_matches(", ")
+            .to_owned(),
+    ));
+    about.push(("vertical".to_owned(), vertical(outcome).to_owned()));
+    let page = report::walk::of_people(outcome, &walk.names(), &about);
+    files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))
+}

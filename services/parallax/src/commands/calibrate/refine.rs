@@ -1,0 +1,221 @@
+//! `parallax calibrate refine`: an existing rig made better by a recording.
+
+use std::process::ExitCode;
+
+use calibration::people::Recording;
+use calibration::refine::{Outcome, Settings, refine};
+use clap::Args;
+use launch::{inputs, output};
+use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
+use serde_json::{Value, json};
+
+use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
+use crate::globals::Globals;
+
+/// What to try where the answer is refused.
+const HINT: &str = "let one person walk through the whole volume for half a minute; if a camera was moved far, \
+or the rig is not that of these cameras, begin anew: parallax calibrate people";
+
+/// Options of `parallax calibrate refine`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The rig of the deployment is believed with the deviations of --sd-degrees and --sd-mm; a camera that was moved breaks away from \
+them. Only a camera whose pose the joints tell better than that moves, the others are held. Time offsets are estimated along, \
+within --sd-ms of those of the deployment.
+
+Whether the new rig is better is told by what it was not fitted to: each half of the recording judges the rig of the other one, \
+by how far the joints of each camera are from where the other cameras see them.
+
+Exit codes: 0 better, and --out is written; 6 no better, the rig is to be kept; 7 refused, with every reason.
+
+With --json one object:
+    {\"verdict\": \"better\" | \"no better\" | \"refused\", \"doubts\": [text], \"instants\", \"before_px\", \"after_px\", \"certainty\",
+     \"blocks\", \"blocks_better\",
+     \"cameras\": [{\"name\", \"moved_degrees\", \"moved_metres\", \"rotation_sd_degrees\", \"centre_sd_metres\", \"is_told\",
+                  \"before_px\", \"after_px\", \"residual_px\", \"offset_ms\"}]}
+
+Examples:
+    parallax calibrate refine my.toml --out rig.toml
+    parallax calibrate refine my.toml --sd-degrees 0.2 --sd-mm 5 --report refined.html --json")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    walk: WalkArguments,
+    /// Standard deviation of the rotations of the rig that is there, degrees.
+    #[arg(long, value_name = "DEGREES", default_value_t = 1.0, value_parser = deviation)]
+    sd_degrees: f64,
+    /// Standard deviation of the places of its cameras, millimetres.
+    #[arg(long, value_name = "MM", default_value_t = 30.0, value_parser = deviation)]
+    sd_mm: f64,
+    /// Standard deviation of the clocks, milliseconds; 0 holds them.
+    #[arg(long, value_name = "MS", default_value_t = 5.0, value_parser = clock)]
+    sd_ms: f64,
+    /// Estimate focal lengths, too: less certain.
+    #[arg(long)]
+    focal: bool,
+}
+
+fn deviation(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|it| (1e-3..=1e4).contains(it));
+    number.ok_or_else(|| format!("expected 0.001 to 10000, got {text:?}"))
+}
+
+fn clock(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|it| (0.0..=1e3).contains(it));
+    number.ok_or_else(|| format!("expected 0 to 1000 milliseconds, got {text:?}"))
+}
+
+pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let walk = walk(&arguments.walk, globals, &stop)?;
+    let settings = Settings {
+        n_joints: walk.found.n_joints,
+        sides: walk.found.sides.clone(),
+        offsets_s: walk.offsets_s.clone(),
+        offset_sd_s: 1e-3 * arguments.sd_ms,
+        pose_sd: [arguments.sd_degrees, 1e-3 * arguments.sd_mm],
+        focal: arguments.focal,
+        most_instants: arguments.walk.instants as usize,
+    };
+    let (cameras, films) = (walk.found.cameras.clone(), walk.found.films.clone());
+    let refined = move || {
+        let recording = Recording {
+            cameras: &cameras,
+            films: &films,
+        };
+        refine(&recording, &settings)
+    };
+    let outcome = computed(&stop, refined)?.or_fail(ExitKind::Input)?;
+    let names = walk.names();
+    if arguments.walk.json {
+        output::json(&as_json(&outcome, &names))?;
+    } else {
+        table(&outcome, &names)?;
+    }
+    if let Some(file) = &arguments.walk.report {
+        let about = about(arguments, &walk);
+        let page = report::walk::of_refinement(&outcome, &names, &about);
+        files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))?;
+        output::message(format_args!("wrote {}", file.display()));
+    }
+    refuse(&outcome.doubts, &names, HINT)?;
+    if !outcome.is_better {
+        let message = format!(
+            "no better: held out, joints are {:.2} px from where the other cameras see them with the rig that is there, and {:.2} px \
+             with the new one; keep the rig",
+            outcome.held_out_px[0], outcome.held_out_px[1]
+        );
+        return Err(Failure::new(ExitKind::Limit, message));
+    }
+    if let Some(file) = &arguments.walk.out {
+        let before = inputs::rig_of(&walk.deployment)?;
+        let source = format!(
+            "{}; refined on a person, {} instants",
+            before.source(),
+            outcome.n_instants
+        );
+        write_rig(file, outcome.cameras.clone(), before.up_in_world(), &source)?;
+        output::message(format_args!("wrote {}", file.display()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn about(arguments: &Arguments, walk: &Walk) -> Vec<(String, String)> {
+    let mut about = vec![
+        (
+            "deployment".to_owned(),
+            format!(
+                "{} ({})",
+                walk.deployment.name,
+                arguments.walk.config.display()
+            ),
+        ),
+        (
+            "believed".to_owned(),
+            format!(
+                "rotations to {} degrees, places to {} mm, clocks to {} ms",
+                arguments.sd_degrees, arguments.sd_mm, arguments.sd_ms
+            ),
+        ),
+    ];
+    let found = walk.names().into_iter().zip(&walk.found.finders);
+    about.extend(found.map(|(name, finder)| (format!("joints of {name}"), finder.clone())));
+    about
+}
+
+fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
+    output::line(format_args!(
+        "{} instants; held out, joints are {:.2} px from where the other cameras see them before, {:.2} px after; {} of {} blocks \
+         became better ({:.1} standard errors)",
+        outcome.n_instants,
+        outcome.held_out_px[0],
+        outcome.held_out_px[1],
+        outcome.blocks[1],
+        outcome.blocks[0],
+        outcome.certainty
+    ))?;
+    output::line(format_args!(
+        "{:<12} {:>11} {:>9} {:>8} {:>8} {:>6} {:>11} {:>10} {:>11}",
+        "camera",
+        "moved, deg",
+        "mm",
+        "+- deg",
+        "+- mm",
+        "told",
+        "before, px",
+        "after, px",
+        "offset, ms"
+    ))?;
+    for (name, it) in names.iter().zip(&outcome.changes) {
+        output::line(format_args!(
+            "{name:<12} {:>11.2} {:>9.1} {:>8.2} {:>8.1} {:>6} {:>11.2} {:>10.2} {:>11.1}",
+            it.moved[0],
+            1e3 * it.moved[1],
+            it.sd[0],
+            1e3 * it.sd[1],
+            if it.is_told { "yes" } else { "held" },
+            it.held_out_px[0],
+            it.held_out_px[1],
+            1e3 * it.offset_s
+        ))?;
+    }
+    Ok(())
+}
+
+fn as_json(outcome: &Outcome, names: &[&str]) -> Value {
+    let finite = |it: f64| it.is_finite().then_some(it);
+    let each = names.iter().zip(&outcome.changes);
+    let cameras: Vec<Value> = each
+        .map(|(name, it)| {
+            json!({
+                "name": name,
+                "moved_degrees": finite(it.moved[0]),
+                "moved_metres": finite(it.moved[1]),
+                "rotation_sd_degrees": finite(it.sd[0]),
+                "centre_sd_metres": finite(it.sd[1]),
+                "is_told": it.is_told,
+                "before_px": finite(it.held_out_px[0]),
+                "after_px": finite(it.held_out_px[1]),
+                "residual_px": finite(it.residual_px),
+                "offset_ms": 1e3 * it.offset_s,
+            })
+        })
+        .collect();
+    let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
+    let verdict = match (doubts.is_empty(), outcome.is_better) {
+        (false, _) => "refused",
+        (true, true) => "better",
+        (true, false) => "no better",
+    };
+    json!({
+        "schema_version": 1,
+        "verdict": verdict,
+        "doubts": doubts,
+        "instants": outcome.n_instants,
+        "before_px": finite(outcome.held_out_px[0]),
+        "after_px": finite(outcome.held_out_px[1]),
+        "certainty": finite(outcome.certainty),
+        "blocks": outcome.blocks[0],
+        "blocks_better": outcome.blocks[1],
+        "cameras": cameras,
+    })
+}

@@ -1,0 +1,145 @@
+//! What `calibrate people` and `calibrate refine` have in common: people seen by all cameras, and a rig file at the end.
+
+use std::path::{Path, PathBuf};
+
+use calibration::people::Doubt;
+use clap::Args;
+use deployment::Deployment;
+use geometry::files::Format;
+use geometry::{Camera, Rig};
+use launch::films::{Films, Part, films};
+use launch::load;
+use nalgebra::UnitVector3;
+use offline::unless_stopped;
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+
+use crate::globals::Globals;
+use crate::terminal::Terminal;
+
+/// The progress bar.
+const BAR: &str =
+    "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left {prefix} {msg}";
+
+/// Options of both.
+#[derive(Debug, Args)]
+pub(super) struct WalkArguments {
+    /// The deployment file; of its rig the intrinsics count.
+    pub(super) config: PathBuf,
+    /// Write the rig file that was found; nothing is written where the answer is refused.
+    #[arg(long, value_name = "FILE")]
+    pub(super) out: Option<PathBuf>,
+    /// Write a page: residuals, where in the pictures people were, uncertainties, the rig in space.
+    #[arg(long, value_name = "FILE")]
+    pub(super) report: Option<PathBuf>,
+    /// Look at every n-th picture.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub(super) every: u64,
+    /// Where to begin in the footage of each camera, seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
+    pub(super) from: f64,
+    /// How much of the footage to look at, seconds; all of it if not given.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub(super) seconds: Option<f64>,
+    /// The most instants that take part, evenly over the footage.
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(12..=5000))]
+    pub(super) instants: u64,
+    /// Replace a value of the deployment, for example `--set rig=lab.toml`; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(super) set: Vec<String>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|it| (0.0..=1e6).contains(it));
+    number.ok_or_else(|| format!("expected 0 to 1000000 seconds, got {text:?}"))
+}
+
+/// People seen by all cameras.
+pub(super) struct Walk {
+    pub(super) deployment: Deployment,
+    pub(super) found: Films,
+    /// What is added to the times of each camera, by the deployment, seconds.
+    pub(super) offsets_s: Vec<f64>,
+}
+
+impl Walk {
+    /// The names of the cameras.
+    pub(super) fn names(&self) -> Vec<&str> {
+        self.found
+            .cameras
+            .iter()
+            .map(|it| it.name.as_str())
+            .collect()
+    }
+}
+
+/// Reads or finds the people.
+pub(super) fn walk(
+    arguments: &WalkArguments,
+    globals: Globals,
+    stop: &Stop,
+) -> Result<Walk, Failure> {
+    let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
+    if deployment.cameras.len() < 2 {
+        let message = "the deployment has one camera: where it stands is told by others only";
+        return Err(Failure::new(ExitKind::Config, message));
+    }
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR).ticking();
+    let part = Part {
+        every: arguments.every,
+        from_s: arguments.from,
+        seconds: arguments.seconds,
+    };
+    let mut found = films(&deployment, part, stop, &terminal)?;
+    for (camera, film) in deployment.cameras.iter().zip(&mut found.films) {
+        let pace = 1.0 + 1e-6 * camera.drift_ppm.unwrap_or(0.0);
+        for shot in &mut film.shots {
+            shot.time_s *= pace;
+        }
+    }
+    let offsets = deployment.cameras.iter();
+    let offsets_s = offsets
+        .map(|it| 1e-3 * it.offset_ms.unwrap_or(0.0))
+        .collect();
+    Ok(Walk {
+        deployment,
+        found,
+        offsets_s,
+    })
+}
+
+/// Runs what takes long, which Ctrl-C ends.
+pub(super) fn computed<T: Send + 'static>(
+    stop: &Stop,
+    compute: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Failure> {
+    let interrupted = || Failure::new(ExitKind::Interrupted, "interrupted");
+    let outcome = unless_stopped(stop, compute)?;
+    if stop.is_requested() {
+        return Err(interrupted());
+    }
+    outcome.ok_or_else(interrupted)
+}
+
+/// Writes the rig file.
+pub(super) fn write_rig(
+    file: &Path,
+    cameras: Vec<Camera>,
+    up: Option<UnitVector3<f64>>,
+    source: &str,
+) -> Result<(), Failure> {
+    let rig = Rig::new(cameras, up, source).or_fail(ExitKind::Calibration)?;
+    geometry::files::write(file, Format::Own, &rig).or_fail(ExitKind::Input)
+}
+
+/// A failure where the answer is not to be used.
+pub(super) fn refuse(doubts: &[Doubt], names: &[&str], hint: &str) -> Result<(), Failure> {
+    if doubts.is_empty() {
+        return Ok(());
+    }
+    let texts: Vec<String> = doubts.iter().map(|it| it.text(names)).collect();
+    let message = format!("the rig is not determined:\n  {}", texts.join("\n  "));
+    Err(Failure::new(ExitKind::Degraded, message).with_hint(hint))
+}

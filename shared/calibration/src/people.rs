@@ -1,0 +1,67 @@
+//! Where cameras stand, from people walking about.
+//!
+//! The joints that two cameras see at one instant give the relative pose of both (essential matrix by eight points within
+//! RANSAC, robust refinement from several starts); other cameras are put where they see the joints that are known then
+//! (resection); and all cameras, joints, lengths of bones and time offsets are adjusted together. Pictures tell no lengths: the
+//! scale is that of a person's height, of one distance, or of the rig that was given. The vertical and the floor are those of
+//! the feet that stand. One person is enough; the one that the cameras see longest is used.
+//!
+//! The honest check is that two halves of the recording, each by itself from the beginning, give the same rig.
+
+pub(crate) mod adjust;
+pub(crate) mod begin;
+mod doubt;
+pub(crate) mod estimate;
+mod frame;
+pub(crate) mod measure;
+mod resect;
+pub(crate) mod sides;
+pub(crate) mod sightings;
+pub(crate) mod solve;
+mod two_view;
+
+#[cfg(test)]
+pub(crate) mod testing;
+#[cfg(test)]
+mod tests;
+
+pub use doubt::Doubt;
+pub use estimate::{CameraReport, Outcome, PeopleError, estimate};
+pub use frame::{Scale, Vertical};
+
+use synchronisation::Film;
+
+use geometry::Camera;
+
+/// What is looked at, and what is wanted.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Number of joints; the first 14 are those of `skeleton::PARSE14`.
+    pub n_joints: usize,
+    /// Of each joint the one on the other side.
+    pub sides: Vec<usize>,
+    /// Whether left and right are those of the picture in some camera, so that cameras may contradict each other.
+    pub as_seen: bool,
+    /// What is added to the times of each camera to have the common ones, as far as it is known, seconds.
+    pub offsets_s: Vec<f64>,
+    /// How far these may be wrong, seconds: offsets are searched within. A few frames are found without.
+    pub window_s: f64,
+    /// What tells lengths.
+    pub scale: Scale,
+    /// Whether focal lengths are estimated, too: less certain.
+    pub focal: bool,
+    /// The most instants that are looked at.
+    pub most_instants: usize,
+    /// For the samples of RANSAC: the same number gives the same answer.
+    pub seed: u64,
+}
+
+/// What the cameras saw: films and cameras in the same order. Of the cameras the intrinsics count; the poses do only for
+/// [`Scale::Rig`].
+#[derive(Debug, Clone, Copy)]
+pub struct Recording<'a> {
+    /// The cameras.
+    pub cameras: &'a [Camera],
+    /// What each saw, by its own clock.
+    pub films: &'a [Film],
+}

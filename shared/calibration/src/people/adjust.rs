@@ -1,0 +1,481 @@
+//! All cameras, time offsets, bones and joints at once.
+
+use body::{BONES, Kind, N_BONES};
+use geometry::bundle::{Cameras, Loss, Problem, Step, Term};
+use geometry::{Camera, Observation, Settings, triangulate};
+use nalgebra::{Point2, Point3, Vector2, Vector3};
+
+use super::sightings::Sightings;
+
+/// Residuals beyond so many standard deviations lose their weight.
+const WIDTH: f64 = 2.0;
+/// Places of a joint nearer than this share of the size of the person are one place.
+const PLACE: f64 = 0.04;
+/// Standard deviation of a bone's length over time, as a share of it.
+const BONE_SPREAD: f64 = 0.06;
+/// Rays that meet at a smaller angle tell no depth, radians.
+const LEAST_ANGLE: f64 = 0.02;
+
+/// A joint that a camera sees.
+#[derive(Debug, Clone)]
+struct Seen {
+    camera: usize,
+    /// Which point of the instant.
+    point: usize,
+    at: Point2<f64>,
+    speed: Vector2<f64>,
+    sigma_px: f64,
+}
+
+/// One person at one instant.
+#[derive(Debug, Clone)]
+struct Instant {
+    /// Which of all instants.
+    nth: usize,
+    /// The joint of each point.
+    joints: Vec<usize>,
+    points: Vec<Point3<f64>>,
+    /// What each point counts as: a joint that stays in its place errs alike all the time.
+    shares: Vec<f64>,
+    seen: Vec<Seen>,
+}
+
+/// What is known of the pose of a camera beforehand.
+#[derive(Debug, Clone)]
+pub(crate) struct PosePrior {
+    pub(crate) camera: Camera,
+    /// Standard deviations: radians, and metres.
+    pub(crate) sd: [f64; 2],
+}
+
+/// What the terms are, besides what is seen.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Beliefs {
+    /// The distance of two cameras, which holds the scale: exactly for all that matters.
+    pub(crate) baseline: Option<(usize, usize, f64)>,
+    /// Poses known beforehand, by camera.
+    pub(crate) poses: Vec<Option<PosePrior>>,
+    /// Standard deviation of a time offset about what it is now, seconds; none: offsets are held.
+    pub(crate) offset_sd_s: Option<f64>,
+    /// Standard deviation of focal lengths about what they were given as, as a share.
+    pub(crate) focal_sd: f64,
+}
+
+/// The problem of [`geometry::bundle`].
+#[derive(Debug, Clone)]
+pub(crate) struct Adjustment {
+    cameras: Cameras,
+    given_focal: Vec<f64>,
+    /// The parameter of each camera's offset, and by how much it has changed, seconds.
+    offsets: Vec<(Option<usize>, f64)>,
+    /// The parameter of each bone's kind, and its length.
+    bones: [Option<usize>; N_BONES],
+    lengths: Vec<f64>,
+    first_bone: usize,
+    beliefs: Beliefs,
+    instants: Vec<Instant>,
+    n_instants: usize,
+}
+
+/// The bones whose length stays the same in every posture.
+fn is_stiff(kind: Kind) -> bool {
+    matches!(
+        kind,
+        Kind::UpperArm | Kind::LowerArm | Kind::UpperLeg | Kind::LowerLeg | Kind::HipWidth
+    )
+}
+
+impl Adjustment {
+    /// * `sigmas_px`: expected error of every joint in every camera, pixels.
+    pub(crate) fn new(
+        cameras: Cameras,
+        sightings: &Sightings,
+        sigmas_px: &[Vec<f64>],
+        beliefs: Beliefs,
+    ) -> Self {
+        let n = cameras.cameras().len();
+        let instants = (0..sightings.times_s.len())
+            .map(|it| Instant {
+                nth: it,
+                ..instant(cameras.cameras(), &sightings.seen[it], sigmas_px)
+            })
+            .filter(|it| !it.points.is_empty())
+            .collect();
+        let mut next = cameras.n_parameters();
+        let mut offsets = vec![(None, 0.0); n];
+        if beliefs.offset_sd_s.is_some() {
+            // The clock of the first camera is that of all.
+            for (parameter, _) in offsets.iter_mut().skip(1) {
+                *parameter = Some(next);
+                next += 1;
+            }
+        }
+        let given_focal = cameras
+            .cameras()
+            .iter()
+            .map(|it| it.intrinsics.fx)
+            .collect();
+        let mut it = Self {
+            cameras,
+            given_focal,
+            offsets,
+            bones: [None; N_BONES],
+            lengths: Vec::new(),
+            first_bone: next,
+            beliefs,
+            instants,
+            n_instants: sightings.times_s.len(),
+        };
+        it.find_bones();
+        it.find_shares();
+        it
+    }
+
+    /// A joint errs alike wherever it is in one place: all its instants there count as one.
+    fn find_shares(&mut self) {
+        let mut sizes: Vec<f64> = self.instants.iter().map(Instant::size).collect();
+        let near = PLACE * crate::median::median(&mut sizes).unwrap_or(0.0);
+        let n_joints = self.instants.iter().flat_map(|it| &it.joints).max();
+        for joint in 0..n_joints.map_or(0, |it| it + 1) {
+            let each = self.instants.iter().enumerate();
+            let places: Vec<(usize, usize, Point3<f64>)> = each
+                .filter_map(|(nth, it)| {
+                    let point = it.place(joint)?;
+                    Some((nth, point, it.points[point]))
+                })
+                .collect();
+            for (nth, point, at) in &places {
+                let alike = places.iter().filter(|it| (it.2 - at).norm() < near);
+                self.instants[*nth].shares[*point] = 1.0 / alike.count().max(1) as f64;
+            }
+        }
+    }
+
+    /// Lengths of bones at the start: medians, left and right together.
+    fn find_bones(&mut self) {
+        let mut kinds: Vec<(Kind, usize)> = Vec::new();
+        for (nth, bone) in BONES.iter().enumerate() {
+            if !is_stiff(bone.kind) {
+                continue;
+            }
+            if let Some((_, parameter)) = kinds.iter().find(|it| it.0 == bone.kind) {
+                self.bones[nth] = Some(*parameter);
+                continue;
+            }
+            let alike = BONES.iter().filter(|it| it.kind == bone.kind);
+            let ends: Vec<[usize; 2]> = alike.map(|it| [it.from[0], it.to]).collect();
+            let mut all: Vec<f64> = Vec::new();
+            for instant in &self.instants {
+                let each = ends.iter().filter_map(|[a, b]| instant.distance(*a, *b));
+                all.extend(each.filter(|it| *it > 0.0));
+            }
+            all.sort_by(f64::total_cmp);
+            if let Some(length) = all.get(all.len() / 2).filter(|_| all.len() >= 6) {
+                let parameter = self.first_bone + self.lengths.len();
+                self.lengths.push(*length);
+                kinds.push((bone.kind, parameter));
+                self.bones[nth] = Some(parameter);
+            }
+        }
+    }
+
+    /// The same with poses that are believed so many times more: to see what joints tell that count for less.
+    pub(crate) fn believing(&self, times: f64) -> Self {
+        let mut it = self.clone();
+        for prior in it.beliefs.poses.iter_mut().flatten() {
+            prior.sd = prior.sd.map(|it| it / times);
+        }
+        it
+    }
+
+    pub(crate) fn cameras(&self) -> &Cameras {
+        &self.cameras
+    }
+
+    /// By how much the offset of each camera has changed, seconds.
+    pub(crate) fn offset_steps_s(&self) -> Vec<f64> {
+        self.offsets.iter().map(|it| it.1).collect()
+    }
+
+    /// The parameter of a camera's offset.
+    pub(crate) fn offset_parameter(&self, camera: usize) -> Option<usize> {
+        self.offsets[camera].0
+    }
+
+    /// Points of all instants.
+    pub(crate) fn n_points(&self) -> usize {
+        self.instants.iter().map(|it| it.points.len()).sum()
+    }
+
+    /// Calls back for every joint seen: camera, joint, residual and place, pixels.
+    pub(crate) fn residuals(&self, take: &mut dyn FnMut(usize, usize, Vector2<f64>, Point2<f64>)) {
+        for instant in &self.instants {
+            for seen in &instant.seen {
+                let camera = &self.cameras.cameras()[seen.camera];
+                let at = seen.at - seen.speed * self.offsets[seen.camera].1;
+                if let Some(image) = camera.project(&instant.points[seen.point]) {
+                    take(seen.camera, instant.joints[seen.point], image - at, at);
+                }
+            }
+        }
+    }
+
+    fn observation(&self, instant: &Instant, seen: &Seen, term: &mut Term) {
+        let (parameter, step) = self.offsets[seen.camera];
+        let at = seen.at - seen.speed * step;
+        let point = &instant.points[seen.point];
+        let what = (at, seen.sigma_px);
+        let observed = self
+            .cameras
+            .observe(seen.camera, point, what, Loss::Cauchy(WIDTH), term);
+        term.counts(instant.shares[seen.point]);
+        for axis in 0..3 {
+            let column = observed.by_point.column(axis);
+            term.by_local(3 * seen.point + axis, column.as_slice());
+        }
+        if let Some(parameter) = parameter.filter(|_| observed.has_image) {
+            let by = seen.speed / seen.sigma_px;
+            term.by_shared(parameter, by.as_slice());
+        }
+    }
+
+    fn bone(&self, instant: &Instant, nth: usize, term: &mut Term) -> bool {
+        let Some(parameter) = self.bones[nth] else {
+            return false;
+        };
+        let ends = [BONES[nth].from[0], BONES[nth].to];
+        let [Some(a), Some(b)] = ends.map(|it| instant.place(it)) else {
+            return false;
+        };
+        let length = self.lengths[parameter - self.first_bone];
+        let sigma = BONE_SPREAD * length.abs().max(1e-6);
+        let way = instant.points[b] - instant.points[a];
+        let distance = way.norm().max(1e-12);
+        let ratio = distance / sigma;
+        term.begin(&[ratio - length / sigma], Loss::Cauchy(WIDTH));
+        term.counts(instant.shares[a].max(instant.shares[b]));
+        for axis in 0..3 {
+            let by = way[axis] / distance / sigma;
+            term.by_local(3 * a + axis, &[-by]);
+            term.by_local(3 * b + axis, &[by]);
+        }
+        // The spread is a share of the length, which changes with it.
+        term.by_shared(parameter, &[-ratio / length]);
+        true
+    }
+
+    fn pose_prior(&self, camera: usize, take: &mut dyn FnMut(&Term)) {
+        let Some(Some(prior)) = self.beliefs.poses.get(camera) else {
+            return;
+        };
+        let Some(parameters) = self.cameras.pose_parameters(camera) else {
+            return;
+        };
+        let now = &self.cameras.cameras()[camera];
+        let turn =
+            now.camera_from_world.rotation * prior.camera.camera_from_world.rotation.inverse();
+        let way = now.centre_in_world() - prior.camera.centre_in_world();
+        let turn = turn.scaled_axis() / prior.sd[0];
+        let way = way / prior.sd[1];
+        // One loss for rotation and place: a camera that was moved is believed to be elsewhere altogether.
+        let all = [turn.x, turn.y, turn.z, way.x, way.y, way.z];
+        let mut term = Term::default();
+        term.begin(&all, Loss::Cauchy(WIDTH));
+        for (nth, parameter) in parameters.into_iter().enumerate() {
+            let mut column = [0.0; 6];
+            // To first order in the turn, which is small where it matters.
+            column[nth] = 1.0 / prior.sd[usize::from(nth >= 3)];
+            term.by_shared(parameter, &column);
+        }
+        take(&term);
+    }
+}
+
+impl Instant {
+    fn place(&self, joint: usize) -> Option<usize> {
+        self.joints.iter().position(|it| *it == joint)
+    }
+
+    /// From one end of the person to the other.
+    fn size(&self) -> f64 {
+        let extent = |axis: usize| {
+            let each = self.points.iter().map(|it| it[axis]);
+            let [from, to] = each.fold([f64::INFINITY, f64::NEG_INFINITY], |[from, to], it| {
+                [from.min(it), to.max(it)]
+            });
+            to - from
+        };
+        Vector3::new(extent(0), extent(1), extent(2)).norm()
+    }
+
+    fn distance(&self, a: usize, b: usize) -> Option<f64> {
+        let (a, b) = (self.place(a)?, self.place(b)?);
+        Some((self.points[a] - self.points[b]).norm())
+    }
+}
+
+/// The joints of an instant that at least two cameras see, triangulated.
+fn instant(
+    cameras: &[Camera],
+    seen: &[Vec<Option<super::sightings::Sight>>],
+    sigmas: &[Vec<f64>],
+) -> Instant {
+    let mut all = Instant {
+        nth: 0,
+        joints: Vec::new(),
+        points: Vec::new(),
+        shares: Vec::new(),
+        seen: Vec::new(),
+    };
+    let n_joints = seen.first().map_or(0, Vec::len);
+    let joints: Vec<usize> = (0..n_joints).collect();
+    for joint in joints {
+        let each = seen.iter().enumerate();
+        let each: Vec<(usize, super::sightings::Sight)> = each
+            .filter_map(|(camera, it)| Some((camera, (*it.get(joint)?)?)))
+            .collect();
+        let sigma = |camera: usize, weight: f64| sigmas[camera][joint] / weight.sqrt();
+        let observations: Vec<Observation<'_>> = each
+            .iter()
+            .map(|(camera, it)| Observation {
+                camera: &cameras[*camera],
+                point_px: it.at,
+                sigma_px: sigma(*camera, it.weight),
+            })
+            .collect();
+        let Some(point) = place(&observations) else {
+            continue;
+        };
+        let nth = all.points.len();
+        all.joints.push(joint);
+        all.points.push(point);
+        all.shares.push(1.0);
+        all.seen.extend(each.iter().map(|(camera, it)| Seen {
+            camera: *camera,
+            point: nth,
+            at: it.at,
+            speed: it.speed,
+            sigma_px: sigma(*camera, it.weight),
+        }));
+    }
+    all
+}
+
+/// A point by robust triangulation.
+pub(crate) fn place(observations: &[Observation<'_>]) -> Option<Point3<f64>> {
+    let sigma = observations.first()?.sigma_px;
+    let settings = Settings {
+        loss_px: WIDTH * sigma,
+        max_reprojection_px: None,
+        min_views: 2,
+        min_angle: LEAST_ANGLE,
+    };
+    Some(triangulate(observations, &settings).ok()?.in_world)
+}
+
+impl Problem for Adjustment {
+    fn n_shared(&self) -> usize {
+        self.first_bone + self.lengths.len()
+    }
+
+    fn name(&self, parameter: usize) -> String {
+        if parameter < self.cameras.n_parameters() {
+            return self.cameras.name(parameter);
+        }
+        let camera = self.offsets.iter().position(|it| it.0 == Some(parameter));
+        if let Some(camera) = camera {
+            return format!("{}: time offset", self.cameras.cameras()[camera].name);
+        }
+        let bone = self.bones.iter().position(|it| *it == Some(parameter));
+        bone.map_or(String::new(), |it| {
+            format!("length of the {}", BONES[it].name)
+        })
+    }
+
+    fn locals(&self) -> Vec<usize> {
+        self.instants.iter().map(|it| 3 * it.points.len()).collect()
+    }
+
+    fn terms_of(&self, local: usize, take: &mut dyn FnMut(&Term)) {
+        let instant = &self.instants[local];
+        let mut term = Term::default();
+        for seen in &instant.seen {
+            self.observation(instant, seen, &mut term);
+            take(&term);
+        }
+        for nth in 0..N_BONES {
+            if self.bone(instant, nth, &mut term) {
+                take(&term);
+            }
+        }
+    }
+
+    fn priors(&self, take: &mut dyn FnMut(&Term)) {
+        let mut term = Term::default();
+        if let Some((a, b, wanted)) = self.beliefs.baseline {
+            let [from, to] = [a, b].map(|it| self.cameras.cameras()[it].centre_in_world());
+            let way = to - from;
+            let sigma = 1e-4 * wanted;
+            term.begin(&[(way.norm() - wanted) / sigma], Loss::Square);
+            for (camera, sign) in [(a, -1.0), (b, 1.0)] {
+                let Some(pose) = self.cameras.pose_parameters(camera) else {
+                    continue;
+                };
+                for axis in 0..3 {
+                    let by = sign * way[axis] / way.norm() / sigma;
+                    term.by_shared(pose[3 + axis], &[by]);
+                }
+            }
+            take(&term);
+        }
+        if let Some(sd) = self.beliefs.offset_sd_s {
+            for (parameter, step) in &self.offsets {
+                let Some(parameter) = *parameter else {
+                    continue;
+                };
+                term.begin(&[step / sd], Loss::Square);
+                term.by_shared(parameter, &[1.0 / sd]);
+                take(&term);
+            }
+        }
+        for camera in 0..self.given_focal.len() {
+            self.pose_prior(camera, take);
+            if let Some(parameter) = self.cameras.focal_parameter(camera) {
+                let given = self.given_focal[camera];
+                let sd = self.beliefs.focal_sd * given;
+                let now = self.cameras.cameras()[camera].intrinsics.fx;
+                term.begin(&[(now - given) / sd], Loss::Square);
+                term.by_shared(parameter, &[1.0 / sd]);
+                take(&term);
+            }
+        }
+    }
+
+    fn moved(&self, step: &Step) -> Self {
+        let mut moved = self.clone();
+        moved.cameras = self.cameras.moved(&step.shared);
+        for (parameter, offset) in &mut moved.offsets {
+            *offset += parameter.map_or(0.0, |it| step.shared[it]);
+        }
+        for (nth, length) in moved.lengths.iter_mut().enumerate() {
+            *length += step.shared[self.first_bone + nth];
+        }
+        for (instant, by) in moved.instants.iter_mut().zip(&step.locals) {
+            for (point, by) in instant.points.iter_mut().zip(by.chunks_exact(3)) {
+                *point += Vector3::from_column_slice(by);
+            }
+        }
+        moved
+    }
+}
+
+/// The joints of all instants, by instant and joint.
+pub(crate) fn skeletons(it: &Adjustment, n_joints: usize) -> Vec<Vec<Option<Point3<f64>>>> {
+    let mut all = vec![vec![None; n_joints]; it.n_instants];
+    for instant in &it.instants {
+        for (joint, point) in instant.joints.iter().zip(&instant.points) {
+            all[instant.nth][*joint] = Some(*point);
+        }
+    }
+    all
+}

@@ -1,0 +1,303 @@
+//! A start: the first pair of cameras, and the others by resection.
+
+use fastrand::Rng;
+use geometry::bundle::{Cameras, Free, Settings as Search, solve};
+use geometry::{Camera, Observation};
+use nalgebra::{Isometry3, Point3};
+
+use super::adjust::{Adjustment, Beliefs, place};
+use super::doubt::Doubt;
+use super::resect::{Known, resected};
+use super::sightings::{Chain, Sightings};
+use super::two_view::{Match, Relative, normalised, relative};
+
+/// Expected error of a joint before anything is known: this share of the size of the person.
+pub(crate) const SHARE: f64 = 0.015;
+/// Pairs of cameras that may be the first.
+const MOST_PAIRS: usize = 10;
+/// A pair begins only with this share of its joints in agreement.
+const LEAST_INLIERS: f64 = 0.4;
+/// An angle between rays at which a pair is as good as any, radians.
+const WIDE: f64 = 0.5;
+/// A camera is placed where the mean cost of a joint, log(1 + (residual / sigma)^2), is less than this.
+const MOST_COST: f64 = 2.5;
+/// Distance of the offsets that are searched, seconds.
+const STEP_S: f64 = 0.1;
+
+/// Which person a camera sees, by which clock, with which sides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Choice {
+    pub(crate) chain: usize,
+    pub(crate) offset_s: f64,
+    pub(crate) is_exchanged: bool,
+}
+
+/// What is searched.
+#[derive(Debug, Clone)]
+pub(crate) struct Study<'a> {
+    /// Without distortion.
+    pub(crate) cameras: Vec<Camera>,
+    pub(crate) chains: &'a [Vec<Chain>],
+    pub(crate) times_s: Vec<f64>,
+    pub(crate) n_joints: usize,
+    pub(crate) sides: &'a [usize],
+    /// What each camera may be: the first is the likeliest.
+    pub(crate) choices: Vec<Vec<Choice>>,
+}
+
+/// Cameras that stand somewhere, in a world of their own.
+#[derive(Debug, Clone)]
+pub(crate) struct Start {
+    pub(crate) cameras: Vec<Camera>,
+    pub(crate) choices: Vec<Choice>,
+    /// The first pair, the distance of which is 1.
+    pub(crate) pair: [usize; 2],
+}
+
+/// All that a camera may be.
+pub(crate) fn choices(n_chains: usize, offset_s: f64, window_s: f64, as_seen: bool) -> Vec<Choice> {
+    let steps = (window_s / STEP_S).ceil() as i64;
+    let mut all = Vec::new();
+    for chain in 0..n_chains {
+        for step in -steps..=steps {
+            for is_exchanged in [false, true] {
+                if is_exchanged && !as_seen {
+                    continue;
+                }
+                all.push(Choice {
+                    chain,
+                    offset_s: offset_s + STEP_S * step as f64,
+                    is_exchanged,
+                });
+            }
+        }
+    }
+    all.sort_by(|a, b| {
+        let far = |it: &Choice| (it.chain, (it.offset_s - offset_s).abs());
+        far(a)
+            .partial_cmp(&far(b))
+            .unwrap_or(core::cmp::Ordering::Equal)
+    });
+    all
+}
+
+impl Study<'_> {
+    /// What the chosen cameras see.
+    pub(crate) fn sightings(&self, chosen: &[Option<Choice>]) -> Sightings {
+        let chains = chosen.iter().enumerate();
+        let chains: Vec<Option<&Chain>> = chains
+            .map(|(camera, it)| self.chains[camera].get((*it)?.chain))
+            .collect();
+        let offsets: Vec<f64> = chosen
+            .iter()
+            .map(|it| it.map_or(0.0, |it| it.offset_s))
+            .collect();
+        let mut all = Sightings::new(&chains, &self.times_s, &offsets, self.n_joints);
+        for (camera, it) in chosen.iter().enumerate() {
+            if it.is_some_and(|it| it.is_exchanged) {
+                all.exchange_all(camera, self.sides);
+            }
+        }
+        all
+    }
+
+    /// Expected error of a joint of a camera at the start, pixels.
+    pub(crate) fn sigma_px(&self, camera: usize, choice: Choice) -> f64 {
+        SHARE * self.chains[camera][choice.chain].size()
+    }
+
+    fn matches(&self, pair: [usize; 2], chosen: [Choice; 2]) -> Vec<Match> {
+        let mut all = vec![None; self.cameras.len()];
+        for (camera, choice) in pair.into_iter().zip(chosen) {
+            all[camera] = Some(choice);
+        }
+        let seen = self.sightings(&all);
+        let mut matches = Vec::new();
+        for instant in &seen.seen {
+            let [of_a, of_b] = pair.map(|it| &instant[it]);
+            for both in of_a.iter().zip(of_b) {
+                let both = [*both.0, *both.1];
+                let [a, b] = [0, 1].map(|nth| {
+                    let (it, at) = (pair[nth], both[nth]?.at);
+                    Some(normalised(&self.cameras[it], &at))
+                });
+                if let (Some(a), Some(b)) = (a, b) {
+                    matches.push(Match { a, b });
+                }
+            }
+        }
+        matches
+    }
+
+    /// The first pair.
+    fn pair(&self, random: &mut Rng) -> Option<([usize; 2], [Choice; 2], Relative)> {
+        let n = self.cameras.len();
+        let mut pairs: Vec<([usize; 2], usize)> = Vec::new();
+        for a in 0..n {
+            for b in a + 1..n {
+                if let (Some(of_a), Some(of_b)) = (self.choices[a].first(), self.choices[b].first())
+                {
+                    pairs.push(([a, b], self.matches([a, b], [*of_a, *of_b]).len()));
+                }
+            }
+        }
+        pairs.sort_by_key(|it| core::cmp::Reverse(it.1));
+        pairs.truncate(MOST_PAIRS);
+        let mut best = None;
+        let mut most = 0.0;
+        for (pair, _) in pairs {
+            let [a, b] = pair;
+            // The clock and the sides of the first camera are those that the other one is compared with.
+            let mut of_a = self.choices[a].clone();
+            let first = of_a[0];
+            of_a.retain(|it| it.offset_s == first.offset_s && !it.is_exchanged || *it == first);
+            for choice_a in of_a {
+                for choice_b in &self.choices[b] {
+                    let matches = self.matches(pair, [choice_a, *choice_b]);
+                    let sigma = |camera: usize, choice| {
+                        self.sigma_px(camera, choice) / self.cameras[camera].intrinsics.fx
+                    };
+                    let sigma =
+                        sigma(a, choice_a).hypot(sigma(b, *choice_b)) / core::f64::consts::SQRT_2;
+                    let Some(found) = relative(&matches, sigma, random) else {
+                        continue;
+                    };
+                    let angle = found.parallax.min(core::f64::consts::PI - found.parallax);
+                    let worth =
+                        found.inliers * (matches.len() as f64).sqrt() * (angle / WIDE).min(1.0)
+                            / (0.1 + found.cost);
+                    if worth > most && found.inliers > LEAST_INLIERS {
+                        most = worth;
+                        best = Some((pair, [choice_a, *choice_b], found));
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// Cameras that stand somewhere.
+    pub(crate) fn start(&self, random: &mut Rng) -> Result<Start, Doubt> {
+        let (pair, chosen, found) = self.pair(random).ok_or(Doubt::NoPair)?;
+        let mut cameras = self.cameras.clone();
+        cameras[pair[0]].camera_from_world = Isometry3::identity();
+        cameras[pair[1]].camera_from_world = found.b_from_a;
+        let mut choices = vec![None; cameras.len()];
+        choices[pair[0]] = Some(chosen[0]);
+        choices[pair[1]] = Some(chosen[1]);
+        while choices.iter().any(Option::is_none) {
+            self.settle(&mut cameras, &choices, pair);
+            let next = self.next(&cameras, &choices, random);
+            let Some((camera, choice, placed, cost)) = next else {
+                let camera = choices.iter().position(Option::is_none).unwrap_or(0);
+                return Err(Doubt::Unplaced { camera, cost: None });
+            };
+            if cost > MOST_COST {
+                return Err(Doubt::Unplaced {
+                    camera,
+                    cost: Some(cost),
+                });
+            }
+            cameras[camera] = placed;
+            choices[camera] = Some(choice);
+        }
+        Ok(Start {
+            cameras,
+            choices: choices.into_iter().flatten().collect(),
+            pair,
+        })
+    }
+
+    /// Adjusts the cameras that are placed.
+    fn settle(&self, cameras: &mut Vec<Camera>, choices: &[Option<Choice>], pair: [usize; 2]) {
+        let free: Vec<Free> = choices
+            .iter()
+            .enumerate()
+            .map(|(camera, it)| Free {
+                pose: it.is_some() && camera != pair[0],
+                ..Free::default()
+            })
+            .collect();
+        let beliefs = Beliefs {
+            baseline: Some((pair[0], pair[1], 1.0)),
+            ..Beliefs::default()
+        };
+        let seen = self.sightings(choices);
+        let sigmas = self.sigmas(choices);
+        let all = Cameras::new(cameras.clone(), &free);
+        let problem = Adjustment::new(all, &seen, &sigmas, beliefs);
+        let settings = Search {
+            max_iterations: 12,
+            least_gain: 1e-4,
+        };
+        let (end, _) = solve(problem, &settings);
+        *cameras = end.cameras().cameras().to_vec();
+    }
+
+    /// Expected errors at the start, by camera and joint.
+    pub(crate) fn sigmas(&self, choices: &[Option<Choice>]) -> Vec<Vec<f64>> {
+        let of = |(camera, it): (usize, &Option<Choice>)| {
+            let sigma = it.map_or(1.0, |it| self.sigma_px(camera, it));
+            vec![sigma; self.n_joints]
+        };
+        choices.iter().enumerate().map(of).collect()
+    }
+
+    /// The camera that is placed best, and where.
+    fn next(
+        &self,
+        cameras: &[Camera],
+        choices: &[Option<Choice>],
+        random: &mut Rng,
+    ) -> Option<(usize, Choice, Camera, f64)> {
+        let points = self.points(cameras, choices);
+        let mut best: Option<(usize, Choice, Camera, f64)> = None;
+        for camera in (0..cameras.len()).filter(|it| choices[*it].is_none()) {
+            for choice in &self.choices[camera] {
+                let mut alone = vec![None; cameras.len()];
+                alone[camera] = Some(*choice);
+                let seen = self.sightings(&alone);
+                let sigma = self.sigma_px(camera, *choice);
+                let mut known: Vec<Known> = Vec::new();
+                for (instant, points) in seen.seen.iter().zip(&points) {
+                    let each = instant[camera].iter().zip(points);
+                    known.extend(each.filter_map(|(seen, point)| {
+                        let seen = (*seen)?;
+                        Some(((*point)?, seen.at, sigma / seen.weight.sqrt()))
+                    }));
+                }
+                if let Some((placed, cost)) = resected(&self.cameras[camera], &known, random)
+                    && best.as_ref().is_none_or(|it| cost < it.3)
+                {
+                    best = Some((camera, *choice, placed, cost));
+                }
+            }
+        }
+        best
+    }
+
+    /// Joints where the cameras that are placed say: by instant and joint.
+    fn points(
+        &self,
+        cameras: &[Camera],
+        choices: &[Option<Choice>],
+    ) -> Vec<Vec<Option<Point3<f64>>>> {
+        let seen = self.sightings(choices);
+        let at = |instant: &Vec<Vec<Option<super::sightings::Sight>>>, joint: usize| {
+            let each = cameras.iter().enumerate();
+            let observations: Vec<Observation<'_>> = each
+                .filter_map(|(camera, it)| {
+                    let sight = instant[camera][joint]?;
+                    Some(Observation {
+                        camera: it,
+                        point_px: sight.at,
+                        sigma_px: self.sigma_px(camera, choices[camera]?),
+                    })
+                })
+                .collect();
+            place(&observations)
+        };
+        let of = |instant| (0..self.n_joints).map(|it| at(instant, it)).collect();
+        seen.seen.iter().map(of).collect()
+    }
+}

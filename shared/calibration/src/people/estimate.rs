@@ -1,0 +1,483 @@
+//! The whole: what is looked at, the rig, and what forbids to use it.
+
+use body::N_JOINTS;
+use fastrand::Rng;
+use geometry::Camera;
+use geometry::bundle::{Covariance, covariance};
+use nalgebra::{DVector, Point3, UnitVector3};
+use synchronisation::Film;
+
+use super::begin::{Choice, Study, choices};
+use super::doubt::Doubt;
+use super::frame::{Scale, Vertical, World, bone_spread, stature_of, world};
+use super::measure::{CELLS, Fit, fits};
+use super::sightings::{Chain, chains, ideal};
+use super::solve::{Solved, Wanted, solved};
+use super::{Recording, Settings};
+use crate::align::{aligned, differences};
+use crate::median::median;
+
+/// A camera sees people for at least so long, seconds.
+pub(crate) const LEAST_SEEN_S: f64 = 0.5;
+/// The fewest instants.
+pub(crate) const LEAST_INSTANTS: usize = 12;
+/// Median residual of a camera, as a share of the size of a person.
+pub(crate) const MOST_RESIDUAL: f64 = 0.04;
+/// Standard deviation of a camera: degrees, and share of its distance to the people.
+const MOST_SD: [f64; 2] = [1.5, 0.04];
+/// Difference of halves, likewise: the whole is about half as far off.
+pub(crate) const MOST_HALVES: [f64; 2] = [3.0, 0.06];
+/// Change of bones.
+const MOST_BONES: f64 = 0.2;
+/// Rigs that are drawn to see how far the joints let each camera be from where it is.
+const DRAWN: usize = 100;
+/// Blocks of the recording, which the halves take in turns, are at least so long, seconds.
+pub(crate) const BLOCK_S: f64 = 1.0;
+
+/// Why nothing was looked at.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PeopleError {
+    /// One camera, or films of other cameras.
+    #[error(
+        "{cameras} cameras with {films} films: at least 2 cameras are needed, each with its film"
+    )]
+    Number {
+        /// Cameras.
+        cameras: usize,
+        /// Films.
+        films: usize,
+    },
+    /// Fewer joints than a body has, or sides of another number.
+    #[error("{joints} joints with {sides} sides: at least {least} are needed, each with its side", least = N_JOINTS)]
+    Joints {
+        /// Joints.
+        joints: usize,
+        /// Sides.
+        sides: usize,
+    },
+    /// A length that is none.
+    #[error("a length of {metres} m cannot be used")]
+    Length {
+        /// The number.
+        metres: f64,
+    },
+}
+
+/// What came out for a camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraReport {
+    /// Joints that took part.
+    pub joints: usize,
+    /// Median residual, pixels.
+    pub residual_px: f64,
+    /// Share of joints within three times their expected error.
+    pub inliers: f64,
+    /// Joints in each of 8 x 8 cells of the picture, row by row.
+    pub cells: Vec<usize>,
+    /// How far it may be from where it is, by the residuals, the rigs being laid upon one another: degrees, metres.
+    pub sd: [f64; 2],
+    /// Standard deviation of the focal length, pixels, where it was estimated.
+    pub focal_sd_px: Option<f64>,
+    /// What halves of the recording differ by: degrees, metres.
+    pub halves: Option<[f64; 2]>,
+    /// What is added to its times, seconds, and the standard deviation.
+    pub offset_s: [f64; 2],
+}
+
+/// What came out.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The cameras with their new poses; as given where there is no answer at all.
+    pub cameras: Vec<Camera>,
+    /// Against gravity.
+    pub up: Option<UnitVector3<f64>>,
+    /// Where that comes from.
+    pub vertical: Vertical,
+    /// Standard deviation of the scale as a share, as far as the bones tell it.
+    pub scale_sd: f64,
+    /// The standing height of the person by the lengths of the bones, metres.
+    pub stature_m: Option<f64>,
+    /// One for each camera; none where there is no answer.
+    pub reports: Vec<CameraReport>,
+    /// Every reason not to use it.
+    pub doubts: Vec<Doubt>,
+    /// Instants that were looked at.
+    pub n_instants: usize,
+    /// Their first and last, seconds on the common clock.
+    pub span_s: [f64; 2],
+    /// Views whose left and right were exchanged.
+    pub n_exchanged: usize,
+    /// The skeletons that were found on the way, metres: by instant and joint.
+    pub skeletons: Vec<Vec<Option<Point3<f64>>>>,
+}
+
+/// Estimates where the cameras stand.
+///
+/// # Errors
+///
+/// [`PeopleError`]: what cannot be looked at. Where too little can be told there is an [`Outcome`] with doubts.
+pub fn estimate(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome, PeopleError> {
+    let Recording { cameras, films } = *recording;
+    check(cameras, films, settings)?;
+    let interval_s = films.iter().filter_map(interval_s).fold(0.0, f64::max);
+    let chains: Vec<Vec<Chain>> = cameras
+        .iter()
+        .zip(films)
+        .map(|(camera, film)| chains(film, camera, settings.n_joints, interval_s))
+        .collect();
+    let mut outcome = nothing(cameras, settings);
+    for (camera, of) in chains.iter().enumerate() {
+        let seen_s = of.first().map_or(0.0, Chain::seen_s);
+        if seen_s < LEAST_SEEN_S {
+            outcome.doubts.push(Doubt::NoPeople {
+                camera,
+                seen_s,
+                least_s: LEAST_SEEN_S,
+            });
+        }
+    }
+    let times_s = instants(
+        &chains,
+        (&settings.offsets_s, settings.most_instants),
+        interval_s,
+    );
+    if outcome.doubts.is_empty() && times_s.len() < LEAST_INSTANTS {
+        outcome.doubts.push(Doubt::FewInstants {
+            n: times_s.len(),
+            least: LEAST_INSTANTS,
+        });
+    }
+    if !outcome.doubts.is_empty() {
+        return Ok(outcome);
+    }
+    outcome.span_s = [times_s[0], times_s[times_s.len() - 1]];
+    let of = |(camera, it): (usize, &Vec<Chain>)| {
+        let offset_s = settings.offsets_s.get(camera).copied().unwrap_or(0.0);
+        choices(it.len(), offset_s, settings.window_s, settings.as_seen)
+    };
+    let study = Study {
+        cameras: cameras.iter().map(ideal).collect(),
+        chains: &chains,
+        choices: chains.iter().enumerate().map(of).collect(),
+        times_s,
+        n_joints: settings.n_joints,
+        sides: &settings.sides,
+    };
+    outcome.n_instants = study.times_s.len();
+    let mut random = Rng::with_seed(settings.seed);
+    let wanted = Wanted {
+        focal: settings.focal,
+    };
+    match solved(&study, wanted, &mut random) {
+        Ok(all) => judge(&mut outcome, (cameras, &study), &all, settings, &mut random),
+        Err(doubt) => outcome.doubts.push(doubt),
+    }
+    Ok(outcome)
+}
+
+fn check(cameras: &[Camera], films: &[Film], settings: &Settings) -> Result<(), PeopleError> {
+    if cameras.len() < 2 || cameras.len() != films.len() {
+        return Err(PeopleError::Number {
+            cameras: cameras.len(),
+            films: films.len(),
+        });
+    }
+    check_joints(settings.n_joints, &settings.sides)?;
+    match settings.scale {
+        Scale::Height(metres) | Scale::Distance(_, _, metres)
+            if !(metres.is_finite() && metres > 0.0) =>
+        {
+            Err(PeopleError::Length { metres })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Sees that the joints are those of a body, and every side is one of them.
+pub(crate) fn check_joints(joints: usize, sides: &[usize]) -> Result<(), PeopleError> {
+    if joints < N_JOINTS || sides.len() != joints || sides.iter().any(|it| *it >= joints) {
+        let sides = sides.len();
+        return Err(PeopleError::Joints { joints, sides });
+    }
+    Ok(())
+}
+
+pub(crate) fn interval_s(film: &Film) -> Option<f64> {
+    let mut steps: Vec<f64> = film
+        .shots
+        .array_windows()
+        .map(|[a, b]| b.time_s - a.time_s)
+        .collect();
+    median(&mut steps)
+}
+
+fn nothing(cameras: &[Camera], settings: &Settings) -> Outcome {
+    Outcome {
+        cameras: cameras.to_vec(),
+        up: None,
+        vertical: if settings.scale == Scale::Rig {
+            Vertical::Rig
+        } else {
+            Vertical::Leaning
+        },
+        scale_sd: f64::NAN,
+        stature_m: None,
+        reports: Vec::new(),
+        doubts: Vec::new(),
+        n_instants: 0,
+        span_s: [0.0; 2],
+        n_exchanged: 0,
+        skeletons: Vec::new(),
+    }
+}
+
+/// Instants at which at least two cameras see their first person, evenly over the recording.
+///
+/// * `offsets_s`: of the clocks; 0 where none is given. `most`: the most instants.
+pub(crate) fn instants(
+    chains: &[Vec<Chain>],
+    (offsets_s, most): (&[f64], usize),
+    interval_s: f64,
+) -> Vec<f64> {
+    let spans: Vec<[f64; 2]> = chains
+        .iter()
+        .enumerate()
+        .filter_map(|(camera, it)| {
+            let offset_s = offsets_s.get(camera).copied().unwrap_or(0.0);
+            Some(it.first()?.span().map(|it| it + offset_s))
+        })
+        .collect();
+    let mut froms: Vec<f64> = spans.iter().map(|it| it[0]).collect();
+    let mut tos: Vec<f64> = spans.iter().map(|it| it[1]).collect();
+    froms.sort_by(f64::total_cmp);
+    tos.sort_by(|a, b| b.total_cmp(a));
+    let (Some(from), Some(to)) = (froms.get(1), tos.get(1)) else {
+        return Vec::new();
+    };
+    let length_s = to - from;
+    if length_s <= 0.0 || interval_s <= 0.0 {
+        return Vec::new();
+    }
+    let n = ((length_s / interval_s).round() as usize + 1).clamp(1, most.max(2));
+    let step_s = length_s / (n.max(2) - 1) as f64;
+    (0..n).map(|it| from + step_s * it as f64).collect()
+}
+
+/// What is to be said of an answer.
+fn judge(
+    outcome: &mut Outcome,
+    (given, study): (&[Camera], &Study<'_>),
+    all: &Solved,
+    settings: &Settings,
+    random: &mut Rng,
+) {
+    let skeletons = all.skeletons(settings.n_joints);
+    let times_s = &study.times_s[..];
+    let found = all.cameras();
+    let made = world(found, (given, None), settings.scale, (times_s, &skeletons));
+    let Some(World {
+        to_metres,
+        up,
+        vertical,
+        scale_sd,
+    }) = made
+    else {
+        outcome.doubts.push(Doubt::NoBody);
+        return;
+    };
+    (outcome.up, outcome.vertical, outcome.scale_sd) = (up, vertical, scale_sd);
+    outcome.n_exchanged = all.n_exchanged;
+    let placed = found.iter().zip(given).map(|(found, given)| {
+        let mut camera = to_metres.camera(found);
+        camera.intrinsics.lens = given.intrinsics.lens;
+        camera
+    });
+    outcome.cameras = placed.collect();
+    let to_metres_point = |it: &Option<Point3<f64>>| it.map(|it| to_metres.point(&it));
+    outcome.skeletons = skeletons
+        .iter()
+        .map(|it| it.iter().map(to_metres_point).collect())
+        .collect();
+    outcome.stature_m = stature_of(&outcome.skeletons).map(|it| it.0);
+    let fits = fits(&all.problem, &all.sigmas_px);
+    let known = covariance(&all.problem);
+    let inflation = all.report.variance().sqrt().max(1.0);
+    let sds = known
+        .as_ref()
+        .ok()
+        .and_then(|it| spread(all, it, inflation, random));
+    outcome.reports = fits
+        .into_iter()
+        .enumerate()
+        .map(|(camera, fit)| {
+            let sd = sds.as_ref().map_or([f64::INFINITY; 2], |it| it[camera]);
+            let sd = [sd[0], to_metres.scale * sd[1]];
+            report((camera, sd), fit, all, known.as_ref().ok(), inflation)
+        })
+        .collect();
+    if !all.report.is_converged() {
+        let iterations = all.report.iterations;
+        outcome.doubts.push(Doubt::NotConverged { iterations });
+    }
+    if let Err(error) = known {
+        let what = error.to_string();
+        outcome.doubts.push(Doubt::Undetermined { what });
+    }
+    if let Some(spread) = bone_spread(&skeletons).filter(|it| *it > MOST_BONES) {
+        let limit = MOST_BONES;
+        outcome.doubts.push(Doubt::Bones { spread, limit });
+    }
+    certainty(outcome, study, all);
+    halves(outcome, study, all, settings, random);
+}
+
+/// How far every camera may be from where it is: degrees, and units of the solution. Rigs are drawn from the covariance, and laid
+/// upon the one that was found, so that no camera counts as exact. None where the covariance is none.
+fn spread(
+    all: &Solved,
+    known: &Covariance,
+    inflation: f64,
+    random: &mut Rng,
+) -> Option<Vec<[f64; 2]>> {
+    let cameras = all.problem.cameras();
+    let n = cameras.n_parameters();
+    let own = known.matrix.view((0, 0), (n, n)).into_owned();
+    let factor = (own * inflation.powi(2)).cholesky()?.unpack();
+    let mut sums = vec![[0.0; 2]; cameras.cameras().len()];
+    for _ in 0..DRAWN {
+        let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+        let drawn = DVector::from_fn(n, |_, _| normal());
+        let moved = cameras.moved((&factor * drawn).as_slice());
+        let apart = differences(moved.cameras(), cameras.cameras(), true);
+        for (sum, it) in sums.iter_mut().zip(apart) {
+            sum[0] += it.turn.to_degrees().powi(2);
+            sum[1] += it.way.powi(2);
+        }
+    }
+    let mean = |it: &[f64; 2]| it.map(|it| (it / DRAWN as f64).sqrt());
+    Some(sums.iter().map(mean).collect())
+}
+
+fn report(
+    (camera, sd): (usize, [f64; 2]),
+    fit: Fit,
+    all: &Solved,
+    known: Option<&Covariance>,
+    inflation: f64,
+) -> CameraReport {
+    debug_assert_eq!(fit.cells.len(), CELLS * CELLS, "a square of cells");
+    let of = |parameter: usize| known.map_or(f64::INFINITY, |it| inflation * it.sd(parameter));
+    let offset_sd = all.problem.offset_parameter(camera).map_or(0.0, of);
+    CameraReport {
+        joints: fit.n,
+        residual_px: fit.median_px,
+        inliers: fit.inliers,
+        cells: fit.cells,
+        sd,
+        focal_sd_px: all.problem.cameras().focal_parameter(camera).map(of),
+        halves: None,
+        offset_s: [all.choices[camera].offset_s, offset_sd],
+    }
+}
+
+/// The distance of a camera to the people, metres.
+fn distances(outcome: &Outcome) -> Vec<f64> {
+    let all: Vec<&Point3<f64>> = outcome.skeletons.iter().flatten().flatten().collect();
+    let axis = |axis: usize| median(&mut all.iter().map(|it| it[axis]).collect::<Vec<_>>());
+    let middle = Point3::new(
+        axis(0).unwrap_or(0.0),
+        axis(1).unwrap_or(0.0),
+        axis(2).unwrap_or(0.0),
+    );
+    let each = outcome.cameras.iter();
+    each.map(|it| (it.centre_in_world() - middle).norm())
+        .collect()
+}
+
+fn certainty(outcome: &mut Outcome, study: &Study<'_>, all: &Solved) {
+    let distances = distances(outcome);
+    for (camera, report) in outcome.reports.iter().enumerate() {
+        let sd = [report.sd[0], report.sd[1] / distances[camera]];
+        // NaN is not less.
+        if !(sd[0] < MOST_SD[0] && sd[1] < MOST_SD[1]) {
+            let limits = MOST_SD;
+            outcome.doubts.push(Doubt::Uncertain { camera, sd, limits });
+        }
+        let size = study.chains[camera][all.choices[camera].chain].size();
+        let share = report.residual_px / size;
+        if share >= MOST_RESIDUAL || share.is_nan() {
+            let limit = MOST_RESIDUAL;
+            outcome.doubts.push(Doubt::Fit {
+                camera,
+                share,
+                limit,
+            });
+        }
+    }
+}
+
+/// Which half an instant belongs to: blocks in turns.
+pub(crate) fn half_of(time_s: f64, [from, to]: [f64; 2]) -> usize {
+    let n = ((to - from) / BLOCK_S).floor().clamp(2.0, 16.0);
+    let n = 2.0 * (n / 2.0).floor();
+    let block = ((time_s - from) / (to - from).max(f64::MIN_POSITIVE) * n).floor();
+    block.clamp(0.0, n - 1.0) as usize % 2
+}
+
+/// Both halves of the recording from the beginning, beside the whole.
+fn halves(
+    outcome: &mut Outcome,
+    study: &Study<'_>,
+    all: &Solved,
+    settings: &Settings,
+    random: &mut Rng,
+) {
+    let span = outcome.span_s;
+    let mut rigs = Vec::new();
+    for half in 0..2 {
+        let near = |it: &Choice| vec![*it];
+        let part = Study {
+            times_s: study
+                .times_s
+                .iter()
+                .copied()
+                .filter(|it| half_of(*it, span) == half)
+                .collect(),
+            choices: all.choices.iter().map(near).collect(),
+            ..study.clone()
+        };
+        let wanted = Wanted {
+            focal: settings.focal,
+        };
+        match solved(&part, wanted, random) {
+            Ok(it) => rigs.push(it.cameras().to_vec()),
+            Err(why) => {
+                let why = Box::new(why);
+                outcome.doubts.push(Doubt::NoHalf { why });
+                return;
+            }
+        }
+    }
+    let laid = rigs.iter().filter_map(|it| {
+        let similarity = aligned(it, &outcome.cameras, true)?;
+        Some(it.iter().map(|it| similarity.camera(it)).collect())
+    });
+    let laid: Vec<Vec<Camera>> = laid.collect();
+    let [one, other] = &laid[..] else { return };
+    let apart = differences(one, other, true);
+    let distances = distances(outcome);
+    let mut worst: Option<(f64, usize, [f64; 2])> = None;
+    for (camera, it) in apart.iter().enumerate() {
+        let by = [it.turn.to_degrees(), it.way / distances[camera]];
+        outcome.reports[camera].halves = Some([by[0], it.way]);
+        let excess = (by[0] / MOST_HALVES[0]).max(by[1] / MOST_HALVES[1]);
+        // NaN counts as worst.
+        if worst.is_none_or(|it| excess > it.0 || excess.is_nan()) {
+            worst = Some((excess, camera, by));
+        }
+    }
+    if let Some((_, camera, by)) = worst.filter(|it| it.0 > 1.0 || it.0.is_nan()) {
+        let limits = MOST_HALVES;
+        outcome.doubts.push(Doubt::Halves { camera, by, limits });
+    }
+}

@@ -1,0 +1,304 @@
+//! The world of a rig that has none: lengths, the vertical, and the floor.
+
+use body::{BONES, Joints, N_JOINTS, stature};
+use geometry::Camera;
+use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, UnitQuaternion, UnitVector3, Vector3};
+
+use crate::align::{Similarity, aligned};
+use crate::median::median;
+
+/// Ankles slower than this stand, metres per second.
+const STANDING_M_S: f64 = 0.25;
+/// Feet have to stand so far apart, metres, and so nearly in one plane, for it to be the floor.
+const FLOOR_M: [f64; 2] = [0.3, 0.06];
+/// The normal of the floor is within so much of the direction of bodies, radians.
+const FROM_BODIES: f64 = 0.5;
+/// Legs straighter than this are those of someone who stands, radians.
+const STRAIGHT: f64 = 0.35;
+/// Height of the ankle above the floor as a share of the stature (Drillis & Contini 1966).
+const ANKLE: f64 = 0.039;
+/// The fewest skeletons, or feet, that say anything.
+const LEAST: usize = 5;
+/// Ankles, knees, hips of both sides, and the neck.
+const LEGS: [[usize; 3]; 2] = [[0, 1, 2], [5, 4, 3]];
+const NECK: usize = 12;
+
+/// What tells lengths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// The standing height of the person, metres, by the lengths of the bones.
+    Height(f64),
+    /// The distance of two cameras, metres.
+    Distance(usize, usize, f64),
+    /// The rig that was given: its scale, and its world.
+    Rig,
+}
+
+/// Where the vertical comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Vertical {
+    /// The plane in which the feet stand.
+    Feet,
+    /// People who stand upright.
+    Bodies,
+    /// Bodies in the mean: nobody stands with straight legs. May be off by many degrees.
+    Leaning,
+    /// The rig that was given.
+    Rig,
+}
+
+/// Skeletons by instant and joint.
+pub(crate) type Skeletons = Vec<Vec<Option<Point3<f64>>>>;
+
+/// Takes the world of a solution to metres, with the floor at z = 0, and says where the vertical comes from.
+pub(crate) struct World {
+    pub(crate) to_metres: Similarity,
+    pub(crate) up: Option<UnitVector3<f64>>,
+    pub(crate) vertical: Vertical,
+    /// Standard deviation of the scale, as a share, as far as bones tell it.
+    pub(crate) scale_sd: f64,
+}
+
+/// None where nothing tells the scale: too few bones.
+pub(crate) fn world(
+    cameras: &[Camera],
+    given: (&[Camera], Option<UnitVector3<f64>>),
+    scale: Scale,
+    (times_s, skeletons): (&[f64], &Skeletons),
+) -> Option<World> {
+    let (factor, scale_sd) = match scale {
+        Scale::Rig => {
+            let (given, up) = given;
+            return Some(World {
+                to_metres: aligned(cameras, given, true)?,
+                up,
+                vertical: Vertical::Rig,
+                scale_sd: 0.0,
+            });
+        }
+        Scale::Distance(a, b, metres) => {
+            let [a, b] = [a, b].map(|it| cameras[it].centre_in_world());
+            (metres / (a - b).norm(), 0.0)
+        }
+        Scale::Height(metres) => of_height(skeletons, metres)?,
+    };
+    let scaled: Skeletons = skeletons
+        .iter()
+        .map(|it| it.iter().map(|it| it.map(|it| it * factor)).collect())
+        .collect();
+    let (up, vertical) = vertical(times_s, &scaled)?;
+    let to_z = turn_to_z(up);
+    let turned = |it: &Point3<f64>| to_z * it;
+    let feet: Vec<Point3<f64>> = standing(times_s, &scaled, &up).iter().map(turned).collect();
+    let all = scaled.iter().flatten().flatten();
+    let turned: Vec<Point3<f64>> = all.map(turned).collect();
+    let middle = |axis: usize| median(&mut turned.iter().map(|it| it[axis]).collect::<Vec<_>>());
+    let ankle = ANKLE * stature_of(&scaled).map_or(1.7, |it| it.0);
+    let floor = match median(&mut feet.iter().map(|it| it.z).collect::<Vec<_>>()) {
+        Some(height) if feet.len() >= LEAST => height - ankle,
+        _ => turned.iter().map(|it| it.z).fold(f64::INFINITY, f64::min) - ankle,
+    };
+    let to_metres = Similarity {
+        rotation: to_z,
+        scale: factor,
+        translation: Vector3::new(-middle(0)?, -middle(1)?, -floor),
+    };
+    Some(World {
+        to_metres,
+        up: Some(Vector3::z_axis()),
+        vertical,
+        scale_sd,
+    })
+}
+
+/// The turn that takes a direction to z by the shortest way.
+fn turn_to_z(up: UnitVector3<f64>) -> UnitQuaternion<f64> {
+    let half = UnitQuaternion::rotation_between(&up, &Vector3::z());
+    half.unwrap_or_else(|| {
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(
+            &Vector3::x_axis(),
+            core::f64::consts::PI,
+        ))
+    })
+}
+
+fn joints(skeleton: &[Option<Point3<f64>>]) -> Joints {
+    let mut joints: Joints = [None; N_JOINTS];
+    for (to, from) in joints.iter_mut().zip(skeleton) {
+        *to = *from;
+    }
+    joints
+}
+
+/// The stature of all skeletons together, the median, and its deviation; metres.
+pub(crate) fn stature_of(skeletons: &Skeletons) -> Option<(f64, f64)> {
+    let mut each: Vec<[f64; 2]> = skeletons
+        .iter()
+        .filter_map(|it| stature(&joints(it)))
+        .map(|it| [it.metres, it.sd])
+        .collect();
+    if each.len() < LEAST {
+        return None;
+    }
+    each.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let [metres, sd] = each[each.len() / 2];
+    Some((metres, sd))
+}
+
+/// Metres in a unit such that the person is so tall, with the relative deviation.
+fn of_height(skeletons: &Skeletons, metres: f64) -> Option<(f64, f64)> {
+    // Shares of the stature depend on the stature a little, so the factor is found by bisection.
+    let tall = |factor: f64| {
+        let scaled = skeletons.iter();
+        let scaled: Skeletons = scaled
+            .map(|it| it.iter().map(|it| it.map(|it| it * factor)).collect())
+            .collect();
+        stature_of(&scaled)
+    };
+    let (first, _) = tall(1.0)?;
+    let [mut low, mut high] = [0.3, 3.0].map(|it| it * metres / first);
+    for _ in 0..40 {
+        let middle = f64::midpoint(low, high);
+        if tall(middle)?.0 < metres {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let factor = f64::midpoint(low, high);
+    let (_, sd) = tall(factor)?;
+    Some((factor, sd / metres))
+}
+
+/// The lower ankle of every instant at which it stands, metres.
+///
+/// * `up`: about against gravity.
+fn standing(times_s: &[f64], skeletons: &Skeletons, up: &UnitVector3<f64>) -> Vec<Point3<f64>> {
+    let mut feet = Vec::new();
+    for nth in 1..skeletons.len() {
+        let passed = times_s[nth] - times_s[nth - 1];
+        if passed > 0.5 || passed <= 0.0 {
+            continue;
+        }
+        let [right, left] = LEGS.map(|it| skeletons[nth][it[0]]);
+        let (Some(right), Some(left)) = (right, left) else {
+            continue;
+        };
+        let is_right = (right - left).dot(up) < 0.0;
+        let (at, ankle) = if is_right {
+            (right, LEGS[0][0])
+        } else {
+            (left, LEGS[1][0])
+        };
+        let before = skeletons[nth - 1][ankle];
+        if before.is_some_and(|it| (at - it).norm() < STANDING_M_S * passed) {
+            feet.push(at);
+        }
+    }
+    feet
+}
+
+/// The direction against gravity.
+fn vertical(times_s: &[f64], skeletons: &Skeletons) -> Option<(UnitVector3<f64>, Vertical)> {
+    let upright: Vec<Vector3<f64>> = skeletons
+        .iter()
+        .filter_map(|it| body(it, STRAIGHT))
+        .collect();
+    let all: Vec<Vector3<f64>> = skeletons
+        .iter()
+        .filter_map(|it| body(it, core::f64::consts::PI))
+        .collect();
+    let (bodies, source) = if upright.len() >= LEAST {
+        (middle(&upright)?, Vertical::Bodies)
+    } else {
+        (middle(&all)?, Vertical::Leaning)
+    };
+    let feet = standing(times_s, skeletons, &bodies);
+    if let Some(normal) = floor(&feet) {
+        let normal = if normal.dot(&bodies) < 0.0 {
+            -normal
+        } else {
+            normal
+        };
+        if normal.angle(&bodies) < FROM_BODIES {
+            return Some((normal, Vertical::Feet));
+        }
+    }
+    Some((bodies, source))
+}
+
+/// The normal of the plane that feet stand in.
+fn floor(feet: &[Point3<f64>]) -> Option<UnitVector3<f64>> {
+    let mut kept: Vec<Point3<f64>> = feet.to_vec();
+    let mut normal = None;
+    for _ in 0..3 {
+        if kept.len() < 4 * LEAST {
+            return None;
+        }
+        let n = kept.len() as f64;
+        let middle = kept.iter().map(|it| it.coords).sum::<Vector3<f64>>() / n;
+        let spread: Matrix3<f64> = kept
+            .iter()
+            .map(|it| (it.coords - middle) * (it.coords - middle).transpose() / n)
+            .sum();
+        let eigen = SymmetricEigen::new(spread);
+        let mut sizes: Vec<f64> = eigen
+            .eigenvalues
+            .iter()
+            .map(|it| it.max(0.0).sqrt())
+            .collect();
+        sizes.sort_by(f64::total_cmp);
+        let axis = eigen
+            .eigenvectors
+            .column(eigen.eigenvalues.imin())
+            .into_owned();
+        let is_floor = sizes[1] > FLOOR_M[0] && sizes[0] < FLOOR_M[1];
+        normal = is_floor.then(|| UnitVector3::new_normalize(axis));
+        let limit = (2.5 * sizes[0]).max(0.01);
+        kept.retain(|it| (it.coords - middle).dot(&axis).abs() < limit);
+    }
+    normal
+}
+
+/// From the middle of the ankles to the neck of someone who stands on a straight leg, with a straight trunk above it.
+fn body(skeleton: &[Option<Point3<f64>>], most: f64) -> Option<Vector3<f64>> {
+    let neck = skeleton[NECK]?.coords;
+    let (mut ankles, mut hips) = (Vector3::zeros(), Vector3::zeros());
+    let mut bend = f64::INFINITY;
+    for [ankle, knee, hip] in LEGS {
+        let [ankle, knee, hip] = [skeleton[ankle]?, skeleton[knee]?, skeleton[hip]?];
+        bend = bend.min((knee - ankle).angle(&(hip - knee)));
+        ankles += 0.5 * ankle.coords;
+        hips += 0.5 * hip.coords;
+    }
+    let way = neck - ankles;
+    let is_straight = bend <= most && (hips - ankles).angle(&(neck - hips)) <= most;
+    (is_straight && way.norm() > 1e-9).then(|| way / way.norm())
+}
+
+/// The direction in the middle: each axis by its median.
+fn middle(all: &[Vector3<f64>]) -> Option<UnitVector3<f64>> {
+    if all.len() < LEAST {
+        return None;
+    }
+    let axis = |axis: usize| median(&mut all.iter().map(|it| it[axis]).collect::<Vec<_>>());
+    UnitVector3::try_new(Vector3::new(axis(0)?, axis(1)?, axis(2)?), 1e-9)
+}
+
+/// How much the bones change their lengths over time: the median over bones of the median deviation, as a share.
+pub(crate) fn bone_spread(skeletons: &Skeletons) -> Option<f64> {
+    let mut each = Vec::new();
+    for bone in BONES.iter().filter(|it| it.from[0] == it.from[1]) {
+        let mut lengths: Vec<f64> = skeletons
+            .iter()
+            .filter_map(|it| bone.length(&joints(it)))
+            .collect();
+        if lengths.len() < 2 * LEAST {
+            continue;
+        }
+        let length = median(&mut lengths)?;
+        let mut away: Vec<f64> = lengths.iter().map(|it| (it / length - 1.0).abs()).collect();
+        each.push(1.4826 * median(&mut away)?);
+    }
+    median(&mut each)
+}

@@ -1,0 +1,74 @@
+//! How well joints fit, and where in the picture they are.
+
+use super::adjust::Adjustment;
+use crate::median::median;
+
+/// Fewer joints of a kind have the expected error of all.
+const LEAST: usize = 30;
+/// The least expected error, pixels.
+const LEAST_PX: f64 = 0.3;
+/// The median length of a residual in the plane is so many standard deviations of one axis.
+const MEDIAN: f64 = 1.1774;
+/// Joints take part in what they are measured by: four views of eight numbers determine three.
+const FITTED: f64 = 1.25;
+/// Cells of a picture along each axis.
+pub(crate) const CELLS: usize = 8;
+
+/// Expected errors from the residuals, by camera and joint.
+///
+/// Each joint has one, as a share of the size of the person, which all cameras together tell: errors of every camera by itself would
+/// let one camera have its way in all.
+///
+/// * `sizes_px`: the size of the person in each camera.
+pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Vec<Vec<f64>> {
+    let mut all = vec![Vec::new(); n_joints];
+    problem.residuals(&mut |camera, joint, residual, _| {
+        all[joint].push(residual.norm() / sizes_px[camera]);
+    });
+    let whole = median(&mut all.concat()).unwrap_or(1.0);
+    let share = |it: &Vec<f64>| {
+        let own = median(&mut it.clone()).filter(|_| it.len() >= LEAST);
+        FITTED * own.unwrap_or(whole) / MEDIAN
+    };
+    let shares: Vec<f64> = all.iter().map(share).collect();
+    let of_camera = |size: &f64| shares.iter().map(|it| (it * size).max(LEAST_PX)).collect();
+    sizes_px.iter().map(of_camera).collect()
+}
+
+/// How the joints of a camera fit.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Fit {
+    /// Joints that count.
+    pub(crate) n: usize,
+    /// Median residual, pixels.
+    pub(crate) median_px: f64,
+    /// Share of joints within three times their expected error.
+    pub(crate) inliers: f64,
+    /// How many joints fall into each cell of the picture, row by row.
+    pub(crate) cells: Vec<usize>,
+}
+
+/// The fit of every camera.
+pub(crate) fn fits(problem: &Adjustment, sigmas_px: &[Vec<f64>]) -> Vec<Fit> {
+    let cameras = problem.cameras().cameras();
+    let mut lengths = vec![Vec::new(); cameras.len()];
+    let mut good = vec![0_usize; cameras.len()];
+    let mut cells = vec![vec![0_usize; CELLS * CELLS]; cameras.len()];
+    problem.residuals(&mut |camera, joint, residual, at| {
+        lengths[camera].push(residual.norm());
+        good[camera] += usize::from(residual.norm() < 3.0 * sigmas_px[camera][joint]);
+        let [width, height] = cameras[camera].intrinsics.size.map(f64::from);
+        let share = [(at.x + 0.5) / width, (at.y + 0.5) / height];
+        let cell =
+            share.map(|it| (it * CELLS as f64).floor().clamp(0.0, CELLS as f64 - 1.0) as usize);
+        cells[camera][cell[1] * CELLS + cell[0]] += 1;
+    });
+    let each = lengths.iter_mut().zip(good).zip(cells);
+    each.map(|((lengths, good), cells)| Fit {
+        n: lengths.len(),
+        median_px: median(lengths).unwrap_or(f64::NAN),
+        inliers: good as f64 / lengths.len().max(1) as f64,
+        cells,
+    })
+    .collect()
+}

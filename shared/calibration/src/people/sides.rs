@@ -1,0 +1,138 @@
+//! Left and right exchanged: which view at which instant has it the other way round.
+
+use geometry::{Camera, Observation};
+use nalgebra::Point3;
+
+use super::adjust::place;
+use super::sightings::{Sight, Sightings};
+use super::two_view::{Match, essential_of, normalised, sampson};
+
+/// By how much the cost has to be less the other way round.
+const CLEARLY: f64 = 4.0;
+/// The fewest joints with sides that are compared.
+pub(crate) const LEAST_JOINTS: usize = 4;
+
+/// What joints cost one way and the other.
+#[derive(Default)]
+struct Costs {
+    here: f64,
+    exchanged: f64,
+    n: usize,
+}
+
+impl Costs {
+    fn is_exchanged(&self) -> bool {
+        self.n >= LEAST_JOINTS && self.exchanged + CLEARLY < self.here
+    }
+}
+
+/// Exchanges the sides of a view at an instant where the other views clearly say so; returns how many times.
+///
+/// With three views and more each is compared with the joints that the others triangulate, with two by epipolar lines.
+pub(crate) fn exchange(
+    cameras: &[Camera],
+    sightings: &mut Sightings,
+    sigmas_px: &[Vec<f64>],
+    sides: &[usize],
+) -> usize {
+    let mut n = 0;
+    for instant in 0..sightings.seen.len() {
+        // The worst of an instant first: an exchanged view makes the others look wrong.
+        for _ in 0..cameras.len() {
+            let seen = &sightings.seen[instant];
+            let gain = |camera: usize| {
+                let costs = costs(cameras, seen, camera, sigmas_px, sides);
+                costs
+                    .is_exchanged()
+                    .then_some((camera, costs.here - costs.exchanged))
+            };
+            let worst = (1..=cameras.len()).filter_map(|it| gain(cameras.len() - it));
+            let Some((camera, _)) = worst.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+                break;
+            };
+            sightings.exchange(instant, camera, sides);
+            n += 1;
+        }
+    }
+    n
+}
+
+fn costs(
+    cameras: &[Camera],
+    seen: &[Vec<Option<Sight>>],
+    camera: usize,
+    sigmas_px: &[Vec<f64>],
+    sides: &[usize],
+) -> Costs {
+    let others = |it: &usize| *it != camera && seen[*it].iter().flatten().count() >= LEAST_JOINTS;
+    let others: Vec<usize> = (0..cameras.len()).filter(others).collect();
+    let mut costs = Costs::default();
+    let sided = |joint: &usize| sides.get(*joint).is_some_and(|it| it != joint);
+    for joint in (0..sides.len()).filter(sided) {
+        let sigma = sigmas_px[camera][joint];
+        let pair = [seen[camera][joint], seen[camera][sides[joint]]];
+        let [Some(here), Some(other)] = pair else {
+            continue;
+        };
+        let each = match &others[..] {
+            [] => None,
+            [only] => of_pair(cameras, [*only, camera], seen[*only][joint], [here, other]),
+            many => {
+                let point = point(cameras, seen, many, joint, sigmas_px);
+                point.and_then(|it| of_point(&cameras[camera], &it, [here, other]))
+            }
+        };
+        if let Some([a, b]) = each {
+            costs.here += (a / sigma).powi(2).ln_1p();
+            costs.exchanged += (b / sigma).powi(2).ln_1p();
+            costs.n += 1;
+        }
+    }
+    costs
+}
+
+/// Where the other cameras see a joint.
+pub(crate) fn point(
+    cameras: &[Camera],
+    seen: &[Vec<Option<Sight>>],
+    others: &[usize],
+    joint: usize,
+    sigmas_px: &[Vec<f64>],
+) -> Option<Point3<f64>> {
+    let observations: Vec<Observation<'_>> = others
+        .iter()
+        .filter_map(|it| {
+            Some(Observation {
+                camera: &cameras[*it],
+                point_px: seen[*it][joint]?.at,
+                sigma_px: sigmas_px[*it][joint],
+            })
+        })
+        .collect();
+    place(&observations)
+}
+
+fn of_point(camera: &Camera, point: &Point3<f64>, both: [Sight; 2]) -> Option<[f64; 2]> {
+    let image = camera.project(point)?;
+    Some(both.map(|it| (it.at - image).norm()))
+}
+
+/// Distances from the epipolar line, pixels of the second camera.
+pub(crate) fn of_pair(
+    cameras: &[Camera],
+    [a, b]: [usize; 2],
+    seen: Option<Sight>,
+    both: [Sight; 2],
+) -> Option<[f64; 2]> {
+    let (first, second) = (&cameras[a], &cameras[b]);
+    let b_from_a = second.camera_from_world * first.camera_from_world.inverse();
+    let essential = essential_of(&b_from_a);
+    let at = normalised(first, &seen?.at);
+    Some(both.map(|it| {
+        let pair = Match {
+            a: at,
+            b: normalised(second, &it.at),
+        };
+        sampson(&pair, &essential).abs() * second.intrinsics.fx
+    }))
+}

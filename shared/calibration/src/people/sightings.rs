@@ -1,0 +1,145 @@
+//! From films to sightings: where the joints of one person are in every camera, at the same instants.
+
+use geometry::{Camera, Lens};
+use nalgebra::{Point2, Vector2};
+use synchronisation::{Film, Track, tracks};
+
+/// Standard deviation of the kernel that smooths places over time: so many intervals between pictures, and seconds.
+const SMOOTHING: [f64; 2] = [0.75, 0.015];
+/// Two tracks of a camera can be one person where the second begins within so many seconds.
+const LONGEST_GAP_S: f64 = 3.0;
+/// Chains of a camera that are looked at, those with most pictures.
+const MOST_CHAINS: usize = 3;
+/// Chains with less than this share of the pictures of the longest one are not.
+const LEAST_SHARE: f64 = 0.15;
+
+/// A joint in a camera at an instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sight {
+    /// Ideal pixels.
+    pub(crate) at: Point2<f64>,
+    /// Ideal pixels per second.
+    pub(crate) speed: Vector2<f64>,
+    /// 0 to 1.
+    pub(crate) weight: f64,
+}
+
+/// Tracks of a camera that may be one person: one after the other.
+#[derive(Debug, Clone)]
+pub(crate) struct Chain {
+    tracks: Vec<Track>,
+}
+
+impl Chain {
+    /// How long it is seen, seconds.
+    pub(crate) fn seen_s(&self) -> f64 {
+        let each = self.tracks.iter().map(Track::span);
+        each.map(|[from, to]| to - from).sum()
+    }
+
+    /// First and last time, by the clock of the camera.
+    pub(crate) fn span(&self) -> [f64; 2] {
+        let each = self.tracks.iter().map(Track::span);
+        each.fold([f64::INFINITY, f64::NEG_INFINITY], |span, it| {
+            [span[0].min(it[0]), span[1].max(it[1])]
+        })
+    }
+
+    /// The size of the person, ideal pixels.
+    pub(crate) fn size(&self) -> f64 {
+        let mut each: Vec<f64> = self.tracks.iter().map(Track::size).collect();
+        each.sort_by(f64::total_cmp);
+        each.get(each.len() / 2).copied().unwrap_or(1.0)
+    }
+
+    fn sight(&self, joint: usize, time_s: f64) -> Option<Sight> {
+        let is_at = |it: &&Track| (it.span()[0]..=it.span()[1]).contains(&time_s);
+        let place = self.tracks.iter().find(is_at)?.place(joint, time_s)?;
+        Some(Sight {
+            at: place.at.into(),
+            speed: place.speed.into(),
+            weight: place.weight.clamp(0.05, 1.0),
+        })
+    }
+
+    /// Whether the person of a track may be the one of this chain, and how long the gap is.
+    fn gap(&self, track: &Track) -> Option<f64> {
+        let gap = track.span()[0] - self.span()[1];
+        (0.0..LONGEST_GAP_S).contains(&gap).then_some(gap)
+    }
+}
+
+/// The people that a camera sees longest.
+pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: f64) -> Vec<Chain> {
+    let sigma_s = (SMOOTHING[0] * interval_s).max(SMOOTHING[1]);
+    let mut found = tracks(film, camera, n_joints, sigma_s);
+    found.sort_by(|a, b| a.span()[0].total_cmp(&b.span()[0]));
+    let mut chains: Vec<Chain> = Vec::new();
+    for track in found {
+        let gaps = chains.iter().enumerate();
+        let gaps = gaps.filter_map(|(nth, it)| Some((nth, it.gap(&track)?)));
+        match gaps.min_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((nth, _)) => chains[nth].tracks.push(track),
+            None => chains.push(Chain {
+                tracks: vec![track],
+            }),
+        }
+    }
+    chains.sort_by(|a, b| b.seen_s().total_cmp(&a.seen_s()));
+    let least = LEAST_SHARE * chains.first().map_or(0.0, Chain::seen_s);
+    chains.retain(|it| it.seen_s() >= least);
+    chains.truncate(MOST_CHAINS);
+    chains
+}
+
+/// A camera without distortion, which sees ideal pixels.
+pub(crate) fn ideal(camera: &Camera) -> Camera {
+    let mut camera = camera.clone();
+    camera.intrinsics.lens = Lens::default();
+    camera
+}
+
+/// The joints of one person at instants: by instant, camera and joint.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sightings {
+    pub(crate) times_s: Vec<f64>,
+    pub(crate) seen: Vec<Vec<Vec<Option<Sight>>>>,
+}
+
+impl Sightings {
+    /// Looks up all cameras at instants of the common clock.
+    ///
+    /// * `chains`: the person in every camera, none where he is not known there.
+    /// * `offsets_s`: what is added to the times of a camera to have the common ones.
+    pub(crate) fn new(
+        chains: &[Option<&Chain>],
+        times_s: &[f64],
+        offsets_s: &[f64],
+        n_joints: usize,
+    ) -> Self {
+        let of = |camera: usize, time_s: f64| -> Vec<Option<Sight>> {
+            let own_s = time_s - offsets_s[camera];
+            let look = |joint| chains[camera]?.sight(joint, own_s);
+            (0..n_joints).map(look).collect()
+        };
+        let at = |time_s: &f64| (0..chains.len()).map(|it| of(it, *time_s)).collect();
+        Self {
+            times_s: times_s.to_vec(),
+            seen: times_s.iter().map(at).collect(),
+        }
+    }
+
+    /// Exchanges left and right of a camera at an instant.
+    pub(crate) fn exchange(&mut self, instant: usize, camera: usize, sides: &[usize]) {
+        let own = &self.seen[instant][camera];
+        let other = sides.iter().map(|it| own.get(*it).copied().flatten());
+        self.seen[instant][camera] = other.collect();
+    }
+
+    /// Exchanges left and right of a camera everywhere.
+    pub(crate) fn exchange_all(&mut self, camera: usize, sides: &[usize]) {
+        for instant in 0..self.seen.len() {
+            self.exchange(instant, camera, sides);
+        }
+    }
+}

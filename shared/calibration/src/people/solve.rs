@@ -1,0 +1,115 @@
+//! From a start to the adjustment of everything.
+
+use fastrand::Rng;
+use geometry::Camera;
+use geometry::bundle::{Cameras, Free, Report, Settings as Search, solve};
+use nalgebra::Point3;
+
+use super::adjust::{Adjustment, Beliefs, skeletons};
+use super::begin::{Choice, Start, Study};
+use super::doubt::Doubt;
+use super::measure::sigmas;
+use super::sides::exchange;
+use super::sightings::Sightings;
+
+/// Rounds of clocks, sides, expected errors and adjustment.
+const ROUNDS: usize = 4;
+/// Standard deviation of an offset about what the start knows, seconds.
+const OFFSET_SD_S: f64 = 0.1;
+/// Standard deviation of a focal length that is estimated, as a share.
+const FOCAL_SD: f64 = 0.1;
+
+/// A rig in a world of its own, and all that led to it.
+#[derive(Debug, Clone)]
+pub(crate) struct Solved {
+    pub(crate) choices: Vec<Choice>,
+    pub(crate) problem: Adjustment,
+    pub(crate) report: Report,
+    /// By camera and joint, pixels.
+    pub(crate) sigmas_px: Vec<Vec<f64>>,
+    /// Views whose sides were exchanged.
+    pub(crate) n_exchanged: usize,
+}
+
+impl Solved {
+    pub(crate) fn cameras(&self) -> &[Camera] {
+        self.problem.cameras().cameras()
+    }
+
+    /// By instant and joint.
+    pub(crate) fn skeletons(&self, n_joints: usize) -> Vec<Vec<Option<Point3<f64>>>> {
+        skeletons(&self.problem, n_joints)
+    }
+}
+
+/// What is free.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wanted {
+    pub(crate) focal: bool,
+}
+
+/// A rig from nothing.
+pub(crate) fn solved(study: &Study<'_>, wanted: Wanted, random: &mut Rng) -> Result<Solved, Doubt> {
+    let start = study.start(random)?;
+    let Start {
+        cameras,
+        choices,
+        pair,
+    } = start;
+    let free: Vec<Free> = (0..cameras.len())
+        .map(|camera| Free {
+            pose: camera != pair[0],
+            focal: wanted.focal,
+            ..Free::default()
+        })
+        .collect();
+    let beliefs = Beliefs {
+        baseline: Some((pair[0], pair[1], 1.0)),
+        offset_sd_s: Some(OFFSET_SD_S),
+        focal_sd: FOCAL_SD,
+        ..Beliefs::default()
+    };
+    rounds(study, Cameras::new(cameras, &free), choices, &beliefs)
+}
+
+/// Clocks, sides, expected errors and everything else, in turns.
+pub(crate) fn rounds(
+    study: &Study<'_>,
+    mut cameras: Cameras,
+    mut choices: Vec<Choice>,
+    beliefs: &Beliefs,
+) -> Result<Solved, Doubt> {
+    let size = |(camera, it): (usize, &Choice)| study.chains[camera][it.chain].size();
+    let sizes_px: Vec<f64> = choices.iter().enumerate().map(size).collect();
+    let mut expected: Option<Vec<Vec<f64>>> = None;
+    let mut last = None;
+    for round in 0..ROUNDS {
+        let chosen: Vec<Option<Choice>> = choices.iter().copied().map(Some).collect();
+        let mut seen: Sightings = study.sightings(&chosen);
+        let sigmas_px = expected.take().unwrap_or_else(|| study.sigmas(&chosen));
+        let n_exchanged = exchange(cameras.cameras(), &mut seen, &sigmas_px, study.sides);
+        let problem = Adjustment::new(cameras, &seen, &sigmas_px, beliefs.clone());
+        if problem.n_points() == 0 {
+            return Err(Doubt::NoPair);
+        }
+        let is_last = round + 1 == ROUNDS;
+        let settings = Search {
+            max_iterations: if is_last { 80 } else { 15 },
+            least_gain: if is_last { 1e-6 } else { 1e-5 },
+        };
+        let (problem, report) = solve(problem, &settings);
+        for (choice, step) in choices.iter_mut().zip(problem.offset_steps_s()) {
+            choice.offset_s += step;
+        }
+        expected = Some(sigmas(&problem, &sizes_px, study.n_joints));
+        cameras = problem.cameras().clone();
+        last = Some(Solved {
+            choices: choices.clone(),
+            problem,
+            report,
+            sigmas_px,
+            n_exchanged,
+        });
+    }
+    last.ok_or(Doubt::NoPair)
+}

@@ -1,0 +1,155 @@
+//! Rings of cameras around someone who walks.
+
+use super::testing::{Flaws, N_JOINTS, RADIUS, ring, sides};
+use super::*;
+use crate::differences;
+
+fn settings() -> Settings {
+    Settings {
+        n_joints: N_JOINTS,
+        sides: sides(),
+        as_seen: false,
+        offsets_s: Vec::new(),
+        window_s: 0.0,
+        scale: Scale::Rig,
+        focal: false,
+        most_instants: 90,
+        seed: 1,
+    }
+}
+
+/// Cameras whose poses say nothing.
+fn nowhere(cameras: &[Camera]) -> Vec<Camera> {
+    let each = cameras.iter().cloned();
+    each.map(|it| Camera {
+        camera_from_world: nalgebra::Isometry3::identity(),
+        ..it
+    })
+    .collect()
+}
+
+/// The largest turn, degrees, and way, share of the radius, of a rig from the truth.
+fn worst(found: &[Camera], truth: &[Camera], with_scale: bool) -> [f64; 2] {
+    let each = differences(found, truth, with_scale);
+    each.iter().fold([0.0; 2], |worst, it| {
+        [
+            worst[0].max(it.turn.to_degrees()),
+            worst[1].max(it.way / RADIUS),
+        ]
+    })
+}
+
+fn found(truth: &[Camera], flaws: &Flaws, settings: &Settings) -> Outcome {
+    let films = flaws.films(truth);
+    let recording = Recording {
+        cameras: truth,
+        films: &films,
+    };
+    estimate(&recording, settings).unwrap()
+}
+
+#[test]
+fn the_height_of_the_person_and_the_feet_make_a_world() {
+    let truth = ring(4);
+    let films = Flaws::none(3).films(&truth);
+    let given = nowhere(&truth);
+    let recording = Recording {
+        cameras: &given,
+        films: &films,
+    };
+    let height = Settings {
+        scale: Scale::Height(1.75),
+        ..settings()
+    };
+    let outcome = estimate(&recording, &height).unwrap();
+    assert_eq!(outcome.doubts, []);
+    assert_eq!(outcome.vertical, Vertical::Feet);
+    // Shares of people's statures are means: the scale is known to a few percent.
+    let heights = outcome.cameras.iter().zip(&truth);
+    for (a, b) in heights {
+        let [a, b] = [a, b].map(|it| it.centre_in_world().z);
+        assert!((a - b).abs() < 0.15, "{a} m, not {b} m above the floor");
+    }
+    let across = Settings {
+        scale: Scale::Distance(0, 2, 2.0 * RADIUS),
+        ..height
+    };
+    let outcome = estimate(&recording, &across).unwrap();
+    let [degrees, share] = worst(&outcome.cameras, &truth, false);
+    assert!(degrees < 0.3 && share < 0.02, "{degrees} {share}");
+}
+
+#[test]
+fn clocks_are_found_with_the_cameras() {
+    let truth = ring(4);
+    let flaws = Flaws {
+        offsets_s: vec![0.0, 0.04, -0.07, 0.02],
+        ..Flaws::none(5)
+    };
+    let outcome = found(&truth, &flaws, &settings());
+    assert_eq!(outcome.doubts, []);
+    for (report, offset_s) in outcome.reports.iter().zip(&flaws.offsets_s) {
+        let [found, _] = report.offset_s;
+        assert!((found - offset_s).abs() < 0.004, "{found} {offset_s}");
+    }
+}
+
+#[test]
+fn what_cannot_be_known_is_refused() {
+    let truth = ring(3);
+    // Cameras that see different moments have nothing in common.
+    let mut films = Flaws::none(1).films(&truth);
+    let far = Flaws::none(40).films(&truth);
+    films[2] = far[2].clone();
+    let recording = Recording {
+        cameras: &truth,
+        films: &films,
+    };
+    let outcome = estimate(&recording, &settings()).unwrap();
+    assert!(!outcome.doubts.is_empty());
+
+    // Nobody.
+    films[1] = Film::default();
+    let recording = Recording {
+        cameras: &truth,
+        films: &films,
+    };
+    let outcome = estimate(&recording, &settings()).unwrap();
+    assert!(matches!(
+        outcome.doubts[..],
+        [Doubt::NoPeople { camera: 1, .. }]
+    ));
+}
+
+/// The number of recordings of each ring; 50 were run to measure, see the guide.
+const N_SEEDS: u64 = 2;
+
+#[test]
+fn rings_are_found_and_no_wrong_answer_goes_unrefused() {
+    for n in [3, 5] {
+        let truth = ring(n);
+        let (mut turns, mut ways, mut refused) = (Vec::new(), Vec::new(), 0);
+        for seed in 0..N_SEEDS {
+            let outcome = found(&truth, &Flaws::usual(100 + seed), &settings());
+            let [degrees, share] = worst(&outcome.cameras, &truth, true);
+            if !outcome.doubts.is_empty() {
+                refused += 1;
+                continue;
+            }
+            assert!(
+                degrees < 1.0 && share < 0.03,
+                "{n} cameras, seed {seed}: {degrees} {share}"
+            );
+            turns.push(degrees);
+            ways.push(share);
+        }
+        turns.sort_by(f64::total_cmp);
+        ways.sort_by(f64::total_cmp);
+        assert!(refused <= N_SEEDS / 2, "{n}: {refused} refused");
+        let [turn, way] = [&turns, &ways].map(|it| it[it.len() / 2]);
+        assert!(
+            turn < 0.3 && way < 0.01,
+            "{n}: {turn} degrees, {way} of the radius"
+        );
+    }
+}

@@ -1,0 +1,384 @@
+//! An existing rig made better by a recording, or put right after a camera was moved.
+//!
+//! The rig that is given is believed with stated deviations; a camera that was moved breaks away from them (the belief in a
+//! camera's pose has a loss that saturates). Only what the joints tell better than that moves: a camera that they do not is held.
+//! Whether the new rig is better is told by blocks of the recording that it was not fitted to: each camera's joints against where
+//! the other cameras see them.
+
+mod held_out;
+
+#[cfg(test)]
+mod tests;
+
+use geometry::Camera;
+use geometry::bundle::{Cameras, Free, covariance};
+
+use crate::align::Difference;
+use crate::median::median;
+use crate::people::adjust::{Beliefs, PosePrior};
+use crate::people::begin::{Choice, Study};
+use crate::people::estimate::{
+    LEAST_INSTANTS, LEAST_SEEN_S, MOST_HALVES, MOST_RESIDUAL, check_joints, half_of, instants,
+    interval_s,
+};
+use crate::people::measure::fits;
+use crate::people::sightings::{Chain, chains, ideal};
+use crate::people::solve::{Solved, rounds};
+use crate::people::{Doubt, PeopleError, Recording};
+use held_out::{Blocks, chosen};
+
+/// A camera moves where its deviation is less than this share of what was believed.
+const TOLD: f64 = 0.8;
+/// A camera was moved where the joints fit by this share better without its pose, and so many times more than without that of
+/// another camera.
+const SUSPECT: [f64; 2] = [0.15, 1.5];
+
+/// What is looked at, and what is believed.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Number of joints; the first 14 are those of `skeleton::PARSE14`.
+    pub n_joints: usize,
+    /// Of each joint the one on the other side.
+    pub sides: Vec<usize>,
+    /// What is added to the times of each camera to have the common ones, seconds.
+    pub offsets_s: Vec<f64>,
+    /// Standard deviation of these, seconds.
+    pub offset_sd_s: f64,
+    /// Standard deviations of the poses that are given: degrees, metres.
+    pub pose_sd: [f64; 2],
+    /// Whether focal lengths move, too.
+    pub focal: bool,
+    /// The most instants that are looked at.
+    pub most_instants: usize,
+}
+
+/// What became of a camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// By how much it has moved: degrees, metres.
+    pub moved: [f64; 2],
+    /// Standard deviation of its pose now: degrees, metres.
+    pub sd: [f64; 2],
+    /// Whether the joints tell its pose; held if not.
+    pub is_told: bool,
+    /// Median residual of the rig fitted to everything, pixels.
+    pub residual_px: f64,
+    /// Median distance of its joints from where the others see them, held out, pixels: before and after.
+    pub held_out_px: [f64; 2],
+    /// What is added to its times, seconds.
+    pub offset_s: f64,
+}
+
+/// What came out.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The new rig.
+    pub cameras: Vec<Camera>,
+    /// One for each camera; none where nothing could be done.
+    pub changes: Vec<Change>,
+    /// Median distance over all cameras, held out, pixels: before and after.
+    pub held_out_px: [f64; 2],
+    /// Mean gain of a block over its standard error: more than 2 is hardly chance.
+    pub certainty: f64,
+    /// Blocks that were held out, and how many of them became better.
+    pub blocks: [usize; 2],
+    /// Whether the new rig is better.
+    pub is_better: bool,
+    /// Every reason not to believe either.
+    pub doubts: Vec<Doubt>,
+    /// Instants that were looked at.
+    pub n_instants: usize,
+}
+
+/// Makes a rig better.
+///
+/// # Errors
+///
+/// [`PeopleError`]: what cannot be looked at. Where too little can be told there is an [`Outcome`] with doubts.
+pub fn refine(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome, PeopleError> {
+    let Recording { cameras, films } = *recording;
+    if cameras.len() < 2 || cameras.len() != films.len() {
+        return Err(PeopleError::Number {
+            cameras: cameras.len(),
+            films: films.len(),
+        });
+    }
+    check_joints(settings.n_joints, &settings.sides)?;
+    let interval_s = films.iter().filter_map(interval_s).fold(0.0, f64::max);
+    let each = cameras.iter().zip(films);
+    let chains: Vec<Vec<Chain>> = each
+        .map(|(camera, film)| chains(film, camera, settings.n_joints, interval_s))
+        .collect();
+    let mut outcome = nothing(cameras);
+    for (camera, of) in chains.iter().enumerate() {
+        let seen_s = of.first().map_or(0.0, Chain::seen_s);
+        if seen_s < LEAST_SEEN_S {
+            let least_s = LEAST_SEEN_S;
+            outcome.doubts.push(Doubt::NoPeople {
+                camera,
+                seen_s,
+                least_s,
+            });
+        }
+    }
+    let wanted = (&settings.offsets_s[..], settings.most_instants);
+    let times_s = instants(&chains, wanted, interval_s);
+    let (n, least) = (times_s.len(), 2 * LEAST_INSTANTS);
+    if outcome.doubts.is_empty() && n < least {
+        outcome.doubts.push(Doubt::FewInstants { n, least });
+    }
+    if !outcome.doubts.is_empty() {
+        return Ok(outcome);
+    }
+    outcome.n_instants = n;
+    let mut study = Study {
+        cameras: cameras.iter().map(ideal).collect(),
+        chains: &chains,
+        choices: Vec::new(),
+        times_s,
+        n_joints: settings.n_joints,
+        sides: &settings.sides,
+    };
+    let choices = chosen(&study, &settings.offsets_s);
+    study.choices = choices.iter().map(|it| vec![*it]).collect();
+    match better(&study, &choices, settings, &mut outcome) {
+        Ok(all) => finish(&mut outcome, (cameras, &study), &all),
+        Err(doubt) => outcome.doubts.push(doubt),
+    }
+    Ok(outcome)
+}
+
+fn nothing(cameras: &[Camera]) -> Outcome {
+    Outcome {
+        cameras: cameras.to_vec(),
+        changes: Vec::new(),
+        held_out_px: [f64::NAN; 2],
+        certainty: 0.0,
+        blocks: [0; 2],
+        is_better: false,
+        doubts: Vec::new(),
+        n_instants: 0,
+    }
+}
+
+/// The rig of everything, after what was said of it by what each half was not fitted to.
+fn better(
+    study: &Study<'_>,
+    choices: &[Choice],
+    settings: &Settings,
+    outcome: &mut Outcome,
+) -> Result<Solved, Doubt> {
+    let everything = Moving {
+        suspect: suspect(study, choices, settings)?,
+        told: vec![true; choices.len()],
+    };
+    let told = told(&fitted(study, choices, settings, &everything)?, settings);
+    let moving = Moving { told, ..everything };
+    let span = [study.times_s[0], study.times_s[study.times_s.len() - 1]];
+    let mut blocks = Blocks::default();
+    let mut rigs = Vec::new();
+    for half in 0..2 {
+        let part = |wanted: usize| Study {
+            times_s: study
+                .times_s
+                .iter()
+                .copied()
+                .filter(|it| half_of(*it, span) == wanted)
+                .collect(),
+            ..study.clone()
+        };
+        let fit = fitted(&part(half), choices, settings, &moving)?;
+        let rest = part(1 - half);
+        blocks.add(
+            &rest,
+            (&study.cameras, choices),
+            (fit.cameras(), &fit.choices),
+        );
+        rigs.push(fit.cameras().to_vec());
+    }
+    let all = fitted(study, choices, settings, &moving)?;
+    blocks.judge(outcome);
+    disagreement(&rigs, &all, settings, outcome);
+    outcome.changes = changes(study, &all, &moving.told, &blocks);
+    Ok(all)
+}
+
+/// Which cameras move.
+#[derive(Debug, Clone)]
+struct Moving {
+    /// One that was moved: nothing is believed of its pose.
+    suspect: Option<usize>,
+    /// The others are held.
+    told: Vec<bool>,
+}
+
+/// The camera that was moved, if one was: where it alone is free, the joints fit so much better than with any other one.
+fn suspect(
+    study: &Study<'_>,
+    choices: &[Choice],
+    settings: &Settings,
+) -> Result<Option<usize>, Doubt> {
+    let n = choices.len();
+    if n < 3 {
+        return Ok(None);
+    }
+    let held = Settings {
+        offset_sd_s: 0.0,
+        ..settings.clone()
+    };
+    let residual = |suspect: Option<usize>| -> Result<f64, Doubt> {
+        let moving = Moving {
+            suspect,
+            told: vec![false; n],
+        };
+        let all = fitted(study, choices, &held, &moving)?;
+        let fits = fits(&all.problem, &all.sigmas_px);
+        let shares = fits.iter().zip(choices).enumerate();
+        let shares =
+            shares.map(|(camera, (fit, it))| fit.median_px / study.chains[camera][it.chain].size());
+        Ok(shares.sum::<f64>() / n as f64)
+    };
+    let before = residual(None)?;
+    let mut each = Vec::new();
+    for camera in 0..n {
+        each.push((before - residual(Some(camera))?, camera));
+    }
+    each.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let [best, second] = [each[0], each[1]];
+    let is_one = best.0 > SUSPECT[0] * before && best.0 > SUSPECT[1] * second.0;
+    Ok(is_one.then_some(best.1))
+}
+
+/// The rig that fits best, what is given being believed; cameras that are not told are held.
+fn fitted(
+    study: &Study<'_>,
+    choices: &[Choice],
+    settings: &Settings,
+    moving: &Moving,
+) -> Result<Solved, Doubt> {
+    let of = |camera: usize| {
+        let is_free = moving.told[camera] || moving.suspect == Some(camera);
+        Free {
+            pose: is_free,
+            focal: settings.focal && is_free,
+            ..Free::default()
+        }
+    };
+    let free: Vec<Free> = (0..choices.len()).map(of).collect();
+    let prior = |(camera, it): (usize, &Camera)| {
+        (moving.suspect != Some(camera)).then(|| PosePrior {
+            camera: it.clone(),
+            sd: [settings.pose_sd[0].to_radians(), settings.pose_sd[1]],
+        })
+    };
+    let beliefs = Beliefs {
+        baseline: None,
+        poses: study.cameras.iter().enumerate().map(prior).collect(),
+        offset_sd_s: (settings.offset_sd_s > 0.0).then_some(settings.offset_sd_s),
+        focal_sd: 0.02,
+    };
+    let cameras = Cameras::new(study.cameras.clone(), &free);
+    rounds(study, cameras, choices.to_vec(), &beliefs)
+}
+
+/// Standard deviation of every camera's pose: degrees, metres; none where nothing is known.
+fn deviations(all: &Solved) -> Vec<[f64; 2]> {
+    let inflation = all.report.variance().sqrt().max(1.0);
+    // The joints count for less, and the beliefs as they are.
+    let known = covariance(&all.problem.believing(inflation)).ok();
+    let cameras = all.problem.cameras();
+    let of = |camera: usize| {
+        let Some(pose) = cameras.pose_parameters(camera) else {
+            return [0.0; 2];
+        };
+        let sd = |own: &[usize]| {
+            let squares = own.iter().map(|it| {
+                known
+                    .as_ref()
+                    .map_or(f64::INFINITY, |known| known.sd(*it).powi(2))
+            });
+            inflation * (squares.sum::<f64>() / 3.0).sqrt()
+        };
+        [sd(&pose[..3]).to_degrees(), sd(&pose[3..])]
+    };
+    (0..cameras.cameras().len()).map(of).collect()
+}
+
+/// Which cameras the joints tell better than what was believed.
+fn told(all: &Solved, settings: &Settings) -> Vec<bool> {
+    let each = deviations(all).into_iter();
+    each.map(|sd| sd[0] < TOLD * settings.pose_sd[0] || sd[1] < TOLD * settings.pose_sd[1])
+        .collect()
+}
+
+/// The rigs of both halves beside one another.
+fn disagreement(rigs: &[Vec<Camera>], all: &Solved, settings: &Settings, outcome: &mut Outcome) {
+    let [one, other] = rigs else { return };
+    let skeletons = all.skeletons(settings.n_joints);
+    let points: Vec<_> = skeletons.iter().flatten().flatten().collect();
+    let axis = |axis: usize| median(&mut points.iter().map(|it| it[axis]).collect::<Vec<_>>());
+    let middle = [0, 1, 2].map(|it| axis(it).unwrap_or(0.0)).into();
+    for (camera, (a, b)) in one.iter().zip(other).enumerate() {
+        let apart = difference(a, b);
+        let distance = nalgebra::distance(&a.centre_in_world(), &middle);
+        let by = [apart.turn.to_degrees(), apart.way / distance];
+        let limits = MOST_HALVES;
+        // NaN is not less.
+        if !(by[0] < limits[0] && by[1] < limits[1]) {
+            outcome.doubts.push(Doubt::Halves { camera, by, limits });
+        }
+    }
+}
+
+fn difference(a: &Camera, b: &Camera) -> Difference {
+    Difference {
+        turn: a
+            .camera_from_world
+            .rotation
+            .angle_to(&b.camera_from_world.rotation),
+        way: (a.centre_in_world() - b.centre_in_world()).norm(),
+    }
+}
+
+fn changes(study: &Study<'_>, all: &Solved, told: &[bool], blocks: &Blocks) -> Vec<Change> {
+    let fits = fits(&all.problem, &all.sigmas_px);
+    let sds = deviations(all);
+    let each = study.cameras.iter().zip(all.cameras()).enumerate();
+    each.map(|(camera, (before, after))| {
+        let moved = difference(before, after);
+        Change {
+            moved: [moved.turn.to_degrees(), moved.way],
+            sd: sds[camera],
+            is_told: told[camera],
+            residual_px: fits[camera].median_px,
+            held_out_px: blocks.of_camera(camera),
+            offset_s: all.choices[camera].offset_s,
+        }
+    })
+    .collect()
+}
+
+fn finish(outcome: &mut Outcome, (given, study): (&[Camera], &Study<'_>), all: &Solved) {
+    let placed = all.cameras().iter().zip(given).map(|(found, given)| {
+        let mut camera = found.clone();
+        camera.intrinsics.lens = given.intrinsics.lens;
+        camera
+    });
+    outcome.cameras = placed.collect();
+    if !all.report.is_converged() {
+        let iterations = all.report.iterations;
+        outcome.doubts.push(Doubt::NotConverged { iterations });
+    }
+    for (camera, change) in outcome.changes.iter().enumerate() {
+        let size = study.chains[camera][all.choices[camera].chain].size();
+        let share = change.residual_px / size;
+        if share >= MOST_RESIDUAL || share.is_nan() {
+            let limit = MOST_RESIDUAL;
+            outcome.doubts.push(Doubt::Fit {
+                camera,
+                share,
+                limit,
+            });
+        }
+    }
+}

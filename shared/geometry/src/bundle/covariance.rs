@@ -1,0 +1,92 @@
+//! How well the shared parameters are known.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use super::Problem;
+use super::equations::Equations;
+
+/// An eigenvalue of the information, every parameter measured by what is known of it alone, that is less than this share of
+/// the largest: the data do not tell of that direction.
+const LEAST_EIGENVALUE: f64 = 1e-11;
+/// A parameter is named where it has at least this share of the largest part of such a direction.
+const NAMED: f64 = 0.2;
+
+/// The covariance of the shared parameters, where the residuals of terms have the variance 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Covariance {
+    /// In the order of the parameters, in the coordinates of a step.
+    pub matrix: DMatrix<f64>,
+}
+
+impl Covariance {
+    /// The standard deviation of a parameter.
+    pub fn sd(&self, parameter: usize) -> f64 {
+        self.matrix[(parameter, parameter)].max(0.0).sqrt()
+    }
+}
+
+/// The data do not determine the shared parameters.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Undetermined {
+    /// Some directions cost nothing.
+    #[error("the data do not determine {}", listed(.directions))]
+    Directions {
+        /// For each direction the names of the parameters that move in it.
+        directions: Vec<Vec<String>>,
+    },
+    /// Values that are not finite.
+    #[error("values that are not finite: nothing can be said of the parameters")]
+    NotFinite,
+}
+
+fn listed(directions: &[Vec<String>]) -> String {
+    let each = directions.iter().map(|it| it.join(" with "));
+    each.collect::<Vec<_>>().join("; nor ")
+}
+
+/// The covariance of the shared parameters at the present values, all local blocks being unknown.
+///
+/// Weights of losses count as they are there.
+///
+/// # Errors
+///
+/// [`Undetermined`] names the parameters that the terms do not tell.
+pub fn covariance<P: Problem>(problem: &P) -> Result<Covariance, Undetermined> {
+    let information = information(problem).ok_or(Undetermined::NotFinite)?;
+    let n = information.nrows();
+    if n == 0 {
+        return Ok(Covariance {
+            matrix: information,
+        });
+    }
+    let size = |nth: usize| information[(nth, nth)].max(f64::MIN_POSITIVE).sqrt();
+    let sizes = DVector::from_iterator(n, (0..n).map(size));
+    let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] / (sizes[i] * sizes[j]));
+    let eigen = SymmetricEigen::new(scaled);
+    let limit = LEAST_EIGENVALUE * eigen.eigenvalues.amax();
+    let lost = (0..n).filter(|it| eigen.eigenvalues[*it] <= limit);
+    let directions: Vec<Vec<String>> = lost
+        .map(|it| names(problem, &eigen.eigenvectors.column(it).into_owned()))
+        .collect();
+    if !directions.is_empty() {
+        return Err(Undetermined::Directions { directions });
+    }
+    let inverse = eigen.eigenvalues.map(|it| 1.0 / it);
+    let vectors = &eigen.eigenvectors;
+    let scaled = vectors * DMatrix::from_diagonal(&inverse) * vectors.transpose();
+    let matrix = DMatrix::from_fn(n, n, |i, j| scaled[(i, j)] / (sizes[i] * sizes[j]));
+    Ok(Covariance { matrix })
+}
+
+/// What the terms tell of the shared parameters, all local blocks being unknown: the inverse of the covariance.
+fn information<P: Problem>(problem: &P) -> Option<DMatrix<f64>> {
+    let reduced = Equations::new(problem).reduced(0.0)?;
+    let is_finite = reduced.matrix.iter().all(|it| it.is_finite());
+    is_finite.then_some(reduced.matrix)
+}
+
+fn names<P: Problem>(problem: &P, direction: &DVector<f64>) -> Vec<String> {
+    let least = NAMED * direction.amax();
+    let moving = (0..direction.len()).filter(|it| direction[*it].abs() >= least);
+    moving.map(|it| problem.name(it)).collect()
+}

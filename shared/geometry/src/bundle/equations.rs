@@ -1,0 +1,216 @@
+//! The normal equations of a problem, and the elimination of its local blocks.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::{Problem, Step, Term};
+
+/// A diagonal entry counts as at least this share of the largest one of its block where it is damped, so that a parameter
+/// that nothing tells of stays where it is.
+const LEAST_DIAGONAL: f64 = 1e-12;
+
+/// The equations of one local block.
+struct Block {
+    /// The shared parameters that it touches.
+    shared: Vec<usize>,
+    /// Of the block with itself.
+    own: DMatrix<f64>,
+    /// Row = coordinate of the block, column = shared parameter.
+    across: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+/// Half the second derivatives (Gauss and Newton's) and half the gradient of the cost.
+pub(super) struct Equations {
+    blocks: Vec<Block>,
+    shared: DMatrix<f64>,
+    gradient: DVector<f64>,
+    /// The cost.
+    pub(super) cost: f64,
+    /// Number of residuals.
+    pub(super) n_residuals: usize,
+}
+
+/// The system that is left of the shared parameters, and what is needed to come back to the local blocks.
+pub(super) struct Reduced {
+    pub(super) matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+    factors: Vec<Cholesky<f64, Dyn>>,
+}
+
+/// The cost alone.
+pub(super) fn cost<P: Problem>(problem: &P) -> f64 {
+    let mut sum = 0.0;
+    let mut take = |term: &Term| sum += term.cost().0;
+    for local in 0..problem.locals().len() {
+        problem.terms_of(local, &mut take);
+    }
+    problem.priors(&mut take);
+    sum
+}
+
+impl Equations {
+    pub(super) fn new<P: Problem>(problem: &P) -> Self {
+        let n = problem.n_shared();
+        let mut all = Self {
+            blocks: Vec::new(),
+            shared: DMatrix::zeros(n, n),
+            gradient: DVector::zeros(n),
+            cost: 0.0,
+            n_residuals: 0,
+        };
+        // Where each shared parameter is among those of the block; n: nowhere.
+        let mut places = vec![n; n];
+        for (local, size) in problem.locals().into_iter().enumerate() {
+            let block = all.block(problem, local, size, &mut places);
+            for parameter in &block.shared {
+                places[*parameter] = n;
+            }
+            all.blocks.push(block);
+        }
+        problem.priors(&mut |term| {
+            all.add_shared(term);
+        });
+        all
+    }
+
+    fn block<P: Problem>(
+        &mut self,
+        problem: &P,
+        local: usize,
+        size: usize,
+        places: &mut [usize],
+    ) -> Block {
+        let n = places.len();
+        let mut shared: Vec<usize> = Vec::new();
+        let mut own = DMatrix::zeros(size, size);
+        let mut gradient = DVector::zeros(size);
+        let mut across: Vec<DVector<f64>> = Vec::new();
+        problem.terms_of(local, &mut |term| {
+            let weight = self.add_shared(term);
+            for (row, a) in term.local_columns() {
+                gradient[row] += weight * dot(a, &term.residuals);
+                for (column, b) in term.local_columns() {
+                    own[(row, column)] += weight * dot(a, b);
+                }
+                for (parameter, b) in term.shared_columns() {
+                    if places[parameter] == n {
+                        places[parameter] = shared.len();
+                        shared.push(parameter);
+                        across.push(DVector::zeros(size));
+                    }
+                    across[places[parameter]][row] += weight * dot(a, b);
+                }
+            }
+        });
+        let across = if across.is_empty() {
+            DMatrix::zeros(size, 0)
+        } else {
+            DMatrix::from_columns(&across)
+        };
+        Block {
+            shared,
+            own,
+            across,
+            gradient,
+        }
+    }
+
+    /// Adds what a term says of the shared parameters among themselves; returns its weight.
+    fn add_shared(&mut self, term: &Term) -> f64 {
+        let (cost, weight) = term.cost();
+        self.cost += cost;
+        self.n_residuals += term.residuals.len();
+        for (row, a) in term.shared_columns() {
+            self.gradient[row] += weight * dot(a, &term.residuals);
+            for (column, b) in term.shared_columns() {
+                self.shared[(row, column)] += weight * dot(a, b);
+            }
+        }
+        weight
+    }
+
+    /// Eliminates the local blocks. None where a block is not finite.
+    pub(super) fn reduced(&self, damping: f64) -> Option<Reduced> {
+        let mut matrix = damped(&self.shared, damping);
+        let mut gradient = self.gradient.clone();
+        let mut factors = Vec::with_capacity(self.blocks.len());
+        for block in &self.blocks {
+            let factor = damped(&block.own, damping.max(LEAST_DIAGONAL)).cholesky()?;
+            let mut half = block.across.clone();
+            let mut of_gradient = block.gradient.clone();
+            let lower = factor.l_dirty();
+            lower.solve_lower_triangular_mut(&mut half);
+            lower.solve_lower_triangular_mut(&mut of_gradient);
+            let square = half.tr_mul(&half);
+            let share = half.tr_mul(&of_gradient);
+            for (i, row) in block.shared.iter().enumerate() {
+                gradient[*row] -= share[i];
+                for (j, column) in block.shared.iter().enumerate() {
+                    matrix[(*row, *column)] -= square[(i, j)];
+                }
+            }
+            factors.push(factor);
+        }
+        Some(Reduced {
+            matrix,
+            gradient,
+            factors,
+        })
+    }
+
+    /// The step to the least of the quadratic that the equations describe. None where there is none.
+    pub(super) fn step(&self, damping: f64) -> Option<Step> {
+        let reduced = self.reduced(damping)?;
+        let shared = if reduced.matrix.is_empty() {
+            DVector::zeros(0)
+        } else {
+            reduced.matrix.cholesky()?.solve(&-reduced.gradient)
+        };
+        let each = self.blocks.iter().zip(&reduced.factors);
+        let of_block = |(block, factor): (&Block, &Cholesky<f64, Dyn>)| {
+            let known = block.shared.iter().map(|it| shared[*it]);
+            let known = DVector::from_iterator(block.shared.len(), known);
+            let right = -(&block.gradient + &block.across * known);
+            factor.solve(&right).iter().copied().collect()
+        };
+        let locals: Vec<Vec<f64>> = each.map(of_block).collect();
+        let shared: Vec<f64> = shared.iter().copied().collect();
+        let mut all = shared.iter().chain(locals.iter().flatten());
+        all.all(|it| it.is_finite())
+            .then_some(Step { shared, locals })
+    }
+
+    /// By how much the quadratic says that a step lowers the cost.
+    pub(super) fn gain(&self, step: &Step) -> f64 {
+        let shared = DVector::from_column_slice(&step.shared);
+        let mut gain = -2.0 * self.gradient.dot(&shared) - shared.dot(&(&self.shared * &shared));
+        for (block, local) in self.blocks.iter().zip(&step.locals) {
+            let local = DVector::from_column_slice(local);
+            let known = block.shared.iter().map(|it| step.shared[*it]);
+            let known = DVector::from_iterator(block.shared.len(), known);
+            gain -= 2.0 * block.gradient.dot(&local)
+                + local.dot(&(&block.own * &local))
+                + 2.0 * local.dot(&(&block.across * known));
+        }
+        gain
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Marquardt's damping: every entry of the diagonal grows by a share of itself.
+fn damped(matrix: &DMatrix<f64>, damping: f64) -> DMatrix<f64> {
+    let mut matrix = matrix.clone();
+    let largest = matrix.diagonal().amax();
+    let least = if largest > 0.0 {
+        LEAST_DIAGONAL * largest
+    } else {
+        1.0
+    };
+    for nth in 0..matrix.nrows() {
+        matrix[(nth, nth)] += damping * matrix[(nth, nth)].max(least);
+    }
+    matrix
+}

@@ -1,0 +1,294 @@
+//! Rings of cameras and points that are known, and what the adjustment makes of them.
+
+use nalgebra::{
+    Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
+};
+
+use super::*;
+use crate::{Camera, Intrinsics, Lens, LensModel};
+
+const BROWN: LensModel = LensModel::BrownConrady {
+    k: [-0.1, 0.05, -0.01, 0.02, -0.003, 0.001],
+    p: [0.001, -0.002],
+};
+const FISHEYE: LensModel = LensModel::KannalaBrandt {
+    k: [-0.02, 0.01, -0.004, 0.0007],
+};
+const ALL: Free = Free {
+    pose: true,
+    focal: true,
+    aspect: true,
+    centre: true,
+    lens: [true; 8],
+};
+
+/// A camera 4 m from the origin, at an angle of the ring.
+fn camera(nth: usize, of: usize, lens: LensModel) -> Camera {
+    let angle = (0.2 + nth as f64) / of as f64 * core::f64::consts::TAU;
+    let centre = Vector3::new(4.0 * angle.cos(), 4.0 * angle.sin(), 1.5 + 0.2 * nth as f64);
+    let forward = (Vector3::new(0.0, 0.0, 1.0) - centre) / (Vector3::z() - centre).norm();
+    let right = forward.cross(&Vector3::z());
+    let right = right / right.norm();
+    let down = forward.cross(&right);
+    let matrix = Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+    Camera {
+        name: format!("cam{nth}"),
+        intrinsics: Intrinsics {
+            fx: 800.0,
+            fy: 820.0,
+            cx: 500.0,
+            cy: 480.0,
+            size: [1000, 1000],
+            lens: Lens::new(lens),
+        },
+        camera_from_world: Isometry3::from_parts(Translation3::from(rotation * -centre), rotation),
+    }
+}
+
+/// Points that cameras see; the distance of the first two is known, and so is the first camera.
+#[derive(Clone)]
+struct Cloud {
+    cameras: Cameras,
+    points: Vec<Point3<f64>>,
+    seen: Vec<Vec<Option<Point2<f64>>>>,
+    loss: Loss,
+    baseline: Option<f64>,
+}
+
+impl Cloud {
+    fn new(n_cameras: usize, n_points: usize, lens: LensModel, free: Free) -> Self {
+        let cameras: Vec<Camera> = (0..n_cameras)
+            .map(|it| camera(it, n_cameras, lens))
+            .collect();
+        let mut random = fastrand_like(7);
+        let mut point = || Point3::new(2.0 * random() - 1.0, 2.0 * random() - 1.0, 2.0 * random());
+        let points: Vec<Point3<f64>> = (0..n_points).map(|_| point()).collect();
+        let of = |it: &Point3<f64>| cameras.iter().map(|camera| camera.project(it)).collect();
+        let seen = points.iter().map(of).collect();
+        let mut each = vec![free; n_cameras];
+        each[0].pose = false;
+        Self {
+            cameras: Cameras::new(cameras, &each),
+            points,
+            seen,
+            loss: Loss::Square,
+            baseline: Some(1.0),
+        }
+    }
+
+    /// Everything that is free somewhat elsewhere.
+    fn disturbed(&self) -> Self {
+        let mut random = fastrand_like(3);
+        let mut by = |size: f64| size * (random() - 0.5);
+        let shared = (0..self.n_shared())
+            .map(|it| {
+                let name = self.name(it);
+                let size = if name.contains("focal") || name.contains("principal") {
+                    20.0
+                } else if name.contains("lens") {
+                    0.002
+                } else {
+                    0.1
+                };
+                by(size)
+            })
+            .collect();
+        let locals = self
+            .points
+            .iter()
+            .map(|_| (0..3).map(|_| by(0.2)).collect());
+        self.moved(&Step {
+            shared,
+            locals: locals.collect(),
+        })
+    }
+}
+
+/// Numbers from 0 to 1.
+fn fastrand_like(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+impl Problem for Cloud {
+    fn n_shared(&self) -> usize {
+        self.cameras.n_parameters()
+    }
+
+    fn name(&self, parameter: usize) -> String {
+        self.cameras.name(parameter)
+    }
+
+    fn locals(&self) -> Vec<usize> {
+        vec![3; self.points.len()]
+    }
+
+    fn terms_of(&self, local: usize, take: &mut dyn FnMut(&Term)) {
+        let mut term = Term::default();
+        for (camera, seen) in self.seen[local].iter().enumerate() {
+            let Some(seen) = *seen else { continue };
+            let point = &self.points[local];
+            let observed = self
+                .cameras
+                .observe(camera, point, (seen, 0.5), self.loss, &mut term);
+            for axis in 0..3 {
+                term.by_local(axis, observed.by_point.column(axis).as_slice());
+            }
+            take(&term);
+        }
+    }
+
+    fn priors(&self, take: &mut dyn FnMut(&Term)) {
+        let Some(wanted) = self.baseline else { return };
+        let [a, b] = [0, 1].map(|it| self.cameras.cameras()[it].centre_in_world());
+        let way = b - a;
+        let mut term = Term::default();
+        let truth = (camera(1, self.cameras.cameras().len(), BROWN).centre_in_world()
+            - camera(0, self.cameras.cameras().len(), BROWN).centre_in_world())
+        .norm();
+        term.begin(&[1e3 * (way.norm() - wanted * truth)], Loss::Square);
+        if let Some(pose) = self.cameras.pose_parameters(1) {
+            for axis in 0..3 {
+                term.by_shared(pose[3 + axis], &[1e3 * way[axis] / way.norm()]);
+            }
+        }
+        take(&term);
+    }
+
+    fn moved(&self, step: &Step) -> Self {
+        let mut moved = self.clone();
+        moved.cameras = self.cameras.moved(&step.shared);
+        for (point, by) in moved.points.iter_mut().zip(&step.locals) {
+            *point += Vector3::from_column_slice(by);
+        }
+        moved
+    }
+}
+
+#[test]
+fn derivatives_are_those_of_differences() {
+    for lens in [LensModel::Pinhole, BROWN, FISHEYE] {
+        let cloud = Cloud::new(3, 4, lens, ALL).disturbed();
+        let error = derivative_error(&cloud, 1e-6);
+        assert!(error < 1e-5, "{lens:?}: {error:e}");
+    }
+}
+
+#[test]
+fn cameras_and_points_are_found_again() {
+    for lens in [LensModel::Pinhole, FISHEYE] {
+        let truth = Cloud::new(4, 60, lens, Free::POSE);
+        let (found, report) = solve(truth.disturbed(), &Settings::default());
+        assert!(report.is_converged(), "{report:?}");
+        assert!(report.cost_after < 1e-10, "{report:?}");
+        for (a, b) in truth.cameras.cameras().iter().zip(found.cameras.cameras()) {
+            let away = (a.centre_in_world() - b.centre_in_world()).norm();
+            assert!(away < 1e-6, "{} is {away} m away", a.name);
+        }
+    }
+}
+
+#[test]
+fn focal_lengths_and_lenses_are_found_with_the_poses() {
+    let free = Free {
+        lens: [true, true, false, false, false, false, true, true],
+        ..ALL
+    };
+    let truth = Cloud::new(4, 200, BROWN, free);
+    let (found, report) = solve(truth.disturbed(), &Settings::default());
+    assert!(report.cost_after < 1e-8, "{report:?}");
+    let [a, b] = [&truth, &found].map(|it| it.cameras.cameras()[2].intrinsics);
+    assert!((a.fx - b.fx).abs() < 1e-3, "{} {}", a.fx, b.fx);
+    assert!((a.cy - b.cy).abs() < 1e-3, "{} {}", a.cy, b.cy);
+}
+
+#[test]
+fn what_is_far_off_hardly_moves_a_robust_answer() {
+    let mut cloud = Cloud::new(4, 60, LensModel::Pinhole, Free::POSE);
+    let truth = cloud.clone();
+    for nth in 0..6 {
+        if let Some(it) = &mut cloud.seen[10 * nth][nth % 4] {
+            *it += nalgebra::Vector2::new(60.0, -40.0);
+        }
+    }
+    let worst = |it: &Cloud| {
+        let each = it.cameras.cameras().iter().zip(truth.cameras.cameras());
+        each.map(|(a, b)| (a.centre_in_world() - b.centre_in_world()).norm())
+            .fold(0.0, f64::max)
+    };
+    let plain = worst(&solve(cloud.clone(), &Settings::default()).0);
+    cloud.loss = Loss::Cauchy(2.0);
+    let robust = worst(&solve(cloud, &Settings::default()).0);
+    assert!(plain > 0.02, "{plain}");
+    assert!(robust < 0.001, "{robust}");
+}
+
+#[test]
+fn the_covariance_is_how_answers_spread() {
+    let truth = Cloud::new(3, 40, LensModel::Pinhole, Free::POSE);
+    let covariance = covariance(&truth).unwrap();
+    let place = truth.cameras.pose_parameters(2).unwrap()[4];
+    let mut random = fastrand_like(11);
+    let mut normal = || (0..12).map(|_| random()).sum::<f64>() - 6.0;
+    let mut spread = 0.0;
+    let n = 60;
+    for _ in 0..n {
+        let mut noisy = truth.clone();
+        for it in noisy.seen.iter_mut().flatten().flatten() {
+            *it += 0.5 * nalgebra::Vector2::new(normal(), normal());
+        }
+        let (found, _) = solve(noisy, &Settings::default());
+        let [a, b] = [&truth, &found].map(|it| it.cameras.cameras()[2].centre_in_world());
+        spread += (a.y - b.y).powi(2) / f64::from(n);
+    }
+    // A variance of 60 is known to 18 %, three of which are allowed for.
+    let ratio = spread / covariance.sd(place).powi(2);
+    assert!((0.5..1.7).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn what_is_not_determined_is_named() {
+    let mut cloud = Cloud::new(3, 40, LensModel::Pinhole, Free::POSE);
+    cloud.baseline = None;
+    let error = covariance(&cloud).unwrap_err().to_string();
+    assert!(
+        error.contains("cam1: place") && error.contains("cam2: place"),
+        "{error}"
+    );
+    assert!(!error.contains("rotation"), "{error}");
+
+    let mut cloud = Cloud::new(3, 40, LensModel::Pinhole, Free::POSE);
+    for it in &mut cloud.seen {
+        it[2] = None;
+    }
+    let error = covariance(&cloud).unwrap_err().to_string();
+    assert!(error.contains("cam2: rotation x"), "{error}");
+    assert!(!error.contains("cam1"), "{error}");
+}
+
+#[test]
+fn a_point_that_one_camera_alone_sees_tells_nothing_and_harms_nothing() {
+    let truth = Cloud::new(3, 40, LensModel::Pinhole, Free::POSE);
+    let mut lonely = truth.clone();
+    lonely.seen[3] = vec![None, lonely.seen[3][1], None];
+    let [all, less] = [&truth, &lonely].map(|it| covariance(it).unwrap().sd(3));
+    assert!(less >= all && less < 1.2 * all, "{less} {all}");
+    let (_, report) = solve(lonely.disturbed(), &Settings::default());
+    assert!(report.cost_after < 1e-8, "{report:?}");
+}
+
+#[test]
+fn losses_have_the_derivatives_that_they_say() {
+    for loss in [Loss::Square, Loss::Huber(1.5), Loss::Cauchy(2.0)] {
+        for s in [0.1, 1.0, 5.0, 100.0] {
+            let numeric = (loss.of(s + 1e-5).0 - loss.of(s - 1e-5).0) / 2e-5;
+            assert!((numeric - loss.of(s).1).abs() < 1e-6, "{loss:?} at {s}");
+        }
+    }
+}
