@@ -72,7 +72,7 @@ const LAYERS: &[&[&str]] = &[
         "results",
     ],
     &["launch"],
-    &["trials"],
+    &["trials", "view"],
     &["parallax"],
 ];
 

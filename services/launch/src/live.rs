@@ -5,13 +5,17 @@ mod snapshot;
 mod table;
 
 use core::time::Duration;
+use std::path::Path;
 use std::time::Instant;
 
-use runtime::{Failure, Namespace, Observer, now_nanos};
+use runtime::{ExitKind, Failure, Namespace, Observer, OrFail as _, deployments, now_nanos};
 
 pub use describe::{describe, measured};
 pub use snapshot::{ProcessSnapshot, Snapshot, State};
 pub use table::table;
+
+use crate::load;
+use crate::resolved::Resolved;
 
 /// How long to wait for the first metrics of all processes.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -73,4 +77,49 @@ impl Live {
     pub fn is_over(&self) -> bool {
         self.observer.is_over()
     }
+}
+
+/// The namespace of a running deployment.
+///
+/// * `named`: its name or its file; none for the only running one.
+///
+/// # Errors
+///
+/// The file cannot be read, the name is none, or not exactly one deployment runs.
+pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
+    if let Some(named) = named {
+        let is_file = Path::new(named).extension().is_some_and(|it| it == "toml");
+        let name = if is_file {
+            load::read(Path::new(named), &[])?.deployment.name
+        } else {
+            named.to_owned()
+        };
+        return Namespace::new(&name).or_fail(ExitKind::Usage);
+    }
+    let mut running = deployments(&Namespace::usual_base())?;
+    running.retain(|it| it.supervisor.is_some());
+    if running.len() > 1 {
+        let names: Vec<&str> = running.iter().map(|it| it.namespace.name()).collect();
+        let message = format!("{} deployments run: {}", names.len(), names.join(", "));
+        return Err(Failure::new(ExitKind::Usage, message).with_hint("name one of them"));
+    }
+    let none = || Failure::new(ExitKind::Usage, "no deployment runs");
+    running.pop().map(|it| it.namespace).ok_or_else(none)
+}
+
+/// What a running deployment says about itself: its settings, without passwords of cameras.
+///
+/// # Errors
+///
+/// It does not run, or is of another version.
+pub fn description(namespace: &Namespace) -> Result<Resolved, Failure> {
+    let name = namespace.name();
+    let text = namespace.description().map_err(|error| {
+        let text = format!("deployment {name:?} does not say what it is: {error}");
+        Failure::new(ExitKind::Usage, text)
+    })?;
+    serde_json::from_str(&text).map_err(|error| {
+        let text = format!("the description of deployment {name:?} cannot be read: {error}");
+        Failure::new(ExitKind::Run, text)
+    })
 }

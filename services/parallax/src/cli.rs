@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands::{
     bench, calib, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame, model,
-    record, replay, run, service, sync, synth, top, train,
+    record, replay, run, service, sync, synth, top, train, view,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -24,6 +24,8 @@ Examples:
     parallax run my.toml --set capture.n_frames=20      the same, with one value replaced
     parallax run my.toml --dry-run                      what would be started, and its memory
     parallax run my.toml --latency-budget-ms 150        fails if 1 frame in 100 takes longer
+    parallax demo --view                                the same, watched in the browser
+    parallax view my.toml                               a page about a deployment, while it runs
     parallax top                                        where the time of a running deployment goes
     parallax record my.toml --out run.mcap              like run, and records every message
     parallax replay run.mcap --from fuse --set fuse.alpha=2     runs the later stages again, with another value
@@ -108,6 +110,8 @@ pub(crate) enum Command {
     Status(deployments::StatusArguments),
     /// Watch the processes of a running deployment: rates, times, losses, memory.
     Top(top::Arguments),
+    /// Watch a running deployment, a finished run or a recording in the browser: skeleton, pictures, processes.
+    View(view::Arguments),
     /// Remove what dead deployments have left in shared memory.
     Clean(deployments::CleanArguments),
     /// Run one process of a deployment; started by `run`.

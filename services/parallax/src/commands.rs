@@ -21,6 +21,7 @@ pub(crate) mod sync;
 pub(crate) mod synth;
 pub(crate) mod top;
 pub(crate) mod train;
+pub(crate) mod view;
 
 use std::process::ExitCode;
 
@@ -54,6 +55,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Config(it) => config::run(&it),
         Command::Status(it) => deployments::status(&it),
         Command::Top(it) => top::run(&it),
+        Command::View(it) => view::run(&it, cli.globals),
         Command::Clean(it) => deployments::clean(&it),
         Command::Synth(it) => synth::run(&it, cli.globals),
         Command::Sync(it) => sync::run(&it, cli.globals),

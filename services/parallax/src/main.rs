@@ -6,7 +6,7 @@
 //!
 //! | layer | crates |
 //! |---|---|
-//! | trials | [`trials`](../trials/index.html): fault injection, benchmarks and the demo |
+//! | trials | [`trials`](../trials/index.html): fault injection, benchmarks and the demo; [`view`](../view/index.html): the page in the browser |
 //! | whole runs | [`launch`](../launch/index.html): prepares and runs a deployment, and reports on it |
 //! | processes | [`capture`](../capture/index.html), [`pose`](../pose/index.html), [`quality`](../quality/index.html), [`fuse`](../fuse/index.html), [`triangulate`](../triangulate/index.html), [`results`](../results/index.html), [`record`](../record/index.html), [`replay`](../replay/index.html), [`supervise`](../supervise/index.html) |
 //! | the loop of a stage | [`stage`](../stage/index.html): wait, receive, check, join, compute, send, account, end |

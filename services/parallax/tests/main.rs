@@ -32,3 +32,4 @@ mod search_size;
 mod sync;
 mod synth;
 mod train;
+mod view;

@@ -10,6 +10,7 @@ use scene::Action;
 use trials::demo::{self, Options};
 
 use super::synth::rate;
+use super::view;
 use crate::globals::Globals;
 
 const HELP: &str = "\
@@ -42,7 +43,8 @@ wrong; 130 stopped by Ctrl-C.
 Examples:
     parallax demo
     parallax demo --seconds 60 --action boxing --subject 4 --out /tmp/boxing
-    parallax demo --no-kill --json";
+    parallax demo --no-kill --json
+    parallax demo --seconds 300 --view      watch it in the browser";
 
 /// Options of `parallax demo`.
 #[derive(Debug, Args)]
@@ -81,6 +83,9 @@ pub(crate) struct Arguments {
     /// Name of the deployment, unique among those that run at the same time.
     #[arg(long, value_name = "NAME", default_value = "demo")]
     name: String,
+    /// Serve a page about the run on the loopback while it runs; `parallax view --help` says what it shows.
+    #[arg(long)]
+    view: bool,
     /// Print the report as JSON.
     #[arg(long)]
     json: bool,
@@ -142,7 +147,11 @@ impl Arguments {
 
 /// Runs the demo, and prints the report.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let Some(outcome) = demo::run(&arguments.options(), globals.verbosity())? else {
+    let page = arguments.view.then(|| view::beside(&arguments.name));
+    let page = page.transpose()?;
+    let outcome = demo::run(&arguments.options(), globals.verbosity());
+    drop(page);
+    let Some(outcome) = outcome? else {
         output::message("stopped: nothing is judged, and no report written");
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };

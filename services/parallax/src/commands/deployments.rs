@@ -10,8 +10,6 @@ use launch::{
 use runtime::{ExitKind, Failure, Namespace, Remains, deployments};
 use serde_json::{Value, json};
 
-use crate::commands::top;
-
 /// The status of a directory that does not belong to a deployment.
 const UNMARKED: &str = "not a deployment: left alone";
 
@@ -72,7 +70,7 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
 
 /// Shows the processes of a running deployment.
 fn status_of(named: &str, json: bool) -> Result<ExitCode, Failure> {
-    let namespace = top::namespace(Some(named))?;
+    let namespace = live::namespace(Some(named))?;
     let snapshot = Live::open(&namespace)?.first_snapshot()?;
     if json {
         output::json(&json!({ "schema_version": 1, "deployment": live::describe(&snapshot) }))?;

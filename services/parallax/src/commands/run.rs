@@ -8,6 +8,7 @@ use launch::{Planned, load, output};
 use runtime::{ExitKind, Failure, OrFail as _, Stop, free_shared_memory, needed_bytes, preflight};
 use supervise::Plan;
 
+use super::view;
 use crate::globals::Globals;
 
 /// Options of `parallax run`.
@@ -42,6 +43,9 @@ pub(crate) struct Arguments {
     /// as `--set supervise.latency_budget_ms=N`.
     #[arg(long, value_name = "N", value_parser = above_zero, allow_negative_numbers = true)]
     latency_budget_ms: Option<f64>,
+    /// Serve a page about the run on the loopback while it runs; `parallax view --help` says what it shows.
+    #[arg(long, conflicts_with = "dry_run")]
+    view: bool,
     /// Show the processes and the shared memory that they need, and start nothing; fails if the run could not start.
     #[arg(long)]
     dry_run: bool,
@@ -75,7 +79,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         output::message(size.text());
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let name = &loaded.deployment.name;
+    let page = arguments.view.then(|| view::beside(name)).transpose()?;
     let report = planned.run(globals.quiet, &stop, &mut |_| None)?;
+    drop(page);
     if arguments.json {
         output::json(&report.json())?;
     } else if !globals.quiet {

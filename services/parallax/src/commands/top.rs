@@ -4,15 +4,14 @@ mod screen;
 
 use core::time::Duration;
 use std::io::{self, IsTerminal as _};
-use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Args;
 use launch::{
     live::{self, Live},
-    load, output,
+    output,
 };
-use runtime::{ExitKind, Failure, Namespace, OrFail as _, Stop, deployments};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
 /// Options of `parallax top`.
 #[derive(Debug, Args)]
@@ -41,7 +40,7 @@ pub(crate) struct Arguments {
 
 /// Shows a deployment until it ends or the user quits.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let mut live = Live::open(&namespace(arguments.deployment.as_deref())?)?;
+    let mut live = Live::open(&live::namespace(arguments.deployment.as_deref())?)?;
     let snapshot = live.first_snapshot()?;
     if arguments.once || !io::stdout().is_terminal() {
         output::line(live::table(&snapshot).trim_end())?;
@@ -52,30 +51,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         output::message("the deployment has ended");
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The namespace of a running deployment.
-///
-/// * `named`: its name or its file; none for the only running one.
-pub(crate) fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
-    if let Some(named) = named {
-        let is_file = Path::new(named).extension().is_some_and(|it| it == "toml");
-        let name = if is_file {
-            load::read(Path::new(named), &[])?.deployment.name
-        } else {
-            named.to_owned()
-        };
-        return Namespace::new(&name).or_fail(ExitKind::Usage);
-    }
-    let mut running = deployments(&Namespace::usual_base())?;
-    running.retain(|it| it.supervisor.is_some());
-    if running.len() > 1 {
-        let names: Vec<&str> = running.iter().map(|it| it.namespace.name()).collect();
-        let message = format!("{} deployments run: {}", names.len(), names.join(", "));
-        return Err(Failure::new(ExitKind::Usage, message).with_hint("name one of them"));
-    }
-    let none = || Failure::new(ExitKind::Usage, "no deployment runs");
-    running.pop().map(|it| it.namespace).ok_or_else(none)
 }
 
 fn pause(text: &str) -> Result<f64, String> {

@@ -157,6 +157,11 @@ impl Started {
         i64::from(self.child.id())
     }
 
+    /// The file of what it says on standard output.
+    pub(crate) fn out_file(&self) -> PathBuf {
+        self.log.with_extension("out")
+    }
+
     fn output(&self, what: &str) -> String {
         fs::read_to_string(self.log.with_extension(what)).unwrap()
     }

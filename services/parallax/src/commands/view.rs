@@ -1,0 +1,212 @@
+//! `parallax view`: a page in the browser about a running deployment, a finished run, or a recording.
+
+use core::net::{IpAddr, SocketAddr};
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use launch::{load, output};
+use runtime::{ExitKind, Failure, Namespace, OrFail as _, Stop, deployments};
+use serde_json::json;
+use view::{Listen, Options, Subject};
+
+use crate::globals::Globals;
+
+/// Shortest token that is accepted, characters.
+const SHORTEST_TOKEN: usize = 16;
+
+/// Options of `parallax view`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The page shows the skeleton in space with its uncertainty, every camera's picture with the pose found in it, epipolar \
+lines of a joint or a point, rates and latency, who is missing, and what happens; a button records what runs into the \
+folder of its results. It is an onlooker: no process of the deployment waits for it, and what it has no time for it leaves \
+out. It may be opened and closed at any time, several times at once; it waits for a deployment that does not run yet, and \
+for the next run when one ends. Of a finished run it shows a time line.
+
+The page is for this machine: it is served on the loopback alone, and pages of other sites cannot read it. Users of this \
+machine can, unless --token is given. With --listen 0.0.0.0 other machines can, and need a token, which is made if none \
+is given. Nothing is encrypted: over a network that others use, prefer a tunnel (`ssh -L 7878:localhost:7878 HOST`).
+
+Keys in the page: ? lists them. Ctrl-C ends the view, and nothing else.
+
+Examples:
+    parallax view                        the deployment that runs
+    parallax view my.toml                the one of that file, now or when it runs
+    parallax view out/                   a finished run, by its folder
+    parallax view run.mcap               a recording
+    parallax run my.toml --view          a run and its page together
+    parallax view --port 0 --json        any free port; the address as JSON")]
+pub(crate) struct Arguments {
+    /// Name of a deployment or its file (.toml), the folder of a finished run, or a recording (.mcap); may be left out if
+    /// only one deployment runs.
+    subject: Option<String>,
+    /// The name of a deployment, also if there is a folder of that name.
+    #[arg(long, value_name = "NAME", conflicts_with = "subject")]
+    deployment: Option<String>,
+    /// Port of the page; 0 for any free one. Without it 7878, or a free one if that is in use.
+    #[arg(long, value_name = "N")]
+    port: Option<u16>,
+    /// Address to listen on; any but the loopback needs a token.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    listen: IpAddr,
+    /// What a page must know, at least 16 letters, digits, '-' or '_'; random if it is not given here.
+    #[arg(long, value_name = "TOKEN", num_args = 0..=1, require_equals = true, value_parser = token)]
+    token: Option<Option<String>>,
+    /// Most pictures of a camera in a second.
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=60))]
+    pictures: u32,
+    /// Print the address of the page as JSON.
+    #[arg(long)]
+    json: bool,
+    /// End with the process that has started this one, which holds the other end of standard input.
+    #[arg(long, hide = true)]
+    with_parent: bool,
+}
+
+/// Serves the page until Ctrl-C.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let subject = match &arguments.deployment {
+        Some(name) => Subject::Deployment(Some(name.clone())),
+        None => subject(arguments.subject.as_deref())?,
+    };
+    let token = match &arguments.token {
+        Some(Some(token)) => Some(token.clone()),
+        None if arguments.listen.is_loopback() => None,
+        _ => Some(random_token()?),
+    };
+    let options = Options {
+        subject,
+        listen: Listen {
+            address: SocketAddr::new(arguments.listen, arguments.port.unwrap_or(Listen::PORT)),
+            may_move: arguments.port.is_none(),
+            token,
+        },
+        pictures_per_second: arguments.pictures,
+    };
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    if arguments.with_parent {
+        end_with_parent(&stop)?;
+    }
+    let mut failed = Ok(());
+    view::run(&options, &stop, &mut |url| {
+        if arguments.with_parent {
+            output::message(format_args!("the page: {url}"));
+        } else if arguments.json {
+            failed = output::json(&json!({ "schema_version": 1, "url": url }));
+        } else if !globals.quiet {
+            failed = output::line(format_args!(
+                "open {url} in a browser; Ctrl-C ends the view"
+            ));
+        }
+    })?;
+    failed?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Starts a view beside a run of a deployment, as `--view` asks.
+///
+/// * `name`: of the deployment.
+pub(crate) fn beside(name: &str) -> Result<view::Companion, Failure> {
+    let executable = std::env::current_exe().or_fail(ExitKind::Run)?;
+    view::Companion::start(&executable, name)
+}
+
+/// What a word on the command line means.
+fn subject(named: Option<&str>) -> Result<Subject, Failure> {
+    let Some(named) = named else {
+        return Ok(Subject::Deployment(None));
+    };
+    let path = Path::new(named);
+    let ends_with = |ending: &str| path.extension().is_some_and(|it| it == ending);
+    if ends_with("toml") {
+        let name = load::read(path, &[])?.deployment.name;
+        return Ok(Subject::Deployment(Some(name)));
+    }
+    if ends_with("mcap") {
+        return Ok(Subject::Recording(PathBuf::from(named)));
+    }
+    if path.is_dir() && !runs(named)? {
+        return Ok(Subject::Folder(PathBuf::from(named)));
+    }
+    if named.contains('/') && !path.exists() {
+        let text = format!("{named} does not exist");
+        return Err(Failure::new(ExitKind::Input, text));
+    }
+    if path.is_file() {
+        let text = format!("{named} is neither a deployment (.toml) nor a recording (.mcap)");
+        return Err(Failure::new(ExitKind::Usage, text));
+    }
+    Namespace::new(named).or_fail(ExitKind::Usage)?;
+    Ok(Subject::Deployment(Some(named.to_owned())))
+}
+
+/// Whether a deployment of that name runs.
+fn runs(name: &str) -> Result<bool, Failure> {
+    let all = deployments(&Namespace::usual_base())?;
+    let mut running = all.iter().filter(|it| it.supervisor.is_some());
+    Ok(running.any(|it| it.namespace.name() == name))
+}
+
+fn token(text: &str) -> Result<String, String> {
+    let is_plain = |it: u8| it.is_ascii_alphanumeric() || b"-_".contains(&it);
+    if text.len() < SHORTEST_TOKEN || !text.bytes().all(is_plain) {
+        return Err(format!(
+            "not at least {SHORTEST_TOKEN} letters, digits, '-' or '_'"
+        ));
+    }
+    Ok(text.to_owned())
+}
+
+/// 128 random bits, as hexadecimal digits.
+fn random_token() -> Result<String, Failure> {
+    let mut bytes = [0; 16];
+    let source = Path::new("/dev/urandom");
+    let read = File::open(source).and_then(|mut it| it.read_exact(&mut bytes));
+    read.map_err(|error| runtime::in_file(source, &error))?;
+    Ok(bytes.iter().map(|it| format!("{it:02x}")).collect())
+}
+
+/// Requests the stop when standard input ends.
+fn end_with_parent(stop: &Stop) -> Result<(), Failure> {
+    let stop = stop.clone();
+    let wait = move || {
+        // Whatever ends the pipe, its other end is gone.
+        let _ended = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        stop.request();
+    };
+    let thread = std::thread::Builder::new().name("parent".to_owned());
+    thread.spawn(wait).or_fail(ExitKind::Run)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tokens_are_long_and_plain() {
+        assert!(token("0123456789abcdef").is_ok());
+        for wrong in ["", "short", "0123456789abcde&", "0123456789 abcdef"] {
+            assert!(token(wrong).is_err(), "{wrong}");
+        }
+        let (one, other) = (random_token().unwrap(), random_token().unwrap());
+        assert!(token(&one).is_ok() && one != other);
+    }
+
+    #[test]
+    fn a_word_means_a_recording_a_folder_or_a_deployment() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().to_str().unwrap();
+        let got = subject(Some(path)).unwrap();
+        assert_eq!(got, Subject::Folder(folder.path().to_owned()));
+        let got = subject(Some("a/b.mcap")).unwrap();
+        assert_eq!(got, Subject::Recording("a/b.mcap".into()));
+        let got = subject(Some("no-such-run")).unwrap();
+        assert_eq!(got, Subject::Deployment(Some("no-such-run".to_owned())));
+        assert_eq!(subject(Some("a/b")).unwrap_err().kind(), ExitKind::Input);
+        assert_eq!(subject(None).unwrap(), Subject::Deployment(None));
+    }
+}

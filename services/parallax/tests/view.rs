@@ -1,0 +1,243 @@
+//! The page of `parallax view`: what a browser gets of a running deployment and of a finished one, and who is refused.
+
+use crate::common;
+
+use core::time::Duration;
+use std::fs;
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::time::Instant;
+
+use common::started::signal;
+use common::{Case, PACED, Started};
+use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket, client};
+
+/// Anything that takes longer is stuck.
+const PATIENCE: Duration = Duration::from_mins(1);
+
+/// The side of the browser.
+struct Page {
+    socket: WebSocket<TcpStream>,
+}
+
+/// A running `parallax view`, and where it listens.
+struct View {
+    started: Started,
+    address: String,
+}
+
+impl View {
+    fn start(case: &Case, subject: &[&str]) -> Self {
+        let arguments = [&["view", "--port", "0", "--json"], subject].concat();
+        let mut started = case.start(&arguments);
+        let mut address = String::new();
+        let out = started.out_file();
+        started.until("the address", |_| {
+            let text = fs::read_to_string(&out).unwrap_or_default();
+            let said: Option<Value> = serde_json::from_str(&text).ok();
+            let url = said.and_then(|it| Some(it["url"].as_str()?.to_owned()));
+            address = url.unwrap_or_default();
+            !address.is_empty()
+        });
+        let address = address.trim_start_matches("http://");
+        Self {
+            address: address.trim_end_matches('/').to_owned(),
+            started,
+        }
+    }
+
+    fn open(&self) -> Page {
+        let stream = TcpStream::connect(&self.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let (socket, _) = client(format!("ws://{}/ws", self.address), stream).unwrap();
+        Page { socket }
+    }
+
+    /// Status line and content of what is asked for.
+    fn get(&self, path: &str, host: &str, more: &str) -> (u16, String) {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let asked =
+            format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n{more}\r\n");
+        // The other side may have refused and closed before all was sent.
+        let _sent = stream.write_all(asked.as_bytes());
+        let mut text = Vec::new();
+        let _read = stream.read_to_end(&mut text);
+        let text = String::from_utf8_lossy(&text).into_owned();
+        let status = text.split(' ').nth(1).and_then(|it| it.parse().ok());
+        (status.unwrap_or(0), text)
+    }
+
+    fn end(self) {
+        signal("TERM", self.started.id());
+        let ended = self.started.wait_among_others();
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    }
+}
+
+impl Page {
+    fn ask(&mut self, question: &Value) {
+        let text = question.to_string();
+        self.socket.send(Message::Text(text.into())).unwrap();
+    }
+
+    /// The first message for which `take` has an answer.
+    fn until<T>(&mut self, what: &str, mut take: impl FnMut(&Message) -> Option<T>) -> T {
+        let begin = Instant::now();
+        loop {
+            assert!(begin.elapsed() < PATIENCE, "no {what}");
+            let message = self.socket.read().unwrap();
+            if let Some(taken) = take(&message) {
+                return taken;
+            }
+        }
+    }
+
+    /// The first text of a type that is as it should be.
+    fn text(&mut self, kind: &str, is_it: impl Fn(&Value) -> bool) -> Value {
+        self.until(kind, |message| {
+            let value: Value = serde_json::from_str(message.to_text().ok()?).ok()?;
+            (value["type"] == kind && is_it(&value)).then_some(value)
+        })
+    }
+
+    /// The view, the frame and the pixels of the next picture.
+    fn picture(&mut self) -> (u8, u64, [u32; 2]) {
+        self.until("picture", |message| {
+            let Message::Binary(bytes) = message else {
+                return None;
+            };
+            let frame = u64::from_le_bytes(bytes[8..16].try_into().unwrap());
+            let read = image::load_from_memory(&bytes[16..]).unwrap();
+            Some((bytes[1], frame, [read.width(), read.height()]))
+        })
+    }
+}
+
+#[test]
+fn a_page_follows_a_run_from_before_its_begin_until_after_its_end() {
+    let case = Case::new("view", &[70; 2], PACED);
+    let view = View::start(&case, &["deployment.toml"]);
+    let mut page = view.open();
+    page.text("hello", |it| it["mode"] == "waiting");
+    let run = case.start(&["run", "deployment.toml", "--json"]);
+    let hello = page.text("hello", |it| it["mode"] == "live");
+    assert_eq!(hello["scene"]["views"].as_array().map(Vec::len), Some(2));
+    page.ask(&json!({ "pictures": [1, 99] }));
+    page.ask(&json!({ "record": true }));
+    let first = page.text("moment", |it| it["why"].is_null());
+    let n_joints = hello["scene"]["joints"].as_array().map(Vec::len);
+    assert_eq!(first["joints"].as_array().map(Vec::len), n_joints);
+    let later = page.text("moment", |it| {
+        it["why"].is_null() && it["frame"] != first["frame"]
+    });
+    assert_ne!(later["joints"], first["joints"], "the figure moves");
+    let (seen, frame, size) = page.picture();
+    assert_eq!(seen, 1, "only that view was asked for");
+    let (_, next, same) = page.picture();
+    assert!(next > frame && same == size);
+    page.ask(&json!({ "epipolar": [[0, [20.0, 30.0]], [7, [0, 0]]] }));
+    let lines = page.text("epipolar", |_| true);
+    assert_eq!(lines["lines"][0][1], 1, "{lines}");
+    assert_eq!(lines["lines"].as_array().map(Vec::len), Some(1));
+    let state = page.text("state", |it| it["recording"].is_object());
+    assert!(state["processes"].as_array().unwrap().len() >= 7, "{state}");
+    page.ask(&json!({ "record": false }));
+    let is_kept = |it: &Value| it["what"].as_str().unwrap().starts_with("recorded to");
+    page.text("event", is_kept);
+    page.text("hello", |it| it["mode"] == "waiting");
+    view.end();
+    let ended = run.wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.assert_nothing_left();
+    finished(&case);
+}
+
+/// A page about what that run has left: its folder, its recording, and either cut off.
+fn finished(case: &Case) {
+    let out = fs::read_dir(case.path("out")).unwrap();
+    let names = out.map(|it| it.unwrap().file_name().into_string().unwrap());
+    let recording = names.into_iter().find(|it| it.ends_with(".mcap")).unwrap();
+    let recording = format!("out/{recording}");
+    for (subject, has_pictures) in [("out", false), (recording.as_str(), true)] {
+        let view = View::start(case, &[subject]);
+        let mut page = view.open();
+        let hello = page.text("hello", |it| it["mode"] == "finished");
+        let n = hello["n"].as_u64().unwrap();
+        assert!(n > 3, "{hello}");
+        page.ask(&json!({ "pictures": [0], "at": n / 2 }));
+        if has_pictures {
+            assert_eq!(page.picture().0, 0);
+        }
+        let middle = page.text("moment", |_| true);
+        assert_eq!(middle["at"], n / 2);
+        page.ask(&json!({ "at": 1_000_000 }));
+        let last = page.text("moment", |_| true);
+        assert_eq!(last["frame"], hello["last"], "beyond the end is the end");
+        view.end();
+    }
+    // Cut off in the middle of a line, and in the middle of a message.
+    for (name, subject) in [("out/pose3d.jsonl", "out"), (&recording, &recording)] {
+        let whole = fs::read(case.path(name)).unwrap();
+        case.write(name, &whole[..whole.len() / 2 + 7]);
+        let view = View::start(case, &[subject]);
+        let hello = view.open().text("hello", |it| it["mode"] == "finished");
+        assert!(hello["n"].as_u64().is_some_and(|it| it > 0), "{hello}");
+        view.end();
+    }
+    fs::create_dir(case.path("empty")).unwrap();
+    for wrong in ["empty", "no/such/folder", "rig.toml", "log-0.err"] {
+        let ended = case
+            .start(&["view", "--port", "0", wrong])
+            .wait_among_others();
+        let code = ended.status.code();
+        assert!(
+            code.is_some_and(|it| (1..=4).contains(&it)),
+            "{wrong}: {code:?}"
+        );
+    }
+}
+
+#[test]
+fn other_sites_strange_requests_and_nonsense_are_refused_and_the_page_goes_on() {
+    let case = Case::new("view-refuses", &[1; 2], "");
+    let view = View::start(&case, &["--deployment", &case.name]);
+    let here = view.address.clone();
+    let (status, page) = view.get("/", &here, "");
+    assert_eq!(status, 200);
+    assert!(page.contains("default-src 'none'"), "{page}");
+    for (path, host, more, expected) in [
+        ("/", "evil.example", "", 403),
+        ("/view.js", &here, "Origin: http://evil.example\r\n", 403),
+        ("/../../etc/passwd", &here, "", 404),
+        ("/%2e%2e/%2e%2e/etc/passwd", &here, "", 404),
+        ("/stage.js", &here, "", 200),
+        ("/ws", &here, "", 400),
+    ] {
+        assert_eq!(view.get(path, host, more).0, expected, "{path} {host}");
+    }
+    let (status, _) = view.get("/", &here, &format!("X: {}\r\n", "x".repeat(4 << 20)));
+    assert!([0, 400, 431].contains(&status), "{status}");
+    let mut pages: Vec<Page> = (0..20).map(|_| view.open()).collect();
+    for page in &mut pages {
+        page.text("hello", |it| it["mode"] == "waiting");
+        page.ask(&json!({ "pictures": [0] }));
+    }
+    let mut wild = view.open();
+    wild.ask(&json!({ "at": "never", "x": [] }));
+    wild.text("refused", |_| true);
+    let huge = "[".repeat(64 << 10);
+    let _refused = wild.socket.send(Message::Text(huge.into()));
+    let mut deep = view.open();
+    for _ in 0..64 {
+        let _refused = deep.socket.send(Message::Binary(vec![0; 99].into()));
+    }
+    view.open().text("hello", |it| it["mode"] == "waiting");
+    // Without a token nothing but the loopback.
+    let ended = case
+        .start(&["view", "--listen", "0.0.0.0", "--token=short"])
+        .wait_among_others();
+    assert_eq!(ended.status.code(), Some(2));
+    view.end();
+}

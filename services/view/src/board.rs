@@ -1,0 +1,268 @@
+//! The newest of everything that pages show. One thread puts it there; every page takes what it has not seen.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use axum::extract::ws::Message;
+use messages::MAX_VIEWS;
+use serde_json::{Value, json};
+use tokio::sync::watch;
+
+use crate::date::unix_ms;
+use crate::scene::Scene;
+
+/// Events that are kept for pages that open later.
+const MOST_EVENTS: usize = 200;
+
+/// How much an event matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Weight {
+    /// Good to know.
+    Note,
+    /// Something is lost.
+    Warning,
+    /// Something has failed.
+    Error,
+}
+
+impl Weight {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}
+
+/// The newest of everything.
+#[derive(Debug)]
+pub(crate) struct Board {
+    inner: Mutex<Inner>,
+    /// The number of the last change.
+    tick: watch::Sender<u64>,
+    /// Pages that show the pictures of a view.
+    wanted: [AtomicUsize; MAX_VIEWS],
+    n_pages: AtomicUsize,
+}
+
+#[derive(Debug, Default)]
+struct Inner {
+    version: u64,
+    hello: Slot,
+    state: Slot,
+    moment: Slot,
+    pictures: [Slot; MAX_VIEWS],
+    events: VecDeque<(u64, Message)>,
+    scene: Option<Arc<Scene>>,
+    /// Whether the user wants what runs to be recorded; taken by the thread that looks on.
+    record: Option<bool>,
+}
+
+/// A message to all pages, and the number of the change that brought it.
+#[derive(Debug, Clone, Default)]
+struct Slot {
+    version: u64,
+    message: Option<Message>,
+}
+
+impl Board {
+    /// Empty.
+    pub(crate) fn new() -> Self {
+        Self {
+            inner: Mutex::default(),
+            tick: watch::Sender::new(0),
+            wanted: Default::default(),
+            n_pages: AtomicUsize::new(0),
+        }
+    }
+
+    /// Shows another run, or that there is none; what was shown of the last one goes.
+    pub(crate) fn begin(&self, hello: &Value, scene: Option<Arc<Scene>>) {
+        self.change(|inner, version| {
+            inner.hello = Slot::new(version, text(hello));
+            for slot in [&mut inner.state, &mut inner.moment]
+                .into_iter()
+                .chain(&mut inner.pictures)
+            {
+                *slot = Slot::default();
+            }
+            inner.record = None;
+            inner.scene = scene;
+        });
+    }
+
+    /// Shows a frame.
+    pub(crate) fn moment(&self, text: String) {
+        self.change(|inner, version| {
+            inner.moment = Slot::new(version, Message::Text(text.into()));
+        });
+    }
+
+    /// Shows the state of the processes.
+    pub(crate) fn state(&self, state: &Value) {
+        self.change(|inner, version| inner.state = Slot::new(version, text(state)));
+    }
+
+    /// Shows a picture ([`crate::picture::message`]).
+    pub(crate) fn picture(&self, view: usize, message: Vec<u8>) {
+        self.change(|inner, version| {
+            if let Some(slot) = inner.pictures.get_mut(view) {
+                *slot = Slot::new(version, Message::Binary(message.into()));
+            }
+        });
+    }
+
+    /// Says what has happened.
+    pub(crate) fn event(&self, weight: Weight, what: &str) {
+        let event = json!({
+            "type": "event", "weight": weight.name(), "unix_ms": unix_ms(), "what": what,
+        });
+        self.change(|inner, version| {
+            inner.events.push_back((version, text(&event)));
+            if inner.events.len() > MOST_EVENTS {
+                inner.events.pop_front();
+            }
+        });
+    }
+
+    /// What is new since a change, and the number of the last one.
+    ///
+    /// * `pictures`: whether the page shows the pictures of a view.
+    pub(crate) fn since(&self, seen: u64, pictures: &[bool; MAX_VIEWS]) -> (u64, Vec<Message>) {
+        let inner = self.lock();
+        let mut new = Vec::new();
+        let mut take = |slot: &Slot| {
+            if slot.version > seen {
+                new.extend(slot.message.clone());
+            }
+        };
+        take(&inner.hello);
+        take(&inner.state);
+        take(&inner.moment);
+        let shown = inner.pictures.iter().zip(pictures);
+        shown.filter(|it| *it.1).for_each(|it| take(it.0));
+        let events = inner.events.iter().filter(|it| it.0 > seen);
+        new.extend(events.map(|it| it.1.clone()));
+        (inner.version, new)
+    }
+
+    /// Tells of changes.
+    pub(crate) fn changes(&self) -> watch::Receiver<u64> {
+        self.tick.subscribe()
+    }
+
+    /// The cameras and joints that are shown.
+    pub(crate) fn scene(&self) -> Option<Arc<Scene>> {
+        self.lock().scene.clone()
+    }
+
+    /// Asks that what runs be recorded, or no more.
+    pub(crate) fn ask_to_record(&self, on: bool) {
+        self.lock().record = Some(on);
+    }
+
+    /// What was asked about recording since the last call.
+    pub(crate) fn take_record(&self) -> Option<bool> {
+        self.lock().record.take()
+    }
+
+    /// Counts pages.
+    pub(crate) fn pages(&self) -> &AtomicUsize {
+        &self.n_pages
+    }
+
+    /// Whether a page is open.
+    pub(crate) fn has_pages(&self) -> bool {
+        self.n_pages.load(Ordering::Relaxed) > 0
+    }
+
+    /// Counts the pages that show the pictures of a view; none for a view that cannot be.
+    pub(crate) fn wanted(&self, view: usize) -> Option<&AtomicUsize> {
+        self.wanted.get(view)
+    }
+
+    /// Whether a page shows the pictures of a view.
+    pub(crate) fn wants(&self, view: usize) -> bool {
+        self.wanted(view)
+            .is_some_and(|it| it.load(Ordering::Relaxed) > 0)
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Inner, u64)) {
+        let mut inner = self.lock();
+        inner.version += 1;
+        let version = inner.version;
+        change(&mut inner, version);
+        drop(inner);
+        self.tick.send_replace(version);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Slot {
+    fn new(version: u64, message: Message) -> Self {
+        Self {
+            version,
+            message: Some(message),
+        }
+    }
+}
+
+fn text(value: &Value) -> Message {
+    Message::Text(value.to_string().into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NONE: [bool; MAX_VIEWS] = [false; MAX_VIEWS];
+
+    #[test]
+    fn a_page_that_is_slow_gets_the_newest_and_never_what_came_before() {
+        let board = Board::new();
+        for n in 0..100 {
+            board.moment(n.to_string());
+        }
+        let (seen, new) = board.since(0, &NONE);
+        assert_eq!(new, [Message::Text("99".into())]);
+        assert_eq!(board.since(seen, &NONE), (seen, Vec::new()));
+    }
+
+    #[test]
+    fn pictures_go_to_pages_that_show_them() {
+        let board = Board::new();
+        board.picture(2, vec![7]);
+        board.picture(MAX_VIEWS, vec![8]);
+        let mut shown = NONE;
+        assert_eq!(board.since(0, &shown).1, []);
+        shown[2] = true;
+        assert_eq!(board.since(0, &shown).1, [Message::Binary(vec![7].into())]);
+    }
+
+    #[test]
+    fn another_run_clears_what_was_shown_of_the_last_one() {
+        let board = Board::new();
+        board.moment("old".to_owned());
+        board.begin(&json!({ "type": "hello" }), None);
+        let new = board.since(0, &NONE).1;
+        assert_eq!(new.len(), 1);
+        assert!(new[0].to_text().is_ok_and(|it| it.contains("hello")));
+    }
+
+    #[test]
+    fn a_page_that_opens_later_learns_what_has_happened_before_up_to_a_limit() {
+        let board = Board::new();
+        for n in 0..2 * MOST_EVENTS {
+            board.event(Weight::Error, &format!("event {n}"));
+        }
+        let new = board.since(0, &NONE).1;
+        assert_eq!(new.len(), MOST_EVENTS);
+        let last = new.last().map(|it| it.to_text().unwrap_or_default());
+        assert!(last.is_some_and(|it| it.contains("event 399")));
+    }
+}

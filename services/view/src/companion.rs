@@ -1,0 +1,121 @@
+//! A view beside a run: a process of its own, started again if it dies, which ends with the run.
+
+use core::net::SocketAddr;
+use core::time::Duration;
+use std::net::TcpListener;
+use std::os::unix::process::CommandExt as _;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use crate::options::Listen;
+
+/// Pause before a view that has died is started again.
+const PAUSE: Duration = Duration::from_millis(500);
+/// How often it is looked at.
+const TURN: Duration = Duration::from_millis(100);
+/// How often it is started again.
+const MOST_STARTS: u32 = 100;
+
+/// A view beside a run. It ends when this is dropped, or when this process ends in any other way.
+#[derive(Debug)]
+pub struct Companion {
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Companion {
+    /// Starts it: `executable view --deployment NAME --port PORT --with-parent`.
+    ///
+    /// * `name`: of the deployment.
+    ///
+    /// # Errors
+    ///
+    /// No port is free, or the thread that watches it cannot be started.
+    pub fn start(executable: &Path, name: &str) -> Result<Self, Failure> {
+        let port = free_port().or_fail(ExitKind::Run)?;
+        let mut command = Command::new(executable);
+        command
+            .args(["view", "--deployment", name, "--with-parent", "--port"])
+            .arg(port.to_string())
+            // It ends when this pipe does. Ctrl-C is for the run.
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .process_group(0);
+        let over = Arc::new(AtomicBool::new(false));
+        let asked = Arc::clone(&over);
+        let thread = std::thread::Builder::new().name("view".to_owned());
+        let thread = thread.spawn(move || watch(command, &asked));
+        Ok(Self {
+            over,
+            thread: Some(thread.or_fail(ExitKind::Run)?),
+        })
+    }
+}
+
+impl Drop for Companion {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::debug!("the thread that watches the view panicked");
+        }
+    }
+}
+
+/// The usual port, or another that is free now.
+fn free_port() -> std::io::Result<u16> {
+    let usual = Listen::usual().address;
+    let bound = TcpListener::bind(usual);
+    let bound = bound.or_else(|_| TcpListener::bind(SocketAddr::new(usual.ip(), 0)));
+    Ok(bound?.local_addr()?.port())
+}
+
+/// Keeps it running.
+fn watch(mut command: Command, over: &AtomicBool) {
+    for _ in 0..MOST_STARTS {
+        let mut child = match command.spawn() {
+            Ok(child) => child,
+            Err(error) => {
+                tracing::warn!(%error, "cannot start the view");
+                return;
+            }
+        };
+        while !over.load(Ordering::Relaxed) {
+            match child.try_wait() {
+                Ok(None) => std::thread::sleep(TURN),
+                Ok(Some(status)) => {
+                    tracing::warn!(%status, "the view has ended; it is started again");
+                    break;
+                }
+                Err(error) => {
+                    tracing::warn!(%error, "cannot watch the view");
+                    break;
+                }
+            }
+        }
+        if over.load(Ordering::Relaxed) {
+            end(child);
+            return;
+        }
+        std::thread::sleep(PAUSE);
+    }
+}
+
+fn end(mut child: Child) {
+    drop(child.stdin.take());
+    for _ in 0..20 {
+        if child.try_wait().is_ok_and(|it| it.is_some()) {
+            return;
+        }
+        std::thread::sleep(TURN);
+    }
+    if let Err(error) = child.kill().and_then(|()| child.wait().map(drop)) {
+        tracing::debug!(%error, "cannot end the view");
+    }
+}

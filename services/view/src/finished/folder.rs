@@ -1,0 +1,317 @@
+//! The folder of a run: results line by line, and pictures with the poses drawn in them.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead as _, BufReader, Read as _, Seek as _, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use launch::Resolved;
+use runfiles::{FrameLine, Line as _, Missing, ViewLine};
+use runtime::{ExitKind, Failure};
+use serde::Deserialize;
+use skeleton::PARSE14;
+
+use super::Frame;
+use crate::moment::{Moment, Seen, in_view, in_world, spread};
+use crate::picture;
+use crate::scene::Scene;
+
+/// Longest line that is read, bytes: hundreds of views.
+const LONGEST_LINE: u64 = 4 << 20;
+/// Most pixels of a picture that is read.
+const MOST_PIXELS: u64 = 64 << 20;
+
+/// The folder of a run.
+#[derive(Debug)]
+pub(crate) struct Folder {
+    name: String,
+    scene: Arc<Scene>,
+    frames: Vec<Frame>,
+    notes: Vec<String>,
+    poses: Mutex<File>,
+    /// Where the lines of a frame about its views begin, and how many there are.
+    views: BTreeMap<u64, (u64, usize)>,
+    view_lines: Option<Mutex<File>>,
+    /// Of every view: its folder of pictures, and the numbers of their frames, ascending.
+    pictures: Vec<(PathBuf, Vec<u64>)>,
+}
+
+/// What of a line about a frame is needed to find it again.
+#[derive(Deserialize)]
+struct Head {
+    frame: u64,
+    #[serde(default)]
+    status: String,
+}
+
+impl Folder {
+    /// Opens it.
+    pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
+        let mut notes = Vec::new();
+        let poses = open_lines(path, FrameLine::FILE, &mut notes)?.ok_or_else(|| {
+            let text = format!("{} has no {}", path.display(), FrameLine::FILE);
+            let failure = Failure::new(ExitKind::Input, text);
+            failure.with_hint("name the folder that a run has left, its `output`")
+        })?;
+        let mut frames = Vec::new();
+        let mut add = |head: Head, place| {
+            frames.push(Frame {
+                number: head.frame,
+                has_pose: Some(head.status == FrameLine::OK),
+                place,
+            });
+        };
+        let n_bad = each_line(&poses, |head, place| add(head, place))?;
+        if n_bad > 0 {
+            notes.push(format!(
+                "{n_bad} lines of {} cannot be read",
+                FrameLine::FILE
+            ));
+        }
+        if frames.is_empty() {
+            let text = format!("{} in {} has no frame", FrameLine::FILE, path.display());
+            return Err(Failure::new(ExitKind::Input, text));
+        }
+        frames.sort_by_key(|it| it.number);
+        let view_lines = open_lines(path, ViewLine::FILE, &mut notes)?;
+        let mut views: BTreeMap<u64, (u64, usize)> = BTreeMap::new();
+        if let Some(file) = &view_lines {
+            each_line(file, |head, place| {
+                views.entry(head.frame).or_insert((place, 0)).1 += 1;
+            })?;
+        }
+        let scene = scene(path, &mut notes);
+        let folders = scene.views.iter().map(|it| pictures(path, &it.name));
+        Ok(Self {
+            name: path.display().to_string(),
+            pictures: folders.collect(),
+            scene: Arc::new(scene),
+            frames,
+            notes,
+            poses: Mutex::new(poses),
+            views,
+            view_lines: view_lines.map(Mutex::new),
+        })
+    }
+
+    /// Its cameras and joints.
+    pub(crate) fn scene(&self) -> Arc<Scene> {
+        Arc::clone(&self.scene)
+    }
+
+    /// Where it is.
+    pub(crate) fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    /// Its frames, ascending.
+    pub(crate) fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// What its user should know of it.
+    pub(crate) fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// A frame.
+    pub(crate) fn moment(&self, at: usize) -> Result<Moment, Failure> {
+        let at = at.min(self.frames.len() - 1);
+        let text = &line_at(&self.poses, self.frames[at].place, 1)?;
+        let line = runfiles::lines::<FrameLine>(text).next();
+        let line = line.ok_or("an empty line").map_err(unreadable)?;
+        let line = line.map_err(unreadable)?;
+        let mut moment = of_line(&self.scene, &line);
+        moment.at = Some(at);
+        if let Some((file, (place, n))) = self.view_lines.as_ref().zip(self.views.get(&line.frame))
+        {
+            let text = line_at(file, *place, *n)?;
+            for it in runfiles::lines::<ViewLine>(&text).filter_map(Result::ok) {
+                see(&self.scene, &mut moment, &it);
+            }
+        }
+        Ok(moment)
+    }
+
+    /// A picture, of the frame or of the last one before it.
+    pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
+        let (folder, frames) = self.pictures.get(view)?;
+        let before = frames.partition_point(|it| *it <= frame);
+        let frame = *frames.get(before.checked_sub(1)?)?;
+        let file = folder.join(format!("{frame:06}.png"));
+        let (width, height) = image::image_dimensions(&file).ok()?;
+        if u64::from(width) * u64::from(height) > MOST_PIXELS {
+            return None;
+        }
+        let read = image::open(&file).ok()?.into_rgb8();
+        let size = [width as usize, height as usize];
+        picture::message(view, frame, size, read.as_raw(), true)
+    }
+}
+
+fn unreadable(why: impl Into<Box<dyn core::error::Error + Send + Sync>>) -> Failure {
+    Failure::new(ExitKind::Input, why)
+}
+
+/// A file of lines; one of a run that was cut short still has another name.
+fn open_lines(folder: &Path, name: &str, notes: &mut Vec<String>) -> Result<Option<File>, Failure> {
+    let part = format!("{name}.part");
+    for name in [name, &part] {
+        let path = folder.join(name);
+        match File::open(&path) {
+            Ok(file) => {
+                if name == part {
+                    notes.push(format!(
+                        "the run was cut short, or goes on: {name} is not finished"
+                    ));
+                }
+                return Ok(Some(file));
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(error) => return Err(runtime::in_file(&path, &error)),
+        }
+    }
+    Ok(None)
+}
+
+/// Calls for every line that can be read, with its place, and counts the others; one that has no end does not count.
+fn each_line(file: &File, mut each: impl FnMut(Head, u64)) -> Result<u64, Failure> {
+    let mut reader = BufReader::new(file);
+    let (mut place, mut n_bad, mut line) = (0, 0, Vec::new());
+    loop {
+        line.clear();
+        let n = (&mut reader)
+            .take(LONGEST_LINE)
+            .read_until(b'\n', &mut line);
+        let n = n.map_err(unreadable)? as u64;
+        if n == 0 || line.last() != Some(&b'\n') {
+            return Ok(n_bad);
+        }
+        match serde_json::from_slice::<Head>(&line) {
+            Ok(head) => each(head, place),
+            Err(_) => n_bad += 1,
+        }
+        place += n;
+    }
+}
+
+/// So many lines from a place on.
+fn line_at(file: &Mutex<File>, place: u64, n: usize) -> Result<String, Failure> {
+    let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+    file.seek(SeekFrom::Start(place)).map_err(unreadable)?;
+    let mut reader = BufReader::new(&mut *file).take(LONGEST_LINE);
+    let mut text = String::new();
+    for _ in 0..n {
+        reader.read_line(&mut text).map_err(unreadable)?;
+    }
+    Ok(text)
+}
+
+/// The cameras and joints of a run by its settings, as far as they can be read.
+fn scene(folder: &Path, notes: &mut Vec<String>) -> Scene {
+    let file = folder.join("deployment.json");
+    let text = runtime::read_text(&file);
+    let read = text.and_then(|text| {
+        let read = serde_json::from_str::<Resolved>(&text);
+        read.map_err(|error| runtime::in_file(&file, &error))
+    });
+    match read {
+        Ok(resolved) => {
+            let mut scene = Scene::of_finished(&resolved);
+            // Coordinates in the files of a run are those of its footage.
+            for (view, footage) in scene.views.iter_mut().zip(&resolved.footage) {
+                view.size = footage.size;
+                if let Some(camera) = &view.camera
+                    && camera.intrinsics.size != footage.size
+                {
+                    view.camera = of_footage(&resolved, &view.name).or_else(|| view.camera.take());
+                }
+            }
+            notes.extend(scene.problem.clone());
+            scene
+        }
+        Err(why) => {
+            notes.push(format!("without cameras: {why}"));
+            Scene {
+                name: String::new(),
+                views: Vec::new(),
+                joints: &PARSE14,
+                up: [0.0, 0.0, 1.0],
+                frame_rate_hz: None,
+                problem: None,
+            }
+        }
+    }
+}
+
+/// The calibrated camera of the footage itself.
+fn of_footage(resolved: &Resolved, name: &str) -> Option<geometry::Camera> {
+    let rig = launch::inputs::rig_of(&resolved.deployment).ok()?;
+    rig.camera(name).cloned()
+}
+
+/// The folder of a camera's pictures, and their frames.
+fn pictures(folder: &Path, camera: &str) -> (PathBuf, Vec<u64>) {
+    let folder = folder.join("overlays").join(camera);
+    let is_plain = !camera.starts_with('.') && !camera.contains('/');
+    let entries = std::fs::read_dir(&folder).ok().filter(|_| is_plain);
+    let names = entries.into_iter().flatten().filter_map(Result::ok);
+    let number = |entry: std::fs::DirEntry| {
+        let name = entry.file_name();
+        name.to_str()?.strip_suffix(".png")?.parse().ok()
+    };
+    let mut frames: Vec<u64> = names.filter_map(number).collect();
+    frames.sort_unstable();
+    (folder, frames)
+}
+
+/// A frame by its line, without the poses of its views.
+fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
+    let placed = scene.joints.joints.iter().map(|it| {
+        let joint = line.joints.get(it.name);
+        joint.and_then(|it| it.placed())
+    });
+    let placed: Vec<_> = placed.collect();
+    let views = scene.views.iter().map(|it| Seen {
+        why: line
+            .views_missing
+            .get(&it.name)
+            .map(|why: &Missing| why.text().to_owned()),
+        ..Seen::default()
+    });
+    let why = line.reason.clone().unwrap_or_else(|| line.status.clone());
+    Moment {
+        kind: Moment::KIND,
+        at: None,
+        frame: line.frame,
+        seconds: line.time_s,
+        why: (!line.has_pose()).then_some(why),
+        joints: placed
+            .iter()
+            .map(|it| it.map(|it| in_world(it.position_m)))
+            .collect(),
+        spread: placed
+            .iter()
+            .map(|it| it.and_then(|it| spread(it.covariance_m2)))
+            .collect(),
+        views: views.collect(),
+        people: line.people,
+        stature: line.stature_m,
+        latency_ms: None,
+    }
+}
+
+/// Adds the pose of a view.
+fn see(scene: &Scene, moment: &mut Moment, line: &ViewLine) {
+    let Some(view) = scene.views.iter().position(|it| it.name == line.view) else {
+        return;
+    };
+    let parts = line.fused.iter().flat_map(|it| &it.parts);
+    let centres: Option<Vec<[f64; 2]>> = parts.map(|it| Some([it.x?, it.y?])).collect();
+    let joints = centres.and_then(|it| scene.joints_of(&it));
+    if let Some(seen) = moment.views.get_mut(view) {
+        seen.joints = joints.map(|it| it.into_iter().map(in_view).collect());
+        seen.behind = line.facing == Some(runfiles::Facing::Behind);
+    }
+}

@@ -1,0 +1,148 @@
+//! A recording: its results and its pictures, by their places in the file.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use bytemuck::pod_read_unaligned;
+use launch::recorded::{self, Settings};
+use messages::{FrameHeader, Pose3d, Status, topic};
+use recording::{Entry, Kind, Recording};
+use runtime::{ExitKind, Failure};
+
+use super::Frame;
+use crate::moment::Moment;
+use crate::picture;
+use crate::scene::Scene;
+
+/// A recording.
+#[derive(Debug)]
+pub(crate) struct Tape {
+    name: String,
+    scene: Arc<Scene>,
+    file: Mutex<File>,
+    frames: Vec<Frame>,
+    notes: Vec<String>,
+    poses: Vec<Entry>,
+    /// Of every view: its pictures by their frames.
+    pictures: Vec<BTreeMap<u64, Entry>>,
+}
+
+impl Tape {
+    /// Opens it.
+    pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
+        let recording = recorded::open(path)?;
+        let refused = |why: String| {
+            let text = format!("{}: {why}", path.display());
+            Failure::new(ExitKind::Input, text)
+        };
+        let about = recording.about.as_ref();
+        let about = about.map_err(|why| refused(why.to_string()))?;
+        let settings = serde_json::from_str::<Settings>(&about.settings);
+        let settings = settings.map_err(|why| refused(format!("its settings: {why}")))?;
+        let scene = Scene::of_finished(&settings.resolved);
+        let mut notes: Vec<String> = scene.problem.clone().into_iter().collect();
+        note(&recording, &mut notes);
+        let track = recording.tracks.get(&topic::pose3d());
+        let mut poses = track.map_or_else(Vec::new, |it| it.entries.clone());
+        let mut input = File::open(path).map_err(|why| runtime::in_file(path, &why))?;
+        poses.retain(|it| read_pose(&mut input, it).is_ok_and(|it| it.status != Status::END));
+        if poses.is_empty() {
+            return Err(refused("it has no result".to_owned()));
+        }
+        poses.sort_by_key(|it| it.frame);
+        let frame = |(place, entry): (usize, &Entry)| Frame {
+            number: entry.frame.unwrap_or(place as u64),
+            has_pose: read_pose(&mut input, entry)
+                .ok()
+                .map(|it| it.status == Status::OK),
+            place: place as u64,
+        };
+        let frames = poses.iter().enumerate().map(frame).collect();
+        let of_view = |view: usize| {
+            let track = recording.tracks.get(&topic::frame(view));
+            let entries = track.into_iter().flat_map(|it| &it.entries);
+            let with_pixels = entries.filter(|it| it.len as usize > size_of::<FrameHeader>() + 64);
+            with_pixels
+                .filter_map(|it| Some((it.frame?, *it)))
+                .collect()
+        };
+        Ok(Self {
+            name: path.display().to_string(),
+            pictures: (0..scene.views.len()).map(of_view).collect(),
+            scene: Arc::new(scene),
+            file: Mutex::new(input),
+            frames,
+            notes,
+            poses,
+        })
+    }
+
+    /// Its cameras and joints.
+    pub(crate) fn scene(&self) -> Arc<Scene> {
+        Arc::clone(&self.scene)
+    }
+
+    /// Where it is.
+    pub(crate) fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    /// Its frames, ascending.
+    pub(crate) fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// What its user should know of it.
+    pub(crate) fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// A frame.
+    pub(crate) fn moment(&self, at: usize) -> Result<Moment, Failure> {
+        let at = at.min(self.poses.len() - 1);
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        let message = read_pose(&mut file, &self.poses[at])?;
+        let n_joints = self.scene.joints.joints.len();
+        let checked = wire::check_pose3d(&message, self.scene.views.len(), n_joints);
+        checked.map_err(|why| Failure::new(ExitKind::Input, why))?;
+        let mut moment = Moment::of_message(&self.scene, &message);
+        moment.at = Some(at);
+        Ok(moment)
+    }
+
+    /// A picture, of the frame or of the last one before it.
+    pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
+        let (frame, entry) = self.pictures.get(view)?.range(..=frame).next_back()?;
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut buffer = Vec::new();
+        let message = recording::read(&mut *file, Kind::Frame, entry, &mut buffer).ok()?;
+        let head: FrameHeader = pod_read_unaligned(message.head);
+        let size = [head.width as usize, head.height as usize];
+        picture::message(view, *frame, size, message.elements, false)
+    }
+}
+
+fn read_pose(file: &mut File, entry: &Entry) -> Result<Pose3d, Failure> {
+    let mut buffer = Vec::new();
+    let message = recording::read(file, Kind::Pose3d, entry, &mut buffer);
+    let message = message.map_err(|why| Failure::new(ExitKind::Input, why))?;
+    Ok(pod_read_unaligned(message.head))
+}
+
+/// What is wrong with a recording.
+fn note(recording: &Recording, notes: &mut Vec<String>) {
+    if !recording.extent.is_complete {
+        notes.push("the recording was cut off, or goes on".to_owned());
+    }
+    if !recording.extent.damage.is_empty() || recording.extent.n_malformed > 0 {
+        notes.push("the recording is damaged; what cannot be read is left out".to_owned());
+    }
+    if recording.n_lost() > 0 {
+        notes.push(format!(
+            "{} messages are not in the recording",
+            recording.n_lost()
+        ));
+    }
+}

@@ -1,0 +1,66 @@
+//! Looks on at a running deployment, and puts what it sees on the board.
+
+mod events;
+mod session;
+mod tape;
+
+use core::time::Duration;
+use std::time::Instant;
+
+use runtime::{Failure, Stop};
+use serde_json::{Value, json};
+
+use crate::board::{Board, Weight};
+use session::{Look, Session};
+
+/// Pause between two looks while a page is open: shorter than any camera's.
+const TURN: Duration = Duration::from_millis(12);
+/// Pause between two looks while none is.
+const IDLE_TURN: Duration = Duration::from_millis(150);
+/// Pause between two attempts to find the deployment.
+const ABSENT: Duration = Duration::from_millis(250);
+
+/// Follows a deployment until a stop is requested: waits until it runs, looks on until it ends, and waits for the next run.
+///
+/// * `named`: its name; the only one that runs if there is none.
+/// * `pictures_per_second`: most pictures of a view.
+pub(crate) fn follow(named: Option<&str>, pictures_per_second: u32, board: &Board, stop: &Stop) {
+    let mut said = None;
+    while !stop.is_requested() {
+        let why = match Session::open(named, pictures_per_second, stop) {
+            Ok(session) => {
+                let ended = watch(session, board, stop);
+                said = None;
+                ended.err().map(|it| it.to_string())
+            }
+            Err(why) => Some(why.to_string()),
+        };
+        let why = why.unwrap_or_else(|| "the deployment has ended".to_owned());
+        if said.as_ref() != Some(&why) {
+            board.begin(&waiting(named, &why), None);
+            said = Some(why);
+        }
+        std::thread::sleep(ABSENT);
+    }
+}
+
+/// What pages show while nothing runs.
+fn waiting(named: Option<&str>, why: &str) -> Value {
+    json!({ "type": "hello", "mode": "waiting", "name": named, "why": why })
+}
+
+/// Looks on until the deployment ends.
+fn watch(mut session: Session, board: &Board, stop: &Stop) -> Result<(), Failure> {
+    board.begin(&session.hello(), Some(session.scene()));
+    board.event(Weight::Note, "looking on");
+    while !stop.is_requested() {
+        let turned = Instant::now();
+        if session.look(board)? == Look::Over {
+            break;
+        }
+        let pause = if board.has_pages() { TURN } else { IDLE_TURN };
+        std::thread::sleep(pause.saturating_sub(turned.elapsed()).max(TURN / 4));
+    }
+    session.leave(board);
+    Ok(())
+}

@@ -1,0 +1,168 @@
+//! What happens in a deployment, as lines for its user: told by the differences between two looks.
+
+use core::time::Duration;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use launch::live::{Snapshot, State};
+use messages::{Cause, Status};
+
+use crate::board::{Board, Weight};
+use crate::moment::Moment;
+use crate::scene::Scene;
+
+/// Results without a skeleton in a row before it is said.
+const IN_A_ROW: u32 = 3;
+/// Shortest time between two lines about what one process has lost.
+const LOSSES: Duration = Duration::from_secs(10);
+
+/// What was seen last.
+#[derive(Debug)]
+pub(crate) struct Events {
+    /// Status of the last frame of every view.
+    frames: Vec<Status>,
+    processes: BTreeMap<String, Seen>,
+    /// Results without a skeleton in a row.
+    n_without: u32,
+    /// Whether a message was refused.
+    has_refused: bool,
+}
+
+/// What was seen of a process.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    state: State,
+    restarts: u32,
+    /// When losses were said last, and those of then.
+    told: Option<Instant>,
+    dropped: [u64; Cause::ALL.len()],
+}
+
+impl Events {
+    /// Nothing was seen yet.
+    pub(crate) fn new(scene: &Scene) -> Self {
+        Self {
+            frames: vec![Status::OK; scene.views.len()],
+            processes: BTreeMap::new(),
+            n_without: 0,
+            has_refused: false,
+        }
+    }
+
+    /// A message about a frame cannot be used; said once.
+    pub(crate) fn refused(&mut self, board: &Board, why: &str) {
+        if !self.has_refused {
+            board.event(Weight::Error, &format!("a result cannot be shown: {why}"));
+        }
+        self.has_refused = true;
+    }
+
+    /// A result: says when skeletons stay away, and when they are back.
+    pub(crate) fn result(&mut self, board: &Board, moment: &Moment) {
+        let Some(why) = &moment.why else {
+            if self.n_without >= IN_A_ROW {
+                board.event(
+                    Weight::Note,
+                    &format!("frame {}: a skeleton again", moment.frame),
+                );
+            }
+            self.n_without = 0;
+            return;
+        };
+        self.n_without = self.n_without.saturating_add(1);
+        if self.n_without == IN_A_ROW {
+            board.event(
+                Weight::Warning,
+                &format!("frame {}: no skeleton: {why}", moment.frame),
+            );
+        }
+    }
+
+    /// A frame of a view: says when its camera fails, and when it is back.
+    pub(crate) fn frame(&mut self, board: &Board, scene: &Scene, view: usize, status: Status) {
+        let Some(last) = self.frames.get_mut(view).filter(|it| **it != status) else {
+            return;
+        };
+        *last = status;
+        let name = scene.views.get(view).map_or("", |it| &it.name);
+        match status {
+            Status::OK => board.event(Weight::Note, &format!("{name}: pictures again")),
+            Status::END => board.event(Weight::Note, &format!("{name}: end of footage")),
+            other => board.event(Weight::Error, &format!("{name}: {}", other.reason())),
+        }
+    }
+
+    /// The processes: says who has died, is back, is silent, and what was lost.
+    pub(crate) fn processes(&mut self, board: &Board, snapshot: &Snapshot) {
+        for process in &snapshot.processes {
+            let name = &process.name;
+            let reading = process.reading.as_ref();
+            let known = self.processes.get(name).copied();
+            let mut seen = Seen {
+                state: process.state,
+                restarts: reading.map_or(0, |it| it.restarts),
+                told: known.and_then(|it| it.told),
+                dropped: known.map_or([0; Cause::ALL.len()], |it| it.dropped),
+            };
+            if let Some(reading) = reading {
+                lost(
+                    board,
+                    name,
+                    &mut seen,
+                    &Cause::ALL.map(|it| reading.n_dropped_by(it)),
+                );
+            }
+            if let Some(known) = known {
+                tell(board, name, known, seen);
+            }
+            self.processes.insert(name.clone(), seen);
+        }
+    }
+}
+
+fn tell(board: &Board, name: &str, known: Seen, seen: Seen) {
+    let is_new = |state: State| seen.state == state && known.state != state;
+    if is_new(State::Dead) {
+        let weight = if known.state == State::Done {
+            Weight::Note
+        } else {
+            Weight::Error
+        };
+        board.event(weight, &format!("{name} has ended"));
+    }
+    if seen.restarts > known.restarts {
+        board.event(
+            Weight::Warning,
+            &format!("{name} was started again, {} times so far", seen.restarts),
+        );
+        return;
+    }
+    if is_new(State::Silent) {
+        board.event(Weight::Error, &format!("{name} is silent"));
+    }
+    if is_new(State::Done) {
+        board.event(Weight::Note, &format!("{name} is done"));
+    }
+}
+
+/// Says what was lost, not more often than every few seconds.
+fn lost(board: &Board, name: &str, seen: &mut Seen, now: &[u64; Cause::ALL.len()]) {
+    // Counts of a process that was started again begin at 0.
+    let is_less = now.iter().zip(&seen.dropped).any(|it| it.0 < it.1);
+    if is_less {
+        seen.dropped = [0; Cause::ALL.len()];
+    }
+    if seen.told.is_some_and(|it| it.elapsed() < LOSSES) {
+        return;
+    }
+    let counts = now.iter().zip(&seen.dropped).zip(Cause::ALL);
+    let new = counts.filter(|it| it.0.0 > it.0.1);
+    let new: Vec<String> = new
+        .map(|((now, then), cause)| format!("{} {}", now - then, cause.name()))
+        .collect();
+    if !new.is_empty() {
+        let what = format!("{name} has lost messages or frames: {}", new.join(", "));
+        board.event(Weight::Warning, &what);
+        (seen.told, seen.dropped) = (Some(Instant::now()), *now);
+    }
+}

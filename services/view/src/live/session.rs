@@ -1,0 +1,236 @@
+//! One run of a deployment, seen by an onlooker.
+
+use core::time::Duration;
+use std::sync::Arc;
+use std::time::Instant;
+
+use launch::Resolved;
+use launch::live::{self, Live};
+use messages::{FrameHeader, MAX_VIEWS, Pose3d, Status, topic};
+use runtime::{Bus, Failure, Namespace, SliceSubscriber, Stop, Subscriber};
+use serde_json::{Value, json};
+
+use super::events::Events;
+use super::tape::Tape;
+use crate::board::{Board, Weight};
+use crate::moment::Moment;
+use crate::picture;
+use crate::scene::Scene;
+
+/// How often the state of the processes is read.
+const STATE_PERIOD: Duration = Duration::from_millis(500);
+
+/// Whether to look again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Look {
+    /// Yes.
+    On,
+    /// The deployment ends; the session has to be dropped.
+    Over,
+}
+
+/// An onlooker of one run.
+#[derive(Debug)]
+pub(crate) struct Session {
+    scene: Arc<Scene>,
+    resolved: Resolved,
+    live: Live,
+    poses: Subscriber<Pose3d>,
+    cameras: Vec<Camera>,
+    events: Events,
+    tape: Option<Tape>,
+    /// When the state was read last.
+    told: Option<Instant>,
+    /// The session in the messages, once it is known.
+    session: Option<u64>,
+    namespace: Namespace,
+    // Dropped last: the subscribers use its ports.
+    _bus: Bus,
+}
+
+/// The frames of one view.
+#[derive(Debug)]
+struct Camera {
+    frames: SliceSubscriber<u8, FrameHeader>,
+    /// The shortest time between two pictures.
+    pause: Duration,
+    /// When the last picture was due.
+    due: Instant,
+}
+
+impl Session {
+    /// Begins to look on.
+    ///
+    /// # Errors
+    ///
+    /// It does not run, has too many onlookers, or its model or calibration cannot be read.
+    pub(crate) fn open(
+        named: Option<&str>,
+        pictures_per_second: u32,
+        stop: &Stop,
+    ) -> Result<Self, Failure> {
+        let namespace = live::namespace(named)?;
+        // Fails if it does not run, before anything is made in its folder.
+        let live = Live::open(&namespace)?;
+        let resolved = live::description(&namespace)?;
+        let scene = Scene::of_frames(&resolved)?;
+        let name = format!("view-{}", std::process::id());
+        let bus = Bus::open(&namespace, &name, stop)?.as_onlooker();
+        let mut waiter = bus.waiter();
+        let poses = bus.subscriber(&topic::pose3d(), &mut waiter)?;
+        let n_views = scene.views.len().min(MAX_VIEWS);
+        let pause = Duration::from_secs(1) / pictures_per_second.max(1);
+        let mut cameras = Vec::new();
+        for view in 0..n_views {
+            let frames = bus.slice_subscriber(&topic::frame(view), &mut waiter)?;
+            let due = Instant::now();
+            cameras.push(Camera { frames, pause, due });
+        }
+        Ok(Self {
+            events: Events::new(&scene),
+            scene: Arc::new(scene),
+            resolved,
+            live,
+            poses,
+            cameras,
+            tape: None,
+            told: None,
+            session: None,
+            namespace,
+            _bus: bus,
+        })
+    }
+
+    /// The cameras and joints.
+    pub(crate) fn scene(&self) -> Arc<Scene> {
+        Arc::clone(&self.scene)
+    }
+
+    /// What a page has to know first.
+    pub(crate) fn hello(&self) -> Value {
+        json!({
+            "type": "hello", "mode": "live", "name": self.scene.name, "scene": self.scene.json(),
+            "can_record": true,
+        })
+    }
+
+    /// Puts what is new on the board.
+    ///
+    /// # Errors
+    ///
+    /// Messages cannot be received.
+    pub(crate) fn look(&mut self, board: &Board) -> Result<Look, Failure> {
+        self.look_at_poses(board)?;
+        for view in 0..self.cameras.len() {
+            self.look_at(view, board)?;
+        }
+        if self.told.is_none_or(|it| it.elapsed() >= STATE_PERIOD) {
+            self.told = Some(Instant::now());
+            self.look_at_processes(board)?;
+            if self.live.is_over() {
+                return Ok(Look::Over);
+            }
+        }
+        Ok(Look::On)
+    }
+
+    /// Ends what it does besides looking on.
+    pub(crate) fn leave(&mut self, board: &Board) {
+        if let Some(tape) = self.tape.take() {
+            tape.finish(board);
+        }
+    }
+
+    fn look_at_poses(&mut self, board: &Board) -> Result<(), Failure> {
+        let Some(message) = self.poses.latest()? else {
+            return Ok(());
+        };
+        let scene = &self.scene;
+        if message.status == Status::END {
+            board.event(Weight::Note, "the footage has ended");
+            return Ok(());
+        }
+        let n_joints = scene.joints.joints.len();
+        if let Err(why) = wire::check_pose3d(&message, scene.views.len(), n_joints) {
+            self.events.refused(board, &why.to_string());
+            return Ok(());
+        }
+        let moment = Moment::of_message(scene, &message);
+        self.events.result(board, &moment);
+        if board.has_pages() {
+            board.moment(moment.text());
+        }
+        Ok(())
+    }
+
+    fn look_at(&mut self, view: usize, board: &Board) -> Result<(), Failure> {
+        let camera = &mut self.cameras[view];
+        let Some(sample) = camera.frames.latest()? else {
+            return Ok(());
+        };
+        let head = sample.header();
+        self.events.frame(board, &self.scene, view, head.status);
+        let now = Instant::now();
+        let is_due = now >= camera.due && board.wants(view) && head.status == Status::OK;
+        if !is_due {
+            return Ok(());
+        }
+        // In step with its rate, so that a picture that comes a little early is not left out.
+        camera.due = (camera.due + camera.pause).max(now - camera.pause / 2);
+        let size = [head.width as usize, head.height as usize];
+        let frame = head.stamp.frame;
+        if let Some(message) = picture::message(view, frame, size, sample.payload(), false) {
+            board.picture(view, message);
+        }
+        Ok(())
+    }
+
+    fn look_at_processes(&mut self, board: &Board) -> Result<(), Failure> {
+        let snapshot = self.live.snapshot()?;
+        self.events.processes(board, &snapshot);
+        let sessions = snapshot.processes.iter();
+        let mut sessions = sessions.filter_map(|it| it.reading.as_ref().map(|it| it.session));
+        self.session = self.session.or_else(|| sessions.next());
+        let described = live::describe(&snapshot);
+        self.record(board);
+        let recording = self.tape.as_ref().map(Tape::json);
+        if board.has_pages() {
+            board.state(&json!({
+                "type": "state", "processes": described["processes"], "recording": recording,
+            }));
+        }
+        Ok(())
+    }
+
+    /// Begins or ends a recording, if that was asked for.
+    fn record(&mut self, board: &Board) {
+        if self.tape.as_ref().is_some_and(Tape::is_finished)
+            && let Some(tape) = self.tape.take()
+        {
+            tape.finish(board);
+        }
+        match board.take_record() {
+            Some(true) if self.tape.is_none() => {
+                let Some(session) = self.session else {
+                    board.event(
+                        Weight::Warning,
+                        "it is too early to record: no process has reported",
+                    );
+                    return;
+                };
+                match Tape::start(&self.namespace, &self.resolved, session) {
+                    Ok(tape) => {
+                        board.event(
+                            Weight::Note,
+                            &format!("recording to {}", tape.file.display()),
+                        );
+                        self.tape = Some(tape);
+                    }
+                    Err(why) => board.event(Weight::Error, &format!("cannot record: {why}")),
+                }
+            }
+            Some(false) => self.leave(board),
+            _ => {}
+        }
+    }
+}

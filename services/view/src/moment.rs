@@ -1,0 +1,134 @@
+//! One frame as the page draws it.
+
+use messages::{Joint3d, MAX_JOINTS, MAX_PARTS, Pose3d, Status};
+use serde::Serialize;
+
+use crate::scene::Scene;
+
+/// One frame: the skeleton in space, the pose in every view, and who is missing.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct Moment {
+    /// Always `moment`.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// Its place in a finished run, from 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at: Option<usize>,
+    /// Number of the frame in the footage.
+    pub frame: u64,
+    /// When it was taken, seconds after frame 0, where known.
+    pub seconds: Option<f64>,
+    /// Why there is no skeleton; none if there is one.
+    pub why: Option<String>,
+    /// Every joint in the world, metres.
+    pub joints: Vec<Option<[f64; 3]>>,
+    /// Covariance of every joint, square metres: xx, xy, xz, yy, yz, zz.
+    pub spread: Vec<Option<[f64; 6]>>,
+    /// Every view.
+    pub views: Vec<Seen>,
+    /// How many people the views agree on, if that was counted.
+    pub people: Option<u32>,
+    /// Height of the person standing upright, metres, where known.
+    pub stature: Option<f64>,
+    /// From the capture to the result, milliseconds, where known.
+    pub latency_ms: Option<f64>,
+}
+
+/// The pose in one view.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct Seen {
+    /// The joints, pixels; none without a pose.
+    pub joints: Option<Vec<[f64; 2]>>,
+    /// Why the view has no part in the result; none if it has one.
+    pub why: Option<String>,
+    /// Whether it sees the person from behind.
+    pub behind: bool,
+}
+
+impl Moment {
+    /// The name of its type.
+    pub(crate) const KIND: &'static str = "moment";
+
+    /// The frame that a message speaks of. Check the message first.
+    pub(crate) fn of_message(scene: &Scene, message: &Pose3d) -> Self {
+        let n_joints = (message.n_joints as usize).min(MAX_JOINTS);
+        let joints = &message.joints[..n_joints];
+        let found = |it: &&Joint3d| it.status == Status::OK;
+        let views = scene.views.iter().enumerate();
+        let latency = message.timing.sent_at_nanos;
+        let latency = latency.checked_sub(message.stamp.captured_at_nanos);
+        Self {
+            kind: Self::KIND,
+            at: None,
+            frame: message.stamp.frame,
+            seconds: scene
+                .frame_rate_hz
+                .map(|rate| rounded(message.stamp.frame as f64 / rate, 1e3)),
+            why: (message.status != Status::OK).then(|| message.status.reason().to_owned()),
+            joints: joints
+                .iter()
+                .map(|it| Some(it).filter(found).map(|it| in_world(it.in_world)))
+                .collect(),
+            spread: joints
+                .iter()
+                .map(|it| Some(it).filter(found).and_then(|it| spread(it.covariance)))
+                .collect(),
+            views: views.map(|(view, _)| seen(scene, message, view)).collect(),
+            people: Some(message.n_people).filter(|it| *it > 0),
+            stature: Some(rounded(message.stature_m, 1e3)).filter(|it| *it > 0.0),
+            latency_ms: latency.map(|nanos| rounded(nanos as f64 / 1e6, 10.0)),
+        }
+    }
+
+    /// As a message to the page.
+    pub(crate) fn text(&self) -> String {
+        // Numbers that are not finite become null; there is no other error.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+fn seen(scene: &Scene, message: &Pose3d, view: usize) -> Seen {
+    let Some(fused) = message.views.get(view) else {
+        return Seen::default();
+    };
+    if fused.status != Status::OK {
+        let is_there = message.views_present >> view & 1 == 1;
+        let why = if is_there || fused.status != Status::NO_DETECTION {
+            fused.status.reason()
+        } else {
+            "nothing in time"
+        };
+        return Seen {
+            why: Some(why.to_owned()),
+            ..Seen::default()
+        };
+    }
+    let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
+    let joints = scene.joints_of(&fused.centres_px[..n_parts]);
+    Seen {
+        joints: joints.map(|it| it.into_iter().map(in_view).collect()),
+        why: None,
+        behind: fused.exchanged == 1,
+    }
+}
+
+/// Rounded to a fraction.
+pub(crate) fn rounded(value: f64, per: f64) -> f64 {
+    (value * per).round() / per
+}
+
+/// To a tenth of a millimetre.
+pub(crate) fn in_world(point: [f64; 3]) -> [f64; 3] {
+    point.map(|it| rounded(it, 1e4))
+}
+
+/// To a tenth of a pixel.
+pub(crate) fn in_view(point: [f64; 2]) -> [f64; 2] {
+    point.map(|it| rounded(it, 10.0))
+}
+
+/// To a hundredth of a square millimetre; none where it is not known.
+pub(crate) fn spread(covariance: [f64; 6]) -> Option<[f64; 6]> {
+    let is_known = covariance.iter().all(|it| it.is_finite());
+    is_known.then(|| covariance.map(|it| rounded(it, 1e8)))
+}

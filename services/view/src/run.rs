@@ -1,0 +1,149 @@
+//! Serves the page until a stop is requested.
+
+use core::net::SocketAddr;
+use core::time::Duration;
+use std::io;
+use std::net::TcpListener;
+use std::sync::Arc;
+
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use tokio::runtime::Builder;
+
+use crate::board::Board;
+use crate::finished::Finished;
+use crate::live;
+use crate::options::{Listen, Options, Subject};
+use crate::server::{Site, router};
+
+/// How often the stop request is checked.
+const CHECK: Duration = Duration::from_millis(50);
+
+/// Serves a page until a stop is requested.
+///
+/// The process gives way to those of the deployment: where processors are scarce, the page is what has to wait.
+///
+/// * `say`: is called once with the address of the page, when it can be opened.
+///
+/// # Errors
+///
+/// The folder or recording cannot be read, the address is in use or not this machine's, or it is not the loopback and there
+/// is no token.
+pub fn run(options: &Options, stop: &Stop, say: &mut dyn FnMut(&str)) -> Result<(), Failure> {
+    check(&options.listen)?;
+    let finished = match &options.subject {
+        Subject::Deployment(_) => None,
+        Subject::Folder(path) => Some(Finished::folder(path)?),
+        Subject::Recording(path) => Some(Finished::tape(path)?),
+    };
+    runtime::give_way();
+    let listener = bind(&options.listen)?;
+    let address = listener.local_addr().or_fail(ExitKind::Run)?;
+    let board = Arc::new(Board::new());
+    if let Some(finished) = &finished {
+        board.begin(&finished.hello(), Some(finished.scene()));
+    }
+    let site = Site {
+        board: Arc::clone(&board),
+        finished: finished.map(Arc::new),
+        token: options.listen.token.clone(),
+    };
+    let looker = match &options.subject {
+        Subject::Deployment(named) => {
+            let (named, most) = (named.clone(), options.pictures_per_second);
+            let (board, stop) = (Arc::clone(&board), stop.clone());
+            let look = move || live::follow(named.as_deref(), most, &board, &stop);
+            let thread = std::thread::Builder::new().name("look".to_owned());
+            Some(thread.spawn(look).or_fail(ExitKind::Run)?)
+        }
+        _ => None,
+    };
+    say(&url(address, options.listen.token.as_deref()));
+    let served = serve(listener, site, stop);
+    stop.request();
+    if let Some(looker) = looker {
+        let panicked = |_| Failure::new(ExitKind::Run, "the thread that looks on panicked");
+        looker.join().map_err(panicked)?;
+    }
+    served
+}
+
+fn check(listen: &Listen) -> Result<(), Failure> {
+    if listen.address.ip().is_loopback() || listen.token.is_some() {
+        return Ok(());
+    }
+    let text = format!(
+        "{} is not the loopback, and there is no token",
+        listen.address
+    );
+    Err(Failure::new(ExitKind::Usage, text))
+}
+
+fn bind(listen: &Listen) -> Result<TcpListener, Failure> {
+    let mut bound = TcpListener::bind(listen.address);
+    let is_taken = |error: &io::Error| error.kind() == io::ErrorKind::AddrInUse;
+    if listen.may_move && bound.as_ref().is_err_and(is_taken) {
+        bound = TcpListener::bind(SocketAddr::new(listen.address.ip(), 0));
+    }
+    bound.map_err(|error| {
+        let text = format!("cannot listen on {}: {error}", listen.address);
+        Failure::new(ExitKind::Run, text).with_hint("--port 0 takes any free port")
+    })
+}
+
+/// The address of the page for a browser.
+fn url(address: SocketAddr, token: Option<&str>) -> String {
+    let token = token.map_or_else(String::new, |it| format!("?token={it}"));
+    format!("http://{address}/{token}")
+}
+
+fn serve(listener: TcpListener, site: Site, stop: &Stop) -> Result<(), Failure> {
+    let runtime = Builder::new_current_thread()
+        .enable_all()
+        .max_blocking_threads(2)
+        .thread_name("read")
+        .build()
+        .or_fail(ExitKind::Run)?;
+    runtime.block_on(async {
+        listener.set_nonblocking(true).or_fail(ExitKind::Run)?;
+        let listener = tokio::net::TcpListener::from_std(listener).or_fail(ExitKind::Run)?;
+        let stopped = async {
+            while !stop.is_requested() {
+                tokio::time::sleep(CHECK).await;
+            }
+        };
+        let serve = axum::serve(listener, router(site));
+        tokio::select! {
+            served = async { serve.await } => served.or_fail(ExitKind::Run),
+            () = stopped => Ok(()),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_loopback_needs_no_token() {
+        let mut listen = Listen::usual();
+        check(&listen).unwrap();
+        listen.address.set_ip([0, 0, 0, 0].into());
+        assert_eq!(check(&listen).unwrap_err().kind(), ExitKind::Usage);
+        listen.token = Some("secret".to_owned());
+        check(&listen).unwrap();
+    }
+
+    #[test]
+    fn a_port_in_use_is_left_to_its_owner_and_another_taken_where_that_is_allowed() {
+        let other = TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut listen = Listen {
+            address: other.local_addr().unwrap(),
+            ..Listen::usual()
+        };
+        let moved = bind(&listen).unwrap().local_addr().unwrap();
+        assert_ne!(moved.port(), listen.address.port());
+        listen.may_move = false;
+        let refused = bind(&listen).unwrap_err().to_string();
+        assert!(refused.contains("cannot listen on 127.0.0.1"), "{refused}");
+    }
+}

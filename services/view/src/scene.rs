@@ -1,0 +1,143 @@
+//! What the numbers about a run mean: its cameras and joints.
+
+use geometry::Camera;
+use geometry::epipolar::epipolar_curve;
+use launch::{Prepared, Resolved};
+use nalgebra::Point2;
+use runtime::Failure;
+use serde_json::{Value, json};
+use skeleton::{JointSet, PARSE14};
+
+/// Points of one epipolar line.
+const N_POINTS: usize = 40;
+
+/// The cameras and joints of a run.
+#[derive(Debug, Clone)]
+pub(crate) struct Scene {
+    /// The name of the deployment.
+    pub name: String,
+    /// The views, as messages number them.
+    pub views: Vec<View>,
+    /// The joints of the result.
+    pub joints: &'static JointSet,
+    /// Against gravity, of length 1.
+    pub up: [f64; 3],
+    /// Frames per second of the footage, where known.
+    pub frame_rate_hz: Option<f64>,
+    /// Why the cameras are not known, if they are not.
+    pub problem: Option<String>,
+}
+
+/// One view.
+#[derive(Debug, Clone)]
+pub(crate) struct View {
+    /// The camera's name.
+    pub name: String,
+    /// Width and height of the pictures that coordinates refer to, pixels.
+    pub size: [u32; 2],
+    /// The camera that sees the world as those pictures show it, where it is known.
+    pub camera: Option<Camera>,
+}
+
+impl Scene {
+    /// The scene of a run, in pixels of its frames.
+    ///
+    /// # Errors
+    ///
+    /// The model or the calibration cannot be read or used.
+    pub(crate) fn of_frames(resolved: &Resolved) -> Result<Self, Failure> {
+        let prepared = Prepared::new(resolved)?;
+        let views = prepared.views.iter().map(|it| {
+            let camera = it.framing.camera();
+            View {
+                name: it.name.clone(),
+                size: camera.intrinsics.size,
+                camera: Some(camera.clone()),
+            }
+        });
+        let up = prepared.up_in_world.map(|it| it.into_inner().into());
+        Ok(Self {
+            name: resolved.deployment.name.clone(),
+            views: views.collect(),
+            joints: prepared.settings.skeleton.joints,
+            up: up.unwrap_or([0.0, 0.0, 1.0]),
+            frame_rate_hz: resolved.frame_rate_hz(),
+            problem: None,
+        })
+    }
+
+    /// The same, and without its cameras if they cannot be read: a run may be looked at where its calibration is not.
+    pub(crate) fn of_finished(resolved: &Resolved) -> Self {
+        Self::of_frames(resolved).unwrap_or_else(|why| {
+            let cameras = resolved.deployment.cameras.iter().zip(&resolved.footage);
+            let views = cameras.map(|(camera, footage)| View {
+                name: camera.name.clone(),
+                size: footage.size,
+                camera: None,
+            });
+            Self {
+                name: resolved.deployment.name.clone(),
+                views: views.collect(),
+                joints: JointSet::by_name(&resolved.deployment.triangulate.joints)
+                    .unwrap_or(&PARSE14),
+                up: resolved.deployment.up.unwrap_or([0.0, 0.0, 1.0]),
+                frame_rate_hz: resolved.frame_rate_hz(),
+                problem: Some(format!("without cameras: {why}")),
+            }
+        })
+    }
+
+    /// What the page has to know about it.
+    pub(crate) fn json(&self) -> Value {
+        let joints = self.joints.joints.iter().map(|it| it.name);
+        let views = self.views.iter().map(|it| {
+            let camera = it.camera.as_ref();
+            let at = camera.map(|it| <[f64; 3]>::from(it.centre_in_world().coords));
+            let axis = camera.map(|it| <[f64; 3]>::from(it.axis_in_world().into_inner()));
+            json!({ "name": it.name, "size": it.size, "at": at, "axis": axis })
+        });
+        json!({
+            "name": self.name,
+            "joints": joints.collect::<Vec<_>>(),
+            "limbs": self.joints.limbs,
+            "up": self.up,
+            "views": views.collect::<Vec<_>>(),
+            "rate": self.frame_rate_hz,
+            "problem": self.problem,
+        })
+    }
+
+    /// The joints of a pose in a view; none if its parts are not those of the joints.
+    ///
+    /// * `centres`: of the parts, pixels.
+    pub(crate) fn joints_of(&self, centres: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+        let last = self.joints.joints.iter().flat_map(|it| it.parts).max()?;
+        (centres.len() > *last).then(|| self.joints.from_parts(centres))
+    }
+
+    /// Where points of views may lie in all other views: `[view of the point, other view, pixels along the line]`.
+    ///
+    /// * `points`: a view and a pixel in it; those that do not exist are left out.
+    pub(crate) fn epipolar_lines(
+        &self,
+        points: &[(usize, [f64; 2])],
+    ) -> Vec<(usize, usize, Vec<[f64; 2]>)> {
+        let mut lines = Vec::new();
+        for (view, point) in points {
+            let from = self.views.get(*view).and_then(|it| it.camera.as_ref());
+            let Some(from) = from.filter(|_| point.iter().all(|it| it.is_finite())) else {
+                continue;
+            };
+            for (other, it) in self.views.iter().enumerate() {
+                let Some(to) = it.camera.as_ref().filter(|_| other != *view) else {
+                    continue;
+                };
+                let curve = epipolar_curve(from, to, &Point2::from(*point), N_POINTS);
+                let tenths = |it: f64| (10.0 * it).round() / 10.0;
+                let curve = curve.iter().map(|it| [tenths(it.x), tenths(it.y)]);
+                lines.push((*view, other, curve.collect()));
+            }
+        }
+        lines
+    }
+}
