@@ -59,7 +59,7 @@ export function showFacts(place, processes) {
 export function showEvent(list, event) {
   const line = document.createElement("li");
   const when = document.createElement("time");
-  when.textContent = new Date(event.unix_ms).toLocaleTimeString();
+  when.textContent = new Date(event.unix_ms).toLocaleTimeString([], { hour12: false });
   const what = document.createElement("span");
   what.textContent = event.what;
   what.className = event.weight;

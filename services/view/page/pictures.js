@@ -17,6 +17,8 @@ export class Pictures {
     this.moments = new Map();
     this.newest = null;
     this.lines = [];
+    // How often the lines have changed.
+    this.nLines = 0;
     this.point = null;
     this.large = null;
     this.poses = true;
@@ -76,9 +78,14 @@ export class Pictures {
     const nearest = far.indexOf(Math.min(...far));
     const isNear = nearest >= 0 && far[nearest] < NEAR * size[0];
     this.point = isNear ? null : [nth, at];
-    this.lines = [];
+    this.takeLines([]);
     this.marked(isNear ? nearest : null);
     this.askForLines(true);
+  }
+
+  takeLines(lines) {
+    this.lines = lines;
+    this.nLines++;
   }
 
   // The lines of a joint as it lies in all views, or of a point.
@@ -92,7 +99,7 @@ export class Pictures {
       points = this.views.map((_, k) => [k, at(k)]).filter((it) => it[1]);
     }
     if (!points.length) {
-      this.lines = [];
+      this.takeLines([]);
       return;
     }
     this.asked = now;
@@ -102,7 +109,7 @@ export class Pictures {
   mark(joint) {
     this.joint = joint;
     if (joint !== null) this.point = null;
-    if (joint === null && !this.point) this.lines = [];
+    if (joint === null && !this.point) this.takeLines([]);
     this.askForLines(true);
   }
 
@@ -161,12 +168,16 @@ export class Pictures {
       this.choose(it);
       const { canvas, pen, shown } = it;
       const ratio = (shown ? shown.bitmap.height / shown.bitmap.width : it.size[1] / Math.max(it.size[0], 1)) || 0.75;
-      const width = Math.max(240, Math.round(Math.min(canvas.clientWidth || 480, 900) * (window.devicePixelRatio || 1)));
+      const width = Math.max(240, Math.min(960, Math.round((canvas.clientWidth || 480) * (window.devicePixelRatio || 1))));
       const height = Math.round(width * ratio);
+      const moment = this.momentOf(nth);
+      // Drawn again only where something has changed.
+      const state = [shown?.frame, moment?.frame, moment?.at, this.nLines, this.joint, this.point, this.poses, this.on, width, height].join();
+      if (state === it.state) return;
+      it.state = state;
       if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
       pen.clearRect(0, 0, width, height);
       if (shown && this.on) pen.drawImage(shown.bitmap, 0, 0, width, height);
-      const moment = this.momentOf(nth);
       const scale = width / Math.max(it.size[0], 1);
       if (!(shown?.isDrawn && this.on)) this.drawPose(pen, moment, nth, scale, !shown || moment?.frame === shown.frame);
       this.drawLines(pen, nth, scale);

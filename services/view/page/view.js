@@ -22,6 +22,7 @@ let floor = null;
 let asked = null;
 let next = null;
 let clock = null;
+let drawn = 0;
 // What a test reads.
 const counts = { moments: 0, pictures: 0, hellos: 0, opened: 0 };
 
@@ -42,7 +43,7 @@ function showLink(word, kind) {
 function take(value) {
   const known = {
     hello: begin, state: showState, moment: arrive, event: (it) => showEvent(element("events"), it),
-    epipolar: (it) => { pictures.lines = it.lines; redraw(); },
+    epipolar: (it) => { pictures.takeLines(it.lines); redraw(); },
     unread: (it) => { asked = null; say(`frame ${it.at} cannot be read: ${it.why}`); },
     refused: (it) => console.warn(it.why),
   };
@@ -54,8 +55,10 @@ function begin(value) {
   counts.hellos++;
   hello = value;
   const isFinished = value.mode === "finished";
-  element("title").textContent = value.name || "Parallax";
-  document.title = value.name ? `${value.name} – Parallax` : "Parallax";
+  const name = value.scene?.name || value.name;
+  element("title").textContent = name || "Parallax";
+  element("title").title = value.name || "";
+  document.title = name ? `${name} – Parallax` : "Parallax";
   if (value.mode === "waiting") {
     showLink("waiting", "");
     empty(value.why);
@@ -170,7 +173,11 @@ function draw() {
 
 function turn(now) {
   if (hello?.mode === "finished" && playing && moment) play(now / 1000);
-  if (dirty) draw();
+  // Thirty times a second is enough, and leaves time for what comes.
+  if (dirty && now - drawn > 30) {
+    drawn = now;
+    draw();
+  }
   requestAnimationFrame(turn);
 }
 

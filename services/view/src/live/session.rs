@@ -7,7 +7,7 @@ use std::time::Instant;
 use launch::Resolved;
 use launch::live::{self, Live};
 use messages::{FrameHeader, MAX_VIEWS, Pose3d, Status, topic};
-use runtime::{Bus, Failure, Namespace, SliceSubscriber, Stop, Subscriber};
+use runtime::{Bus, ExitKind, Failure, Namespace, SliceSubscriber, Stop, Subscriber};
 use serde_json::{Value, json};
 
 use super::events::Events;
@@ -71,8 +71,13 @@ impl Session {
     ) -> Result<Self, Failure> {
         let namespace = live::namespace(named)?;
         // Fails if it does not run, before anything is made in its folder.
-        let live = Live::open(&namespace)?;
+        let mut live = Live::open(&namespace)?;
         let resolved = live::description(&namespace)?;
+        let n_processes = resolved.topology().processes().len();
+        if live.snapshot()?.processes.len() < n_processes {
+            let text = format!("deployment {:?} is starting", namespace.name());
+            return Err(Failure::new(ExitKind::Run, text));
+        }
         let scene = Scene::of_frames(&resolved)?;
         let name = format!("view-{}", std::process::id());
         let bus = Bus::open(&namespace, &name, stop)?.as_onlooker();
@@ -212,10 +217,8 @@ impl Session {
         match board.take_record() {
             Some(true) if self.tape.is_none() => {
                 let Some(session) = self.session else {
-                    board.event(
-                        Weight::Warning,
-                        "it is too early to record: no process has reported",
-                    );
+                    // No process has reported yet, which they do every second.
+                    board.ask_to_record(true);
                     return;
                 };
                 match Tape::start(&self.namespace, &self.resolved, session) {
