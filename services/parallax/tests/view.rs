@@ -187,7 +187,7 @@ fn finished(case: &Case) {
         view.end();
     }
     fs::create_dir(case.path("empty")).unwrap();
-    for wrong in ["empty", "no/such/folder", "rig.toml", "log-0.err"] {
+    for wrong in ["empty", "no/such/folder", "rig.toml", "model.plx"] {
         let ended = case
             .start(&["view", "--port", "0", wrong])
             .wait_among_others();

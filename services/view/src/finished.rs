@@ -62,7 +62,7 @@ impl Finished {
         let scene = self.scene();
         json!({
             "type": "hello", "mode": "finished", "name": name, "scene": scene.json(),
-            "n": frames.len(), "line": pieces(&frames), "notes": notes,
+            "n": frames.len(), "line": pieces(frames), "notes": notes,
             "first": frames.first().map(|it| it.number), "last": frames.last().map(|it| it.number),
         })
     }

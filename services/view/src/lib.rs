@@ -27,6 +27,7 @@ mod finished;
 mod live;
 
 mod server;
+mod site;
 mod socket;
 
 mod companion;

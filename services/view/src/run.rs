@@ -13,7 +13,8 @@ use crate::board::Board;
 use crate::finished::Finished;
 use crate::live;
 use crate::options::{Listen, Options, Subject};
-use crate::server::{Site, router};
+use crate::server::router;
+use crate::site::Site;
 
 /// How often the stop request is checked.
 const CHECK: Duration = Duration::from_millis(50);

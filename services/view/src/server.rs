@@ -5,8 +5,6 @@
 //! of another site has that site in `Origin`. With a token, which is needed on any other address, pages have to know it
 //! instead. The files of the page hold no data: what does, goes over the one web socket.
 
-use std::sync::Arc;
-
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{RawQuery, Request, State};
@@ -16,8 +14,7 @@ use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::get;
 
-use crate::board::Board;
-use crate::finished::Finished;
+use crate::site::Site;
 use crate::socket;
 
 /// The largest message of a page, bytes.
@@ -38,24 +35,16 @@ const MODULES: [(&str, &str); 4] = [
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
     connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// What is served.
-#[derive(Debug, Clone)]
-pub(crate) struct Site {
-    /// The newest of everything.
-    pub board: Arc<Board>,
-    /// The finished run, if it is one.
-    pub finished: Option<Arc<Finished>>,
-    /// What a page must know; none only on the loopback.
-    pub token: Option<String>,
-}
-
 /// The files of the page and its web socket.
 pub(crate) fn router(site: Site) -> Router {
-    let script = |text: &'static str| get(move || file("text/javascript", text));
+    let script = |text: &'static str| get(move || async move { file("text/javascript", text) });
     let mut router = Router::new()
-        .route("/", get(|| file("text/html", INDEX)))
-        .route("/look.css", get(|| file("text/css", ::report::STYLE)))
-        .route("/view.css", get(|| file("text/css", STYLE)))
+        .route("/", get(|| async { file("text/html", INDEX) }))
+        .route(
+            "/look.css",
+            get(|| async { file("text/css", ::report::STYLE) }),
+        )
+        .route("/view.css", get(|| async { file("text/css", STYLE) }))
         .route("/stage.js", script(::report::STAGE));
     for (path, text) in MODULES {
         router = router.route(path, script(text));
@@ -68,7 +57,7 @@ pub(crate) fn router(site: Site) -> Router {
         .with_state(site)
 }
 
-async fn file(kind: &'static str, text: &'static str) -> Response {
+fn file(kind: &'static str, text: &'static str) -> Response {
     let kind = format!("{kind}; charset=utf-8");
     ([("content-type", kind)], text).into_response()
 }

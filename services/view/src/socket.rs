@@ -12,7 +12,7 @@ use tokio::time::timeout;
 
 use crate::board::Board;
 use crate::finished::Finished;
-use crate::server::Site;
+use crate::site::Site;
 
 /// How long a page may take to accept a message.
 const PATIENCE: Duration = Duration::from_secs(10);

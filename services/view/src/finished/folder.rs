@@ -55,14 +55,14 @@ impl Folder {
             failure.with_hint("name the folder that a run has left, its `output`")
         })?;
         let mut frames = Vec::new();
-        let mut add = |head: Head, place| {
+        let add = |head: Head, place| {
             frames.push(Frame {
                 number: head.frame,
                 has_pose: Some(head.status == FrameLine::OK),
                 place,
             });
         };
-        let n_bad = each_line(&poses, |head, place| add(head, place))?;
+        let n_bad = each_line(&poses, add)?;
         if n_bad > 0 {
             notes.push(format!(
                 "{n_bad} lines of {} cannot be read",

@@ -42,7 +42,7 @@ pub(crate) struct Session {
     /// When the state was read last.
     told: Option<Instant>,
     /// The session in the messages, once it is known.
-    session: Option<u64>,
+    run: Option<u64>,
     namespace: Namespace,
     // Dropped last: the subscribers use its ports.
     _bus: Bus,
@@ -100,7 +100,7 @@ impl Session {
             cameras,
             tape: None,
             told: None,
-            session: None,
+            run: None,
             namespace,
             _bus: bus,
         })
@@ -180,8 +180,9 @@ impl Session {
         if !is_due {
             return Ok(());
         }
+        let earlier = now.checked_sub(camera.pause / 2).unwrap_or(now);
         // In step with its rate, so that a picture that comes a little early is not left out.
-        camera.due = (camera.due + camera.pause).max(now - camera.pause / 2);
+        camera.due = (camera.due + camera.pause).max(earlier);
         let size = [head.width as usize, head.height as usize];
         let frame = head.stamp.frame;
         if let Some(message) = picture::message(view, frame, size, sample.payload(), false) {
@@ -195,7 +196,7 @@ impl Session {
         self.events.processes(board, &snapshot);
         let sessions = snapshot.processes.iter();
         let mut sessions = sessions.filter_map(|it| it.reading.as_ref().map(|it| it.session));
-        self.session = self.session.or_else(|| sessions.next());
+        self.run = self.run.or_else(|| sessions.next());
         let described = live::describe(&snapshot);
         self.record(board);
         let recording = self.tape.as_ref().map(Tape::json);
@@ -216,16 +217,16 @@ impl Session {
         }
         match board.take_record() {
             Some(true) if self.tape.is_none() => {
-                let Some(session) = self.session else {
+                let Some(run) = self.run else {
                     // No process has reported yet, which they do every second.
                     board.ask_to_record(true);
                     return;
                 };
-                match Tape::start(&self.namespace, &self.resolved, session) {
+                match Tape::start(&self.namespace, &self.resolved, run) {
                     Ok(tape) => {
                         board.event(
                             Weight::Note,
-                            &format!("recording to {}", tape.file.display()),
+                            &format!("recording to {}", tape.file().display()),
                         );
                         self.tape = Some(tape);
                     }

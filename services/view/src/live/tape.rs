@@ -1,7 +1,7 @@
 //! A recording that a page has asked for.
 
 use core::sync::atomic::{AtomicBool, Ordering};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Instant;
@@ -21,8 +21,7 @@ const QUEUE_MB: u64 = 128;
 /// A recording under way, in a thread of its own.
 #[derive(Debug)]
 pub(crate) struct Tape {
-    /// The file.
-    pub file: PathBuf,
+    file: PathBuf,
     began: Instant,
     stop: Arc<AtomicBool>,
     thread: JoinHandle<Result<Kept, Failure>>,
@@ -77,6 +76,11 @@ impl Tape {
             stop,
             thread: thread.spawn(record).or_fail(ExitKind::Run)?,
         })
+    }
+
+    /// The file.
+    pub(crate) fn file(&self) -> &Path {
+        &self.file
     }
 
     /// Whether it has ended by itself.

@@ -1,0 +1,17 @@
+//! What every page gets its answers from.
+
+use std::sync::Arc;
+
+use crate::board::Board;
+use crate::finished::Finished;
+
+/// What is served.
+#[derive(Debug, Clone)]
+pub(crate) struct Site {
+    /// The newest of everything.
+    pub board: Arc<Board>,
+    /// The finished run, if it is one.
+    pub finished: Option<Arc<Finished>>,
+    /// What a page must know; none only on the loopback.
+    pub token: Option<String>,
+}
