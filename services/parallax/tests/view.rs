@@ -1,4 +1,5 @@
 //! The page of `parallax view`: what a browser gets of a running deployment and of a finished one, and who is refused.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
 
@@ -158,7 +159,10 @@ fn a_page_follows_a_run_from_before_its_begin_until_after_its_end() {
 fn finished(case: &Case) {
     let out = fs::read_dir(case.path("out")).unwrap();
     let names = out.map(|it| it.unwrap().file_name().into_string().unwrap());
-    let recording = names.into_iter().find(|it| it.ends_with(".mcap")).unwrap();
+    let recording = names
+        .into_iter()
+        .find(|it| it.starts_with("recording-"))
+        .unwrap();
     let recording = format!("out/{recording}");
     for (subject, has_pictures) in [("out", false), (recording.as_str(), true)] {
         let view = View::start(case, &[subject]);

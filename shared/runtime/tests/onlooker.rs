@@ -30,7 +30,7 @@ fn a_sender_without_loss_does_not_wait_for_onlookers_and_its_receiver_gets_every
     let bus = deployment.bus("sender");
     let publisher = bus.publisher::<ViewQuality>("small").unwrap();
     let frames = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
-    let looking = [deployment.bus("x"), deployment.bus("y")].map(|it| it.as_onlooker());
+    let looking = [deployment.bus("x"), deployment.bus("y")].map(runtime::Bus::as_onlooker);
     let open = |it: &runtime::Bus| {
         let mut waiter = it.waiter();
         let small = it.subscriber::<ViewQuality>("small", &mut waiter).unwrap();

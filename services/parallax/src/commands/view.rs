@@ -16,6 +16,8 @@ use crate::globals::Globals;
 
 /// Shortest token that is accepted, characters.
 const SHORTEST_TOKEN: usize = 16;
+/// What stands for a token that is made.
+const RANDOM: &str = "random";
 
 /// Options of `parallax view`.
 #[derive(Debug, Args)]
@@ -53,8 +55,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     listen: IpAddr,
     /// What a page must know, at least 16 letters, digits, '-' or '_'; random if it is not given here.
-    #[arg(long, value_name = "TOKEN", num_args = 0..=1, require_equals = true, value_parser = token)]
-    token: Option<Option<String>>,
+    #[arg(long, value_name = "TOKEN", num_args = 0..=1, default_missing_value = RANDOM, require_equals = true, value_parser = token)]
+    token: Option<String>,
     /// Most pictures of a camera in a second.
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=60))]
     pictures: u32,
@@ -72,10 +74,11 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         Some(name) => Subject::Deployment(Some(name.clone())),
         None => subject(arguments.subject.as_deref())?,
     };
-    let token = match &arguments.token {
-        Some(Some(token)) => Some(token.clone()),
+    let token = match arguments.token.as_deref() {
+        Some(RANDOM) => Some(random_token()?),
+        Some(token) => Some(token.to_owned()),
         None if arguments.listen.is_loopback() => None,
-        _ => Some(random_token()?),
+        None => Some(random_token()?),
     };
     let options = Options {
         subject,
@@ -152,6 +155,9 @@ fn runs(name: &str) -> Result<bool, Failure> {
 
 fn token(text: &str) -> Result<String, String> {
     let is_plain = |it: u8| it.is_ascii_alphanumeric() || b"-_".contains(&it);
+    if text == RANDOM {
+        return Ok(text.to_owned());
+    }
     if text.len() < SHORTEST_TOKEN || !text.bytes().all(is_plain) {
         return Err(format!(
             "not at least {SHORTEST_TOKEN} letters, digits, '-' or '_'"
@@ -166,7 +172,9 @@ fn random_token() -> Result<String, Failure> {
     let source = Path::new("/dev/urandom");
     let read = File::open(source).and_then(|mut it| it.read_exact(&mut bytes));
     read.map_err(|error| runtime::in_file(source, &error))?;
-    Ok(bytes.iter().map(|it| format!("{it:02x}")).collect())
+    let digits = bytes.iter().flat_map(|it| [it >> 4, it & 15]);
+    let digits = digits.filter_map(|it| char::from_digit(it.into(), 16));
+    Ok(digits.collect())
 }
 
 /// Requests the stop when standard input ends.
@@ -188,12 +196,13 @@ mod tests {
 
     #[test]
     fn tokens_are_long_and_plain() {
-        assert!(token("0123456789abcdef").is_ok());
+        token("0123456789abcdef").unwrap();
         for wrong in ["", "short", "0123456789abcde&", "0123456789 abcdef"] {
             assert!(token(wrong).is_err(), "{wrong}");
         }
         let (one, other) = (random_token().unwrap(), random_token().unwrap());
-        assert!(token(&one).is_ok() && one != other);
+        token(&one).unwrap();
+        assert_ne!(one, other);
     }
 
     #[test]
