@@ -15,7 +15,8 @@ use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 
 use crate::bus::prepare;
-use crate::private::{self, DESCRIPTION_FILE, LOCK_FILE, Root};
+use crate::namespace::DESCRIPTION_FILE;
+use crate::private::{self, LOCK_FILE, Root};
 use crate::{BusError, ExitKind, Fault, Namespace, beneath};
 
 /// Tells observers that the deployment is ending.

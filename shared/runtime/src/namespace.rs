@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString as _};
 
-use crate::private::DESCRIPTION_FILE;
 use crate::{ExitKind, Fault};
 
 /// The longest file name that iceoryx2 puts below the root: `/`, 39 digits, `.event`.
@@ -18,6 +17,8 @@ const PREFIX_LEN: usize = 11;
 /// Longest root directory, bytes.
 pub(crate) const ROOT_LEN_MAX: usize = SOCKET_PATH_MAX - SOCKET_NAME_LEN - PREFIX_LEN;
 const NAME_LEN_MAX: usize = 32;
+/// The description of a running deployment.
+pub(crate) const DESCRIPTION_FILE: &str = "deployment.json";
 
 /// A deployment name or a directory that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

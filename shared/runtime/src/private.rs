@@ -27,8 +27,6 @@ const OTHERS_WRITE: u32 = 0o022;
 const STICKY: u32 = 0o1000;
 /// The file that the supervisor of a deployment locks.
 pub(crate) const LOCK_FILE: &str = "lock";
-/// The description of a running deployment.
-pub(crate) const DESCRIPTION_FILE: &str = "deployment.json";
 /// The marker file, which names the deployment that a directory belongs to.
 const MARK_FILE: &str = "parallax-deployment";
 
