@@ -26,7 +26,7 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
     let labels = trial.labels();
     let too_many = |_| io::Error::other("C3D has no room for so many frames");
     let n_frames = u32::try_from(trial.slots.len()).map_err(too_many)?;
-    let first_frame = trial.first_frame / trial.frame_step + 1;
+    let first_frame = (trial.first_frame / trial.frame_step).saturating_add(1);
     let heading = Heading {
         rate_hz: rate(trial)?,
         units: "mm",
@@ -54,7 +54,7 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
         points.collect()
     });
     c3d::write(&mut out, &heading, frames)?;
-    let last = first_frame + trial.slots.len() as u64 - 1;
+    let last = first_frame.saturating_add(trial.slots.len() as u64 - 1);
     let mut notes = Notes::new();
     if last > u64::from(u16::MAX) && first_frame > 1 {
         notes.push(format!(
