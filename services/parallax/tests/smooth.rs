@@ -79,6 +79,23 @@ fn mean(row: &Value, name: &str) -> f64 {
     row[name]["mean"].as_f64().unwrap()
 }
 
+fn assert_angles(case: &Case) {
+    let angles = fs::read_to_string(case.path("out/angles.csv")).unwrap();
+    let knee = angles
+        .lines()
+        .find(|it| it.starts_with("40,") && it.contains("right knee flexion"));
+    let cells: Vec<&str> = knee.unwrap().split(',').collect();
+    assert!(
+        cells[3].parse::<f64>().is_ok() && cells[4].parse::<f64>().is_ok(),
+        "{cells:?}"
+    );
+    assert_eq!(
+        angles.lines().count() % N_FRAMES,
+        1,
+        "the same rows for every frame"
+    );
+}
+
 #[test]
 fn a_run_is_smoothed_live_and_better_afterwards() {
     let case = case();
@@ -122,20 +139,7 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
             .count()
             > 10
     );
-    let angles = fs::read_to_string(case.path("out/angles.csv")).unwrap();
-    let knee = angles
-        .lines()
-        .find(|it| it.starts_with("40,") && it.contains("right knee flexion"));
-    let cells: Vec<&str> = knee.unwrap().split(',').collect();
-    assert!(
-        cells[3].parse::<f64>().is_ok() && cells[4].parse::<f64>().is_ok(),
-        "{cells:?}"
-    );
-    assert_eq!(
-        angles.lines().count() % N_FRAMES,
-        1,
-        "the same rows for every frame"
-    );
+    assert_angles(&case);
     // Without `live` the next run has nothing smoothed, not what an earlier one has left.
     let off = [
         "run",
