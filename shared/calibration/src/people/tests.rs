@@ -121,7 +121,7 @@ fn what_cannot_be_known_is_refused() {
     ));
 }
 
-/// The number of recordings of each ring; 50 were run to measure, see the guide.
+/// The number of recordings of each ring.
 const N_SEEDS: u64 = 2;
 
 #[test]
