@@ -36,12 +36,14 @@ pub(crate) fn refine(picture: &Picture, start: Point2<f64>, radius: f64) -> Opti
         }
         let trace = normal.trace();
         // The smaller eigenvalue over the larger: an edge has none.
-        if !(normal.determinant() > 0.02 * trace * trace / 4.0) {
+        let sharpness = normal.determinant();
+        if sharpness.is_nan() || sharpness <= 0.02 * trace * trace / 4.0 {
             return None;
         }
         let step = normal.try_inverse()? * right;
         at += step;
-        if !((at - start).norm() <= radius) {
+        let moved = (at - start).norm();
+        if moved.is_nan() || moved > radius {
             return None;
         }
         if step.norm() < LAST_STEP {
@@ -60,7 +62,7 @@ mod tests {
         let truth = Point2::new(20.37, 19.81);
         let soft = |it: f64| (it / 1.2).tanh();
         let pixels = (0..40 * 40).map(|i| {
-            let offset = Point2::new((i % 40) as f64, (i / 40) as f64) - truth;
+            let offset = Point2::new(f64::from(i % 40), f64::from(i / 40)) - truth;
             let (u, v) = (offset.x + 0.2 * offset.y, offset.y - 0.3 * offset.x);
             (128.0 + 80.0 * soft(u) * soft(v)) as u8
         });

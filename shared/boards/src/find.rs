@@ -141,19 +141,17 @@ impl Finder {
     ///
     /// [`Nothing`] that says what was seen instead.
     pub fn find(&self, picture: &Picture, hints: Hints) -> Result<Found, Nothing> {
-        match &self.codes {
-            Some(codes) => self.by_markers(codes, picture, hints),
-            None => {
-                let Variant { board, layout, .. } = &self.variants[0];
-                chess::find(picture, board, layout).map(|corners| Found {
-                    corners,
-                    variant: 0,
-                    is_inverted: false,
-                    is_mirrored: false,
-                    n_markers: 0,
-                })
-            }
+        if let Some(codes) = &self.codes {
+            return self.by_markers(codes, picture, hints);
         }
+        let Variant { board, layout, .. } = &self.variants[0];
+        chess::find(picture, board, layout).map(|corners| Found {
+            corners,
+            variant: 0,
+            is_inverted: false,
+            is_mirrored: false,
+            n_markers: 0,
+        })
     }
 
     fn by_markers(&self, codes: &Codes, picture: &Picture, hints: Hints) -> Result<Found, Nothing> {

@@ -41,7 +41,8 @@ impl Homography {
             return None;
         };
         // Two vanishing eigenvalues: points on a line.
-        if !(eigen.eigenvalues[next] > 1e-11 * eigen.eigenvalues[most]) {
+        let second = eigen.eigenvalues[next];
+        if second.is_nan() || second <= 1e-11 * eigen.eigenvalues[most] {
             return None;
         }
         let h = eigen.eigenvectors.column(least);

@@ -16,7 +16,7 @@ const MOST_WRONG_BITS: u32 = 3;
 pub(crate) struct Codes {
     /// Cells along a side, without the frame.
     side: usize,
-    codes: Vec<u64>,
+    bits: Vec<u64>,
     /// Bits that may be wrong.
     tolerance: u32,
 }
@@ -62,7 +62,7 @@ impl Codes {
         }
         Self {
             side,
-            codes: codes.to_vec(),
+            bits: codes.to_vec(),
             tolerance: (least.saturating_sub(1) as u32 / 2).min(MOST_WRONG_BITS),
         }
     }
@@ -106,7 +106,7 @@ impl Codes {
                 bits
             };
             for (turn, seen) in turns(seen, self.side).into_iter().enumerate() {
-                for (id, code) in self.codes.iter().enumerate() {
+                for (id, code) in self.bits.iter().enumerate() {
                     let n_wrong = (code ^ seen).count_ones();
                     if n_wrong <= self.tolerance && best.is_none_or(|it| n_wrong < it.n_wrong) {
                         let corners = [0, 1, 2, 3].map(|nth| {

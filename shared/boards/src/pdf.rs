@@ -36,7 +36,7 @@ pub fn pdf(drawing: &Drawing) -> Vec<u8> {
     let count = objects.len() + 1;
     write!(out, "xref\n0 {count}\n0000000000 65535 f \n").unwrap_or_default();
     for place in places {
-        write!(out, "{place:010} 00000 n \n").unwrap_or_default();
+        writeln!(out, "{place:010} 00000 n ").unwrap_or_default();
     }
     write!(
         out,
