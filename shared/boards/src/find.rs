@@ -1,28 +1,17 @@
 //! A board in a picture.
 
-use nalgebra::Point2;
-
 use crate::board::Kind;
 use crate::chess;
 use crate::fit::agreeing;
 use crate::grow::{Known, grow};
 use crate::marker::{Codes, Sighting};
 use crate::quads::quads;
-use crate::{Board, Layout, Picture};
+use crate::{Board, Corner, Layout, Nothing, Picture};
 
 /// The smallest picture that is doubled for a second look has this side at most.
 const DOUBLED_UP_TO: usize = 2000;
 /// The largest picture that is not halved.
 const HALVED_FROM: usize = 900;
-
-/// A corner of the board in a picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Corner {
-    /// Its number: an index of [`Layout::points`].
-    pub id: usize,
-    /// Where it is, pixels.
-    pub at: Point2<f64>,
-}
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,46 +26,6 @@ pub struct Found {
     pub is_mirrored: bool,
     /// Markers that were read.
     pub n_markers: usize,
-}
-
-/// Why there is no board.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Nothing {
-    /// No grid of corners.
-    NoGrid,
-    /// A grid of other counts than the board's.
-    OtherGrid {
-        /// Inner corners from left to right, or from top to bottom.
-        columns: usize,
-        /// The others.
-        rows: usize,
-    },
-    /// Fewer than two markers of the board.
-    NoMarkers,
-    /// Markers, but not where the board has them.
-    Elsewhere {
-        /// How many were read.
-        n_markers: usize,
-    },
-    /// The board is there; too few of its corners are sharp.
-    NoCorners,
-}
-
-impl Nothing {
-    /// The one that says more.
-    pub(crate) fn or(self, other: Self) -> Self {
-        let says = |it: Self| match it {
-            Self::NoGrid | Self::NoMarkers => 0,
-            Self::OtherGrid { .. } => 1,
-            Self::Elsewhere { n_markers } => 1 + n_markers,
-            Self::NoCorners => usize::MAX,
-        };
-        if says(other) > says(self) {
-            other
-        } else {
-            self
-        }
-    }
 }
 
 /// What is known from other pictures of the same camera.

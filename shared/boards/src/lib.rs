@@ -30,6 +30,7 @@ mod threshold;
 mod marker;
 
 mod corner;
+mod seen;
 
 mod fit;
 mod grow;
@@ -43,9 +44,10 @@ mod tests;
 
 pub use board::{Board, BoardError, Kind, dictionary_names};
 pub use drawing::{Drawing, Paper, PaperError, Shape};
-pub use find::{Corner, Finder, Found, Hints, Nothing};
+pub use find::{Finder, Found, Hints};
 pub use homography::Homography;
 pub use layout::{Layout, Marker};
 pub use pdf::pdf;
 pub use picture::Picture;
+pub use seen::{Corner, Nothing};
 pub use svg::svg;

@@ -2,12 +2,12 @@
 
 use geometry::Camera;
 use geometry::bundle::{Cameras, Free, Loss, Settings, solve};
-use nalgebra::{Isometry3, Point3, Translation3};
+use nalgebra::Point3;
 use statistics::Sorted;
 
-use super::outcome::{Adjusted, outcome};
+use super::outcome::{Adjusted, Shown, middle, outcome};
 use super::problem::{BoardProblem, Observation};
-use super::{BoardError, CornerLoss, Outcome, Sight, Task};
+use super::{BoardError, CornerLoss, Outcome, Task};
 
 /// Corners further off than this many standard deviations are wrong, and so few pixels never.
 const WRONG_SIGMAS: f64 = 5.0;
@@ -16,22 +16,6 @@ const WRONG_PX: f64 = 0.7;
 const RAYLEIGH_MEDIAN: f64 = 1.177_410;
 /// How often wrong corners are looked for: what is wrong is seen better the better the rest fits.
 const ROUNDS: usize = 4;
-
-/// A frame that is used.
-pub(crate) struct Shown {
-    pub(crate) frame: usize,
-    /// Of a board whose origin is its middle.
-    pub(crate) world_from_board: Isometry3<f64>,
-    pub(crate) sights: Vec<Sight>,
-}
-
-/// The frame of the board with its origin in the middle of the board.
-pub(crate) fn middle(task: &Task) -> Isometry3<f64> {
-    let n = task.board.len().max(1) as f64;
-    let sum = task.board.iter().map(|it| it.coords);
-    let sum = sum.sum::<nalgebra::Vector2<f64>>();
-    Translation3::new(sum.x / n, sum.y / n, 0.0).into()
-}
 
 /// Adjusts cameras and boards.
 ///

@@ -2,11 +2,26 @@
 
 use geometry::Camera;
 use geometry::bundle::{Problem as _, covariance};
-use nalgebra::{Point2, Vector3};
+use nalgebra::{Isometry3, Point2, Translation3, Vector3};
 
-use super::adjust::{Shown, middle};
 use super::problem::{BoardProblem, Observation};
-use super::{CameraOutcome, Known, Outcome, Residual, Task, choose};
+use super::{CameraOutcome, Known, Outcome, Residual, Sight, Task, choose};
+
+/// A frame that is used.
+pub(crate) struct Shown {
+    pub(crate) frame: usize,
+    /// Of a board whose origin is its middle.
+    pub(crate) world_from_board: Isometry3<f64>,
+    pub(crate) sights: Vec<Sight>,
+}
+
+/// The frame of the board with its origin in the middle of the board.
+pub(crate) fn middle(task: &Task) -> Isometry3<f64> {
+    let n = task.board.len().max(1) as f64;
+    let sum = task.board.iter().map(|it| it.coords);
+    let sum = sum.sum::<nalgebra::Vector2<f64>>();
+    Translation3::new(sum.x / n, sum.y / n, 0.0).into()
+}
 
 /// What the adjustment ended with.
 pub(crate) struct Adjusted<'a> {
@@ -48,24 +63,15 @@ pub(crate) fn outcome(task: &Task, adjusted: &Adjusted<'_>) -> Outcome {
     let cameras = residuals.into_iter().enumerate().map(|(nth, residuals)| {
         frames[nth].dedup();
         let used = |it: &&Residual| !it.is_wrong;
+        let place = |it: &Residual| -> Point2<f64> { it.at };
         CameraOutcome {
             camera: solved.cameras.cameras()[nth].clone(),
             is_known: task.known[nth].is_some(),
             n_boards: [0, frames[nth].len()],
             rms_px: rms(residuals.iter().filter(used).map(|it| it.off)),
             rms_of_all_px: rms(residuals.iter().map(|it| it.off)),
-            coverage: choose::coverage(
-                residuals
-                    .iter()
-                    .filter(used)
-                    .map(|it: &Residual| -> Point2<f64> { it.at }),
-                task.sizes[nth],
-            ),
-            numbers: solved
-                .cameras
-                .parameters(nth)
-                .map(|it| known[it].clone())
-                .collect(),
+            coverage: choose::coverage(residuals.iter().filter(used).map(place), task.sizes[nth]),
+            numbers: known[solved.cameras.parameters(nth)].to_vec(),
             residuals,
         }
     });

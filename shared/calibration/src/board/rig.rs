@@ -4,8 +4,9 @@ use geometry::bundle::Free;
 use geometry::{Camera, Intrinsics};
 use nalgebra::{Isometry3, Point3};
 
-use super::adjust::{Shown, adjusted, middle};
+use super::adjust::adjusted;
 use super::graph::{Meeting, Pair, pair, standing};
+use super::outcome::{Shown, middle};
 use super::pose::board_pose;
 use super::{
     BoardError, LEAST_BOARDS, LEAST_CORNERS, LensKind, Outcome, Sight, Task, Together, choose,

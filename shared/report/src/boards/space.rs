@@ -84,22 +84,7 @@ fn view(out: &mut Html, page: &Page<'_>, map: &Matrix2x3<f64>) {
         "<svg class=\"chart\" viewBox=\"0 0 {SIDE} {SIDE}\" width=\"{SIDE}\" height=\"{SIDE}\" role=\"img\">",
         [SIDE]
     );
-    for corners in boards {
-        let [a, b, c, d] = corners.map(|it| frame.place(it));
-        put!(
-            out,
-            "<path d=\"M{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}Z\" fill=\"#808894\" fill-opacity=\"0.08\" stroke=\"#808894\" \
-             stroke-width=\"0.5\"/>",
-            a.x,
-            a.y,
-            b.x,
-            b.y,
-            c.x,
-            c.y,
-            d.x,
-            d.y
-        );
-    }
+    outlines(out, &frame, boards);
     for ((centre, ahead), name) in cameras.into_iter().zip(page.names) {
         let (at, to) = (frame.place(centre), frame.place(ahead));
         put!(
@@ -119,6 +104,25 @@ fn view(out: &mut Html, page: &Page<'_>, map: &Matrix2x3<f64>) {
     }
     ruler(out, frame.scale);
     put!(out, "</svg>");
+}
+
+fn outlines(out: &mut Html, frame: &Frame, boards: Vec<[Vector2<f64>; 4]>) {
+    for corners in boards {
+        let [a, b, c, d] = corners.map(|it| frame.place(it));
+        put!(
+            out,
+            "<path d=\"M{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}Z\" fill=\"#808894\" fill-opacity=\"0.08\" stroke=\"#808894\" \
+             stroke-width=\"0.5\"/>",
+            a.x,
+            a.y,
+            b.x,
+            b.y,
+            c.x,
+            c.y,
+            d.x,
+            d.y
+        );
+    }
 }
 
 /// A line of a round length.
