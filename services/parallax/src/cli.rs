@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands::{
     bench, calib, calibrate, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame,
-    model, record, replay, run, service, sync, synth, top, train,
+    model, new, record, replay, run, service, sync, synth, top, train,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -39,6 +39,7 @@ Examples:
     parallax synth out/walk --actions walking           synthetic pictures, with the truth
     parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
     parallax sync estimate my.toml --write              how far the clocks of recorded cameras are apart
+    parallax calibrate board --board charuco:7x5:40mm a.mp4 b.mp4 --out rig.toml    a rig from a board
     parallax calib show Calib.toml                      what a calibration file says
 ";
 
@@ -83,6 +84,8 @@ pub(crate) enum Command {
     Detect(detect::Arguments),
     /// Fuse one synchronised set of still images, in this process.
     FuseFrame(fuse_frame::Arguments),
+    /// Make a deployment from footage, step by step.
+    New(Box<new::Arguments>),
     /// Evaluate versions of the method on sequences whose joints are known.
     Eval(Box<eval::Arguments>),
     /// Train a model from annotated people.

@@ -14,6 +14,7 @@ pub(crate) mod fuse_frame;
 pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod network;
+pub(crate) mod new;
 pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod run;
@@ -47,6 +48,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Replay(it) => replay::run(&it, cli.globals),
         Command::Detect(it) => detect::run(&it),
         Command::FuseFrame(it) => fuse_frame::run(&it),
+        Command::New(it) => new::run(&it, cli.globals),
         Command::Eval(it) => eval::run(&it, cli.globals),
         Command::Train(it) => train::run(it, cli.globals),
         Command::Model(it) => model::run(&it, cli.globals),
