@@ -25,6 +25,7 @@ const LAYERS: &[&[&str]] = &[
     ],
     &[
         "body",
+        "boards",
         "geometry",
         "kernels",
         "messages",

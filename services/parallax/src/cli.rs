@@ -4,8 +4,8 @@ use clap::{Parser, Subcommand};
 
 use crate::commands::{
     bench, calib, calibrate, cameras, chaos, config, demo, deployments, detect, eval, export,
-    fuse_frame, messages, model, publish, record, replay, run, service, smooth, sync, synth, top,
-    train, view,
+    fuse_frame, messages, model, new, publish, record, replay, run, service, smooth, sync, synth,
+    top, train, view,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -46,6 +46,7 @@ Examples:
     parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
     parallax sync estimate my.toml --write              how far the clocks of recorded cameras are apart
     parallax calibrate people my.toml --height-m 1.78 --out rig.toml   where the cameras stand, from someone who walks about
+    parallax calibrate board --board charuco:7x5:40mm a.mp4 b.mp4 --out rig.toml    a rig from a board
     parallax calib show Calib.toml                      what a calibration file says
 ";
 
@@ -92,6 +93,8 @@ pub(crate) enum Command {
     Detect(detect::Arguments),
     /// Fuse one synchronised set of still images, in this process.
     FuseFrame(fuse_frame::Arguments),
+    /// Make a deployment from footage, step by step.
+    New(Box<new::Arguments>),
     /// Evaluate versions of the method on sequences whose joints are known.
     Eval(Box<eval::Arguments>),
     /// Train a model from annotated people.

@@ -16,6 +16,7 @@ pub(crate) mod judge;
 pub(crate) mod messages;
 pub(crate) mod model;
 pub(crate) mod network;
+pub(crate) mod new;
 pub(crate) mod publish;
 pub(crate) mod record;
 pub(crate) mod replay;
@@ -53,6 +54,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Export(it) => export::run(&it, cli.globals),
         Command::Detect(it) => detect::run(&it),
         Command::FuseFrame(it) => fuse_frame::run(&it),
+        Command::New(it) => new::run(&it, cli.globals),
         Command::Eval(it) => eval::run(&it, cli.globals),
         Command::Train(it) => train::run(it, cli.globals),
         Command::Model(it) => model::run(&it, cli.globals),

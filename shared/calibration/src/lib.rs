@@ -5,15 +5,17 @@
 //!
 //! | from | module |
 //! |---|---|
+//! | a board that is moved around | [`board`] |
 //! | people walking about | [`people`] |
 //! | a rig that is there, and people | [`refine`] |
+//! | a board on the floor, or three points | [`origin`]: floor and axes |
 #![forbid(unsafe_code)]
 
 mod align;
+pub mod board;
 mod median;
-
+pub mod origin;
 pub mod people;
-
 pub mod refine;
 
 pub use align::{Difference, Similarity, aligned, differences};

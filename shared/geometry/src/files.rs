@@ -42,6 +42,8 @@ pub enum Format {
     Own,
     /// TOML of Pose2Sim, anipose, Caliscope and `FreeMoCap`: [`pose2sim`].
     Pose2Sim,
+    /// The same in millimetres, as anipose and `FreeMoCap` have it; read as [`Pose2Sim`](Self::Pose2Sim).
+    Anipose,
     /// XML of Qualisys: [`qualisys`].
     Qualisys,
     /// YAML of `OpenCV` and `EasyMocap`: [`opencv`].
@@ -60,6 +62,7 @@ impl Format {
         match self {
             Self::Own => "Parallax rig",
             Self::Pose2Sim => "Pose2Sim calibration",
+            Self::Anipose => "anipose calibration",
             Self::Qualisys => "Qualisys calibration",
             Self::OpenCv => "OpenCV storage",
             Self::HumanEva => "HumanEva .cal",
@@ -174,6 +177,7 @@ pub fn write(path: &Path, format: Format, rig: &Rig) -> Result<(), RigFileError>
     let files: Result<Vec<(PathBuf, String)>, UnwritableRig> = match format {
         Format::Own => single(Ok(own::write(rig))),
         Format::Pose2Sim => single(pose2sim::write(rig)),
+        Format::Anipose => single(pose2sim::write_anipose(rig)),
         Format::OpenCv => single(opencv::write(rig)),
         Format::HumanEva => each("cal", humaneva::write),
         Format::Umpm => each("ini", umpm::write),
@@ -205,7 +209,7 @@ impl Document {
     fn parse(&self, options: &ReadOptions) -> Result<Rig, RigFileError> {
         let rig = match self.format {
             Format::Own => own::parse(&self.text, options),
-            Format::Pose2Sim => pose2sim::parse(&self.text, options),
+            Format::Pose2Sim | Format::Anipose => pose2sim::parse(&self.text, options),
             Format::Qualisys => qualisys::parse(&self.text, options),
             Format::OpenCv => opencv::parse(&[(&self.stem(), &self.text)], options),
             Format::HumanEva => humaneva::parse(&self.stem(), &self.text, options),

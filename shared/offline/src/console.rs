@@ -45,3 +45,33 @@ pub trait Console: Debug + Send + Sync {
     /// Removes the bar.
     fn finish(&self);
 }
+
+/// Shows nothing.
+#[derive(Debug)]
+pub(crate) struct Silent;
+
+impl Console for Silent {
+    fn message(&self, _text: &str) {}
+
+    fn event(&self, _event: &Value) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn result(&self, _text: &str) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn shows_bar(&self) -> bool {
+        false
+    }
+
+    fn begin(&self, _label: &str, _details: &str) {}
+
+    fn details(&self, _text: &str) {}
+
+    fn set(&self, _done: usize, _of: usize) {}
+
+    fn advance(&self, _n: usize) {}
+
+    fn finish(&self) {}
+}

@@ -9,6 +9,7 @@
 //! * [`quality`]: the samples of the network that predicts the errors of single views, and its training.
 //! * [`orientation`]: the network that tells the direction in which a person faces.
 //! * [`posetraining`]: the network that finds joints, from annotated people and scenes.
+//! * [`boards`]: boards to calibrate with, looked for in footage.
 //! * [`eval`]: the evaluation on sequences or pictures whose joints are known.
 //! * [`joints`]: where joints lie among the parts of a model, from annotated people.
 //! * [`springs`]: the springs between joints, from annotated people.
@@ -30,6 +31,7 @@ mod searches;
 
 pub mod images;
 
+pub mod boards;
 pub mod cards;
 pub mod consistency;
 pub mod described;

@@ -11,6 +11,7 @@
 
 mod html;
 
+pub mod boards;
 pub mod clocks;
 pub mod curves;
 pub mod evaluation;

@@ -87,14 +87,30 @@ pub(crate) enum UnitName {
 pub(crate) enum To {
     /// Parallax's own.
     Rig,
-    /// Pose2Sim, anipose, Caliscope and similar programs.
+    /// Pose2Sim, Caliscope and similar programs.
     Pose2sim,
+    /// anipose and `FreeMoCap`: the same in millimetres.
+    Anipose,
     /// OpenCV YAML.
     Opencv,
     /// One `.cal` file per camera.
     Humaneva,
     /// One `.ini` file per camera.
     Umpm,
+}
+
+impl To {
+    /// As `geometry` has it.
+    pub(crate) fn format(self) -> Format {
+        match self {
+            Self::Rig => Format::Own,
+            Self::Pose2sim => Format::Pose2Sim,
+            Self::Anipose => Format::Anipose,
+            Self::Opencv => Format::OpenCv,
+            Self::Humaneva => Format::HumanEva,
+            Self::Umpm => Format::Umpm,
+        }
+    }
 }
 
 impl Input {
@@ -270,14 +286,7 @@ fn points(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Point2<f64>>>>, Failu
 }
 
 fn convert(rig: &Rig, out: &Path, to: To) -> Result<ExitCode, Failure> {
-    let format = match to {
-        To::Rig => Format::Own,
-        To::Pose2sim => Format::Pose2Sim,
-        To::Opencv => Format::OpenCv,
-        To::Humaneva => Format::HumanEva,
-        To::Umpm => Format::Umpm,
-    };
-    geometry::files::write(out, format, rig).or_fail(ExitKind::Input)?;
+    geometry::files::write(out, to.format(), rig).or_fail(ExitKind::Input)?;
     output::message(format_args!("wrote {}", out.display()));
     Ok(ExitCode::SUCCESS)
 }

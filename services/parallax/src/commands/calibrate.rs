@@ -1,5 +1,7 @@
 //! `parallax calibrate`: cameras calibrated from what they see. One file a subcommand.
 
+mod board;
+mod origin;
 mod people;
 mod refine;
 mod walk;
@@ -14,6 +16,10 @@ use crate::globals::Globals;
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Find lenses, and where cameras stand, from a board that is moved around; draw boards to print.
+    Board(Box<board::Arguments>),
+    /// Put the origin of a rig on the floor, by a board or three points.
+    Origin(Box<origin::Arguments>),
     /// Find where the cameras of a deployment stand, from people walking about.
     People(Box<people::Arguments>),
     /// Make a rig better by a recording, or put it right after a camera was moved.
@@ -23,6 +29,8 @@ pub(crate) enum Command {
 /// Runs the subcommand.
 pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failure> {
     match command {
+        Command::Board(it) => board::run(it, globals),
+        Command::Origin(it) => origin::run(it, globals),
         Command::People(it) => people::run(it, globals),
         Command::Refine(it) => refine::run(it, globals),
     }

@@ -123,11 +123,23 @@ fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Cam
 ///
 /// [`UnwritableRig::Name`] for a camera named `metadata` or `cameras`, which mean something else here.
 pub fn write(rig: &Rig) -> Result<String, UnwritableRig> {
-    let tables: Result<String, _> = rig.cameras().iter().map(camera_table).collect();
+    let table = |camera| camera_table(camera, Unit::Metres);
+    let tables: Result<String, _> = rig.cameras().iter().map(table).collect();
     Ok(tables? + "[metadata]\nadjusted = false\nerror = 0.0\n")
 }
 
-fn camera_table(camera: &Camera) -> Result<String, UnwritableRig> {
+/// Writes a file for anipose and `FreeMoCap`: in millimetres, with image sizes that are whole numbers.
+///
+/// # Errors
+///
+/// As [`write`].
+pub fn write_anipose(rig: &Rig) -> Result<String, UnwritableRig> {
+    let table = |camera| camera_table(camera, Unit::Millimetres);
+    let tables: Result<String, _> = rig.cameras().iter().map(table).collect();
+    Ok(tables? + "[metadata]\n")
+}
+
+fn camera_table(camera: &Camera, unit: Unit) -> Result<String, UnwritableRig> {
     if ["metadata", "cameras"].contains(&camera.name.as_str()) {
         return Err(UnwritableRig::Name {
             camera: camera.name.clone(),
@@ -140,8 +152,14 @@ fn camera_table(camera: &Camera) -> Result<String, UnwritableRig> {
         numbers::rows(&intrinsics.matrix()).map(|row| format!("[{}]", numbers::joined(row, ", ")));
     let (coefficients, fisheye) = numbers::distortion(intrinsics.lens.model());
     let pose = &camera.camera_from_world;
+    let translation = pose.translation.vector * unit.per_metre();
+    // Pose2Sim writes floats; anipose takes the size of an image only as whole numbers.
+    let size = match unit {
+        Unit::Metres => format!("{width}.0, {height}.0"),
+        Unit::Centimetres | Unit::Millimetres => format!("{width}, {height}"),
+    };
     Ok(format!(
-        "[{key}]\nname = {name}\nsize = [{width}.0, {height}.0]\nmatrix = [{k}]\n\
+        "[{key}]\nname = {name}\nsize = [{size}]\nmatrix = [{k}]\n\
          distortions = [{distortions}]\nrotation = [{rotation}]\ntranslation = [{translation}]\n\
          fisheye = {fisheye}\n\n",
         key = quoted_key(&camera.name),
@@ -149,7 +167,7 @@ fn camera_table(camera: &Camera) -> Result<String, UnwritableRig> {
         k = k.join(", "),
         distortions = numbers::joined(&coefficients, ", "),
         rotation = numbers::joined(pose.rotation.scaled_axis().iter(), ", "),
-        translation = numbers::joined(pose.translation.vector.iter(), ", "),
+        translation = numbers::joined(translation.iter(), ", "),
     ))
 }
 

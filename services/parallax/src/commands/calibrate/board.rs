@@ -1,0 +1,226 @@
+//! `parallax calibrate board`: cameras from a board that is moved around, and boards to print.
+
+mod print;
+mod words;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use boards::{Board, Paper};
+use calibration::board::LensKind;
+use clap::{Args, ValueEnum};
+use geometry::files::ReadOptions;
+use launch::{inputs, output};
+use offline::Console as _;
+use offline::boards::{
+    BoardSettings, Calibrated, CameraFootage, LookSettings, calibrate, read_frames, write_corners,
+};
+use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
+
+use crate::commands::calib::To;
+use crate::globals::Globals;
+use crate::terminal::Terminal;
+
+/// The progress bar.
+const BAR: &str =
+    "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left {prefix} {msg}";
+
+/// Options of `parallax calibrate board`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+A board is KIND:COLUMNSxROWS:SIDE, with options after further colons:
+    charuco:7x5:40mm                  7 x 5 squares; markers of 4x4_1000 (4x4_50 begins with the same), 0.75 of a square
+    charuco:4x5:5.4cm:5x5_250:marker=0.8:legacy      another dictionary, larger markers, drawn as OpenCV before 4.6 did
+    chessboard:9x6:25mm               9 x 6 inner corners
+    aprilgrid:6x6:88mm:36h11:gap=0.3  6 x 6 tags with gaps of 0.3 of a tag
+
+Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, into the corners of every picture. Two cameras at
+a time have to see it, never all. Which pictures belong together is told by timestamps.csv beside the first video (Caliscope's:
+the n-th row of a camera is its n-th picture) or --timestamps, else by their number, or by time where frame rates differ.
+
+The world is the frame of the first camera; `parallax calibrate origin` puts it on the floor. With doubts the files are written,
+the report and the rig say so, and the exit code is 7; where there is no answer it is 5, or 4 without a board in the pictures.
+
+With --json one object:
+    {\"is_trusted\", \"doubts\", \"notes\", \"board\", \"sigma_px\",
+     \"cameras\": [{\"name\", \"size_px\", \"pictures\", \"boards\", \"boards_used\", \"corners\", \"left_out\", \"rms_px\", \"rms_of_all_px\",
+                  \"coverage\", \"numbers\": {NAME: {\"value\", \"sd\"}}}],
+     \"pairs\": [{\"cameras\", \"together\", \"agree\", \"distance_m\"}]}
+
+Examples:
+    parallax calibrate board --print charuco:7x5:40mm --out board.pdf
+    parallax calibrate board --board charuco:7x5:40mm cam0.mp4 cam1.mp4 cam2.mp4 --out rig.toml --report rig.html
+    parallax calibrate board --board chessboard:9x6:25mm left*.jpg --intrinsics --out left.toml
+    parallax calibrate board --board charuco:7x5:40mm wide=a.mp4 b=b.mp4 --known lenses.toml --out rig.toml")]
+pub(crate) struct Arguments {
+    /// One video, folder of pictures or pattern for each camera, in the order of the rig; NAME=PATH names it. With --intrinsics,
+    /// several pictures are those of one camera.
+    #[arg(value_name = "FOOTAGE", required_unless_present = "print", num_args = 1..)]
+    footage: Vec<String>,
+    /// The board.
+    #[arg(long, value_name = "BOARD", required_unless_present = "print")]
+    board: Option<Board>,
+    /// Find the intrinsics of every camera by itself, not where they stand.
+    #[arg(long)]
+    intrinsics: bool,
+    /// Intrinsics to keep: a calibration of any format that has cameras of these names.
+    #[arg(long, value_name = "FILE")]
+    known: Option<PathBuf>,
+    /// What is found of a lens.
+    #[arg(long, value_enum, default_value_t = Lens::Five)]
+    lens: Lens,
+    /// Which pictures were taken together: a table with the columns `sync_index` and `cam_id`.
+    #[arg(long, value_name = "FILE")]
+    timestamps: Option<PathBuf>,
+    /// Look at every n-th frame; chosen by the length of the footage if not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    every: Option<u32>,
+    /// Look at no more pictures of a camera.
+    #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(1..))]
+    most_pictures: u32,
+    /// Use no more frames, those that cover most.
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(3..=2000))]
+    most_frames: u32,
+    /// Read the corners from a table, in the columns of Caliscope, instead.
+    #[arg(long, value_name = "FILE")]
+    corners: Option<PathBuf>,
+    /// Write the corners that were found as such a table.
+    #[arg(long, value_name = "FILE")]
+    save_corners: Option<PathBuf>,
+    /// The footage is mirrored, in all recordings alike.
+    #[arg(long)]
+    mirrored: bool,
+    /// Write the calibration; with --print the board (.pdf or .svg; both if not given).
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Its format.
+    #[arg(long, value_enum, default_value_t = To::Rig)]
+    to: To,
+    /// Write a page with residuals and coverage, every number with its uncertainty, the rig, the worst pictures.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Draw a board to print.
+    #[arg(long, value_name = "BOARD", conflicts_with_all = ["footage", "board", "corners"])]
+    print: Option<Board>,
+    /// The page: a4, a3, a2, a1, a0, letter, legal, tabloid, WIDTHxHEIGHT in mm, or fit (the smallest of A4 to A0).
+    #[arg(long, value_name = "PAGE", default_value = "fit", requires = "print")]
+    paper: Paper,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is found of a lens.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum Lens {
+    /// Pinhole with k1, k2, k3, p1, p2.
+    Five,
+    /// Pinhole with k1 to k6, p1, p2: wide lenses, with many pictures.
+    Eight,
+    /// Fisheye with k1 to k4.
+    Fisheye,
+}
+
+/// Runs the subcommand.
+pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    if let Some(board) = &arguments.print {
+        return print::run(board, arguments.paper, arguments.out.as_deref());
+    }
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let settings = settings(arguments)?;
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR).ticking();
+    let calibrated = calibrate(&settings, &stop, &terminal);
+    terminal.finish();
+    let calibrated = calibrated?;
+    if arguments.json {
+        output::json(&words::json(&calibrated))?;
+    } else {
+        words::table(&calibrated)?;
+    }
+    write(arguments, &settings, &calibrated)?;
+    let doubts = calibrated.doubts();
+    if doubts.is_empty() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    let message = format!(
+        "the calibration is not to be trusted as it is:\n  {}",
+        doubts.join("\n  ")
+    );
+    Err(Failure::new(ExitKind::Degraded, message))
+}
+
+fn settings(arguments: &Arguments) -> Result<BoardSettings, Failure> {
+    let board = arguments.board.clone();
+    let board = board.ok_or("--board is missing").or_fail(ExitKind::Usage)?;
+    let frames = arguments
+        .timestamps
+        .as_deref()
+        .map(read_frames)
+        .transpose()?;
+    let known = arguments
+        .known
+        .as_ref()
+        .map(|it| inputs::rig(&[it], &ReadOptions::default()))
+        .transpose()?;
+    Ok(BoardSettings {
+        board,
+        cameras: cameras(arguments),
+        look: LookSettings {
+            every: arguments.every.map(|it| it as usize),
+            most: arguments.most_pictures as usize,
+            first: None,
+            frames,
+        },
+        corners: arguments.corners.clone(),
+        known,
+        lens: match arguments.lens {
+            Lens::Five => LensKind::Five,
+            Lens::Eight => LensKind::Eight,
+            Lens::Fisheye => LensKind::Fisheye,
+        },
+        wants_rig: !arguments.intrinsics,
+        most_frames: arguments.most_frames as usize,
+        is_mirrored: arguments.mirrored,
+    })
+}
+
+/// One camera for each path; several pictures are one camera where intrinsics alone are wanted.
+fn cameras(arguments: &Arguments) -> Vec<CameraFootage> {
+    let each: Vec<CameraFootage> = arguments
+        .footage
+        .iter()
+        .map(|it| CameraFootage::of(it))
+        .collect();
+    let is_picture = |it: &CameraFootage| {
+        let path = PathBuf::from(&it.paths[0]);
+        path.is_file() && footage::is_image(&path).unwrap_or(false)
+    };
+    if arguments.intrinsics && each.len() > 1 && each.iter().all(is_picture) {
+        let name = each[0].name.clone();
+        let paths = each.into_iter().flat_map(|it| it.paths).collect();
+        return vec![CameraFootage { name, paths }];
+    }
+    each
+}
+
+fn write(
+    arguments: &Arguments,
+    settings: &BoardSettings,
+    calibrated: &Calibrated,
+) -> Result<(), Failure> {
+    if let Some(file) = &arguments.save_corners {
+        write_corners(file, &calibrated.task.sights, &calibrated.task.names)?;
+        output::message(format_args!("wrote {}", file.display()));
+    }
+    if let Some(file) = &arguments.out {
+        let rig = calibrated.rig()?;
+        geometry::files::write(file, arguments.to.format(), &rig).or_fail(ExitKind::Calibration)?;
+        output::message(format_args!("wrote {}", file.display()));
+    }
+    if let Some(file) = &arguments.report {
+        let page = calibrated.page(&settings.cameras, &words::about(arguments, calibrated))?;
+        files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))?;
+        output::message(format_args!("wrote {}", file.display()));
+    }
+    Ok(())
+}

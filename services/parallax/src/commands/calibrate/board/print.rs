@@ -1,0 +1,41 @@
+//! `--print`: a board as PDF or SVG.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use boards::{Board, Drawing, Paper, pdf, svg};
+use launch::output;
+use runtime::{ExitKind, Failure, OrFail as _, in_file};
+
+/// Writes the board.
+pub(super) fn run(board: &Board, paper: Paper, out: Option<&Path>) -> Result<ExitCode, Failure> {
+    let drawing = Drawing::new(board, paper).or_fail(ExitKind::Usage)?;
+    let files = if let Some(file) = out {
+        vec![file.to_path_buf()]
+    } else {
+        let name = board.to_string().replace([':', '='], "-");
+        ["pdf", "svg"]
+            .map(|it| PathBuf::from(format!("{name}.{it}")))
+            .to_vec()
+    };
+    for file in files {
+        let ending = file.extension().unwrap_or_default().to_ascii_lowercase();
+        let bytes = match ending.to_str() {
+            Some("pdf") => pdf(&drawing),
+            Some("svg") => svg(&drawing).into_bytes(),
+            _ => {
+                return Err(Failure::new(
+                    ExitKind::Usage,
+                    format!("{}: a board is written as .pdf or .svg", file.display()),
+                ));
+            }
+        };
+        files::replace(&file, &bytes).map_err(|error| in_file(&file, &error))?;
+        let [width, height] = drawing.page;
+        output::message(format_args!(
+            "wrote {}: {board} on {width:.0} x {height:.0} mm; print at 100 %, and measure the ruler",
+            file.display()
+        ));
+    }
+    Ok(ExitCode::SUCCESS)
+}

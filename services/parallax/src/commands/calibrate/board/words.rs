@@ -1,0 +1,144 @@
+//! What came out, as a table and as JSON.
+
+use calibration::board::CameraOutcome;
+use launch::output;
+use offline::boards::Calibrated;
+use runtime::Failure;
+use serde_json::{Map, Value, json};
+
+use super::Arguments;
+
+/// The table.
+pub(super) fn table(calibrated: &Calibrated) -> Result<(), Failure> {
+    for note in &calibrated.notes {
+        output::line(format_args!("note: {note}"))?;
+    }
+    let outcome = &calibrated.outcome;
+    output::line(format_args!(
+        "{:<14} {:>8} {:>7} {:>5} {:>8} {:>9} {:>9} {:>9} {:>10} {:>7}",
+        "camera",
+        "pictures",
+        "boards",
+        "used",
+        "corners",
+        "left out",
+        "rms, px",
+        "covered",
+        "focal, px",
+        "+-"
+    ))?;
+    for (nth, it) in outcome.cameras.iter().enumerate() {
+        let wrong = it.residuals.iter().filter(|it| it.is_wrong).count();
+        let pictures = pictures(calibrated, nth).map_or("-".to_owned(), |it| it.to_string());
+        let sd = focal_sd(it).map_or("given".to_owned(), |it| format!("{it:.2}"));
+        output::line(format_args!(
+            "{:<14} {pictures:>8} {:>7} {:>5} {:>8} {wrong:>9} {:>9.3} {:>7.0} % {:>10.1} {sd:>7}",
+            calibrated.task.names[nth],
+            it.n_boards[0],
+            it.n_boards[1],
+            it.residuals.len() - wrong,
+            it.rms_px,
+            100.0 * it.coverage,
+            it.camera.intrinsics.fx,
+        ))?;
+    }
+    for it in &outcome.pairs {
+        let [a, b] = it.cameras.map(|nth| &calibrated.task.names[nth]);
+        output::line(format_args!(
+            "{:<29} {:>5} frames together, {} agree, {:.4} m apart",
+            format!("{a} - {b}"),
+            it.n,
+            it.n_agree,
+            distance(calibrated, it.cameras)
+        ))?;
+    }
+    Ok(())
+}
+
+fn pictures(calibrated: &Calibrated, camera: usize) -> Option<usize> {
+    calibrated
+        .looked
+        .as_ref()
+        .map(|it| it.cameras[camera].n_pictures)
+}
+
+fn focal_sd(camera: &CameraOutcome) -> Option<f64> {
+    let focal = camera.numbers.iter().find(|it| it.name == "focal length");
+    focal.map(|it| it.sd)
+}
+
+fn distance(calibrated: &Calibrated, [a, b]: [usize; 2]) -> f64 {
+    let centre = |nth: usize| calibrated.outcome.cameras[nth].camera.centre_in_world();
+    (centre(a) - centre(b)).norm()
+}
+
+/// One object.
+pub(super) fn json(calibrated: &Calibrated) -> Value {
+    let doubts = calibrated.doubts();
+    let finite = |it: f64| it.is_finite().then_some(it);
+    let cameras = calibrated
+        .outcome
+        .cameras
+        .iter()
+        .enumerate()
+        .map(|(nth, it)| {
+            let wrong = it.residuals.iter().filter(|it| it.is_wrong).count();
+            let number = |it: &calibration::board::Known| {
+                let value = json!({ "value": finite(it.value), "sd": finite(it.sd) });
+                (it.name.clone(), value)
+            };
+            let numbers: Map<String, Value> = it.numbers.iter().map(number).collect();
+            json!({
+                "name": calibrated.task.names[nth],
+                "size_px": it.camera.intrinsics.size,
+                "pictures": pictures(calibrated, nth),
+                "boards": it.n_boards[0],
+                "boards_used": it.n_boards[1],
+                "corners": it.residuals.len() - wrong,
+                "left_out": wrong,
+                "rms_px": finite(it.rms_px),
+                "rms_of_all_px": finite(it.rms_of_all_px),
+                "coverage": it.coverage,
+                "numbers": numbers,
+            })
+        });
+    let pairs = calibrated.outcome.pairs.iter().map(|it| {
+        json!({
+            "cameras": it.cameras.map(|nth| &calibrated.task.names[nth]),
+            "together": it.n,
+            "agree": it.n_agree,
+            "distance_m": finite(distance(calibrated, it.cameras)),
+        })
+    });
+    json!({
+        "schema_version": 1,
+        "is_trusted": doubts.is_empty(),
+        "doubts": doubts,
+        "notes": calibrated.notes,
+        "board": calibrated.board.to_string(),
+        "sigma_px": finite(calibrated.outcome.sigma_px),
+        "cameras": cameras.collect::<Vec<_>>(),
+        "pairs": pairs.collect::<Vec<_>>(),
+    })
+}
+
+/// What the report says of the command.
+pub(super) fn about(arguments: &Arguments, calibrated: &Calibrated) -> Vec<(String, String)> {
+    let mut about = vec![
+        ("board".to_owned(), calibrated.board.to_string()),
+        ("footage".to_owned(), arguments.footage.join(", ")),
+    ];
+    if let Some(corners) = &arguments.corners {
+        about.push(("corners of".to_owned(), corners.display().to_string()));
+    }
+    if let Some(known) = &arguments.known {
+        about.push(("intrinsics kept of".to_owned(), known.display().to_string()));
+    }
+    about.extend(
+        calibrated
+            .notes
+            .iter()
+            .map(|it| ("note".to_owned(), it.clone())),
+    );
+    about
+}

@@ -1,0 +1,164 @@
+//! `parallax calibrate origin`: a rig put on the floor.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use boards::Board;
+use calibration::origin::{Click, OriginError, from_board, from_points, rebased};
+use clap::Args;
+use geometry::Rig;
+use geometry::files::{Format, ReadOptions};
+use launch::{inputs, output};
+use nalgebra::Point2;
+use offline::boards::{CameraFootage, LookSettings, look};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+
+use crate::globals::Globals;
+use crate::terminal::Terminal;
+
+/// Options of `parallax calibrate origin`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+With a board on the floor, its print up: the origin is its upper left corner, x along its rows, y against its columns, z up.
+With three points on the floor: the origin, one along x, and any other; each as pixels of at least two cameras.
+
+Examples:
+    parallax calibrate origin rig.toml --board charuco:7x5:40mm cam0.mp4 cam1.mp4 --frames 1 --out room.toml
+    parallax calibrate origin rig.toml --out room.toml --at cam0=412,633 --at cam1=820.5,590 \\
+        --x cam0=700,610 --x cam1=1010,566 --floor cam0=500,480 --floor cam1=700,500")]
+pub(crate) struct Arguments {
+    /// The rig, a calibration of any format.
+    rig: PathBuf,
+    /// Footage of cameras of the rig, NAME=PATH or named as the camera, with the board on the floor.
+    #[arg(value_name = "FOOTAGE", requires = "board")]
+    footage: Vec<String>,
+    /// The board.
+    #[arg(long, value_name = "BOARD", requires = "footage")]
+    board: Option<Board>,
+    /// How many frames, from the first, show the board lying still.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    frames: u64,
+    /// The origin, as a camera sees it; once for each camera.
+    #[arg(long, value_name = "CAMERA=X,Y", conflicts_with = "board", requires_all = ["x", "floor"])]
+    at: Vec<String>,
+    /// A point along x.
+    #[arg(long, value_name = "CAMERA=X,Y")]
+    x: Vec<String>,
+    /// Any other point of the floor.
+    #[arg(long, value_name = "CAMERA=X,Y")]
+    floor: Vec<String>,
+    /// The rig file to write.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// Runs the subcommand.
+pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let rig = inputs::rig(&[&arguments.rig], &ReadOptions::default())?;
+    let (new_from_old, source) = match &arguments.board {
+        Some(board) => (
+            by_board(arguments, &rig, board, globals)?,
+            format!("origin by {board}"),
+        ),
+        None if arguments.at.is_empty() => {
+            return Err(
+                Failure::new(ExitKind::Usage, "neither a board nor points on the floor")
+                    .with_hint("--board BOARD FOOTAGE..., or --at, --x and --floor"),
+            );
+        }
+        None => {
+            let clicks = [&arguments.at, &arguments.x, &arguments.floor];
+            let clicks = clicks.map(|texts| clicks_of(&rig, texts));
+            let [at, x, floor] = clicks;
+            let found = from_points(&rig, &[at?, x?, floor?]).or_fail(ExitKind::Calibration)?;
+            (found, "origin by three points".to_owned())
+        }
+    };
+    let new = rebased(&rig, &new_from_old, &source).or_fail(ExitKind::Calibration)?;
+    geometry::files::write(&arguments.out, Format::Own, &new).or_fail(ExitKind::Input)?;
+    for camera in new.cameras() {
+        let at = camera.centre_in_world();
+        output::line(format_args!(
+            "{:<14} at ({:.3}, {:.3}, {:.3}) m",
+            camera.name, at.x, at.y, at.z
+        ))?;
+    }
+    output::message(format_args!("wrote {}", arguments.out.display()));
+    let below = new.cameras().iter().find(|it| it.centre_in_world().z < 0.0);
+    match below {
+        None => Ok(ExitCode::SUCCESS),
+        Some(camera) => Err(Failure::new(
+            ExitKind::Degraded,
+            format!(
+                "camera {} is now below the floor: is it the floor?",
+                camera.name
+            ),
+        )),
+    }
+}
+
+fn by_board(
+    arguments: &Arguments,
+    rig: &Rig,
+    board: &Board,
+    globals: Globals,
+) -> Result<nalgebra::Isometry3<f64>, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let cameras: Vec<CameraFootage> = arguments
+        .footage
+        .iter()
+        .map(|it| CameraFootage::of(it))
+        .collect();
+    let places: Vec<usize> = cameras
+        .iter()
+        .map(|it| camera_named(rig, &it.name))
+        .collect::<Result<_, _>>()?;
+    let settings = LookSettings {
+        every: Some(1),
+        first: Some(arguments.frames),
+        ..LookSettings::default()
+    };
+    let terminal = Terminal::without_bar(globals.quiet, false);
+    let looked = look(board, &cameras, &settings, &stop, &terminal)?;
+    let mut sights = looked.sights();
+    for sight in &mut sights {
+        sight.camera = places[sight.camera];
+    }
+    from_board(rig, &looked.layout.points, &sights).map_err(|error| {
+        let hint = match error {
+            OriginError::BoardApart { .. } => "--frames says how many frames show it lying still",
+            _ => "does it lie flat, in the sight of a camera, in the first frames?",
+        };
+        Failure::new(ExitKind::Calibration, error).with_hint(hint)
+    })
+}
+
+fn camera_named(rig: &Rig, name: &str) -> Result<usize, Failure> {
+    let found = rig.cameras().iter().position(|it| it.name == name);
+    found.ok_or_else(|| {
+        let known: Vec<&str> = rig.cameras().iter().map(|it| it.name.as_str()).collect();
+        Failure::new(
+            ExitKind::Usage,
+            format!("the rig has the cameras {}, not {name}", known.join(", ")),
+        )
+    })
+}
+
+/// `CAMERA=X,Y`, several times.
+fn clicks_of(rig: &Rig, texts: &[String]) -> Result<Vec<Click>, Failure> {
+    let each = texts.iter().map(|text| {
+        let parts = text.split_once('=').and_then(|(name, at)| {
+            let (x, y) = at.split_once(',')?;
+            let number = |text: &str| text.trim().parse::<f64>().ok().filter(|it| it.is_finite());
+            Some((name, Point2::new(number(x)?, number(y)?)))
+        });
+        let (name, at) = parts.ok_or_else(|| {
+            Failure::new(
+                ExitKind::Usage,
+                format!("{text:?}: expected CAMERA=X,Y in pixels"),
+            )
+        })?;
+        Ok((camera_named(rig, name)?, at))
+    });
+    each.collect()
+}

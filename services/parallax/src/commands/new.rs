@@ -1,0 +1,237 @@
+//! `parallax new`: from footage to a deployment, one command after the other, each of which can be run alone.
+
+use std::fs;
+use std::path::{Path, PathBuf, absolute};
+use std::process::{Command, ExitCode};
+
+use boards::Board;
+use clap::Args;
+use launch::output;
+use offline::boards::CameraFootage;
+use runtime::{ExitKind, Failure, OrFail as _, in_file};
+
+use crate::globals::Globals;
+
+/// Options of `parallax new`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Every step is a command of its own, which is printed before it runs; what a step has already written is kept, so that `new` goes on
+where it ended. A step that fails ends it, with its exit code; one whose answer is not to be trusted (7) too, unless --go-on.
+
+    1  the rig: --rig converts one; --board with --show finds it (`parallax calibrate board`)
+    2  the floor: --floor puts the rig on it (`parallax calibrate origin`)
+    3  ROOM/deployment.toml, which is yours from then on (`parallax config check`)
+    4  clocks: --sync finds offsets of recorded cameras from people (`parallax sync estimate --write`)
+    5  a first run: --run (`parallax run`)
+
+A rig from people walking about, without a board: write the deployment with --rig and lenses, then `parallax calibrate people`.
+
+Examples:
+    parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --rig Calib.toml --run
+    parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --board charuco:7x5:40mm --show a=board/a.mp4 --show b=board/b.mp4 \\
+        --floor a=floor/a.mp4 --floor b=floor/b.mp4 --sync --run
+    parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --rig Calib.toml --dry-run")]
+pub(crate) struct Arguments {
+    /// The folder to make.
+    room: PathBuf,
+    /// A camera: its name, and a video, a folder or pattern of pictures, or a live address; once for each. `parallax cameras`
+    /// lists video devices.
+    #[arg(long, value_name = "NAME=SOURCE", required = true)]
+    camera: Vec<String>,
+    /// A calibration of any format that has these cameras.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["board", "show"], required_unless_present = "board")]
+    rig: Option<PathBuf>,
+    /// The board that is shown.
+    #[arg(long, value_name = "BOARD", requires = "show")]
+    board: Option<Board>,
+    /// Footage of a camera with the board moved about; once for each.
+    #[arg(long, value_name = "NAME=PATH", requires = "board")]
+    show: Vec<String>,
+    /// Footage of a camera with the board lying on the floor.
+    #[arg(long, value_name = "NAME=PATH", requires = "board")]
+    floor: Vec<String>,
+    /// Find offset and drift of the cameras' clocks.
+    #[arg(long)]
+    sync: bool,
+    /// Run the deployment.
+    #[arg(long)]
+    run: bool,
+    /// Go on where an answer is not to be trusted.
+    #[arg(long)]
+    go_on: bool,
+    /// Print the commands only.
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// A command, and the file that shows that it has been done.
+struct Step {
+    words: Vec<String>,
+    done: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let room = &arguments.room;
+    let deployment = room.join("deployment.toml");
+    let text = deployment_text(arguments)?;
+    if !arguments.dry_run {
+        fs::create_dir_all(room).map_err(|error| in_file(room, &error))?;
+    }
+    for step in rig_steps(arguments) {
+        if let Some(code) = step.run(arguments, globals)? {
+            return Ok(code);
+        }
+    }
+    if deployment.exists() {
+        output::message(format_args!("kept {}", deployment.display()));
+    } else if arguments.dry_run {
+        output::line(format_args!("# writes {}\n{text}", deployment.display()))?;
+    } else {
+        files::replace(&deployment, text.as_bytes())
+            .map_err(|error| in_file(&deployment, &error))?;
+        output::message(format_args!("wrote {}", deployment.display()));
+    }
+    for step in later_steps(arguments, &deployment) {
+        if let Some(code) = step.run(arguments, globals)? {
+            return Ok(code);
+        }
+    }
+    if !arguments.run {
+        output::message(format_args!("next: parallax run {}", deployment.display()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Step {
+    fn new(words: &[&str], done: Option<PathBuf>) -> Self {
+        let words = words.iter().map(|it| (*it).to_owned()).collect();
+        Self { words, done }
+    }
+
+    /// The exit code that ends everything, if it does.
+    fn run(&self, arguments: &Arguments, globals: Globals) -> Result<Option<ExitCode>, Failure> {
+        let quoted = |word: &String| {
+            if word.contains([' ', '*', '?', '\'', '"']) {
+                format!("'{word}'")
+            } else {
+                word.clone()
+            }
+        };
+        let line: Vec<String> = self.words.iter().map(quoted).collect();
+        if let Some(file) = self.done.as_ref().filter(|it| it.exists()) {
+            output::message(format_args!("kept {}", file.display()));
+            return Ok(None);
+        }
+        if arguments.dry_run {
+            output::line(format_args!("parallax {}", line.join(" ")))?;
+            return Ok(None);
+        }
+        output::message(format_args!("$ parallax {}", line.join(" ")));
+        let program = std::env::current_exe().or_fail(ExitKind::Run)?;
+        let mut command = Command::new(program);
+        command.args(&self.words);
+        if globals.quiet {
+            command.arg("--quiet");
+        }
+        let status = command.status().or_fail(ExitKind::Run)?;
+        let code = status.code().unwrap_or(1);
+        let is_doubt = code == i32::from(ExitKind::Degraded.status());
+        if status.success() || (is_doubt && arguments.go_on) {
+            return Ok(None);
+        }
+        Ok(Some(ExitCode::from(u8::try_from(code).unwrap_or(1))))
+    }
+}
+
+/// The rig, in the room, and on the floor.
+fn rig_steps(arguments: &Arguments) -> Vec<Step> {
+    let room = &arguments.room;
+    let rig = room.join("rig.toml");
+    let raw = if arguments.floor.is_empty() {
+        rig.clone()
+    } else {
+        room.join("rig-of-board.toml")
+    };
+    let (rig_text, raw_text) = (rig.display().to_string(), raw.display().to_string());
+    let mut steps = Vec::new();
+    if let Some(file) = &arguments.rig {
+        let file = file.display().to_string();
+        let words = ["calib", "convert", &file, "--out", &rig_text];
+        steps.push(Step::new(&words, Some(rig)));
+        return steps;
+    }
+    let board = arguments
+        .board
+        .as_ref()
+        .map(ToString::to_string)
+        .unwrap_or_default();
+    let report = room.join("rig.html").display().to_string();
+    let mut words = vec!["calibrate", "board", "--board", &board];
+    words.extend(arguments.show.iter().map(String::as_str));
+    words.extend(["--out", &raw_text, "--report", &report]);
+    steps.push(Step::new(&words, Some(raw.clone())));
+    if !arguments.floor.is_empty() {
+        let mut words = vec!["calibrate", "origin", raw_text.as_str(), "--board", &board];
+        words.extend(arguments.floor.iter().map(String::as_str));
+        words.extend(["--out", &rig_text]);
+        steps.push(Step::new(&words, Some(rig)));
+    }
+    steps
+}
+
+fn later_steps(arguments: &Arguments, deployment: &Path) -> Vec<Step> {
+    let file = deployment.display().to_string();
+    let mut steps = vec![Step::new(&["config", "check", &file], None)];
+    if arguments.sync {
+        let page = arguments.room.join("clocks.html");
+        let page_text = page.display().to_string();
+        let words = ["sync", "estimate", &file, "--write", "--out", &page_text];
+        steps.push(Step::new(&words, Some(page)));
+    }
+    if arguments.run {
+        steps.push(Step::new(&["run", &file], None));
+    }
+    steps
+}
+
+/// The deployment file: the cameras, the rig, and where results go.
+fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
+    let stem = arguments
+        .room
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy();
+    let plain = |it: char| {
+        if it.is_ascii_alphanumeric() || it == '-' {
+            it
+        } else {
+            '-'
+        }
+    };
+    let name: String = stem.chars().map(plain).collect();
+    let name = if geometry::is_plain_name(&name) {
+        name
+    } else {
+        "room".to_owned()
+    };
+    let mut text = format!(
+        "# Made by `parallax new`. Everything that is not said here has a default: `parallax config show` prints it.\n\n\
+         name = {name:?}\nrig = \"rig.toml\"\noutput = \"out\"\n"
+    );
+    for camera in &arguments.camera {
+        let CameraFootage { name, paths } = CameraFootage::of(camera);
+        let source = source(&paths[0]).or_fail(ExitKind::Input)?;
+        let source = toml::Value::from(source);
+        text += &format!("\n[[camera]]\nname = {name:?}\nsource = {source}\n");
+    }
+    Ok(text)
+}
+
+/// A path as it is from the room; addresses and devices as they are.
+fn source(path: &str) -> std::io::Result<String> {
+    if footage::is_address(path) {
+        return Ok(path.to_owned());
+    }
+    Ok(absolute(path)?.display().to_string())
+}

@@ -1,0 +1,189 @@
+//! Which frames are used: those that cover the pictures, distances and tilts, not all.
+
+use std::collections::BTreeMap;
+
+use boards::Homography;
+use nalgebra::Point2;
+use statistics::Sorted;
+
+use super::Sight;
+
+/// Cells of a picture along each side.
+const CELLS: [usize; 2] = [8, 6];
+/// Steps of the apparent size of a board (a factor of 1.5 each), and of its tilt.
+const SIZES: usize = 8;
+const TILTS: usize = 6;
+/// The fewest slow frames that are enough.
+const FEWEST_SLOW: usize = 12;
+
+/// The frames of `sights` that cover most, at most `most`, in their order.
+///
+/// One after the other the frame is taken that adds most of what has been seen least: cells of each camera's picture, sizes and
+/// tilts of the board, and pairs of cameras that see it together.
+pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<usize> {
+    let mut all: Vec<usize> = sights.iter().map(|it| it.frame).collect();
+    all.sort_unstable();
+    all.dedup();
+    if all.len() <= most {
+        return all;
+    }
+    let n_cameras = sizes.len();
+    let per_camera = CELLS[0] * CELLS[1] + SIZES + TILTS * TILTS;
+    let n_features = n_cameras * per_camera + n_cameras * n_cameras;
+    let features: Vec<Vec<usize>> = all
+        .iter()
+        .map(|frame| {
+            let own: Vec<&Sight> = sights.iter().filter(|it| it.frame == *frame).collect();
+            let mut list: Vec<usize> = own
+                .iter()
+                .flat_map(|it| {
+                    let size = sizes[it.camera].map(f64::from);
+                    features_of(it, size).map(move |feature| it.camera * per_camera + feature)
+                })
+                .collect();
+            for a in &own {
+                for b in &own {
+                    if a.camera < b.camera {
+                        let pair = a.camera * n_cameras + b.camera;
+                        // Pairs hold the rig together: they count several times.
+                        list.extend([n_cameras * per_camera + pair; 6]);
+                    }
+                }
+            }
+            list
+        })
+        .collect();
+    let mut times = vec![0_u32; n_features];
+    let mut is_taken = vec![false; all.len()];
+    for _ in 0..most {
+        let gain = |nth: usize| -> f64 {
+            let each = features[nth]
+                .iter()
+                .map(|it| 1.0 / f64::from(1 + times[*it]));
+            each.sum()
+        };
+        let open = (0..all.len()).filter(|nth| !is_taken[*nth]);
+        let Some(best) = open.max_by(|a, b| gain(*a).total_cmp(&gain(*b)).then(b.cmp(a))) else {
+            break;
+        };
+        is_taken[best] = true;
+        for feature in &features[best] {
+            times[*feature] += 1;
+        }
+    }
+    let taken = all.iter().zip(&is_taken).filter(|(_, is_taken)| **is_taken);
+    taken.map(|(frame, _)| *frame).collect()
+}
+
+/// The half of the frames in which the board moves least, as all cameras see it; none where that cannot be told, or is too few.
+pub(crate) fn slow(sights: &[Sight], n_cameras: usize) -> Vec<usize> {
+    let mut speeds: BTreeMap<usize, f64> = BTreeMap::new();
+    for camera in 0..n_cameras {
+        let mut own: Vec<&Sight> = sights.iter().filter(|it| it.camera == camera).collect();
+        own.sort_by_key(|it| it.frame);
+        for (nth, sight) in own.iter().enumerate() {
+            let before = nth.checked_sub(1).and_then(|it| own.get(it));
+            let near = [before, own.get(nth + 1)].into_iter().flatten();
+            let each = near.filter_map(|other| speed(sight, other));
+            let fastest = each.fold(f64::NAN, f64::max);
+            if fastest.is_finite() {
+                let known = speeds.entry(sight.frame).or_default();
+                *known = known.max(fastest);
+            }
+        }
+    }
+    let several = |frame: &usize| sights.iter().filter(|it| it.frame == *frame).count() > 1;
+    let mut order: Vec<(usize, f64)> = speeds.into_iter().filter(|it| several(&it.0)).collect();
+    order.sort_by(|a, b| a.1.total_cmp(&b.1));
+    order.truncate(order.len().div_ceil(2));
+    if order.len() < FEWEST_SLOW {
+        return Vec::new();
+    }
+    let mut frames: Vec<usize> = order.into_iter().map(|it| it.0).collect();
+    frames.sort_unstable();
+    frames
+}
+
+/// The median movement of corners between two pictures, pixels a frame.
+fn speed(a: &Sight, b: &Sight) -> Option<f64> {
+    let moved = a.points.iter().filter_map(|(id, at)| {
+        let other = b.points.iter().find(|it| it.0 == *id)?;
+        Some((other.1 - at).norm())
+    });
+    let moved = Sorted::new(moved.collect::<Vec<f64>>()).median()?;
+    Some(moved / a.frame.abs_diff(b.frame).max(1) as f64)
+}
+
+/// What a board in a picture covers: cells, its size, its tilt in both directions.
+fn features_of(sight: &Sight, size: [f64; 2]) -> impl Iterator<Item = usize> {
+    let mut cells: Vec<usize> = sight.points.iter().map(|(_, at)| cell(*at, size)).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let n_cells = CELLS[0] * CELLS[1];
+    let side = spread(sight) / size[0].max(size[1]);
+    let step = (-side.max(1e-3).ln() / 1.5_f64.ln()).clamp(0.0, (SIZES - 1) as f64) as usize;
+    cells.push(n_cells + step);
+    if let Some([u, v]) = tilt(sight) {
+        let bin =
+            |it: f64| ((it + 0.75) / 1.5 * TILTS as f64).clamp(0.0, (TILTS - 1) as f64) as usize;
+        cells.push(n_cells + SIZES + bin(v) * TILTS + bin(u));
+    }
+    cells.into_iter()
+}
+
+/// The cell of a place in a picture.
+fn cell(at: Point2<f64>, size: [f64; 2]) -> usize {
+    let along = |axis: usize| {
+        let share = (at[axis] + 0.5) / size[axis];
+        (share * CELLS[axis] as f64).clamp(0.0, (CELLS[axis] - 1) as f64) as usize
+    };
+    along(1) * CELLS[0] + along(0)
+}
+
+/// The share of a picture's cells that some points are in, from 0 to 1.
+pub(crate) fn coverage(points: impl Iterator<Item = Point2<f64>>, size: [u32; 2]) -> f64 {
+    let mut is_seen = [false; CELLS[0] * CELLS[1]];
+    for at in points {
+        is_seen[cell(at, size.map(f64::from))] = true;
+    }
+    is_seen.iter().filter(|it| **it).count() as f64 / is_seen.len() as f64
+}
+
+/// The root mean square distance of points from their middle, pixels.
+fn spread(sight: &Sight) -> f64 {
+    let n = sight.points.len().max(1) as f64;
+    let middle = sight.points.iter().map(|it| it.1.coords);
+    let middle = middle.sum::<nalgebra::Vector2<f64>>() / n;
+    let square = sight
+        .points
+        .iter()
+        .map(|it| (it.1.coords - middle).norm_squared());
+    (square.sum::<f64>() / n).sqrt()
+}
+
+/// How much the far side of a board is smaller than the near one, along its two axes.
+fn tilt(sight: &Sight) -> Option<[f64; 2]> {
+    let map = Homography::fit(
+        sight
+            .on_board
+            .iter()
+            .zip(&sight.points)
+            .map(|(on, at)| (*on, at.1, 1.0)),
+    )?;
+    let n = sight.on_board.len() as f64;
+    let middle = sight
+        .on_board
+        .iter()
+        .map(|it| it.coords)
+        .sum::<nalgebra::Vector2<f64>>()
+        / n;
+    let reach = sight
+        .on_board
+        .iter()
+        .map(|it| (it.coords - middle).norm())
+        .fold(0.0, f64::max);
+    let row = map.matrix().row(2).into_owned();
+    let depth = row[0] * middle.x + row[1] * middle.y + row[2];
+    let share = [row[0] * reach / depth, row[1] * reach / depth];
+    share.iter().all(|it| it.is_finite()).then_some(share)
+}

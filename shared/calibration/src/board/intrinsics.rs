@@ -1,0 +1,149 @@
+//! The intrinsics of one camera from boards, without knowing anything of it.
+
+use geometry::bundle::{Cameras, Free, Loss, Settings, solve};
+use geometry::{Camera, Intrinsics, Lens, LensModel};
+use nalgebra::{Isometry3, Point3};
+
+use super::pose::{Sighted, board_pose, linear};
+use super::problem::{BoardProblem, Observation};
+use super::{CornerLoss, LensKind};
+
+/// Focal lengths that are tried, as shares of the longer side of the picture: from this on, each larger by a factor.
+const SHORTEST: f64 = 0.25;
+const FACTOR: f64 = 1.12;
+const TRIED: i32 = 26;
+/// The most boards that a first look uses.
+const FIRST_LOOK: usize = 25;
+
+/// A start: the focal length under which boards look most like boards, no distortion.
+pub(crate) fn start(size: [u32; 2], lens: LensKind, boards: &[Vec<Sighted>]) -> Option<Intrinsics> {
+    let longer = f64::from(size[0].max(size[1]));
+    let step = boards.len().div_ceil(FIRST_LOOK).max(1);
+    let tried = (0..TRIED).map(|nth| with_focal(size, lens, longer * SHORTEST * FACTOR.powi(nth)));
+    let cost = |intrinsics: &Intrinsics| -> f64 {
+        let each = boards.iter().step_by(step).map(|points| {
+            let rms = linear(intrinsics, points).and_then(|pose| square(intrinsics, &pose, points));
+            rms.map_or(1e4, |it| it.min(1e4))
+        });
+        each.sum()
+    };
+    let costs: Vec<(f64, Intrinsics)> = tried.map(|it| (cost(&it), it)).collect();
+    let best = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    best.0.is_finite().then_some(best.1)
+}
+
+fn with_focal(size: [u32; 2], lens: LensKind, focal: f64) -> Intrinsics {
+    Intrinsics {
+        fx: focal,
+        fy: focal,
+        cx: 0.5 * f64::from(size[0] - 1),
+        cy: 0.5 * f64::from(size[1] - 1),
+        size,
+        lens: Lens::new(match lens {
+            LensKind::Fisheye => LensModel::KannalaBrandt { k: [0.0; 4] },
+            LensKind::Five | LensKind::Eight => LensModel::BrownConrady {
+                k: [0.0; 6],
+                p: [0.0; 2],
+            },
+        }),
+    }
+}
+
+/// The mean square of the residuals of a pose, pixels.
+fn square(intrinsics: &Intrinsics, pose: &Isometry3<f64>, points: &[Sighted]) -> Option<f64> {
+    let camera = Camera {
+        name: String::new(),
+        intrinsics: *intrinsics,
+        camera_from_world: *pose,
+    };
+    let sum = points.iter().try_fold(0.0, |sum, (on_board, seen)| {
+        let image = camera.project(&Point3::new(on_board.x, on_board.y, 0.0))?;
+        Some(sum + (image - seen).norm_squared())
+    });
+    sum.map(|it| it / points.len().max(1) as f64)
+}
+
+/// What of a camera's intrinsics is free.
+pub(crate) fn free(lens: LensKind, pose: bool) -> Free {
+    Free {
+        pose,
+        focal: true,
+        aspect: true,
+        centre: true,
+        lens: match lens {
+            LensKind::Five => [true, true, true, false, false, false, true, true],
+            LensKind::Eight => [true; 8],
+            LensKind::Fisheye => [true, true, true, true, false, false, false, false],
+        },
+    }
+}
+
+/// The intrinsics from boards: what [`start`] gives, adjusted step by step with the poses of the boards.
+///
+/// First the focal length, then the first coefficient of the lens, then everything: a lens that is bent much has no near
+/// minimum otherwise.
+pub(crate) fn adjusted(
+    start: Intrinsics,
+    lens: LensKind,
+    boards: &[Vec<Sighted>],
+) -> Option<Intrinsics> {
+    let all = free(lens, false);
+    let mut only_focal = all;
+    (only_focal.aspect, only_focal.centre, only_focal.lens) = (false, false, [false; 8]);
+    let mut bent = only_focal;
+    bent.lens[0] = true;
+    bent.lens[1] = true;
+    let mut intrinsics = start;
+    for (free, loss) in [
+        (only_focal, Loss::Cauchy(8.0)),
+        (bent, Loss::Cauchy(4.0)),
+        (all, Loss::Cauchy(2.0)),
+        (all, CornerLoss::ROBUST),
+    ] {
+        intrinsics = adjusted_once(&intrinsics, free, loss, boards)?;
+    }
+    Some(intrinsics)
+}
+
+fn adjusted_once(
+    intrinsics: &Intrinsics,
+    free: Free,
+    loss: Loss,
+    boards: &[Vec<Sighted>],
+) -> Option<Intrinsics> {
+    let camera = Camera {
+        name: "camera".to_owned(),
+        intrinsics: *intrinsics,
+        camera_from_world: Isometry3::identity(),
+    };
+    let (mut poses, mut seen) = (Vec::new(), Vec::new());
+    for points in boards {
+        let Some(pose) = board_pose(intrinsics, points) else {
+            continue;
+        };
+        poses.push(pose.camera_from_board);
+        let each = points.iter().map(|(on_board, at)| Observation {
+            camera: 0,
+            on_board: Point3::new(on_board.x, on_board.y, 0.0),
+            seen: *at,
+        });
+        seen.push(each.collect());
+    }
+    if poses.is_empty() {
+        return None;
+    }
+    let problem = BoardProblem {
+        cameras: Cameras::new(vec![camera], &[free]),
+        boards: poses,
+        seen: &seen,
+        sigma_px: 1.0,
+        loss,
+    };
+    let settings = Settings {
+        max_iterations: 60,
+        least_gain: 1e-8,
+    };
+    let (solved, report) = solve(problem, &settings);
+    let answer = solved.cameras.cameras()[0].intrinsics;
+    (report.cost_after.is_finite() && answer.fx > 0.0 && answer.fy > 0.0).then_some(answer)
+}

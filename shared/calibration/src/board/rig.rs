@@ -1,0 +1,331 @@
+//! From sights of a board to cameras.
+
+use geometry::bundle::Free;
+use geometry::{Camera, Intrinsics};
+use nalgebra::{Isometry3, Point3};
+
+use super::adjust::adjusted;
+use super::graph::{Meeting, Pair, pair, standing};
+use super::outcome::{Shown, middle};
+use super::pose::board_pose;
+use super::{
+    BoardError, LEAST_BOARDS, LEAST_CORNERS, LensKind, Outcome, Sight, Task, Together, choose,
+    intrinsics, verdict,
+};
+
+/// The most pictures that intrinsics of one camera are begun with.
+const MOST_FOR_START: usize = 60;
+/// Cameras are out of step where residuals of all together are so many times those of each by itself, and at least so large.
+const OUT_OF_STEP: f64 = 1.4;
+const OUT_OF_STEP_PX: f64 = 0.4;
+
+/// Calibrates cameras from a board.
+///
+/// The world is the frame of the first camera; which way is up is not known.
+///
+/// # Errors
+///
+/// [`BoardError`] where there is no answer; an answer that is not to be trusted has [`Outcome::doubts`].
+pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
+    let usable = |it: &&Sight| it.points.len() >= LEAST_CORNERS && verdict::is_spread(it);
+    let sights: Vec<Sight> = task.sights.iter().filter(usable).cloned().collect();
+    let mut started = Vec::new();
+    for camera in 0..task.names.len() {
+        started.push(first_intrinsics(task, camera, &sights)?);
+    }
+    if !task.wants_rig {
+        return each_alone(task, &sights, &started);
+    }
+    let alone = each_alone(task, &sights, &started)?;
+    let lenses: Vec<Intrinsics> = alone
+        .cameras
+        .iter()
+        .map(|it| it.camera.intrinsics)
+        .collect();
+    let placed = placed(task, &sights, &lenses);
+    let (pairs, together) = pairs(task, &placed);
+    let standing = standing(task.names.len(), &pairs);
+    let poses: Option<Vec<Isometry3<f64>>> = standing.poses.iter().copied().collect();
+    let Some(poses) = poses else {
+        let named = |group: &Vec<usize>| group.iter().map(|it| task.names[*it].clone()).collect();
+        return Err(BoardError::Apart {
+            groups: standing.groups.iter().map(named).collect(),
+        });
+    };
+    let cameras: Vec<Camera> = (0..task.names.len())
+        .map(|nth| camera_of(task, nth, lenses[nth], poses[nth]))
+        .collect();
+    let free: Vec<Free> = (0..cameras.len())
+        .map(|nth| free_of(task, nth, nth != 0))
+        .collect();
+    let frames = choose::frames(&sights, &task.sizes, task.most_frames);
+    let found = boards(task, &cameras, &placed, &frames);
+    let mut outcome = adjusted(task, cameras.clone(), &free, &found)?;
+    let rms_px = [pooled(&alone), pooled(&outcome)];
+    if rms_px[1] > OUT_OF_STEP * rms_px[0] && rms_px[1] > OUT_OF_STEP_PX {
+        outcome = in_step(task, (cameras, &alone), &placed, &sights)?;
+        outcome.out_of_step_px = Some(rms_px);
+    }
+    outcome.pairs = together;
+    for (nth, camera) in outcome.cameras.iter_mut().enumerate() {
+        camera.n_boards[0] = sights.iter().filter(|it| it.camera == nth).count();
+    }
+    verdict::doubt(task, &mut outcome);
+    Ok(outcome)
+}
+
+/// Pictures of one frame that were not taken at the same time put boards where they were not, and lenses are bent to fit:
+/// so lenses that each camera by itself tells well stay as it has them, and where the cameras stand is told by the frames in which
+/// the board moves least.
+fn in_step(
+    task: &Task,
+    (cameras, alone): (Vec<Camera>, &Outcome),
+    placed: &[Placed],
+    sights: &[Sight],
+) -> Result<Outcome, BoardError> {
+    // A lens that its camera alone does not tell well is not held at what it tells.
+    let is_sure = alone.cameras.iter().map(verdict::is_lens_sure);
+    let free: Vec<Free> = is_sure
+        .enumerate()
+        .map(|(nth, is_sure)| match (is_sure, nth) {
+            (true, 0) => Free::default(),
+            (true, _) => Free::POSE,
+            (false, _) => free_of(task, nth, nth != 0),
+        })
+        .collect();
+    let slow = choose::slow(sights, task.names.len());
+    let frames = if slow.is_empty() {
+        choose::frames(sights, &task.sizes, task.most_frames)
+    } else {
+        slow
+    };
+    let boards = boards(task, &cameras, placed, &frames);
+    let mut outcome = adjusted(task, cameras, &free, &boards)?;
+    for (camera, alone) in outcome.cameras.iter_mut().zip(&alone.cameras) {
+        let is_held = camera.numbers.iter().all(|it| it.name != "focal length");
+        if is_held {
+            camera.numbers.extend(alone.numbers.iter().cloned());
+        }
+        // The lens is told by all that the camera saw.
+        camera.coverage = alone.coverage;
+        camera.n_boards[1] = alone.n_boards[1];
+    }
+    Ok(outcome)
+}
+
+/// The root mean square of all residuals that were used, pixels.
+fn pooled(outcome: &Outcome) -> f64 {
+    let all = outcome.cameras.iter().flat_map(|it| &it.residuals);
+    let squares: Vec<f64> = all
+        .filter(|it| !it.is_wrong)
+        .map(|it| it.off.norm_squared())
+        .collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+}
+
+fn free_of(task: &Task, camera: usize, pose: bool) -> Free {
+    match task.known[camera] {
+        Some(_) if pose => Free::POSE,
+        Some(_) => Free::default(),
+        None => intrinsics::free(task.lens, pose),
+    }
+}
+
+fn camera_of(
+    task: &Task,
+    nth: usize,
+    intrinsics: Intrinsics,
+    camera_from_world: Isometry3<f64>,
+) -> Camera {
+    Camera {
+        name: task.names[nth].clone(),
+        intrinsics,
+        camera_from_world,
+    }
+}
+
+/// Every camera by itself.
+fn each_alone(
+    task: &Task,
+    sights: &[Sight],
+    started: &[Intrinsics],
+) -> Result<Outcome, BoardError> {
+    let mut all: Option<Outcome> = None;
+    for (nth, start) in started.iter().enumerate() {
+        let own: Vec<Sight> = sights
+            .iter()
+            .filter(|it| it.camera == nth)
+            .cloned()
+            .collect();
+        let frames = choose::frames(&own, &task.sizes, task.most_frames);
+        let placed = placed(task, &own, started);
+        let cameras: Vec<Camera> = (0..task.names.len())
+            .map(|it| camera_of(task, it, started[it], Isometry3::identity()))
+            .collect();
+        let mut free = vec![Free::default(); cameras.len()];
+        free[nth] = free_of(task, nth, false);
+        let boards = boards(task, &cameras, &placed, &frames);
+        let mut outcome = adjusted(task, cameras, &free, &boards)?;
+        let mut own_outcome = outcome.cameras.swap_remove(nth);
+        own_outcome.n_boards[0] = own.len();
+        own_outcome.is_known = task.known[nth] == Some(*start);
+        if let Some(all) = &mut all {
+            all.cameras.push(own_outcome);
+            all.sigma_px = all.sigma_px.max(outcome.sigma_px);
+        } else {
+            outcome.cameras = vec![own_outcome];
+            all = Some(outcome);
+        }
+    }
+    let mut outcome = all.ok_or(BoardError::NotFinite)?;
+    outcome.boards.clear();
+    verdict::doubt(task, &mut outcome);
+    Ok(outcome)
+}
+
+/// The intrinsics that are known, or those that the camera's own boards tell.
+fn first_intrinsics(
+    task: &Task,
+    camera: usize,
+    sights: &[Sight],
+) -> Result<Intrinsics, BoardError> {
+    let own: Vec<Sight> = sights
+        .iter()
+        .filter(|it| it.camera == camera)
+        .cloned()
+        .collect();
+    let name = || task.names[camera].clone();
+    let least = if task.known[camera].is_some() {
+        1
+    } else {
+        LEAST_BOARDS
+    };
+    if own.len() < least {
+        return Err(BoardError::TooFewBoards {
+            camera: name(),
+            n: own.len(),
+            least,
+        });
+    }
+    if let Some(known) = task.known[camera] {
+        return Ok(known);
+    }
+    let frames = choose::frames(&own, &task.sizes, MOST_FOR_START);
+    let chosen = own.iter().filter(|it| frames.contains(&it.frame));
+    let boards: Vec<_> = chosen.map(Sight::sighted).collect();
+    let kind = task.lens;
+    // Eight coefficients are begun with five, whose minimum is wider.
+    let first = if kind == LensKind::Eight {
+        LensKind::Five
+    } else {
+        kind
+    };
+    intrinsics::start(task.sizes[camera], first, &boards)
+        .and_then(|start| intrinsics::adjusted(start, first, &boards))
+        .ok_or_else(|| BoardError::NoStart { camera: name() })
+}
+
+/// A sight with the pose of the board, one for each way in which the board may have been taken for itself.
+struct Placed {
+    sight: Sight,
+    ways: Vec<(Sight, Isometry3<f64>)>,
+}
+
+fn placed(task: &Task, sights: &[Sight], started: &[Intrinsics]) -> Vec<Placed> {
+    let mut list = Vec::new();
+    for sight in sights {
+        let turned = task
+            .look_alikes
+            .iter()
+            .map(|numbers| sight.renumbered(numbers, &task.board));
+        let ways = core::iter::once(sight.clone()).chain(turned);
+        let ways: Vec<(Sight, Isometry3<f64>)> = ways
+            .filter_map(|way| {
+                let pose = board_pose(&started[way.camera], &way.sighted())?;
+                (pose.rms_px < 50.0).then_some((way, pose.camera_from_board))
+            })
+            .collect();
+        if !ways.is_empty() {
+            list.push(Placed {
+                sight: sight.clone(),
+                ways,
+            });
+        }
+    }
+    list
+}
+
+fn pairs(task: &Task, placed: &[Placed]) -> (Vec<([usize; 2], Pair)>, Vec<Together>) {
+    let (mut pairs, mut together) = (Vec::new(), Vec::new());
+    for a in 0..task.names.len() {
+        for b in a + 1..task.names.len() {
+            let mut meetings = Vec::new();
+            for one in placed.iter().filter(|it| it.sight.camera == a) {
+                let same = placed
+                    .iter()
+                    .filter(|it| it.sight.camera == b && it.sight.frame == one.sight.frame);
+                for other in same {
+                    let first = one.ways[0].1;
+                    let n = one.sight.points.len().min(other.sight.points.len());
+                    meetings.push(Meeting {
+                        a_from_b: other.ways.iter().map(|it| first * it.1.inverse()).collect(),
+                        weight: n as f64,
+                    });
+                }
+            }
+            if let Some(found) = pair(&meetings) {
+                together.push(Together {
+                    cameras: [a, b],
+                    n: found.n,
+                    n_agree: found.n_agree,
+                });
+                pairs.push(([a, b], found));
+            }
+        }
+    }
+    (pairs, together)
+}
+
+/// The board in the world in every frame: the pose by one of the cameras that all of them like best.
+fn boards(task: &Task, cameras: &[Camera], placed: &[Placed], frames: &[usize]) -> Vec<Shown> {
+    let mut list = Vec::new();
+    for &frame in frames {
+        let own: Vec<&Placed> = placed.iter().filter(|it| it.sight.frame == frame).collect();
+        let candidates = own.iter().map(|it| {
+            let camera = &cameras[it.sight.camera];
+            camera.camera_from_world.inverse() * it.ways[0].1
+        });
+        let judged = candidates.map(|pose| {
+            let ways: Vec<(f64, Sight)> = own
+                .iter()
+                .filter_map(|it| {
+                    let costs = it
+                        .ways
+                        .iter()
+                        .map(|(way, _)| (cost(&cameras[way.camera], &pose, way), way.clone()));
+                    costs.min_by(|a, b| a.0.total_cmp(&b.0))
+                })
+                .collect();
+            (ways.iter().map(|it| it.0).sum::<f64>(), pose, ways)
+        });
+        let Some((_, pose, ways)) = judged.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            continue;
+        };
+        list.push(Shown {
+            frame,
+            world_from_board: pose * middle(task),
+            sights: ways.into_iter().map(|it| it.1).collect(),
+        });
+    }
+    list
+}
+
+/// The mean length of a sight's residuals, those of many pixels counting as so many.
+fn cost(camera: &Camera, world_from_board: &Isometry3<f64>, sight: &Sight) -> f64 {
+    let each = sight.sighted().into_iter().map(|(on_board, at)| {
+        let in_world = world_from_board * Point3::new(on_board.x, on_board.y, 0.0);
+        let image = camera.project(&in_world);
+        image.map_or(100.0, |it| (it - at).norm().min(100.0))
+    });
+    each.sum::<f64>() / sight.points.len().max(1) as f64
+}

@@ -1,0 +1,296 @@
+//! Boards that do not exist, before cameras that are known.
+
+use geometry::{Lens, LensModel};
+use nalgebra::{Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use super::*;
+
+const SIZE: [u32; 2] = [1280, 720];
+
+fn board(columns: usize, rows: usize) -> Vec<Point2<f64>> {
+    let place = |nth: usize| {
+        let at = [nth % columns, nth / columns];
+        Point2::new(at[0] as f64 * 0.05, at[1] as f64 * 0.05)
+    };
+    (0..columns * rows).map(place).collect()
+}
+
+fn looking(name: &str, from: Point3<f64>, focal: f64, lens: LensModel) -> Camera {
+    let to = Point3::new(0.0, 0.0, 1.5);
+    let rotation = UnitQuaternion::look_at_rh(&(to - from), &Vector3::y());
+    let flip = Rotation3::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI);
+    let rotation = UnitQuaternion::from_rotation_matrix(&flip) * rotation;
+    Camera {
+        name: name.to_owned(),
+        intrinsics: Intrinsics {
+            fx: focal,
+            fy: focal * 1.004,
+            cx: 651.0,
+            cy: 352.0,
+            size: SIZE,
+            lens: Lens::new(lens),
+        },
+        camera_from_world: Isometry3::from_parts(
+            Translation3::from(rotation * -from.coords),
+            rotation,
+        ),
+    }
+}
+
+const BROWN: LensModel = LensModel::BrownConrady {
+    k: [-0.3, 0.09, 0.01, 0.0, 0.0, 0.0],
+    p: [0.001, -0.0006],
+};
+
+fn ring(n: usize, lens: LensModel) -> Vec<Camera> {
+    let each = (0..n).map(|nth| {
+        let angle = nth as f64 * 2.0 * core::f64::consts::PI / n as f64;
+        let from = Point3::new(1.4 * angle.sin(), -0.5, 1.5 - 1.4 * angle.cos());
+        looking(&format!("cam{nth}"), from, 700.0 + 60.0 * nth as f64, lens)
+    });
+    each.collect()
+}
+
+struct Show<'a> {
+    cameras: &'a [Camera],
+    board: &'a [Point2<f64>],
+    n_frames: usize,
+    noise_px: f64,
+}
+
+impl Show<'_> {
+    /// The board moved about, seen where at least `LEAST_CORNERS` of its front are in a picture.
+    fn sights(&self, random: &mut fastrand::Rng) -> Vec<Sight> {
+        let mut sights = Vec::new();
+        for frame in 0..self.n_frames {
+            let mut spread = |reach: f64| reach * (2.0 * random.f64() - 1.0);
+            let turn = Vector3::new(spread(0.6), spread(3.1), spread(0.6));
+            let place = Translation3::new(spread(0.45), spread(0.3), 1.5 + spread(0.45));
+            let rotation = UnitQuaternion::from_scaled_axis(Vector3::y() * turn.y)
+                * UnitQuaternion::from_scaled_axis(Vector3::new(turn.x, 0.0, turn.z));
+            let pose = Isometry3::from_parts(place, rotation);
+            for (nth, camera) in self.cameras.iter().enumerate() {
+                let facing = (camera.camera_from_world.rotation * pose.rotation * Vector3::z()).z;
+                if facing < 0.35 {
+                    continue;
+                }
+                let mut noise = || {
+                    let sum: f64 = (0..12).map(|_| random.f64()).sum();
+                    self.noise_px * (sum - 6.0)
+                };
+                let seen = self.board.iter().enumerate().filter_map(|(id, point)| {
+                    let image = camera.project(&(pose * Point3::new(point.x, point.y, 0.0)))?;
+                    let inside =
+                        (0..2).all(|it| image[it] > 0.0 && image[it] < f64::from(SIZE[it]));
+                    inside.then(|| (id, image + Vector2::new(noise(), noise())))
+                });
+                let sight = Sight::new(nth, frame, seen, self.board);
+                if sight.points.len() >= LEAST_CORNERS {
+                    sights.push(sight);
+                }
+            }
+        }
+        sights
+    }
+}
+
+fn task(cameras: &[Camera], board: &[Point2<f64>], sights: Vec<Sight>) -> Task {
+    Task {
+        names: cameras.iter().map(|it| it.name.clone()).collect(),
+        sizes: vec![SIZE; cameras.len()],
+        known: vec![None; cameras.len()],
+        lens: LensKind::Five,
+        board: board.to_vec(),
+        look_alikes: Vec::new(),
+        sights,
+        wants_rig: true,
+        most_frames: 60,
+    }
+}
+
+/// The largest errors: focal lengths as a share, turns in degrees, distances from the first camera as a share.
+fn errors(outcome: &Outcome, truth: &[Camera]) -> [f64; 3] {
+    let mut worst = [0.0_f64; 3];
+    let first = &truth[0].camera_from_world;
+    for (found, truth) in outcome.cameras.iter().zip(truth) {
+        let focal = found.camera.intrinsics.fx / truth.intrinsics.fx - 1.0;
+        worst[0] = worst[0].max(focal.abs());
+        let expected = truth.camera_from_world * first.inverse();
+        let pose = found.camera.camera_from_world;
+        let turn = pose.rotation.angle_to(&expected.rotation).to_degrees();
+        worst[1] = worst[1].max(turn);
+        let length = expected.translation.vector.norm();
+        let off = (pose.translation.vector - expected.translation.vector).norm();
+        worst[2] = worst[2].max(off / length.max(1.0));
+    }
+    worst
+}
+
+#[test]
+fn a_rig_is_found_from_a_board_that_no_two_opposite_cameras_see_together() {
+    let truth = ring(5, BROWN);
+    let board = board(6, 4);
+    let show = Show {
+        cameras: &truth,
+        board: &board,
+        n_frames: 120,
+        noise_px: 0.2,
+    };
+    let mut random = fastrand::Rng::with_seed(3);
+    let mut sights = show.sights(&mut random);
+    // One corner in a hundred is elsewhere.
+    let mut n_wrong = 0;
+    for sight in &mut sights {
+        for (_, at) in &mut sight.points {
+            if random.f64() < 0.01 {
+                *at += Vector2::new(12.0, -9.0);
+                n_wrong += 1;
+            }
+        }
+    }
+    let outcome = calibrate(&task(&truth, &board, sights)).unwrap();
+    let [focal, turn, place] = errors(&outcome, &truth);
+    assert!(
+        focal < 4e-3 && turn < 0.6 && place < 1e-2,
+        "{focal} {turn} {place}"
+    );
+    assert_eq!(outcome.doubts, []);
+    let all = outcome.cameras.iter().flat_map(|it| &it.residuals);
+    let left_out = all.clone().filter(|it| it.is_wrong).count();
+    assert!(
+        left_out > 0 && left_out <= n_wrong,
+        "{left_out} of {n_wrong}"
+    );
+    assert!(
+        (0.15..0.25).contains(&outcome.sigma_px),
+        "{}",
+        outcome.sigma_px
+    );
+    // What is said of the focal lengths is true.
+    for (found, truth) in outcome.cameras.iter().zip(&truth) {
+        let focal = found.numbers.iter().find(|it| it.name == "focal length");
+        let off = (found.camera.intrinsics.fx - truth.intrinsics.fx).abs();
+        assert!(focal.is_some_and(|it| off < 4.0 * it.sd), "{off} {focal:?}");
+    }
+}
+
+#[test]
+fn a_fisheye_is_found() {
+    let lens = LensModel::KannalaBrandt {
+        k: [0.02, -0.01, 0.003, 0.0],
+    };
+    let mut truth = ring(2, lens);
+    for camera in &mut truth {
+        camera.intrinsics.fx = 420.0;
+        camera.intrinsics.fy = 421.0;
+    }
+    let board = board(6, 4);
+    let show = Show {
+        cameras: &truth[..1],
+        board: &board,
+        n_frames: 60,
+        noise_px: 0.2,
+    };
+    let sights = show.sights(&mut fastrand::Rng::with_seed(9));
+    let mut task = task(&truth[..1], &board, sights);
+    (task.lens, task.wants_rig) = (LensKind::Fisheye, false);
+    let outcome = calibrate(&task).unwrap();
+    let found = outcome.cameras[0].camera.intrinsics;
+    assert!((found.fx / 420.0 - 1.0).abs() < 5e-3, "{found:?}");
+    assert!(outcome.cameras[0].rms_px < 0.4);
+}
+
+#[test]
+fn a_board_that_looks_the_same_turned_is_told_by_the_cameras_together() {
+    let truth = ring(4, BROWN);
+    let board = board(6, 4);
+    let show = Show {
+        cameras: &truth,
+        board: &board,
+        n_frames: 80,
+        noise_px: 0.1,
+    };
+    let turned: Vec<usize> = (0..24).rev().collect();
+    let mut random = fastrand::Rng::with_seed(4);
+    let sights = show.sights(&mut random).into_iter().map(|sight| {
+        let is_turned = random.bool();
+        if is_turned {
+            sight.renumbered(&turned, &board)
+        } else {
+            sight
+        }
+    });
+    let sights = sights.collect();
+    let mut task = task(&truth, &board, sights);
+    task.look_alikes = vec![turned];
+    let outcome = calibrate(&task).unwrap();
+    let [focal, turn, place] = errors(&outcome, &truth);
+    assert!(
+        focal < 4e-3 && turn < 0.6 && place < 1e-2,
+        "{focal} {turn} {place}"
+    );
+    assert!(outcome.cameras.iter().all(|it| it.wrong_share() < 0.02));
+}
+
+#[test]
+fn what_cannot_be_known_is_refused_with_the_reason() {
+    let truth = ring(4, BROWN);
+    let board = board(6, 4);
+    let show = Show {
+        cameras: &truth,
+        board: &board,
+        n_frames: 60,
+        noise_px: 0.2,
+    };
+    let sights = show.sights(&mut fastrand::Rng::with_seed(3));
+    // Cameras 0, 1 and cameras 2, 3 never at the same time.
+    let apart = sights
+        .iter()
+        .filter(|it| (it.camera < 2) == (it.frame % 2 == 0));
+    let error = calibrate(&task(&truth, &board, apart.cloned().collect())).unwrap_err();
+    assert!(
+        error.to_string().contains("cam0, cam1 | cam2, cam3"),
+        "{error}"
+    );
+    let none = sights.iter().filter(|it| it.camera != 2).cloned().collect();
+    let error = calibrate(&task(&truth, &board, none)).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("\"cam2\" saw the board in 0 pictures"),
+        "{error}"
+    );
+    let few = sights.iter().filter(|it| it.frame < 9).cloned().collect();
+    match calibrate(&task(&truth, &board, few)) {
+        Ok(outcome) => assert!(!outcome.doubts.is_empty()),
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+#[test]
+fn cameras_out_of_step_are_doubted() {
+    let truth = ring(3, BROWN);
+    let board = board(6, 4);
+    let show = Show {
+        cameras: &truth,
+        board: &board,
+        n_frames: 90,
+        noise_px: 0.2,
+    };
+    let mut sights = show.sights(&mut fastrand::Rng::with_seed(3));
+    for sight in &mut sights {
+        // One camera is a frame behind.
+        sight.frame += usize::from(sight.camera == 1);
+    }
+    match calibrate(&task(&truth, &board, sights)) {
+        Ok(outcome) => assert!(
+            outcome
+                .doubts
+                .iter()
+                .any(|it| matches!(it, Doubt::Disagreement { .. })),
+            "{:?}",
+            outcome.doubts
+        ),
+        Err(error) => assert!(matches!(error, BoardError::Apart { .. }), "{error}"),
+    }
+}

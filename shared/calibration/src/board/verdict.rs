@@ -1,0 +1,177 @@
+//! What forbids to trust a calibration from a board.
+
+use super::{CameraOutcome, Outcome, Sight, Task};
+
+/// Limits: fewer boards, less of the picture, larger residuals or less certain focal lengths are doubts.
+const FEW_BOARDS: usize = 6;
+const LITTLE_COVERED: f64 = 0.2;
+const LARGE_PX: f64 = 1.5;
+const FOCAL_SHARE: f64 = 0.01;
+const WRONG_SHARE: f64 = 0.15;
+const AGREEING_SHARE: f64 = 0.6;
+/// Residuals are judged in a picture of this longer side; larger ones are allowed as much more.
+const USUAL_SIDE: f64 = 1280.0;
+
+/// Why a calibration is not to be trusted.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Doubt {
+    /// Few pictures with the board.
+    FewBoards {
+        /// The camera.
+        camera: usize,
+        /// How many.
+        n: usize,
+    },
+    /// The board was seen in a small part of the picture.
+    LittleCovered {
+        /// The camera.
+        camera: usize,
+        /// The share of the picture, from 0 to 1.
+        share: f64,
+    },
+    /// Large residuals.
+    LargeResiduals {
+        /// The camera.
+        camera: usize,
+        /// Root mean square, pixels.
+        rms_px: f64,
+        /// The limit for its picture.
+        limit_px: f64,
+    },
+    /// The focal length is not known well.
+    Focal {
+        /// The camera.
+        camera: usize,
+        /// Its standard deviation as a share of it.
+        share: f64,
+    },
+    /// Many corners do not fit.
+    ManyWrong {
+        /// The camera.
+        camera: usize,
+        /// Their share, from 0 to 1.
+        share: f64,
+    },
+    /// Frames of a pair that contradict one another.
+    Disagreement {
+        /// The cameras.
+        cameras: [usize; 2],
+        /// Frames that agree, and all.
+        n: [usize; 2],
+    },
+}
+
+impl Doubt {
+    /// As a sentence that says what to do.
+    pub fn text(&self, names: &[String]) -> String {
+        let name = |camera: &usize| names.get(*camera).map_or("?", String::as_str);
+        match self {
+            Self::FewBoards { camera, n } => format!(
+                "{}: the board was used in {n} pictures only, {FEW_BOARDS} are the least: show it longer, in other places and tilts",
+                name(camera)
+            ),
+            Self::LittleCovered { camera, share } => format!(
+                "{}: its board covered {:.0} % of the picture, the lens is not known beyond it: move the board into the corners",
+                name(camera),
+                100.0 * share
+            ),
+            Self::LargeResiduals {
+                camera,
+                rms_px,
+                limit_px,
+            } => format!(
+                "{}: residuals of {rms_px:.2} px (limit {limit_px:.2}): is the board flat, its description right, the lens of another kind (--lens)?",
+                name(camera)
+            ),
+            Self::Focal { camera, share } => format!(
+                "{}: its focal length is known to {:.1} % only: show the board tilted by 30 to 45 degrees, nearer and further away",
+                name(camera),
+                100.0 * share
+            ),
+            Self::ManyWrong { camera, share } => format!(
+                "{}: {:.0} % of its corners do not fit and were left out: was the board moved too fast?",
+                name(camera),
+                100.0 * share
+            ),
+            Self::Disagreement { cameras: [a, b], n } => format!(
+                "{} and {}: {} of {} frames agree about where they stand: are the videos synchronised, did a camera move?",
+                name(a),
+                name(b),
+                n[0],
+                n[1]
+            ),
+        }
+    }
+}
+
+/// Whether the points of a sight span a plane.
+pub(super) fn is_spread(sight: &Sight) -> bool {
+    let n = sight.on_board.len() as f64;
+    let sum = sight
+        .on_board
+        .iter()
+        .map(|it| it.coords)
+        .sum::<nalgebra::Vector2<f64>>();
+    let middle = sum / n;
+    let mut scatter = nalgebra::Matrix2::zeros();
+    for point in &sight.on_board {
+        let offset = point.coords - middle;
+        scatter += offset * offset.transpose();
+    }
+    let eigenvalues = scatter.symmetric_eigenvalues();
+    let finite = sight
+        .points
+        .iter()
+        .all(|it| it.1.coords.iter().all(|c| c.is_finite()));
+    finite && eigenvalues.min() > 0.01 * eigenvalues.max()
+}
+
+/// Whether the focal length of a camera is given, or known well.
+pub(super) fn is_lens_sure(camera: &CameraOutcome) -> bool {
+    let focal = camera.numbers.iter().find(|it| it.name == "focal length");
+    camera.is_known || focal.is_some_and(|it| it.sd <= FOCAL_SHARE * it.value)
+}
+
+/// Adds the doubts of an outcome to it.
+pub(super) fn doubt(task: &Task, outcome: &mut Outcome) {
+    let mut doubts = Vec::new();
+    for (camera, it) in outcome.cameras.iter().enumerate() {
+        let side = f64::from(task.sizes[camera][0].max(task.sizes[camera][1]));
+        let limit_px = LARGE_PX * (side / USUAL_SIDE).max(0.5);
+        if it.rms_px.is_nan() || it.rms_px > limit_px {
+            let rms_px = it.rms_px;
+            doubts.push(Doubt::LargeResiduals {
+                camera,
+                rms_px,
+                limit_px,
+            });
+        }
+        let share = it.wrong_share();
+        if share > WRONG_SHARE {
+            doubts.push(Doubt::ManyWrong { camera, share });
+        }
+        if it.is_known {
+            continue;
+        }
+        if it.n_boards[1] < FEW_BOARDS {
+            let n = it.n_boards[1];
+            doubts.push(Doubt::FewBoards { camera, n });
+        }
+        if it.coverage < LITTLE_COVERED {
+            let share = it.coverage;
+            doubts.push(Doubt::LittleCovered { camera, share });
+        }
+        let focal = it.numbers.iter().find(|it| it.name == "focal length");
+        let share = focal.map_or(0.0, |it| it.sd / it.value);
+        if share.is_nan() || share > FOCAL_SHARE {
+            doubts.push(Doubt::Focal { camera, share });
+        }
+    }
+    for it in &outcome.pairs {
+        if (it.n_agree as f64) < AGREEING_SHARE * it.n as f64 {
+            let (cameras, n) = (it.cameras, [it.n_agree, it.n]);
+            doubts.push(Doubt::Disagreement { cameras, n });
+        }
+    }
+    outcome.doubts = doubts;
+}

@@ -1,0 +1,277 @@
+//! Where the origin of the world is, and which way is up: from a board on the floor, from three points.
+//!
+//! The new world has z up and z = 0 on the floor.
+
+use geometry::{Camera, Observation, Rig, RigError, Settings, TriangulateError, triangulate};
+use nalgebra::{
+    Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
+};
+
+use crate::board::{Sight, standing_board};
+
+/// Three points whose triangle is flatter than this (sine of its angle at the origin) tell no floor.
+const FLATTEST: f64 = 0.05;
+
+/// Why there is no new origin.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum OriginError {
+    /// A point that was not seen by two cameras.
+    #[error("point {point} is given in {views} cameras, at least 2 are needed")]
+    TooFewViews {
+        /// Which point, from 1.
+        point: usize,
+        /// Cameras.
+        views: usize,
+    },
+    /// A point whose rays do not meet.
+    #[error(
+        "point {point}: its rays miss one another by {rms_px:.1} px: is it the same point in all cameras?"
+    )]
+    Apart {
+        /// Which point, from 1.
+        point: usize,
+        /// Root mean square of its residuals, pixels.
+        rms_px: f64,
+    },
+    /// A point that cannot be triangulated.
+    #[error("point {point}")]
+    Point {
+        /// Which point, from 1.
+        point: usize,
+        /// Why.
+        source: TriangulateError,
+    },
+    /// Three points on a line.
+    #[error("the three points lie on a line, or two of them are the same")]
+    OnALine,
+    /// No camera sees the board.
+    #[error("no camera sees enough of the board")]
+    NoBoard,
+    /// The board does not lie where all cameras see it.
+    #[error(
+        "the cameras disagree about the board by {rms_px:.1} px: does it lie still, is it the board of the calibration?"
+    )]
+    BoardApart {
+        /// Root mean square of the residuals, pixels.
+        rms_px: f64,
+    },
+    /// Cameras that are none in the new world.
+    #[error("the rig in the new world")]
+    Rig(#[from] RigError),
+}
+
+/// A pixel of a camera, by the camera's index.
+pub type Click = (usize, Point2<f64>);
+
+/// The largest residual of a clicked point, and of a board, pixels.
+const CLICK_PX: f64 = 15.0;
+const BOARD_PX: f64 = 5.0;
+
+/// The new world by three points on the floor: the origin, one along x, and any other. Cameras are above the floor.
+///
+/// * `clicks`: for each point where cameras see it.
+/// * Returns `new_from_old`.
+///
+/// # Errors
+///
+/// [`OriginError`].
+pub fn from_points(rig: &Rig, clicks: &[Vec<Click>; 3]) -> Result<Isometry3<f64>, OriginError> {
+    let mut points = [Point3::origin(); 3];
+    for (nth, (point, clicks)) in points.iter_mut().zip(clicks).enumerate() {
+        *point = place(rig, clicks, nth + 1)?;
+    }
+    let [origin, along, other] = points;
+    let normal = (along - origin).cross(&(other - origin));
+    let sides = (along - origin).norm() * (other - origin).norm();
+    let height = normal.norm();
+    if height.is_nan() || height <= FLATTEST * sides {
+        return Err(OriginError::OnALine);
+    }
+    let above = mean_centre(rig) - origin;
+    let up = normal * normal.dot(&above).signum();
+    Ok(frame(origin, along - origin, up))
+}
+
+fn place(rig: &Rig, clicks: &[Click], point: usize) -> Result<Point3<f64>, OriginError> {
+    if clicks.len() < 2 {
+        let views = clicks.len();
+        return Err(OriginError::TooFewViews { point, views });
+    }
+    let seen: Vec<Observation<'_>> = clicks
+        .iter()
+        .map(|(camera, at)| Observation {
+            camera: &rig.cameras()[*camera],
+            point_px: *at,
+            sigma_px: 1.0,
+        })
+        .collect();
+    let found = triangulate(&seen, &Settings::default());
+    let found = found.map_err(|source| OriginError::Point { point, source })?;
+    let squares = seen.iter().map(|it| {
+        let image = it.camera.project(&found.in_world);
+        image.map_or(1e6, |image| (image - it.point_px).norm_squared())
+    });
+    let rms_px = (squares.sum::<f64>() / clicks.len() as f64).sqrt();
+    if rms_px > CLICK_PX {
+        return Err(OriginError::Apart { point, rms_px });
+    }
+    Ok(found.in_world)
+}
+
+/// The new world by a board that lies on the floor, its print up: the origin in its upper left corner, x along its rows, y
+/// against its columns.
+///
+/// # Errors
+///
+/// [`OriginError`].
+pub fn from_board(
+    rig: &Rig,
+    board: &[Point2<f64>],
+    sights: &[Sight],
+) -> Result<Isometry3<f64>, OriginError> {
+    let (world_from_board, rms_px) =
+        standing_board(rig.cameras(), board, sights).ok_or(OriginError::NoBoard)?;
+    if rms_px.is_nan() || rms_px > BOARD_PX {
+        return Err(OriginError::BoardApart { rms_px });
+    }
+    let along = world_from_board * Vector3::x();
+    let up = world_from_board * -Vector3::z();
+    Ok(frame(world_from_board * Point3::origin(), along, up))
+}
+
+/// `new_from_old` of a world with this origin, x nearest to `along`, z along `up`.
+fn frame(origin: Point3<f64>, along: Vector3<f64>, up: Vector3<f64>) -> Isometry3<f64> {
+    let z = up.scale(1.0 / up.norm());
+    let flat = along - z * z.dot(&along);
+    let x = flat.scale(1.0 / flat.norm());
+    let rows = Matrix3::from_columns(&[x, z.cross(&x), z]).transpose();
+    let rotation = Rotation3::from_matrix_unchecked(rows);
+    let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
+    Isometry3::from_parts(Translation3::from(rotation * -origin.coords), rotation)
+}
+
+fn mean_centre(rig: &Rig) -> Point3<f64> {
+    let cameras = rig.cameras();
+    let sum: Vector3<f64> = cameras.iter().map(|it| it.centre_in_world().coords).sum();
+    Point3::from(sum / cameras.len() as f64)
+}
+
+/// The rig in the new world, z up.
+///
+/// # Errors
+///
+/// [`OriginError::Rig`].
+pub fn rebased(rig: &Rig, new_from_old: &Isometry3<f64>, source: &str) -> Result<Rig, OriginError> {
+    let old_from_new = new_from_old.inverse();
+    let cameras = rig.cameras().iter().map(|it| Camera {
+        camera_from_world: it.camera_from_world * old_from_new,
+        ..it.clone()
+    });
+    let text = match rig.source() {
+        "" => source.to_owned(),
+        before => format!("{before}; {source}"),
+    };
+    Ok(Rig::new(cameras.collect(), Some(Vector3::z_axis()), text)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use geometry::{Intrinsics, Lens};
+
+    use super::*;
+
+    fn rig() -> Rig {
+        let camera = |name: &str, at: Point3<f64>| {
+            let rotation = UnitQuaternion::look_at_rh(&(Point3::origin() - at), &Vector3::z());
+            let flip = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI);
+            let rotation = flip * rotation;
+            Camera {
+                name: name.to_owned(),
+                intrinsics: Intrinsics {
+                    fx: 800.0,
+                    fy: 800.0,
+                    cx: 640.0,
+                    cy: 360.0,
+                    size: [1280, 720],
+                    lens: Lens::default(),
+                },
+                camera_from_world: Isometry3::from_parts(
+                    Translation3::from(rotation * -at.coords),
+                    rotation,
+                ),
+            }
+        };
+        let cameras = vec![
+            camera("a", Point3::new(3.0, -2.0, 1.8)),
+            camera("b", Point3::new(-3.0, -2.0, 1.6)),
+            camera("c", Point3::new(0.0, 3.0, 2.1)),
+        ];
+        Rig::new(cameras, None, "given").unwrap()
+    }
+
+    /// The rig in another world, and what brings it back.
+    fn moved() -> (Rig, Rig) {
+        let truth = rig();
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -1.1, 0.7));
+        let away = Isometry3::from_parts(Translation3::new(4.0, 1.0, -2.0), rotation);
+        let cameras = truth.cameras().iter().map(|it| Camera {
+            camera_from_world: it.camera_from_world * away.inverse(),
+            ..it.clone()
+        });
+        let moved = Rig::new(cameras.collect(), None, "moved").unwrap();
+        (truth, moved)
+    }
+
+    fn is_same(found: &Rig, truth: &Rig) {
+        for (found, truth) in found.cameras().iter().zip(truth.cameras()) {
+            let off = (found.centre_in_world() - truth.centre_in_world()).norm();
+            assert!(off < 1e-6, "{off}");
+        }
+        assert_eq!(found.up_in_world(), Some(Vector3::z_axis()));
+    }
+
+    #[test]
+    fn three_points_on_the_floor_put_the_rig_on_it_in_any_order() {
+        let (truth, moved) = moved();
+        for other in [[0.2, 1.0], [0.5, -1.2]] {
+            let points = [[0.0, 0.0], [1.0, 0.0], other];
+            let clicks = points.map(|[x, y]| -> Vec<Click> {
+                let at = |nth: usize| truth.cameras()[nth].project(&Point3::new(x, y, 0.0));
+                [0, 2]
+                    .into_iter()
+                    .filter_map(|nth| Some((nth, at(nth)?)))
+                    .collect()
+            });
+            let found = from_points(&moved, &clicks).unwrap();
+            is_same(&rebased(&moved, &found, "three points").unwrap(), &truth);
+            let mut line = clicks.clone();
+            line[2] = line[1].clone();
+            assert_eq!(from_points(&moved, &line), Err(OriginError::OnALine));
+            line[2].truncate(1);
+            assert!(matches!(
+                from_points(&moved, &line),
+                Err(OriginError::TooFewViews { .. })
+            ));
+        }
+    }
+
+    #[test]
+    fn a_board_on_the_floor_puts_the_rig_on_it() {
+        let (truth, moved) = moved();
+        let board: Vec<Point2<f64>> = (0..20)
+            .map(|nth| Point2::new(0.1 * f64::from(nth % 5), 0.1 * f64::from(nth / 5)))
+            .collect();
+        let sights: Vec<Sight> = (0..3)
+            .map(|nth| {
+                let corners = board.iter().enumerate().filter_map(|(id, it)| {
+                    let on_floor = Point3::new(it.x, -it.y, 0.0);
+                    Some((id, truth.cameras()[nth].project(&on_floor)?))
+                });
+                Sight::new(nth, 0, corners, &board)
+            })
+            .collect();
+        let found = from_board(&moved, &board, &sights).unwrap();
+        is_same(&rebased(&moved, &found, "a board").unwrap(), &truth);
+        assert_eq!(from_board(&moved, &board, &[]), Err(OriginError::NoBoard));
+    }
+}
