@@ -43,6 +43,7 @@ const LAYERS: &[&[&str]] = &[
         "fmp",
         "scene",
         "deployment",
+        "hosts",
         "keypointfiles",
         "synchronisation",
     ],
@@ -61,6 +62,7 @@ const LAYERS: &[&[&str]] = &[
     &["report"],
     &["offline"],
     &[
+        "bridge",
         "capture",
         "pose",
         "quality",

@@ -10,6 +10,7 @@
 //! | run one of its processes | [`process`] |
 //! | show progress, and report on the run | [`Watcher`], [`Report`] |
 //! | what the cameras see, so that their clocks can be compared | [`films`] |
+//! | the part of one of several hosts | [`hosts`] |
 //! | observe a running deployment from another process | [`live`] |
 //! | read the settings in a recording, and report its flaws | [`recorded`] |
 //!
@@ -31,6 +32,7 @@ mod views;
 
 pub mod budget;
 pub mod films;
+pub mod hosts;
 pub mod inputs;
 pub mod keypoints;
 pub mod live;

@@ -2,6 +2,8 @@
 
 mod live;
 
+pub(crate) use live::lead_nanos;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,6 +21,7 @@ use rayon::ThreadPoolBuilder;
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use viewquality::Forecaster;
 
+use crate::hosts;
 use crate::inputs;
 use crate::keypoints;
 use crate::prepare::{Prepared, frame_scale, framing};
@@ -44,11 +47,13 @@ pub enum Name {
     Record,
     /// The recorded messages of another process.
     Replay,
+    /// Messages between hosts.
+    Bridge,
 }
 
 impl Name {
     /// All processes, in pipeline order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Capture,
         Self::Pose,
         Self::Quality,
@@ -56,6 +61,7 @@ impl Name {
         Self::Triangulate,
         Self::Results,
         Self::Record,
+        Self::Bridge,
         Self::Replay,
     ];
 
@@ -70,6 +76,7 @@ impl Name {
             Self::Results => "results",
             Self::Record => "record",
             Self::Replay => "replay",
+            Self::Bridge => "bridge",
         }
     }
 
@@ -89,6 +96,7 @@ impl Name {
             Self::Results => "The output folder",
             Self::Record => "Every message into one file",
             Self::Replay => "The recorded messages of another process",
+            Self::Bridge => "Messages between hosts",
         }
     }
 }
@@ -141,6 +149,7 @@ pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Resul
         Name::Results => results(service, &resolved),
         Name::Record => record(service, &resolved),
         Name::Replay => replay(service, &resolved, arguments),
+        Name::Bridge => bridge::run(service, &hosts::job(&resolved)?),
     }
 }
 
@@ -163,7 +172,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         source: inputs::source(&deployment.cameras[view], &deployment.capture),
         timeline: resolved.footage[view].timeline,
         live: live::job(resolved, view),
-        lead_nanos: live::lead_nanos(deployment),
+        lead_nanos: lead_nanos(deployment),
         faults: deployment.cameras[view].fault.clone(),
         frozen_after: deployment.capture.frozen_after,
         skew_nanos: live::skew_nanos(resolved, view),
@@ -470,6 +479,7 @@ mod tests {
         found.dedup();
         let mut all = Name::ALL.to_vec();
         assert_eq!(all.pop(), Some(Name::Replay), "no process of its own");
+        assert_eq!(all.pop(), Some(Name::Bridge), "with hosts alone");
         assert_eq!(found.len(), all.len());
         assert!(all.iter().all(|it| found.contains(it)), "{found:?}");
     }

@@ -57,6 +57,8 @@ pub struct Report {
     recorded: Recorded,
     /// What became of the pictures of live cameras, a line each.
     live: Vec<String>,
+    /// Whether another host fuses, and has the results.
+    is_far: bool,
 }
 
 impl Report {
@@ -106,6 +108,7 @@ impl Report {
                 .filter(|_| !resolved.deployment.has_maps()),
             measured: measured(outcome),
             live: cameras::live(outcome),
+            is_far: resolved.is_far(),
             recorded,
         }
     }
@@ -175,6 +178,9 @@ impl Report {
 
     /// Whether views, frames or processes were lost, or the losses are unknown. False for an interrupted run.
     fn is_degraded(&self) -> bool {
+        if self.is_far {
+            return !self.given_up.is_empty() || !self.restarts.is_empty();
+        }
         !self.interrupted
             && (self.no_results_reason().is_some()
                 || !self.given_up.is_empty()
@@ -251,6 +257,12 @@ impl Report {
             "{}: {} frames in {:.1} s{status}",
             self.name, self.n_frames, self.seconds
         )?;
+        if self.is_far {
+            writeln!(text, "  results       on the host that fuses")?;
+            let live = self.live.iter();
+            text.extend(live.map(|it| format!("  live camera   {it}\n")));
+            return self.write_memory(text);
+        }
         writeln!(text, "  results       {}", self.folder)?;
         if let Some(problem) = self.recorded.problem() {
             writeln!(text, "  recorded      {problem}")?;

@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    bench, calib, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame, model,
-    record, replay, run, service, sync, synth, top, train,
+    bench, calib, cameras, chaos, config, demo, deployments, detect, eval, fuse_frame, hosts,
+    model, record, replay, run, service, simulate, sync, synth, top, train,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -102,6 +102,12 @@ pub(crate) enum Command {
     /// Show and check deployment files.
     #[command(subcommand)]
     Config(config::Command),
+    /// Deployments of several machines: their state, and their keys.
+    #[command(subcommand)]
+    Hosts(hosts::Command),
+    /// Work out what a deployment will take, before there is one.
+    #[command(subcommand)]
+    Simulate(simulate::Command),
     /// Make synthetic sequences of people, with the truth.
     Synth(Box<synth::Arguments>),
     /// List running deployments, and what dead ones have left in shared memory; or show the processes of one.

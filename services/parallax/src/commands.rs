@@ -10,6 +10,7 @@ pub(crate) mod deployments;
 pub(crate) mod detect;
 pub(crate) mod eval;
 pub(crate) mod fuse_frame;
+pub(crate) mod hosts;
 pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod network;
@@ -17,6 +18,7 @@ pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod run;
 pub(crate) mod service;
+pub(crate) mod simulate;
 pub(crate) mod sync;
 pub(crate) mod synth;
 pub(crate) mod top;
@@ -56,6 +58,8 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Top(it) => top::run(&it),
         Command::Clean(it) => deployments::clean(&it),
         Command::Synth(it) => synth::run(&it, cli.globals),
+        Command::Hosts(it) => hosts::run(&it),
+        Command::Simulate(it) => simulate::run(&it),
         Command::Sync(it) => sync::run(&it, cli.globals),
         Command::Service(it) => service::run(&it),
     }

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | trials | [`trials`](../trials/index.html): fault injection, benchmarks and the demo |
 //! | whole runs | [`launch`](../launch/index.html): prepares and runs a deployment, and reports on it |
-//! | processes | [`capture`](../capture/index.html), [`pose`](../pose/index.html), [`quality`](../quality/index.html), [`fuse`](../fuse/index.html), [`triangulate`](../triangulate/index.html), [`results`](../results/index.html), [`record`](../record/index.html), [`replay`](../replay/index.html), [`supervise`](../supervise/index.html) |
+//! | processes | [`capture`](../capture/index.html), [`pose`](../pose/index.html), [`quality`](../quality/index.html), [`fuse`](../fuse/index.html), [`triangulate`](../triangulate/index.html), [`results`](../results/index.html), [`record`](../record/index.html), [`replay`](../replay/index.html), [`bridge`](../bridge/index.html), [`supervise`](../supervise/index.html) |
 //! | the loop of a stage | [`stage`](../stage/index.html): wait, receive, check, join, compute, send, account, end |
 //! | at the wire | [`wire`](../wire/index.html): messages to domain types and back, checked |
 //! | the deployment | [`deployment`](../deployment/index.html): keys, defaults, rules, processes |
@@ -17,7 +17,7 @@
 //! | composition | [`pipeline`](../pipeline/index.html): all steps in one process; [`evaluation`](../evaluation/index.html), [`datasets`](../datasets/index.html), [`consistency`](../consistency/index.html) |
 //! | method | [`orientation`](../orientation/index.html): which way a person faces; [`multiview`](../multiview/index.html), [`viewquality`](../viewquality/index.html), [`posenetwork`](../posenetwork/index.html), [`fmp`](../fmp/index.html): the paper |
 //! | transport | [`runtime`](../runtime/index.html), [`join`](../join/index.html) |
-//! | tools | [`body`](../body/index.html), [`geometry`](../geometry/index.html), [`kernels`](../kernels/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`metrics`](../metrics/index.html), [`recording`](../recording/index.html), [`runfiles`](../runfiles/index.html), [`trc`](../trc/index.html), [`mat5`](../mat5/index.html), [`c3d`](../c3d/index.html), [`keypoints`](../keypoints/index.html), [`keypointfiles`](../keypointfiles/index.html), [`synchronisation`](../synchronisation/index.html), [`inference`](../inference/index.html) |
+//! | tools | [`body`](../body/index.html), [`geometry`](../geometry/index.html), [`kernels`](../kernels/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`metrics`](../metrics/index.html), [`recording`](../recording/index.html), [`runfiles`](../runfiles/index.html), [`trc`](../trc/index.html), [`mat5`](../mat5/index.html), [`c3d`](../c3d/index.html), [`keypoints`](../keypoints/index.html), [`keypointfiles`](../keypointfiles/index.html), [`synchronisation`](../synchronisation/index.html), [`hosts`](../hosts/index.html), [`inference`](../inference/index.html) |
 //! | ground | [`skeleton`](../skeleton/index.html), [`wording`](../wording/index.html), [`statistics`](../statistics/index.html), [`checksum`](../checksum/index.html), [`causes`](../causes/index.html), [`files`](../files/index.html), [`onnx`](../onnx/index.html); for tests only: [`testkit`](../testkit/index.html) |
 //!
 //! Start with [`pipeline`](../pipeline/index.html) for the path of a frame, [`multiview`](../multiview/index.html) for the

@@ -50,7 +50,7 @@ pub(super) fn skew_nanos(resolved: &Resolved, view: usize) -> i64 {
 
 /// From the beginning of a run to its first frame in real time, nanoseconds: until every process has started, and streams
 /// have shown their first picture.
-pub(super) fn lead_nanos(deployment: &Deployment) -> u64 {
+pub(crate) fn lead_nanos(deployment: &Deployment) -> u64 {
     const FOOTAGE: u64 = 2_000_000_000;
     const DEVICES: u64 = 3_000_000_000;
     const STREAMS: u64 = 6_000_000_000;
