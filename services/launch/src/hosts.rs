@@ -11,7 +11,6 @@ use runtime::{ExitKind, Failure, OrFail as _};
 
 use crate::inputs;
 use crate::prepare::Prepared;
-use crate::process;
 use crate::resolved::Resolved;
 
 /// The host that this machine is: the one that is named, or the one with the name of the machine. None for a deployment without
@@ -199,7 +198,7 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
         carry: deployment.link.carry,
         has_quality: deployment.has_quality(),
         sizes: sizes.collect(),
-        lead_nanos: process::lead_nanos(deployment),
+        lead_nanos: inputs::lead_nanos(deployment),
         period_nanos: 1e9 / rate_hz,
         start_frame: capture.start_frame,
         frame_step: step,

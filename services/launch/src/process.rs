@@ -2,8 +2,6 @@
 
 mod live;
 
-pub(crate) use live::lead_nanos;
-
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -172,7 +170,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         source: inputs::source(&deployment.cameras[view], &deployment.capture),
         timeline: resolved.footage[view].timeline,
         live: live::job(resolved, view),
-        lead_nanos: lead_nanos(deployment),
+        lead_nanos: inputs::lead_nanos(deployment),
         faults: deployment.cameras[view].fault.clone(),
         frozen_after: deployment.capture.frozen_after,
         skew_nanos: live::skew_nanos(resolved, view),

@@ -3,6 +3,7 @@
 mod camera;
 mod fault;
 mod host;
+mod host_fault;
 mod judge;
 mod moved;
 mod options;
@@ -34,7 +35,7 @@ use verdict::Verdict;
 
 pub use crate::trial::injection::ProcessFault;
 pub use fault::CameraFault;
-pub use host::HostFault;
+pub use host_fault::HostFault;
 pub use options::{Limits, Options};
 pub use scenario::Scenario;
 

@@ -112,6 +112,20 @@ fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage
     looked.collect()
 }
 
+/// From the beginning of a run to its first frame in real time, nanoseconds: until every process has started, and streams
+/// have shown their first picture.
+pub(crate) fn lead_nanos(deployment: &Deployment) -> u64 {
+    const FOOTAGE: u64 = 2_000_000_000;
+    const DEVICES: u64 = 3_000_000_000;
+    const STREAMS: u64 = 6_000_000_000;
+    let cameras = deployment.cameras.iter().filter_map(live_camera);
+    let leads = cameras.map(|it| match it.address {
+        LiveAddress::Device(_) => DEVICES,
+        LiveAddress::Stream(_) => STREAMS,
+    });
+    leads.max().unwrap_or(FOOTAGE)
+}
+
 fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
     let info = Feed::look(&source(camera, capture));
     let info = info.map_err(|error| {

@@ -10,6 +10,7 @@ use launch::inputs;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
+use super::host_fault::HostFault;
 use super::options::Options;
 use super::relay::Relay;
 use super::testbed::Testbed;
@@ -25,34 +26,6 @@ const PATIENCE: Duration = Duration::from_mins(2);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// The host with cameras.
 const FAR: &str = "rack";
-
-/// A fault of a host or its link.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum HostFault {
-    /// The link is cut for three seconds.
-    Cut,
-    /// The host with cameras is killed, and started again.
-    Kill,
-}
-
-impl HostFault {
-    /// Both.
-    pub(super) const ALL: [Self; 2] = [Self::Cut, Self::Kill];
-
-    /// The name of its scenario, and what happens.
-    pub(super) fn name_and_summary(self) -> [&'static str; 2] {
-        match self {
-            Self::Cut => [
-                "cut-link",
-                "of two hosts on this machine the link is cut for three seconds",
-            ],
-            Self::Kill => [
-                "kill-host",
-                "of two hosts on this machine the one with cameras is killed, and started again",
-            ],
-        }
-    }
-}
 
 /// What was measured.
 #[derive(Debug, Default)]

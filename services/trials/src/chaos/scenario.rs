@@ -3,7 +3,7 @@
 use launch::SERVICES;
 
 use super::fault::CameraFault;
-use super::host::HostFault;
+use super::host_fault::HostFault;
 use crate::trial::injection::ProcessFault;
 
 /// The name of the scenario with a camera that was moved after the calibration.
