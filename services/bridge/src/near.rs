@@ -37,7 +37,8 @@ const LONGEST: Duration = Duration::from_millis(20);
 
 /// A view of another host.
 struct View {
-    view: usize,
+    /// Its number.
+    index: usize,
     remote: usize,
     publisher: Publisher,
     arrivals: Arrivals,
@@ -77,7 +78,7 @@ pub(crate) fn run(service: &Service, job: &Job, role: &Near) -> Result<(), Failu
     let patience = service.patience_at_start(role.patience);
     for it in &views {
         it.publisher.wait_for_receivers(
-            role.n_receivers.get(it.view).copied().unwrap_or(0),
+            role.n_receivers.get(it.index).copied().unwrap_or(0),
             patience,
         );
     }
@@ -130,7 +131,7 @@ fn views(service: &Service, job: &Job, role: &Near) -> Result<Vec<View>, Failure
         for &view in &host.views {
             let patience = [deadline + 2 * period, period + 50_000_000];
             views.push(View {
-                view,
+                index: view,
                 remote,
                 publisher: Publisher::open(service, job, view)?,
                 arrivals: Arrivals::new(grid, patience, role.n_frames, next),
@@ -192,7 +193,7 @@ impl Receiving<'_> {
     fn publish(&mut self, arrived: &Arrived) -> Result<(), Failure> {
         let health = self.service.health();
         health.received(1);
-        let Some(index) = self.views.iter().position(|it| it.view == arrived.view()) else {
+        let Some(index) = self.views.iter().position(|it| it.index == arrived.view()) else {
             return Ok(());
         };
         let remote = &self.remotes[self.views[index].remote];
@@ -238,7 +239,7 @@ impl Receiving<'_> {
                     .send(service, job.frame(nth), arrived, &times(nth))?;
                 it.arrivals.used();
                 health.sent(job.frame(nth));
-                self.report.took(it.view, arrived, &clock);
+                self.report.took(it.index, arrived, &clock);
             }
             Place::Late => health.dropped(Cause::Late, 1),
             Place::Surplus => {}
@@ -302,7 +303,7 @@ impl Receiving<'_> {
         let views = self
             .views
             .iter()
-            .map(|it| (it.view, it.remote, it.arrivals.tally()));
+            .map(|it| (it.index, it.remote, it.arrivals.tally()));
         self.report
             .write(&self.remotes, &views.collect::<Vec<_>>(), is_last);
     }

@@ -1,5 +1,6 @@
 //! What stands in the place of the link in a build without it: everything says so.
 
+use core::convert::Infallible;
 use core::time::Duration;
 
 use crate::keys::KeyFiles;
@@ -29,21 +30,24 @@ pub enum LinkError {
 
 /// There is none.
 #[derive(Debug)]
-pub(crate) struct Link {}
+pub(crate) struct Link(Infallible);
 
 impl Link {
     pub(crate) fn open(_address: &Address) -> Result<Self, LinkError> {
         Err(LinkError::NotBuilt)
     }
 
-    pub(crate) fn send(&self, _key: &str, _bytes: Vec<u8>, _is_urgent: bool) {}
+    pub(crate) fn send(&self, _key: &str, bytes: Vec<u8>, _is_urgent: bool) {
+        drop(bytes);
+        match self.0 {}
+    }
 
     pub(crate) fn subscribe(
         &self,
         _key: &str,
         _on: impl Fn(&str, &[u8]) + Send + Sync + 'static,
     ) -> Result<(), LinkError> {
-        Err(LinkError::NotBuilt)
+        match self.0 {}
     }
 
     pub(crate) fn answer(
@@ -51,12 +55,14 @@ impl Link {
         _key: &str,
         _on: impl Fn() -> Vec<u8> + Send + Sync + 'static,
     ) -> Result<(), LinkError> {
-        Err(LinkError::NotBuilt)
+        match self.0 {}
     }
 
     pub(crate) fn ask(&self, _key: &str, _limit: Duration) -> Option<Vec<u8>> {
-        None
+        match self.0 {}
     }
 
-    pub(crate) fn close(self) {}
+    pub(crate) fn close(self) {
+        match self.0 {}
+    }
 }

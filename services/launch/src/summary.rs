@@ -258,10 +258,7 @@ impl Report {
             self.name, self.n_frames, self.seconds
         )?;
         if self.is_far {
-            writeln!(text, "  results       on the host that fuses")?;
-            let live = self.live.iter();
-            text.extend(live.map(|it| format!("  live camera   {it}\n")));
-            return self.write_memory(text);
+            return self.write_far(text);
         }
         writeln!(text, "  results       {}", self.folder)?;
         if let Some(problem) = self.recorded.problem() {
@@ -278,8 +275,7 @@ impl Report {
             self.write_views(text, it)?;
             self.write_misplaced(text, it)?;
         }
-        let live = self.live.iter();
-        text.extend(live.map(|it| format!("  live camera   {it}\n")));
+        self.write_live(text);
         if let Some(latency) = self.recorded.latency() {
             write_latency(text, latency)?;
         }
@@ -310,6 +306,18 @@ impl Report {
             writeln!(text, "  given up      {}", self.given_up.join(", "))?;
         }
         Ok(())
+    }
+
+    /// Writes what a host with cameras can tell: the results are elsewhere.
+    fn write_far(&self, text: &mut String) -> core::fmt::Result {
+        writeln!(text, "  results       on the host that fuses")?;
+        self.write_live(text);
+        self.write_memory(text)
+    }
+
+    fn write_live(&self, text: &mut String) {
+        let live = self.live.iter();
+        text.extend(live.map(|it| format!("  live camera   {it}\n")));
     }
 
     fn write_views(&self, text: &mut String, summary: &Summary) -> core::fmt::Result {

@@ -28,7 +28,7 @@ pub(super) struct Arrived {
     /// Pixels, or the message as in a recording; empty without either.
     pub(super) body: Vec<u8>,
     /// When it came, and when it was decoded.
-    pub(super) arrived_at: u64,
+    pub(super) came_at: u64,
     pub(super) decoded_at: u64,
     /// Its bytes on the way.
     pub(super) n_bytes: usize,
@@ -49,7 +49,7 @@ impl Arrived {
 struct Waiting {
     head: Head,
     body: Vec<u8>,
-    arrived_at: u64,
+    came_at: u64,
     n_bytes: usize,
 }
 
@@ -120,7 +120,7 @@ struct Gate {
 
 impl Gate {
     fn take(&self, key: &str, bytes: &[u8]) {
-        let arrived_at = now_nanos();
+        let came_at = now_nanos();
         let name = host_of(key);
         let Some(remote) = self.remotes.iter().find(|it| it.name == name) else {
             tracing::debug!(key, "from a host that is none of the deployment's");
@@ -151,18 +151,16 @@ impl Gate {
         state.n_packets += 1;
         state.n_bytes += bytes.len() as u64;
         drop(state);
-        remote.heard(arrived_at);
+        remote.heard(came_at);
         let waiting = Waiting {
             head: packet.head,
             body: packet.body.to_vec(),
-            arrived_at,
+            came_at,
             n_bytes: bytes.len(),
         };
         let inlet = self.inlets.get(packet.head.view as usize);
-        let sent = inlet
-            .and_then(Option::as_ref)
-            .map(|it| it.try_send(waiting));
-        if !matches!(sent, Some(Ok(()))) {
+        let inlet = inlet.and_then(Option::as_ref);
+        if inlet.is_none_or(|it| it.try_send(waiting).is_err()) {
             remote.state().n_no_room += 1;
         }
     }
@@ -228,7 +226,7 @@ impl Decoder {
         Some(Arrived {
             head: it.head,
             body,
-            arrived_at: it.arrived_at,
+            came_at: it.came_at,
             decoded_at: now_nanos(),
             n_bytes: it.n_bytes,
         })

@@ -17,10 +17,10 @@ pub(super) struct Publisher {
 }
 
 enum Port {
-    Frame(SlicePublisher<u8, FrameHeader>),
+    Frame(Box<SlicePublisher<u8, FrameHeader>>),
     Pose {
-        pose: Sender,
-        quality: Option<Sender>,
+        pose: Box<Sender>,
+        quality: Option<Box<Sender>>,
     },
 }
 
@@ -54,12 +54,12 @@ impl Publisher {
     pub(super) fn open(service: &Service, job: &Job, view: usize) -> Result<Self, Failure> {
         let bus = service.bus();
         let port = match job.carry {
-            Carry::Frames => Port::Frame(bus.slice_publisher(&topic::frame(view))?),
+            Carry::Frames => Port::Frame(Box::new(bus.slice_publisher(&topic::frame(view))?)),
             Carry::Poses => {
                 let quality = || Sender::open(bus, Kind::ViewQuality, &topic::view_quality(view));
                 Port::Pose {
-                    pose: Sender::open(bus, Kind::ViewPose, &topic::view_pose(view))?,
-                    quality: job.has_quality.then(quality).transpose()?,
+                    pose: Box::new(Sender::open(bus, Kind::ViewPose, &topic::view_pose(view))?),
+                    quality: job.has_quality.then(quality).transpose()?.map(Box::new),
                 }
             }
         };
@@ -145,9 +145,9 @@ impl Publisher {
                     status,
                 };
                 let port = if arrived.head.content == Content::ViewQuality {
-                    quality.as_ref()
+                    quality.as_deref()
                 } else {
-                    Some(pose)
+                    Some(&**pose)
                 };
                 if let Some(port) = port {
                     port.send(&message, &envelope)?;
@@ -200,7 +200,7 @@ impl Publisher {
                     )
                 };
                 nothing(pose, Kind::ViewPose)?;
-                if let Some(port) = quality.as_ref().filter(|_| status == Status::END) {
+                if let Some(port) = quality.as_deref().filter(|_| status == Status::END) {
                     nothing(port, Kind::ViewQuality)?;
                 }
             }

@@ -65,8 +65,8 @@ impl Report {
             .add(since(head.packed_at_nanos, head.sent_at_nanos));
         times
             .network
-            .add(since(it.arrived_at, clock.ours(head.packed_at_nanos)));
-        times.decode.add(since(it.decoded_at, it.arrived_at));
+            .add(since(it.came_at, clock.ours(head.packed_at_nanos)));
+        times.decode.add(since(it.decoded_at, it.came_at));
         times
             .all
             .add(since(now_nanos(), clock.ours(head.sent_at_nanos)));

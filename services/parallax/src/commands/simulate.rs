@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use ::hosts::{Costs, Load, forecast};
+use ::hosts::{Costs, Forecast, Load, forecast};
 use clap::{Args, Subcommand};
 use launch::output;
 use runtime::Failure;
@@ -103,6 +103,11 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
         output::json(&json!({ "schema_version": 1, "costs": costs, "rows": all }))?;
         return Ok(ExitCode::SUCCESS);
     }
+    table(&rows)
+}
+
+/// Prints a row for each number of cameras and hosts.
+fn table(rows: &[(Load, Forecast)]) -> Result<ExitCode, Failure> {
     output::line(
         "cameras  hosts  crosses  views (fusing, other)  cores (fusing, other)  MB/s in  latency ms  fits",
     )?;
