@@ -45,6 +45,7 @@ const LAYERS: &[&[&str]] = &[
         "fmp",
         "scene",
         "deployment",
+        "hosts",
         "keypointfiles",
         "motion",
         "synchronisation",
@@ -71,6 +72,7 @@ const LAYERS: &[&[&str]] = &[
     &["report"],
     &["offline"],
     &[
+        "bridge",
         "capture",
         "pose",
         "publish",

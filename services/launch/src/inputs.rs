@@ -29,7 +29,7 @@ use crate::shipped::Shipped;
 use runtime::no_text;
 
 pub use joints::Joints;
-pub(crate) use live::footage;
+pub(crate) use live::{footage, lead_nanos};
 pub use live::{is_live, live_camera};
 pub(crate) use maps::{check_maps, network_card};
 pub use maps::{detector, open_network, pose_network, springs};

@@ -10,6 +10,7 @@
 //! | run one of its processes | [`process`] |
 //! | show progress, and report on the run | [`Watcher`], [`Report`] |
 //! | what the cameras see, so that their clocks can be compared | [`films`] |
+//! | the part of one of several hosts | [`hosts`] |
 //! | observe a running deployment from another process | [`live`] |
 //! | read the settings in a recording, and report its flaws | [`recorded`] |
 //! | write a finished run into the files of other tools | [`export`] |
@@ -34,6 +35,7 @@ mod views;
 pub mod budget;
 pub mod export;
 pub mod films;
+pub mod hosts;
 pub mod inputs;
 pub mod keypoints;
 pub mod live;

@@ -4,6 +4,7 @@ use core::time::Duration;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use deployment::hosts::Host;
 use deployment::{Content, Deployment, Process, Room, Stage, Topology, ViewSize};
 use messages::{
     EvidenceHeader, FrameHeader, PairPose, PictureHeader, Pose3d, ViewPose, ViewQuality,
@@ -15,6 +16,7 @@ use runtime::{
 use supervise::{Plan, Policy, ProcessSpec, Role};
 use tracing::Level;
 
+use crate::hosts;
 use crate::inputs;
 use crate::keypoints;
 use crate::prepare::Prepared;
@@ -37,9 +39,22 @@ const MAX_WORK_FACTOR: u32 = 3;
 ///
 /// Footage or calibration cannot be read, or no joints can be located in space with them.
 pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
+    resolve_on(deployment, None)
+}
+
+/// Resolves the part of a deployment that one of its hosts runs: of cameras of other hosts nothing is read.
+///
+/// # Errors
+///
+/// As for [`resolve`]; or no vertical is given, which hosts must have in common.
+pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolved, Failure> {
     let lengths = keypoints::lengths(deployment)?;
     let deployment = &keypoints::with_pictures(deployment.clone(), &lengths)?;
-    let footage = inputs::footage(deployment);
+    let is_here = |camera: usize| {
+        let name = &deployment.cameras[camera].name;
+        host.is_none_or(|it| it.views.contains(name))
+    };
+    let footage = inputs::footage(deployment, &is_here);
     let found = keypoints::found(deployment)?;
     let mut resolved = Resolved {
         footage: footage.map_err(|it| inputs::of_deployment(it, deployment))?,
@@ -47,12 +62,21 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
         search_size: None,
         extra_keypoints: found.extra,
         sides_as_seen: found.as_seen,
+        host: host.map(|it| it.name.clone()),
         recording: None,
         replay: None,
     };
     sanity::warn(&resolved, &lengths)?;
     // Stored in the deployment, so that every process and a replay use the same vertical.
     if let Some(found) = vertical::find(deployment)? {
+        if host.is_some() {
+            let message = "neither the calibration nor the deployment says where up is";
+            let failure = Failure::new(ExitKind::Config, message);
+            return Err(failure.with_hint(format!(
+                "hosts must agree on it: `up = {:?}` in the deployment, which is what this one found",
+                found.up
+            )));
+        }
         tracing::warn!("{}", found.why);
         resolved.deployment.up = Some(found.up);
     }
@@ -126,7 +150,14 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
     };
     let mode = resolved.deployment.capture.mode;
     let sizes: Vec<ViewSize> = sizes.collect();
-    let rooms = resolved.topology().rooms(mode, &sizes, held_frames);
+    let topology = resolved.topology();
+    let mut rooms = topology.rooms(mode, &sizes, held_frames);
+    if resolved.is_far() {
+        // The others' views, and what is fused, are elsewhere.
+        let uses =
+            |it: &Process, topic: &String| it.inputs.contains(topic) || it.outputs.contains(topic);
+        rooms.retain(|room| topology.processes().iter().any(|it| uses(it, &room.topic)));
+    }
     let between = rooms.into_iter().map(|it| topic_of(it, delivery));
     let of_processes = names.iter().flat_map(|it| process_topics(it));
     between.chain(of_processes).collect()
@@ -243,7 +274,7 @@ pub(crate) fn plan(
         executable: executable()?,
         given: resolved.to_text()?.into_bytes(),
         description: programs::description(resolved, prepared, session)?.into_bytes(),
-        namespace: Namespace::new(&resolved.deployment.name)?,
+        namespace: Namespace::new(&hosts::namespace(resolved))?,
         session,
         delivery: resolved.delivery(),
         topics: topics(resolved, prepared, &names),

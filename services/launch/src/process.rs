@@ -20,6 +20,7 @@ use rayon::ThreadPoolBuilder;
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use viewquality::Forecaster;
 
+use crate::hosts;
 use crate::inputs;
 use crate::keypoints;
 use crate::prepare::{Prepared, frame_scale, framing};
@@ -45,11 +46,13 @@ pub enum Name {
     Record,
     /// The recorded messages of another process.
     Replay,
+    /// Messages between hosts.
+    Bridge,
 }
 
 impl Name {
     /// All processes, in pipeline order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Capture,
         Self::Pose,
         Self::Quality,
@@ -57,6 +60,7 @@ impl Name {
         Self::Triangulate,
         Self::Results,
         Self::Record,
+        Self::Bridge,
         Self::Replay,
     ];
 
@@ -71,6 +75,7 @@ impl Name {
             Self::Results => "results",
             Self::Record => "record",
             Self::Replay => "replay",
+            Self::Bridge => "bridge",
         }
     }
 
@@ -90,6 +95,7 @@ impl Name {
             Self::Results => "The output folder",
             Self::Record => "Every message into one file",
             Self::Replay => "The recorded messages of another process",
+            Self::Bridge => "Messages between hosts",
         }
     }
 }
@@ -142,6 +148,7 @@ pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Resul
         Name::Results => results(service, &resolved),
         Name::Record => record(service, &resolved),
         Name::Replay => replay(service, &resolved, arguments),
+        Name::Bridge => bridge::run(service, &hosts::job(&resolved)?),
     }
 }
 
@@ -164,7 +171,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         source: inputs::source(&deployment.cameras[view], &deployment.capture),
         timeline: resolved.footage[view].timeline,
         live: live::job(resolved, view),
-        lead_nanos: live::lead_nanos(deployment),
+        lead_nanos: inputs::lead_nanos(deployment),
         faults: deployment.cameras[view].fault.clone(),
         frozen_after: deployment.capture.frozen_after,
         skew_nanos: live::skew_nanos(resolved, view),
@@ -461,6 +468,7 @@ mod tests {
         found.dedup();
         let mut all = Name::ALL.to_vec();
         assert_eq!(all.pop(), Some(Name::Replay), "no process of its own");
+        assert_eq!(all.pop(), Some(Name::Bridge), "with hosts alone");
         assert_eq!(found.len(), all.len());
         assert!(all.iter().all(|it| found.contains(it)), "{found:?}");
     }

@@ -4,6 +4,7 @@ use core::time::Duration;
 use std::io::{IsTerminal as _, Read as _};
 use std::path::Path;
 
+use deployment::hosts::Host;
 use deployment::{Deployment, RecordingPlan, Replay, Topology};
 use runtime::{Delivery, ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
@@ -30,6 +31,9 @@ pub struct Resolved {
     /// recordings of earlier versions.
     #[serde(default)]
     pub sides_as_seen: bool,
+    /// The host that runs, of a deployment of several. Not in the recordings of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub host: Option<String>,
     /// The recording to write, if there is one.
     #[serde(default, alias = "tape")]
     pub recording: Option<RecordingPlan>,
@@ -145,6 +149,20 @@ impl Resolved {
     /// The processes of the deployment and the topics between them.
     pub fn topology(&self) -> Topology {
         let (recording, replay) = (self.recording.as_ref(), self.replay.as_ref());
-        Topology::new(&self.deployment, recording, replay)
+        let whole = Topology::new(&self.deployment, recording, replay);
+        match self.own_host() {
+            Some(host) => whole.on_host(&self.deployment, host),
+            None => whole,
+        }
+    }
+
+    /// The host that runs, of a deployment of several.
+    pub fn own_host(&self) -> Option<&Host> {
+        self.deployment.host(self.host.as_deref()?)
+    }
+
+    /// Whether this is a host with cameras that leaves the results to another.
+    pub fn is_far(&self) -> bool {
+        self.own_host().is_some_and(|it| !it.fuses)
     }
 }

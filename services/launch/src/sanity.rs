@@ -33,6 +33,11 @@ fn check(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<Vec<String>, Fa
     let deployment = &resolved.deployment;
     let mut warnings = deployment.doubts(n_cores());
     check_number(deployment)?;
+    if resolved.host.is_some() {
+        // Devices of two machines have the same names, and footage of another cannot be read.
+        warnings.extend(check_cameras(deployment)?);
+        return Ok(warnings);
+    }
     check_sources(deployment)?;
     warnings.extend(check_cameras(deployment)?);
     warnings.extend(check_rates(resolved)?);

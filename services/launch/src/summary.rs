@@ -57,6 +57,8 @@ pub struct Report {
     recorded: Recorded,
     /// What became of the pictures of live cameras, a line each.
     live: Vec<String>,
+    /// Whether another host fuses, and has the results.
+    is_far: bool,
 }
 
 impl Report {
@@ -106,6 +108,7 @@ impl Report {
                 .filter(|_| !resolved.deployment.has_maps()),
             measured: measured(outcome),
             live: cameras::live(outcome),
+            is_far: resolved.is_far(),
             recorded,
         }
     }
@@ -175,6 +178,9 @@ impl Report {
 
     /// Whether views, frames or processes were lost, or the losses are unknown. False for an interrupted run.
     fn is_degraded(&self) -> bool {
+        if self.is_far {
+            return !self.given_up.is_empty() || !self.restarts.is_empty();
+        }
         !self.interrupted
             && (self.no_results_reason().is_some()
                 || !self.given_up.is_empty()
@@ -251,6 +257,9 @@ impl Report {
             "{}: {} frames in {:.1} s{status}",
             self.name, self.n_frames, self.seconds
         )?;
+        if self.is_far {
+            return self.write_far(text);
+        }
         writeln!(text, "  results       {}", self.folder)?;
         if let Some(problem) = self.recorded.problem() {
             writeln!(text, "  recorded      {problem}")?;
@@ -266,8 +275,7 @@ impl Report {
             self.write_views(text, it)?;
             self.write_misplaced(text, it)?;
         }
-        let live = self.live.iter();
-        text.extend(live.map(|it| format!("  live camera   {it}\n")));
+        self.write_live(text);
         if let Some(latency) = self.recorded.latency() {
             write_latency(text, latency)?;
         }
@@ -298,6 +306,18 @@ impl Report {
             writeln!(text, "  given up      {}", self.given_up.join(", "))?;
         }
         Ok(())
+    }
+
+    /// Writes what a host with cameras can tell: the results are elsewhere.
+    fn write_far(&self, text: &mut String) -> core::fmt::Result {
+        writeln!(text, "  results       on the host that fuses")?;
+        self.write_live(text);
+        self.write_memory(text)
+    }
+
+    fn write_live(&self, text: &mut String) {
+        let live = self.live.iter();
+        text.extend(live.map(|it| format!("  live camera   {it}\n")));
     }
 
     fn write_views(&self, text: &mut String, summary: &Summary) -> core::fmt::Result {

@@ -119,7 +119,7 @@ pub(crate) fn n_reached(resolved: &Resolved, outcome: &Outcome) -> u64 {
     let cameras = outcome
         .processes
         .iter()
-        .filter(|it| it.service == "capture");
+        .filter(|it| ["capture", "bridge"].contains(&it.service.as_str()));
     let last = cameras.filter_map(|it| it.last.as_ref().filter(|it| it.n_sent > 0));
     let last = last
         .map(|it| it.last_frame.saturating_sub(capture.start_frame))

@@ -4,8 +4,8 @@ use clap::{Parser, Subcommand};
 
 use crate::commands::{
     bench, calib, calibrate, cameras, chaos, config, demo, deployments, detect, eval, export,
-    fuse_frame, messages, model, new, publish, record, replay, run, service, smooth, sync, synth,
-    top, train, view,
+    fuse_frame, hosts, messages, model, new, publish, record, replay, run, service, simulate,
+    smooth, sync, synth, top, train, view,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -123,6 +123,12 @@ pub(crate) enum Command {
     Publish(publish::Arguments),
     /// Print the layout of messages, for programs in other languages.
     Messages(messages::Arguments),
+    /// Deployments of several machines: their state, and their keys.
+    #[command(subcommand)]
+    Hosts(hosts::Command),
+    /// Work out what a deployment will take, before there is one.
+    #[command(subcommand)]
+    Simulate(simulate::Command),
     /// Make synthetic sequences of people, with the truth.
     Synth(Box<synth::Arguments>),
     /// List running deployments, and what dead ones have left in shared memory; or show the processes of one.

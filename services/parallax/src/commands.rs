@@ -12,6 +12,7 @@ pub(crate) mod detect;
 pub(crate) mod eval;
 pub(crate) mod export;
 pub(crate) mod fuse_frame;
+pub(crate) mod hosts;
 pub(crate) mod judge;
 pub(crate) mod messages;
 pub(crate) mod model;
@@ -22,6 +23,7 @@ pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod run;
 pub(crate) mod service;
+pub(crate) mod simulate;
 pub(crate) mod smooth;
 pub(crate) mod sync;
 pub(crate) mod synth;
@@ -70,6 +72,8 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Clean(it) => deployments::clean(&it),
         Command::Synth(it) => synth::run(&it, cli.globals),
         Command::Smooth(it) => smooth::run(&it, cli.globals),
+        Command::Hosts(it) => hosts::run(&it),
+        Command::Simulate(it) => simulate::run(&it),
         Command::Sync(it) => sync::run(&it, cli.globals),
         Command::Service(it) => service::run(&it),
     }

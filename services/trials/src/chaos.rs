@@ -2,12 +2,15 @@
 
 mod camera;
 mod fault;
+mod host;
+mod host_fault;
 mod judge;
 mod moved;
 mod options;
 mod orphans;
 mod random;
 mod random_kills;
+mod relay;
 mod resources;
 mod scenario;
 mod series;
@@ -32,6 +35,7 @@ use verdict::Verdict;
 
 pub use crate::trial::injection::ProcessFault;
 pub use fault::CameraFault;
+pub use host_fault::HostFault;
 pub use options::{Limits, Options};
 pub use scenario::Scenario;
 
@@ -95,7 +99,14 @@ fn chosen(requested: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>,
     match requested.iter().find(|it| !it.is_possible(processes)) {
         None => Ok(requested.to_vec()),
         Some(it) => {
-            let message = format!("{}: the deployment has no such process", it.name());
+            let why = match it {
+                Scenario::Host(_) if !bridge::HAS_LINK => {
+                    "this build has no hosts: build it with `--features hosts`"
+                }
+                Scenario::Host(_) => "the deployment has fewer than four cameras",
+                _ => "the deployment has no such process",
+            };
+            let message = format!("{}: {why}", it.name());
             Err(Failure::new(ExitKind::Usage, message))
         }
     }
@@ -109,6 +120,7 @@ fn attempt(testbed: &Testbed, options: &Options, scenario: Scenario) -> Result<V
         Scenario::Camera(fault) => camera::attempt(testbed, options, fault),
         Scenario::Moved => moved::attempt(testbed, options),
         Scenario::Stall => stall::attempt(testbed, options),
+        Scenario::Host(fault) => host::attempt(testbed, options, fault),
     }
 }
 

@@ -4,14 +4,14 @@ use crate::fields::fields_of;
 use crate::older::OLDER;
 use crate::schema::{Key, Shapes, schema};
 use crate::{
-    Deployment, Runtime, Supervision, capture, fuse, person, pose, quality, results, smooth,
+    Deployment, Runtime, Supervision, capture, fuse, hosts, person, pose, quality, results, smooth,
     triangulate,
 };
 
 /// A section, and its keys in order.
 type Section = (&'static str, fn() -> &'static [&'static str]);
 
-const SECTIONS: [Section; 10] = [
+const SECTIONS: [Section; 11] = [
     ("capture", fields_of::<capture::Config>),
     ("person", fields_of::<person::Config>),
     ("pose", fields_of::<pose::Config>),
@@ -20,6 +20,7 @@ const SECTIONS: [Section; 10] = [
     ("triangulate", fields_of::<triangulate::Config>),
     ("results", fields_of::<results::Config>),
     ("smooth", fields_of::<smooth::Config>),
+    ("link", fields_of::<hosts::Link>),
     ("supervise", fields_of::<Supervision>),
     ("runtime", fields_of::<Runtime>),
 ];
@@ -50,6 +51,13 @@ pub(crate) fn camera_keys() -> Vec<Key> {
     fields.map(|it| schema.key("", "camera", it)).collect()
 }
 
+/// The keys of a `[[host]]`, without their section.
+pub(crate) fn host_keys() -> Vec<Key> {
+    let schema = Shapes(schema());
+    let fields = fields_of::<hosts::Host>().iter();
+    fields.map(|it| schema.key("", "host", it)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use toml::{Table, Value};
@@ -73,7 +81,7 @@ mod tests {
                 );
             }
         }
-        for it in keys.into_iter().chain(camera_keys()) {
+        for it in keys.into_iter().chain(camera_keys()).chain(host_keys()) {
             assert!(it.meaning.ends_with('.') && it.meaning.len() > 10, "{it:?}");
             assert!(!it.takes.is_empty() && !it.takes.contains("null"), "{it:?}");
         }

@@ -8,6 +8,7 @@
 
 pub mod capture;
 pub mod fuse;
+pub mod hosts;
 pub mod person;
 pub mod pose;
 pub mod quality;
@@ -85,6 +86,9 @@ pub struct Deployment {
     /// The cameras, each a `[[camera]]` of its own, in the order in which views are numbered.
     #[serde(rename = "camera")]
     pub cameras: Vec<capture::Camera>,
+    /// The machines, each a `[[host]]` of its own, where one is not enough; none means this machine alone.
+    #[serde(rename = "host", default, skip_serializing_if = "Vec::is_empty")]
+    pub hosts: Vec<hosts::Host>,
     /// How pixels get in.
     #[serde(default)]
     pub capture: capture::Config,
@@ -109,6 +113,8 @@ pub struct Deployment {
     /// Smoothed trajectories.
     #[serde(default)]
     pub smooth: smooth::Config,
+    /// The connection between hosts.
+    pub link: hosts::Link,
     /// Deadlines and restarts.
     #[serde(default)]
     pub supervise: Supervision,
@@ -238,6 +244,7 @@ impl Deployment {
                 *network = relative_to(network, base);
             }
         }
+        self.link.resolve(base);
         let quality = &mut self.quality;
         let files = [&mut quality.table, &mut quality.onnx_runtime];
         for file in files.into_iter().flatten() {

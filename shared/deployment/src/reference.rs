@@ -4,7 +4,7 @@ use core::fmt::Write as _;
 
 use toml::{Table, Value};
 
-use crate::keys::camera_keys;
+use crate::keys::{camera_keys, host_keys};
 use crate::{ConfigError, Entry, Key, Loaded, keys};
 
 const INTRODUCTION: &str = "\
@@ -34,12 +34,14 @@ pub fn reference() -> Result<String, ConfigError> {
         }
         let entry = entries.iter().find(|it| it.key == key.name);
         row(&mut text, name, &key, entry.and_then(default));
-        if key.name == "camera" {
-            text.push_str("\n## `[[camera]]`\n\n");
-            text.push_str(HEAD);
-            for key in camera_keys() {
-                row(&mut text, &key.name, &key, None);
-            }
+        let list = match key.name.as_str() {
+            "camera" => camera_keys(),
+            "host" => host_keys(),
+            _ => continue,
+        };
+        begin_list(&mut text, &key.name);
+        for key in list {
+            row(&mut text, &key.name, &key, None);
         }
     }
     Ok(text)
@@ -51,6 +53,11 @@ fn begin(text: &mut String, section: Option<&str>) {
     let title = section.map_or("At the top".to_owned(), |it| format!("`[{it}]`"));
     // Writing to a string cannot fail.
     let _infallible = write!(text, "\n## {title}\n\n{HEAD}");
+}
+
+fn begin_list(text: &mut String, name: &str) {
+    // Writing to a string cannot fail.
+    let _infallible = write!(text, "\n## `[[{name}]]`\n\n{HEAD}");
 }
 
 fn row(text: &mut String, name: &str, key: &Key, default: Option<String>) {

@@ -3,7 +3,9 @@
 use crate::complaint::{Complaint, demand, not_negative, positive, whole};
 use crate::older::OLDER;
 use crate::topology::{process_name, services};
-use crate::{Deployment, Machine, capture, fuse, is_shipped, limits, pose, quality, triangulate};
+use crate::{
+    Deployment, Machine, capture, fuse, hosts, is_shipped, limits, pose, quality, triangulate,
+};
 
 /// Checks the values that the types alone do not.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
@@ -19,6 +21,7 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     }
     whole("supervise.missed_beats", it.supervise.missed_beats)?;
     runtime(it)?;
+    hosts::check(it)?;
     limits::check(it)?;
     let joints = &it.triangulate.joints;
     let known = skeleton::JointSet::ALL.map(|it| it.name).join(", ");

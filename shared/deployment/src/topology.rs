@@ -2,6 +2,7 @@
 //!
 //! One place counts: a topic has as many receivers as there are processes that list it among their inputs.
 
+mod hosts;
 mod rooms;
 #[cfg(test)]
 mod tests;
@@ -62,6 +63,8 @@ impl Stage {
 const RESULTS: &str = "results";
 /// The process that records every message.
 const RECORD: &str = "record";
+/// The process that carries messages between hosts.
+const BRIDGE: &str = "bridge";
 
 /// The services whose processes a deployment file may give cores and a priority, each with the most processes that are
 /// told apart by their number. What records is none of them: no file says whether it runs.
@@ -127,7 +130,7 @@ pub enum Role {
 pub struct Process {
     /// Its name in the deployment: `pose-1`.
     pub name: String,
-    /// What it is: a stage, `results` or `record`.
+    /// What it is: a stage, `results`, `record` or `bridge`.
     pub service: &'static str,
     /// The view or the worker, where there is one process for each.
     pub index: Option<usize>,

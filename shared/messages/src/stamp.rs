@@ -65,8 +65,13 @@ impl Status {
     /// The body that was found is none that a person can have.
     pub const IMPLAUSIBLE: Self = Self(15);
 
+    /// It did not come from its host in time.
+    pub const LATE: Self = Self(16);
+    /// The host of the camera does not answer.
+    pub const HOST_GONE: Self = Self(17);
+
     /// Camera faults: all reasons for a frame without a picture that a camera itself can cause.
-    pub const CAMERA_FAULTS: [Self; 9] = [
+    pub const CAMERA_FAULTS: [Self; 11] = [
         Self::NO_FRAME,
         Self::FROZEN,
         Self::TIME_REPEATED,
@@ -76,6 +81,8 @@ impl Status {
         Self::UNPLUGGED,
         Self::LEFT_OUT,
         Self::DAMAGED,
+        Self::LATE,
+        Self::HOST_GONE,
     ];
 
     /// The reason for people.
@@ -98,6 +105,8 @@ impl Status {
             Self::LEFT_OUT => "left out by the camera",
             Self::DAMAGED => "damaged picture",
             Self::IMPLAUSIBLE => "implausible",
+            Self::LATE => "late from its host",
+            Self::HOST_GONE => "host gone",
             Self(_) => "unknown",
         }
     }

@@ -2,6 +2,7 @@
 //! run by a plain test over the seeds and their mutations.
 
 mod files;
+mod hosts;
 mod messages;
 
 pub use files::{
@@ -9,16 +10,18 @@ pub use files::{
     model_text, motion_c3d, network_card, people_lines, people_mat, quality_network, quality_table,
     run_files, scene_text, training_checkpoint, type_table,
 };
+pub use hosts::host_messages;
 pub use messages::{wire_fusion, wire_messages};
 
 /// A target by name.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 20] = [
+pub const TARGETS: [Target; 21] = [
     ("calibration", calibration),
     ("consistency", consistency),
     ("deployment_text", deployment_text),
+    ("host_messages", host_messages),
     ("joint_file", joint_file),
     ("keypoint_files", keypoint_files),
     ("network_card", network_card),

@@ -8,6 +8,7 @@ use deployment::capture::{Camera, Config, Transport};
 use deployment::{Deployment, Timeline};
 use footage::LiveAddress;
 use runtime::{ExitKind, Failure, Fault as _};
+use scene::Address;
 
 use super::{Footage, advice, source, warn_of_orientation_tag};
 
@@ -36,30 +37,39 @@ pub fn live_camera(camera: &Camera) -> Option<LiveCamera> {
 }
 
 /// Reads the metadata of every camera's footage; live cameras are asked all at once.
-pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> {
+///
+/// * `is_here`: whether a camera is on this machine; of others what the calibration says.
+pub(crate) fn footage(
+    deployment: &Deployment,
+    is_here: &dyn Fn(usize) -> bool,
+) -> Result<Vec<Footage>, Failure> {
     let capture = &deployment.capture;
     let all: Vec<Result<Footage, Failure>> = thread::scope(|scope| {
         let asked: Vec<_> = deployment
             .cameras
             .iter()
-            .map(|camera| {
-                let live = live_camera(camera)?;
+            .enumerate()
+            .map(|(index, camera)| {
+                let live = live_camera(camera).filter(|_| is_here(index))?;
                 let thread = thread::Builder::new().name(camera.name.clone());
                 thread.spawn_scoped(scope, move || live.look()).ok()
             })
             .collect();
-        let cameras = deployment.cameras.iter().zip(asked);
-        let read = cameras.map(
-            |(camera, asked)| match asked.map(thread::ScopedJoinHandle::join) {
-                None => of_files(camera, capture),
+        let cameras = deployment.cameras.iter().enumerate().zip(asked);
+        let read = cameras.map(|((index, camera), asked)| {
+            match asked.map(thread::ScopedJoinHandle::join) {
+                None if is_here(index) || Address::is_address(&camera.source) => {
+                    of_files(camera, capture)
+                }
+                None => elsewhere(deployment, camera),
                 Some(Ok(found)) => found
                     .map(|it| of_live(it, capture))
                     .map_err(|it| refused(it, camera)),
                 Some(Err(_panic)) => {
                     Err(Failure::new(ExitKind::Run, "a camera could not be asked"))
                 }
-            },
-        );
+            }
+        });
         read.collect()
     });
     let all: Vec<Footage> = all.into_iter().collect::<Result<_, Failure>>()?;
@@ -102,6 +112,20 @@ fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage
     looked.collect()
 }
 
+/// From the beginning of a run to its first frame in real time, nanoseconds: until every process has started, and streams
+/// have shown their first picture.
+pub(crate) fn lead_nanos(deployment: &Deployment) -> u64 {
+    const FOOTAGE: u64 = 2_000_000_000;
+    const DEVICES: u64 = 3_000_000_000;
+    const STREAMS: u64 = 6_000_000_000;
+    let cameras = deployment.cameras.iter().filter_map(live_camera);
+    let leads = cameras.map(|it| match it.address {
+        LiveAddress::Device(_) => DEVICES,
+        LiveAddress::Stream(_) => STREAMS,
+    });
+    leads.max().unwrap_or(FOOTAGE)
+}
+
 fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
     let info = Feed::look(&source(camera, capture));
     let info = info.map_err(|error| {
@@ -124,6 +148,23 @@ fn of_live((size, rate_hz): (footage::Size, f64), capture: &Config) -> Footage {
         frame_rate_hz: Some(rate_hz / capture.frame_step as f64),
         timeline: None,
     }
+}
+
+/// What is known of a camera of another host.
+fn elsewhere(deployment: &Deployment, camera: &Camera) -> Result<Footage, Failure> {
+    let capture = &deployment.capture;
+    let rig = super::rig_of(deployment)?;
+    // One that is not in the rig is reported later, by name.
+    let size = rig
+        .camera(&camera.name)
+        .map_or([1; 2], |it| it.intrinsics.size);
+    let rate_hz = capture.frame_rate_hz;
+    Ok(Footage {
+        size,
+        n_frames: capture.n_frames.unwrap_or(ENDLESS),
+        frame_rate_hz: rate_hz.map(|it| it / capture.frame_step as f64),
+        timeline: None,
+    })
 }
 
 fn refused(error: LiveError, camera: &Camera) -> Failure {

@@ -92,6 +92,7 @@ fn footage_of_another_length_than_its_keypoints_is_told_with_both_numbers() {
             search_size: None,
             extra_keypoints: Vec::new(),
             sides_as_seen: false,
+            host: None,
             recording: None,
             replay: None,
         };

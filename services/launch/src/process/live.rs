@@ -1,6 +1,5 @@
 //! Live cameras of a run.
 
-use deployment::Deployment;
 use footage::{LiveAddress, Size};
 use scene::{Address, skew_ms_of};
 
@@ -27,7 +26,7 @@ pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> 
             .is_some_and(|it| it.pictures.contains(&view)),
         name: entry.name.clone(),
         max_skew_nanos: max_skew_nanos(resolved),
-        lead_nanos: lead_nanos(&resolved.deployment),
+        lead_nanos: inputs::lead_nanos(&resolved.deployment),
     })
 }
 
@@ -46,18 +45,4 @@ pub(super) fn skew_nanos(resolved: &Resolved, view: usize) -> i64 {
     let of_scene = || Some(skew_ms_of(&Address::parse(&camera.source).ok()?));
     let skew_ms = camera.skew_ms.or_else(of_scene).unwrap_or(0.0);
     (skew_ms * 1e6).round() as i64
-}
-
-/// From the beginning of a run to its first frame in real time, nanoseconds: until every process has started, and streams
-/// have shown their first picture.
-pub(super) fn lead_nanos(deployment: &Deployment) -> u64 {
-    const FOOTAGE: u64 = 2_000_000_000;
-    const DEVICES: u64 = 3_000_000_000;
-    const STREAMS: u64 = 6_000_000_000;
-    let cameras = deployment.cameras.iter().filter_map(inputs::live_camera);
-    let leads = cameras.map(|it| match it.address {
-        LiveAddress::Device(_) => DEVICES,
-        LiveAddress::Stream(_) => STREAMS,
-    });
-    leads.max().unwrap_or(FOOTAGE)
 }

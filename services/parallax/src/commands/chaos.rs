@@ -36,6 +36,10 @@ identified, and no other, which takes four cameras and some seconds of results. 
 is stopped for three seconds and then resumed: with realtime delivery, results continue at half the rate at least; with \
 lossless delivery, nothing is lost.
 
+With cut-link and kill-host (builds with the feature hosts) the deployment runs as two hosts on this machine, each with half of the cameras, and a relay \
+between them: it is cut for three seconds, or the host with cameras is killed and started again. The other must notice it, its views must be used again \
+within --max-return-ms, and every frame of them be accounted for. They need a DEPLOYMENT in real time with a rate, and four cameras.
+
 A process is back when it has sent its first message that contributes to a result. Results do not name fuse, quality and \
 results; these are back when they report that they have worked. The number of restarts is not limited here \
 (supervise.max_restarts), and no overlays are drawn.

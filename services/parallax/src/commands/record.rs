@@ -96,6 +96,11 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         pictures: Vec::new(),
         without_foxglove: arguments.without.contains(&Bulk::Foxglove),
     };
+    if !loaded.deployment.hosts.is_empty() {
+        let message = "the deployment has several hosts, whose messages are not recorded";
+        let failure = Failure::new(ExitKind::Config, message);
+        return Err(failure.with_hint("`parallax run --host NAME` runs it"));
+    }
     let resolved = plan::resolve(&loaded.deployment)?;
     let pictures = if arguments.without.contains(&Bulk::Camera) {
         Vec::new()

@@ -149,6 +149,8 @@ fn resolve(
         (Some(Speed::Max), _) | (None, deployment::capture::Mode::Lossless) => None,
     };
     Ok(Resolved {
+        // On one machine, whatever it was recorded on.
+        host: None,
         footage: recorded.footage,
         deployment,
         search_size,

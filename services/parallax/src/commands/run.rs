@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::{Planned, load, output};
+use launch::{load, output};
 use runtime::{ExitKind, Failure, OrFail as _, Stop, free_shared_memory, needed_bytes, preflight};
 use supervise::Plan;
 
-use super::{publish, view};
+use super::{hosts, publish, view};
 use crate::globals::Globals;
 
 /// Options of `parallax run`.
@@ -27,6 +27,7 @@ Examples:
     parallax run my.toml --latency-budget-ms 150
     parallax run my.toml --publish udp://127.0.0.1:9000
     parallax run my.toml --dry-run
+    parallax run my.toml --host left        the part of one of several machines
 
 While it runs, `parallax top` and `parallax status NAME --json` show every process and where its time goes. With a
 latency budget the run ends with exit code 6 if the 99th percentile from capture to result exceeds it, or if no frame
@@ -40,6 +41,9 @@ pub(crate) struct Arguments {
     /// Replace a value, for example `--set fuse.workers=2`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// The host that this machine is, of a deployment with several `[[host]]`; without it the one with the name of the machine.
+    #[arg(long, value_name = "NAME")]
+    host: Option<String>,
     /// Fail with exit code 6 if 1 frame in 100 takes longer than this from capture to result, milliseconds; the same
     /// as `--set supervise.latency_budget_ms=N`.
     #[arg(long, value_name = "N", value_parser = above_zero, allow_negative_numbers = true)]
@@ -71,7 +75,11 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if let Some(out) = &arguments.out {
         loaded.deployment.output = std::path::absolute(out).or_fail(ExitKind::Usage)?;
     }
-    let planned = Planned::new(&loaded.deployment, globals.level())?;
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let chosen = (arguments.host.as_deref(), arguments.dry_run);
+    let Some(planned) = hosts::plan(&loaded.deployment, chosen, &stop, globals)? else {
+        return Ok(ExitCode::from(ExitKind::Interrupted.status()));
+    };
     if arguments.dry_run {
         if let Some(size) = &planned.resolved().search_size {
             output::line(size.text())?;
@@ -86,7 +94,6 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     {
         output::message(size.text());
     }
-    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let name = &loaded.deployment.name;
     let page = arguments.view.then(|| view::beside(name)).transpose()?;
     let companion = publish::beside(name, &arguments.publish, arguments.beyond_this_machine)?;

@@ -3,6 +3,7 @@
 use launch::SERVICES;
 
 use super::fault::CameraFault;
+use super::host_fault::HostFault;
 use crate::trial::injection::ProcessFault;
 
 /// The name of the scenario with a camera that was moved after the calibration.
@@ -25,6 +26,8 @@ pub enum Scenario {
     Moved,
     /// The process `results` is stopped for a while.
     Stall,
+    /// A fault of a link between two hosts, or of one of them.
+    Host(HostFault),
 }
 
 impl Scenario {
@@ -40,6 +43,7 @@ impl Scenario {
         all.push(Self::Supervisor);
         all.extend(CameraFault::ALL.map(Self::Camera));
         all.extend([Self::Moved, Self::Stall]);
+        all.extend(HostFault::ALL.map(Self::Host));
         all
     }
 
@@ -64,6 +68,7 @@ impl Scenario {
             Self::Camera(it) => it.name_and_summary()[0].to_owned(),
             Self::Moved => MOVED.to_owned(),
             Self::Stall => STALL.to_owned(),
+            Self::Host(it) => it.name_and_summary()[0].to_owned(),
         }
     }
 
@@ -90,6 +95,7 @@ impl Scenario {
             Self::Stall => {
                 "the results process stands still for three seconds, and goes on".to_owned()
             }
+            Self::Host(it) => it.name_and_summary()[1].to_owned(),
         }
     }
 
@@ -100,6 +106,15 @@ impl Scenario {
         match self {
             Self::Once(_, service) => processes.iter().any(|it| service_of(it) == service),
             Self::Random | Self::Supervisor | Self::Camera(_) | Self::Stall => true,
+            // Two of its cameras at either host; what carries messages is in some builds only.
+            Self::Host(_) => {
+                bridge::HAS_LINK
+                    && processes
+                        .iter()
+                        .filter(|it| service_of(it) == "capture")
+                        .count()
+                        > 3
+            }
             // With fewer than four cameras the moved one cannot be identified.
             Self::Moved => {
                 processes
@@ -124,7 +139,7 @@ mod tests {
     #[test]
     fn every_scenario_has_a_unique_name() {
         let all = Scenario::all();
-        assert_eq!(all.len(), 27);
+        assert_eq!(all.len(), 29);
         for it in all {
             assert_eq!(Scenario::by_name(&it.name()), Ok(it));
         }

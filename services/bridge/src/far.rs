@@ -1,0 +1,398 @@
+//! The bridge of a host with cameras: takes messages of its views from shared memory, and sends the newest.
+
+use core::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use crossbeam::channel::{Receiver as ChannelReceiver, Sender, bounded};
+use hosts::{Answer, Content, Grid, Head, Hello, Outbox, Packet, Parcel, Signal, VERSION};
+use messages::{Cause, FrameHeader, Stamp, Status, Timing, topic};
+use recording::{Envelope, Kind, Message};
+use runtime::{ExitKind, Failure, OrFail as _, Service, SliceSubscriber, Waiter, Woken, now_nanos};
+use stage::any::Receiver;
+
+use crate::job::{Far, Job};
+use crate::join::listed;
+use crate::jpeg;
+use crate::link::Link;
+use crate::topics::Topics;
+
+/// How often the host introduces itself: the other may have been started again.
+const HELLO_EVERY: Duration = Duration::from_millis(500);
+/// How often the end of a stream is sent until it is acknowledged, and for how long.
+const END_EVERY: Duration = Duration::from_millis(300);
+const END_PATIENCE: Duration = Duration::from_secs(15);
+/// Longest sleep: while something waits for an acknowledgement, and else.
+const SHORT: Duration = Duration::from_millis(2);
+const LONG: Duration = Duration::from_millis(20);
+/// Acknowledgements that wait to be read.
+const MOST_ACKS: usize = 1024;
+
+/// A message that waits to be sent.
+#[derive(Debug, Clone)]
+enum Item {
+    Frame {
+        header: FrameHeader,
+        rgb: Vec<u8>,
+    },
+    Message {
+        content: Content,
+        envelope: Envelope,
+        data: Vec<u8>,
+    },
+}
+
+/// Where the messages of a lane come from.
+enum Port {
+    Frame(SliceSubscriber<u8, FrameHeader>),
+    Message(Content, Receiver),
+}
+
+/// A topic of a view.
+struct Lane {
+    view: usize,
+    port: Port,
+    /// The end of its stream, once it came.
+    end: Option<Item>,
+    /// The sequence from which on an acknowledgement means that the end has arrived.
+    end_sequence: Option<u64>,
+    has_ended: bool,
+    end_sent: Option<Instant>,
+}
+
+/// An acknowledgement: view, content, sequence.
+type Ack = (u32, Content, u64);
+
+/// Sends what the views of this host publish, until they end or a stop is requested.
+pub(crate) fn run(service: &Service, job: &Job, role: &Far) -> Result<(), Failure> {
+    let mut waiter = service.bus().waiter();
+    let lanes = lanes(service, job, role, &mut waiter)?;
+    let link = Arc::new(Link::open(&job.address).or_fail(ExitKind::Run)?);
+    let origin = fastrand::u64(..);
+    let (acks, answer) = listen(&link, job, origin)?;
+    let outbox = Outbox::new(lanes.len());
+    let mut it = Sending {
+        service,
+        job,
+        role,
+        grid: job.grid(service.session()),
+        link,
+        origin,
+        lanes,
+        outbox,
+        acks,
+    };
+    let hello = Hello {
+        version: VERSION,
+        host: job.address.host.clone(),
+        origin,
+        fingerprint: job.fingerprint.clone(),
+    };
+    let topic = Topics::of(&job.address.deployment).hello(&job.address.host);
+    let mut introduced = None::<Instant>;
+    let mut ended = None::<Instant>;
+    loop {
+        let limit = if it.outbox.is_empty() { LONG } else { SHORT };
+        if waiter.wait(limit)? == Woken::Stop {
+            return Ok(());
+        }
+        if introduced.is_none_or(|at| at.elapsed() > HELLO_EVERY) {
+            it.link.send(&topic, hello.to_bytes(), true);
+            introduced = Some(Instant::now());
+        }
+        check(&answer)?;
+        it.receive()?;
+        it.acknowledge();
+        it.repeat_ends();
+        it.send_all();
+        if it.lanes.iter().all(|lane| lane.end.is_some()) {
+            let since = ended.get_or_insert_with(Instant::now).elapsed();
+            if it.lanes.iter().all(|lane| lane.has_ended) || since > END_PATIENCE {
+                break;
+            }
+        }
+    }
+    service.health().finished();
+    while waiter.wait(Duration::from_millis(50))? != Woken::Stop {}
+    Ok(())
+}
+
+/// Fails if the other host has refused this one.
+fn check(answer: &Mutex<Option<Answer>>) -> Result<(), Failure> {
+    let answer = answer.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(Answer::Refused(why)) = answer.as_ref() {
+        let message = format!("the host that fuses refuses this one: {}", listed(why));
+        return Err(Failure::new(ExitKind::Config, message));
+    }
+    Ok(())
+}
+
+fn lanes(
+    service: &Service,
+    job: &Job,
+    role: &Far,
+    waiter: &mut Waiter,
+) -> Result<Vec<Lane>, Failure> {
+    let mut lanes = Vec::new();
+    let bus = service.bus();
+    for &view in &role.views {
+        let mut add = |port| {
+            lanes.push(Lane {
+                view,
+                port,
+                end: None,
+                end_sequence: None,
+                has_ended: false,
+                end_sent: None,
+            });
+        };
+        match job.carry {
+            deployment::hosts::Carry::Frames => {
+                add(Port::Frame(
+                    bus.slice_subscriber(&topic::frame(view), waiter)?,
+                ));
+            }
+            deployment::hosts::Carry::Poses => {
+                let name = topic::view_pose(view);
+                let port = Receiver::open(bus, Kind::ViewPose, &name, waiter, false)?;
+                add(Port::Message(Content::ViewPose, port));
+                if job.has_quality {
+                    let name = topic::view_quality(view);
+                    let port = Receiver::open(bus, Kind::ViewQuality, &name, waiter, false)?;
+                    add(Port::Message(Content::ViewQuality, port));
+                }
+            }
+        }
+    }
+    Ok(lanes)
+}
+
+type Listening = (ChannelReceiver<Ack>, Arc<Mutex<Option<Answer>>>);
+
+/// Answers questions about the time at once, and keeps acknowledgements and the last answer.
+fn listen(link: &Arc<Link>, job: &Job, origin: u64) -> Result<Listening, Failure> {
+    let topics = Topics::of(&job.address.deployment);
+    let host = &job.address.host;
+    let (sender, acks): (Sender<Ack>, _) = bounded(MOST_ACKS);
+    let up = topics.up(host);
+    let back = Arc::downgrade(link);
+    let on_signal = move |_: &str, bytes: &[u8]| {
+        let received_at = now_nanos();
+        match Signal::parse(bytes) {
+            Ok(Signal::Ping { asked_at, .. }) => {
+                let pong = Signal::Pong {
+                    origin,
+                    asked_at,
+                    received_at,
+                    answered_at: now_nanos(),
+                };
+                if let Some(link) = back.upgrade() {
+                    link.send(&up, pong.to_bytes().to_vec(), true);
+                }
+            }
+            Ok(Signal::Ack {
+                origin: of,
+                view,
+                content,
+                sequence,
+            }) if of == origin => {
+                // What finds no room counts as lost after a while.
+                let _is_kept = sender.try_send((view, content, sequence)).is_ok();
+            }
+            Ok(_) => {}
+            Err(error) => tracing::debug!(%error, "from the host that fuses"),
+        }
+    };
+    let subscribed = link.subscribe(&topics.down(host), on_signal);
+    subscribed.or_fail(ExitKind::Run)?;
+    let answer = Arc::new(Mutex::new(None));
+    let keep = Arc::clone(&answer);
+    let on_answer = move |_: &str, bytes: &[u8]| match Answer::parse(bytes) {
+        Ok(it) => *keep.lock().unwrap_or_else(PoisonError::into_inner) = Some(it),
+        Err(error) => tracing::debug!(%error, "from the host that fuses"),
+    };
+    let subscribed = link.subscribe(&topics.answer(host), on_answer);
+    subscribed.or_fail(ExitKind::Run)?;
+    Ok((acks, answer))
+}
+
+struct Sending<'a> {
+    service: &'a Service,
+    job: &'a Job,
+    role: &'a Far,
+    grid: Grid,
+    link: Arc<Link>,
+    origin: u64,
+    lanes: Vec<Lane>,
+    outbox: Outbox<Item>,
+    acks: ChannelReceiver<Ack>,
+}
+
+impl Sending<'_> {
+    /// Takes everything that waits in shared memory.
+    fn receive(&mut self) -> Result<(), Failure> {
+        let session = self.service.session();
+        let health = self.service.health();
+        for (index, lane) in self.lanes.iter_mut().enumerate() {
+            while let Some((of, status, item)) = next(&lane.port)? {
+                if of != session {
+                    continue;
+                }
+                health.received(1);
+                if status == Status::END {
+                    lane.end = Some(item);
+                } else {
+                    self.outbox.offer(index, item);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn acknowledge(&mut self) {
+        while let Ok((view, content, sequence)) = self.acks.try_recv() {
+            let is_meant = |it: &Lane| it.view == view as usize && content_of(&it.port) == content;
+            let Some(index) = self.lanes.iter().position(is_meant) else {
+                continue;
+            };
+            self.outbox.acknowledge(index, sequence, now_nanos());
+            let lane = &mut self.lanes[index];
+            lane.has_ended |= lane.end_sequence.is_some_and(|end| sequence >= end);
+        }
+    }
+
+    /// Sends the ends of streams, again and again until they are acknowledged.
+    fn repeat_ends(&mut self) {
+        for (index, lane) in self.lanes.iter_mut().enumerate() {
+            let is_due = lane.end_sent.is_none_or(|at| at.elapsed() > END_EVERY);
+            let Some(end) = lane.end.as_ref().filter(|_| is_due && !lane.has_ended) else {
+                continue;
+            };
+            // Not before the last frame has gone: it would be overtaken.
+            if lane.end_sent.is_some()
+                || self.outbox.sent(index).n_offered == 0
+                || self.outbox.n_waiting() == 0
+            {
+                self.outbox.offer(index, end.clone());
+                lane.end_sent = Some(Instant::now());
+            }
+        }
+    }
+
+    fn send_all(&mut self) {
+        while let Some(parcel) = self.outbox.next(now_nanos()) {
+            self.send(&parcel);
+        }
+    }
+
+    fn send(&mut self, parcel: &Parcel<Item>) {
+        let lane = &mut self.lanes[parcel.lane];
+        let (envelope, content) = parts(&parcel.item);
+        if envelope.status == Status::END {
+            lane.end_sequence.get_or_insert(parcel.sequence);
+        }
+        let encoded;
+        let (body, size, n_dropped, skew_nanos) = match &parcel.item {
+            Item::Frame { header, rgb } if header.status == Status::OK => {
+                let size = [header.width, header.height];
+                match jpeg::encode(rgb, size, self.role.jpeg_quality) {
+                    Ok(jpeg) => encoded = jpeg,
+                    Err(error) => {
+                        tracing::warn!(%error, view = lane.view, "a frame without JPEG");
+                        self.service.health().dropped(Cause::Malformed, 1);
+                        return;
+                    }
+                }
+                (&encoded[..], size, header.n_dropped, header.skew_nanos)
+            }
+            Item::Frame { header, .. } => (&[][..], [0; 2], header.n_dropped, 0),
+            Item::Message { data, .. } => (&data[..], [0; 2], 0, 0),
+        };
+        let stamp = envelope.stamp;
+        let head = Head {
+            content,
+            view: lane.view as u32,
+            status: envelope.status,
+            origin: self.origin,
+            sequence: parcel.sequence,
+            frame: stamp.frame,
+            instant_nanos: self.grid.at(self.job.nth(stamp.frame)),
+            captured_at_nanos: stamp.captured_at_nanos,
+            received_at_nanos: envelope.timing.received_at_nanos,
+            sent_at_nanos: envelope.timing.sent_at_nanos,
+            packed_at_nanos: now_nanos(),
+            skew_nanos,
+            n_dropped,
+            n_overtaken: parcel.n_overtaken,
+            size,
+        };
+        let address = &self.job.address;
+        let topic = Topics::of(&address.deployment).data(&address.host);
+        self.link
+            .send(&topic, Packet { head, body }.to_bytes(), false);
+        self.service.health().sent(stamp.frame);
+    }
+}
+
+fn content_of(port: &Port) -> Content {
+    match port {
+        Port::Frame(_) => Content::Frame,
+        Port::Message(content, _) => *content,
+    }
+}
+
+fn parts(item: &Item) -> (Envelope, Content) {
+    match item {
+        Item::Frame { header, .. } => {
+            let envelope = Envelope {
+                stamp: header.stamp,
+                timing: header.timing,
+                status: header.status,
+            };
+            (envelope, Content::Frame)
+        }
+        Item::Message {
+            content, envelope, ..
+        } => (*envelope, *content),
+    }
+}
+
+/// The next message of a topic: its session, its status, and itself.
+fn next(port: &Port) -> Result<Option<(u64, Status, Item)>, Failure> {
+    match port {
+        Port::Frame(port) => Ok(port.receive()?.map(|sample| {
+            let header = *sample.header();
+            let has_picture = header.status == Status::OK;
+            let rgb = if has_picture {
+                sample.payload().to_vec()
+            } else {
+                Vec::new()
+            };
+            (
+                header.stamp.session,
+                header.status,
+                Item::Frame { header, rgb },
+            )
+        })),
+        Port::Message(content, port) => {
+            let Some(received) = port.receive(|_| true)? else {
+                return Ok(None);
+            };
+            let data = received.data.unwrap_or_default();
+            let message = Message::parse(port.kind(), &data).ok();
+            let envelope = message.and_then(|it| Envelope::of(port.kind(), it.head));
+            let envelope = envelope.unwrap_or(Envelope {
+                stamp: Stamp::default(),
+                timing: Timing::default(),
+                status: received.status,
+            });
+            let content = *content;
+            let item = Item::Message {
+                content,
+                envelope,
+                data,
+            };
+            Ok(Some((received.session, received.status, item)))
+        }
+    }
+}

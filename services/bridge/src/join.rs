@@ -1,0 +1,171 @@
+//! Before a run: whether the host that fuses takes part, with the same files, and when its run began by our clock.
+
+use core::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use hosts::{Answer, Clock, Difference, Exchange, Fingerprint, Hello, Signal, VERSION, Welcome};
+use runtime::{Stop, now_nanos};
+
+use crate::link::{Address, Link, LinkError};
+use crate::topics::Topics;
+
+/// Exchanges of times before a run.
+const N_EXCHANGES: usize = 12;
+const ASK_EVERY: Duration = Duration::from_millis(50);
+/// How often it is said that nobody answers.
+const SAY_EVERY: Duration = Duration::from_secs(10);
+
+/// A host cannot take part.
+#[derive(Debug, thiserror::Error)]
+pub enum JoinError {
+    /// The link cannot be opened.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// It has other files than the host that fuses.
+    #[error("the host that fuses refuses this one: {}", listed(.0))]
+    Refused(Vec<Difference>),
+}
+
+/// The differences, in the words of the host that reads them: the one that fuses wrote them.
+pub(crate) fn listed(all: &[Difference]) -> String {
+    let each = all.iter().map(|it| {
+        let (there, here) = (&it.here, &it.there);
+        format!("{} is {here} here, {there} there", it.what)
+    });
+    each.collect::<Vec<_>>().join("; ")
+}
+
+#[derive(Debug, Default)]
+struct Heard {
+    clock: Clock,
+    n_exchanges: usize,
+    answer: Option<Answer>,
+}
+
+/// Waits for the host that fuses, and returns when its run began by our clock, nanoseconds; none on a stop request.
+///
+/// * `say`: is called with what the user should know while nobody answers.
+///
+/// # Errors
+///
+/// [`JoinError`].
+pub fn join(
+    address: &Address,
+    fingerprint: &Fingerprint,
+    stop: &Stop,
+    say: &mut dyn FnMut(&str),
+) -> Result<Option<u64>, JoinError> {
+    let link = Link::open(address)?;
+    let topics = Topics::of(&address.deployment);
+    let heard = Arc::new(Mutex::new(Heard::default()));
+    let origin = fastrand::u64(..);
+    listen(&link, &topics, &address.host, &heard)?;
+    let hello = Hello {
+        version: VERSION,
+        host: address.host.clone(),
+        origin,
+        fingerprint: fingerprint.clone(),
+    };
+    let mut said = None::<Instant>;
+    let welcome = loop {
+        if stop.is_requested() {
+            return Ok(None);
+        }
+        let lock = heard.lock().unwrap_or_else(PoisonError::into_inner);
+        match (&lock.answer, lock.n_exchanges) {
+            (Some(Answer::Refused(why)), _) => return Err(JoinError::Refused(why.clone())),
+            (Some(Answer::Welcome(welcome)), N_EXCHANGES..) => break *welcome,
+            _ => {}
+        }
+        drop(lock);
+        if said.is_none_or(|it| it.elapsed() > SAY_EVERY) {
+            if said.is_some() {
+                let what = if address.keys.is_some() {
+                    " (does it run, is it reachable, and are its keys of the same authority?)"
+                } else {
+                    ""
+                };
+                say(&format!("{} does not answer yet{what}", address.address));
+            }
+            said = Some(Instant::now());
+        }
+        link.send(&topics.hello(&address.host), hello.to_bytes(), true);
+        let ping = Signal::Ping {
+            origin,
+            asked_at: now_nanos(),
+        };
+        link.send(&topics.up(&address.host), ping.to_bytes().to_vec(), true);
+        std::thread::sleep(ASK_EVERY);
+    };
+    let clock = heard
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .clock
+        .clone();
+    link.close();
+    Ok(Some(begin(&clock, welcome)))
+}
+
+/// When a run began, by our clock.
+fn begin(clock: &Clock, welcome: Welcome) -> u64 {
+    let now = now_nanos();
+    clock
+        .estimate(now)
+        .map_or(now, |it| it.ours(welcome.session))
+}
+
+fn listen(
+    link: &Link,
+    topics: &Topics,
+    host: &str,
+    heard: &Arc<Mutex<Heard>>,
+) -> Result<(), LinkError> {
+    let of_answers = Arc::clone(heard);
+    link.subscribe(&topics.answer(host), move |_, bytes| {
+        if let Ok(answer) = Answer::parse(bytes) {
+            let mut heard = of_answers.lock().unwrap_or_else(PoisonError::into_inner);
+            heard.answer = Some(answer);
+        }
+    })?;
+    let of_signals = Arc::clone(heard);
+    link.subscribe(&topics.down(host), move |_, bytes| {
+        let heard_at = now_nanos();
+        if let Ok(Signal::Pong {
+            asked_at,
+            received_at,
+            answered_at,
+            ..
+        }) = Signal::parse(bytes)
+        {
+            let mut heard = of_signals.lock().unwrap_or_else(PoisonError::into_inner);
+            let exchange = Exchange {
+                asked_at,
+                received_at,
+                answered_at,
+                heard_at,
+            };
+            heard.n_exchanges += usize::from(heard.clock.add(exchange).is_ok());
+        }
+    })
+}
+
+/// The state of all hosts, as the one that fuses tells it; none if it does not answer within a time.
+///
+/// # Errors
+///
+/// The link cannot be opened.
+pub fn status(address: &Address, limit: Duration) -> Result<Option<String>, LinkError> {
+    let link = Link::open(address)?;
+    let key = Topics::of(&address.deployment).status();
+    let begin = Instant::now();
+    let mut answer = None;
+    while answer.is_none() && begin.elapsed() < limit {
+        answer = link.ask(&key, Duration::from_millis(500));
+        if answer.is_none() {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
+    link.close();
+    Ok(answer.and_then(|it| String::from_utf8(it).ok()))
+}

@@ -1,0 +1,185 @@
+//! The keys of the hosts: one authority, and a certificate with its key for each.
+
+use std::path::{Path, PathBuf};
+
+/// The files that a host needs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeyFiles {
+    /// The certificate of the authority.
+    pub authority: PathBuf,
+    /// The certificate of this host.
+    pub certificate: PathBuf,
+    /// Its key.
+    pub key: PathBuf,
+}
+
+/// Keys cannot be made or used.
+#[derive(Debug, thiserror::Error)]
+pub enum KeyError {
+    /// A file is missing.
+    #[error("there is no {0}")]
+    Missing(PathBuf),
+    /// There are keys already.
+    #[error("{0} is there already, and is not replaced: hosts that have it would be refused")]
+    Exists(PathBuf),
+    /// A file cannot be written.
+    #[error("cannot write {file}")]
+    Write {
+        /// Which one.
+        file: PathBuf,
+        /// Why.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A certificate cannot be made.
+    #[error("cannot make the certificate of {host}: {message}")]
+    Make {
+        /// For whom.
+        host: String,
+        /// Why.
+        message: String,
+    },
+    /// This build cannot.
+    #[error("this build has no hosts: build with `--features hosts`")]
+    NotBuilt,
+}
+
+impl KeyFiles {
+    /// The files of a host in a folder, as [`make_keys`] writes them.
+    ///
+    /// # Errors
+    ///
+    /// [`KeyError::Missing`].
+    pub fn find(folder: &Path, host: &str) -> Result<Self, KeyError> {
+        let files = Self {
+            authority: folder.join("ca.pem"),
+            certificate: folder.join(format!("{host}.pem")),
+            key: folder.join(format!("{host}.key")),
+        };
+        let all = [&files.authority, &files.certificate, &files.key];
+        let missing = all.into_iter().find(|it| !it.is_file()).cloned();
+        match missing {
+            Some(missing) => Err(KeyError::Missing(missing)),
+            None => Ok(files),
+        }
+    }
+}
+
+/// Makes an authority, and a certificate with its key for every host, in a folder: `ca.pem`, `ca.key`, `HOST.pem`, `HOST.key`. Keys are for
+/// their user alone. Nothing is replaced.
+///
+/// * `hosts`: their names, with the names or numbers that others reach them by.
+///
+/// # Errors
+///
+/// [`KeyError`].
+#[cfg(feature = "zenoh")]
+pub fn make_keys(folder: &Path, hosts: &[(String, Vec<String>)]) -> Result<Vec<PathBuf>, KeyError> {
+    use rcgen::{BasicConstraints, CertificateParams, DnType, IsCa, Issuer, KeyPair};
+
+    let file = |name: &str, ending: &str| folder.join(format!("{name}.{ending}"));
+    let names = || core::iter::once("ca").chain(hosts.iter().map(|it| it.0.as_str()));
+    let mut all = names().flat_map(|name| [file(name, "pem"), file(name, "key")]);
+    if let Some(exists) = all.find(|it| it.exists()) {
+        return Err(KeyError::Exists(exists));
+    }
+    let failed = |host: &str, error: &dyn core::fmt::Display| KeyError::Make {
+        host: host.to_owned(),
+        message: error.to_string(),
+    };
+    let make = |host: &str, names: Vec<String>| {
+        let mut params = CertificateParams::new(names).map_err(|it| failed(host, &it))?;
+        params.distinguished_name.push(DnType::CommonName, host);
+        Ok::<_, KeyError>(params)
+    };
+    let mut params = make("Parallax hosts", Vec::new())?;
+    params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+    let key = KeyPair::generate().map_err(|it| failed("ca", &it))?;
+    let authority = params.self_signed(&key).map_err(|it| failed("ca", &it))?;
+    let mut files = vec![
+        (file("ca", "pem"), authority.pem()),
+        (file("ca", "key"), key.serialize_pem()),
+    ];
+    let issuer = Issuer::new(params, key);
+    for (host, names) in hosts {
+        let key = KeyPair::generate().map_err(|it| failed(host, &it))?;
+        let params = make(
+            host,
+            [host.clone()].into_iter().chain(names.clone()).collect(),
+        )?;
+        let signed = params.signed_by(&key, &issuer);
+        let signed = signed.map_err(|it| failed(host, &it))?;
+        files.push((file(host, "pem"), signed.pem()));
+        files.push((file(host, "key"), key.serialize_pem()));
+    }
+    for (file, text) in &files {
+        write_private(file, text)?;
+    }
+    Ok(files.into_iter().map(|it| it.0).collect())
+}
+
+/// Without the feature there are none.
+///
+/// # Errors
+///
+/// [`KeyError::NotBuilt`].
+#[cfg(not(feature = "zenoh"))]
+pub fn make_keys(
+    _folder: &Path,
+    _hosts: &[(String, Vec<String>)],
+) -> Result<Vec<PathBuf>, KeyError> {
+    Err(KeyError::NotBuilt)
+}
+
+/// Writes a file that its user alone may read.
+#[cfg(feature = "zenoh")]
+fn write_private(file: &Path, text: &str) -> Result<(), KeyError> {
+    use std::io::Write as _;
+    use std::os::unix::fs::OpenOptionsExt as _;
+
+    let failed = |source| KeyError::Write {
+        file: file.to_owned(),
+        source,
+    };
+    if let Some(folder) = file.parent() {
+        std::fs::create_dir_all(folder).map_err(failed)?;
+    }
+    let mut options = std::fs::File::options();
+    let open = options.write(true).create_new(true).mode(0o600).open(file);
+    open.and_then(|mut it| it.write_all(text.as_bytes()))
+        .map_err(failed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_key_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("ca.pem"), "x").unwrap();
+        let error = KeyFiles::find(folder.path(), "far").unwrap_err();
+        assert!(error.to_string().ends_with("far.pem"), "{error}");
+    }
+
+    #[cfg(feature = "zenoh")]
+    #[test]
+    fn keys_are_made_once_for_their_user_alone() {
+        use std::os::unix::fs::PermissionsExt as _;
+
+        let folder = tempfile::tempdir().unwrap();
+        let hosts = [
+            ("desk".to_owned(), vec!["10.0.0.1".to_owned()]),
+            ("far".to_owned(), Vec::new()),
+        ];
+        let files = make_keys(folder.path(), &hosts).unwrap();
+        assert_eq!(files.len(), 6);
+        for file in files {
+            let mode = file.metadata().unwrap().permissions().mode();
+            assert_eq!(mode & 0o077, 0, "{}", file.display());
+        }
+        KeyFiles::find(folder.path(), "far").unwrap();
+        let again = make_keys(folder.path(), &hosts).unwrap_err();
+        assert!(matches!(again, KeyError::Exists(_)));
+    }
+}

@@ -1,0 +1,52 @@
+//! Carries messages of views between the hosts of a deployment: takes them from shared memory on one host, and writes them into loaned
+//! shared memory on another, so that every other process is as it is on one machine.
+//!
+//! | host | what its bridge does | where |
+//! |---|---|---|
+//! | with cameras | sends frames as JPEG, or poses; the newest wins | [`far`] |
+//! | that fuses | publishes them for the frames of its run, and says why where one is missing | [`near`] |
+//!
+//! The engine is Zenoh, behind the feature `zenoh`; what crosses, and the rules for it, are in `hosts`.
+#![forbid(unsafe_code)]
+
+mod far;
+mod job;
+mod join;
+mod jpeg;
+mod keys;
+mod near;
+mod timing;
+mod topics;
+
+#[cfg(feature = "zenoh")]
+mod link;
+#[cfg(not(feature = "zenoh"))]
+#[path = "no_link.rs"]
+mod link;
+
+pub use job::{Far, Job, Near, NearHost, Role};
+pub use join::{JoinError, join, status};
+pub use keys::{KeyError, KeyFiles, make_keys};
+pub use link::{Address, LinkError};
+
+use runtime::{Failure, Service};
+
+/// Whether this build has what carries messages between hosts.
+pub const HAS_LINK: bool = cfg!(feature = "zenoh");
+
+/// Carries messages until the run ends or a stop is requested.
+///
+/// # Errors
+///
+/// The link cannot be opened, another host has other files, and what the transport reports.
+pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
+    if job.address.keys.is_none() {
+        tracing::warn!(
+            "link.insecure = true: anybody on the network can read the pictures of this deployment, and send others"
+        );
+    }
+    match &job.role {
+        Role::Far(role) => far::run(service, job, role),
+        Role::Near(role) => near::run(service, job, role),
+    }
+}

@@ -1,0 +1,226 @@
+//! The link between hosts: Zenoh with explicit addresses, over TLS with certificates on both sides.
+
+use core::time::Duration;
+use std::path::Path;
+
+use serde_json::{Value, json};
+use zenoh::Wait as _;
+use zenoh::qos::{CongestionControl, Priority};
+
+use crate::keys::KeyFiles;
+
+/// How long a link without any sign of life lasts.
+const LEASE: Duration = Duration::from_secs(2);
+
+/// Where to connect to, or to listen, and as whom.
+#[derive(Debug, Clone)]
+pub struct Address {
+    /// The deployment.
+    pub deployment: String,
+    /// This host.
+    pub host: String,
+    /// The address of the host that fuses: name or number, and port.
+    pub address: String,
+    /// Whether this is that host.
+    pub listens: bool,
+    /// The keys; none if the deployment is insecure.
+    pub keys: Option<KeyFiles>,
+}
+
+/// The link cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkError {
+    /// It cannot be opened.
+    #[error("cannot {what} {address}: {message}")]
+    Open {
+        /// Connect or listen.
+        what: &'static str,
+        /// Where.
+        address: String,
+        /// Why.
+        message: String,
+    },
+    /// A name cannot be used.
+    #[error("cannot use {key:?} on the link: {message}")]
+    Use {
+        /// The name.
+        key: String,
+        /// Why.
+        message: String,
+    },
+    /// This build has none.
+    #[error("this build has no hosts: build with `--features hosts`")]
+    NotBuilt,
+}
+
+/// An open link.
+#[derive(Debug)]
+pub(crate) struct Link(zenoh::Session);
+
+impl Link {
+    /// Opens the link. A host that connects does not wait for the other: it tries for ever.
+    pub(crate) fn open(address: &Address) -> Result<Self, LinkError> {
+        let failed = |message: String| LinkError::Open {
+            what: if address.listens {
+                "listen at"
+            } else {
+                "connect to"
+            },
+            address: address.address.clone(),
+            message,
+        };
+        let config = zenoh::Config::from_json5(&config(address).to_string());
+        let config = config.map_err(|it| failed(it.to_string()))?;
+        let session = zenoh::open(config).wait();
+        Ok(Self(session.map_err(|it| failed(it.to_string()))?))
+    }
+
+    /// Sends something; what there is no room for is dropped: what must not be lost is acknowledged.
+    pub(crate) fn send(&self, key: &str, bytes: Vec<u8>, is_urgent: bool) {
+        let priority = if is_urgent {
+            Priority::RealTime
+        } else {
+            Priority::Data
+        };
+        let put = self.0.put(key, bytes);
+        let put = put
+            .congestion_control(CongestionControl::Drop)
+            .priority(priority)
+            .express(true);
+        if let Err(error) = put.wait() {
+            tracing::debug!(%error, key, "not sent");
+        }
+    }
+
+    /// Calls `on` with everything that comes under a name, until the link is closed.
+    pub(crate) fn subscribe(
+        &self,
+        key: &str,
+        on: impl Fn(&str, &[u8]) + Send + Sync + 'static,
+    ) -> Result<(), LinkError> {
+        let declared = self.0.declare_subscriber(key).callback(move |sample| {
+            on(sample.key_expr().as_str(), &sample.payload().to_bytes());
+        });
+        let declared = declared.background().wait();
+        declared.map_err(|error| LinkError::Use {
+            key: key.to_owned(),
+            message: error.to_string(),
+        })
+    }
+
+    /// Answers questions under a name.
+    pub(crate) fn answer(
+        &self,
+        key: &str,
+        on: impl Fn() -> Vec<u8> + Send + Sync + 'static,
+    ) -> Result<(), LinkError> {
+        let own = key.to_owned();
+        let declared = self.0.declare_queryable(key).callback(move |query| {
+            if let Err(error) = query.reply(own.as_str(), on()).wait() {
+                tracing::debug!(%error, "not answered");
+            }
+        });
+        let declared = declared.background().wait();
+        declared.map_err(|error| LinkError::Use {
+            key: key.to_owned(),
+            message: error.to_string(),
+        })
+    }
+
+    /// Asks under a name; the first answer within a time.
+    pub(crate) fn ask(&self, key: &str, limit: Duration) -> Option<Vec<u8>> {
+        let answers = self.0.get(key).timeout(limit).wait().ok()?;
+        let answer = answers.recv_timeout(limit).ok().flatten()?;
+        let sample = answer.into_result().ok()?;
+        Some(sample.payload().to_bytes().into_owned())
+    }
+
+    /// Closes the link.
+    pub(crate) fn close(self) {
+        if let Err(error) = self.0.close().wait() {
+            tracing::debug!(%error, "the link does not close");
+        }
+    }
+}
+
+/// The settings of Zenoh. Nothing looks for others on the network, nobody is told of others, and only the host that fuses listens.
+fn config(address: &Address) -> Value {
+    let text = |path: &Path| Value::from(path.display().to_string());
+    let protocol = if address.keys.is_some() { "tls" } else { "tcp" };
+    let at = format!("{protocol}/{}", address.address);
+    let [listen, connect] = if address.listens {
+        [vec![at], vec![]]
+    } else {
+        [vec![], vec![at]]
+    };
+    let tls = address.keys.as_ref().map(|keys| {
+        json!({
+            "root_ca_certificate": text(&keys.authority),
+            "listen_certificate": text(&keys.certificate),
+            "listen_private_key": text(&keys.key),
+            "connect_certificate": text(&keys.certificate),
+            "connect_private_key": text(&keys.key),
+            "enable_mtls": true,
+            "verify_name_on_connect": true,
+        })
+    });
+    let mut link = json!({ "tx": { "lease": LEASE.as_millis() as u64, "keep_alive": 4 } });
+    if let Some(tls) = tls {
+        link["protocols"] = json!(["tls"]);
+        link["tls"] = tls;
+    } else {
+        link["protocols"] = json!(["tcp"]);
+    }
+    json!({
+        "mode": "peer",
+        "listen": { "endpoints": listen },
+        "connect": {
+            "endpoints": connect,
+            "timeout_ms": -1,
+            "exit_on_failure": false,
+            "retry": { "period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5 },
+        },
+        "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+        "transport": { "link": link },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn address(listens: bool, keys: bool) -> Address {
+        let file = |name: &str| format!("/k/{name}").into();
+        Address {
+            deployment: "a".to_owned(),
+            host: "desk".to_owned(),
+            address: "10.0.0.1:7447".to_owned(),
+            listens,
+            keys: keys.then(|| KeyFiles {
+                authority: file("ca.pem"),
+                certificate: file("desk.pem"),
+                key: file("desk.key"),
+            }),
+        }
+    }
+
+    #[test]
+    fn only_the_host_that_fuses_listens_and_with_keys_over_tls_alone() {
+        for listens in [true, false] {
+            for keys in [true, false] {
+                let text = config(&address(listens, keys));
+                let at = format!("{}/10.0.0.1:7447", if keys { "tls" } else { "tcp" });
+                let expected = if listens {
+                    [json!([at]), json!([])]
+                } else {
+                    [json!([]), json!([at])]
+                };
+                let got = ["listen", "connect"].map(|it| text[it]["endpoints"].clone());
+                assert_eq!(got, expected);
+                let tls = &text["transport"]["link"]["tls"];
+                assert_eq!(tls["enable_mtls"].as_bool(), keys.then_some(true));
+                zenoh::Config::from_json5(&text.to_string()).unwrap();
+            }
+        }
+    }
+}

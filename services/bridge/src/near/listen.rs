@@ -1,0 +1,323 @@
+//! What comes over the link: every packet is checked, decoded in a thread of its view, and acknowledged then.
+
+use std::sync::{Arc, Mutex};
+
+use crossbeam::channel::{Receiver, Sender, bounded};
+use deployment::hosts::Carry;
+use hosts::{
+    Answer, Content, Exchange, Expected, Fingerprint, Head, Hello, Packet, Signal, Welcome,
+};
+use messages::Status;
+use recording::{Kind, Message};
+use runtime::{ExitKind, Failure, OrFail as _, Service, now_nanos};
+
+use super::remote::Remote;
+use crate::job::{Job, Near};
+use crate::jpeg;
+use crate::link::Link;
+use crate::topics::{Topics, host_of};
+
+/// Packets of a view that wait to be decoded: more than a host that keeps to the rules has on its way.
+const MOST_WAITING: usize = 8;
+/// Messages that wait to be published.
+const MOST_ARRIVED: usize = 256;
+
+/// A message that was decoded.
+pub(super) struct Arrived {
+    pub(super) head: Head,
+    /// Pixels, or the message as in a recording; empty without either.
+    pub(super) body: Vec<u8>,
+    /// When it came, and when it was decoded.
+    pub(super) came_at: u64,
+    pub(super) decoded_at: u64,
+    /// Its bytes on the way.
+    pub(super) n_bytes: usize,
+}
+
+impl Arrived {
+    pub(super) fn view(&self) -> usize {
+        self.head.view as usize
+    }
+
+    /// Whether it goes beside another message of its frame, which is the one that counts.
+    pub(super) fn is_beside(&self) -> bool {
+        self.head.content == Content::ViewQuality
+    }
+}
+
+/// A packet that was checked and waits to be decoded.
+struct Waiting {
+    head: Head,
+    body: Vec<u8>,
+    came_at: u64,
+    n_bytes: usize,
+}
+
+/// Begins to listen. Returns what arrives.
+///
+/// * `own`: the start of this bridge, and the text that is answered to questions about the state of all hosts.
+pub(super) fn listen(
+    service: &Service,
+    (job, role): (&Job, &Near),
+    link: &Arc<Link>,
+    remotes: &Arc<Vec<Remote>>,
+    own: (u64, Arc<Mutex<String>>),
+) -> Result<Receiver<Arrived>, Failure> {
+    let topics = Topics::of(&job.address.deployment);
+    let (origin, status) = own;
+    let welcome = Welcome {
+        origin,
+        session: service.session(),
+    };
+    let (sender, arrived) = bounded(MOST_ARRIVED);
+    let mut inlets: Vec<Option<Sender<Waiting>>> = Vec::new();
+    inlets.resize_with(job.sizes.len(), || None);
+    for (index, host) in role.hosts.iter().enumerate() {
+        for &view in &host.views {
+            let (inlet, waiting) = bounded(MOST_WAITING);
+            let decoder = Decoder {
+                link: Arc::clone(link),
+                remotes: Arc::clone(remotes),
+                remote: index,
+                down: topics.down(&host.name),
+                size: job.sizes.get(view).copied().unwrap_or_default(),
+                arrived: sender.clone(),
+            };
+            let thread = std::thread::Builder::new().name(format!("decode-{view}"));
+            let started = thread.spawn(move || decoder.run(&waiting));
+            started.or_fail(ExitKind::Run)?;
+            if let Some(slot) = inlets.get_mut(view) {
+                *slot = Some(inlet);
+            }
+        }
+    }
+    let gate = Gate {
+        remotes: Arc::clone(remotes),
+        sizes: job.sizes.clone(),
+        carry: job.carry,
+        inlets,
+    };
+    let subscribed = link.subscribe(&topics.data("*"), move |key, bytes| gate.take(key, bytes));
+    subscribed.or_fail(ExitKind::Run)?;
+    hear_signals(link, &topics, remotes, origin)?;
+    hear_hellos(link, &topics, remotes, (&job.fingerprint, welcome))?;
+    let answering = link.answer(&topics.status(), move || {
+        let text = status.lock();
+        text.map_or_else(|_| Vec::new(), |it| it.clone().into_bytes())
+    });
+    answering.or_fail(ExitKind::Run)?;
+    Ok(arrived)
+}
+
+/// Checks packets.
+struct Gate {
+    remotes: Arc<Vec<Remote>>,
+    sizes: Vec<[u32; 2]>,
+    carry: Carry,
+    /// By view.
+    inlets: Vec<Option<Sender<Waiting>>>,
+}
+
+impl Gate {
+    fn take(&self, key: &str, bytes: &[u8]) {
+        let came_at = now_nanos();
+        let name = host_of(key);
+        let Some(remote) = self.remotes.iter().find(|it| it.name == name) else {
+            tracing::debug!(key, "from a host that is none of the deployment's");
+            return;
+        };
+        let expected = Expected {
+            views: &remote.views,
+            sizes: &self.sizes,
+            // No JPEG of a frame is larger than its pixels and its tables.
+            max_body: self.most_body(),
+        };
+        let packet = match Packet::parse(bytes, &expected) {
+            Ok(packet) => packet,
+            Err(error) => return remote.malformed(&error),
+        };
+        let crosses = match packet.head.content {
+            Content::Frame => self.carry == Carry::Frames,
+            Content::ViewPose | Content::ViewQuality => self.carry == Carry::Poses,
+        };
+        if !crosses {
+            return remote.malformed(&"a message that does not cross: link.carry is another there");
+        }
+        let mut state = remote.state();
+        if state.welcomed != Some(packet.head.origin) {
+            state.n_unknown += 1;
+            return;
+        }
+        state.n_packets += 1;
+        state.n_bytes += bytes.len() as u64;
+        drop(state);
+        remote.heard(came_at);
+        let waiting = Waiting {
+            head: packet.head,
+            body: packet.body.to_vec(),
+            came_at,
+            n_bytes: bytes.len(),
+        };
+        let inlet = self.inlets.get(packet.head.view as usize);
+        let inlet = inlet.and_then(Option::as_ref);
+        if inlet.is_none_or(|it| it.try_send(waiting).is_err()) {
+            remote.state().n_no_room += 1;
+        }
+    }
+
+    fn most_body(&self) -> usize {
+        const TABLES: usize = 1 << 16;
+        let pixels = self.sizes.iter().map(|it| (it[0] * it[1] * 3) as usize);
+        pixels.max().unwrap_or(0) + TABLES
+    }
+}
+
+/// Decodes the packets of one view.
+struct Decoder {
+    link: Arc<Link>,
+    remotes: Arc<Vec<Remote>>,
+    remote: usize,
+    /// Where acknowledgements go.
+    down: String,
+    size: [u32; 2],
+    arrived: Sender<Arrived>,
+}
+
+impl Decoder {
+    fn run(&self, waiting: &Receiver<Waiting>) {
+        while let Ok(it) = waiting.recv() {
+            let ack = Signal::Ack {
+                origin: it.head.origin,
+                view: it.head.view,
+                content: it.head.content,
+                sequence: it.head.sequence,
+            };
+            let arrived = self.decode(it);
+            // Only now: the other host sends no faster than this one decodes.
+            self.link.send(&self.down, ack.to_bytes().to_vec(), true);
+            if let Some(arrived) = arrived
+                && self.arrived.send(arrived).is_err()
+            {
+                return;
+            }
+        }
+    }
+
+    fn decode(&self, it: Waiting) -> Option<Arrived> {
+        let remote = &self.remotes[self.remote];
+        let body = match it.head.content {
+            Content::Frame if it.head.status == Status::OK => {
+                let pixels = jpeg::decode(&it.body, self.size);
+                if pixels.is_none() {
+                    remote.malformed(&"a JPEG that is damaged, or of another size");
+                }
+                pixels?
+            }
+            Content::Frame => Vec::new(),
+            Content::ViewPose | Content::ViewQuality => {
+                let kind = kind_of(it.head.content)?;
+                if let Err(error) = Message::parse(kind, &it.body) {
+                    remote.malformed(&error);
+                    return None;
+                }
+                it.body
+            }
+        };
+        Some(Arrived {
+            head: it.head,
+            body,
+            came_at: it.came_at,
+            decoded_at: now_nanos(),
+            n_bytes: it.n_bytes,
+        })
+    }
+}
+
+/// The kind of message in a recording; none for frames.
+pub(super) fn kind_of(content: Content) -> Option<Kind> {
+    match content {
+        Content::Frame => None,
+        Content::ViewPose => Some(Kind::ViewPose),
+        Content::ViewQuality => Some(Kind::ViewQuality),
+    }
+}
+
+/// Answers to our questions about the time, and the questions of hosts that begin.
+fn hear_signals(
+    link: &Arc<Link>,
+    topics: &Topics,
+    remotes: &Arc<Vec<Remote>>,
+    origin: u64,
+) -> Result<(), Failure> {
+    let (remotes, own, back) = (Arc::clone(remotes), topics.clone(), Arc::downgrade(link));
+    let heard = link.subscribe(&topics.up("*"), move |key, bytes| {
+        let heard_at = now_nanos();
+        let name = host_of(key);
+        let Some(remote) = remotes.iter().find(|it| it.name == name) else {
+            return;
+        };
+        match Signal::parse(bytes) {
+            Ok(Signal::Ping { asked_at, .. }) => {
+                let pong = Signal::Pong {
+                    origin,
+                    asked_at,
+                    received_at: heard_at,
+                    answered_at: now_nanos(),
+                };
+                if let Some(link) = back.upgrade() {
+                    link.send(&own.down(name), pong.to_bytes().to_vec(), true);
+                }
+            }
+            Ok(Signal::Pong {
+                origin: of,
+                asked_at,
+                received_at,
+                answered_at,
+            }) => {
+                // Of the bridge whose messages are taken: what came before it may be of another clock.
+                if remote.state().welcomed == Some(of) {
+                    remote.exchanged(Exchange {
+                        asked_at,
+                        received_at,
+                        answered_at,
+                        heard_at,
+                    });
+                }
+            }
+            Ok(Signal::Ack { .. }) => {}
+            Err(error) => remote.malformed(&error),
+        }
+    });
+    heard.or_fail(ExitKind::Run)
+}
+
+/// Welcomes hosts, or refuses them.
+fn hear_hellos(
+    link: &Arc<Link>,
+    topics: &Topics,
+    remotes: &Arc<Vec<Remote>>,
+    (fingerprint, welcome): (&Fingerprint, Welcome),
+) -> Result<(), Failure> {
+    let (remotes, own, back) = (Arc::clone(remotes), topics.clone(), Arc::downgrade(link));
+    let fingerprint = fingerprint.clone();
+    let heard = link.subscribe(&topics.hello("*"), move |key, bytes| {
+        let Ok(hello) = Hello::parse(bytes) else {
+            tracing::debug!(key, "no introduction");
+            return;
+        };
+        let name = host_of(key);
+        let remote = remotes
+            .iter()
+            .find(|it| it.name == name && it.name == hello.host);
+        let answer = hello.answer(remote.is_some(), &fingerprint, welcome);
+        match (remote, &answer) {
+            (Some(remote), Answer::Welcome(_)) => remote.welcomed(hello.origin, now_nanos()),
+            (Some(remote), Answer::Refused(why)) => remote.refused(why),
+            (None, _) => tracing::warn!(name, "a host that is none of the deployment's is refused"),
+        }
+        if let Some(link) = back.upgrade() {
+            link.send(&own.answer(name), answer.to_bytes(), true);
+        }
+    });
+    heard.or_fail(ExitKind::Run)
+}

@@ -1,0 +1,150 @@
+//! What is known of another host.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use hosts::{Clock, Difference, Estimate, Exchange};
+
+use crate::job::NearHost;
+use crate::join::listed;
+
+/// A host that has not been heard for so long does not answer, nanoseconds.
+const SILENT_AFTER: u64 = 1_200_000_000;
+
+/// Another host. Shared with the threads of the link.
+#[derive(Debug)]
+pub(super) struct Remote {
+    pub(super) name: String,
+    pub(super) views: Vec<usize>,
+    state: Mutex<State>,
+}
+
+/// What changes.
+#[derive(Debug, Default, Clone)]
+pub(super) struct State {
+    pub(super) clock: Clock,
+    /// The start of its bridge that was welcomed.
+    pub(super) welcomed: Option<u64>,
+    pub(super) refused: Option<Vec<Difference>>,
+    heard_at: Option<u64>,
+    pub(super) n_packets: u64,
+    pub(super) n_bytes: u64,
+    /// Packets that were none, with the reason of the last.
+    pub(super) n_malformed: u64,
+    pub(super) last_malformed: String,
+    /// Packets of a bridge that was not welcomed (yet).
+    pub(super) n_unknown: u64,
+    /// Packets that came before its clock was known.
+    pub(super) n_without_clock: u64,
+    /// Packets for which there was no room: it does not keep to the rules.
+    pub(super) n_no_room: u64,
+    /// How often it came, and went.
+    pub(super) n_came: u64,
+    pub(super) n_went: u64,
+    was_there: bool,
+    has_warned: bool,
+}
+
+impl Remote {
+    pub(super) fn new(host: &NearHost) -> Self {
+        Self {
+            name: host.name.clone(),
+            views: host.views.clone(),
+            state: Mutex::new(State::default()),
+        }
+    }
+
+    pub(super) fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// It was heard.
+    pub(super) fn heard(&self, now: u64) {
+        self.state().heard_at = Some(now);
+    }
+
+    /// Whether it was welcomed, and heard lately.
+    pub(super) fn is_there(&self, now: u64) -> bool {
+        self.state().is_there(now)
+    }
+
+    /// What is known of its clock.
+    pub(super) fn estimate(&self, now: u64) -> Option<Estimate> {
+        self.state().clock.estimate(now)
+    }
+
+    pub(super) fn count_without_clock(&self) {
+        self.state().n_without_clock += 1;
+    }
+
+    /// An exchange of times with it.
+    pub(super) fn exchanged(&self, exchange: Exchange) {
+        let mut state = self.state();
+        state.heard_at = Some(exchange.heard_at);
+        if let Err(error) = state.clock.add(exchange) {
+            tracing::debug!(%error, host = self.name, "times that are not used");
+        }
+    }
+
+    /// A bridge of that host was welcomed.
+    pub(super) fn welcomed(&self, origin: u64, now: u64) {
+        let mut state = self.state();
+        state.heard_at = Some(now);
+        if state.welcomed.replace(origin) != Some(origin) {
+            // Perhaps with the host: its clock is another then.
+            state.clock.forget();
+            state.refused = None;
+        }
+    }
+
+    /// A bridge of that host was refused; logged where that is new.
+    pub(super) fn refused(&self, why: &[Difference]) {
+        let mut state = self.state();
+        if state.refused.as_deref() != Some(why) {
+            let why = listed(why);
+            tracing::warn!(host = self.name, "refused, as the host sees it: {why}");
+        }
+        state.refused = Some(why.to_vec());
+        state.welcomed = None;
+    }
+
+    /// Something came from it that is no packet.
+    pub(super) fn malformed(&self, why: &dyn core::fmt::Display) {
+        let mut state = self.state();
+        state.n_malformed += 1;
+        state.last_malformed = why.to_string();
+        if state.n_malformed.is_power_of_two() {
+            let n = state.n_malformed;
+            tracing::warn!(host = self.name, %why, n, "what came from this host is refused");
+        }
+    }
+
+    /// Logs whether it is there where that has changed, and once a clock that is not known well enough.
+    pub(super) fn watch(&self, now: u64, period_nanos: f64, max_share: f64) {
+        let mut state = self.state();
+        let is_there = state.is_there(now);
+        if is_there != state.was_there {
+            state.was_there = is_there;
+            if is_there {
+                state.n_came += 1;
+                tracing::info!(host = self.name, "answers");
+            } else {
+                state.n_went += 1;
+                tracing::warn!(host = self.name, "does not answer: its views are missing");
+            }
+        }
+        let estimate = state.clock.estimate(now).filter(|_| is_there);
+        let settled = estimate.filter(|it| it.n_exchanges >= 20);
+        let warning = settled.and_then(|it| it.warning(period_nanos as u64, max_share));
+        if let Some(warning) = warning.filter(|_| !state.has_warned) {
+            state.has_warned = true;
+            tracing::warn!(host = self.name, "{warning}");
+        }
+    }
+}
+
+impl State {
+    pub(super) fn is_there(&self, now: u64) -> bool {
+        let is_heard = |at: u64| now.saturating_sub(at) < SILENT_AFTER;
+        self.welcomed.is_some() && self.heard_at.is_some_and(is_heard)
+    }
+}

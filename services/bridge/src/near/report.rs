@@ -1,0 +1,160 @@
+//! The state of all hosts as JSON: for `parallax hosts status`, and as a file beside the results.
+
+use core::time::Duration;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use hosts::{Estimate, Tally};
+use runtime::now_nanos;
+use serde_json::{Value, json};
+
+use super::listen::Arrived;
+use super::remote::Remote;
+use crate::timing::Timing;
+
+/// How long the messages of a view took.
+#[derive(Debug, Default)]
+struct Times {
+    /// From the send time of its stage until it was encoded, there.
+    encode: Timing,
+    /// From there to here.
+    network: Timing,
+    /// Until it was decoded, here.
+    decode: Timing,
+    /// All of it, with the publishing.
+    all: Timing,
+    n_bytes: u64,
+    n_overtaken: u64,
+}
+
+/// The state of all hosts.
+#[derive(Debug)]
+pub(super) struct Report {
+    file: PathBuf,
+    text: Arc<Mutex<String>>,
+    views: BTreeMap<usize, Times>,
+    written: Option<Instant>,
+    begin: Instant,
+}
+
+impl Report {
+    pub(super) fn new(file: PathBuf) -> Self {
+        Self {
+            file,
+            text: Arc::default(),
+            views: BTreeMap::new(),
+            written: None,
+            begin: Instant::now(),
+        }
+    }
+
+    /// The newest text.
+    pub(super) fn text(&self) -> Arc<Mutex<String>> {
+        Arc::clone(&self.text)
+    }
+
+    /// A message was published.
+    pub(super) fn took(&mut self, view: usize, it: &Arrived, clock: &Estimate) {
+        let times = self.views.entry(view).or_default();
+        let head = &it.head;
+        let since = |later: u64, earlier: u64| later.saturating_sub(earlier);
+        times
+            .encode
+            .add(since(head.packed_at_nanos, head.sent_at_nanos));
+        times
+            .network
+            .add(since(it.came_at, clock.ours(head.packed_at_nanos)));
+        times.decode.add(since(it.decoded_at, it.came_at));
+        times
+            .all
+            .add(since(now_nanos(), clock.ours(head.sent_at_nanos)));
+        times.n_bytes += it.n_bytes as u64;
+        times.n_overtaken = head.n_overtaken;
+    }
+
+    pub(super) fn is_due(&self, every: Duration) -> bool {
+        self.written.is_none_or(|at| at.elapsed() >= every)
+    }
+
+    /// Writes the state.
+    ///
+    /// * `views`: of every view of another host its number, that of its host and its tally.
+    pub(super) fn write(
+        &mut self,
+        remotes: &[Remote],
+        views: &[(usize, usize, Tally)],
+        is_last: bool,
+    ) {
+        self.written = Some(Instant::now());
+        let hosts: Vec<Value> = remotes
+            .iter()
+            .enumerate()
+            .map(|(index, remote)| {
+                let own = views.iter().filter(|it| it.1 == index);
+                self.host(remote, own.map(|it| (it.0, it.2)))
+            })
+            .collect();
+        let seconds = self.begin.elapsed().as_secs_f64();
+        let value =
+            json!({ "schema_version": 1, "seconds": seconds, "over": is_last, "hosts": hosts });
+        let text = format!("{value:#}\n");
+        if let Err(error) = files::replace_unsynced(&self.file, text.as_bytes()) {
+            tracing::debug!(%error, "cannot write the state of the hosts");
+        }
+        *self.text.lock().unwrap_or_else(PoisonError::into_inner) = text;
+    }
+
+    fn host(&self, remote: &Remote, views: impl Iterator<Item = (usize, Tally)>) -> Value {
+        let now = now_nanos();
+        let state = remote.state().clone();
+        let clock = state.clock.estimate(now).map(|it| {
+            json!({
+                "offset_ms": it.offset_nanos as f64 * 1e-6,
+                "drift_ppm": it.drift_ppb * 1e-3,
+                "bound_ms": it.bound_nanos as f64 * 1e-6,
+                "trip_ms": it.trip_nanos as f64 * 1e-6,
+                "exchanges": it.n_exchanges,
+                "resets": state.clock.n_resets(),
+            })
+        });
+        let views: Vec<Value> = views.map(|(view, tally)| self.view(view, &tally)).collect();
+        json!({
+            "name": remote.name,
+            "there": state.is_there(now),
+            "refused": state.refused,
+            "clock": clock,
+            "packets": state.n_packets,
+            "bytes": state.n_bytes,
+            "malformed": state.n_malformed,
+            "last_malformed": state.last_malformed,
+            "unknown": state.n_unknown,
+            "without_clock": state.n_without_clock,
+            "no_room": state.n_no_room,
+            "came": state.n_came,
+            "went": state.n_went,
+            "views": views,
+        })
+    }
+
+    fn view(&self, view: usize, tally: &Tally) -> Value {
+        let times = self.views.get(&view);
+        let of = |pick: fn(&Times) -> &Timing| times.and_then(|it| pick(it).percentiles());
+        json!({
+            "view": view,
+            "used": tally.n_used,
+            "late": tally.n_late,
+            "gone": tally.n_gone,
+            "left_out": tally.n_left_out,
+            "came_late": tally.n_came_late,
+            "surplus": tally.n_surplus,
+            "overtaken": times.map_or(0, |it| it.n_overtaken),
+            "bytes": times.map_or(0, |it| it.n_bytes),
+            "encode": of(|it| &it.encode),
+            "network": of(|it| &it.network),
+            "decode": of(|it| &it.decode),
+            "all": of(|it| &it.all),
+        })
+    }
+}

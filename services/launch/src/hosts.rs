@@ -1,0 +1,260 @@
+//! Deployments of several hosts: which of them this machine is, what must be the same on all, and the job of the bridge.
+
+use std::path::Path;
+
+use bridge::{Address, KeyFiles, NearHost};
+use deployment::Deployment;
+use deployment::hosts::Host;
+use hosts::Fingerprint;
+use messages::topic;
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use crate::inputs;
+use crate::prepare::Prepared;
+use crate::resolved::Resolved;
+
+/// The host that this machine is: the one that is named, or the one with the name of the machine. None for a deployment without
+/// hosts.
+///
+/// * `machine`: the name of the machine.
+///
+/// # Errors
+///
+/// There is no such host, or this build has none.
+pub fn choose<'a>(
+    deployment: &'a Deployment,
+    named: Option<&str>,
+    machine: &str,
+) -> Result<Option<&'a Host>, Failure> {
+    if deployment.hosts.is_empty() {
+        return match named {
+            None => Ok(None),
+            Some(name) => {
+                let message = format!("--host {name}: the deployment has no [[host]]");
+                Err(Failure::new(ExitKind::Usage, message))
+            }
+        };
+    }
+    let known: Vec<&str> = deployment.hosts.iter().map(|it| it.name.as_str()).collect();
+    let short = machine.split('.').next().unwrap_or(machine);
+    let name = named.unwrap_or(short);
+    let Some(host) = deployment.host(name) else {
+        let message = format!(
+            "{name:?} is none of the hosts of the deployment: {}",
+            known.join(", ")
+        );
+        let failure = Failure::new(ExitKind::Usage, message);
+        return Err(failure.with_hint("say which one this machine is: --host NAME"));
+    };
+    let has_keypoints = deployment.cameras.iter().find(|it| it.keypoints.is_some());
+    if let Some(camera) = has_keypoints {
+        let message = format!(
+            "camera {:?} has `keypoints`, and the deployment has hosts: files of keypoints are for one machine",
+            camera.name
+        );
+        return Err(Failure::new(ExitKind::Config, message));
+    }
+    if !bridge::HAS_LINK {
+        let failure = Failure::new(ExitKind::Usage, "this build has no hosts");
+        return Err(failure.with_hint("build it with `cargo build --release --features hosts`"));
+    }
+    Ok(Some(host))
+}
+
+/// Where a host connects to, or listens, and as whom.
+///
+/// # Errors
+///
+/// A key is missing.
+pub fn address(deployment: &Deployment, host: &Host) -> Result<Address, Failure> {
+    let fusing = deployment.fusing_host().and_then(|it| it.address.clone());
+    let keys = match &deployment.link.keys {
+        Some(folder) if !deployment.link.insecure => {
+            Some(KeyFiles::find(folder, &host.name).map_err(|error| {
+                let failure = Failure::new(ExitKind::Input, error);
+                failure.with_hint("`parallax hosts keys FILE` makes them; every host needs ca.pem and its own two files")
+            })?)
+        }
+        _ => None,
+    };
+    Ok(Address {
+        deployment: deployment.name.clone(),
+        host: host.name.clone(),
+        address: fusing.unwrap_or_default(),
+        listens: host.fuses,
+        keys,
+    })
+}
+
+/// What must be the same on all hosts: the files that results depend on, and the settings.
+///
+/// # Errors
+///
+/// A file cannot be read.
+pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
+    let mut all = Fingerprint::default();
+    all.add_text("version of Parallax", env!("CARGO_PKG_VERSION"));
+    all.add("rig", &read(&deployment.rig)?);
+    all.add("model", &inputs::model_bytes(deployment.model.as_deref())?);
+    let networks = [
+        ("pose.network", &deployment.pose.network),
+        ("pose.detector", &deployment.pose.detector),
+        ("quality.network", &deployment.quality.network),
+    ];
+    for (what, file) in networks {
+        match file.as_deref() {
+            None => {}
+            Some(file) if deployment::is_shipped(file) => all.add_text(what, "shipped"),
+            Some(file) => all.add(what, &read(file)?),
+        }
+    }
+    let hosts = deployment.hosts.iter();
+    let views: Vec<String> = hosts
+        .map(|it| format!("{}: {}", it.name, it.views.join(" ")))
+        .collect();
+    all.add("views of hosts", views.join("\n").as_bytes());
+    let settings = serde_json::to_vec(&(
+        &deployment.capture,
+        &deployment.link.carry,
+        deployment.unit,
+        deployment.up,
+        deployment
+            .cameras
+            .iter()
+            .map(|it| &it.name)
+            .collect::<Vec<_>>(),
+    ));
+    all.add("capture", &settings.or_fail(ExitKind::Run)?);
+    Ok(all)
+}
+
+fn read(file: &Path) -> Result<Vec<u8>, Failure> {
+    std::fs::read(file).map_err(|error| runtime::in_file(file, &error))
+}
+
+/// The part of a deployment that a host runs: one with cameras has a name and a folder of its own, so that it can run beside the others
+/// on one machine.
+pub fn part(deployment: &Deployment, host: &Host) -> Deployment {
+    let mut part = deployment.clone();
+    if !host.fuses {
+        part.output = deployment.output.join(&host.name);
+    }
+    part
+}
+
+/// The name under which the processes of a host share memory.
+pub(crate) fn namespace(resolved: &Resolved) -> String {
+    let deployment = &resolved.deployment;
+    match resolved.own_host().filter(|it| !it.fuses) {
+        Some(host) => deployment.name_on(host),
+        None => deployment.name.clone(),
+    }
+}
+
+/// The job of the bridge.
+pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
+    let deployment = &resolved.deployment;
+    let host = resolved
+        .own_host()
+        .ok_or("the deployment has no host of that name")
+        .or_fail(ExitKind::Config)?;
+    let prepared = Prepared::new(resolved)?;
+    let capture = &deployment.capture;
+    let step = capture.frame_step.max(1);
+    let rate_hz = capture.frame_rate_hz.unwrap_or(1.0) / step as f64;
+    let sizes = prepared.views.iter().map(|it| it.framing.out_size());
+    let role = if host.fuses {
+        let topology = resolved.topology();
+        let others = deployment.hosts.iter().filter(|it| !it.fuses);
+        let topic = |view: usize| match deployment.link.carry {
+            deployment::hosts::Carry::Frames => topic::frame(view),
+            deployment::hosts::Carry::Poses => topic::view_pose(view),
+        };
+        let views = 0..prepared.views.len();
+        bridge::Role::Near(bridge::Near {
+            hosts: others
+                .map(|it| NearHost {
+                    name: it.name.clone(),
+                    views: deployment.views_of(it),
+                })
+                .collect(),
+            n_frames: resolved.n_frames(),
+            n_receivers: views
+                .map(|view| topology.receivers_of(&topic(view)))
+                .collect(),
+            patience: resolved.patience(),
+            max_clock_share: deployment.link.max_clock_share,
+            file: deployment.output.join("hosts.json"),
+        })
+    } else {
+        bridge::Role::Far(bridge::Far {
+            views: deployment.views_of(host),
+            jpeg_quality: deployment.link.jpeg_quality,
+        })
+    };
+    Ok(bridge::Job {
+        address: address(deployment, host)?,
+        fingerprint: fingerprint(deployment)?,
+        carry: deployment.link.carry,
+        has_quality: deployment.has_quality(),
+        sizes: sizes.collect(),
+        lead_nanos: inputs::lead_nanos(deployment),
+        period_nanos: 1e9 / rate_hz,
+        start_frame: capture.start_frame,
+        frame_step: step,
+        role,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use deployment::{AnyMachine, Loaded};
+
+    use super::*;
+
+    fn deployment(hosts: &str) -> Deployment {
+        let text = format!(
+            "name = 'a'\nrig = 'r'\noutput = '/o'\n\
+             [[camera]]\nname = 'c0'\nsource = 's'\n[[camera]]\nname = 'c1'\nsource = 's'\n\
+             [capture]\nmode = 'realtime'\npace = 'realtime'\nframe_rate_hz = 5.0\n{hosts}"
+        );
+        let loaded = Loaded::parse(&text, Path::new("d.toml"), &[], &AnyMachine);
+        loaded.unwrap().deployment
+    }
+
+    const HOSTS: &str = "[link]\ninsecure = true\n\
+        [[host]]\nname = 'desk'\nfuses = true\naddress = 'x:1'\nviews = ['c0']\n[[host]]\nname = 'far'\nviews = ['c1']\n";
+
+    #[test]
+    fn a_deployment_without_hosts_has_none_whatever_the_machine_is_called() {
+        let it = deployment("");
+        assert_eq!(choose(&it, None, "far").unwrap(), None);
+        let error = choose(&it, Some("far"), "far").unwrap_err();
+        assert!(error.to_string().contains("no [[host]]"), "{error}");
+    }
+
+    #[test]
+    fn a_host_is_named_or_is_the_machine() {
+        let it = deployment(HOSTS);
+        if bridge::HAS_LINK {
+            let chosen =
+                |named, machine| choose(&it, named, machine).unwrap().unwrap().name.clone();
+            assert_eq!(chosen(None, "far.example.org"), "far");
+            assert_eq!(chosen(Some("desk"), "far"), "desk");
+        } else {
+            let error = choose(&it, Some("desk"), "far").unwrap_err();
+            assert!(error.to_string().contains("no hosts"), "{error}");
+        }
+        let error = choose(&it, None, "laptop").unwrap_err();
+        assert!(error.to_string().contains("desk, far"), "{error}");
+    }
+
+    #[test]
+    fn a_host_with_cameras_has_a_folder_of_its_own() {
+        let it = deployment(HOSTS);
+        assert_eq!(part(&it, &it.hosts[0]), it);
+        assert_eq!(part(&it, &it.hosts[1]).output, Path::new("/o/far"));
+    }
+}

@@ -1,0 +1,210 @@
+//! `parallax hosts`: the machines of a deployment of several: their state, and their keys.
+
+use core::fmt::Write as _;
+use core::time::Duration;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+use deployment::Deployment;
+use launch::{Planned, hosts, load, output};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use serde_json::Value;
+
+use crate::globals::Globals;
+
+/// How long `status` waits for the host that fuses.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Show the hosts of a running deployment: who answers, how well clocks are known, what became of every view.
+    Status(StatusArguments),
+    /// Make the keys of all hosts: an authority, and a certificate with its key for each.
+    Keys(KeysArguments),
+}
+
+/// Options of `parallax hosts status`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Asks the host that fuses over the link, so it works from every host that has keys.
+
+Exit codes: 0 all hosts answer; 7 some do not; 4 the host that fuses does not answer.
+
+Examples:
+    parallax hosts status my.toml
+    parallax hosts status my.toml --host left --json")]
+pub(crate) struct StatusArguments {
+    /// The deployment file.
+    config: PathBuf,
+    /// The host that this machine is; without it the one with the name of the machine.
+    #[arg(long, value_name = "NAME")]
+    host: Option<String>,
+    /// Print the state as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Options of `parallax hosts keys`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Writes ca.pem, ca.key, and HOST.pem and HOST.key of every host into `link.keys` of the deployment. Every host needs ca.pem and its
+own two files there; ca.key is needed for further hosts alone, and belongs on none of them. Nothing is replaced.
+
+Example:
+    parallax hosts keys my.toml")]
+pub(crate) struct KeysArguments {
+    /// The deployment file.
+    config: PathBuf,
+}
+
+/// Runs a command.
+pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
+    match command {
+        Command::Status(it) => status(it),
+        Command::Keys(it) => keys(it),
+    }
+}
+
+/// Plans the run of this machine: of a whole deployment, or of the part of one of its hosts. One with cameras waits for the host that
+/// fuses; none on a stop request.
+///
+/// * `chosen`: the host that was asked for, and whether nothing is to be started.
+pub(crate) fn plan(
+    deployment: &Deployment,
+    (named, is_dry): (Option<&str>, bool),
+    stop: &Stop,
+    globals: Globals,
+) -> Result<Option<Planned>, Failure> {
+    let Some(host) = hosts::choose(deployment, named, &machine())? else {
+        return Planned::new(deployment, globals.level()).map(Some);
+    };
+    let session = if host.fuses || is_dry {
+        None
+    } else {
+        let address = hosts::address(deployment, host)?;
+        let fingerprint = hosts::fingerprint(deployment)?;
+        let mut say = |text: &str| output::message(text);
+        let joined = bridge::join(&address, &fingerprint, stop, &mut say);
+        match joined.or_fail(ExitKind::Config)? {
+            Some(session) => Some(session),
+            None => return Ok(None),
+        }
+    };
+    Planned::on_host(deployment, host, session, globals.level()).map(Some)
+}
+
+/// The name of this machine.
+fn machine() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname");
+    name.unwrap_or_default().trim().to_owned()
+}
+
+fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
+    let loaded = load::read(&arguments.config, &[])?;
+    let deployment = &loaded.deployment;
+    let named = arguments.host.as_deref();
+    let host = hosts::choose(deployment, named, &machine())?;
+    let host = host
+        .ok_or("the deployment has no [[host]]")
+        .or_fail(ExitKind::Usage)?;
+    let mut address = hosts::address(deployment, host)?;
+    // The host that fuses asks itself: its bridge listens already.
+    address.listens = false;
+    let text = bridge::status(&address, PATIENCE).or_fail(ExitKind::Run)?;
+    let Some(text) = text else {
+        let message = format!(
+            "{} does not answer: does the deployment run there?",
+            address.address
+        );
+        return Err(Failure::new(ExitKind::Input, message));
+    };
+    let state: Value = serde_json::from_str(&text).or_fail(ExitKind::Run)?;
+    let none = Vec::new();
+    let all = state["hosts"].as_array().unwrap_or(&none);
+    if arguments.json {
+        output::json(&state)?;
+    } else {
+        for it in all {
+            output::line(line(it, deployment).trim_end())?;
+        }
+    }
+    let is_whole = all.iter().all(|it| it["there"] == true);
+    let status = if is_whole {
+        0
+    } else {
+        ExitKind::Degraded.status()
+    };
+    Ok(ExitCode::from(status))
+}
+
+/// A host in words, with a line for every view.
+fn line(host: &Value, deployment: &Deployment) -> String {
+    let number = |it: &Value| it.as_f64().unwrap_or(f64::NAN);
+    let name = host["name"].as_str().unwrap_or_default();
+    let there = if host["there"] == true {
+        "answers"
+    } else if host["refused"].is_null() {
+        "does not answer"
+    } else {
+        "is refused: it has other files"
+    };
+    let clock = &host["clock"];
+    let clock = if clock.is_null() {
+        "clock unknown".to_owned()
+    } else {
+        format!(
+            "clock within {:.3} ms, drift {:.1} ppm, round trip {:.3} ms",
+            number(&clock["bound_ms"]),
+            number(&clock["drift_ppm"]),
+            number(&clock["trip_ms"])
+        )
+    };
+    let mut text = format!("{name}: {there}; {clock}\n");
+    for view in host["views"].as_array().into_iter().flatten() {
+        let index = view["view"].as_u64().unwrap_or(0) as usize;
+        let camera = deployment
+            .cameras
+            .get(index)
+            .map_or("?", |it| it.name.as_str());
+        // Writing to a string cannot fail.
+        let _infallible = writeln!(
+            text,
+            "    {camera}: {} used, {} late, {} gone, {} left out; from there to here {:.1} ms (99 of 100 within {:.1})",
+            view["used"],
+            view["late"],
+            view["gone"],
+            view["left_out"],
+            number(&view["all"]["p50_ms"]),
+            number(&view["all"]["p99_ms"])
+        );
+    }
+    text
+}
+
+fn keys(arguments: &KeysArguments) -> Result<ExitCode, Failure> {
+    let loaded = load::read(&arguments.config, &[])?;
+    let deployment = &loaded.deployment;
+    let folder = deployment
+        .link
+        .keys
+        .as_deref()
+        .ok_or("the deployment has no `link.keys`")
+        .or_fail(ExitKind::Config)?;
+    let names = deployment.hosts.iter().map(|it| {
+        let address = it.address.iter();
+        let name = address.filter_map(|it| it.rsplit_once(':')).map(|it| {
+            let name = it.0.trim_start_matches('[').trim_end_matches(']');
+            name.to_owned()
+        });
+        (it.name.clone(), name.collect())
+    });
+    let names: Vec<(String, Vec<String>)> = names.collect();
+    let made = bridge::make_keys(folder, &names).or_fail(ExitKind::Input)?;
+    for file in made {
+        output::line(file.display())?;
+    }
+    output::message("give every host ca.pem and its own two files; keep ca.key elsewhere");
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,29 @@
+//! Faults of a host, or of the link to it.
+
+/// A fault of a host or its link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HostFault {
+    /// The link is cut for three seconds.
+    Cut,
+    /// The host with cameras is killed, and started again.
+    Kill,
+}
+
+impl HostFault {
+    /// Both.
+    pub(super) const ALL: [Self; 2] = [Self::Cut, Self::Kill];
+
+    /// The name of its scenario, and what happens.
+    pub(super) fn name_and_summary(self) -> [&'static str; 2] {
+        match self {
+            Self::Cut => [
+                "cut-link",
+                "of two hosts on this machine the link is cut for three seconds",
+            ],
+            Self::Kill => [
+                "kill-host",
+                "of two hosts on this machine the one with cameras is killed, and started again",
+            ],
+        }
+    }
+}

@@ -1,0 +1,263 @@
+//! `[[host]]` and section `[link]` of a deployment file: which views run on which machine, and what crosses between them.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::capture::{Mode, Pace};
+use crate::complaint::{Complaint, between, demand, whole};
+use crate::{Deployment, fuse};
+
+/// A machine of the deployment.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Host {
+    /// Its name, for `--host`, in keys and reports; `parallax run` takes the host with the name of the machine.
+    pub name: String,
+    /// The cameras that are connected to it, by name.
+    #[serde(default)]
+    pub views: Vec<String>,
+    /// Whether the views are fused here; of exactly one host.
+    #[serde(default)]
+    pub fuses: bool,
+    /// Where the host that fuses listens, `"192.168.1.5:7447"` or a name with a port; the others connect to it.
+    pub address: Option<String>,
+}
+
+/// What crosses from a host with cameras to the one that fuses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Carry {
+    /// Frames at search size as JPEG; poses are found on the host that fuses.
+    #[default]
+    Frames,
+    /// Poses of single views; these views take no part in the search over several views, only in the triangulation.
+    Poses,
+}
+
+/// The connection between hosts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Link {
+    /// What crosses: `frames` (JPEG, poses are found on the host that fuses) or `poses` (found where the camera is; less
+    /// data and less accurate).
+    pub carry: Carry,
+    /// Quality of the JPEG, 1 to 100.
+    pub jpeg_quality: u8,
+    /// Folder with `ca.pem`, and `HOST.pem` and `HOST.key` of this host, as `parallax hosts keys` makes them.
+    pub keys: Option<PathBuf>,
+    /// Connect without keys: anybody on the network can read the pictures and send others.
+    pub insecure: bool,
+    /// Largest uncertainty of another host's clock, as a share of the time between two frames, without a warning.
+    pub max_clock_share: f64,
+}
+
+impl Default for Link {
+    fn default() -> Self {
+        Self {
+            carry: Carry::Frames,
+            jpeg_quality: 90,
+            keys: None,
+            insecure: false,
+            max_clock_share: 0.1,
+        }
+    }
+}
+
+impl Link {
+    /// Takes a relative path as relative to `base`.
+    pub(crate) fn resolve(&mut self, base: &Path) {
+        if let Some(keys) = &mut self.keys {
+            *keys = base.join(&keys);
+        }
+    }
+}
+
+impl Deployment {
+    /// The host of that name.
+    pub fn host(&self, name: &str) -> Option<&Host> {
+        self.hosts.iter().find(|it| it.name == name)
+    }
+
+    /// The host that fuses.
+    pub fn fusing_host(&self) -> Option<&Host> {
+        self.hosts.iter().find(|it| it.fuses)
+    }
+
+    /// The views of a host, ascending.
+    pub fn views_of(&self, host: &Host) -> Vec<usize> {
+        let cameras = self.cameras.iter().enumerate();
+        let own = cameras.filter(|(_, camera)| host.views.contains(&camera.name));
+        own.map(|it| it.0).collect()
+    }
+
+    /// The host that a view belongs to.
+    pub fn host_of(&self, view: usize) -> Option<&Host> {
+        let name = &self.cameras.get(view)?.name;
+        self.hosts.iter().find(|it| it.views.contains(name))
+    }
+
+    /// The name of the part of a deployment that runs on a host: its processes share memory under it.
+    pub fn name_on(&self, host: &Host) -> String {
+        format!("{}.{}", self.name, host.name)
+    }
+}
+
+/// Checks the hosts of a deployment; without any, only the numbers of the link.
+pub(crate) fn check(it: &Deployment) -> Result<(), Complaint> {
+    whole("link.jpeg_quality", it.link.jpeg_quality)?;
+    between("link.max_clock_share", it.link.max_clock_share)?;
+    if it.hosts.is_empty() {
+        return Ok(());
+    }
+    demand(
+        it.hosts.len() >= 2,
+        "host",
+        "given once",
+        "two or more, or none: with one machine there are no hosts",
+    )?;
+    names(it)?;
+    views(it)?;
+    let fusing: Vec<&Host> = it.hosts.iter().filter(|it| it.fuses).collect();
+    demand(
+        fusing.len() == 1,
+        "host.fuses",
+        &format!("true for {} hosts", fusing.len()),
+        "true for exactly one: the results are written there",
+    )?;
+    for host in &it.hosts {
+        address(host)?;
+    }
+    real_time(it)?;
+    keys(it)
+}
+
+fn names(it: &Deployment) -> Result<(), Complaint> {
+    let good = |it: char| it.is_ascii_lowercase() || it.is_ascii_digit() || it == '-';
+    for (index, host) in it.hosts.iter().enumerate() {
+        let name = &host.name;
+        demand(
+            !name.is_empty() && name.chars().all(good),
+            "host.name",
+            &format!("{name:?}"),
+            "lower-case letters, digits and hyphens",
+        )?;
+        let whole = it.name_on(host);
+        demand(
+            whole.len() <= 32,
+            "host.name",
+            &format!("{name:?}, {whole:?} with that of the deployment"),
+            "at most 32 characters together",
+        )?;
+        demand(
+            it.hosts[..index].iter().all(|other| other.name != *name),
+            "host.name",
+            &format!("twice {name:?}"),
+            "every host once",
+        )?;
+    }
+    Ok(())
+}
+
+/// Every view on exactly one host.
+fn views(it: &Deployment) -> Result<(), Complaint> {
+    for host in &it.hosts {
+        for view in &host.views {
+            demand(
+                it.cameras.iter().any(|camera| camera.name == *view),
+                "host.views",
+                &format!("{view:?} of host {:?}", host.name),
+                "the name of a [[camera]]",
+            )?;
+        }
+        demand(
+            host.fuses || !host.views.is_empty(),
+            "host.views",
+            &format!("empty for {:?}", host.name),
+            "at least one camera on a host that does not fuse",
+        )?;
+    }
+    for camera in &it.cameras {
+        let all = it.hosts.iter().flat_map(|host| &host.views);
+        let n = all.filter(|view| **view == camera.name).count();
+        demand(
+            n == 1,
+            "host.views",
+            &format!("{:?} in {n} places", camera.name),
+            "every camera on exactly one host",
+        )?;
+    }
+    Ok(())
+}
+
+/// Where the host that fuses listens: a name or number, and a port.
+fn address(host: &Host) -> Result<(), Complaint> {
+    let Some(address) = &host.address else {
+        return demand(
+            !host.fuses,
+            "host.address",
+            &format!("left out of host {:?}, which fuses", host.name),
+            "where it listens: \"192.168.1.5:7447\"",
+        );
+    };
+    let parts = address.rsplit_once(':');
+    let is_good = parts.is_some_and(|(name, port)| {
+        let of_name = |it: char| it.is_ascii_alphanumeric() || "-._:[]".contains(it);
+        let port: Option<u16> = port.parse().ok();
+        !name.is_empty() && name.chars().all(of_name) && port.is_some_and(|it| it > 0)
+    });
+    demand(
+        is_good,
+        "host.address",
+        &format!("{address:?}"),
+        "a name or number, a colon and a port: \"192.168.1.5:7447\"",
+    )
+}
+
+/// Hosts do not wait for one another.
+fn real_time(it: &Deployment) -> Result<(), Complaint> {
+    demand(
+        it.capture.mode == Mode::Realtime && it.capture.pace == Pace::Realtime,
+        "capture.mode",
+        "not \"realtime\" with capture.pace = \"realtime\"",
+        "both, where there are hosts: frames of several machines belong together by their times",
+    )?;
+    demand(
+        it.capture.frame_rate_hz.is_some(),
+        "capture.frame_rate_hz",
+        "left out",
+        "frames per second of all cameras, where there are hosts",
+    )?;
+    let has_clocks = it.cameras.iter().any(|it| it.offset_ms.is_some());
+    demand(
+        !has_clocks,
+        "camera.offset_ms",
+        "given, with hosts",
+        "none: the clocks of hosts are compared while they run",
+    )?;
+    demand(
+        it.link.carry == Carry::Frames || it.views() == fuse::Views::Pairs,
+        "link.carry",
+        "\"poses\", with `fuse.views` other than \"pairs\"",
+        "\"frames\": all views at once are solved on their evidence, which poses alone do not have",
+    )
+}
+
+fn keys(it: &Deployment) -> Result<(), Complaint> {
+    demand(
+        it.link.insecure || it.link.keys.is_some(),
+        "link.keys",
+        "left out",
+        "the folder that `parallax hosts keys` makes; or link.insecure = true, and everybody on the network can look on",
+    )?;
+    demand(
+        !(it.link.insecure && it.link.keys.is_some()),
+        "link.insecure",
+        "true, with link.keys",
+        "either of the two",
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,160 @@
+//! The part of a deployment's processes that runs on one of its hosts.
+
+use messages::topic;
+
+use super::{BRIDGE, Process, Role, Stage, Topology, process};
+use crate::Deployment;
+use crate::hosts::{Carry, Host};
+
+impl Topology {
+    /// The processes that run on a host, of a topology of the whole deployment. A bridge takes the place of those that run on the
+    /// others: on the host that fuses it publishes what they would, on the others it subscribes to what they publish.
+    ///
+    /// * `host`: one of the deployment's.
+    #[must_use]
+    pub fn on_host(mut self, deployment: &Deployment, host: &Host) -> Self {
+        let own = deployment.views_of(host);
+        let carry = deployment.link.carry;
+        let has_quality = deployment.has_quality();
+        let crosses = |view: &usize| crossing(*view, carry, has_quality);
+        if host.fuses {
+            let remote = (0..self.n_views).filter(|view| !own.contains(view));
+            let outputs: Vec<String> = remote.flat_map(|view| crosses(&view)).collect();
+            let is_here = |it: &Process| {
+                let view = it.index.filter(|view| !own.contains(view));
+                view.is_none() || !is_at_camera(it.service, carry)
+            };
+            self.processes.retain(is_here);
+            // Views that are here go on without it; two can be triangulated.
+            let role = if own.len() > 1 {
+                Role::Optional
+            } else {
+                Role::Essential
+            };
+            let bridge = process(BRIDGE, None, role, Vec::new(), outputs);
+            self.processes.push(bridge);
+        } else {
+            let is_here = |it: &Process| {
+                is_at_camera(it.service, carry) && it.index.is_some_and(|it| own.contains(&it))
+            };
+            self.processes.retain(is_here);
+            self.n_workers = 0;
+            let inputs = own.iter().flat_map(crosses).collect();
+            let bridge = process(BRIDGE, None, Role::Essential, inputs, Vec::new());
+            self.processes.insert(0, bridge);
+        }
+        self
+    }
+}
+
+/// Whether a service runs where the camera is.
+fn is_at_camera(service: &str, carry: Carry) -> bool {
+    let with_poses = [Stage::Pose, Stage::Quality].map(Stage::name);
+    service == Stage::Capture.name() || (carry == Carry::Poses && with_poses.contains(&service))
+}
+
+/// The topics of a view that cross from its host to the one that fuses.
+fn crossing(view: usize, carry: Carry, has_quality: bool) -> Vec<String> {
+    match carry {
+        Carry::Frames => vec![topic::frame(view)],
+        Carry::Poses => {
+            let quality = has_quality.then(|| topic::view_quality(view));
+            [topic::view_pose(view)]
+                .into_iter()
+                .chain(quality)
+                .collect()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{AnyMachine, Loaded};
+
+    fn deployment(more: &str) -> Deployment {
+        let text = format!(
+            "name = 'a'\nrig = 'r'\noutput = 'o'\n\
+             [[camera]]\nname = 'c0'\nsource = 's'\n[[camera]]\nname = 'c1'\nsource = 's'\n\
+             [[camera]]\nname = 'c2'\nsource = 's'\n\
+             [capture]\nmode = 'realtime'\npace = 'realtime'\nframe_rate_hz = 5.0\n\
+             [[host]]\nname = 'desk'\nfuses = true\naddress = 'x:1'\nviews = ['c1']\n\
+             [[host]]\nname = 'far'\nviews = ['c0', 'c2']\n[fuse]\nviews = 'pairs'\n[link]\ninsecure = true\n{more}"
+        );
+        let loaded = Loaded::parse(&text, Path::new("d.toml"), &[], &AnyMachine);
+        loaded.unwrap().deployment
+    }
+
+    fn names(it: &Topology) -> Vec<&str> {
+        it.processes().iter().map(|it| it.name.as_str()).collect()
+    }
+
+    #[test]
+    fn every_process_of_the_whole_runs_on_exactly_one_host() {
+        for more in [
+            "",
+            "carry = 'poses'\n",
+            "carry = 'poses'\n[quality]\nnetwork = 'shipped'\n",
+        ] {
+            let it = deployment(more);
+            let whole = Topology::new(&it, None, None);
+            let mut all = Vec::new();
+            for host in &it.hosts {
+                let part = whole.clone().on_host(&it, host);
+                all.extend(names(&part).into_iter().map(str::to_owned));
+            }
+            all.retain(|it| it != BRIDGE);
+            all.sort();
+            let mut expected: Vec<&str> = names(&whole);
+            expected.sort_unstable();
+            assert_eq!(all, expected, "{more}");
+        }
+    }
+
+    #[test]
+    fn the_bridge_publishes_here_what_it_subscribes_to_there() {
+        for (more, topics) in [
+            ("", vec!["frame/v1/0", "frame/v1/2"]),
+            (
+                "carry = 'poses'\n",
+                vec!["view-pose/v6/0", "view-pose/v6/2"],
+            ),
+        ] {
+            let it = deployment(more);
+            let whole = Topology::new(&it, None, None);
+            let [desk, far] = [0, 1].map(|host| whole.clone().on_host(&it, &it.hosts[host]));
+            assert_eq!(desk.process(BRIDGE).unwrap().outputs, topics);
+            assert_eq!(far.process(BRIDGE).unwrap().inputs, topics);
+            // Who receives a topic on the host that fuses has not changed.
+            for topic in topics {
+                assert_eq!(desk.receivers_of(topic), whole.receivers_of(topic));
+                assert_eq!(far.receivers_of(topic), 1);
+            }
+        }
+    }
+
+    #[test]
+    fn a_host_with_cameras_has_what_crosses_and_nothing_else() {
+        let it = deployment("");
+        let far = Topology::new(&it, None, None).on_host(&it, &it.hosts[1]);
+        assert_eq!(names(&far), ["bridge", "capture-0", "capture-2"]);
+        let it = deployment("carry = 'poses'\n");
+        let far = Topology::new(&it, None, None).on_host(&it, &it.hosts[1]);
+        let expected = ["bridge", "pose-0", "pose-2", "capture-0", "capture-2"];
+        assert_eq!(names(&far), expected);
+        assert_eq!(far.receivers_of("evidence/v3/0"), 0);
+    }
+
+    #[test]
+    fn hosts_do_not_change_the_processes_of_the_whole() {
+        let with = deployment("");
+        let without = Deployment {
+            hosts: Vec::new(),
+            ..with.clone()
+        };
+        let [with, without] = [with, without].map(|it| Topology::new(&it, None, None));
+        assert_eq!(with, without);
+    }
+}

@@ -1,0 +1,290 @@
+//! How far the clock of another host is from ours: offset and drift, with a bound.
+//!
+//! An exchange of four times (RFC 5905, section 8) bounds the offset by half of its round trip, however the delay is divided between the
+//! two ways. Of every part of a window the exchange with the shortest round trip counts, as in the clock filter of NTP. A line
+//! through these gives offset and drift.
+
+use std::collections::VecDeque;
+
+/// Parts of the window; of each the best exchange is kept.
+const N_PARTS: usize = 12;
+/// Length of a part, nanoseconds.
+const PART_NANOS: u64 = 5_000_000_000;
+/// A drift is estimated from exchanges that are so far apart, nanoseconds.
+const LEAST_SPAN: u64 = 5_000_000_000;
+/// The most that two clocks may drift apart where nothing is known: the kernel slews either by 500 ppm at most.
+const MOST_DRIFT: f64 = 1e-3;
+/// The longest round trip that is used, nanoseconds.
+const MOST_TRIP: u64 = 2_000_000_000;
+/// Exchanges in a row that contradict the estimate, from which on the other clock counts as another.
+const N_ODD: u32 = 3;
+
+/// The four times of a question and its answer, nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Exchange {
+    /// When the question went, by our clock.
+    pub asked_at: u64,
+    /// When it came, by theirs.
+    pub received_at: u64,
+    /// When the answer went, by theirs.
+    pub answered_at: u64,
+    /// When it came, by ours.
+    pub heard_at: u64,
+}
+
+/// Four times that cannot be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ExchangeError {
+    /// One of the clocks went back.
+    #[error("an answer before its question")]
+    Backwards,
+    /// The other host says that it took longer than the whole exchange.
+    #[error("an answer that took {inside} ns of {outside} ns")]
+    Inside {
+        /// From question to answer there, nanoseconds.
+        inside: u64,
+        /// From question to answer here, nanoseconds.
+        outside: u64,
+    },
+    /// The round trip was too long to tell anything.
+    #[error("a round trip of {trip} ns")]
+    Slow {
+        /// Its length, nanoseconds.
+        trip: u64,
+    },
+}
+
+/// What is known of another host's clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// What is added to our time to have theirs, nanoseconds.
+    pub offset_nanos: i64,
+    /// By how much a second of theirs is shorter than ours, billionths.
+    pub drift_ppb: f64,
+    /// How far the offset can be from the truth, nanoseconds: half of the best round trip, and what the drift may have added.
+    pub bound_nanos: u64,
+    /// The shortest round trip of the window, nanoseconds.
+    pub trip_nanos: u64,
+    /// Exchanges that it rests on.
+    pub n_exchanges: usize,
+}
+
+impl Estimate {
+    /// Their time in ours.
+    pub fn ours(&self, theirs: u64) -> u64 {
+        let ours = i128::from(theirs) - i128::from(self.offset_nanos);
+        ours.clamp(0, i128::from(u64::MAX)) as u64
+    }
+
+    /// Our time in theirs.
+    pub fn theirs(&self, ours: u64) -> u64 {
+        let theirs = i128::from(ours) + i128::from(self.offset_nanos);
+        theirs.clamp(0, i128::from(u64::MAX)) as u64
+    }
+
+    /// A warning where the bound is a larger share of the time between two frames than it may be.
+    ///
+    /// * `max_share`: the largest.
+    pub fn warning(&self, period_nanos: u64, max_share: f64) -> Option<String> {
+        let share = self.bound_nanos as f64 / period_nanos.max(1) as f64;
+        (share > max_share).then(|| {
+            format!(
+                "its clock is known to {:.3} ms only, {:.0} % of the time between two frames (link.max_clock_share is {:.0} %): \
+                 the network's round trips take {:.3} ms at best; a quieter network helps, and where cameras stamp their \
+                 pictures themselves `chrony` or `linuxptp` on all hosts",
+                self.bound_nanos as f64 * 1e-6,
+                100.0 * share,
+                100.0 * max_share,
+                self.trip_nanos as f64 * 1e-6,
+            )
+        })
+    }
+}
+
+/// An exchange, as it counts.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    /// Our time in its middle, nanoseconds.
+    at: u64,
+    /// Theirs minus ours, nanoseconds.
+    offset: i64,
+    trip: u64,
+}
+
+/// The clock of another host. Reads none itself.
+#[derive(Debug, Clone, Default)]
+pub struct Clock {
+    /// The best exchange of every part of the window, oldest first, with the number of the part.
+    parts: VecDeque<(u64, Sample)>,
+    n_exchanges: usize,
+    n_odd: u32,
+    n_resets: u32,
+}
+
+impl Clock {
+    /// Takes an exchange.
+    ///
+    /// # Errors
+    ///
+    /// [`ExchangeError`]; it is not used then.
+    pub fn add(&mut self, exchange: Exchange) -> Result<(), ExchangeError> {
+        let sample = sample(&exchange)?;
+        if self.contradicts(&sample) {
+            self.n_odd += 1;
+            if self.n_odd < N_ODD {
+                return Ok(());
+            }
+            // The other host was started again, or its clock set.
+            self.parts.clear();
+            (self.n_exchanges, self.n_resets) = (0, self.n_resets + 1);
+        }
+        self.n_odd = 0;
+        self.n_exchanges += 1;
+        let part = sample.at / PART_NANOS;
+        match self.parts.back_mut().filter(|it| it.0 >= part) {
+            Some((_, best)) if best.trip < sample.trip => {}
+            Some((_, best)) => *best = sample,
+            None => self.parts.push_back((part, sample)),
+        }
+        while self.parts.len() > N_PARTS
+            || self
+                .parts
+                .front()
+                .is_some_and(|it| it.0 + (N_PARTS as u64) <= part)
+        {
+            self.parts.pop_front();
+        }
+        Ok(())
+    }
+
+    /// Forgets everything: the other bridge was started again, perhaps with its host.
+    pub fn forget(&mut self) {
+        self.parts.clear();
+        (self.n_exchanges, self.n_odd) = (0, 0);
+    }
+
+    /// How often the other clock was found to be another than before.
+    pub fn n_resets(&self) -> u32 {
+        self.n_resets
+    }
+
+    /// What is known at a time of ours; none before the first exchange.
+    pub fn estimate(&self, now: u64) -> Option<Estimate> {
+        let all = || self.parts.iter().map(|it| it.1);
+        let best = all().min_by_key(|it| it.trip)?;
+        let line = Line::through(all(), best);
+        let at = |time: u64| line.at(time);
+        let bound = all().map(|it| {
+            // What the exchange itself bounds, how far the line misses it, and what an error of the drift makes since.
+            let off = (at(it.at) - it.offset as f64).abs();
+            let age = time_between(now, it.at).abs();
+            it.trip as f64 / 2.0 + off + line.drift_error * age
+        });
+        let bound = bound.fold(f64::INFINITY, f64::min);
+        Some(Estimate {
+            offset_nanos: at(now).round() as i64,
+            drift_ppb: line.drift * 1e9,
+            bound_nanos: bound.ceil() as u64,
+            trip_nanos: best.trip,
+            n_exchanges: self.n_exchanges,
+        })
+    }
+
+    /// Whether an exchange cannot be of the clock that is known.
+    fn contradicts(&self, sample: &Sample) -> bool {
+        let Some(known) = self.estimate(sample.at) else {
+            return false;
+        };
+        let off = i128::from(sample.offset) - i128::from(known.offset_nanos);
+        let most = (sample.trip / 2).saturating_add(known.bound_nanos);
+        off.unsigned_abs() > u128::from(most) + 1_000_000
+    }
+}
+
+fn sample(it: &Exchange) -> Result<Sample, ExchangeError> {
+    let outside = it.heard_at.checked_sub(it.asked_at);
+    let inside = it.answered_at.checked_sub(it.received_at);
+    let (Some(outside), Some(inside)) = (outside, inside) else {
+        return Err(ExchangeError::Backwards);
+    };
+    let trip = outside
+        .checked_sub(inside)
+        .ok_or(ExchangeError::Inside { inside, outside })?;
+    if trip > MOST_TRIP {
+        return Err(ExchangeError::Slow { trip });
+    }
+    let there = i128::from(it.received_at) - i128::from(it.asked_at);
+    let back = i128::from(it.answered_at) - i128::from(it.heard_at);
+    let limits = [i64::MIN, i64::MAX].map(i128::from);
+    Ok(Sample {
+        at: it.asked_at + outside / 2,
+        offset: i128::midpoint(there, back).clamp(limits[0], limits[1]) as i64,
+        trip,
+    })
+}
+
+/// From one time to another, nanoseconds.
+fn time_between(later: u64, earlier: u64) -> f64 {
+    (i128::from(later) - i128::from(earlier)) as f64
+}
+
+/// Offset over time.
+struct Line {
+    /// Our time, nanoseconds.
+    origin: u64,
+    /// Offset there, nanoseconds.
+    offset: f64,
+    /// Its change, nanoseconds a nanosecond.
+    drift: f64,
+    /// How far the drift can be from the truth.
+    drift_error: f64,
+}
+
+impl Line {
+    /// A line through exchanges, each weighted by the square of its round trip; level where they are too close.
+    fn through(all: impl Iterator<Item = Sample> + Clone, best: Sample) -> Self {
+        let level = Self {
+            origin: best.at,
+            offset: best.offset as f64,
+            drift: 0.0,
+            drift_error: MOST_DRIFT,
+        };
+        let first = all.clone().min_by_key(|it| it.at);
+        let last = all.clone().max_by_key(|it| it.at);
+        let (Some(first), Some(last)) = (first, last) else {
+            return level;
+        };
+        let span = last.at - first.at;
+        if span < LEAST_SPAN {
+            return level;
+        }
+        let [mut w, mut wx, mut wy, mut wxx, mut wxy] = [0.0; 5];
+        for it in all {
+            let weight = 1.0 / (it.trip as f64 + 1e3).powi(2);
+            let x = time_between(it.at, best.at);
+            let y = (i128::from(it.offset) - i128::from(best.offset)) as f64;
+            (w, wx, wy) = (w + weight, wx + weight * x, wy + weight * y);
+            (wxx, wxy) = (wxx + weight * x * x, wxy + weight * x * y);
+        }
+        let determinant = w * wxx - wx * wx;
+        if determinant <= 0.0 {
+            return level;
+        }
+        let drift = (w * wxy - wx * wy) / determinant;
+        // Between the two ends the offset is known to half of either's round trip.
+        let error = (first.trip + last.trip) as f64 / 2.0 / span as f64;
+        Self {
+            origin: best.at,
+            offset: best.offset as f64 + (wy - drift * wx) / w,
+            drift,
+            drift_error: error.min(MOST_DRIFT),
+        }
+    }
+
+    fn at(&self, time: u64) -> f64 {
+        self.offset + self.drift * time_between(time, self.origin)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,217 @@
+//! What a number of cameras on a number of hosts takes: processor time, network, latency. For planning, from measured costs.
+//!
+//! Every stage is a queue with one server of deterministic service (M/D/1 is not assumed: frames come at a fixed rate, so what waits is what the
+//! other processes of a host take of its cores). A host is full when its processes take all of its cores.
+
+use serde::Serialize;
+
+/// What one frame of one view costs, milliseconds of processor time, and what it weighs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Costs {
+    /// `capture`.
+    pub capture_ms: f64,
+    /// `pose`.
+    pub pose_ms: f64,
+    /// To JPEG, on the host of the camera.
+    pub encode_ms: f64,
+    /// From JPEG, on the host that fuses.
+    pub decode_ms: f64,
+    /// `fuse`, `triangulate` and `results`, for every view of a frame.
+    pub fuse_ms_per_view: f64,
+    /// The same for every frame, whatever views it has.
+    pub fuse_ms: f64,
+    /// Bytes of a frame as JPEG at search size, with its head.
+    pub frame_bytes: f64,
+    /// Bytes of the poses of a view, with their head.
+    pub pose_bytes: f64,
+    /// Of the network, one way, for a small message.
+    pub network_ms: f64,
+}
+
+/// What is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Load {
+    /// Cameras.
+    pub n_cameras: usize,
+    /// Hosts, the one that fuses among them; 1 for one machine without a link.
+    pub n_hosts: usize,
+    /// Cores of each.
+    pub n_cores: f64,
+    /// Frames per second.
+    pub rate_hz: f64,
+    /// Bytes per second that a host can send or receive.
+    pub network_bytes_s: f64,
+    /// Whether poses cross in place of frames.
+    pub with_poses: bool,
+}
+
+/// What it takes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Forecast {
+    /// Views of the host that fuses, and the most of any other.
+    pub views: [usize; 2],
+    /// Cores that are used: on the host that fuses, and the most of any other.
+    pub cores: [f64; 2],
+    /// Bytes per second that the host that fuses receives, and the most that another sends.
+    pub bytes_s: [f64; 2],
+    /// From capture to result, milliseconds, where it fits.
+    pub latency_ms: f64,
+    /// Of it: what the link adds, codec and network.
+    pub link_ms: f64,
+    /// Whether every host has the cores, and the network the room.
+    pub fits: bool,
+}
+
+/// What a number of cameras on a number of hosts takes. Cameras are spread evenly over the hosts, by their cost: the host that fuses gets
+/// fewer where it has more to do.
+pub fn forecast(costs: &Costs, load: &Load) -> Forecast {
+    let n_far = load.n_hosts.saturating_sub(1);
+    let options = (0..=load.n_cameras).filter(|near| n_far > 0 || *near == load.n_cameras);
+    let all = options.map(|near| with_views(costs, load, near, n_far));
+    let worst = |it: &Forecast| it.cores[0].max(it.cores[1]);
+    let best = all.min_by(|a, b| worst(a).total_cmp(&worst(b)));
+    best.unwrap_or_else(|| with_views(costs, load, load.n_cameras, n_far))
+}
+
+fn with_views(costs: &Costs, load: &Load, near: usize, n_far: usize) -> Forecast {
+    let far = load.n_cameras - near;
+    let most_far = if n_far == 0 { 0 } else { far.div_ceil(n_far) };
+    let busy = |ms: f64| ms * 1e-3 * load.rate_hz;
+    let at_camera = if load.with_poses {
+        costs.capture_ms + costs.pose_ms
+    } else {
+        costs.capture_ms + costs.encode_ms
+    };
+    let at_fusion = if load.with_poses {
+        0.0
+    } else {
+        costs.decode_ms + costs.pose_ms
+    };
+    let own = costs.capture_ms + costs.pose_ms;
+    let fusing = costs.fuse_ms + load.n_cameras as f64 * costs.fuse_ms_per_view;
+    let cores = [
+        busy(near as f64 * own + far as f64 * at_fusion + fusing),
+        busy(most_far as f64 * at_camera),
+    ];
+    let bytes = if load.with_poses {
+        costs.pose_bytes
+    } else {
+        costs.frame_bytes
+    };
+    let bytes_s = [far, most_far].map(|views| views as f64 * bytes * load.rate_hz);
+    // Processes of one frame are due together: they share the cores.
+    let rounds = |views: usize, ms: f64| ms * (views as f64 / load.n_cores.max(1.0)).max(1.0);
+    let n_poses_here = if load.with_poses {
+        near
+    } else {
+        load.n_cameras
+    };
+    let codec = if load.with_poses || far == 0 {
+        0.0
+    } else {
+        rounds(most_far, costs.encode_ms) + rounds(far, costs.decode_ms)
+    };
+    let wire = if far == 0 {
+        0.0
+    } else {
+        let slowest = far as f64 * bytes / load.network_bytes_s.max(1.0);
+        costs.network_ms + 1e3 * slowest
+    };
+    let n_poses = n_poses_here.max(if load.with_poses { most_far } else { 0 });
+    let pose = rounds(n_poses, costs.pose_ms);
+    let capture = rounds(near.max(most_far), costs.capture_ms);
+    let link_ms = codec + wire;
+    let is_free = |cores: f64| cores <= 0.9 * load.n_cores;
+    Forecast {
+        views: [near, most_far],
+        cores,
+        bytes_s,
+        latency_ms: capture + pose + fusing + link_ms,
+        link_ms,
+        fits: cores.into_iter().all(is_free)
+            && bytes_s
+                .into_iter()
+                .all(|it| it <= 0.8 * load.network_bytes_s),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COSTS: Costs = Costs {
+        capture_ms: 5.0,
+        pose_ms: 40.0,
+        encode_ms: 3.0,
+        decode_ms: 2.0,
+        fuse_ms_per_view: 4.0,
+        fuse_ms: 2.0,
+        frame_bytes: 25_000.0,
+        pose_bytes: 4_000.0,
+        network_ms: 0.3,
+    };
+
+    const LOAD: Load = Load {
+        n_cameras: 4,
+        n_hosts: 1,
+        n_cores: 4.0,
+        rate_hz: 10.0,
+        network_bytes_s: 100e6,
+        with_poses: false,
+    };
+
+    #[test]
+    fn one_host_has_no_link() {
+        let got = forecast(&COSTS, &LOAD);
+        assert_eq!(
+            (got.views, got.bytes_s, got.link_ms),
+            ([4, 0], [0.0; 2], 0.0)
+        );
+        assert!((got.cores[0] - 1.98).abs() < 1e-9, "{got:?}");
+        assert!((got.latency_ms - 63.0).abs() < 1e-9, "{got:?}");
+        assert!(got.fits);
+    }
+
+    #[test]
+    fn a_second_host_takes_what_the_first_has_no_cores_for() {
+        let load = Load {
+            n_cameras: 16,
+            ..LOAD
+        };
+        assert!(!forecast(&COSTS, &load).fits);
+        let with_poses = Load {
+            n_hosts: 3,
+            with_poses: true,
+            ..load
+        };
+        let got = forecast(&COSTS, &with_poses);
+        assert!(got.fits, "{got:?}");
+        // Everything is somewhere, and the host that fuses has no more views than the others.
+        assert!(got.views[0] <= got.views[1] && got.views[0] + 2 * got.views[1] >= 16);
+        assert!(got.bytes_s[0] < 16.0 * 4_000.0 * 10.0 + 1.0);
+    }
+
+    #[test]
+    fn frames_that_cross_keep_pose_where_fusion_is() {
+        let load = Load {
+            n_cameras: 16,
+            n_hosts: 3,
+            ..LOAD
+        };
+        let got = forecast(&COSTS, &load);
+        // All poses are still found on one host: more hosts do not help there.
+        assert!(got.cores[0] > 16.0 * 0.4, "{got:?}");
+        assert!(!got.fits);
+    }
+
+    #[test]
+    fn a_slow_network_does_not_fit() {
+        let slow = Load {
+            n_hosts: 2,
+            network_bytes_s: 1e4,
+            ..LOAD
+        };
+        let got = forecast(&COSTS, &slow);
+        assert!(got.bytes_s[0] == 0.0 || !got.fits, "{got:?}");
+    }
+}

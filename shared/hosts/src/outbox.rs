@@ -1,0 +1,200 @@
+//! What waits to be sent to another host. It never grows: of every lane the newest waits, and few are on their way.
+
+use std::collections::VecDeque;
+
+/// Parcels of a lane that may be on their way without having been acknowledged.
+const MOST_ON_WAY: usize = 3;
+/// After this time without an acknowledgement a parcel counts as lost, nanoseconds.
+const LOST_AFTER: u64 = 1_500_000_000;
+
+/// What is to be sent next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Parcel<T> {
+    /// Its lane.
+    pub lane: usize,
+    /// Counts the parcels of its lane, from 0.
+    pub sequence: u64,
+    /// Parcels of its lane that newer ones overtook before they were sent.
+    pub n_overtaken: u64,
+    /// What is sent.
+    pub item: T,
+}
+
+/// What became of the parcels of a lane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Sent {
+    /// Offered.
+    pub n_offered: u64,
+    /// Overtaken by newer ones before they were sent.
+    pub n_overtaken: u64,
+    /// Given to the link.
+    pub n_sent: u64,
+    /// Acknowledged by the other host.
+    pub n_acknowledged: u64,
+    /// Sent, and never acknowledged.
+    pub n_lost: u64,
+}
+
+/// The lanes to one other host. Reads no clock.
+#[derive(Debug)]
+pub struct Outbox<T> {
+    lanes: Vec<Lane<T>>,
+}
+
+#[derive(Debug)]
+struct Lane<T> {
+    waiting: Option<T>,
+    /// Sequence, and when it was sent.
+    on_way: VecDeque<(u64, u64)>,
+    sent: Sent,
+}
+
+impl<T> Outbox<T> {
+    /// Empty lanes.
+    pub fn new(n_lanes: usize) -> Self {
+        let lane = || Lane {
+            waiting: None,
+            on_way: VecDeque::with_capacity(MOST_ON_WAY),
+            sent: Sent::default(),
+        };
+        Self {
+            lanes: (0..n_lanes).map(|_| lane()).collect(),
+        }
+    }
+
+    /// Puts something into a lane; what waited there is overtaken.
+    pub fn offer(&mut self, lane: usize, item: T) {
+        if let Some(lane) = self.lanes.get_mut(lane) {
+            lane.sent.n_offered += 1;
+            if lane.waiting.replace(item).is_some() {
+                lane.sent.n_overtaken += 1;
+            }
+        }
+    }
+
+    /// The next parcel that may be sent, of the lane with the fewest on their way; it counts as sent.
+    pub fn next(&mut self, now_nanos: u64) -> Option<Parcel<T>> {
+        for lane in &mut self.lanes {
+            lane.forget_lost(now_nanos);
+        }
+        let ready = self.lanes.iter_mut().enumerate();
+        let ready = ready.filter(|(_, it)| it.waiting.is_some() && it.on_way.len() < MOST_ON_WAY);
+        let (index, lane) = ready.min_by_key(|(_, it)| it.on_way.len())?;
+        let item = lane.waiting.take()?;
+        let sequence = lane.sent.n_sent;
+        lane.sent.n_sent += 1;
+        lane.on_way.push_back((sequence, now_nanos));
+        Some(Parcel {
+            lane: index,
+            sequence,
+            n_overtaken: lane.sent.n_overtaken,
+            item,
+        })
+    }
+
+    /// A parcel has arrived. Those of its lane before it that were not acknowledged are lost: the link keeps the order.
+    ///
+    /// Returns how long after it was sent, nanoseconds; none if it was not on its way.
+    pub fn acknowledge(&mut self, lane: usize, sequence: u64, now_nanos: u64) -> Option<u64> {
+        let lane = self.lanes.get_mut(lane)?;
+        let at = lane.on_way.iter().position(|it| it.0 == sequence)?;
+        let (_, sent_at) = lane.on_way[at];
+        lane.on_way.drain(..=at);
+        lane.sent.n_acknowledged += 1;
+        lane.sent.n_lost += at as u64;
+        Some(now_nanos.saturating_sub(sent_at))
+    }
+
+    /// What became of the parcels of a lane.
+    pub fn sent(&self, lane: usize) -> Sent {
+        self.lanes
+            .get(lane)
+            .map_or_else(Sent::default, |it| it.sent)
+    }
+
+    /// Lanes with something that waits.
+    pub fn n_waiting(&self) -> usize {
+        self.lanes.iter().filter(|it| it.waiting.is_some()).count()
+    }
+
+    /// Whether nothing waits, and nothing is on its way.
+    pub fn is_empty(&self) -> bool {
+        self.lanes
+            .iter()
+            .all(|it| it.waiting.is_none() && it.on_way.is_empty())
+    }
+}
+
+impl<T> Lane<T> {
+    fn forget_lost(&mut self, now_nanos: u64) {
+        while let Some((_, sent_at)) = self.on_way.front()
+            && now_nanos.saturating_sub(*sent_at) > LOST_AFTER
+        {
+            self.on_way.pop_front();
+            self.sent.n_lost += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn the_newest_wins_and_what_it_overtook_is_counted() {
+        let mut outbox = Outbox::new(1);
+        for item in 0..10 {
+            outbox.offer(0, item);
+        }
+        let parcel = outbox.next(0).unwrap();
+        assert_eq!(
+            (parcel.item, parcel.sequence, parcel.n_overtaken),
+            (9, 0, 9)
+        );
+        assert_eq!(outbox.next(0), None);
+    }
+
+    #[test]
+    fn a_link_that_does_not_answer_holds_few_parcels_and_then_some_again_after_a_while() {
+        let mut outbox = Outbox::new(2);
+        let mut n_sent = 0;
+        for ms in 0..10_000 {
+            outbox.offer((ms % 2) as usize, ms);
+            while outbox.next(ms * MS).is_some() {
+                n_sent += 1;
+            }
+        }
+        // Three of either lane at a time, every one and a half seconds.
+        assert!((36..=42).contains(&n_sent), "{n_sent}");
+        for lane in 0..2 {
+            let it = outbox.sent(lane);
+            let held = u64::from(outbox.lanes[lane].waiting.is_some());
+            assert_eq!(it.n_offered, 5000);
+            assert_eq!(it.n_offered, it.n_overtaken + it.n_sent + held);
+            assert!(it.n_sent - it.n_lost <= MOST_ON_WAY as u64);
+        }
+    }
+
+    #[test]
+    fn an_acknowledgement_makes_room_and_says_what_was_lost_before_it() {
+        let mut outbox = Outbox::new(1);
+        for item in 0..3 {
+            outbox.offer(0, item);
+            assert!(outbox.next(item).is_some());
+        }
+        outbox.offer(0, 3);
+        assert_eq!(outbox.next(3), None, "all on their way");
+        assert_eq!(outbox.acknowledge(0, 1, 9), Some(8));
+        assert_eq!(outbox.acknowledge(0, 1, 9), None, "twice");
+        assert_eq!(outbox.acknowledge(0, 99, 9), None);
+        assert_eq!(outbox.acknowledge(7, 0, 9), None);
+        let it = outbox.sent(0);
+        assert_eq!((it.n_acknowledged, it.n_lost), (1, 1));
+        assert_eq!(outbox.next(9).unwrap().sequence, 3);
+        assert!(!outbox.is_empty());
+        assert_eq!(outbox.acknowledge(0, 3, 10), Some(1));
+        assert!(outbox.is_empty());
+    }
+}

@@ -1,0 +1,250 @@
+"""The parts of tests/live/hosts: runs on one and on three hosts, faults on the link, and what became of every frame."""
+
+import json, math, os, re, signal, subprocess, sys, time
+
+parallax, out, n_cameras, seconds, rate, carry = sys.argv[1:7]
+n_cameras, seconds, rate = int(n_cameras), int(seconds), float(rate)
+n_frames = int(seconds * rate)
+# Light enough for a busy machine: small frames, the filters, tracked.
+LIGHT = ["pose.network=none", "pose.search=tracked", "capture.scale=0.4", "capture.upright=true"]
+if carry == "poses":
+    LIGHT.append("fuse.views=pairs")
+LIMBS = [("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist")]
+LIMBS = [(f"{s} {a}", f"{s} {b}") for s in ("left", "right") for a, b in LIMBS] + [("neck", "head")]
+
+
+def sh(*command, check=True):
+    return subprocess.run(command, check=check, capture_output=True, text=True)
+
+
+def say(part, **values):
+    print(json.dumps({"part": part, **values}), flush=True)
+
+
+def write(folder, keys):
+    """A deployment of synthetic cameras: half of them at the host that fuses, the others at two more."""
+    sh(parallax, "synth", folder, "--live", "--frames", str(n_frames), "--rig", f"ring:{n_cameras}",
+       "--actions", "walking", "--rate", str(rate))
+    text = open(f"{folder}/deployment.toml").read()
+    names = re.findall(r'^name = "(c\d+)"', text, re.M)
+    near, far = names[: n_cameras // 2], names[n_cameras // 2 :]
+    left, right = far[: len(far) // 2], far[len(far) // 2 :]
+    quoted = lambda all: "[" + ", ".join(f'"{it}"' for it in all) + "]"
+    text = re.sub(r'^name = ".*"', 'name = "px-test"', text, count=1, flags=re.M)
+    open(f"{folder}/one.toml", "w").write(text)
+    text += f'\n[link]\ncarry = "{carry}"\n' + (f'keys = "{keys}"\n' if keys else "insecure = true\n")
+    text += f'[[host]]\nname = "desk"\nfuses = true\naddress = "10.77.0.1:7447"\nviews = {quoted(near)}\n'
+    text += f'[[host]]\nname = "left"\nviews = {quoted(left)}\n[[host]]\nname = "right"\nviews = {quoted(right)}\n'
+    open(f"{folder}/hosts.toml", "w").write(text)
+    return [int(it[1:]) - 1 for it in left], [int(it[1:]) - 1 for it in right]
+
+
+def run(file, out, *more, ns=None, clock=0, log=None):
+    command = [parallax, "run", file, "--out", out, "--set", "supervise.deadline_ms=1500",
+               "--set", "supervise.hang_limit_s=120", "--set", "results.overlay_every=0"]
+    for it in LIGHT:
+        command += ["--set", it]
+    command += list(more)
+    if clock:
+        command = ["unshare", "--fork", "--time", "--monotonic", str(clock)] + command
+    if ns:
+        command = ["ip", "netns", "exec", f"px-{ns}"] + command
+    return subprocess.Popen(command, stdout=open(log or os.devnull, "a"), stderr=subprocess.STDOUT, start_new_session=True)
+
+
+def lines(folder):
+    with open(f"{folder}/pose3d.jsonl") as file:
+        return [json.loads(it) for it in file]
+
+
+def position(joint):
+    return joint.get("position_m")
+
+
+def score(folder, truth):
+    """PCP3D over the limbs of all frames with a result, and how many frames and limbs."""
+    good = total = 0
+    for line in lines(folder):
+        true = truth[line["frame"]]
+        for a, b in LIMBS:
+            got = [position(line["joints"].get(it, {})) for it in (a, b)]
+            if None in got:
+                continue
+            limb = math.dist(true[a], true[b])
+            total += 1
+            good += sum(math.dist(g, true[it]) for g, it in zip(got, (a, b))) / 2 <= limb / 2
+    return {"pcp3d": round(100 * good / max(total, 1), 2), "limbs": total}
+
+
+def truth_of(folder):
+    rows = [json.loads(it) for it in open(f"{folder}/truth.jsonl")]
+    names = rows[0]["joints"]
+    return {row["frame"]: dict(zip(names, row["joints"])) for row in rows[1:]}
+
+
+def state(folder):
+    try:
+        return json.load(open(f"{folder}/hosts.json"))
+    except (OSError, ValueError):
+        return None
+
+
+def accounted(folder):
+    """Whether used, late, gone and left out make all frames, of every view of another host."""
+    it = state(folder)
+    views = [view for host in it["hosts"] for view in host["views"]]
+    sums = [view["used"] + view["late"] + view["gone"] + view["left_out"] for view in views]
+    return {"frames": n_frames, "sums": sums, "views": [
+        {key: view[key] for key in ("view", "used", "late", "gone", "left_out", "came_late", "surplus", "overtaken")} for view in views]}
+
+
+def stop(process):
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGTERM)
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def three(file, out, fault=None):
+    """A run on three hosts; `fault(out, processes)` is called once all views came."""
+    os.makedirs(out, exist_ok=True)
+    log = f"{out}/log"
+    desk = run(file, out, "--host", "desk", ns="desk", log=log)
+    start = lambda name, clock: run(file, out, "--host", name, ns=name, clock=clock, log=f"{out}/log-{name}")
+    processes = {"desk": desk, "left": start("left", 5000), "right": start("right", 900000)}
+    processes["start"] = start
+    begin = time.time()
+    try:
+        while fault and time.time() - begin < 60:
+            now = state(out)
+            if now and all(host["there"] and all(v["used"] > 2 for v in host["views"]) for host in now["hosts"]):
+                break
+            time.sleep(0.05)
+        said = fault(out, processes) if fault else {}
+        status = desk.wait(seconds * 3 + 120)
+    finally:
+        for name in ("left", "right", "desk"):
+            stop(processes[name])
+    return {"exit": status, **said}
+
+
+def used(folder, host):
+    it = state(folder)
+    return sum(view["used"] for other in it["hosts"] if other["name"] == host for view in other["views"])
+
+
+def watch(folder, host, restore, after):
+    """Times from a fault: until the host counts as gone, and from its end until messages are used again."""
+    begin, gone, back, restored, n = time.time(), None, None, None, None
+    while time.time() - begin < after + 40:
+        now = state(folder)
+        there = now and all(it["there"] for it in now["hosts"] if it["name"] == host)
+        if gone is None and now and not there:
+            gone = time.time() - begin
+        if restored is None and time.time() - begin >= after:
+            n = used(folder, host)
+            restore()
+            restored = time.time()
+        if restored and used(folder, host) > n + 1:
+            back = time.time() - restored
+            break
+        if now and now["over"]:
+            break
+        time.sleep(0.03)
+    return {"gone_s": gone and round(gone, 2), "back_s": back and round(back, 2)}
+
+
+def cable(seconds):
+    def fault(folder, _):
+        sh("ip", "link", "set", "px-left", "down")
+        return watch(folder, "left", lambda: sh("ip", "link", "set", "px-left", "up"), seconds)
+    return fault
+
+
+def for_ever(folder, _):
+    sh("ip", "link", "set", "px-left", "down")
+    return {}
+
+
+def loss(percent):
+    def fault(folder, _):
+        rules = ("add table inet px; add chain inet px in { type filter hook input priority 0 ; }; "
+                 f"add rule inet px in numgen random mod 100 < {percent} drop")
+        sh("ip", "netns", "exec", "px-desk", "nft", rules)
+        return {}
+    return fault
+
+
+def slow(kbit):
+    def fault(folder, _):
+        sh("ip", "netns", "exec", "px-left", "tc", "qdisc", "add", "dev", "eth0", "root", "tbf", "rate", f"{kbit}kbit",
+           "burst", "16kb", "latency", "200ms")
+        return {}
+    return fault
+
+
+def kill_host(folder, processes):
+    os.killpg(processes["left"].pid, signal.SIGKILL)
+
+    def restore():
+        processes["left"] = processes["start"]("left", 5000)
+    return watch(folder, "left", restore, 3)
+
+
+def clear():
+    sh("ip", "link", "set", "px-left", "up")
+    sh("ip", "netns", "exec", "px-desk", "nft", "flush", "ruleset", check=False)
+    sh("ip", "netns", "exec", "px-left", "tc", "qdisc", "del", "dev", "eth0", "root", check=False)
+
+
+def main():
+    data = f"{out}/data"
+    # Without keys for builds and networks that have none.
+    keys = None if os.environ.get("INSECURE") else f"{out}/keys"
+    write(data, keys)
+    truth = truth_of(data)
+    if keys:
+        sh(parallax, "hosts", "keys", f"{data}/hosts.toml")
+    wanted = os.environ.get("PARTS", "one,three,cut-1,cut-10,cut,loss-1,loss-10,slow,kill,thief").split(",")
+    if "one" in wanted:
+        one = run(f"{data}/one.toml", f"{out}/one", "--quiet", log=f"{out}/one.log")
+        status = one.wait(seconds * 3 + 120)
+        say("one", exit=status, **score(f"{out}/one", truth))
+    parts = {"three": None, "cut-1": cable(1), "cut-10": cable(10), "cut": for_ever, "loss-1": loss(1), "loss-10": loss(10),
+             "slow": slow(int(os.environ.get("KBIT", "200"))), "kill": kill_host}
+    for part, fault in parts.items():
+        if part not in wanted:
+            continue
+        folder = f"{out}/{part}"
+        said = three(f"{data}/hosts.toml", folder, fault)
+        clear()
+        it = state(folder)
+        link = [{key: view[key] for key in ("view", "bytes", "encode", "network", "decode", "all")} for host in it["hosts"] for view in host["views"]]
+        clocks = {host["name"]: host["clock"] for host in it["hosts"]}
+        say(part, **said, **score(folder, truth), accounted=accounted(folder), link=link, clocks=clocks, seconds=round(it["seconds"], 1))
+    if "thief" in wanted and keys:
+        thief(data)
+
+
+def thief(data):
+    """A host with keys of an authority of its own, and one without any: neither gets in."""
+    text = open(f"{data}/hosts.toml").read()
+    open(f"{data}/thief.toml", "w").write(re.sub(r'keys = ".*"', f'keys = "{out}/keys-thief"', text))
+    open(f"{data}/open.toml", "w").write(re.sub(r'keys = ".*"', "insecure = true", text))
+    sh(parallax, "hosts", "keys", f"{data}/thief.toml")
+
+    def fault(folder, _):
+        got = {}
+        for name in ("thief", "open"):
+            it = run(f"{data}/{name}.toml", f"{out}/thief-out", "--host", "left", ns="thief", log=f"{out}/thief-{name}.log")
+            time.sleep(8)
+            got[name] = "still waits" if it.poll() is None else f"exit {it.returncode}"
+            stop(it)
+        return got
+    said = three(f"{data}/hosts.toml", f"{out}/thief", fault)
+    say("thief", **said, accounted=accounted(f"{out}/thief"))
+
+
+main()
