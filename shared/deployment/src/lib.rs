@@ -114,6 +114,7 @@ pub struct Deployment {
     #[serde(default)]
     pub smooth: smooth::Config,
     /// The connection between hosts.
+    #[serde(default)]
     pub link: hosts::Link,
     /// Deadlines and restarts.
     #[serde(default)]
