@@ -208,8 +208,6 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use deployment::{AnyMachine, Loaded};
 
     use super::*;

@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn statuses_are_all_there_and_have_different_names() {
         let names: Vec<String> = statuses().map(|it| constant(it.reason())).collect();
-        assert_eq!(names.len(), 16);
+        assert_eq!(names.len(), 18);
         assert_eq!(names[1], "END_OF_FOOTAGE");
         let mut unique = names.clone();
         unique.sort();
