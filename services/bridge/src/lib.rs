@@ -3,8 +3,8 @@
 //!
 //! | host | what its bridge does | where |
 //! |---|---|---|
-//! | with cameras | sends frames as JPEG, or poses; the newest wins | [`far`] |
-//! | that fuses | publishes them for the frames of its run, and says why where one is missing | [`near`] |
+//! | with cameras | sends frames as JPEG, or poses; the newest wins | `far` |
+//! | that fuses | publishes them for the frames of its run, and says why where one is missing | `near` |
 //!
 //! The engine is Zenoh, behind the feature `zenoh`; what crosses, and the rules for it, are in `hosts`.
 #![forbid(unsafe_code)]

@@ -31,6 +31,10 @@ Examples:
     parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --board charuco:7x5:40mm --show a=board/a.mp4 --show b=board/b.mp4 \\
         --floor a=floor/a.mp4 --floor b=floor/b.mp4 --sync --run
     parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --rig Calib.toml --dry-run")]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a flag of the command line"
+)]
 pub(crate) struct Arguments {
     /// The folder to make.
     room: PathBuf,
@@ -223,7 +227,8 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
         let CameraFootage { name, paths } = CameraFootage::of(camera);
         let source = source(&paths[0]).or_fail(ExitKind::Input)?;
         let source = toml::Value::from(source);
-        text += &format!("\n[[camera]]\nname = {name:?}\nsource = {source}\n");
+        let camera = format!("\n[[camera]]\nname = {name:?}\nsource = {source}\n");
+        text.push_str(&camera);
     }
     Ok(text)
 }

@@ -32,6 +32,10 @@ Examples:
 While it runs, `parallax top` and `parallax status NAME --json` show every process and where its time goes. With a
 latency budget the run ends with exit code 6 if the 99th percentile from capture to result exceeds it, or if no frame
 was measured (unless it was stopped by Ctrl-C before any was).")]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a flag of the command line"
+)]
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,

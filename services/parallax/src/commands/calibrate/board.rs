@@ -102,7 +102,7 @@ pub(crate) struct Arguments {
     /// Draw a board to print.
     #[arg(long, value_name = "BOARD", conflicts_with_all = ["footage", "board", "corners"])]
     print: Option<Board>,
-    /// The page: a4, a3, a2, a1, a0, letter, legal, tabloid, WIDTHxHEIGHT in mm, or fit (the smallest of A4 to A0).
+    /// The page: a4, a3, a2, a1, a0, letter, legal, tabloid, `WIDTHxHEIGHT` in mm, or fit (the smallest of A4 to A0).
     #[arg(long, value_name = "PAGE", default_value = "fit", requires = "print")]
     paper: Paper,
     /// Print JSON.
