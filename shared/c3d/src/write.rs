@@ -13,7 +13,7 @@ const MAX_BLOCKS: usize = 255;
 /// Steps of a residual: one byte holds it.
 const MAX_RESIDUAL: f64 = 255.0;
 
-/// What a file says before its points; see [`write`].
+/// What a file says before its points; see [`write()`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading<'a> {
     /// Frames per second.

@@ -59,7 +59,7 @@ pub struct Value {
 ///
 /// * `joints`: with a role; of several of one role the first counts.
 /// * `up`: against gravity in the world, where that is known: without it, angles with the vertical are missing.
-/// * Returns every angle of [`Angle::ALL`], in their order.
+/// * Returns every angle of `Angle`, in their order.
 pub fn angles(
     joints: &[(Role, Estimate)],
     up: Option<UnitVector3<f64>>,

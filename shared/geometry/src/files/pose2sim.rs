@@ -132,7 +132,7 @@ pub fn write(rig: &Rig) -> Result<String, UnwritableRig> {
 ///
 /// # Errors
 ///
-/// As [`write`].
+/// As [`write()`].
 pub fn write_anipose(rig: &Rig) -> Result<String, UnwritableRig> {
     let table = |camera| camera_table(camera, Unit::Millimetres);
     let tables: Result<String, _> = rig.cameras().iter().map(table).collect();

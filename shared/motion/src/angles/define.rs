@@ -73,7 +73,7 @@ impl Angle {
         matches!(self, Self::TrunkForwards | Self::TrunkSideways)
     }
 
-    /// The joints that it is between, in the order that [`Self::degrees`] takes them.
+    /// The joints that it is between, in the order that `degrees` takes them.
     pub fn roles(self) -> Vec<Role> {
         use Role::{Ankle, BigToe, Elbow, Heel, Hip, Knee, Neck, Shoulder, Wrist};
         use Side::{Left, Right};
