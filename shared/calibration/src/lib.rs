@@ -13,7 +13,6 @@
 
 mod align;
 pub mod board;
-mod median;
 pub mod origin;
 pub mod people;
 pub mod refine;

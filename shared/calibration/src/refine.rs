@@ -12,9 +12,9 @@ mod tests;
 
 use geometry::Camera;
 use geometry::bundle::{Cameras, Free, covariance};
+use statistics::Sorted;
 
 use crate::align::Difference;
-use crate::median::median;
 use crate::people::adjust::{Beliefs, PosePrior};
 use crate::people::begin::{Choice, Study};
 use crate::people::estimate::{
@@ -316,7 +316,9 @@ fn disagreement(rigs: &[Vec<Camera>], all: &Solved, settings: &Settings, outcome
     let [one, other] = rigs else { return };
     let skeletons = all.skeletons(settings.n_joints);
     let points: Vec<_> = skeletons.iter().flatten().flatten().collect();
-    let axis = |axis: usize| median(&mut points.iter().map(|it| it[axis]).collect::<Vec<_>>());
+    let axis = |axis: usize| {
+        Sorted::new(points.iter().map(|it| it[axis]).collect::<Vec<_>>()).upper_median()
+    };
     let middle = [0, 1, 2].map(|it| axis(it).unwrap_or(0.0)).into();
     for (camera, (a, b)) in one.iter().zip(other).enumerate() {
         let apart = difference(a, b);

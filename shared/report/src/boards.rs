@@ -8,7 +8,8 @@ use base64::engine::general_purpose::STANDARD;
 use calibration::board::{CameraOutcome, Outcome};
 use nalgebra::Point2;
 
-use crate::html::{Html, STYLE, html, put};
+use crate::html::{Html, put};
+use crate::parts::{about_table, begin, number, verdict};
 
 /// The content of the page.
 #[derive(Debug, Clone)]
@@ -31,28 +32,12 @@ pub struct Page<'a> {
 
 /// One self-contained page.
 pub fn html(page: &Page<'_>) -> String {
-    let mut out = html!("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
-    put!(
-        out,
-        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-    );
-    put!(
-        out,
-        "<title>Parallax: cameras by a board</title>\n<style>\n"
-    );
-    put!(out, "{}", Html::constant(STYLE));
-    put!(out, "</style>\n<h1>Parallax: cameras by a board</h1>\n");
-    verdict(&mut out, page);
-    put!(out, "<div class=\"scroll\"><table>\n");
-    for (key, value) in page.about {
-        put!(
-            out,
-            "<tr><td>{}</td><td class=\"name\">{}</td></tr>\n",
-            key,
-            value
-        );
-    }
-    put!(out, "</table></div>\n");
+    let mut out = begin("Parallax: cameras by a board");
+    let own = page.outcome.doubts.iter().map(|it| it.text(page.names));
+    let doubts: Vec<String> = page.more_doubts.iter().cloned().chain(own).collect();
+    let said = ("calibrated", "not to be trusted as it is");
+    verdict(&mut out, said, &doubts);
+    about_table(&mut out, page.about);
     cameras(&mut out, page);
     put!(
         out,
@@ -78,32 +63,6 @@ pub fn html(page: &Page<'_>) -> String {
     worst(&mut out, page);
     put!(out, "</html>\n");
     out.into_page()
-}
-
-fn verdict(out: &mut Html, page: &Page<'_>) {
-    let own = page.outcome.doubts.iter().map(|it| it.text(page.names));
-    let doubts: Vec<String> = page.more_doubts.iter().cloned().chain(own).collect();
-    if doubts.is_empty() {
-        put!(out, "<p class=\"verdict held\">calibrated</p>\n");
-        return;
-    }
-    put!(
-        out,
-        "<p class=\"verdict missed\">not to be trusted as it is</p>\n<ul>\n"
-    );
-    for it in doubts {
-        put!(out, "<li>{}</li>\n", it);
-    }
-    put!(out, "</ul>\n");
-}
-
-/// A number with some decimals; a dash for one that is not finite.
-pub(super) fn number(value: f64, decimals: usize) -> String {
-    if value.is_finite() {
-        format!("{value:.decimals$}")
-    } else {
-        "-".to_owned()
-    }
 }
 
 fn focal(camera: &CameraOutcome) -> (String, String) {

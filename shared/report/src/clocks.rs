@@ -4,7 +4,8 @@ use core::fmt::Write as _;
 
 use synchronisation::{Curve, Outcome, PairReport};
 
-use crate::html::{Html, STYLE, html, put};
+use crate::html::{Html, put};
+use crate::parts::{about_table, begin, number, verdict};
 
 const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 150.0;
@@ -25,25 +26,11 @@ pub struct Page<'a> {
 
 /// One self-contained page.
 pub fn html(page: &Page<'_>) -> String {
-    let mut out = html!("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
-    put!(
-        out,
-        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-    );
-    put!(out, "<title>Parallax: clocks of cameras</title>\n<style>\n");
-    put!(out, "{}", Html::constant(STYLE));
-    put!(out, "</style>\n<h1>Parallax: clocks of cameras</h1>\n");
-    verdict(&mut out, page);
-    put!(out, "<div class=\"scroll\"><table>\n");
-    for (key, value) in page.about {
-        put!(
-            out,
-            "<tr><td>{}</td><td class=\"name\">{}</td></tr>\n",
-            key,
-            value
-        );
-    }
-    put!(out, "</table></div>\n");
+    let mut out = begin("Parallax: clocks of cameras");
+    let doubts = page.outcome.doubts.iter().map(|it| it.text(page.names));
+    let doubts: Vec<String> = doubts.collect();
+    verdict(&mut out, ("determined", "not to be used"), &doubts);
+    about_table(&mut out, page.about);
     cameras(&mut out, page);
     put!(
         out,
@@ -56,22 +43,6 @@ pub fn html(page: &Page<'_>) -> String {
     }
     put!(out, "</html>\n");
     out.into_page()
-}
-
-fn verdict(out: &mut Html, page: &Page<'_>) {
-    let doubts = &page.outcome.doubts;
-    if doubts.is_empty() {
-        put!(out, "<p class=\"verdict held\">determined</p>\n");
-        return;
-    }
-    put!(
-        out,
-        "<p class=\"verdict missed\">not to be used</p>\n<ul>\n"
-    );
-    for it in doubts {
-        put!(out, "<li>{}</li>\n", it.text(page.names));
-    }
-    put!(out, "</ul>\n");
 }
 
 fn cameras(out: &mut Html, page: &Page<'_>) {
@@ -96,15 +67,6 @@ fn cameras(out: &mut Html, page: &Page<'_>) {
         );
     }
     put!(out, "</table></div>\n");
-}
-
-/// A number with some decimals; a dash for one that is not finite.
-fn number(value: f64, decimals: usize) -> String {
-    if value.is_finite() {
-        format!("{value:.decimals$}")
-    } else {
-        "-".to_owned()
-    }
 }
 
 fn pair_plot(out: &mut Html, names: &[&str], curve: &Curve, pair: &PairReport) {

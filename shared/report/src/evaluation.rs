@@ -5,7 +5,8 @@ mod pictures;
 
 use experiment::{Group, Numbers, Summary, Version, number, overall, published};
 
-use crate::html::{Html, STYLE, html, put};
+use crate::html::{Html, html, put};
+use crate::parts::{about_table, begin};
 use figure::{bars, colour, curves, histogram};
 
 pub use pictures::pictures_html;
@@ -24,7 +25,7 @@ pub struct Page<'a> {
 /// One self-contained page.
 pub fn html(page: &Page<'_>) -> String {
     let titles: Vec<String> = page.versions.iter().map(|it| it.title()).collect();
-    let mut out = head();
+    let mut out = begin("Parallax: evaluation");
     about_table(&mut out, page.about);
     put!(out, "<p class=\"key\">");
     for (version, title) in titles.iter().enumerate() {
@@ -51,33 +52,6 @@ pub fn html(page: &Page<'_>) -> String {
     predictions(&mut out, page.summary);
     put!(out, "</html>\n");
     out.into_page()
-}
-
-/// The beginning of a page, up to its heading.
-fn head() -> Html {
-    let mut out = html!("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
-    put!(
-        out,
-        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-    );
-    put!(out, "<title>Parallax: evaluation</title>\n<style>\n");
-    put!(out, "{}", Html::constant(STYLE));
-    put!(out, "</style>\n<h1>Parallax: evaluation</h1>\n");
-    out
-}
-
-/// What was run: key and value.
-fn about_table(out: &mut Html, about: &[(String, String)]) {
-    put!(out, "<div class=\"scroll\"><table>\n");
-    for (key, value) in about {
-        put!(
-            out,
-            "<tr><td>{}</td><td class=\"name\">{}</td></tr>\n",
-            key,
-            value
-        );
-    }
-    put!(out, "</table></div>\n");
 }
 
 /// The paper's main tables: PCP3D by group, with the published values.

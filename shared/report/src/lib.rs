@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 mod html;
+mod parts;
 
 pub mod boards;
 pub mod clocks;

@@ -5,12 +5,15 @@ use calibration::refine;
 use geometry::Camera;
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-use crate::html::{Html, STYLE, html, put};
+use crate::html::{Html, put};
+use crate::parts::{about_table, begin, number, verdict};
 use crate::run::{Eye, Moment, SCRIPT, Space};
 
 /// Cells of a picture along each axis, and the size of its drawing.
 const CELLS: usize = 8;
 const WIDTH: f64 = 160.0;
+/// What is said of a rig with doubts.
+const UNUSABLE: &str = "not to be used";
 /// The most skeletons that are drawn.
 const MOST_MOMENTS: usize = 150;
 
@@ -20,8 +23,8 @@ const MOST_MOMENTS: usize = 150;
 pub fn of_people(outcome: &people::Outcome, names: &[&str], about: &[(String, String)]) -> String {
     let mut out = begin("Parallax: a rig from people");
     let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
-    verdict(&mut out, "determined", &doubts);
-    facts(&mut out, about);
+    verdict(&mut out, ("determined", UNUSABLE), &doubts);
+    about_table(&mut out, about);
     put!(
         out,
         "<p class=\"note\">{} instants over {} s; sides of {} views exchanged; scale to {} %.</p>\n",
@@ -96,8 +99,8 @@ pub fn of_refinement(
                 .to_owned(),
         );
     }
-    verdict(&mut out, "better", &doubts);
-    facts(&mut out, about);
+    verdict(&mut out, ("better", UNUSABLE), &doubts);
+    about_table(&mut out, about);
     put!(
         out,
         "<p class=\"note\">{} instants. Held out, joints are {} px from where the other cameras see them before and {} px after; \
@@ -136,55 +139,6 @@ pub fn of_refinement(
     }
     put!(out, "</table></div>\n</html>\n");
     out.into_page()
-}
-
-fn begin(title: &str) -> Html {
-    let mut out = html!("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
-    put!(
-        out,
-        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{}</title>\n<style>\n{}</style>\n<h1>{}</h1>\n",
-        title,
-        Html::constant(STYLE),
-        title
-    );
-    out
-}
-
-fn verdict(out: &mut Html, good: &str, doubts: &[String]) {
-    if doubts.is_empty() {
-        put!(out, "<p class=\"verdict held\">{}</p>\n", good);
-        return;
-    }
-    put!(
-        out,
-        "<p class=\"verdict missed\">not to be used</p>\n<ul>\n"
-    );
-    for it in doubts {
-        put!(out, "<li>{}</li>\n", it);
-    }
-    put!(out, "</ul>\n");
-}
-
-fn facts(out: &mut Html, about: &[(String, String)]) {
-    put!(out, "<div class=\"scroll\"><table>\n");
-    for (key, value) in about {
-        put!(
-            out,
-            "<tr><td>{}</td><td class=\"name\">{}</td></tr>\n",
-            key,
-            value
-        );
-    }
-    put!(out, "</table></div>\n");
-}
-
-/// A number with some decimals; a dash for one that is not finite.
-fn number(value: f64, decimals: usize) -> String {
-    if value.is_finite() {
-        format!("{value:.decimals$}")
-    } else {
-        "-".to_owned()
-    }
 }
 
 /// Where in the picture of every camera the joints were.

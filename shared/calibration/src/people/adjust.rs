@@ -4,6 +4,7 @@ use body::{BONES, Kind, N_BONES};
 use geometry::bundle::{Cameras, Loss, Problem, Step, Term};
 use geometry::{Camera, Observation, Settings, triangulate};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
+use statistics::Sorted;
 
 use super::sightings::Sightings;
 
@@ -133,8 +134,8 @@ impl Adjustment {
 
     /// A joint errs alike wherever it is in one place: all its instants there count as one.
     fn find_shares(&mut self) {
-        let mut sizes: Vec<f64> = self.instants.iter().map(Instant::size).collect();
-        let near = PLACE * crate::median::median(&mut sizes).unwrap_or(0.0);
+        let sizes: Vec<f64> = self.instants.iter().map(Instant::size).collect();
+        let near = PLACE * Sorted::new(sizes).upper_median().unwrap_or(0.0);
         let n_joints = self.instants.iter().flat_map(|it| &it.joints).max();
         for joint in 0..n_joints.map_or(0, |it| it + 1) {
             let each = self.instants.iter().enumerate();

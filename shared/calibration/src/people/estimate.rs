@@ -5,6 +5,7 @@ use fastrand::Rng;
 use geometry::Camera;
 use geometry::bundle::{Covariance, covariance};
 use nalgebra::{DVector, Point3, UnitVector3};
+use statistics::Sorted;
 use synchronisation::Film;
 
 use super::begin::{Choice, Study, choices};
@@ -15,7 +16,6 @@ use super::sightings::{Chain, chains, ideal};
 use super::solve::{Solved, Wanted, solved};
 use super::{Recording, Settings};
 use crate::align::{aligned, differences};
-use crate::median::median;
 
 /// A camera sees people for at least so long, seconds.
 pub(crate) const LEAST_SEEN_S: f64 = 0.5;
@@ -203,12 +203,12 @@ pub(crate) fn check_joints(joints: usize, sides: &[usize]) -> Result<(), PeopleE
 }
 
 pub(crate) fn interval_s(film: &Film) -> Option<f64> {
-    let mut steps: Vec<f64> = film
+    let steps: Vec<f64> = film
         .shots
         .array_windows()
         .map(|[a, b]| b.time_s - a.time_s)
         .collect();
-    median(&mut steps)
+    Sorted::new(steps).upper_median()
 }
 
 fn nothing(cameras: &[Camera], settings: &Settings) -> Outcome {
@@ -383,7 +383,8 @@ fn report(
 /// The distance of a camera to the people, metres.
 fn distances(outcome: &Outcome) -> Vec<f64> {
     let all: Vec<&Point3<f64>> = outcome.skeletons.iter().flatten().flatten().collect();
-    let axis = |axis: usize| median(&mut all.iter().map(|it| it[axis]).collect::<Vec<_>>());
+    let axis =
+        |axis: usize| Sorted::new(all.iter().map(|it| it[axis]).collect::<Vec<_>>()).upper_median();
     let middle = Point3::new(
         axis(0).unwrap_or(0.0),
         axis(1).unwrap_or(0.0),

@@ -3,9 +3,9 @@
 use body::{BONES, Joints, N_JOINTS, stature};
 use geometry::Camera;
 use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, UnitQuaternion, UnitVector3, Vector3};
+use statistics::Sorted;
 
 use crate::align::{Similarity, aligned};
-use crate::median::median;
 
 /// Ankles slower than this stand, metres per second.
 const STANDING_M_S: f64 = 0.25;
@@ -92,9 +92,11 @@ pub(crate) fn world(
     let feet: Vec<Point3<f64>> = standing(times_s, &scaled, &up).iter().map(turned).collect();
     let all = scaled.iter().flatten().flatten();
     let turned: Vec<Point3<f64>> = all.map(turned).collect();
-    let middle = |axis: usize| median(&mut turned.iter().map(|it| it[axis]).collect::<Vec<_>>());
+    let middle = |axis: usize| {
+        Sorted::new(turned.iter().map(|it| it[axis]).collect::<Vec<_>>()).upper_median()
+    };
     let ankle = ANKLE * stature_of(&scaled).map_or(1.7, |it| it.0);
-    let floor = match median(&mut feet.iter().map(|it| it.z).collect::<Vec<_>>()) {
+    let floor = match Sorted::new(feet.iter().map(|it| it.z).collect::<Vec<_>>()).upper_median() {
         Some(height) if feet.len() >= LEAST => height - ankle,
         _ => turned.iter().map(|it| it.z).fold(f64::INFINITY, f64::min) - ankle,
     };
@@ -281,7 +283,8 @@ fn middle(all: &[Vector3<f64>]) -> Option<UnitVector3<f64>> {
     if all.len() < LEAST {
         return None;
     }
-    let axis = |axis: usize| median(&mut all.iter().map(|it| it[axis]).collect::<Vec<_>>());
+    let axis =
+        |axis: usize| Sorted::new(all.iter().map(|it| it[axis]).collect::<Vec<_>>()).upper_median();
     UnitVector3::try_new(Vector3::new(axis(0)?, axis(1)?, axis(2)?), 1e-9)
 }
 
@@ -289,16 +292,21 @@ fn middle(all: &[Vector3<f64>]) -> Option<UnitVector3<f64>> {
 pub(crate) fn bone_spread(skeletons: &Skeletons) -> Option<f64> {
     let mut each = Vec::new();
     for bone in BONES.iter().filter(|it| it.from[0] == it.from[1]) {
-        let mut lengths: Vec<f64> = skeletons
+        let lengths: Vec<f64> = skeletons
             .iter()
             .filter_map(|it| bone.length(&joints(it)))
             .collect();
         if lengths.len() < 2 * LEAST {
             continue;
         }
-        let length = median(&mut lengths)?;
-        let mut away: Vec<f64> = lengths.iter().map(|it| (it / length - 1.0).abs()).collect();
-        each.push(1.4826 * median(&mut away)?);
+        let lengths = Sorted::new(lengths);
+        let length = lengths.upper_median()?;
+        let away: Vec<f64> = lengths
+            .values()
+            .iter()
+            .map(|it| (it / length - 1.0).abs())
+            .collect();
+        each.push(1.4826 * Sorted::new(away).upper_median()?);
     }
-    median(&mut each)
+    Sorted::new(each).upper_median()
 }

@@ -1,7 +1,7 @@
 //! How well joints fit, and where in the picture they are.
+use statistics::Sorted;
 
 use super::adjust::Adjustment;
-use crate::median::median;
 
 /// Fewer joints of a kind have the expected error of all.
 const LEAST: usize = 30;
@@ -25,9 +25,11 @@ pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) ->
     problem.residuals(&mut |camera, joint, residual, _| {
         all[joint].push(residual.norm() / sizes_px[camera]);
     });
-    let whole = median(&mut all.concat()).unwrap_or(1.0);
+    let whole = Sorted::new(all.concat()).upper_median().unwrap_or(1.0);
     let share = |it: &Vec<f64>| {
-        let own = median(&mut it.clone()).filter(|_| it.len() >= LEAST);
+        let own = Sorted::new(it.clone())
+            .upper_median()
+            .filter(|_| it.len() >= LEAST);
         FITTED * own.unwrap_or(whole) / MEDIAN
     };
     let shares: Vec<f64> = all.iter().map(share).collect();
@@ -63,11 +65,11 @@ pub(crate) fn fits(problem: &Adjustment, sigmas_px: &[Vec<f64>]) -> Vec<Fit> {
             share.map(|it| (it * CELLS as f64).floor().clamp(0.0, CELLS as f64 - 1.0) as usize);
         cells[camera][cell[1] * CELLS + cell[0]] += 1;
     });
-    let each = lengths.iter_mut().zip(good).zip(cells);
+    let each = lengths.into_iter().zip(good).zip(cells);
     each.map(|((lengths, good), cells)| Fit {
         n: lengths.len(),
-        median_px: median(lengths).unwrap_or(f64::NAN),
         inliers: good as f64 / lengths.len().max(1) as f64,
+        median_px: Sorted::new(lengths).upper_median().unwrap_or(f64::NAN),
         cells,
     })
     .collect()

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use geometry::Camera;
+use statistics::Sorted;
 
 use super::Outcome;
-use crate::median::median;
 use crate::people::begin::{Choice, Study};
 use crate::people::estimate::BLOCK_S;
 use crate::people::sides::{exchange, of_pair, point};
@@ -51,7 +51,7 @@ pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
             if each.len() < LEAST {
                 return f64::INFINITY;
             }
-            median(&mut each).unwrap_or(f64::INFINITY)
+            Sorted::new(each).upper_median().unwrap_or(f64::INFINITY)
         };
         let n_chains = study.chains[camera].len();
         let best = (0..n_chains).min_by(|a, b| cost(*a).total_cmp(&cost(*b)));
@@ -122,7 +122,7 @@ impl Blocks {
 
     /// Median distances of a camera, pixels: before and after.
     pub(super) fn of_camera(&self, camera: usize) -> [f64; 2] {
-        let of = |it: &Vec<f64>| median(&mut it.clone()).unwrap_or(f64::NAN);
+        let of = |it: &Vec<f64>| Sorted::new(it.clone()).upper_median().unwrap_or(f64::NAN);
         self.distances
             .get(camera)
             .map_or([f64::NAN; 2], |it| [of(&it[0]), of(&it[1])])
@@ -132,7 +132,9 @@ impl Blocks {
     pub(super) fn judge(&self, outcome: &mut Outcome) {
         let all = |nth: usize| {
             let each = self.distances.iter().flat_map(|it| it[nth].iter().copied());
-            median(&mut each.collect::<Vec<_>>()).unwrap_or(f64::NAN)
+            Sorted::new(each.collect::<Vec<_>>())
+                .upper_median()
+                .unwrap_or(f64::NAN)
         };
         let [before, after] = [all(0), all(1)];
         outcome.held_out_px = [before, after];

@@ -3,8 +3,8 @@
 use evaluation::Bootstrap;
 use experiment::{Pictures, number};
 
-use super::{about_table, head};
 use crate::html::put;
+use crate::parts::{about_table, begin};
 
 /// One page that needs no other file.
 ///
@@ -14,7 +14,7 @@ pub fn pictures_html(
     about: &[(String, String)],
     bootstrap: &Bootstrap,
 ) -> String {
-    let mut out = head();
+    let mut out = begin("Parallax: evaluation");
     about_table(&mut out, about);
     for table in sets.iter().flat_map(|it| it.tables(bootstrap)) {
         put!(

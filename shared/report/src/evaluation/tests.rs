@@ -8,6 +8,7 @@ use experiment::{Judgement, Pictures};
 
 use super::figure::{tick, top};
 use super::*;
+use crate::html::STYLE;
 
 #[test]
 fn the_page_is_self_contained_with_every_table_and_figure() {

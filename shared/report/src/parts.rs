@@ -1,0 +1,54 @@
+//! What several pages have: their beginning, the verdict, what was looked at, numbers.
+
+use crate::html::{Html, STYLE, html, put};
+
+/// The beginning of a page, up to its heading.
+pub(crate) fn begin(title: &str) -> Html {
+    let mut out = html!("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
+    put!(
+        out,
+        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{}</title>\n<style>\n{}</style>\n<h1>{}</h1>\n",
+        title,
+        Html::constant(STYLE),
+        title
+    );
+    out
+}
+
+/// Whether what the page is about can be used.
+///
+/// * `good`, `bad`: what is said without and with doubts.
+pub(crate) fn verdict(out: &mut Html, (good, bad): (&str, &str), doubts: &[String]) {
+    if doubts.is_empty() {
+        put!(out, "<p class=\"verdict held\">{}</p>\n", good);
+        return;
+    }
+    put!(out, "<p class=\"verdict missed\">{}</p>\n<ul>\n", bad);
+    for it in doubts {
+        put!(out, "<li>{}</li>\n", it);
+    }
+    put!(out, "</ul>\n");
+}
+
+/// What was looked at, or run: key and value.
+pub(crate) fn about_table(out: &mut Html, about: &[(String, String)]) {
+    put!(out, "<div class=\"scroll\"><table>\n");
+    for (key, value) in about {
+        put!(
+            out,
+            "<tr><td>{}</td><td class=\"name\">{}</td></tr>\n",
+            key,
+            value
+        );
+    }
+    put!(out, "</table></div>\n");
+}
+
+/// A number with some decimals; a dash for one that is not finite.
+pub(crate) fn number(value: f64, decimals: usize) -> String {
+    if value.is_finite() {
+        format!("{value:.decimals$}")
+    } else {
+        "-".to_owned()
+    }
+}
