@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use deployment::hosts::Carry;
 use hosts::{Fingerprint, Grid};
 
-use crate::link::Address;
+use crate::address::Address;
 
 /// What the process has to do.
 #[derive(Debug)]

@@ -7,7 +7,8 @@ use std::time::Instant;
 use hosts::{Answer, Clock, Difference, Exchange, Fingerprint, Hello, Signal, VERSION, Welcome};
 use runtime::{Stop, now_nanos};
 
-use crate::link::{Address, Link, LinkError};
+use crate::address::{Address, LinkError};
+use crate::link::Link;
 use crate::topics::Topics;
 
 /// Exchanges of times before a run.

@@ -9,6 +9,7 @@
 //! The engine is Zenoh, behind the feature `zenoh`; what crosses, and the rules for it, are in `hosts`.
 #![forbid(unsafe_code)]
 
+mod address;
 mod far;
 mod job;
 mod join;
@@ -24,10 +25,10 @@ mod link;
 #[path = "no_link.rs"]
 mod link;
 
+pub use address::{Address, LinkError};
 pub use job::{Far, Job, Near, NearHost, Role};
 pub use join::{JoinError, join, status};
 pub use keys::{KeyError, KeyFiles, make_keys};
-pub use link::{Address, LinkError};
 
 use runtime::{Failure, Service};
 

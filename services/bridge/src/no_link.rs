@@ -3,30 +3,7 @@
 use core::convert::Infallible;
 use core::time::Duration;
 
-use crate::keys::KeyFiles;
-
-/// Where to connect to, or to listen, and as whom.
-#[derive(Debug, Clone)]
-pub struct Address {
-    /// The deployment.
-    pub deployment: String,
-    /// This host.
-    pub host: String,
-    /// The address of the host that fuses: name or number, and port.
-    pub address: String,
-    /// Whether this is that host.
-    pub listens: bool,
-    /// The keys; none if the deployment is insecure.
-    pub keys: Option<KeyFiles>,
-}
-
-/// The link cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum LinkError {
-    /// This build has none.
-    #[error("this build has no hosts: build with `--features hosts`")]
-    NotBuilt,
-}
+use crate::address::{Address, LinkError};
 
 /// There is none.
 #[derive(Debug)]

@@ -4,6 +4,7 @@ use datasets::{People, Person, Picture, Sides};
 use experiment::{Joints, Pictures};
 use fmp::{Layout, Pose, Search, Solver};
 use keypoints::Keypoint;
+use pipeline::ViewSettings;
 use posenetwork::springs::joint_of;
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
@@ -19,10 +20,6 @@ const HEAD: usize = 13;
 /// A joint lies where its map is highest if the springs put it nearer than this, cells: between cells the maxima of the maps
 /// are more exact.
 const SAME: f64 = 1.5;
-/// Most boxes of the filters that the network looks into.
-const MOST_BOXES: usize = 8;
-/// Least mean distance of the parts of two poses whose boxes these are, box sides.
-const SEPARATION: f64 = 1.0;
 
 /// A network, and the tree of springs that holds its maps together.
 #[derive(Debug)]
@@ -186,8 +183,14 @@ fn found_boxes(
     };
     let searched = Searched::new(&picture, Some(BOXES_PX), finder)?;
     let image = searched.image(&picture)?;
+    // As many, and as far apart, as a view of a deployment offers.
+    let ViewSettings {
+        n_candidates,
+        min_separation,
+        ..
+    } = ViewSettings::default();
     let found = finder.on(image, searched.layout(), |it| {
-        finder.solver.distinct(it, MOST_BOXES, SEPARATION)
+        finder.solver.distinct(it, n_candidates, min_separation)
     });
     let outlines = found.iter().map(|it| searched.outline(&finder.model, it));
     Ok(outlines.collect())

@@ -10,10 +10,9 @@ use fmp::{Bound, Bounds, Layout, Placement, Pose, Region, Responses, Scope, Solv
 use kernels::Rgb8View;
 use keypoints::Keypoint;
 use multiview::FrontEvidence;
-use posenetwork::springs::joint_of;
 use posenetwork::{
-    Detector, JointMaps, LookError, LookMemory, Looker, MapSettings, PoseNetwork, outline_of,
-    outline_of_parts, overlap,
+    Detector, JointMaps, LookError, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
+    outline_of_pose, overlap,
 };
 
 use crate::view_result::ExtraKeypoint;
@@ -363,7 +362,8 @@ impl NetworkStep {
                 maps.pose(&self.solver, &self.layout, responses)
             };
             if let Some(pose) = pose {
-                memory.outlines.extend(self.outline(&pose));
+                let tree = (&**self.solver.model(), &*self.layout);
+                memory.outlines.extend(outline_of_pose(&pose, tree));
                 found.push((self.at_level(pose, &scope), nth));
             }
         }
@@ -407,13 +407,6 @@ impl NetworkStep {
         let levels: Vec<u16> = scope.levels().collect();
         let evidence = Responses::within(&self.layout, responses, &levels, scope);
         self.solver.best(&evidence, None)
-    }
-
-    /// The box of a pose for the next frame.
-    fn outline(&self, pose: &Pose) -> Option<[f64; 4]> {
-        let model = self.solver.model();
-        let joints = (0..pose.parts.len()).filter(|part| joint_of(*part).is_some());
-        outline_of(joints.map(|part| pose.centre(model, &self.layout, part)))
     }
 
     /// The same pose on the level of a scope.

@@ -1,12 +1,11 @@
 //! Looking at people in boxes that may not fit: into several, and closer where somebody is seen.
 
-use fmp::{Layout, Pose, Solver};
+use fmp::{Layout, Solver};
 use kernels::Rgb8View;
 
 use crate::maps::{JointMaps, MapSettings};
 use crate::network::{LookError, PoseNetwork, Workspace};
-use crate::outline::{outline_of, overlap};
-use crate::springs::joint_of;
+use crate::outline::{outline_of_pose, overlap};
 
 /// Boxes that cover each other by more show the same to a network: another look tells nothing new.
 const FITS: f64 = 0.8;
@@ -91,7 +90,7 @@ impl Looker<'_> {
             outline,
             front,
             score: pose.as_ref().map_or(f32::NEG_INFINITY, |it| it.score),
-            around: pose.and_then(|it| self.around(&it)),
+            around: pose.and_then(|it| outline_of_pose(&it, (self.springs.model(), self.layout))),
         }))
     }
 
@@ -164,12 +163,5 @@ impl Looker<'_> {
             responses,
         } = memory;
         self.look_in(what, (workspace, responses), other)
-    }
-
-    /// The box around a pose of the springs.
-    fn around(&self, pose: &Pose) -> Option<[f64; 4]> {
-        let model = self.springs.model();
-        let joints = (0..pose.parts.len()).filter(|part| joint_of(*part).is_some());
-        outline_of(joints.map(|part| pose.centre(model, self.layout, part)))
     }
 }

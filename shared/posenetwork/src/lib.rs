@@ -23,4 +23,4 @@ pub use detector::Detector;
 pub use expected::expected_error;
 pub use maps::{JointMaps, MapSettings};
 pub use network::{FitError, LookError, PoseNetwork, Sight, Workspace};
-pub use outline::{OF_FILTERS, outline_of, outline_of_parts, overlap};
+pub use outline::{OF_FILTERS, outline_of, outline_of_parts, outline_of_pose, overlap};

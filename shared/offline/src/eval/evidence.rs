@@ -10,6 +10,7 @@ use geometry::Camera;
 use kernels::Rgb8View;
 use keypoints::Sides;
 use multiview::{SeenPerson, same_person};
+use pipeline::ViewSettings;
 use posenetwork::{
     Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
 };
@@ -68,7 +69,8 @@ impl Boxes<'_> {
                 let layout = Layout::new(&search.model, image.width(), image.height());
                 let layout = layout.or_fail(ExitKind::Input)?;
                 let found = search.on(image, &layout, |it| {
-                    search.solver.distinct(it, MOST_PEOPLE, SEPARATION)
+                    let separation = ViewSettings::default().min_separation;
+                    search.solver.distinct(it, MOST_PEOPLE, separation)
                 });
                 let outline = |it: &Pose| outline_of_parts(it.bounding_box(&search.model, &layout));
                 Ok(found.iter().map(outline).collect())
@@ -277,8 +279,6 @@ impl EvidenceJob<'_> {
     }
 }
 
-/// Least mean distance of two poses of the filters, in box sides: that of a deployment (`pose.min_separation`).
-const SEPARATION: f64 = 1.0;
 /// Most people of a view that the network looks at.
 const MOST_PEOPLE: usize = 4;
 
