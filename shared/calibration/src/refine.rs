@@ -18,8 +18,7 @@ use crate::align::Difference;
 use crate::people::adjust::{Beliefs, PosePrior};
 use crate::people::begin::{Choice, Study};
 use crate::people::estimate::{
-    LEAST_INSTANTS, LEAST_SEEN_S, MOST_HALVES, MOST_RESIDUAL, check_joints, half_of, instants,
-    interval_s,
+    LEAST_INSTANTS, LEAST_SEEN_S, MOST_HALVES, check_joints, half_of, instants, interval_s,
 };
 use crate::people::measure::fits;
 use crate::people::sightings::{Chain, chains, ideal};
@@ -373,14 +372,7 @@ fn finish(outcome: &mut Outcome, (given, study): (&[Camera], &Study<'_>), all: &
     }
     for (camera, change) in outcome.changes.iter().enumerate() {
         let size = study.chains[camera][all.choices[camera].chain].size();
-        let share = change.residual_px / size;
-        if share >= MOST_RESIDUAL || share.is_nan() {
-            let limit = MOST_RESIDUAL;
-            outcome.doubts.push(Doubt::Fit {
-                camera,
-                share,
-                limit,
-            });
-        }
+        let fit = Doubt::of_fit(camera, change.residual_px, size);
+        outcome.doubts.extend(fit);
     }
 }

@@ -1,5 +1,7 @@
 //! Why an answer is not to be used.
 
+use super::estimate::MOST_RESIDUAL;
+
 /// A reason not to use what was found. Cameras by number, from 0.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Doubt {
@@ -82,6 +84,19 @@ pub enum Doubt {
 }
 
 impl Doubt {
+    /// That the joints of a camera do not fit, if so.
+    ///
+    /// * `residual_px`: the median; `size_px`: of the person in the camera's pictures.
+    pub(crate) fn of_fit(camera: usize, residual_px: f64, size_px: f64) -> Option<Self> {
+        let (share, limit) = (residual_px / size_px, MOST_RESIDUAL);
+        // NaN is not less.
+        (share >= limit || share.is_nan()).then_some(Self::Fit {
+            camera,
+            share,
+            limit,
+        })
+    }
+
     /// For people to read.
     ///
     /// * `names`: of the cameras.

@@ -405,15 +405,8 @@ fn certainty(outcome: &mut Outcome, study: &Study<'_>, all: &Solved) {
             outcome.doubts.push(Doubt::Uncertain { camera, sd, limits });
         }
         let size = study.chains[camera][all.choices[camera].chain].size();
-        let share = report.residual_px / size;
-        if share >= MOST_RESIDUAL || share.is_nan() {
-            let limit = MOST_RESIDUAL;
-            outcome.doubts.push(Doubt::Fit {
-                camera,
-                share,
-                limit,
-            });
-        }
+        let fit = Doubt::of_fit(camera, report.residual_px, size);
+        outcome.doubts.extend(fit);
     }
 }
 
