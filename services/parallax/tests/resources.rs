@@ -34,12 +34,13 @@ fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal()
         n=0\n\
         for wait in 0 1 3 5 8 0 2 0 4 0 6 0 1 0 3 0 5 0 8 0; do\n\
           n=$((n + 1))\n\
-          \"$PARALLAX\" run deployment.toml --json >said-$n 2>&1 & run=$!\n\
+          timeout -k 20 100 \"$PARALLAX\" run deployment.toml --json >said-$n 2>&1 & run=$!\n\
           while set -- /dev/shm/px*/*/lock; [ ! -e \"$1\" ]; do kill -0 $run; done\n\
           [ $wait = 0 ] || sleep 0.0$wait\n\
           while kill -0 $run 2>/dev/null; do cat /dev/zero >>/dev/shm/filler 2>/dev/null || true; done\n\
           code=0; wait $run || code=$?; echo $code >code-$n\n\
           rm /dev/shm/filler\n\
+          if [ $code -ge 124 ]; then break; fi\n\
           if [ $n -ge 5 ] && grep -qx 1 code-*; then break; fi\n\
         done\n\
         exec \"$PARALLAX\" run deployment.toml --json";
@@ -56,9 +57,11 @@ fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal()
         for words in ["signal 7", "SIGBUS", "signal 11", "SIGSEGV", "panic"] {
             assert!(!said.contains(words), "{words}: {said}");
         }
+        let is_ended = !["124", "137"].contains(&code.trim());
+        assert!(is_ended, "it waited for ever: {said}");
         if code.trim() == "1" {
             n_refused += 1;
-            let tells = said.contains("free in /dev/shm") && said.contains("make room");
+            let tells = said.contains("in /dev/shm") && said.contains("make room");
             assert!(tells || said.contains("No space left"), "{said}");
         }
     }
@@ -158,24 +161,10 @@ fn truncated_shared_memory_is_reported_and_ends_no_process_by_a_signal() {
             file.and_then(|it| it.set_len(0)).ok();
         }
     }
-    // Usually the supervisor ends at once. It may also wait for ever on a truncated file, until it is killed: this is a
-    // documented limit.
-    let (id, begin) = (started.id(), Instant::now());
-    while !started.is_over() && begin.elapsed() < Duration::from_secs(15) {
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    let is_stuck = !started.is_over();
-    if is_stuck {
-        signal("KILL", id);
-    }
-    // Its processes end with it, after a moment.
+    // Usually it ends at once. It may also wait for a truncated file, which it notices after a minute.
     let ended = started.wait_among_others();
-    let expected = if is_stuck { None } else { Some(1) };
-    assert_eq!(ended.status.code(), expected, "{}", ended.stderr);
-    for words in [
-        "error: shared memory of the deployment is gone or damaged",
-        "parallax clean",
-    ] {
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
+    for words in ["error: shared memory of the deployment ", "parallax clean"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
     let cleaned = case.start(&["clean", &case.name]).wait();

@@ -5,6 +5,7 @@ mod plan;
 
 mod event;
 mod outcome;
+mod stall;
 mod watch;
 
 mod supervisor;

@@ -10,6 +10,7 @@ use runtime::{
     PreflightError, Stop, preflight, wait_for_any,
 };
 
+use crate::stall::Stall;
 use crate::watch::{Phase, Sequel, Watch, death_of};
 use crate::{Death, Event, Outcome, Plan, Role};
 
@@ -17,6 +18,12 @@ use crate::{Death, Event, Outcome, Plan, Role};
 const TURN: Duration = Duration::from_millis(50);
 /// An iteration that took this long means that the supervisor itself was stopped, and received no heartbeats.
 const ASLEEP: Duration = Duration::from_secs(2);
+/// Longest time without an answer from shared memory: a file that was cut off, or filled while it was made, may be waited for
+/// for ever by the transport.
+const LONGEST_STALL: Duration = Duration::from_mins(1);
+const STALLED: &str = "error: shared memory of the deployment has not answered the supervisor for a minute\n  \
+    hint: something else has filled, cut off or changed files in /dev/shm while they were in use: make room there; \
+    `parallax clean` removes what is left\n";
 
 /// The run failed.
 #[derive(Debug, thiserror::Error)]
@@ -95,6 +102,8 @@ const REPEAT_STOP: core::ops::Range<Duration> =
 /// Afterwards no process, file or shared memory of the deployment is left, whatever the outcome. Call it from
 /// a thread that lives as long as the run: its children end with it.
 ///
+/// Where shared memory does not answer for a minute, the process is ended with a message and [`ExitKind::Run`], and files may be left.
+///
 /// * `on_event`: is called for every event, and must not take long.
 ///
 /// # Errors
@@ -106,6 +115,9 @@ pub fn run(
     on_event: &mut dyn FnMut(Event<'_>),
 ) -> Result<Outcome, SuperviseError> {
     runtime::raise_file_limit();
+    let stall = Stall::watch(LONGEST_STALL, || runtime::end_process(STALLED))
+        .map_err(SuperviseError::Watch)?;
+    let on_event = &mut |event: Event<'_>| stall.outside(|| on_event(event));
     // Dropped in reverse: ports, topics, bus, and the lock last, which removes every file.
     let lock = plan.namespace.acquire()?;
     preflight(&plan.topics)?;
@@ -127,6 +139,7 @@ pub fn run(
         watches,
         cleaner: Cleaner::default(),
         cleaned: now,
+        stall: &stall,
         on_event,
     };
     let result = supervisor.watch();
@@ -145,6 +158,7 @@ struct Supervisor<'a> {
     watches: Vec<Watch>,
     cleaner: Cleaner,
     cleaned: Instant,
+    stall: &'a Stall,
     on_event: &'a mut dyn FnMut(Event<'_>),
 }
 
@@ -214,6 +228,7 @@ impl Supervisor<'_> {
     }
 
     fn sleep(&self, longest: Duration, stop: Option<&Stop>) -> Result<(), SuperviseError> {
+        self.stall.turn();
         let children: Vec<&Child> = self.watches.iter().filter_map(Watch::child).collect();
         wait_for_any(&children, stop, longest).map_err(SuperviseError::Watch)
     }

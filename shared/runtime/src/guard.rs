@@ -65,16 +65,28 @@ fn handle(signal: c_int) -> io::Result<()> {
     }
 }
 
-/// Writes the message and ends the process: two system calls.
+/// Ends the process from any thread, whatever the others wait for: nothing is dropped.
+///
+/// * `text`: written to standard error.
+pub fn end_process(text: &str) {
+    write_and_exit(text.as_bytes());
+}
+
+/// Two system calls.
+fn write_and_exit(text: &[u8]) {
+    // SAFETY: standard error stays open for the life of the process.
+    let stderr = unsafe { BorrowedFd::borrow_raw(libc::STDERR_FILENO) };
+    // A failure cannot be reported.
+    rustix::io::write(stderr, text).ok();
+    signal_hook::low_level::exit(c_int::from(ExitKind::Run.status()));
+}
+
+/// Writes the message and ends the process.
 extern "C" fn end(signal: c_int, _info: *mut libc::siginfo_t, _context: *mut libc::c_void) {
     let text = if signal == SIGBUS {
         NO_MEMORY
     } else {
         WRONG_MEMORY
     };
-    // SAFETY: standard error stays open for the life of the process.
-    let stderr = unsafe { BorrowedFd::borrow_raw(libc::STDERR_FILENO) };
-    // A failure cannot be reported.
-    rustix::io::write(stderr, text).ok();
-    signal_hook::low_level::exit(c_int::from(ExitKind::Run.status()));
+    write_and_exit(text);
 }

@@ -51,7 +51,7 @@ pub use clock::now_nanos;
 pub use copies::Copies;
 pub use delivery::{Delivery, Limits};
 pub use failure::{ExitKind, Failure, Fault, OrFail};
-pub use guard::guard_process;
+pub use guard::{end_process, guard_process};
 pub use guest::{Guest, GuestError, GuestPort, MOST_GUESTS, Seen, running_deployments};
 pub use health::{HEARTBEAT, Health, HealthError};
 pub use input::{in_file, no_text, read_text};
