@@ -1,6 +1,7 @@
 //! Why an answer is not to be used.
 
-use super::estimate::MOST_RESIDUAL;
+/// Median residual of a camera, as a share of the size of a person.
+const MOST_RESIDUAL: f64 = 0.04;
 
 /// A reason not to use what was found. Cameras by number, from 0.
 #[derive(Debug, Clone, PartialEq)]

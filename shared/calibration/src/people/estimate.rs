@@ -21,8 +21,6 @@ use crate::align::{aligned, differences};
 pub(crate) const LEAST_SEEN_S: f64 = 0.5;
 /// The fewest instants.
 pub(crate) const LEAST_INSTANTS: usize = 12;
-/// Median residual of a camera, as a share of the size of a person.
-pub(crate) const MOST_RESIDUAL: f64 = 0.04;
 /// Standard deviation of a camera: degrees, and share of its distance to the people.
 const MOST_SD: [f64; 2] = [1.5, 0.04];
 /// Difference of halves, likewise: the whole is about half as far off.
