@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 use std::sync::Arc;
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::{io, thread};
 
 /// Watches a thread, from another one, until it is dropped.
@@ -11,7 +11,7 @@ use std::{io, thread};
 pub(crate) struct Stall {
     watched: Arc<Watched>,
     /// The end of the watching: the receiver notices that it is gone.
-    _end: Sender<()>,
+    _end: SyncSender<()>,
 }
 
 #[derive(Debug, Default)]
@@ -31,7 +31,7 @@ impl Stall {
     /// There is no other thread.
     pub(crate) fn watch(limit: Duration, on_stall: fn()) -> io::Result<Self> {
         let watched = Arc::new(Watched::default());
-        let (end, ended) = channel();
+        let (end, ended) = sync_channel(0);
         let seen = Arc::clone(&watched);
         // A stopped process sleeps through many ticks and counts one.
         let tick = limit / 60;
