@@ -3,13 +3,11 @@
 
 use crate::common;
 
-use core::time::Duration;
 use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, chown};
-use std::time::Instant;
 
-use common::started::{processes, signal};
+use common::started::processes;
 use common::{Case, Ended, PACED, PLAIN, Started};
 use runtime::Namespace;
 use serde_json::{Value, json};

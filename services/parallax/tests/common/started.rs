@@ -147,11 +147,6 @@ impl Started {
         self.until(words, |_| said());
     }
 
-    /// Whether it has ended.
-    pub(crate) fn is_over(&mut self) -> bool {
-        self.child.try_wait().unwrap().is_some()
-    }
-
     /// Its process id, which is that of its group too.
     pub(crate) fn id(&self) -> i64 {
         i64::from(self.child.id())
