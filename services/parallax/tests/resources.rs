@@ -59,7 +59,7 @@ fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal()
         assert!(is_ended, "it waited for ever: {said}");
         if code.trim() == "1" {
             n_refused += 1;
-            let tells = said.contains("in /dev/shm") && said.contains("make room");
+            let tells = said.contains("free in /dev/shm") && said.contains("make room");
             assert!(tells || said.contains("No space left"), "{said}");
         }
     }
@@ -162,7 +162,10 @@ fn truncated_shared_memory_is_reported_and_ends_no_process_by_a_signal() {
     // Usually it ends at once. It may also wait for a truncated file, which it notices after a minute.
     let ended = started.wait_among_others();
     assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
-    for words in ["error: shared memory of the deployment ", "parallax clean"] {
+    for words in [
+        "error: shared memory of the deployment is gone or damaged",
+        "parallax clean",
+    ] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
     let cleaned = case.start(&["clean", &case.name]).wait();

@@ -18,9 +18,9 @@ use crate::{Death, Event, Outcome, Plan, Role};
 const TURN: Duration = Duration::from_millis(50);
 /// An iteration that took this long means that the supervisor itself was stopped, and received no heartbeats.
 const ASLEEP: Duration = Duration::from_secs(2);
-/// Longest time without an answer from shared memory: a file that was cut off, or filled while it was made, may be waited for
-/// for ever by the transport.
+/// Longest time without an answer from shared memory: the transport may wait for ever for a file that was cut off.
 const LONGEST_STALL: Duration = Duration::from_mins(1);
+/// What is said then.
 const STALLED: &str = "error: shared memory of the deployment has not answered the supervisor for a minute\n  \
     hint: something else has filled, cut off or changed files in /dev/shm while they were in use: make room there; \
     `parallax clean` removes what is left\n";
@@ -102,7 +102,8 @@ const REPEAT_STOP: core::ops::Range<Duration> =
 /// Afterwards no process, file or shared memory of the deployment is left, whatever the outcome. Call it from
 /// a thread that lives as long as the run: its children end with it.
 ///
-/// Where shared memory does not answer for a minute, the process is ended with a message and [`ExitKind::Run`], and files may be left.
+/// The exception: where shared memory does not answer for a minute, the process ends at once, with a message and the exit
+/// status of [`ExitKind::Run`], and files may be left.
 ///
 /// * `on_event`: is called for every event, and must not take long.
 ///
