@@ -95,7 +95,8 @@ impl Looker<'_> {
     }
 
     /// Looks into the box around the pose that was seen in another one, and so on, as long as that is another box and shows the person
-    /// better: a box that cuts off the feet, or in which a person is small, is left for a better one.
+    /// better: a box in which a person is small or at the edge is left for a better one. One that cuts off the feet stays: a network
+    /// puts them at its edge.
     ///
     /// * `seen`, `maps`: what was seen in the first box; the maps are replaced by better ones.
     ///
