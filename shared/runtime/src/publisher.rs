@@ -417,6 +417,10 @@ impl<E: Message, H: Header> Port<E, H> {
     }
 }
 
+/// How long a sender sleeps before it looks again whether a receiver has room: a quarter of what it has waited, within these.
+const LEAST_PAUSE: Duration = Duration::from_micros(50);
+const MOST_PAUSE: Duration = Duration::from_millis(1);
+
 /// What to do while a receiver has no room: wait, until the patience is over or stop is requested. An onlooker misses the
 /// message.
 fn patience(
@@ -433,9 +437,10 @@ fn patience(
         }
         progress.tick();
         if stop.is_requested() || info.elapsed_time >= limit {
-            BackpressureAction::DiscardDataAndFail
-        } else {
-            BackpressureAction::Retry
+            return BackpressureAction::DiscardDataAndFail;
         }
+        // iceoryx2 itself tries ten thousand times, one right after the other, before it sleeps: a core that the receiver may need.
+        std::thread::sleep((info.elapsed_time / 4).clamp(LEAST_PAUSE, MOST_PAUSE));
+        BackpressureAction::Retry
     }
 }
