@@ -11,7 +11,7 @@
 
 use nalgebra::Point3;
 
-use geometry::Camera;
+use geometry::{Camera, Ray};
 
 /// Number of joints: those of `skeleton::PARSE14`.
 const N: usize = 14;
@@ -162,12 +162,14 @@ pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N -
 /// * Returns an empty list for a joint that no two views show.
 pub fn places(views: &[SpaceView<'_>], n: usize) -> [Vec<Point3<f64>>; N] {
     core::array::from_fn(|joint| {
+        // A lens is inverted step by step, which takes long: once for each maximum, not for each pair.
+        let rays: Vec<Vec<Ray>> = views.iter().map(|it| it.rays(joint)).collect();
         let mut found: Vec<(f64, Point3<f64>)> = Vec::new();
-        for (nth, a) in views.iter().enumerate() {
-            for b in &views[nth + 1..] {
-                for (in_a, _) in a.evidence.maxima(a.named(joint)) {
-                    for (in_b, _) in b.evidence.maxima(b.named(joint)) {
-                        if let Some(at) = nearest([a.camera, b.camera], [*in_a, *in_b]) {
+        for (nth, of_a) in rays.iter().enumerate() {
+            for of_b in &rays[nth + 1..] {
+                for a in of_a {
+                    for b in of_b {
+                        if let Some(at) = nearest(a, b) {
                             found.push((unary(views, joint, &at), at));
                         }
                     }
@@ -180,10 +182,8 @@ pub fn places(views: &[SpaceView<'_>], n: usize) -> [Vec<Point3<f64>>; N] {
     })
 }
 
-/// The point nearest to the rays of two pixels; `None` behind a camera, or for rays that are parallel.
-fn nearest(cameras: [&Camera; 2], pixels: [[f64; 2]; 2]) -> Option<Point3<f64>> {
-    let ray = |nth: usize| cameras[nth].ray(&pixels[nth].into());
-    let (a, b) = (ray(0)?, ray(1)?);
+/// The point nearest to two rays; `None` behind a camera, or for rays that are parallel.
+fn nearest(a: &Ray, b: &Ray) -> Option<Point3<f64>> {
     let (u, v) = (a.direction.into_inner(), b.direction.into_inner());
     let between = b.origin - a.origin;
     let cosine = u.dot(&v);
@@ -214,6 +214,14 @@ impl SpaceView<'_> {
     /// The evidence for a joint of the body at a place, whatever the view calls it.
     pub fn evidence_at(&self, joint: usize, at: &Point3<f64>) -> f32 {
         self.at(self.named(joint), at) as f32
+    }
+
+    /// The rays of the places in the picture where a joint may be; not of those for which the lens has none.
+    fn rays(&self, joint: usize) -> Vec<Ray> {
+        let maxima = self.evidence.maxima(self.named(joint)).iter();
+        maxima
+            .filter_map(|(at, _)| self.camera.ray(&(*at).into()))
+            .collect()
     }
 
     /// What the view calls a joint.

@@ -62,6 +62,9 @@ fn polish(lens: &Lens, target: Vector2<f64>, mut point: Vector2<f64>) -> Vector2
         let mut scale = 1.0;
         let better = loop {
             let candidate = point - step * scale;
+            if candidate == point {
+                break None;
+            }
             let (at, slope) = lens.model.distort(candidate);
             if (at - target).norm() < residual.norm() {
                 break Some((candidate, at, slope));
