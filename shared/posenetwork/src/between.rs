@@ -39,16 +39,75 @@ pub fn interpolate(map: &[f32], [columns, rows]: [usize; 2], cell: [f64; 2]) -> 
     (across.is_inside && down.is_inside).then(|| between(map, columns, &down, &across))
 }
 
-/// The value of a map between sixteen cells.
+/// The value of a map between sixteen cells: along each of four rows, then across them.
 pub(crate) fn between(map: &[f32], columns: usize, row: &Tap, column: &Tap) -> f32 {
-    let mut sum = 0.0;
-    for (down, row_weight) in row.cells.into_iter().zip(row.weights) {
-        let line = &map[down * columns..(down + 1) * columns];
-        for (across, weight) in column.cells.into_iter().zip(column.weights) {
-            sum += row_weight * weight * line[across];
+    let [a, b, c, d] = row.cells.map(|it| {
+        let line = &map[it * columns..(it + 1) * columns];
+        column.along(line)
+    });
+    let [w_a, w_b, w_c, w_d] = row.weights;
+    w_a * a + w_b * b + w_c * c + w_d * d
+}
+
+impl Tap {
+    /// The value of a line at the place.
+    fn along(&self, line: &[f32]) -> f32 {
+        let [a, b, c, d] = self.cells;
+        let [w_a, w_b, w_c, w_d] = self.weights;
+        w_a * line[a] + w_b * line[b] + w_c * line[c] + w_d * line[d]
+    }
+}
+
+/// Memory of [`fill`], used again from map to map.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Lines {
+    values: Vec<f32>,
+}
+
+/// The values of a map at the crossings of places down and across, each that of [`between`] to the bit: every row of the map is
+/// interpolated once, not for each of the places between which it lies.
+///
+/// * `map`: row major, `columns` wide.
+/// * `take`: called for each row of places with its number and its values; those across that are not inside have none.
+pub(crate) fn for_each_row(
+    map: &[f32],
+    columns: usize,
+    [across, down]: [&[Tap]; 2],
+    lines: &mut Lines,
+    mut take: impl FnMut(usize, Option<&[f32]>),
+) {
+    let width = across.len();
+    let n_rows = map.len().checked_div(columns).unwrap_or(0);
+    let needed = down.iter().filter(|it| it.is_inside);
+    let cells = needed.flat_map(|it| it.cells);
+    let [first, last] = cells.fold([n_rows, 0], |[first, last], it| {
+        [first.min(it), last.max(it + 1)]
+    });
+    // Those of the rows that are needed, then one for the result.
+    let n_lines = last.saturating_sub(first);
+    lines.values.resize((n_lines + 1) * width, 0.0);
+    let (of_rows, result) = lines.values.split_at_mut(n_lines * width);
+    let rows = map.chunks_exact(columns.max(1)).skip(first);
+    for (line, row) in of_rows.chunks_exact_mut(width.max(1)).zip(rows) {
+        for (value, tap) in line.iter_mut().zip(across) {
+            *value = tap.along(row);
         }
     }
-    sum
+    for (nth, tap) in down.iter().enumerate() {
+        if !tap.is_inside {
+            take(nth, None);
+            continue;
+        }
+        let [a, b, c, d] = tap.cells.map(|it| {
+            let at = (it - first) * width;
+            &of_rows[at..at + width]
+        });
+        let [w_a, w_b, w_c, w_d] = tap.weights;
+        for ((((value, a), b), c), d) in result.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+            *value = w_a * a + w_b * b + w_c * c + w_d * d;
+        }
+        take(nth, Some(result));
+    }
 }
 
 /// Weights of four neighbours for a place between the two in the middle (Catmull & Rom 1974).

@@ -6,7 +6,7 @@ use fmp::{Layout, Placement, Scope};
 use keypoints::{Codec, Keypoint, Window, joint_rows};
 use skeleton::PARSE14;
 
-use crate::between::{Tap, between};
+use crate::between::{Lines, Tap, between, for_each_row};
 use crate::expected::expected_error;
 use crate::found::{likelihood, score_of, scored, weighted};
 use crate::network::{LookError, Read, Sight};
@@ -78,6 +78,7 @@ pub struct JointMaps {
     sigma_px: Option<f64>,
     /// Across and down: between which cells those of a layout lie.
     taps: [Vec<Tap>; 2],
+    lines: Lines,
 }
 
 /// Cells between two columns or rows of a grid that is made for a codec without maps.
@@ -451,23 +452,27 @@ impl JointMaps {
         }));
     }
 
-    fn write_joint(&self, joint: usize, map: &mut [f32], how: Write) {
+    fn write_joint(&mut self, joint: usize, map: &mut [f32], how: Write) {
         let area = self.rows * self.columns;
         let own = &self.values[joint * area..(joint + 1) * area];
-        let [across, down] = &self.taps;
-        for (row, line) in down.iter().zip(map.chunks_exact_mut(across.len().max(1))) {
-            for (column, value) in across.iter().zip(line) {
-                let here = if row.is_inside && column.is_inside {
-                    between(own, self.columns, row, column)
-                } else {
-                    self.floor
-                };
-                *value = match how {
-                    Write::Over => here,
-                    Write::Highest => value.max(here),
-                };
-            }
-        }
+        let (floor, [across, down]) = (self.floor, &self.taps);
+        let width = across.len();
+        for_each_row(
+            own,
+            self.columns,
+            [across, down],
+            &mut self.lines,
+            |row, line| {
+                let to = &mut map[row * width..(row + 1) * width];
+                for (nth, (value, tap)) in to.iter_mut().zip(across).enumerate() {
+                    let here = line.filter(|_| tap.is_inside).map_or(floor, |it| it[nth]);
+                    *value = match how {
+                        Write::Over => here,
+                        Write::Highest => value.max(here),
+                    };
+                }
+            },
+        );
     }
 }
 
