@@ -300,7 +300,11 @@ mod long {
         assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
         // What the killed process leaves becomes free, so that the next one gets further or less far before there is no room:
         // the queues, a topic or its wake-up is what is refused first.
-        for words in ["of shared memory", "free in /dev/shm", "make room in /dev/shm"] {
+        for words in [
+            "of shared memory",
+            "free in /dev/shm",
+            "make room in /dev/shm",
+        ] {
             assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
         }
         for restarted in report["restarts"].as_array().unwrap() {

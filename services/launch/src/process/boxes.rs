@@ -11,20 +11,18 @@ use crate::resolved::Resolved;
 
 /// In every n-th frame of a view boxes are looked for; n where the deployment does not say.
 pub(super) fn find_every(resolved: &Resolved) -> u64 {
-    /// With a detector, and the least by the filters.
+    /// Never more often: the network follows who it sees.
     const OFTEN: u64 = 10;
-    /// By the filters at an unknown rate.
-    const SELDOM: u64 = 30;
     let pose = &resolved.deployment.pose;
-    let by_filters = || {
-        let step = resolved.deployment.capture.frame_step.max(1) as f64;
-        let of_second = |rate: f64| (rate / step).round().clamp(OFTEN as f64, 1e6) as u64;
-        resolved.frame_rate_hz().map_or(SELDOM, of_second)
+    // People come and go by time: a detector looks twice a second, the filters, which take longer, once.
+    let (seconds, at_unknown_rate) = match pose.detector {
+        Some(_) => (0.5, OFTEN),
+        None => (1.0, 30),
     };
-    pose.find_every.unwrap_or_else(|| match pose.detector {
-        Some(_) => OFTEN,
-        None => by_filters(),
-    })
+    let step = resolved.deployment.capture.frame_step.max(1) as f64;
+    let of_time = |rate: f64| (seconds * rate / step).round().clamp(OFTEN as f64, 1e6) as u64;
+    let by_rate = || resolved.frame_rate_hz().map_or(at_unknown_rate, of_time);
+    pose.find_every.unwrap_or_else(by_rate)
 }
 
 /// The search of the filters over the whole frame, which finds boxes for a network.
