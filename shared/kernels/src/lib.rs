@@ -16,6 +16,7 @@ mod amx;
 mod bf16;
 mod correlate;
 mod dispatch;
+mod distance;
 mod envelope;
 mod gradient;
 mod hog;
@@ -37,6 +38,7 @@ const fn sized(usual: usize, interpreted: usize) -> usize {
 pub use amx::{Amx, NoAmx};
 pub use bf16::{Bf16Bank, Bf16Level, Bf16Map};
 pub use correlate::{CorrelateWorkspace, FeatureMap, FilterBank, Level, Template, correlate_f64};
+pub use distance::{LengthSpring, ScoredPoints};
 pub use envelope::{Transformed, transform_f64};
 pub use hog::{HogShape, HogWorkspace, MIRRORED_CHANNEL, N_CHANNELS, hog, hog_f64};
 pub use image::{ImageSizeError, Rgb8View};

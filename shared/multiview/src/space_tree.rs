@@ -12,6 +12,7 @@
 use nalgebra::Point3;
 
 use geometry::{Camera, Ray};
+use kernels::{Isa, LengthSpring, ScoredPoints};
 
 /// Number of joints: those of `skeleton::PARSE14`.
 const N: usize = 14;
@@ -323,18 +324,15 @@ pub(crate) fn best_on_tree(
         } else {
             0.0
         };
-        let spring = Bone {
+        let spring = LengthSpring {
             mean,
             sd,
             weight: springs,
             cap: settings.cap,
         };
-        let ends = Ends::new(of(child), &scores[child]);
-        let mut totals = vec![0.0; of(child).len()];
-        let choice: Vec<(usize, f64)> = of(parent)
-            .iter()
-            .map(|from| ends.best(from, &spring, &mut totals))
-            .collect();
+        let coordinates = |it: &Point3<f64>| [it.x, it.y, it.z];
+        let ends = ScoredPoints::new(of(child).iter().map(coordinates), &scores[child]);
+        let choice = ends.best(Isa::best(), of(parent).iter().map(coordinates), &spring);
         for (score, it) in scores[parent].iter_mut().zip(&choice) {
             *score += it.1;
         }
@@ -353,47 +351,6 @@ pub(crate) fn best_on_tree(
         joints: core::array::from_fn(|joint| places[joint].get(chosen[joint]).copied()),
         energy,
     })
-}
-
-/// A bone's spring, and the most that it costs.
-struct Bone {
-    mean: f64,
-    sd: f64,
-    weight: f64,
-    cap: f64,
-}
-
-/// The places of a child, coordinate by coordinate, so that several are tried at a time.
-struct Ends<'a> {
-    at: [Vec<f64>; 3],
-    scores: &'a [f64],
-}
-
-impl<'a> Ends<'a> {
-    fn new(places: &[Point3<f64>], scores: &'a [f64]) -> Self {
-        let at = core::array::from_fn(|axis| places.iter().map(|it| it[axis]).collect());
-        Self { at, scores }
-    }
-
-    /// The best place for a parent, and its score less what the bone costs; the first of several.
-    ///
-    /// * `totals`: a buffer, one for every place.
-    fn best(&self, from: &Point3<f64>, bone: &Bone, totals: &mut [f64]) -> (usize, f64) {
-        let [x, y, z] = &self.at;
-        let places = x.iter().zip(y).zip(z).zip(self.scores);
-        for (total, (((x, y), z), score)) in totals.iter_mut().zip(places) {
-            let by = [x - from.x, y - from.y, z - from.z];
-            let length = (by[0] * by[0] + by[1] * by[1] + by[2] * by[2]).sqrt();
-            let off = (length - bone.mean) / bone.sd;
-            let cost = 0.5 * off * off;
-            let cost = if cost < bone.cap { cost } else { bone.cap };
-            *total = score - bone.weight * cost;
-        }
-        let larger = |a: f64, b: &f64| if *b > a { *b } else { a };
-        let most = totals.iter().fold(f64::NEG_INFINITY, larger);
-        let first = totals.iter().position(|it| *it == most);
-        (first.unwrap_or(0), most)
-    }
 }
 
 #[cfg(test)]

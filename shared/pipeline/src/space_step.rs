@@ -119,24 +119,26 @@ impl<'a> PersonEvidence<'a> {
     fn highest(&self, joint: usize) -> Vec<([f64; 2], f32)> {
         let window = &self.window;
         let map = self.map(joint);
+        let least = self.floor + 1e-3;
         let mut found: Vec<([f64; 2], f32)> = Vec::new();
-        for row in 0..window.rows {
-            for column in 0..window.cols {
-                let here = map[row * window.cols + column];
+        for (row, line) in map.chunks_exact(window.cols.max(1)).enumerate() {
+            // Most of a map is the floor.
+            let above = line.iter().enumerate().filter(|(_, here)| **here > least);
+            for (column, here) in above {
                 let at = self.pixel(row, column);
-                if here <= self.floor + 1e-3 || !self.is_near(at) {
+                if !self.is_near(at) {
                     continue;
                 }
-                let rows = row.saturating_sub(1)..(row + 2).min(window.rows);
-                let is_highest = rows.clone().all(|it| {
+                let mut rows = row.saturating_sub(1)..(row + 2).min(window.rows);
+                let is_highest = rows.all(|it| {
                     let first = it * window.cols;
                     let columns = column.saturating_sub(1)..(column + 2).min(window.cols);
                     map[first + columns.start..first + columns.end]
                         .iter()
-                        .all(|other| *other <= here)
+                        .all(|other| other <= here)
                 });
                 if is_highest {
-                    found.push((at, here));
+                    found.push((at, *here));
                 }
             }
         }
