@@ -69,7 +69,7 @@ impl ScoredPoints {
                 Best {
                     points: self,
                     from,
-                    spring,
+                    spring: *spring,
                     totals: &mut totals,
                     found: &mut found,
                 },
@@ -114,7 +114,7 @@ fn total(from: [f64; 3], [x, y, z]: [f64; 3], score: f64, spring: &LengthSpring)
 struct Best<'a> {
     points: &'a ScoredPoints,
     from: [f64; 3],
-    spring: &'a LengthSpring,
+    spring: LengthSpring,
     totals: &'a mut [f64],
     found: &'a mut (usize, f64),
 }
@@ -122,32 +122,37 @@ struct Best<'a> {
 impl Body for Best<'_> {
     #[inline(always)]
     fn run(self) {
-        let ScoredPoints { at, scores, .. } = self.points;
+        let Best {
+            points: ScoredPoints { at, scores, .. },
+            from,
+            spring,
+            totals,
+            found,
+        } = self;
         let [x, y, z] = at.each_ref().map(|it| it.as_chunks::<LANES>().0);
         let scores = scores.as_chunks::<LANES>().0;
-        let totals = self.totals.as_chunks_mut::<LANES>().0;
+        let all = totals.as_chunks_mut::<LANES>().0;
         let mut most = [f64::NEG_INFINITY; LANES];
         let points = x.iter().zip(y).zip(z).zip(scores);
-        for (totals, (((x, y), z), scores)) in totals.iter_mut().zip(points) {
-            for lane in 0..LANES {
-                let point = [x[lane], y[lane], z[lane]];
-                let total = total(self.from, point, scores[lane], self.spring);
-                totals[lane] = total;
-                most[lane] = if total > most[lane] {
-                    total
-                } else {
-                    most[lane]
-                };
+        for (totals, (((x, y), z), scores)) in all.iter_mut().zip(points) {
+            // Copies: behind references the compiler takes one place after the other, a tenth as fast.
+            let (x, y, z, scores) = (*x, *y, *z, *scores);
+            let here: [f64; LANES] = core::array::from_fn(|lane| {
+                total(from, [x[lane], y[lane], z[lane]], scores[lane], &spring)
+            });
+            for (most, here) in most.iter_mut().zip(here) {
+                *most = if here > *most { here } else { *most };
             }
+            *totals = here;
         }
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let most = most.into_iter().fold(f64::NEG_INFINITY, larger);
-        let mut of_best = totals.iter().enumerate().filter_map(|(chunk, totals)| {
+        let mut of_best = all.iter().enumerate().filter_map(|(chunk, totals)| {
             let is_here = totals.iter().fold(false, |any, it| any | (*it == most));
             let lane = is_here.then(|| totals.iter().position(|it| *it == most))??;
             Some((chunk * LANES + lane, totals[lane]))
         });
-        *self.found = of_best.next().unwrap_or((0, f64::NEG_INFINITY));
+        *found = of_best.next().unwrap_or((0, f64::NEG_INFINITY));
     }
 }
 
