@@ -5,9 +5,11 @@ use serde::{Deserialize, Serialize};
 use crate::names::SETS;
 
 mod kind;
+mod value;
 
 pub use kind::CardKind;
 pub(crate) use kind::{DETECTOR_FORMAT, FORMAT, VERSION, check_head};
+pub use value::{Refine, Score};
 
 /// Longest side of an input, pixels.
 const MAX_SIDE: usize = 2048;
@@ -179,6 +181,9 @@ pub enum Codec {
         /// [`Window`](crate::Window)); else a cell covers a whole number of pixels from the corner of the input on.
         #[serde(default)]
         udp: bool,
+        /// Whether each cell lies in the middle of the pixels that it covers; else on the first of them. Not with `udp`.
+        #[serde(default)]
+        centred: bool,
         /// How a maximum is refined.
         #[serde(default)]
         refine: Refine,
@@ -211,40 +216,6 @@ pub enum Codec {
         #[serde(default)]
         score: Score,
     },
-}
-
-/// How a maximum of a map is refined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Refine {
-    /// Not at all.
-    None,
-    /// By a quarter of a cell towards the higher neighbour.
-    #[default]
-    Quarter,
-    /// To the maximum of a parabola through logarithms (DARK: Zhang et al. 2020, without its smoothing).
-    Parabola,
-}
-
-/// What a score is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Score {
-    /// A number from 0 to 1.
-    #[default]
-    Share,
-    /// Log-odds: its logistic function is the score.
-    LogOdds,
-}
-
-impl Score {
-    /// A value of the output as a score.
-    pub fn of(self, value: f64) -> f64 {
-        match self {
-            Self::Share => value,
-            Self::LogOdds => 1.0 / (1.0 + (-value).exp()),
-        }
-    }
 }
 
 /// One number of a listed keypoint.
@@ -389,9 +360,17 @@ impl Card {
 
     fn check_output(&self) -> Result<(), CardError> {
         match &self.output {
-            Codec::HeatMap { further, .. } => {
+            Codec::HeatMap {
+                further,
+                udp,
+                centred,
+                ..
+            } => {
                 demand(*further <= MAX_KEYPOINTS, "output.further", further, || {
                     format!("0 to {MAX_KEYPOINTS}")
+                })?;
+                demand(!(*udp && *centred), "output.centred", centred, || {
+                    "false where `udp` is true: corner cells lie on corner pixels there".to_owned()
                 })
             }
             Codec::Simcc {

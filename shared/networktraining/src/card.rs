@@ -52,6 +52,7 @@ fill = {fill}
 [output]
 codec = \"heat-map\"
 maps = \"{MAPS}\"
+centred = true
 score = \"log-odds\"
 
 [keypoints]

@@ -104,7 +104,8 @@ impl JointMaps {
         let rows = joint_rows(sight.network().names());
         let read = sight.read()?;
         let size = sight.network().size();
-        self.window = Some(*sight.window());
+        let window = sight.maps_window()?;
+        self.window = Some(window);
         self.floor = settings.floor();
         (self.rows, self.columns, self.step) = if let Read::Maps(maps) = &read {
             let [rows, columns] = maps.size();
@@ -145,7 +146,8 @@ impl JointMaps {
             let found = |it: usize| self.keypoints[it];
             let peak = row.as_ref().and_then(|row| weighted(row, found));
             self.peaks.push(peak);
-            if let (Some(row), Some(peak)) = (row, peak) {
+            if let (Some(row), Some(mut peak)) = (row, peak) {
+                peak.at = window.in_input(peak.at);
                 self.fill_joint(joint, (row, peak), (&read, sight), settings);
             }
         }
@@ -228,6 +230,8 @@ impl JointMaps {
     }
 
     /// Fills the map of one joint, which is a weighted sum of keypoints.
+    ///
+    /// * `peak`: in the coordinates of the maps.
     fn fill_joint(
         &mut self,
         joint: usize,
@@ -266,9 +270,8 @@ impl JointMaps {
                 }
             }
             _ => {
-                let at = sight.window().in_input(peak.at);
                 let sigma = settings.point_sigma * size[1] as f64;
-                self.fill_bump(joint, (at, peak.score), sigma, settings);
+                self.fill_bump(joint, (peak.at, peak.score), sigma, settings);
             }
         }
     }

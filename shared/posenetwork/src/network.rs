@@ -246,6 +246,30 @@ impl<'a> Sight<'a> {
         &self.window
     }
 
+    /// The window in which a cell of the maps lies at its number times their step, as [`HeatMaps::step`] has it. That is
+    /// [`Self::window`] where the first cell lies on the first pixel, and half a cell from there where every cell lies in the
+    /// middle of the pixels that it covers.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`].
+    pub fn maps_window(&self) -> Result<Window, LookError> {
+        let by = match (self.read()?, &self.network.card.output) {
+            (
+                Read::Maps(maps),
+                Codec::HeatMap {
+                    udp, centred: true, ..
+                },
+            ) => {
+                let cell = maps.step(self.network.size(), *udp);
+                let step = self.window.step();
+                [0, 1].map(|axis| 0.5 * (cell[axis] - 1.0) * step[axis])
+            }
+            _ => [0.0; 2],
+        };
+        Ok(self.window.shifted(by))
+    }
+
     /// The output, read as the card says.
     ///
     /// # Errors
@@ -357,8 +381,9 @@ impl<'a> Sight<'a> {
             }
             _ => Vec::new(),
         };
+        let window = self.maps_window()?;
         for it in &mut found {
-            it.at = self.window.in_picture(it.at);
+            it.at = window.in_picture(it.at);
         }
         Ok(found)
     }

@@ -306,12 +306,14 @@ fn given(card: &Card) -> String {
     match &card.output {
         Codec::HeatMap {
             udp,
+            centred,
             refine,
             score,
             further,
             ..
         } => format!(
-            "a map for every keypoint and {further} further ones; corner cells on corner pixels: {udp}; maxima refined: {}; \
+            "a map for every keypoint and {further} further ones; corner cells on corner pixels: {udp}; cells in the middle of \
+             their pixels: {centred}; maxima refined: {}; \
              values: {}",
             word(&json!(refine)),
             word(&json!(score))

@@ -56,7 +56,12 @@ fn every_codec_is_read() {
 }
 
 /// What is replaced, by what, and what is said.
-const CASES: [[&str; 3]; 17] = [
+const CASES: [[&str; 3]; 18] = [
+    [
+        "codec = \"heat-map\"",
+        "codec = \"heat-map\"\nudp = true\ncentred = true",
+        "`output.centred` is true, expected false where `udp` is true",
+    ],
     ["version = 1", "version = 2", "version 2, expected"],
     [
         "width = 96",

@@ -3,6 +3,7 @@
 use onnx::{Attribute, Network, Side};
 
 use super::*;
+use crate::maps::{JointMaps, MapSettings};
 
 const CARD: &str = r#"
 format = "parallax-keypoint-network"
@@ -198,6 +199,34 @@ fn columns_and_rows_are_read_from_two_outputs() {
     );
     let missing = simcc.replace("\"down\"", "\"up\"");
     assert!(refused(&net, &missing).contains("the output `up`"));
+}
+
+#[test]
+fn a_cell_lies_on_the_first_of_its_pixels_or_in_their_middle() {
+    let mut net = network("Relu");
+    net.nodes.clear();
+    net.outputs[0].1 = sides(&[1, 3, 4, 3]);
+    let of_four = || Attribute::Ints(vec![4, 4]);
+    let pool = vec![("kernel_shape", of_four()), ("strides", of_four())];
+    net.node("MaxPool", &["picture"], "maps", pool);
+    let plain = CARD.replace("[\"a\", \"b\", \"c\"]", "[\"right hip\", \"b\", \"c\"]");
+    let centred = plain.replace("refine", "centred = true\nrefine");
+    for (card, expected) in [(&plain, [4.0, 8.0]), (&centred, [5.5, 9.5])] {
+        let network = fitted(&net, card).unwrap();
+        let mut rgb = vec![0; 3 * 12 * 16];
+        rgb[3 * (12 * 9 + 5)..][..3].fill(1);
+        let image = Rgb8View::new(12, 16, &rgb).unwrap();
+        let mut workspace = Workspace::default();
+        let sight = network.look(image, [0.0, 0.0, 12.0, 16.0], &mut workspace);
+        let sight = sight.unwrap().unwrap();
+        assert_eq!(sight.keypoints().unwrap()[0].at, expected);
+        // What fusion looks at lies where the keypoints do.
+        let mut maps = JointMaps::default();
+        maps.read(&sight, &MapSettings::default()).unwrap();
+        assert_eq!(maps.maxima(2, 1)[0].0, expected);
+        let beside = expected.map(|it| it + 1.0);
+        assert!(maps.at(2, expected) > maps.at(2, beside));
+    }
 }
 
 #[test]
