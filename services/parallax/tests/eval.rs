@@ -192,6 +192,10 @@ fn footage_that_ends_before_the_ground_truth_is_reported() {
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert!(ended.stderr.contains("2 frames"), "{}", ended.stderr);
     assert!(ended.stdout.contains("planted walk"), "{}", ended.stdout);
+    // The person of these pictures is lower than models of people want.
+    let height =
+        "px high in the frames of planted, where the filters want 150 to 250: see --scale 2";
+    assert!(ended.stderr.contains(height), "{}", ended.stderr);
 }
 
 #[test]

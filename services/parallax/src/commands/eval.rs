@@ -1,6 +1,7 @@
 //! `parallax eval`: the paper's evaluation on sequences with ground truth.
 
 mod evidence;
+mod height;
 mod pictures;
 mod report;
 
@@ -347,6 +348,9 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
             }
             all.push(sequence);
         }
+    }
+    for warning in height::warnings(&all, arguments.size, arguments.scale) {
+        tracing::warn!("{warning}");
     }
     Ok(all)
 }

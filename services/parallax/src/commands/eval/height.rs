@@ -1,0 +1,43 @@
+//! Whether people are as high in the frames as the filters know them.
+
+use std::collections::BTreeSet;
+
+use geometry::search_size::{GOOD_PX, USABLE_PX, better_scale, search_sizes};
+use sequences::Sequence;
+
+/// What to set where people are too high or too low in the frames, once for sequences of the same rig.
+///
+/// * `size`: width and height of the frames, else they are `scale` times the footage.
+pub(super) fn warnings(
+    sequences: &[Sequence],
+    size: Option<[u32; 2]>,
+    scale: f64,
+) -> BTreeSet<String> {
+    let each = sequences.iter();
+    each.filter_map(|it| warning(it, size, scale)).collect()
+}
+
+fn warning(sequence: &Sequence, size: Option<[u32; 2]>, scale: f64) -> Option<String> {
+    let sizes = search_sizes(&sequence.rig).cameras;
+    let cameras = sizes.iter().zip(sequence.rig.cameras());
+    let seen: Vec<[f64; 2]> = cameras
+        .filter(|(it, _)| sequence.views.iter().any(|view| view.camera == it.camera))
+        .filter_map(|(it, camera)| {
+            let [columns, rows] = camera.intrinsics.size.map(f64::from);
+            let scale = size.map_or(scale, |[width, height]| {
+                (f64::from(width) / columns).min(f64::from(height) / rows)
+            });
+            Some([scale, scale * it.person_px?])
+        })
+        .collect();
+    let [least, most] = USABLE_PX;
+    let outside = seen.iter().find(|it| !(least..=most).contains(&it[1]))?;
+    Some(format!(
+        "a person is about {:.0} px high in the frames of {}, where the filters want {} to {}: see --scale {}",
+        outside[1],
+        sequence.dataset,
+        GOOD_PX[0],
+        GOOD_PX[1],
+        better_scale(&seen)?
+    ))
+}
