@@ -10,9 +10,11 @@
 
 pub(crate) mod adjust;
 pub(crate) mod begin;
+mod bias;
 mod doubt;
 pub(crate) mod estimate;
 mod frame;
+mod instant;
 pub(crate) mod measure;
 mod resect;
 pub(crate) mod sides;

@@ -275,6 +275,7 @@ fn fitted(
         poses: study.cameras.iter().enumerate().map(prior).collect(),
         offset_sd_s: (settings.offset_sd_s > 0.0).then_some(settings.offset_sd_s),
         focal_sd: 0.02,
+        bias_sd_px: None,
     };
     let cameras = Cameras::new(study.cameras.clone(), &free);
     rounds(study, cameras, choices.to_vec(), &beliefs)

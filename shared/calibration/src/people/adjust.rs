@@ -1,45 +1,19 @@
 //! All cameras, time offsets, bones and joints at once.
 
 use body::{BONES, Kind, N_BONES};
+use geometry::Camera;
 use geometry::bundle::{Cameras, Loss, Problem, Step, Term};
-use geometry::{Camera, Observation, Settings, triangulate};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use statistics::Sorted;
 
+use super::bias::Biases;
+use super::instant::{Instant, Seen, WIDTH, instant};
 use super::sightings::Sightings;
 
-/// Residuals beyond so many standard deviations lose their weight.
-const WIDTH: f64 = 2.0;
 /// Places of a joint nearer than this share of the size of the person are one place.
 const PLACE: f64 = 0.04;
 /// Standard deviation of a bone's length over time, as a share of it.
 const BONE_SPREAD: f64 = 0.06;
-/// Rays that meet at a smaller angle tell no depth, radians.
-const LEAST_ANGLE: f64 = 0.02;
-
-/// A joint that a camera sees.
-#[derive(Debug, Clone)]
-struct Seen {
-    camera: usize,
-    /// Which point of the instant.
-    point: usize,
-    at: Point2<f64>,
-    speed: Vector2<f64>,
-    sigma_px: f64,
-}
-
-/// One person at one instant.
-#[derive(Debug, Clone)]
-struct Instant {
-    /// Which of all instants.
-    nth: usize,
-    /// The joint of each point.
-    joints: Vec<usize>,
-    points: Vec<Point3<f64>>,
-    /// What each point counts as: a joint that stays in its place errs alike all the time.
-    shares: Vec<f64>,
-    seen: Vec<Seen>,
-}
 
 /// What is known of the pose of a camera beforehand.
 #[derive(Debug, Clone)]
@@ -60,6 +34,21 @@ pub(crate) struct Beliefs {
     pub(crate) offset_sd_s: Option<f64>,
     /// Standard deviation of focal lengths about what they were given as, as a share.
     pub(crate) focal_sd: f64,
+    /// Standard deviation of what a joint errs by in a camera all the time, pixels, by camera; none: joints have no such habits.
+    pub(crate) bias_sd_px: Option<Vec<f64>>,
+}
+
+/// How far a joint is from where it is seen, pixels.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Residual {
+    pub(crate) camera: usize,
+    pub(crate) joint: usize,
+    /// Where it should be, less where it is seen.
+    pub(crate) whole: Vector2<f64>,
+    /// The same without what the joint errs by in this camera all the time.
+    pub(crate) own: Vector2<f64>,
+    /// Where it is seen.
+    pub(crate) at: Point2<f64>,
 }
 
 /// The problem of [`geometry::bundle`].
@@ -73,6 +62,7 @@ pub(crate) struct Adjustment {
     bones: [Option<usize>; N_BONES],
     lengths: Vec<f64>,
     first_bone: usize,
+    biases: Biases,
     beliefs: Beliefs,
     instants: Vec<Instant>,
     n_instants: usize,
@@ -123,12 +113,17 @@ impl Adjustment {
             bones: [None; N_BONES],
             lengths: Vec::new(),
             first_bone: next,
+            biases: Biases::default(),
             beliefs,
             instants,
             n_instants: sightings.times_s.len(),
         };
         it.find_bones();
         it.find_shares();
+        if let Some(sd_px) = &it.beliefs.bias_sd_px {
+            let first = it.first_bone + it.lengths.len();
+            it.biases = Biases::new(first, sd_px, &it.instants);
+        }
         it
     }
 
@@ -208,14 +203,21 @@ impl Adjustment {
         self.instants.iter().map(|it| it.points.len()).sum()
     }
 
-    /// Calls back for every joint seen: camera, joint, residual and place, pixels.
-    pub(crate) fn residuals(&self, take: &mut dyn FnMut(usize, usize, Vector2<f64>, Point2<f64>)) {
+    /// Calls back for every joint seen.
+    pub(crate) fn residuals(&self, take: &mut dyn FnMut(Residual)) {
         for instant in &self.instants {
             for seen in &instant.seen {
                 let camera = &self.cameras.cameras()[seen.camera];
                 let at = seen.at - seen.speed * self.offsets[seen.camera].1;
+                let joint = instant.joints[seen.point];
                 if let Some(image) = camera.project(&instant.points[seen.point]) {
-                    take(seen.camera, instant.joints[seen.point], image - at, at);
+                    take(Residual {
+                        camera: seen.camera,
+                        joint,
+                        whole: image - at,
+                        own: image - at + self.biases.of(seen.camera, joint),
+                        at,
+                    });
                 }
             }
         }
@@ -223,7 +225,8 @@ impl Adjustment {
 
     fn observation(&self, instant: &Instant, seen: &Seen, term: &mut Term) {
         let (parameter, step) = self.offsets[seen.camera];
-        let at = seen.at - seen.speed * step;
+        let joint = instant.joints[seen.point];
+        let at = seen.at - seen.speed * step - self.biases.of(seen.camera, joint);
         let point = &instant.points[seen.point];
         let what = (at, seen.sigma_px);
         let observed = self
@@ -237,6 +240,10 @@ impl Adjustment {
         if let Some(parameter) = parameter.filter(|_| observed.has_image) {
             let by = seen.speed / seen.sigma_px;
             term.by_shared(parameter, by.as_slice());
+        }
+        if observed.has_image {
+            self.biases
+                .observed((seen.camera, joint), seen.sigma_px, term);
         }
     }
 
@@ -292,91 +299,9 @@ impl Adjustment {
     }
 }
 
-impl Instant {
-    fn place(&self, joint: usize) -> Option<usize> {
-        self.joints.iter().position(|it| *it == joint)
-    }
-
-    /// From one end of the person to the other.
-    fn size(&self) -> f64 {
-        let extent = |axis: usize| {
-            let each = self.points.iter().map(|it| it[axis]);
-            let [from, to] = each.fold([f64::INFINITY, f64::NEG_INFINITY], |[from, to], it| {
-                [from.min(it), to.max(it)]
-            });
-            to - from
-        };
-        Vector3::new(extent(0), extent(1), extent(2)).norm()
-    }
-
-    fn distance(&self, a: usize, b: usize) -> Option<f64> {
-        let (a, b) = (self.place(a)?, self.place(b)?);
-        Some((self.points[a] - self.points[b]).norm())
-    }
-}
-
-/// The joints of an instant that at least two cameras see, triangulated.
-fn instant(
-    cameras: &[Camera],
-    seen: &[Vec<Option<super::sightings::Sight>>],
-    sigmas: &[Vec<f64>],
-) -> Instant {
-    let mut all = Instant {
-        nth: 0,
-        joints: Vec::new(),
-        points: Vec::new(),
-        shares: Vec::new(),
-        seen: Vec::new(),
-    };
-    let n_joints = seen.first().map_or(0, Vec::len);
-    let joints: Vec<usize> = (0..n_joints).collect();
-    for joint in joints {
-        let each = seen.iter().enumerate();
-        let each: Vec<(usize, super::sightings::Sight)> = each
-            .filter_map(|(camera, it)| Some((camera, (*it.get(joint)?)?)))
-            .collect();
-        let sigma = |camera: usize, weight: f64| sigmas[camera][joint] / weight.sqrt();
-        let observations: Vec<Observation<'_>> = each
-            .iter()
-            .map(|(camera, it)| Observation {
-                camera: &cameras[*camera],
-                point_px: it.at,
-                sigma_px: sigma(*camera, it.weight),
-            })
-            .collect();
-        let Some(point) = place(&observations) else {
-            continue;
-        };
-        let nth = all.points.len();
-        all.joints.push(joint);
-        all.points.push(point);
-        all.shares.push(1.0);
-        all.seen.extend(each.iter().map(|(camera, it)| Seen {
-            camera: *camera,
-            point: nth,
-            at: it.at,
-            speed: it.speed,
-            sigma_px: sigma(*camera, it.weight),
-        }));
-    }
-    all
-}
-
-/// A point by robust triangulation.
-pub(crate) fn place(observations: &[Observation<'_>]) -> Option<Point3<f64>> {
-    let sigma = observations.first()?.sigma_px;
-    let settings = Settings {
-        loss_px: WIDTH * sigma,
-        max_reprojection_px: None,
-        min_views: 2,
-        min_angle: LEAST_ANGLE,
-    };
-    Some(triangulate(observations, &settings).ok()?.in_world)
-}
-
 impl Problem for Adjustment {
     fn n_shared(&self) -> usize {
-        self.first_bone + self.lengths.len()
+        self.first_bone + self.lengths.len() + self.biases.n_parameters()
     }
 
     fn name(&self, parameter: usize) -> String {
@@ -388,9 +313,10 @@ impl Problem for Adjustment {
             return format!("{}: time offset", self.cameras.cameras()[camera].name);
         }
         let bone = self.bones.iter().position(|it| *it == Some(parameter));
-        bone.map_or(String::new(), |it| {
-            format!("length of the {}", BONES[it].name)
-        })
+        bone.map_or_else(
+            || "what a joint errs by all the time".to_owned(),
+            |it| format!("length of the {}", BONES[it].name),
+        )
     }
 
     fn locals(&self) -> Vec<usize> {
@@ -439,6 +365,7 @@ impl Problem for Adjustment {
                 take(&term);
             }
         }
+        self.biases.priors(take);
         for camera in 0..self.given_focal.len() {
             self.pose_prior(camera, take);
             if let Some(parameter) = self.cameras.focal_parameter(camera) {
@@ -458,6 +385,7 @@ impl Problem for Adjustment {
         for (parameter, offset) in &mut moved.offsets {
             *offset += parameter.map_or(0.0, |it| step.shared[it]);
         }
+        moved.biases.step(&step.shared);
         for (nth, length) in moved.lengths.iter_mut().enumerate() {
             *length += step.shared[self.first_bone + nth];
         }

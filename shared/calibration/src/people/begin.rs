@@ -5,8 +5,9 @@ use geometry::bundle::{Cameras, Free, Settings as Search, solve};
 use geometry::{Camera, Observation};
 use nalgebra::{Isometry3, Point3};
 
-use super::adjust::{Adjustment, Beliefs, place};
+use super::adjust::{Adjustment, Beliefs};
 use super::doubt::Doubt;
+use super::instant::place;
 use super::resect::{Known, resected};
 use super::sightings::{Chain, Sightings};
 use super::two_view::{Match, Relative, normalised, relative};

@@ -2,6 +2,7 @@
 use statistics::Sorted;
 
 use super::adjust::Adjustment;
+use super::bias::share_of;
 
 /// Fewer joints of a kind have the expected error of all.
 const LEAST: usize = 30;
@@ -22,9 +23,7 @@ pub(crate) const CELLS: usize = 8;
 /// * `sizes_px`: the size of the person in each camera.
 pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Vec<Vec<f64>> {
     let mut all = vec![Vec::new(); n_joints];
-    problem.residuals(&mut |camera, joint, residual, _| {
-        all[joint].push(residual.norm() / sizes_px[camera]);
-    });
+    problem.residuals(&mut |it| all[it.joint].push(it.own.norm() / sizes_px[it.camera]));
     let whole = Sorted::new(all.concat()).upper_median().unwrap_or(1.0);
     let share = |it: &Vec<f64>| {
         let own = Sorted::new(it.clone())
@@ -35,6 +34,16 @@ pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) ->
     let shares: Vec<f64> = all.iter().map(share).collect();
     let of_camera = |size: &f64| shares.iter().map(|it| (it * size).max(LEAST_PX)).collect();
     sizes_px.iter().map(of_camera).collect()
+}
+
+/// What joints err by in a camera all the time, pixels, by camera; none where that is next to nothing.
+pub(crate) fn biases(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Option<Vec<f64>> {
+    let mut all = vec![Vec::new(); n_joints * sizes_px.len()];
+    problem.residuals(&mut |it| {
+        all[it.camera * n_joints + it.joint].push(it.whole / sizes_px[it.camera]);
+    });
+    let share = share_of(&all)?;
+    Some(sizes_px.iter().map(|it| share * it).collect())
 }
 
 /// How the joints of a camera fit.
@@ -56,9 +65,10 @@ pub(crate) fn fits(problem: &Adjustment, sigmas_px: &[Vec<f64>]) -> Vec<Fit> {
     let mut lengths = vec![Vec::new(); cameras.len()];
     let mut good = vec![0_usize; cameras.len()];
     let mut cells = vec![vec![0_usize; CELLS * CELLS]; cameras.len()];
-    problem.residuals(&mut |camera, joint, residual, at| {
-        lengths[camera].push(residual.norm());
-        good[camera] += usize::from(residual.norm() < 3.0 * sigmas_px[camera][joint]);
+    problem.residuals(&mut |it| {
+        let (camera, at) = (it.camera, it.at);
+        lengths[camera].push(it.whole.norm());
+        good[camera] += usize::from(it.own.norm() < 3.0 * sigmas_px[camera][it.joint]);
         let [width, height] = cameras[camera].intrinsics.size.map(f64::from);
         let share = [(at.x + 0.5) / width, (at.y + 0.5) / height];
         let cell =

@@ -3,7 +3,7 @@
 use geometry::{Camera, Observation};
 use nalgebra::Point3;
 
-use super::adjust::place;
+use super::instant::place;
 use super::sightings::{Sight, Sightings};
 use super::two_view::{Match, essential_of, normalised, sampson};
 

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use super::adjust::{Adjustment, Beliefs, skeletons};
 use super::begin::{Choice, Start, Study};
 use super::doubt::Doubt;
-use super::measure::sigmas;
+use super::measure::{biases, sigmas};
 use super::sides::exchange;
 use super::sightings::Sightings;
 
@@ -82,6 +82,7 @@ pub(crate) fn rounds(
     let size = |(camera, it): (usize, &Choice)| study.chains[camera][it.chain].size();
     let sizes_px: Vec<f64> = choices.iter().enumerate().map(size).collect();
     let mut expected: Option<Vec<Vec<f64>>> = None;
+    let mut beliefs = beliefs.clone();
     let mut last = None;
     for round in 0..ROUNDS {
         let chosen: Vec<Option<Choice>> = choices.iter().copied().map(Some).collect();
@@ -102,6 +103,7 @@ pub(crate) fn rounds(
             choice.offset_s += step;
         }
         expected = Some(sigmas(&problem, &sizes_px, study.n_joints));
+        beliefs.bias_sd_px = biases(&problem, &sizes_px, study.n_joints);
         cameras = problem.cameras().clone();
         last = Some(Solved {
             choices: choices.clone(),

@@ -153,3 +153,40 @@ fn rings_are_found_and_no_wrong_answer_goes_unrefused() {
         );
     }
 }
+
+/// Joints that every camera sees beside where they are, all the time.
+fn beside(films: &mut [Film], px: f64) {
+    let mut random = fastrand::Rng::with_seed(8);
+    for film in films {
+        let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+        let by: Vec<[f64; 2]> = (0..N_JOINTS)
+            .map(|_| [0; 2].map(|_| px * normal()))
+            .collect();
+        for person in film.shots.iter_mut().flat_map(|it| &mut it.people) {
+            for (joint, by) in person.joints.iter_mut().zip(&by) {
+                if let Some(it) = joint {
+                    it.at = [0, 1].map(|axis| it.at[axis] + by[axis]);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_joints_err_by_all_the_time_is_no_movement_of_the_cameras() {
+    let truth = ring(4);
+    let flaws = Flaws {
+        size: 0.5,
+        ..Flaws::none(12)
+    };
+    let mut films = flaws.films(&truth);
+    beside(&mut films, 6.0);
+    let recording = Recording {
+        cameras: &truth,
+        films: &films,
+    };
+    let outcome = estimate(&recording, &settings()).unwrap();
+    assert_eq!(outcome.doubts, []);
+    let [degrees, share] = worst(&outcome.cameras, &truth, true);
+    assert!(degrees < 0.3 && share < 0.01, "{degrees} {share}");
+}

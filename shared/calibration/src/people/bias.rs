@@ -1,0 +1,189 @@
+//! What a joint errs by in a camera all the time: a hip is marked elsewhere from the front than from the side.
+//!
+//! Such errors do not average out over a recording in which somebody stays in one place. Each is an unknown of its own, believed
+//! to be near 0 by a standard deviation that the residuals tell: where people walk about it comes out as next to nothing.
+
+use geometry::bundle::{Loss, Term};
+use nalgebra::Vector2;
+use statistics::Sorted;
+
+use super::instant::Instant;
+
+/// A joint that a camera sees fewer times has no bias of its own.
+const LEAST: usize = 6;
+/// The most that a joint is believed to err by all the time, as a share of the size of the person.
+const MOST: f64 = 0.02;
+/// And the least, below which nothing is to be told.
+const NOTHING: f64 = 0.0005;
+/// The median of the squares of a normal number.
+const MEDIAN_SQUARE: f64 = 0.4549;
+
+/// The bias of every joint in every camera.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Biases {
+    /// The first of two parameters.
+    first: usize,
+    /// By camera and joint: which.
+    places: Vec<Vec<Option<usize>>>,
+    /// Pixels.
+    values: Vec<Vector2<f64>>,
+    /// What is believed of each, pixels.
+    sd_px: Vec<f64>,
+}
+
+impl Biases {
+    /// * `first`: the first parameter; `sd_px`: what is believed, by camera.
+    pub(super) fn new(first: usize, sd_px: &[f64], instants: &[Instant]) -> Self {
+        let n_joints = instants.iter().flat_map(|it| &it.joints).max();
+        let mut counts = vec![vec![0_usize; n_joints.map_or(0, |it| it + 1)]; sd_px.len()];
+        for instant in instants {
+            for seen in &instant.seen {
+                counts[seen.camera][instant.joints[seen.point]] += 1;
+            }
+        }
+        let mut it = Self {
+            first,
+            ..Self::default()
+        };
+        for (counts, sd) in counts.iter().zip(sd_px) {
+            let mut places = Vec::new();
+            for n in counts {
+                let is_seen = *n >= LEAST;
+                places.push(is_seen.then_some(it.values.len()));
+                if is_seen {
+                    it.values.push(Vector2::zeros());
+                    it.sd_px.push(*sd);
+                }
+            }
+            it.places.push(places);
+        }
+        it
+    }
+
+    pub(super) fn n_parameters(&self) -> usize {
+        2 * self.values.len()
+    }
+
+    fn place(&self, camera: usize, joint: usize) -> Option<usize> {
+        self.places.get(camera)?.get(joint).copied()?
+    }
+
+    /// Pixels; 0 where there is none.
+    pub(super) fn of(&self, camera: usize, joint: usize) -> Vector2<f64> {
+        self.place(camera, joint)
+            .map_or_else(Vector2::zeros, |it| self.values[it])
+    }
+
+    /// The derivatives of what a camera sees of a joint.
+    pub(super) fn observed(&self, (camera, joint): (usize, usize), sigma_px: f64, term: &mut Term) {
+        if let Some(place) = self.place(camera, joint) {
+            let parameter = self.first + 2 * place;
+            term.by_shared(parameter, &[1.0 / sigma_px, 0.0]);
+            term.by_shared(parameter + 1, &[0.0, 1.0 / sigma_px]);
+        }
+    }
+
+    /// What is believed.
+    pub(super) fn priors(&self, take: &mut dyn FnMut(&Term)) {
+        let mut term = Term::default();
+        for (nth, (value, sd)) in self.values.iter().zip(&self.sd_px).enumerate() {
+            let parameter = self.first + 2 * nth;
+            term.begin((value / *sd).as_slice(), Loss::Square);
+            term.by_shared(parameter, &[1.0 / sd, 0.0]);
+            term.by_shared(parameter + 1, &[0.0, 1.0 / sd]);
+            take(&term);
+        }
+    }
+
+    pub(super) fn step(&mut self, shared: &[f64]) {
+        for (nth, value) in self.values.iter_mut().enumerate() {
+            let parameter = self.first + 2 * nth;
+            *value += Vector2::new(shared[parameter], shared[parameter + 1]);
+        }
+    }
+}
+
+/// What joints err by all the time, from their residuals: a share of the size of the person, all joints and cameras together. None
+/// where it is next to nothing.
+///
+/// * `residuals`: of each joint in each camera, as shares of the size.
+pub(super) fn share_of(residuals: &[Vec<Vector2<f64>>]) -> Option<f64> {
+    let mut squares = Vec::new();
+    for of_joint in residuals.iter().filter(|it| it.len() >= LEAST) {
+        for axis in 0..2 {
+            let each: Vec<f64> = of_joint.iter().map(|it| it[axis]).collect();
+            let middle = Sorted::new(each.clone()).upper_median()?;
+            let away = each.iter().map(|it| (it - middle).abs());
+            let noise = 1.4826 * Sorted::new(away.collect::<Vec<_>>()).upper_median()?;
+            // The median of n numbers has pi / 2 times the variance of their mean.
+            let chance = core::f64::consts::FRAC_PI_2 * noise.powi(2) / of_joint.len() as f64;
+            squares.push(middle.powi(2) - chance);
+        }
+    }
+    let share = (Sorted::new(squares).upper_median()? / MEDIAN_SQUARE)
+        .max(0.0)
+        .sqrt();
+    (share > NOTHING).then(|| share.min(MOST))
+}
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+
+    use super::*;
+
+    /// Residuals of 40 joints over 60 instants: by noise, and by what each errs by all the time.
+    fn residuals(noise: f64, bias: f64) -> Vec<Vec<Vector2<f64>>> {
+        let mut random = Rng::with_seed(3);
+        let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+        let mut of_joint = || {
+            let always = bias * Vector2::new(normal(), normal());
+            let each = (0..60).map(|_| always + noise * Vector2::new(normal(), normal()));
+            each.collect()
+        };
+        (0..40).map(|_| of_joint()).collect()
+    }
+
+    #[test]
+    fn what_joints_err_by_all_the_time_is_told_from_noise() {
+        let found = share_of(&residuals(0.006, 0.008)).unwrap();
+        assert!((0.006..0.010).contains(&found), "{found}");
+        let noise = share_of(&residuals(0.006, 0.0));
+        assert!(noise.is_none_or(|it| it < 0.001), "{noise:?}");
+        assert_eq!(share_of(&residuals(0.0, 0.0)), None);
+        assert_eq!(share_of(&residuals(0.0, 1.0)), Some(MOST));
+        assert_eq!(share_of(&[]), None);
+    }
+
+    #[test]
+    fn a_joint_that_is_hardly_seen_has_none() {
+        let seen = |camera| super::super::instant::Seen {
+            camera,
+            point: 0,
+            at: nalgebra::Point2::origin(),
+            speed: Vector2::zeros(),
+            sigma_px: 1.0,
+        };
+        let instant = |nth| Instant {
+            nth,
+            joints: vec![2],
+            points: vec![nalgebra::Point3::origin()],
+            shares: vec![1.0],
+            seen: if nth < LEAST - 1 {
+                vec![seen(0), seen(1)]
+            } else {
+                vec![seen(0)]
+            },
+        };
+        let instants: Vec<Instant> = (0..LEAST).map(instant).collect();
+        let mut biases = Biases::new(5, &[2.0, 2.0], &instants);
+        assert_eq!(biases.n_parameters(), 2);
+        biases.step(&[0.0, 0.0, 0.0, 0.0, 0.0, 1.5, -2.5]);
+        assert_eq!(biases.of(0, 2), Vector2::new(1.5, -2.5));
+        assert_eq!(biases.of(1, 2), Vector2::zeros());
+        assert_eq!(biases.of(0, 9), Vector2::zeros());
+        let mut squares = 0.0;
+        biases.priors(&mut |term| squares += term.square());
+        assert_eq!(squares, (1.5_f64.powi(2) + 2.5_f64.powi(2)) / 4.0);
+    }
+}
