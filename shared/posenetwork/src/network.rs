@@ -1,10 +1,12 @@
 //! A network with its card: a picture and a box in, keypoints and maps out.
 
-use inference::{Input, Port, RunError, Session, Values, written};
+mod taken;
+
+pub(crate) use taken::as_taken;
+
+use inference::{Input, Port, RunError, Session, written};
 use kernels::Rgb8View;
-use keypoints::{
-    Card, Codec, HeatMaps, Keypoint, Layout, List, Numbers, OutputError, SimCc, Window,
-};
+use keypoints::{Card, Codec, HeatMaps, Keypoint, Layout, List, OutputError, SimCc, Window};
 
 /// A network that fits its card.
 #[derive(Debug)]
@@ -386,29 +388,6 @@ impl<'a> Sight<'a> {
             it.at = window.in_picture(it.at);
         }
         Ok(found)
-    }
-}
-
-/// The values of an input as numbers of the type that the network takes.
-///
-/// * `memory`: used again from picture to picture; not touched for [`Numbers::F32`].
-pub(crate) fn as_taken<'a>(
-    numbers: Numbers,
-    values: &'a [f32],
-    (whole, bytes): (&'a mut Vec<i32>, &'a mut Vec<u8>),
-) -> Values<'a> {
-    match numbers {
-        Numbers::F32 => Values::F32(values),
-        Numbers::I32 => {
-            whole.clear();
-            whole.extend(values.iter().map(|it| it.round() as i32));
-            Values::I32(whole)
-        }
-        Numbers::U8 => {
-            bytes.clear();
-            bytes.extend(values.iter().map(|it| it.round() as u8));
-            Values::U8(bytes)
-        }
     }
 }
 
