@@ -6,7 +6,7 @@ mod look;
 mod overlays;
 mod run;
 
-pub use corners::{read_corners, write_corners};
+pub use corners::{corners_text, parse_corners, read_corners, write_corners};
 pub use frames::{FrameTable, read_frames};
 pub use look::{LookSettings, look};
 pub use overlays::{Overlay, worst};

@@ -10,6 +10,7 @@ use fmp::files::{describe, mat, own, text};
 use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisys, umpm};
 use keypoints::files::{NameSet, SeenKeypoints, coco, openpose};
 use multiview::Compatibility;
+use offline::boards::{corners_text, parse_corners};
 use runfiles::{
     FrameLine, LatencyReport, Line, RunSummary, Running, SmoothLine, SmoothReport, TimesLine,
     ViewLine,
@@ -254,6 +255,21 @@ pub fn calibration(input: &[u8]) {
     let _umpm = umpm::parse("l", input, &options);
     let _panoptic = panoptic::parse(input, &options);
     let _opencv = opencv::parse(&[("cam01", input)], &options);
+}
+
+/// Tables of corners of boards, as other programs write them.
+///
+/// What is taken is written as it would be after it was read again.
+pub fn board_corners(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    let names = ["cam_0".to_owned(), "cam_1".to_owned()];
+    if let Ok((sights, _)) = parse_corners(input, &names) {
+        let text = corners_text(&sights, &names);
+        let (again, _) = parse_corners(&text, &names).expect("it was written");
+        assert_eq!(corners_text(&again, &names), text);
+    }
 }
 
 /// Our own annotation file, line by line, and skeletons.

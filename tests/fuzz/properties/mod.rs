@@ -6,9 +6,9 @@ mod hosts;
 mod messages;
 
 pub use files::{
-    calibration, consistency, deployment_text, joint_file, keypoint_files, model_mat, model_own,
-    model_text, motion_c3d, network_card, people_lines, people_mat, quality_network, quality_table,
-    run_files, scene_text, training_checkpoint, type_table,
+    board_corners, calibration, consistency, deployment_text, joint_file, keypoint_files,
+    model_mat, model_own, model_text, motion_c3d, network_card, people_lines, people_mat,
+    quality_network, quality_table, run_files, scene_text, training_checkpoint, type_table,
 };
 pub use hosts::host_messages;
 pub use messages::{wire_fusion, wire_messages};
@@ -17,7 +17,8 @@ pub use messages::{wire_fusion, wire_messages};
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 21] = [
+pub const TARGETS: [Target; 22] = [
+    ("board_corners", board_corners),
     ("calibration", calibration),
     ("consistency", consistency),
     ("deployment_text", deployment_text),

@@ -27,11 +27,16 @@ type Corners = Vec<(usize, Point2<f64>)>;
 /// A file that cannot be read, lacks a column, or has a row that makes no sense; each names it.
 pub fn read_corners(path: &Path, names: &[String]) -> Result<Read, Failure> {
     let text = runtime::read_text(path)?;
-    parse(&text, names)
+    parse_corners(&text, names)
         .map_err(|error| Failure::new(ExitKind::Input, format!("{}: {error}", path.display())))
 }
 
-fn parse(text: &str, names: &[String]) -> Result<Read, String> {
+/// The text of such a table, as [`read_corners`].
+///
+/// # Errors
+///
+/// What is wrong with it.
+pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| error.to_string())?.clone();
     let column = |wanted: &[&str]| {
@@ -105,6 +110,16 @@ fn camera_named(names: &[String], id: &str) -> Option<usize> {
 ///
 /// The file cannot be written.
 pub fn write_corners(path: &Path, sights: &[Sight], names: &[String]) -> Result<(), Failure> {
+    let text = corners_text(sights, names);
+    files::replace(path, text.as_bytes()).map_err(|error| runtime::in_file(path, &error))
+}
+
+/// The text of such a table.
+///
+/// # Panics
+///
+/// If a sight is of a camera beyond the names.
+pub fn corners_text(sights: &[Sight], names: &[String]) -> String {
     let mut text =
         "sync_index,cam_id,keypoint_id,img_loc_x,img_loc_y,board_loc_x,board_loc_y\n".to_owned();
     for sight in sights {
@@ -120,7 +135,7 @@ pub fn write_corners(path: &Path, sights: &[Sight], names: &[String]) -> Result<
             .unwrap_or_default();
         }
     }
-    files::replace(path, text.as_bytes()).map_err(|error| runtime::in_file(path, &error))
+    text
 }
 
 #[cfg(test)]
@@ -140,14 +155,14 @@ mod tests {
         write_corners(&path, &sights, &names).unwrap();
         assert_eq!(read_corners(&path, &names).unwrap(), (sights, board));
         let text = std::fs::read_to_string(&path).unwrap();
-        parse(&text.replace("cam_7", "7"), &names).unwrap();
+        parse_corners(&text.replace("cam_7", "7"), &names).unwrap();
         for wrong in [
             "",
             "a,b\n",
             &text.replace("10.5", "NaN"),
             &text.replace("cam_7", "cam_8"),
         ] {
-            assert!(parse(wrong, &names).is_err(), "{wrong:?}");
+            assert!(parse_corners(wrong, &names).is_err(), "{wrong:?}");
         }
     }
 }
