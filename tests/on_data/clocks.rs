@@ -11,7 +11,7 @@ const RATE_HZ: f64 = 60.0;
 const N_SEEDS: u64 = 20;
 
 /// The keypoints of the four cameras, and how many a person has.
-fn recorded(shared: &std::path::Path) -> (Vec<Film>, usize) {
+pub(crate) fn recorded(shared: &std::path::Path) -> (Vec<Film>, usize) {
     let (mut films, mut n_joints) = (Vec::new(), 0);
     for camera in ["cam01", "cam02", "cam03", "cam04"] {
         let folder = format!("data/pose2sim_balancing/openpose/{camera}_json");

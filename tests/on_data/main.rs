@@ -21,6 +21,7 @@ mod models;
 mod motion;
 mod multi_view;
 mod parse_set;
+mod people;
 mod shipped;
 mod single_view;
 mod tiles;
