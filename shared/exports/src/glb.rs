@@ -22,6 +22,8 @@ use store::Store;
 
 /// Length at rest of a bone that was never seen, metres.
 const UNSEEN_M: f64 = 0.2;
+/// What a shorter bone has no extent to show by, metres: matrices divide by it.
+const SHORTEST_M: f64 = 1e-4;
 /// Size of a keypoint's mark, metres.
 const MARK_M: f64 = 0.02;
 
@@ -123,7 +125,7 @@ const fn in_file(node: usize) -> usize {
 
 fn bones(lengths: &[Option<f64>; N_NODES], rest: &[Vector3<f64>; N_NODES]) -> Vec<Piece> {
     let all = NODES.iter().enumerate().filter_map(|(index, node)| {
-        let (length, parent) = (lengths[index]?, node.parent?);
+        let (length, parent) = (lengths[index].filter(|it| *it > SHORTEST_M)?, node.parent?);
         let width = (0.25 * length).clamp(0.03, 0.09);
         let along = UnitQuaternion::rotation_between(&Vector3::y(), &node.rest.into());
         let down = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI);

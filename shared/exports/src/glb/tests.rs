@@ -174,3 +174,22 @@ fn keypoints_are_marks_of_their_own() {
     let scale = |frame| read.value(nose, "scale", frame, &[1.0; 3]);
     assert_eq!((scale(0), scale(1)), (vec![1.0; 3], vec![0.0; 3]));
 }
+
+#[test]
+fn bones_whose_ends_coincide_are_left_out_and_all_numbers_are_finite() {
+    let mut trial = walker(3);
+    for slot in &mut trial.slots {
+        slot.points[0] = slot.points[1].clone();
+    }
+    let read = Read::of(&trial);
+    let nodes = read.json["nodes"].as_array().unwrap();
+    let has = |name: &str| nodes.iter().any(|it| it["name"] == name);
+    assert!(!has("right_ankle_bone") && has("left_ankle_bone"));
+    let bind = read.reals(&read.json["skins"][0]["inverseBindMatrices"]);
+    assert!(bind.iter().all(|it| it.is_finite()));
+    let samplers = read.json["animations"][0]["samplers"].as_array().unwrap();
+    for sampler in samplers {
+        let values = read.reals(&sampler["output"]);
+        assert!(values.iter().all(|it| it.is_finite()));
+    }
+}
