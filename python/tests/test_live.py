@@ -1,6 +1,8 @@
 """A real deployment of synthetic cameras, read while it runs. Skipped without the executable or iceoryx2."""
 
+import itertools
 import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -84,6 +86,30 @@ def test_programs_that_are_killed_or_asleep_keep_no_place_and_hold_up_nobody(dep
         assert again.process.poll() is None
     asleep.kill()
     asleep.wait()
+
+
+def test_the_example_prints_a_wrist_that_moves_also_after_a_process_was_killed(deploy):
+    deployment = deploy()
+    example = pathlib.Path(__file__).parents[1] / "examples" / "wrist.py"
+    paths = os.pathsep.join([str(example.parents[1]), os.environ.get("PYTHONPATH", "")])
+    program = subprocess.Popen([sys.executable, example, deployment.name, "neck"], stdout=subprocess.PIPE, text=True,
+                               env={**os.environ, "PYTHONPATH": paths})
+
+    def places(n):
+        """The next places that it prints; a deployment that ends ends the program, and with it these."""
+        found = (line.split()[1:4] for line in program.stdout if " m  +-" in line)
+        return {tuple(it) for it in itertools.islice(found, n)}
+
+    try:
+        assert len(places(3)) > 1
+        os.kill(deployment.pids("triangulate")[0], signal.SIGKILL)
+        assert len(places(5)) > 1
+        deployment.stop()
+        assert program.stdout.read().splitlines()[-1].split()[1:3] == ["frames", "received,"]
+        assert program.wait(PATIENCE) == 0
+    finally:
+        program.kill()
+        program.wait()
 
 
 def test_there_is_a_limit_which_is_named(deploy):
