@@ -4,10 +4,10 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 
 use c3d::C3d;
-use serde_json::Value;
+use serde_json::{Value, json};
 use trc::Trc;
 
 use crate::common::{Case, Ended, PLAIN};
@@ -59,7 +59,12 @@ fn a_run_is_exported_from_its_folder_and_from_its_recording() {
     let ended = exported(&case, "out", &["--to", ALL]);
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(ended.stderr.contains("--rate 30"), "{}", ended.stderr);
-    let told = ["--to", ALL, "--rate", "20", "--up", "0,0,1"];
+    let all = if cfg!(feature = "parquet") {
+        format!("{ALL},parquet")
+    } else {
+        ALL.to_owned()
+    };
+    let told = ["--to", &all, "--rate", "20", "--up", "0,0,1"];
     let of_folder = done(&case, "out", &told);
     assert_eq!(of_folder["frames"], N_FRAMES);
     assert!(of_folder["frames_with_points"].as_u64().unwrap() > 0);
@@ -69,7 +74,8 @@ fn a_run_is_exported_from_its_folder_and_from_its_recording() {
         assert!(a.unwrap() == b.unwrap(), "{name} differs");
     }
     check_positions(&case);
-    check_with_python(&case.path("out/export"));
+    check_with_python(&case);
+    check_with_validator(&case.path("out/export"));
 
     let ended = exported(&case, "out", &told);
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
@@ -118,29 +124,94 @@ fn check_positions(case: &Case) {
 }
 
 /// The same by programs of others, where Python has them.
-fn check_with_python(folder: &Path) {
-    const SCRIPT: &str = "\
-import sys, ezc3d, bvh\n\
-file = ezc3d.c3d(sys.argv[1] + '/pose3d.c3d')\n\
-animation = bvh.Bvh(open(sys.argv[1] + '/pose3d.bvh').read())\n\
-print(file['data']['points'].shape[1:], animation.nframes, len(animation.get_joints_names()))\n";
-    let has = Command::new("python3")
-        .args(["-c", "import ezc3d, bvh"])
-        .output();
-    if !has.is_ok_and(|it| it.status.success()) {
-        eprintln!("skipped: Python has no ezc3d and bvh (pip install ezc3d bvh)");
-        return;
+fn check_with_python(case: &Case) {
+    const SCRIPT: &str = include_str!("export.py");
+    let mut formats = vec!["c3d", "bvh", "glb", "csv"];
+    if cfg!(feature = "parquet") {
+        formats.push("parquet");
     }
     let read = Command::new("python3")
         .args(["-c", SCRIPT])
-        .arg(folder)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&read.stdout).into_owned();
-    assert!(
-        said.starts_with(&format!("(14, {N_FRAMES}) {N_FRAMES} ")),
-        "{said}"
-    );
+        .arg(case.path("out/export"))
+        .args(&formats)
+        .output();
+    let Ok(read) = read else {
+        eprintln!("skipped: no python3");
+        return;
+    };
+    let complaint = String::from_utf8_lossy(&read.stderr);
+    assert!(read.status.success(), "{complaint}");
+    let said: Value = serde_json::from_slice(&read.stdout).unwrap();
+    let found = found(case);
+    for format in formats {
+        let said = &said[format];
+        if said.is_null() {
+            eprintln!("skipped: Python has no package that reads {format} (see .ci/run)");
+            continue;
+        }
+        match format {
+            "glb" => {
+                let is_moved = said["keys"] == json!([N_FRAMES]);
+                assert!(is_moved && said["skins"] == 1, "{said}");
+                assert_eq!(said["animations"], 1);
+            }
+            "bvh" => {
+                assert_eq!(said["frames"], N_FRAMES);
+                assert_eq!(said["is_finite"], true);
+                assert!((said["seconds"].as_f64().unwrap() - 0.05).abs() < 1e-6);
+            }
+            _ => check_points(format, said, &found),
+        }
+    }
+}
+
+/// `[frame][joint]` as another program reads it, and null in gaps.
+fn check_points(format: &str, said: &Value, found: &[Vec<Option<[f64; 3]>>]) {
+    let joints = skeleton::PARSE14.joints.iter().map(|it| it.name);
+    if format == "c3d" {
+        assert_eq!(
+            (&said["units"], &said["rate"]),
+            (&json!("mm"), &json!(20.0))
+        );
+    } else {
+        assert_eq!(said["joints"], json!(joints.collect::<Vec<_>>()));
+    }
+    let read: Vec<Vec<Option<[f64; 3]>>> = serde_json::from_value(said["points"].clone()).unwrap();
+    assert_eq!(read.len(), found.len(), "{format}");
+    for (frame, (read, due)) in read.iter().zip(found).enumerate() {
+        assert_eq!(read.len(), due.len(), "{format}");
+        for (joint, (read, due)) in read.iter().zip(due).enumerate() {
+            let is_same = match (read, due) {
+                (Some(read), Some(due)) => (0..3).all(|axis| (read[axis] - due[axis]).abs() < 1e-5),
+                _ => read == due,
+            };
+            assert!(
+                is_same,
+                "{format}, frame {frame}, joint {joint}: {read:?}, {due:?}"
+            );
+        }
+    }
+}
+
+/// The validator of those who made glTF, where Node has it.
+fn check_with_validator(folder: &Path) {
+    const SCRIPT: &str = "\
+let validator;\n\
+try { validator = require('gltf-validator'); } catch { process.exit(9); }\n\
+const bytes = new Uint8Array(require('fs').readFileSync(process.argv[1]));\n\
+validator.validateBytes(bytes).then((it) => console.log(JSON.stringify(it.issues)));\n";
+    let file = folder.join("pose3d.glb");
+    let read = Command::new("node").args(["-e", SCRIPT]).arg(file).output();
+    let has = |it: &Output| it.status.code() != Some(9);
+    let Some(read) = read.ok().filter(has) else {
+        eprintln!("skipped: Node has no gltf-validator (npm install gltf-validator, NODE_PATH)");
+        return;
+    };
+    let complaint = String::from_utf8_lossy(&read.stderr);
+    let issues: Value = serde_json::from_slice(&read.stdout).unwrap_or_default();
+    let of = |kind: &str| issues[kind].as_u64();
+    let is_sound = (of("numErrors"), of("numWarnings")) == (Some(0), Some(0));
+    assert!(is_sound, "{issues} {complaint}");
 }
 
 /// Videos of the footage, and of the pictures of the recording where the footage is gone.
