@@ -6,6 +6,8 @@ const MOST_WAITING = 8;
 const MOST_MOMENTS = 120;
 // A click so near to a joint means it, in shares of the picture's width.
 const NEAR = 0.05;
+// A question about lines that was not answered for so long is asked again.
+const PATIENCE_MS = 1000;
 
 export class Pictures {
   // ask: of the link; marked: called with the joint that was clicked, or nothing for a point without one
@@ -24,7 +26,9 @@ export class Pictures {
     this.poses = true;
     this.on = true;
     this.isLive = true;
-    this.asked = 0;
+    // When lines were asked for that have not come yet, and whether what to ask for has changed since.
+    this.asked = null;
+    this.isChanged = false;
   }
 
   show(scene, isLive) {
@@ -80,7 +84,7 @@ export class Pictures {
     this.point = isNear ? null : [nth, at];
     this.takeLines([]);
     this.marked(isNear ? nearest : null);
-    this.askForLines(true);
+    this.askForLines();
   }
 
   takeLines(lines) {
@@ -88,10 +92,19 @@ export class Pictures {
     this.nLines++;
   }
 
-  // The lines of a joint as it lies in all views, or of a point.
-  askForLines(isUrgent) {
+  // The lines that were asked for.
+  answer(lines) {
+    this.asked = null;
+    if (this.point || Number.isInteger(this.joint)) this.takeLines(lines);
+    if (this.isChanged) this.askForLines();
+  }
+
+  // The lines of a joint as it lies in all views, or of a point. One question is on its way at a time: lines come as often as
+  // results where all have time for that, and nothing piles up where they have not.
+  askForLines() {
     const now = performance.now();
-    if (!isUrgent && now - this.asked < 120) return;
+    this.isChanged = this.asked !== null && now - this.asked < PATIENCE_MS;
+    if (this.isChanged) return;
     let points = [];
     if (this.point) points = [this.point];
     else if (this.joint !== null && this.joint !== undefined) {
@@ -99,18 +112,18 @@ export class Pictures {
       points = this.views.map((_, k) => [k, at(k)]).filter((it) => it[1]);
     }
     if (!points.length) {
-      this.takeLines([]);
+      // Pictures are drawn again only where there were lines.
+      if (this.lines.length) this.takeLines([]);
       return;
     }
-    this.asked = now;
-    this.ask({ epipolar: points });
+    this.asked = this.ask({ epipolar: points }) ? now : null;
   }
 
   mark(joint) {
     this.joint = joint;
     if (joint !== null) this.point = null;
     if (joint === null && !this.point) this.takeLines([]);
-    this.askForLines(true);
+    this.askForLines();
   }
 
   result(moment) {
@@ -118,7 +131,7 @@ export class Pictures {
     this.newest = moment;
     this.moments.set(moment.frame, moment);
     while (this.moments.size > MOST_MOMENTS) this.moments.delete(this.moments.keys().next().value);
-    if (!this.point) this.askForLines(false);
+    if (!this.point) this.askForLines();
   }
 
   async take({ view, frame, isDrawn, jpeg }) {

@@ -24,7 +24,7 @@ let next = null;
 let clock = null;
 let drawn = 0;
 // What a test reads.
-const counts = { moments: 0, pictures: 0, hellos: 0, opened: 0 };
+const counts = { moments: 0, pictures: 0, lines: 0, hellos: 0, opened: 0 };
 
 const redraw = () => { dirty = true; };
 const stage = new Stage(element("space"), NOWHERE, redraw);
@@ -43,7 +43,7 @@ function showLink(word, kind) {
 function take(value) {
   const known = {
     hello: begin, state: showState, moment: arrive, event: (it) => showEvent(element("events"), it),
-    epipolar: (it) => { pictures.takeLines(it.lines); redraw(); },
+    epipolar: (it) => { counts.lines++; pictures.answer(it.lines); redraw(); },
     unread: (it) => { asked = null; say(`frame ${it.at} cannot be read: ${it.why}`); },
     refused: (it) => console.warn(it.why),
   };
