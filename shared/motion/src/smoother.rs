@@ -69,13 +69,13 @@ pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
         let track = &mut tracks[joint];
         track.smooth(&recorded.times, &stretches(&track.used));
     }
+    let noise = tracks.iter().map(Track::known_noise).collect();
+    // Each track goes when its joint is there: a long run would need both at once.
+    let filled = |it: Track| it.filled(&recorded.times, settings.fill_s);
     let mut motion = Motion {
-        joints: tracks
-            .iter()
-            .map(|it| it.filled(&recorded.times, settings.fill_s))
-            .collect(),
+        joints: tracks.into_iter().map(filled).collect(),
         report: Report {
-            noise: tracks.iter().map(Track::known_noise).collect(),
+            noise,
             breaks,
             unsure,
             ..Report::default()
