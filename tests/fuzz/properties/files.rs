@@ -9,6 +9,7 @@ use fmp::Model;
 use fmp::files::{describe, mat, own, text};
 use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisys, umpm};
 use keypoints::files::{NameSet, SeenKeypoints, coco, openpose};
+use motion::{Joint, Recorded, Role};
 use multiview::Compatibility;
 use offline::boards::{corners_text, parse_corners};
 use runfiles::{
@@ -376,6 +377,52 @@ fn exported(input: &str) {
     }
 }
 
+/// Lines of results as a person over time: what is smoothed are numbers, however wrong what was measured.
+fn smoothed(input: &str) {
+    let mut recorded = Recorded::default();
+    for line in runfiles::lines::<FrameLine>(input).flatten() {
+        let at = recorded.times.len();
+        let Some(time_s) = line.time_s else { continue };
+        recorded.times.push(time_s);
+        recorded.sides.push(motion::lines::sides(&line));
+        for (name, it) in &line.joints {
+            let known = recorded.joints.iter().position(|it| it.name == *name);
+            let nth = known.unwrap_or(recorded.joints.len());
+            if known.is_none() {
+                let (name, role) = (name.clone(), Role::of(name));
+                let measured = Vec::new();
+                recorded.joints.push(Joint {
+                    name,
+                    role,
+                    measured,
+                });
+            }
+            let measured = &mut recorded.joints[nth].measured;
+            measured.resize(at, None);
+            measured.push(motion::lines::measured(it));
+        }
+    }
+    for joint in &mut recorded.joints {
+        joint.measured.resize(recorded.times.len(), None);
+    }
+    if recorded.check().is_err() {
+        return;
+    }
+    let constant_bones = true;
+    for settings in [
+        motion::Settings::default(),
+        motion::Settings {
+            fill_s: 1e3,
+            constant_bones,
+        },
+    ] {
+        let motion = motion::smooth(&recorded, &settings);
+        for it in motion.joints.iter().flatten().flatten() {
+            assert!(it.position.iter().all(|it| it.is_finite()), "{it:?}");
+        }
+    }
+}
+
 /// The files that a run leaves behind: what was read is written so that it reads back to the same text.
 pub fn run_files(input: &[u8]) {
     fn lines<L: Line>(input: &str) {
@@ -391,6 +438,7 @@ pub fn run_files(input: &[u8]) {
     };
     lines::<FrameLine>(input);
     exported(input);
+    smoothed(input);
     lines::<ViewLine>(input);
     lines::<TimesLine>(input);
     lines::<SmoothLine>(input);
