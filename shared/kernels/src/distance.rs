@@ -148,8 +148,9 @@ impl Body for Best<'_> {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let most = most.into_iter().fold(f64::NEG_INFINITY, larger);
         let mut of_best = all.iter().enumerate().filter_map(|(chunk, totals)| {
-            let is_here = totals.iter().fold(false, |any, it| any | (*it == most));
-            let lane = is_here.then(|| totals.iter().position(|it| *it == most))??;
+            // Counted, not searched: all at a time.
+            let n_best = totals.iter().filter(|it| **it == most).count();
+            let lane = (n_best > 0).then(|| totals.iter().position(|it| *it == most))??;
             Some((chunk * LANES + lane, totals[lane]))
         });
         *found = of_best.next().unwrap_or((0, f64::NEG_INFINITY));
