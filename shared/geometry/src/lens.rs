@@ -200,7 +200,6 @@ impl LensModel {
     }
 
     /// The distorted point and its derivative, without regard to the valid range.
-    #[inline]
     fn distort(&self, v: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         match self {
             Self::Pinhole => (v, Matrix2::identity()),

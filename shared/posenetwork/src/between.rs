@@ -58,22 +58,17 @@ impl Tap {
     }
 }
 
-/// Memory of [`fill`], used again from map to map.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Lines {
-    values: Vec<f32>,
-}
-
 /// The values of a map at the crossings of places down and across, each that of [`between`] to the bit: every row of the map is
 /// interpolated once, not for each of the places between which it lies.
 ///
 /// * `map`: row major, `columns` wide.
+/// * `lines`: memory that is used again from map to map.
 /// * `take`: called for each row of places with its number and its values; those across that are not inside have none.
 pub(crate) fn for_each_row(
     map: &[f32],
     columns: usize,
     [across, down]: [&[Tap]; 2],
-    lines: &mut Lines,
+    lines: &mut Vec<f32>,
     mut take: impl FnMut(usize, Option<&[f32]>),
 ) {
     let width = across.len();
@@ -85,8 +80,8 @@ pub(crate) fn for_each_row(
     });
     // Those of the rows that are needed, then one for the result.
     let n_lines = last.saturating_sub(first);
-    lines.values.resize((n_lines + 1) * width, 0.0);
-    let (of_rows, result) = lines.values.split_at_mut(n_lines * width);
+    lines.resize((n_lines + 1) * width, 0.0);
+    let (of_rows, result) = lines.split_at_mut(n_lines * width);
     let rows = map.chunks_exact(columns.max(1)).skip(first);
     for (line, row) in of_rows.chunks_exact_mut(width.max(1)).zip(rows) {
         for (value, tap) in line.iter_mut().zip(across) {
@@ -119,4 +114,43 @@ fn cubic(t: f32) -> [f32; 4] {
         0.5 * (-3.0 * t3 + 4.0 * t2 + t),
         0.5 * (t3 - t2),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_places_have_the_values_of_each_place_to_the_bit() {
+        let (columns, rows) = (7, 5);
+        let map: Vec<f32> = (0..columns * rows)
+            .map(|nth| ((nth * 13 + 5) % 17) as f32 * 0.37 - 2.0)
+            .collect();
+        // From beyond the first cell to beyond the last, and in another order than that of the map.
+        let places = |n: usize| -> Vec<f64> {
+            let each = (0..40).map(|nth| f64::from(nth * 29 % 40) / 39.0);
+            each.map(|it| it * (n as f64 + 4.0) - 2.0).collect()
+        };
+        let (across, down) = (places(columns), places(rows));
+        let taps = |places: &[f64], n: usize| -> Vec<Tap> {
+            places.iter().map(|it| Tap::at(*it, n)).collect()
+        };
+        let of_places = [&taps(&across, columns)[..], &taps(&down, rows)[..]];
+        let mut n_compared = 0;
+        for_each_row(&map, columns, of_places, &mut Vec::new(), |row, line| {
+            for (nth, column) in across.iter().enumerate() {
+                let inside = of_places[0][nth].is_inside;
+                let got = line.filter(|_| inside).map(|it| it[nth].to_bits());
+                let wanted = interpolate(&map, [columns, rows], [*column, down[row]]);
+                assert_eq!(got, wanted.map(f32::to_bits), "{column} {}", down[row]);
+                n_compared += usize::from(got.is_some());
+            }
+        });
+        assert!(n_compared > 500, "{n_compared}");
+        // Nothing is needed where no place is inside.
+        let beyond = [&[Tap::at(-9.0, columns)][..], &[Tap::at(-9.0, rows)][..]];
+        for_each_row(&map, columns, beyond, &mut Vec::new(), |_, line| {
+            assert_eq!(line, None);
+        });
+    }
 }

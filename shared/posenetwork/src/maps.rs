@@ -6,7 +6,7 @@ use fmp::{Layout, Placement, Scope};
 use keypoints::{Codec, Keypoint, Window, joint_rows};
 use skeleton::PARSE14;
 
-use crate::between::{Lines, Tap, between, for_each_row};
+use crate::between::{Tap, between, for_each_row};
 use crate::expected::expected_error;
 use crate::found::{likelihood, score_of, scored, weighted};
 use crate::network::{LookError, Read, Sight};
@@ -78,7 +78,8 @@ pub struct JointMaps {
     sigma_px: Option<f64>,
     /// Across and down: between which cells those of a layout lie.
     taps: [Vec<Tap>; 2],
-    lines: Lines,
+    /// Memory for rows of a map between their cells.
+    lines: Vec<f32>,
 }
 
 /// Cells between two columns or rows of a grid that is made for a codec without maps.

@@ -349,8 +349,11 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
             all.push(sequence);
         }
     }
-    for warning in height::warnings(&all, arguments.size, arguments.scale) {
-        tracing::warn!("{warning}");
+    // A network with a detector of its own does without the filters.
+    if arguments.evidence.detector.is_none() {
+        for warning in height::warnings(&all, arguments.size, arguments.scale) {
+            tracing::warn!("{warning}");
+        }
     }
     Ok(all)
 }
