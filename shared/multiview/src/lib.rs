@@ -121,6 +121,7 @@ mod average;
 mod consensus;
 mod facing;
 mod optimise;
+mod space_apart;
 mod space_person;
 mod space_tree;
 mod start;

@@ -4,7 +4,7 @@
 use nalgebra::Point3;
 
 use crate::space_tree::{
-    LIMBS, SpacePose, SpaceSettings, SpaceView, best_on_tree, lengths_of, places, solve_in_space,
+    LIMBS, N, SpacePose, SpaceSettings, SpaceView, best_on_tree, lengths_of, places, solve_in_space,
 };
 
 /// A person in space, and what was decided about the views.
@@ -67,7 +67,8 @@ pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option
 /// The best choice among the places of the joints, for a person of any stature.
 fn coarse(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SpacePose> {
     let all = places(views, settings.n_places);
-    best_on_tree(views, &all, &lengths_of(None), settings)
+    let lengths = lengths_of(None);
+    best_on_tree(views, &all, (&lengths, &[None; N]), settings)
 }
 
 /// The best first solution with no view, or one view, exchanged.

@@ -14,8 +14,13 @@ use nalgebra::Point3;
 use geometry::{Camera, Ray};
 use kernels::{Isa, LengthSpring, ScoredPoints};
 
+use crate::space_apart::{Occupied, cost, kept_apart};
+
 /// Number of joints: those of `skeleton::PARSE14`.
-const N: usize = 14;
+pub(crate) const N: usize = 14;
+
+/// Places of every joint, metres in the world.
+pub(crate) type Places = [Vec<Point3<f64>>; N];
 
 /// The bones of the tree, `[parent, child]`, joints of `skeleton::PARSE14`, parents first. A hip hangs on the neck.
 pub const TREE: [[usize; 2]; N - 1] = [
@@ -72,6 +77,10 @@ pub struct SpaceSettings {
     pub springs: f64,
     /// Most that a bone costs: half the square of so many standard deviations.
     pub cap: f64,
+    /// What it costs that the right and the left of a pair of joints lie at one place.
+    pub apart: f64,
+    /// From so far apart on, a pair costs nothing, metres.
+    pub least_apart_m: f64,
     /// Whether left and right follow the picture: every view may have them exchanged, whatever the others say.
     pub as_seen: bool,
     /// By how much exchanged sides must fit a view better.
@@ -94,6 +103,8 @@ impl Default for SpaceSettings {
         Self {
             springs: 1.0,
             cap: 8.0,
+            apart: 3.0,
+            least_apart_m: 0.1,
             as_seen: false,
             margin: 3.0,
             good_fit: 0.7,
@@ -161,7 +172,7 @@ pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N -
 /// Where pairs of views put every joint, the best first.
 ///
 /// * Returns an empty list for a joint that no two views show.
-pub fn places(views: &[SpaceView<'_>], n: usize) -> [Vec<Point3<f64>>; N] {
+pub fn places(views: &[SpaceView<'_>], n: usize) -> Places {
     core::array::from_fn(|joint| {
         // A lens is inverted step by step, which takes long: once for each maximum, not for each pair.
         let rays: Vec<Vec<Ray>> = views.iter().map(|it| it.rays(joint)).collect();
@@ -256,16 +267,16 @@ pub fn solve_in_space(
     lengths: &[BoneLength; N - 1],
     settings: &SpaceSettings,
 ) -> Option<SpacePose> {
-    let mut best = best_on_tree(views, places, lengths, settings)?;
+    let first = best_on_tree(views, places, (lengths, &[None; N]), settings)?;
+    let (mut best, occupied) = kept_apart(views, places, lengths, settings, first);
     let mut step = settings.coarsest_m;
     while step >= settings.finest_m {
         for _ in 0..2 {
-            let about: [Vec<Point3<f64>>; N] =
-                core::array::from_fn(|joint| match &best.joints[joint] {
-                    Some(at) => grid(at, step),
-                    None => Vec::new(),
-                });
-            let found = best_on_tree(views, &about, lengths, settings)?;
+            let about: Places = core::array::from_fn(|joint| match &best.joints[joint] {
+                Some(at) => grid(at, step),
+                None => Vec::new(),
+            });
+            let found = best_on_tree(views, &about, (lengths, &occupied), settings)?;
             let has_moved = found.joints != best.joints;
             best = found;
             if !has_moved {
@@ -289,10 +300,12 @@ fn grid(about: &Point3<f64>, step: f64) -> Vec<Point3<f64>> {
 }
 
 /// The best of all choices of one place for each joint: messages from the leaves to the root, then back.
+///
+/// * `occupied`: places that joints are kept away from.
 pub(crate) fn best_on_tree(
     views: &[SpaceView<'_>],
-    places: &[Vec<Point3<f64>>; N],
-    lengths: &[BoneLength; N - 1],
+    places: &Places,
+    (lengths, occupied): (&[BoneLength; N - 1], &Occupied),
     settings: &SpaceSettings,
 ) -> Option<SpacePose> {
     if places.iter().all(Vec::is_empty) {
@@ -309,7 +322,10 @@ pub(crate) fn best_on_tree(
         }
     };
     let mut scores: [Vec<f64>; N] = core::array::from_fn(|joint| {
-        let of_place = |at: &Point3<f64>| unary(views, joint, at);
+        let of_place = |at: &Point3<f64>| {
+            let crowded = occupied[joint].map_or(0.0, |it| cost(at, &it, settings));
+            unary(views, joint, at) - crowded
+        };
         if is_there(joint) {
             places[joint].iter().map(of_place).collect()
         } else {

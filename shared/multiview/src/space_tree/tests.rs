@@ -281,3 +281,86 @@ fn whoever_is_the_same_person_in_most_views_is_chosen() {
     assert_eq!(same_person(&nobody, false), [Some(0), None]);
     assert_eq!(same_person(&[], false), []);
 }
+
+/// A view whose network cannot tell the ankles from each other, nor the knees, and sees the left leg better in the maps of both.
+struct EitherLeg(Bumps);
+
+impl EitherLeg {
+    fn of(camera: &Camera) -> Self {
+        let mut bumps = Bumps::of(camera);
+        for [right, left] in [[1, 4], [0, 5]] {
+            let places = [left, right].map(|it| bumps.at[it].unwrap());
+            let heats: [f32; 2] = [1.0, 0.8];
+            let both = places.into_iter().zip(heats);
+            let both: Vec<_> = both
+                .map(|(at, heat)| (at, (heat + EPS as f32).ln()))
+                .collect();
+            bumps.maxima[right].clone_from(&both);
+            bumps.maxima[left] = both;
+        }
+        Self(bumps)
+    }
+}
+
+impl JointEvidence for EitherLeg {
+    fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
+        let heat = |it: usize| self.0.at(it, point).exp() - EPS as f32;
+        match joint {
+            0 | 5 => (heat(5).max(0.8 * heat(0)) + EPS as f32).ln(),
+            1 | 4 => (heat(4).max(0.8 * heat(1)) + EPS as f32).ln(),
+            _ => self.0.at(joint, point),
+        }
+    }
+
+    fn maxima(&self, joint: usize) -> &[([f64; 2], f32)] {
+        self.0.maxima(joint)
+    }
+
+    fn floor(&self) -> f32 {
+        self.0.floor()
+    }
+}
+
+#[test]
+fn both_legs_do_not_lie_on_the_one_that_is_seen_better() {
+    let cameras = RING.map(camera);
+    let evidence = cameras.each_ref().map(EitherLeg::of);
+    let views: Vec<SpaceView<'_>> = cameras
+        .iter()
+        .zip(&evidence)
+        .map(|(camera, evidence)| SpaceView {
+            camera,
+            evidence,
+            exchanged: [false; 2],
+        })
+        .collect();
+    let solved = |settings: &SpaceSettings| solve_person(&views, settings).unwrap().pose;
+    let apart = solved(&SpaceSettings::default());
+    assert!(worst(&apart) < 0.03, "{}", worst(&apart));
+    let together = solved(&SpaceSettings {
+        apart: 0.0,
+        ..SpaceSettings::default()
+    });
+    assert!(worst(&together) > 0.15, "the term is what keeps them apart");
+}
+
+#[test]
+fn legs_that_are_together_stay_together() {
+    // What both maps show is in one place only: there is no other leg to find.
+    let cameras = RING.map(camera);
+    let mut bumps = cameras.each_ref().map(Bumps::of);
+    for view in &mut bumps {
+        for [right, left] in [[1, 4], [0, 5]] {
+            view.at[right] = view.at[left];
+            view.maxima[right] = view.maxima[left].clone();
+        }
+    }
+    let found = solved(&cameras, &bumps);
+    for joint in [0, 1] {
+        let left = [5, 4][joint];
+        let between = (found.joints[joint].unwrap() - found.joints[left].unwrap()).norm();
+        assert!(between < 0.12, "joint {joint}: {between}");
+        let off = (found.joints[joint].unwrap() - Point3::from(STANDING[left])).norm();
+        assert!(off < 0.12, "joint {joint}: {off}");
+    }
+}
