@@ -18,6 +18,7 @@ mod skeleton_settings;
 mod skeleton_step;
 mod space;
 mod space_step;
+mod tracks;
 mod view_result;
 mod view_step;
 

@@ -15,6 +15,7 @@ use posenetwork::{
     outline_of_pose, overlap,
 };
 
+use crate::tracks::{MUCH_WORSE, Track, wider};
 use crate::view_result::ExtraKeypoint;
 use crate::view_step::{ViewEstimate, ViewStep};
 
@@ -90,8 +91,8 @@ pub struct NetworkStep {
 pub struct NetworkMemory {
     look: LookMemory,
     values: Vec<f32>,
-    /// The boxes for the next frame, pixels.
-    outlines: Vec<[f64; 4]>,
+    /// Where the people of this frame are looked for in the next one.
+    tracks: Vec<Track>,
     /// The people of this frame; those beyond `n_seen` are memory for more.
     seen: Vec<Seen>,
     n_seen: usize,
@@ -106,6 +107,8 @@ pub struct NetworkMemory {
 struct Seen {
     maps: JointMaps,
     outline: [f64; 4],
+    /// The score that the person's poses had in the frames before; `None` for somebody new.
+    usual_score: Option<f32>,
     /// Mean heat of the joints at their peaks, 0 to 1.
     heat: f64,
     /// In which direction the trunk faces, if the network tells.
@@ -118,6 +121,14 @@ impl NetworkMemory {
     /// The people that the network sees in this frame.
     fn people(&self) -> &[Seen] {
         &self.seen[..self.n_seen]
+    }
+
+    /// Memory for looking, and for one more person of this frame.
+    fn next(&mut self) -> (&mut LookMemory, &mut Seen) {
+        if self.seen.len() == self.n_seen {
+            self.seen.push(Seen::default());
+        }
+        (&mut self.look, &mut self.seen[self.n_seen])
     }
 
     /// Whether boxes were looked for in this frame.
@@ -157,7 +168,9 @@ impl NetworkStep {
     /// Looks at a frame; returns what of it the responses will cover, or `None` if nobody is seen well.
     ///
     /// Where boxes are looked for, those of a detector come before those of the frame before, so that no box shrinks or wanders off
-    /// unnoticed; those of the filters come after. Up to twice as many people as are kept are then looked at, and the largest kept.
+    /// unnoticed. Those of the filters fit less well and come after: every person of the frame before is then looked at in a wider box as
+    /// well, and the better sight kept. So is one whose pose was much worse than usual. Up to twice as many people as are kept are
+    /// looked at, and the largest kept.
     ///
     /// # Errors
     ///
@@ -176,18 +189,33 @@ impl NetworkStep {
         let is_due = memory.until.is_none_or(|it| it == 0);
         memory.has_searched = is_due;
         memory.n_seen = 0;
-        let tracked = core::mem::take(&mut memory.outlines);
+        let tracks = core::mem::take(&mut memory.tracks);
         let with = (&**network, image);
-        if is_due && matches!(boxes, Boxes::Detector(_)) {
-            let found = find(boxes, image, &mut memory.values)?;
-            self.see_all(with, (&found, true), memory)?;
-            self.see_all(with, (&tracked, false), memory)?;
+        let found = if is_due {
+            find(boxes, image, &mut memory.values)?
         } else {
-            self.see_all(with, (&tracked, false), memory)?;
-            memory.has_searched |= memory.n_seen == 0;
-            if memory.has_searched {
+            Vec::new()
+        };
+        if is_due && matches!(boxes, Boxes::Detector(_)) {
+            self.see_all(with, &found, memory)?;
+            for track in &tracks {
+                self.see_again(with, track, memory)?;
+            }
+        } else {
+            for track in &tracks {
+                if is_due || track.is_doubtful {
+                    let wider = wider(track.outline, &found);
+                    let usual_score = Some(track.usual_score);
+                    self.see(with, (&[track.outline, wider], usual_score), memory)?;
+                } else {
+                    self.see_again(with, track, memory)?;
+                }
+            }
+            self.see_all(with, &found, memory)?;
+            if memory.n_seen == 0 && !is_due {
+                memory.has_searched = true;
                 let found = find(boxes, image, &mut memory.values)?;
-                self.see_all(with, (&found, true), memory)?;
+                self.see_all(with, &found, memory)?;
             }
         }
         let until = if memory.has_searched {
@@ -201,66 +229,87 @@ impl NetworkStep {
         memory.seen[..n_seen].sort_by(|a, b| size(b).total_cmp(&size(a)));
         memory.n_seen = n_seen.min(self.settings.n_people);
         // The memory of the list is kept.
-        memory.outlines = tracked;
-        memory.outlines.clear();
+        memory.tracks = tracks;
+        memory.tracks.clear();
         Ok(self.scope(memory))
     }
 
-    /// Looks into boxes in which nobody is known yet.
-    ///
-    /// * `are_found`: they are not those of the frame before.
+    /// Looks for people in boxes that were found.
     fn see_all(
         &self,
         with: (&PoseNetwork, Rgb8View<'_>),
-        (outlines, are_found): (&[[f64; 4]], bool),
+        outlines: &[[f64; 4]],
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
         for outline in outlines {
-            let is_known = |it: &Seen| overlap(it.outline, *outline) > SAME;
-            let has_room = memory.n_seen < 2 * self.settings.n_people;
-            if has_room && !memory.people().iter().any(is_known) {
-                self.see(with, (*outline, are_found), memory)?;
-            }
+            self.see(with, (core::slice::from_ref(outline), None), memory)?;
         }
         Ok(())
     }
 
-    /// Looks at the person in a box, and keeps what is seen well.
+    /// Whether there is room for the person in a box, and nobody is known there.
+    fn is_unknown(&self, outline: [f64; 4], memory: &NetworkMemory) -> bool {
+        let is_known = |it: &Seen| overlap(it.outline, outline) > SAME;
+        let has_room = memory.n_seen < 2 * self.settings.n_people;
+        has_room && !memory.people().iter().any(is_known)
+    }
+
+    /// Looks at a person in several boxes and around what is seen there, and keeps the best sight if it is good.
     ///
-    /// * `is_found`: the box is not that of the frame before: a better one may be around what is seen there.
+    /// * `outlines`: nothing is done where somebody is known in the first.
     fn see(
         &self,
         (network, image): (&PoseNetwork, Rgb8View<'_>),
-        (outline, is_found): ([f64; 4], bool),
+        (outlines, usual_score): (&[[f64; 4]], Option<f32>),
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
-        if memory.seen.len() == memory.n_seen {
-            memory.seen.push(Seen::default());
+        let first = outlines.first();
+        if !first.is_some_and(|it| self.is_unknown(*it, memory)) {
+            return Ok(());
         }
-        let seen = &mut memory.seen[memory.n_seen];
-        if is_found {
-            let looker = Looker {
-                network,
-                springs: &self.solver,
-                layout: &self.layout,
-                settings: &self.settings.maps,
-            };
-            let what = (image, outline);
-            let Some(first) = looker.look(what, &mut memory.look, &mut seen.maps)? else {
-                return Ok(());
-            };
-            let look = looker.look_closer((image, first), &mut memory.look, &mut seen.maps)?;
-            (seen.outline, seen.front) = (look.outline, look.front);
-        } else {
-            let Some(sight) = network.look(image, outline, memory.look.workspace())? else {
-                return Ok(());
-            };
-            seen.maps.read(&sight, &self.settings.maps)?;
-            (seen.outline, seen.front) = (outline, sight.front());
+        let looker = Looker {
+            network,
+            springs: &self.solver,
+            layout: &self.layout,
+            settings: &self.settings.maps,
+        };
+        let (look, seen) = memory.next();
+        if let Some(best) = looker.best_of((image, outlines), look, &mut seen.maps)? {
+            seen.outline = best.outline;
+            seen.front = best.front;
+            seen.usual_score = usual_score;
+            self.keep(memory);
         }
+        Ok(())
+    }
+
+    /// Looks at a person of the frame before, where nobody is known yet, and keeps what is seen well.
+    fn see_again(
+        &self,
+        (network, image): (&PoseNetwork, Rgb8View<'_>),
+        track: &Track,
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        if !self.is_unknown(track.outline, memory) {
+            return Ok(());
+        }
+        let (look, seen) = memory.next();
+        let Some(sight) = network.look(image, track.outline, look.workspace())? else {
+            return Ok(());
+        };
+        seen.maps.read(&sight, &self.settings.maps)?;
+        seen.outline = track.outline;
+        seen.front = sight.front();
+        seen.usual_score = Some(track.usual_score);
+        self.keep(memory);
+        Ok(())
+    }
+
+    /// Keeps the next person if it is seen well and not known yet.
+    fn keep(&self, memory: &mut NetworkMemory) {
+        let (_, seen) = memory.next();
         let is_new = self.is_well_seen(seen) && !is_known(&memory.seen, memory.n_seen);
         memory.n_seen += usize::from(is_new);
-        Ok(())
     }
 
     /// Takes the people of a frame whose keypoints another program found; returns what of the frame the responses will cover, or
@@ -272,7 +321,7 @@ impl NetworkStep {
         people: impl Iterator<Item = P>,
         memory: &mut NetworkMemory,
     ) -> Option<Scope> {
-        memory.outlines.clear();
+        memory.tracks.clear();
         memory.n_seen = 0;
         let Eyes::Keypoints(rows) = &self.eyes else {
             return None;
@@ -281,10 +330,7 @@ impl NetworkStep {
             if memory.n_seen == self.settings.n_people {
                 break;
             }
-            if memory.seen.len() == memory.n_seen {
-                memory.seen.push(Seen::default());
-            }
-            let seen = &mut memory.seen[memory.n_seen];
+            let (_, seen) = memory.next();
             let NetworkSettings {
                 maps,
                 keypoint_sigma,
@@ -346,6 +392,7 @@ impl NetworkStep {
     ) -> ViewEstimate {
         let level = scope.levels().start;
         let n_seen = memory.n_seen;
+        let most_lost = -MUCH_WORSE * self.settings.maps.floor();
         let mut found: Vec<(Pose, usize)> = Vec::with_capacity(n_seen);
         for (nth, seen) in memory.seen[..n_seen].iter_mut().enumerate() {
             if nth == 0 {
@@ -353,6 +400,7 @@ impl NetworkStep {
             } else {
                 seen.maps.raise(&self.layout, &scope, responses);
             }
+            let (looked_at, usual_score) = (seen.outline, seen.usual_score);
             let pose = if n_seen == 1 && seen.level == level {
                 self.best(responses, scope)
             } else {
@@ -363,7 +411,10 @@ impl NetworkStep {
             };
             if let Some(pose) = pose {
                 let tree = (&**self.solver.model(), &*self.layout);
-                memory.outlines.extend(outline_of_pose(&pose, tree));
+                let around = outline_of_pose(&pose, tree);
+                let before = (looked_at, usual_score);
+                let next = around.map(|it| Track::next(before, (it, pose.score), most_lost));
+                memory.tracks.extend(next);
                 found.push((self.at_level(pose, &scope), nth));
             }
         }

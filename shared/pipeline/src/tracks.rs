@@ -1,0 +1,124 @@
+//! Where the people of a view are looked for in the next frame.
+
+/// Which share of the way to the box around a pose a side moves in a frame, inward.
+const INWARD: f64 = 0.5;
+/// A pose is much worse than usual if so many joints are lost that were seen at their best.
+pub(crate) const MUCH_WORSE: f32 = 1.5;
+/// Weight of a new score in the usual one.
+const NEW_SCORE: f32 = 0.1;
+/// By how much a box is enlarged to see whether there is more of a person, share of the longer side.
+const WIDER: f64 = 0.25;
+/// Most of a box.
+const MOST: f64 = 0.5;
+
+/// Where a person is looked for in the next frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Track {
+    /// The box, pixels.
+    pub(crate) outline: [f64; 4],
+    /// The score that the person's poses usually have.
+    pub(crate) usual_score: f32,
+    /// Whether this frame's is so much lower that the box may not fit.
+    pub(crate) is_doubtful: bool,
+}
+
+impl Track {
+    /// Where a person is looked for next.
+    ///
+    /// In the box around the pose, but a side moves inward step by step: a pose that leaves out the head or a leg in one frame does not
+    /// put it beyond the edge of the next one. One that is much worse than the person's poses usually are moves no side at all.
+    ///
+    /// * `looked_at`: the box of this frame; `usual_score`: of the person's poses before; `None` for somebody new.
+    /// * `around`, `score`: the box around the pose that was seen, and its score.
+    /// * `most_lost`: by how much a score may be lower than usual.
+    pub(crate) fn next(
+        (looked_at, usual_score): ([f64; 4], Option<f32>),
+        (around, score): ([f64; 4], f32),
+        most_lost: f32,
+    ) -> Self {
+        let usual_score = usual_score.unwrap_or(score);
+        let is_doubtful = score < usual_score - most_lost;
+        let moved = |side: usize| {
+            let by = around[side] - looked_at[side];
+            let is_inward = (by > 0.0) == (side < 2);
+            looked_at[side] + if is_inward { INWARD * by } else { by }
+        };
+        Self {
+            outline: if is_doubtful {
+                looked_at
+            } else {
+                core::array::from_fn(moved)
+            },
+            usual_score: usual_score + NEW_SCORE * (score - usual_score),
+            is_doubtful,
+        }
+    }
+}
+
+/// A box that shows more around a person of the frame before: together with the first box in which most of it lies; without one, enlarged
+/// by a quarter of the longer side all around.
+///
+/// * `found`: boxes around people, the best first.
+pub(crate) fn wider(outline: [f64; 4], found: &[[f64; 4]]) -> [f64; 4] {
+    let [left, top, right, bottom] = outline;
+    let covered = |it: &&[f64; 4]| {
+        let width = right.min(it[2]) - left.max(it[0]);
+        let height = bottom.min(it[3]) - top.max(it[1]);
+        width.max(0.0) * height.max(0.0) > MOST * (right - left) * (bottom - top)
+    };
+    if let Some(it) = found.iter().find(covered) {
+        return [
+            left.min(it[0]),
+            top.min(it[1]),
+            right.max(it[2]),
+            bottom.max(it[3]),
+        ];
+    }
+    let more = WIDER * (right - left).max(bottom - top);
+    [left - more, top - more, right + more, bottom + more]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOX: [f64; 4] = [100.0, 50.0, 180.0, 250.0];
+
+    #[test]
+    fn a_side_moves_outward_at_once_and_inward_step_by_step() {
+        let around = [90.0, 150.0, 170.0, 260.0];
+        let next = Track::next((BOX, None), (around, -20.0), 6.0);
+        assert_eq!(next.outline, [90.0, 100.0, 175.0, 260.0]);
+        assert!(!next.is_doubtful, "nothing is usual for somebody new");
+    }
+
+    #[test]
+    fn a_pose_that_is_much_worse_than_usual_moves_no_side() {
+        let legs = [120.0, 150.0, 200.0, 250.0];
+        let next = Track::next((BOX, Some(-18.0)), (legs, -25.0), 6.0);
+        assert_eq!(next.outline, BOX);
+        assert!(next.is_doubtful);
+        assert!(!Track::next((BOX, Some(-18.0)), (legs, -23.0), 6.0).is_doubtful);
+    }
+
+    #[test]
+    fn what_stays_worse_becomes_usual() {
+        let mut track = Track::next((BOX, Some(-18.0)), (BOX, -30.0), 6.0);
+        let mut n_doubtful = 0;
+        while track.is_doubtful {
+            n_doubtful += 1;
+            assert!(n_doubtful < 20);
+            track = Track::next((track.outline, Some(track.usual_score)), (BOX, -30.0), 6.0);
+        }
+        assert!(n_doubtful > 2);
+    }
+
+    #[test]
+    fn a_wider_box_reaches_to_what_was_found_around_the_person() {
+        let legs = [110.0, 150.0, 170.0, 260.0];
+        let elsewhere = [300.0, 50.0, 380.0, 250.0];
+        assert_eq!(wider(legs, &[elsewhere, BOX]), [100.0, 50.0, 180.0, 260.0]);
+        let alone = wider(legs, &[elsewhere]);
+        assert_eq!(alone, [82.5, 122.5, 197.5, 287.5]);
+    }
+}
