@@ -1,6 +1,6 @@
 """The parts of tests/live/hosts: runs on one and on three hosts, faults on the link, and what became of every frame."""
 
-import json, math, os, re, signal, subprocess, sys, time
+import json, math, os, random, re, signal, subprocess, sys, time
 
 parallax, out, n_cameras, seconds, rate, carry = sys.argv[1:7]
 n_cameras, seconds, rate = int(n_cameras), int(seconds), float(rate)
@@ -193,6 +193,79 @@ def kill_host(folder, processes):
     return watch(folder, "left", restore, 3)
 
 
+def descendants(roots):
+    """All processes below these, by their parents."""
+    below, parents = set(roots), {}
+    for name in os.listdir("/proc"):
+        if name.isdigit():
+            try:
+                parents[int(name)] = int(open(f"/proc/{name}/stat").read().rsplit(")", 1)[1].split()[1])
+            except (OSError, IndexError):
+                pass
+    while more := {it for it, parent in parents.items() if parent in below} - below:
+        below |= more
+    return below
+
+
+def held(roots):
+    """Memory of its own (the proportional share, MB), descriptors and threads, by the processes' names."""
+    sums = {}
+    for it in descendants(roots):
+        try:
+            words = open(f"/proc/{it}/cmdline").read().split("\0")
+            if os.path.basename(words[0]) != os.path.basename(parallax):
+                continue
+            pss = next(int(line.split()[1]) for line in open(f"/proc/{it}/smaps_rollup") if line.startswith("Pss:")) / 1024
+            threads = len(os.listdir(f"/proc/{it}/task"))
+            row = sums.setdefault(words[1], {"processes": 0, "mb": 0.0, "descriptors": 0, "threads": 0})
+            row["processes"] += 1
+            row["mb"] = round(row["mb"] + pss, 1)
+            row["descriptors"] += len(os.listdir(f"/proc/{it}/fd"))
+            row["threads"] += threads
+        except (OSError, StopIteration, IndexError):
+            pass
+    return sums
+
+
+def endurance(folder, processes):
+    """Links cut and hosts killed at random until the run is over; what the fusing host holds, every half a minute."""
+    dice, begin, next_sample = random.Random(1), time.time(), 0.0
+    faults, samples = [], open(f"{folder}/held.jsonl", "a", buffering=1)
+    held_now = {}
+    while processes["desk"].poll() is None and time.time() - begin < seconds - 90:
+        host, kind = dice.choice(["left", "right"]), dice.choice(["cut", "cut", "cut", "cut", "kill"])
+        length, calm = dice.uniform(0.5, 20.0), dice.uniform(10.0, 50.0)
+        end = time.time() + calm
+        while time.time() < end:
+            if time.time() >= next_sample:
+                next_sample = time.time() + 30
+                held_now = held([processes["desk"].pid])
+                samples.write(json.dumps({"s": round(time.time() - begin), "held": held_now}) + "\n")
+            time.sleep(0.5)
+        if kind == "cut":
+            sh("ip", "link", "set", f"px-{host}", "down")
+            restore = lambda: sh("ip", "link", "set", f"px-{host}", "up")
+        else:
+            os.killpg(processes[host].pid, signal.SIGKILL)
+
+            def restore():
+                processes[host] = processes["start"](host, 5000 if host == "left" else 900000)
+        it = watch(folder, host, restore, length)
+        faults.append({"host": host, "kind": kind, "length_s": round(length, 1), **it})
+        with open(f"{folder}/faults.jsonl", "a") as file:
+            file.write(json.dumps(faults[-1]) + "\n")
+    rows = [json.loads(it) for it in open(f"{folder}/held.jsonl")]
+    rows = [it["held"] for it in rows if it["s"] > 120] or [held_now]
+    # The first and the last quarter: what grows shows as a difference of the two.
+    quarter = max(len(rows) // 4, 1)
+    total = lambda row, key: sum(it[key] for it in row.values())
+    mean = lambda part, key: round(sum(total(it, key) for it in part) / len(part), 1)
+    flat = {key: [mean(rows[:quarter], key), mean(rows[-quarter:], key)] for key in ("processes", "mb", "descriptors", "threads")}
+    back = sorted(it["back_s"] for it in faults if it["back_s"] is not None)
+    return {"faults": len(faults), "kills": sum(it["kind"] == "kill" for it in faults), "came_back": len(back),
+            "back_p50_s": back and back[len(back) // 2], "back_max_s": back and back[-1], "first_and_last_quarter": flat}
+
+
 def clear():
     sh("ip", "link", "set", "px-left", "up")
     sh("ip", "netns", "exec", "px-desk", "nft", "flush", "ruleset", check=False)
@@ -213,7 +286,7 @@ def main():
         status = one.wait(seconds * 3 + 120)
         say("one", exit=status, **score(f"{out}/one", truth))
     parts = {"three": None, "cut-1": cable(1), "cut-10": cable(10), "cut": for_ever, "loss-1": loss(1), "loss-10": loss(10),
-             "slow": slow(int(os.environ.get("KBIT", "200"))), "kill": kill_host}
+             "slow": slow(int(os.environ.get("KBIT", "200"))), "kill": kill_host, "endurance": endurance}
     for part, fault in parts.items():
         if part not in wanted:
             continue
