@@ -35,7 +35,8 @@ pub struct Config {
     /// `network`: what holds its maps together: a file that `parallax train springs` made; `"shipped"`: the one that ships.
     pub springs: PathBuf,
     /// `network`: people are looked for in every n-th frame, and wherever nobody is seen; between, the network looks where they were.
-    /// Without it twice a second with a `detector`, once by the filters, which take longer, and at most in every tenth.
+    /// Without it twice a second with a `detector`, once by the filters, which take longer, and at most in every tenth; in every frame
+    /// if these are more than half a second apart or their rate is not known.
     pub find_every: Option<u64>,
     /// `network`, keypoints: least mean heat (or confidence) of the joints of somebody who is seen, 0 to 1.
     pub least_heat: f64,
