@@ -63,12 +63,12 @@ mod tests {
         assert_eq!(find_every_at(Some(60.0), false), 60);
         assert_eq!(find_every_at(Some(60.0), true), 30);
         assert_eq!(find_every_at(Some(15.0), true), 10);
-        assert_eq!(find_every_at(Some(5.0), false), 10);
+        assert_eq!(find_every_at(Some(2.5), false), 10);
     }
 
     #[test]
     fn nobody_is_followed_from_one_picture_to_another_that_may_be_of_any_time() {
-        assert_eq!(find_every_at(Some(2.5), false), 1);
+        assert_eq!(find_every_at(Some(1.9), false), 1);
         assert_eq!(find_every_at(Some(1.0), true), 1);
         assert_eq!(find_every_at(None, false), 1);
     }
