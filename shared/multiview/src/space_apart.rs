@@ -8,20 +8,10 @@
 //! with `d` the least distance of a pair. It closes loops, so that the tree alone is not exact any more: one side is kept away from where
 //! the other one is, the tree solved again, and the better one of both sides chosen.
 
-use nalgebra::Point3;
-
 use crate::space_tree::{
-    BoneLength, LIMBS, N, Places, SpacePose, SpaceSettings, SpaceView, TREE, best_on_tree,
+    BoneLength, LIMBS, N, Occupied, Places, SpacePose, SpaceSettings, SpaceView, TREE,
+    best_on_tree, cost,
 };
-
-/// Where each joint must not be: at that of the other side. `None` for joints that are not kept away from anything.
-pub(crate) type Occupied = [Option<Point3<f64>>; N];
-
-/// What it costs that a joint lies near the other one of its pair.
-pub(crate) fn cost(at: &Point3<f64>, other: &Point3<f64>, settings: &SpaceSettings) -> f64 {
-    let share = (at - other).norm() / settings.least_apart_m;
-    settings.apart * (1.0 - share).max(0.0)
-}
 
 /// What it costs that the pairs of a limb lie near each other.
 fn crowding(joints: &Occupied, pairs: &[[usize; 2]], settings: &SpaceSettings) -> f64 {

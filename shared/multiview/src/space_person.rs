@@ -3,8 +3,9 @@
 
 use nalgebra::Point3;
 
+use crate::space_solve::solve_in_space;
 use crate::space_tree::{
-    LIMBS, N, SpacePose, SpaceSettings, SpaceView, best_on_tree, lengths_of, places, solve_in_space,
+    LIMBS, N, SpacePose, SpaceSettings, SpaceView, best_on_tree, lengths_of, places,
 };
 
 /// A person in space, and what was decided about the views.

@@ -14,8 +14,6 @@ use nalgebra::Point3;
 use geometry::{Camera, Ray};
 use kernels::{Isa, LengthSpring, ScoredPoints};
 
-use crate::space_apart::{Occupied, cost, kept_apart};
-
 /// Number of joints: those of `skeleton::PARSE14`.
 pub(crate) const N: usize = 14;
 
@@ -256,47 +254,13 @@ impl SpaceView<'_> {
 pub(crate) const LIMBS: [[[usize; 2]; 3]; 2] =
     [[[8, 9], [7, 10], [6, 11]], [[2, 3], [1, 4], [0, 5]]];
 
-/// Solves for all joints at once.
-///
-/// * `places`: of every joint, for example of [`places`]; a joint without one is left out.
-/// * `lengths`: of the bones of [`TREE`].
-/// * Returns `None` if no joint has a place.
-pub fn solve_in_space(
-    views: &[SpaceView<'_>],
-    places: &[Vec<Point3<f64>>; N],
-    lengths: &[BoneLength; N - 1],
-    settings: &SpaceSettings,
-) -> Option<SpacePose> {
-    let first = best_on_tree(views, places, (lengths, &[None; N]), settings)?;
-    let (mut best, occupied) = kept_apart(views, places, lengths, settings, first);
-    let mut step = settings.coarsest_m;
-    while step >= settings.finest_m {
-        for _ in 0..2 {
-            let about: Places = core::array::from_fn(|joint| match &best.joints[joint] {
-                Some(at) => grid(at, step),
-                None => Vec::new(),
-            });
-            let found = best_on_tree(views, &about, (lengths, &occupied), settings)?;
-            let has_moved = found.joints != best.joints;
-            best = found;
-            if !has_moved {
-                break;
-            }
-        }
-        step /= 2.0;
-    }
-    Some(best)
-}
+/// Where each joint must not be: at that of the other side. `None` for joints that are not kept away from anything.
+pub(crate) type Occupied = [Option<Point3<f64>>; N];
 
-/// The 125 places of a grid about a place, that one in the middle.
-fn grid(about: &Point3<f64>, step: f64) -> Vec<Point3<f64>> {
-    let along = |nth: usize| (nth as f64 - 2.0) * step;
-    (0..125)
-        .map(|nth| {
-            let by = [along(nth % 5), along(nth / 5 % 5), along(nth / 25)];
-            about + nalgebra::Vector3::from(by)
-        })
-        .collect()
+/// What it costs that a joint lies near the other one of its pair.
+pub(crate) fn cost(at: &Point3<f64>, other: &Point3<f64>, settings: &SpaceSettings) -> f64 {
+    let share = (at - other).norm() / settings.least_apart_m;
+    settings.apart * (1.0 - share).max(0.0)
 }
 
 /// The best of all choices of one place for each joint: messages from the leaves to the root, then back.

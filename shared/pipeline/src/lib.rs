@@ -12,6 +12,7 @@ mod fuse_step;
 mod fused;
 mod fused_view;
 mod motion;
+mod network_memory;
 mod network_step;
 mod people;
 mod skeleton_settings;
@@ -33,7 +34,8 @@ pub use fuse_step::{
 };
 pub use fused_view::FusedView;
 pub use motion::Motion;
-pub use network_step::{Boxes, Eyes, MOST_VALUES, NetworkMemory, NetworkSettings, NetworkStep};
+pub use network_memory::NetworkMemory;
+pub use network_step::{Boxes, Eyes, MOST_VALUES, NetworkSettings, NetworkStep};
 pub use people::{Person, people};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};

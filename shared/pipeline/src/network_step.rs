@@ -11,10 +11,11 @@ use kernels::Rgb8View;
 use keypoints::Keypoint;
 use multiview::FrontEvidence;
 use posenetwork::{
-    Detector, JointMaps, LookError, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
+    Detector, JointMaps, LookError, Looker, MapSettings, PoseNetwork, outline_of_parts,
     outline_of_pose, overlap,
 };
 
+use crate::network_memory::{NetworkMemory, Seen, is_known};
 use crate::tracks::{MUCH_WORSE, Track, wider};
 use crate::view_result::ExtraKeypoint;
 use crate::view_step::{ViewEstimate, ViewStep};
@@ -69,8 +70,6 @@ impl Default for NetworkSettings {
 
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
-/// People half of whose joints are nearer to each other, as a share of the height of the network's window, are one.
-const TWIN: f64 = 0.05;
 /// Least score of an extra keypoint: below it, its place is a guess (0.3 is what mmpose and `Pose2Sim` use).
 const LEAST_SCORE: f64 = 0.3;
 /// Most response values of a frame; the cells of the evidence become larger rather than more.
@@ -84,57 +83,6 @@ pub struct NetworkStep {
     layout: Arc<Layout>,
     settings: NetworkSettings,
     extras: Vec<Option<usize>>,
-}
-
-/// What the step keeps from frame to frame: memory that is used again, and the boxes of the people it sees.
-#[derive(Debug, Default)]
-pub struct NetworkMemory {
-    look: LookMemory,
-    values: Vec<f32>,
-    /// Where the people of this frame are looked for in the next one.
-    tracks: Vec<Track>,
-    /// The people of this frame; those beyond `n_seen` are memory for more.
-    seen: Vec<Seen>,
-    n_seen: usize,
-    /// Frames until boxes are looked for; none before the first frame.
-    until: Option<u64>,
-    /// Whether they were looked for in this frame.
-    has_searched: bool,
-}
-
-/// A person in a frame.
-#[derive(Debug, Default)]
-struct Seen {
-    maps: JointMaps,
-    outline: [f64; 4],
-    /// The score that the person's poses had in the frames before; `None` for somebody new.
-    usual_score: Option<f32>,
-    /// Mean heat of the joints at their peaks, 0 to 1.
-    heat: f64,
-    /// In which direction the trunk faces, if the network tells.
-    front: Option<FrontEvidence>,
-    level: u16,
-    responses: Vec<f32>,
-}
-
-impl NetworkMemory {
-    /// The people that the network sees in this frame.
-    fn people(&self) -> &[Seen] {
-        &self.seen[..self.n_seen]
-    }
-
-    /// Memory for looking, and for one more person of this frame.
-    fn next(&mut self) -> (&mut LookMemory, &mut Seen) {
-        if self.seen.len() == self.n_seen {
-            self.seen.push(Seen::default());
-        }
-        (&mut self.look, &mut self.seen[self.n_seen])
-    }
-
-    /// Whether boxes were looked for in this frame.
-    pub fn has_searched(&self) -> bool {
-        self.has_searched
-    }
 }
 
 impl NetworkStep {
@@ -483,22 +431,6 @@ impl NetworkStep {
         }
         moved
     }
-}
-
-/// Whether the person after the first `n` is one of these: two boxes can be of one person.
-fn is_known(seen: &[Seen], n: usize) -> bool {
-    let (before, last) = seen[..=n].split_at(n);
-    before.iter().any(|it| {
-        let [_, top, _, bottom] = it.maps.extent();
-        let both = it.maps.peaks().iter().zip(last[0].maps.peaks());
-        let both = both.filter_map(|(a, b)| Some((a.as_ref()?.at, b.as_ref()?.at)));
-        let mut distances: Vec<f64> = both
-            .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
-            .collect();
-        distances.sort_by(f64::total_cmp);
-        let middle = distances.get(distances.len() / 2);
-        middle.is_some_and(|it| *it < TWIN * (bottom - top))
-    })
 }
 
 /// Boxes around people, pixels, the best first.

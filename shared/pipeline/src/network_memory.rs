@@ -1,0 +1,76 @@
+//! What the step with a network keeps from frame to frame.
+
+use multiview::FrontEvidence;
+use posenetwork::{JointMaps, LookMemory};
+
+use crate::tracks::Track;
+
+/// People half of whose joints are nearer to each other, as a share of the height of the network's window, are one.
+const TWIN: f64 = 0.05;
+
+/// What the step keeps from frame to frame: memory that is used again, and the boxes of the people it sees.
+#[derive(Debug, Default)]
+pub struct NetworkMemory {
+    pub(crate) look: LookMemory,
+    pub(crate) values: Vec<f32>,
+    /// Where the people of this frame are looked for in the next one.
+    pub(crate) tracks: Vec<Track>,
+    /// The people of this frame; those beyond `n_seen` are memory for more.
+    pub(crate) seen: Vec<Seen>,
+    pub(crate) n_seen: usize,
+    /// Frames until boxes are looked for; none before the first frame.
+    pub(crate) until: Option<u64>,
+    /// Whether they were looked for in this frame.
+    pub(crate) has_searched: bool,
+}
+
+/// A person in a frame.
+#[derive(Debug, Default)]
+pub(crate) struct Seen {
+    pub(crate) maps: JointMaps,
+    pub(crate) outline: [f64; 4],
+    /// The score that the person's poses had in the frames before; `None` for somebody new.
+    pub(crate) usual_score: Option<f32>,
+    /// Mean heat of the joints at their peaks, 0 to 1.
+    pub(crate) heat: f64,
+    /// In which direction the trunk faces, if the network tells.
+    pub(crate) front: Option<FrontEvidence>,
+    pub(crate) level: u16,
+    pub(crate) responses: Vec<f32>,
+}
+
+impl NetworkMemory {
+    /// The people that the network sees in this frame.
+    pub(crate) fn people(&self) -> &[Seen] {
+        &self.seen[..self.n_seen]
+    }
+
+    /// Memory for looking, and for one more person of this frame.
+    pub(crate) fn next(&mut self) -> (&mut LookMemory, &mut Seen) {
+        if self.seen.len() == self.n_seen {
+            self.seen.push(Seen::default());
+        }
+        (&mut self.look, &mut self.seen[self.n_seen])
+    }
+
+    /// Whether boxes were looked for in this frame.
+    pub fn has_searched(&self) -> bool {
+        self.has_searched
+    }
+}
+
+/// Whether the person after the first `n` is one of these: two boxes can be of one person.
+pub(crate) fn is_known(seen: &[Seen], n: usize) -> bool {
+    let (before, last) = seen[..=n].split_at(n);
+    before.iter().any(|it| {
+        let [_, top, _, bottom] = it.maps.extent();
+        let both = it.maps.peaks().iter().zip(last[0].maps.peaks());
+        let both = both.filter_map(|(a, b)| Some((a.as_ref()?.at, b.as_ref()?.at)));
+        let mut distances: Vec<f64> = both
+            .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+            .collect();
+        distances.sort_by(f64::total_cmp);
+        let middle = distances.get(distances.len() / 2);
+        middle.is_some_and(|it| *it < TWIN * (bottom - top))
+    })
+}
