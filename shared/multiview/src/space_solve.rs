@@ -7,8 +7,8 @@ use crate::space_tree::{BoneLength, N, Places, SpacePose, SpaceSettings, SpaceVi
 
 /// Solves for all joints at once.
 ///
-/// * `places`: of every joint, for example of [`places`]; a joint without one is left out.
-/// * `lengths`: of the bones of [`TREE`].
+/// * `places`: of every joint, for example of [`places`](crate::places); a joint without one is left out.
+/// * `lengths`: of the bones of [`TREE`](crate::TREE).
 /// * Returns `None` if no joint has a place.
 pub fn solve_in_space(
     views: &[SpaceView<'_>],
