@@ -9,6 +9,8 @@ n_frames = int(seconds * rate)
 LIGHT = ["pose.network=none", "pose.search=tracked", "capture.scale=0.4", "capture.upright=true"]
 if carry == "poses":
     LIGHT.append("fuse.views=pairs")
+# By how much the hosts' monotonic clocks are ahead of the fusing one's, seconds.
+CLOCKS = {"left": 5000, "right": 900000}
 LIMBS = [("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist")]
 LIMBS = [(f"{s} {a}", f"{s} {b}") for s in ("left", "right") for a, b in LIMBS] + [("neck", "head")]
 
@@ -112,8 +114,8 @@ def three(file, out, fault=None):
     os.makedirs(out, exist_ok=True)
     log = f"{out}/log"
     desk = run(file, out, "--host", "desk", ns="desk", log=log)
-    start = lambda name, clock: run(file, out, "--host", name, ns=name, clock=clock, log=f"{out}/log-{name}")
-    processes = {"desk": desk, "left": start("left", 5000), "right": start("right", 900000)}
+    start = lambda name: run(file, out, "--host", name, ns=name, clock=CLOCKS[name], log=f"{out}/log-{name}")
+    processes = {"desk": desk, "left": start("left"), "right": start("right")}
     processes["start"] = start
     begin = time.time()
     try:
@@ -189,7 +191,7 @@ def kill_host(folder, processes):
     os.killpg(processes["left"].pid, signal.SIGKILL)
 
     def restore():
-        processes["left"] = processes["start"]("left", 5000)
+        processes["left"] = processes["start"]("left")
     return watch(folder, "left", restore, 3)
 
 
@@ -249,7 +251,7 @@ def endurance(folder, processes):
             os.killpg(processes[host].pid, signal.SIGKILL)
 
             def restore():
-                processes[host] = processes["start"](host, 5000 if host == "left" else 900000)
+                processes[host] = processes["start"](host)
         it = watch(folder, host, restore, length)
         faults.append({"host": host, "kind": kind, "length_s": round(length, 1), **it})
         with open(f"{folder}/faults.jsonl", "a") as file:

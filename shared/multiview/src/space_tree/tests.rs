@@ -91,19 +91,25 @@ impl JointEvidence for Bumps {
     }
 }
 
-fn solved(cameras: &[Camera], bumps: &[Bumps]) -> SpacePose {
+fn solved<E: JointEvidence>(cameras: &[Camera], evidence: &[E]) -> SpacePose {
+    solved_by(cameras, evidence, &SpaceSettings::default())
+}
+
+fn solved_by<E: JointEvidence>(
+    cameras: &[Camera],
+    evidence: &[E],
+    settings: &SpaceSettings,
+) -> SpacePose {
     let views: Vec<SpaceView<'_>> = cameras
         .iter()
-        .zip(bumps)
+        .zip(evidence)
         .map(|(camera, evidence)| SpaceView {
             camera,
             evidence,
             exchanged: [false; 2],
         })
         .collect();
-    solve_person(&views, &SpaceSettings::default())
-        .unwrap()
-        .pose
+    solve_person(&views, settings).unwrap().pose
 }
 
 /// The largest error, metres.
@@ -325,22 +331,13 @@ impl JointEvidence for EitherLeg {
 fn both_legs_do_not_lie_on_the_one_that_is_seen_better() {
     let cameras = RING.map(camera);
     let evidence = cameras.each_ref().map(EitherLeg::of);
-    let views: Vec<SpaceView<'_>> = cameras
-        .iter()
-        .zip(&evidence)
-        .map(|(camera, evidence)| SpaceView {
-            camera,
-            evidence,
-            exchanged: [false; 2],
-        })
-        .collect();
-    let solved = |settings: &SpaceSettings| solve_person(&views, settings).unwrap().pose;
-    let apart = solved(&SpaceSettings::default());
+    let apart = solved(&cameras, &evidence);
     assert!(worst(&apart) < 0.03, "{}", worst(&apart));
-    let together = solved(&SpaceSettings {
+    let without = SpaceSettings {
         apart: 0.0,
         ..SpaceSettings::default()
-    });
+    };
+    let together = solved_by(&cameras, &evidence, &without);
     assert!(worst(&together) > 0.15, "the term is what keeps them apart");
 }
 
