@@ -259,7 +259,7 @@ impl Line {
             return level;
         }
         let [mut w, mut wx, mut wy, mut wxx, mut wxy] = [0.0; 5];
-        for it in all {
+        for it in all.clone() {
             let weight = 1.0 / (it.trip as f64 + 1e3).powi(2);
             let x = time_between(it.at, best.at);
             let y = (i128::from(it.offset) - i128::from(best.offset)) as f64;
@@ -270,20 +270,33 @@ impl Line {
         if determinant <= 0.0 {
             return level;
         }
-        let drift = (w * wxy - wx * wy) / determinant;
-        // Between the two ends the offset is known to half of either's round trip.
-        let error = (first.trip + last.trip) as f64 / 2.0 / span as f64;
+        let drift = ((w * wxy - wx * wy) / determinant).clamp(-MOST_DRIFT, MOST_DRIFT);
         Self {
             origin: best.at,
             offset: best.offset as f64 + (wy - drift * wx) / w,
             drift,
-            drift_error: error.min(MOST_DRIFT),
+            drift_error: drift_error(drift, all),
         }
     }
 
     fn at(&self, time: u64) -> f64 {
         self.offset + self.drift * time_between(time, self.origin)
     }
+}
+
+/// How far a drift can be from the truth: any two exchanges bound it, since at each the offset is known to half of its round trip.
+fn drift_error(drift: f64, all: impl Iterator<Item = Sample> + Clone) -> f64 {
+    let pairs = all
+        .clone()
+        .enumerate()
+        .flat_map(|(nth, it)| all.clone().skip(nth + 1).map(move |other| (it, other)));
+    let errors = pairs.filter_map(|(it, other)| {
+        let span = time_between(other.at, it.at);
+        let change = (i128::from(other.offset) - i128::from(it.offset)) as f64;
+        let unknown = (it.trip as f64 + other.trip as f64) / 2.0 / span.abs();
+        (span.abs() >= LEAST_SPAN as f64).then(|| (change / span - drift).abs() + unknown)
+    });
+    errors.fold(MOST_DRIFT + drift.abs(), f64::min)
 }
 
 #[cfg(test)]

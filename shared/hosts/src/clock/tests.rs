@@ -181,7 +181,25 @@ fn times_translate_there_and_back() {
     assert_eq!(got.ours(0), 0, "before our clock began");
 }
 
+/// Three exchanges of six seconds whose line is far from the one through the first and the last.
+#[test]
+fn a_line_that_leaves_its_ends_has_a_bound_that_says_so() {
+    let random = Rng::with_seed(10_865_627_331_665_547_518);
+    let mut other = Other {
+        random,
+        ..other(0.01, 0.01, 5.354_207_936_067_242, 0.0)
+    };
+    let (got, truth) = after(6, &mut other);
+    let off = (got.offset_nanos - truth).unsigned_abs();
+    assert!(
+        off <= got.bound_nanos,
+        "off by {off} ns, bound {}",
+        got.bound_nanos
+    );
+}
+
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4096))]
     #[test]
     fn the_truth_is_within_the_bound(
         there in 0.01..20.0,
