@@ -10,7 +10,7 @@
 //! | what a problem has to say of itself | [`Problem`], [`Term`], [`Loss`] |
 //! | the cameras of a problem, with poses, focal lengths, centres and lenses that are free or held | [`Cameras`], [`Free`] |
 //! | the least cost, by Levenberg and Marquardt's method | [`solve`], [`Settings`], [`Report`] |
-//! | how well the shared parameters are known, and which are not | [`covariance`], [`Undetermined`] |
+//! | how well the shared parameters are known, and which are not | [`covariance`], [`clustered`], [`Undetermined`] |
 //! | derivatives beside numeric ones, for tests | [`derivative_error`] |
 //!
 //! A parameter that is held (the gauge: the first camera, say) is no parameter: it is left out. Scale is held by a term
@@ -27,7 +27,7 @@ mod term;
 mod tests;
 
 pub use cameras::{Cameras, Free, Observed};
-pub use covariance::{Covariance, Undetermined, covariance};
+pub use covariance::{Covariance, Undetermined, clustered, covariance};
 pub use derivatives::derivative_error;
 pub use solve::{Report, Settings, Stopped, solve};
 pub use term::{Loss, Term};

@@ -53,11 +53,70 @@ fn listed(directions: &[Vec<String>]) -> String {
 /// [`Undetermined`] names the parameters that the terms do not tell.
 pub fn covariance<P: Problem>(problem: &P) -> Result<Covariance, Undetermined> {
     let information = information(problem).ok_or(Undetermined::NotFinite)?;
+    let matrix = inverse(problem, &information)?;
+    Ok(Covariance { matrix })
+}
+
+/// The covariance of the shared parameters by how clusters of local blocks differ, whatever the errors within a cluster have in
+/// common: that of successive frames, of all joints of a picture. The standard deviations of terms count as weights only.
+///
+/// Each cluster is left out in turns (jackknife), by one step of Newton's from the minimum; Cameron, Gelbach & Miller, Review of
+/// Economics and Statistics 90, 2008, call it CR3. What is known beforehand errs as much as it says. The curvature of the losses,
+/// not their weights, tells how far a step leads. With m clusters a standard deviation is known to about 1 / √(2 (m - 1)) of it.
+/// Where residuals are about as large as the width of a loss, deviations come out too small, by a third.
+///
+/// * `cluster_of`: of every local block; they are counted from 0.
+/// * Returns none where there are fewer than two clusters, or where the others do not determine what one of them is left out from.
+///
+/// # Errors
+///
+/// [`Undetermined`] names the parameters that the terms do not tell.
+pub fn clustered<P: Problem>(
+    problem: &P,
+    cluster_of: &[usize],
+) -> Result<Option<Covariance>, Undetermined> {
+    let n_clusters = cluster_of.iter().max().map_or(0, |it| it + 1);
+    let mut clusters = Vec::new();
+    let mut weights = [0.0; 2];
+    for cluster in 0..n_clusters {
+        let equations = Equations::of(problem, |it| cluster_of.get(it) == Some(&cluster));
+        weights = [0, 1].map(|it| weights[it] + equations.weights[it]);
+        clusters.push(equations.reduced(0.0).ok_or(Undetermined::NotFinite)?);
+    }
+    let steepness = weights[1] / weights[0];
+    let known = Equations::known(problem);
+    let known = known.reduced(0.0).ok_or(Undetermined::NotFinite)?.matrix;
+    let of_clusters = clusters.iter().map(|it| &it.matrix * steepness);
+    let information = of_clusters.fold(known.clone(), |sum, it| sum + it);
+    let inverse = inverse(problem, &information)?;
+    let mut matrix = &inverse * known * &inverse;
+    let m = clusters.len() as f64;
+    if clusters.len() < 2 || steepness.is_nan() {
+        return Ok(None);
+    }
+    for it in &clusters {
+        let rest = &information - &it.matrix * steepness;
+        let Some(factor) = rest.cholesky() else {
+            return Ok(None);
+        };
+        let step = factor.solve(&it.gradient);
+        matrix += (m - 1.0) / m * &step * step.transpose();
+    }
+    let is_finite = matrix.iter().all(|it| it.is_finite());
+    Ok(is_finite.then_some(Covariance { matrix }))
+}
+
+/// The inverse of the information.
+fn inverse<P: Problem>(
+    problem: &P,
+    information: &DMatrix<f64>,
+) -> Result<DMatrix<f64>, Undetermined> {
+    if information.iter().any(|it| !it.is_finite()) {
+        return Err(Undetermined::NotFinite);
+    }
     let n = information.nrows();
     if n == 0 {
-        return Ok(Covariance {
-            matrix: information,
-        });
+        return Ok(information.clone());
     }
     let size = |nth: usize| information[(nth, nth)].max(f64::MIN_POSITIVE).sqrt();
     let sizes = DVector::from_iterator(n, (0..n).map(size));
@@ -74,8 +133,9 @@ pub fn covariance<P: Problem>(problem: &P) -> Result<Covariance, Undetermined> {
     let inverse = eigen.eigenvalues.map(|it| 1.0 / it);
     let vectors = &eigen.eigenvectors;
     let scaled = vectors * DMatrix::from_diagonal(&inverse) * vectors.transpose();
-    let matrix = DMatrix::from_fn(n, n, |i, j| scaled[(i, j)] / (sizes[i] * sizes[j]));
-    Ok(Covariance { matrix })
+    Ok(DMatrix::from_fn(n, n, |i, j| {
+        scaled[(i, j)] / (sizes[i] * sizes[j])
+    }))
 }
 
 /// What the terms tell of the shared parameters, all local blocks being unknown: the inverse of the covariance.

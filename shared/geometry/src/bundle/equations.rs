@@ -28,12 +28,14 @@ pub(super) struct Equations {
     pub(super) cost: f64,
     /// Number of residuals.
     pub(super) n_residuals: usize,
+    /// Sums over all residuals: of the weights, and of the curvatures of the losses.
+    pub(super) weights: [f64; 2],
 }
 
 /// The system that is left of the shared parameters, and what is needed to come back to the local blocks.
 pub(super) struct Reduced {
     pub(super) matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
+    pub(super) gradient: DVector<f64>,
     factors: Vec<Cholesky<f64, Dyn>>,
 }
 
@@ -50,6 +52,15 @@ pub(super) fn cost<P: Problem>(problem: &P) -> f64 {
 
 impl Equations {
     pub(super) fn new<P: Problem>(problem: &P) -> Self {
+        let mut all = Self::of(problem, |_| true);
+        problem.priors(&mut |term| {
+            all.add_shared(term);
+        });
+        all
+    }
+
+    /// Those of some of the local blocks, without what is known beforehand.
+    pub(super) fn of<P: Problem>(problem: &P, is_wanted: impl Fn(usize) -> bool) -> Self {
         let n = problem.n_shared();
         let mut all = Self {
             blocks: Vec::new(),
@@ -57,16 +68,24 @@ impl Equations {
             gradient: DVector::zeros(n),
             cost: 0.0,
             n_residuals: 0,
+            weights: [0.0; 2],
         };
         // Where each shared parameter is among those of the block; n: nowhere.
         let mut places = vec![n; n];
-        for (local, size) in problem.locals().into_iter().enumerate() {
+        let each = problem.locals().into_iter().enumerate();
+        for (local, size) in each.filter(|it| is_wanted(it.0)) {
             let block = all.block(problem, local, size, &mut places);
             for parameter in &block.shared {
                 places[*parameter] = n;
             }
             all.blocks.push(block);
         }
+        all
+    }
+
+    /// Those of what is known beforehand alone.
+    pub(super) fn known<P: Problem>(problem: &P) -> Self {
+        let mut all = Self::of(problem, |_| false);
         problem.priors(&mut |term| {
             all.add_shared(term);
         });
@@ -120,6 +139,9 @@ impl Equations {
         let (cost, weight) = term.cost();
         self.cost += cost;
         self.n_residuals += term.residuals.len();
+        let n = term.residuals.len() as f64;
+        self.weights[0] += n * weight;
+        self.weights[1] += n * term.curvature();
         for (row, a) in term.shared_columns() {
             self.gradient[row] += weight * dot(a, &term.residuals);
             for (column, b) in term.shared_columns() {

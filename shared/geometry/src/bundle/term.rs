@@ -25,6 +25,19 @@ impl Loss {
             }
         }
     }
+
+    /// The mean second derivative of half the cost along each of so many residuals: what tells how far a small push moves the
+    /// minimum. The weight overstates it where residuals are large.
+    pub fn curvature(self, s: f64, n_residuals: usize) -> f64 {
+        let weight = self.of(s).1;
+        let by_s = match self {
+            Self::Square => 0.0,
+            Self::Huber(k) if s <= k * k => 0.0,
+            Self::Huber(k) => -0.5 * k / (s * s.sqrt()),
+            Self::Cauchy(k) => -(weight / k).powi(2),
+        };
+        weight + 2.0 * by_s * s / n_residuals.max(1) as f64
+    }
 }
 
 /// A term: residuals in standard deviations, with their derivatives by a few parameters.
@@ -98,6 +111,11 @@ impl Term {
     pub fn cost(&self) -> (f64, f64) {
         let (cost, weight) = self.loss.of(self.square());
         (self.share * cost, self.share * weight)
+    }
+
+    /// The curvature of the loss, by what the term counts as.
+    pub(super) fn curvature(&self) -> f64 {
+        self.share * self.loss.curvature(self.square(), self.residuals.len())
     }
 
     pub(super) fn shared_columns(&self) -> impl Iterator<Item = (usize, &[f64])> {

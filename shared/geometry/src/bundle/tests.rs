@@ -1,7 +1,7 @@
 //! Rings of cameras and points that are known, and what the adjustment makes of them.
 
 use nalgebra::{
-    Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
+    Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3,
 };
 
 use super::*;
@@ -214,7 +214,7 @@ fn what_is_far_off_hardly_moves_a_robust_answer() {
     let truth = cloud.clone();
     for nth in 0..6 {
         if let Some(it) = &mut cloud.seen[10 * nth][nth % 4] {
-            *it += nalgebra::Vector2::new(60.0, -40.0);
+            *it += Vector2::new(60.0, -40.0);
         }
     }
     let worst = |it: &Cloud| {
@@ -241,7 +241,7 @@ fn the_covariance_is_how_answers_spread() {
     for _ in 0..n {
         let mut noisy = truth.clone();
         for it in noisy.seen.iter_mut().flatten().flatten() {
-            *it += 0.5 * nalgebra::Vector2::new(normal(), normal());
+            *it += 0.5 * Vector2::new(normal(), normal());
         }
         let (found, _) = solve(noisy, &Settings::default());
         let [a, b] = [&truth, &found].map(|it| it.cameras.cameras()[2].centre_in_world());
@@ -250,6 +250,41 @@ fn the_covariance_is_how_answers_spread() {
     // A variance of 60 is known to 18 %, three of which are allowed for.
     let ratio = spread / covariance.sd(place).powi(2);
     assert!((0.5..1.7).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn clusters_tell_how_answers_spread_where_errors_have_much_in_common() {
+    const N_CLUSTERS: usize = 10;
+    let mut truth = Cloud::new(3, 60, LensModel::Pinhole, Free::POSE);
+    truth.loss = Loss::Square;
+    let cluster_of: Vec<usize> = (0..60).map(|it| it * N_CLUSTERS / 60).collect();
+    let place = truth.cameras.pose_parameters(2).unwrap()[4];
+    let mut random = fastrand_like(11);
+    let mut normal = || (0..12).map(|_| random()).sum::<f64>() - 6.0;
+    let (mut spread, mut by_clusters, mut by_residuals) = (0.0, 0.0, 0.0);
+    let n = 60;
+    for _ in 0..n {
+        let mut noisy = truth.clone();
+        let common = [0; 3 * N_CLUSTERS].map(|_| 0.8 * Vector2::new(normal(), normal()));
+        for (nth, seen) in noisy.seen.iter_mut().enumerate() {
+            for (camera, it) in seen.iter_mut().enumerate() {
+                let own = 0.8 * Vector2::new(normal(), normal());
+                let common = common[3 * cluster_of[nth] + camera];
+                *it = it.map(|it| it + own + common);
+            }
+        }
+        let (found, _) = solve(noisy, &Settings::default());
+        let [a, b] = [&truth, &found].map(|it| it.cameras.cameras()[2].centre_in_world());
+        spread += (a.y - b.y).powi(2);
+        let known = clustered(&found, &cluster_of).unwrap().unwrap();
+        by_clusters += known.sd(place).powi(2);
+        by_residuals += covariance(&found).unwrap().sd(place).powi(2);
+    }
+    assert!(spread > 2.5 * by_residuals, "{spread} {by_residuals}");
+    // A variance of 60 is known to 18 %, three of which are allowed for.
+    let ratio = spread / by_clusters;
+    assert!((0.5..1.7).contains(&ratio), "{ratio}");
+    assert_eq!(clustered(&truth, &[0; 60]), Ok(None));
 }
 
 #[test]
@@ -289,6 +324,11 @@ fn losses_have_the_derivatives_that_they_say() {
         for s in [0.1, 1.0, 5.0, 100.0] {
             let numeric = (loss.of(s + 1e-5).0 - loss.of(s - 1e-5).0) / 2e-5;
             assert!((numeric - loss.of(s).1).abs() < 1e-6, "{loss:?} at {s}");
+            // Along one residual: the derivative of half the derivative of the cost.
+            let slope = |at: f64| at * loss.of(at * at).1;
+            let numeric = (slope(s.sqrt() + 1e-5) - slope(s.sqrt() - 1e-5)) / 2e-5;
+            let found = loss.curvature(s, 1);
+            assert!((numeric - found).abs() < 1e-5, "{loss:?} at {s}: {found}");
         }
     }
 }
