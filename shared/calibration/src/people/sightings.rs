@@ -2,6 +2,7 @@
 
 use geometry::{Camera, Lens};
 use nalgebra::{Point2, Vector2};
+use statistics::Sorted;
 use synchronisation::{Film, Track, tracks};
 
 /// Standard deviation of the kernel that smooths places over time: so many intervals between pictures, and seconds.
@@ -18,7 +19,7 @@ const LEAST_SHARE: f64 = 0.15;
 pub(crate) struct Sight {
     /// Ideal pixels.
     pub(crate) at: Point2<f64>,
-    /// Ideal pixels per second.
+    /// Ideal pixels per second; 0 where it is not known.
     pub(crate) speed: Vector2<f64>,
     /// 0 to 1.
     pub(crate) weight: f64,
@@ -28,6 +29,8 @@ pub(crate) struct Sight {
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     tracks: Vec<Track>,
+    /// Between two pictures, seconds.
+    interval_s: f64,
 }
 
 impl Chain {
@@ -54,12 +57,26 @@ impl Chain {
 
     fn sight(&self, joint: usize, time_s: f64) -> Option<Sight> {
         let is_at = |it: &&Track| (it.span()[0]..=it.span()[1]).contains(&time_s);
-        let place = self.tracks.iter().find(is_at)?.place(joint, time_s)?;
+        let track = self.tracks.iter().find(is_at)?;
+        let place = track.place(joint, time_s)?;
         Some(Sight {
             at: place.at.into(),
-            speed: place.speed.into(),
+            speed: self.speed(track, joint, time_s),
             weight: place.weight.clamp(0.05, 1.0),
         })
+    }
+
+    /// By the places one picture before and one after.
+    ///
+    /// The slope of the line that tells the place would not do: between two pictures its errors are those of the place, too, so that
+    /// an adjustment would move clocks to where the two cancel, half a picture away from the truth.
+    fn speed(&self, track: &Track, joint: usize, time_s: f64) -> Vector2<f64> {
+        let at = |time_s: f64| Some(Vector2::from(track.place(joint, time_s)?.at));
+        let ends = [-1.0, 1.0].map(|sign| at(time_s + sign * self.interval_s));
+        let [Some(before), Some(after)] = ends else {
+            return Vector2::zeros();
+        };
+        (after - before) / (2.0 * self.interval_s)
     }
 
     /// Whether the person of a track may be the one of this chain, and how long the gap is.
@@ -71,6 +88,7 @@ impl Chain {
 
 /// The people that a camera sees longest.
 pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: f64) -> Vec<Chain> {
+    let own_s = own_interval_s(film).unwrap_or(interval_s);
     let sigma_s = (SMOOTHING[0] * interval_s).max(SMOOTHING[1]);
     let mut found = tracks(film, camera, n_joints, sigma_s);
     found.sort_by(|a, b| a.span()[0].total_cmp(&b.span()[0]));
@@ -82,6 +100,7 @@ pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: 
             Some((nth, _)) => chains[nth].tracks.push(track),
             None => chains.push(Chain {
                 tracks: vec![track],
+                interval_s: own_s,
             }),
         }
     }
@@ -97,6 +116,13 @@ pub(crate) fn ideal(camera: &Camera) -> Camera {
     let mut camera = camera.clone();
     camera.intrinsics.lens = Lens::default();
     camera
+}
+
+/// Between two pictures of a film, seconds.
+pub(crate) fn own_interval_s(film: &Film) -> Option<f64> {
+    let each = film.shots.array_windows();
+    let steps: Vec<f64> = each.map(|[a, b]| b.time_s - a.time_s).collect();
+    Sorted::new(steps).upper_median().filter(|it| *it > 0.0)
 }
 
 /// The joints of one person at instants: by instant, camera and joint.
@@ -140,6 +166,60 @@ impl Sightings {
     pub(crate) fn exchange_all(&mut self, camera: usize, sides: &[usize]) {
         for instant in 0..self.seen.len() {
             self.exchange(instant, camera, sides);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+    use synchronisation::{Joint, Person, Shot};
+
+    use super::*;
+    use crate::people::testing::{N_JOINTS, ring};
+
+    /// Someone who stands, with noise, at 10 Hz.
+    fn standing() -> Film {
+        let mut random = Rng::with_seed(2);
+        let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+        let mut joint = |nth: usize| {
+            let at = [400.0 + 10.0 * nth as f64, 300.0 + 25.0 * nth as f64];
+            let at = at.map(|it| it + 3.0 * normal());
+            Some(Joint { at, score: 0.9 })
+        };
+        let mut shot = |nth: i32| Shot {
+            time_s: 0.1 * f64::from(nth),
+            people: vec![Person {
+                joints: (0..N_JOINTS).map(&mut joint).collect(),
+            }],
+        };
+        Film {
+            shots: (0..300).map(&mut shot).collect(),
+        }
+    }
+
+    #[test]
+    fn a_speed_errs_by_itself_wherever_between_two_pictures_it_is_asked_for() {
+        let camera = ideal(&ring(3)[0]);
+        let chains = chains(&standing(), &camera, N_JOINTS, 0.1);
+        let chain = &chains[0];
+        for phase in [0.0, 0.025, 0.05, 0.075] {
+            let (mut both, mut squares) = (0.0, [0.0; 2]);
+            for joint in 0..N_JOINTS {
+                let times = (5..295).map(|it| 0.1 * f64::from(it) + phase);
+                let each: Vec<Sight> = times.filter_map(|it| chain.sight(joint, it)).collect();
+                let n = each.len() as f64;
+                let middle = each.iter().map(|it| it.at.coords).sum::<Vector2<f64>>() / n;
+                for it in &each {
+                    let error = it.at.coords - middle;
+                    both += error.dot(&it.speed);
+                    squares[0] += error.norm_squared();
+                    squares[1] += it.speed.norm_squared();
+                }
+            }
+            let correlation = both / (squares[0] * squares[1]).sqrt();
+            // Of some 8000 numbers.
+            assert!(correlation.abs() < 0.04, "{correlation} at {phase} s");
         }
     }
 }
