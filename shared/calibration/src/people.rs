@@ -11,6 +11,7 @@
 pub(crate) mod adjust;
 pub(crate) mod begin;
 mod bias;
+pub(crate) mod certainty;
 mod doubt;
 pub(crate) mod estimate;
 mod frame;

@@ -17,9 +17,8 @@ use statistics::Sorted;
 use crate::align::Difference;
 use crate::people::adjust::{Beliefs, PosePrior};
 use crate::people::begin::{Choice, Study};
-use crate::people::estimate::{
-    LEAST_INSTANTS, LEAST_SEEN_S, MOST_HALVES, check_joints, half_of, instants, interval_s,
-};
+use crate::people::certainty::{MOST_HALVES, half_of};
+use crate::people::estimate::{LEAST_INSTANTS, LEAST_SEEN_S, check_joints, instants, interval_s};
 use crate::people::measure::fits;
 use crate::people::sightings::{Chain, chains, ideal};
 use crate::people::solve::{Solved, rounds};

@@ -14,6 +14,8 @@ const CELLS: usize = 8;
 const WIDTH: f64 = 160.0;
 /// What is said of a rig with doubts.
 const UNUSABLE: &str = "not to be used";
+/// What is said of a rig with cautions.
+const ROUGH: &str = "usable, but not known well";
 /// The most skeletons that are drawn.
 const MOST_MOMENTS: usize = 150;
 
@@ -22,8 +24,7 @@ const MOST_MOMENTS: usize = 150;
 /// * `names`: of the cameras. `about`: what was looked at, key and value.
 pub fn of_people(outcome: &people::Outcome, names: &[&str], about: &[(String, String)]) -> String {
     let mut out = begin("Parallax: a rig from people");
-    let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
-    verdict(&mut out, ("determined", UNUSABLE), &doubts);
+    judged(&mut out, outcome, names);
     about_table(&mut out, about);
     put!(
         out,
@@ -69,8 +70,8 @@ pub fn of_people(outcome: &people::Outcome, names: &[&str], about: &[(String, St
     }
     put!(
         out,
-        "</table></div>\n<p class=\"note\">The deviations are those of the residuals, relative to the camera of the first pair, whose own \
-         are 0. Halves: each half of the recording by itself, laid upon the other.</p>\n"
+        "</table></div>\n<p class=\"note\">The deviations are one standard deviation, by how blocks of the recording differ, and its halves; \
+         rigs laid upon one another. Halves: each half of the recording by itself, laid upon the other.</p>\n"
     );
     coverage(&mut out, outcome, names);
     in_space(
@@ -81,6 +82,17 @@ pub fn of_people(outcome: &people::Outcome, names: &[&str], about: &[(String, St
     );
     put!(out, "</html>\n");
     out.into_page()
+}
+
+/// The verdict, with doubts, or else with cautions.
+fn judged(out: &mut Html, outcome: &people::Outcome, names: &[&str]) {
+    let (bad, reasons) = if outcome.doubts.is_empty() {
+        (ROUGH, &outcome.cautions)
+    } else {
+        (UNUSABLE, &outcome.doubts)
+    };
+    let reasons: Vec<String> = reasons.iter().map(|it| it.text(names)).collect();
+    verdict(out, ("determined", bad), &reasons);
 }
 
 /// The page of `calibrate refine`.
@@ -256,6 +268,8 @@ mod tests {
                 seen_s: 0.0,
                 least_s: 0.5,
             }],
+            cautions: Vec::new(),
+            clocks_are_found: false,
             n_instants: 0,
             span_s: [0.0; 2],
             n_exchanged: 0,
@@ -269,6 +283,16 @@ mod tests {
         );
         assert!(
             page.contains("a&lt;b") && page.contains("not to be used"),
+            "{page}"
+        );
+        let rough = people::Outcome {
+            doubts: Vec::new(),
+            cautions: outcome.doubts.clone(),
+            ..outcome
+        };
+        let page = of_people(&rough, &["one"], &about);
+        assert!(
+            page.contains("usable, but not known well") && page.contains("one sees a person"),
             "{page}"
         );
     }

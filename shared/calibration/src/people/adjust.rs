@@ -198,6 +198,11 @@ impl Adjustment {
         self.offsets[camera].0
     }
 
+    /// Which of all instants each local block is.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = usize> {
+        self.instants.iter().map(|it| it.nth)
+    }
+
     /// Points of all instants.
     pub(crate) fn n_points(&self) -> usize {
         self.instants.iter().map(|it| it.points.len()).sum()

@@ -3,35 +3,26 @@
 use body::N_JOINTS;
 use fastrand::Rng;
 use geometry::Camera;
-use geometry::bundle::{Covariance, covariance};
-use nalgebra::{DVector, Point3, UnitVector3};
+use geometry::bundle::{Covariance, clustered};
+use nalgebra::{Point3, UnitVector3};
 use statistics::Sorted;
 use synchronisation::Film;
 
-use super::begin::{Choice, Study, choices};
+use super::begin::{Study, choices};
+use super::certainty::{blocks, certainty, halves, spread};
 use super::doubt::Doubt;
 use super::frame::{Scale, Vertical, World, bone_spread, stature_of, world};
 use super::measure::{CELLS, Fit, fits};
 use super::sightings::{Chain, chains, ideal};
-use super::solve::{Solved, Wanted, solved};
+use super::solve::{Clocks, Solved, Wanted, with_clocks};
 use super::{Recording, Settings};
-use crate::align::{aligned, differences};
 
 /// A camera sees people for at least so long, seconds.
 pub(crate) const LEAST_SEEN_S: f64 = 0.5;
 /// The fewest instants.
 pub(crate) const LEAST_INSTANTS: usize = 12;
-/// Standard deviation of a camera: degrees, and share of its distance to the people.
-const MOST_SD: [f64; 2] = [1.5, 0.04];
-/// Difference of halves, likewise: the whole is about half as far off.
-pub(crate) const MOST_HALVES: [f64; 2] = [3.0, 0.06];
 /// Change of bones.
 const MOST_BONES: f64 = 0.2;
-/// Rigs that are drawn to see how far the joints let each camera be from where it is.
-const DRAWN: usize = 100;
-/// Blocks of the recording, which the halves take in turns, are at least so long, seconds.
-pub(crate) const BLOCK_S: f64 = 1.0;
-
 /// Why nothing was looked at.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PeopleError {
@@ -99,6 +90,10 @@ pub struct Outcome {
     pub reports: Vec<CameraReport>,
     /// Every reason not to use it.
     pub doubts: Vec<Doubt>,
+    /// What is to be known by whoever uses it: cameras that are known less well than is good.
+    pub cautions: Vec<Doubt>,
+    /// Whether time offsets were found, the joints contradicting those that were given; else they are as given.
+    pub clocks_are_found: bool,
     /// Instants that were looked at.
     pub n_instants: usize,
     /// Their first and last, seconds on the common clock.
@@ -162,15 +157,24 @@ pub fn estimate(recording: &Recording<'_>, settings: &Settings) -> Result<Outcom
         sides: &settings.sides,
     };
     outcome.n_instants = study.times_s.len();
+    answer(&mut outcome, (cameras, &study), settings);
+    Ok(outcome)
+}
+
+/// Solves, and says what is to be said of the answer.
+fn answer(outcome: &mut Outcome, given: (&[Camera], &Study<'_>), settings: &Settings) {
+    let (study, focal) = (given.1, settings.focal);
     let mut random = Rng::with_seed(settings.seed);
-    let wanted = Wanted {
-        focal: settings.focal,
-    };
-    match solved(&study, wanted, &mut random) {
-        Ok(all) => judge(&mut outcome, (cameras, &study), &all, settings, &mut random),
+    let searches = settings.window_s > 0.0;
+    match with_clocks(study, (focal, searches), &mut random) {
+        Ok((all, clocks)) => {
+            outcome.clocks_are_found = clocks == Clocks::Found;
+            judge(outcome, given, &all, settings);
+            halves(outcome, study, &all, Wanted { focal, clocks }, &mut random);
+            certainty(outcome, study, &all);
+        }
         Err(doubt) => outcome.doubts.push(doubt),
     }
-    Ok(outcome)
 }
 
 fn check(cameras: &[Camera], films: &[Film], settings: &Settings) -> Result<(), PeopleError> {
@@ -222,6 +226,8 @@ fn nothing(cameras: &[Camera], settings: &Settings) -> Outcome {
         stature_m: None,
         reports: Vec::new(),
         doubts: Vec::new(),
+        cautions: Vec::new(),
+        clocks_are_found: false,
         n_instants: 0,
         span_s: [0.0; 2],
         n_exchanged: 0,
@@ -267,7 +273,6 @@ fn judge(
     (given, study): (&[Camera], &Study<'_>),
     all: &Solved,
     settings: &Settings,
-    random: &mut Rng,
 ) {
     let skeletons = all.skeletons(settings.n_joints);
     let times_s = &study.times_s[..];
@@ -298,19 +303,17 @@ fn judge(
         .collect();
     outcome.stature_m = stature_of(&outcome.skeletons).map(|it| it.0);
     let fits = fits(&all.problem, &all.sigmas_px);
-    let known = covariance(&all.problem);
-    let inflation = all.report.variance().sqrt().max(1.0);
-    let sds = known
-        .as_ref()
-        .ok()
-        .and_then(|it| spread(all, it, inflation, random));
+    let blocks = blocks(&all.problem, &study.times_s);
+    let known = clustered(&all.problem, &blocks);
+    let deviations = known.as_ref().ok().and_then(Option::as_ref);
+    let sds = deviations.map(|it| spread(all, it));
     outcome.reports = fits
         .into_iter()
         .enumerate()
         .map(|(camera, fit)| {
             let sd = sds.as_ref().map_or([f64::INFINITY; 2], |it| it[camera]);
             let sd = [sd[0], to_metres.scale * sd[1]];
-            report((camera, sd), fit, all, known.as_ref().ok(), inflation)
+            report((camera, sd), fit, all, deviations)
         })
         .collect();
     if !all.report.is_converged() {
@@ -325,35 +328,6 @@ fn judge(
         let limit = MOST_BONES;
         outcome.doubts.push(Doubt::Bones { spread, limit });
     }
-    certainty(outcome, study, all);
-    halves(outcome, study, all, settings, random);
-}
-
-/// How far every camera may be from where it is: degrees, and units of the solution. Rigs are drawn from the covariance, and laid
-/// upon the one that was found, so that no camera counts as exact. None where the covariance is none.
-fn spread(
-    all: &Solved,
-    known: &Covariance,
-    inflation: f64,
-    random: &mut Rng,
-) -> Option<Vec<[f64; 2]>> {
-    let cameras = all.problem.cameras();
-    let n = cameras.n_parameters();
-    let own = known.matrix.view((0, 0), (n, n)).into_owned();
-    let factor = (own * inflation.powi(2)).cholesky()?.unpack();
-    let mut sums = vec![[0.0; 2]; cameras.cameras().len()];
-    for _ in 0..DRAWN {
-        let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
-        let drawn = DVector::from_fn(n, |_, _| normal());
-        let moved = cameras.moved((&factor * drawn).as_slice());
-        let apart = differences(moved.cameras(), cameras.cameras(), true);
-        for (sum, it) in sums.iter_mut().zip(apart) {
-            sum[0] += it.turn.to_degrees().powi(2);
-            sum[1] += it.way.powi(2);
-        }
-    }
-    let mean = |it: &[f64; 2]| it.map(|it| (it / DRAWN as f64).sqrt());
-    Some(sums.iter().map(mean).collect())
 }
 
 fn report(
@@ -361,10 +335,9 @@ fn report(
     fit: Fit,
     all: &Solved,
     known: Option<&Covariance>,
-    inflation: f64,
 ) -> CameraReport {
     debug_assert_eq!(fit.cells.len(), CELLS * CELLS, "a square of cells");
-    let of = |parameter: usize| known.map_or(f64::INFINITY, |it| inflation * it.sd(parameter));
+    let of = |parameter: usize| known.map_or(f64::INFINITY, |it| it.sd(parameter));
     let offset_sd = all.problem.offset_parameter(camera).map_or(0.0, of);
     CameraReport {
         joints: fit.n,
@@ -375,101 +348,5 @@ fn report(
         focal_sd_px: all.problem.cameras().focal_parameter(camera).map(of),
         halves: None,
         offset_s: [all.choices[camera].offset_s, offset_sd],
-    }
-}
-
-/// The distance of a camera to the people, metres.
-fn distances(outcome: &Outcome) -> Vec<f64> {
-    let all: Vec<&Point3<f64>> = outcome.skeletons.iter().flatten().flatten().collect();
-    let axis =
-        |axis: usize| Sorted::new(all.iter().map(|it| it[axis]).collect::<Vec<_>>()).upper_median();
-    let middle = Point3::new(
-        axis(0).unwrap_or(0.0),
-        axis(1).unwrap_or(0.0),
-        axis(2).unwrap_or(0.0),
-    );
-    let each = outcome.cameras.iter();
-    each.map(|it| (it.centre_in_world() - middle).norm())
-        .collect()
-}
-
-fn certainty(outcome: &mut Outcome, study: &Study<'_>, all: &Solved) {
-    let distances = distances(outcome);
-    for (camera, report) in outcome.reports.iter().enumerate() {
-        let sd = [report.sd[0], report.sd[1] / distances[camera]];
-        // NaN is not less.
-        if !(sd[0] < MOST_SD[0] && sd[1] < MOST_SD[1]) {
-            let limits = MOST_SD;
-            outcome.doubts.push(Doubt::Uncertain { camera, sd, limits });
-        }
-        let size = study.chains[camera][all.choices[camera].chain].size();
-        let fit = Doubt::of_fit(camera, report.residual_px, size);
-        outcome.doubts.extend(fit);
-    }
-}
-
-/// Which half an instant belongs to: blocks in turns.
-pub(crate) fn half_of(time_s: f64, [from, to]: [f64; 2]) -> usize {
-    let n = ((to - from) / BLOCK_S).floor().clamp(2.0, 16.0);
-    let n = 2.0 * (n / 2.0).floor();
-    let block = ((time_s - from) / (to - from).max(f64::MIN_POSITIVE) * n).floor();
-    block.clamp(0.0, n - 1.0) as usize % 2
-}
-
-/// Both halves of the recording from the beginning, beside the whole.
-fn halves(
-    outcome: &mut Outcome,
-    study: &Study<'_>,
-    all: &Solved,
-    settings: &Settings,
-    random: &mut Rng,
-) {
-    let span = outcome.span_s;
-    let mut rigs = Vec::new();
-    for half in 0..2 {
-        let near = |it: &Choice| vec![*it];
-        let part = Study {
-            times_s: study
-                .times_s
-                .iter()
-                .copied()
-                .filter(|it| half_of(*it, span) == half)
-                .collect(),
-            choices: all.choices.iter().map(near).collect(),
-            ..study.clone()
-        };
-        let wanted = Wanted {
-            focal: settings.focal,
-        };
-        match solved(&part, wanted, random) {
-            Ok(it) => rigs.push(it.cameras().to_vec()),
-            Err(why) => {
-                let why = Box::new(why);
-                outcome.doubts.push(Doubt::NoHalf { why });
-                return;
-            }
-        }
-    }
-    let laid = rigs.iter().filter_map(|it| {
-        let similarity = aligned(it, &outcome.cameras, true)?;
-        Some(it.iter().map(|it| similarity.camera(it)).collect())
-    });
-    let laid: Vec<Vec<Camera>> = laid.collect();
-    let [one, other] = &laid[..] else { return };
-    let apart = differences(one, other, true);
-    let distances = distances(outcome);
-    let mut worst: Option<(f64, usize, [f64; 2])> = None;
-    for (camera, it) in apart.iter().enumerate() {
-        let by = [it.turn.to_degrees(), it.way / distances[camera]];
-        outcome.reports[camera].halves = Some([by[0], it.way]);
-        let excess = (by[0] / MOST_HALVES[0]).max(by[1] / MOST_HALVES[1]);
-        // NaN counts as worst.
-        if worst.is_none_or(|it| excess > it.0 || excess.is_nan()) {
-            worst = Some((excess, camera, by));
-        }
-    }
-    if let Some((_, camera, by)) = worst.filter(|it| it.0 > 1.0 || it.0.is_nan()) {
-        let limits = MOST_HALVES;
-        outcome.doubts.push(Doubt::Halves { camera, by, limits });
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use super::adjust::{Adjustment, Beliefs, skeletons};
 use super::begin::{Choice, Start, Study};
 use super::doubt::Doubt;
-use super::measure::{biases, sigmas};
+use super::measure::{Fit, biases, fits, sigmas};
 use super::sides::exchange;
 use super::sightings::Sightings;
 
@@ -42,15 +42,75 @@ impl Solved {
     }
 }
 
+/// Joints contradict the clocks that were given where they fit by this share better with others.
+const BETTER: f64 = 0.15;
+
+/// What is done about the clocks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Clocks {
+    /// They are as given.
+    Given,
+    /// They are found.
+    Found,
+}
+
 /// What is free.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Wanted {
     pub(crate) focal: bool,
+    pub(crate) clocks: Clocks,
+}
+
+/// A rig from nothing, with the clocks that were given unless the joints contradict them.
+///
+/// For someone who walks in a circle another clock of a camera is the same as another place of it, but for the swing of the limbs: what
+/// little tells them apart are errors of the joints as much as clocks. Clocks that do not matter to how well joints fit are left alone.
+///
+/// * `search`: whether clocks are searched far around.
+pub(crate) fn with_clocks(
+    study: &Study<'_>,
+    (focal, search): (bool, bool),
+    random: &mut Rng,
+) -> Result<(Solved, Clocks), Doubt> {
+    let start = study.start(random)?;
+    let of = |clocks: Clocks| from(study, start.clone(), Wanted { focal, clocks });
+    let found = of(Clocks::Found);
+    if search {
+        return found.map(|it| (it, Clocks::Found));
+    }
+    let given = of(Clocks::Given);
+    match (given, found) {
+        (Ok(given), Ok(found)) => {
+            let is_contradicted = misfit(study, &found) < (1.0 - BETTER) * misfit(study, &given);
+            Ok(if is_contradicted {
+                (found, Clocks::Found)
+            } else {
+                (given, Clocks::Given)
+            })
+        }
+        (Ok(it), Err(_)) => Ok((it, Clocks::Given)),
+        (Err(_), Ok(it)) => Ok((it, Clocks::Found)),
+        (Err(doubt), Err(_)) => Err(doubt),
+    }
+}
+
+/// The mean over cameras of the median residual, as a share of the size of the person.
+fn misfit(study: &Study<'_>, it: &Solved) -> f64 {
+    let fits = fits(&it.problem, &it.sigmas_px);
+    let n = fits.len() as f64;
+    let each = fits.iter().zip(&it.choices).enumerate();
+    let share = |(camera, (fit, choice)): (usize, (&Fit, &Choice))| {
+        fit.median_px / study.chains[camera][choice.chain].size()
+    };
+    each.map(share).sum::<f64>() / n
 }
 
 /// A rig from nothing.
 pub(crate) fn solved(study: &Study<'_>, wanted: Wanted, random: &mut Rng) -> Result<Solved, Doubt> {
-    let start = study.start(random)?;
+    from(study, study.start(random)?, wanted)
+}
+
+fn from(study: &Study<'_>, start: Start, wanted: Wanted) -> Result<Solved, Doubt> {
     let Start {
         cameras,
         choices,
@@ -65,7 +125,7 @@ pub(crate) fn solved(study: &Study<'_>, wanted: Wanted, random: &mut Rng) -> Res
         .collect();
     let beliefs = Beliefs {
         baseline: Some((pair[0], pair[1], 1.0)),
-        offset_sd_s: Some(OFFSET_SD_S),
+        offset_sd_s: (wanted.clocks == Clocks::Found).then_some(OFFSET_SD_S),
         focal_sd: FOCAL_SD,
         ..Beliefs::default()
     };
@@ -95,7 +155,7 @@ pub(crate) fn rounds(
         }
         let is_last = round + 1 == ROUNDS;
         let settings = Search {
-            max_iterations: if is_last { 80 } else { 15 },
+            max_iterations: if is_last { 200 } else { 15 },
             least_gain: if is_last { 1e-6 } else { 1e-5 },
         };
         let (problem, report) = solve(problem, &settings);

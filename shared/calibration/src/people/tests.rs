@@ -88,10 +88,92 @@ fn clocks_are_found_with_the_cameras() {
     };
     let outcome = found(&truth, &flaws, &settings());
     assert_eq!(outcome.doubts, []);
+    assert!(outcome.clocks_are_found);
     for (report, offset_s) in outcome.reports.iter().zip(&flaws.offsets_s) {
         let [found, _] = report.offset_s;
         assert!((found - offset_s).abs() < 0.004, "{found} {offset_s}");
     }
+}
+
+#[test]
+fn clocks_that_joints_do_not_contradict_are_as_given() {
+    let truth = ring(3);
+    let flaws = Flaws {
+        offsets_s: vec![0.0, 0.04, -0.07],
+        ..Flaws::usual(6)
+    };
+    let told = Settings {
+        offsets_s: flaws.offsets_s.clone(),
+        ..settings()
+    };
+    let outcome = found(&truth, &flaws, &told);
+    assert_eq!(outcome.doubts, []);
+    assert!(!outcome.clocks_are_found);
+    let offsets = outcome.reports.iter().map(|it| it.offset_s);
+    let given = flaws.offsets_s.iter().map(|it| [*it, 0.0]);
+    assert!(offsets.eq(given), "{:?}", outcome.reports);
+}
+
+/// All joints of a camera beside their places, alike for half a second, then elsewhere.
+fn drifting(films: &mut [Film], px: f64, seed: u64) {
+    let mut random = fastrand::Rng::with_seed(seed);
+    for film in films {
+        let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+        let by: Vec<[f64; 2]> = (0..24).map(|_| [0; 2].map(|_| px * normal())).collect();
+        for shot in &mut film.shots {
+            let by = by[(2.0 * shot.time_s) as usize];
+            let joints = shot.people.iter_mut().flat_map(|it| &mut it.joints);
+            for it in joints.flatten() {
+                it.at = [0, 1].map(|axis| it.at[axis] + by[axis]);
+            }
+        }
+    }
+}
+
+#[test]
+fn deviations_are_those_of_the_answers_where_errors_last() {
+    let truth = ring(4);
+    let (mut squares, mut n) = ([0.0; 2], 0.0);
+    for seed in 0..3 {
+        let mut films = Flaws::none(20 + seed).films(&truth);
+        drifting(&mut films, 4.0, seed);
+        let recording = Recording {
+            cameras: &truth,
+            films: &films,
+        };
+        let outcome = estimate(&recording, &settings()).unwrap();
+        assert_eq!(outcome.doubts, []);
+        let apart = differences(&outcome.cameras, &truth, true);
+        for (it, report) in apart.iter().zip(&outcome.reports) {
+            squares[0] += (it.turn.to_degrees() / report.sd[0]).powi(2);
+            squares[1] += (it.way / report.sd[1]).powi(2);
+            n += 1.0;
+        }
+    }
+    let ratios = squares.map(|it: f64| (it / n).sqrt());
+    assert!(
+        ratios.iter().all(|it| (0.5..1.6).contains(it)),
+        "{ratios:?}"
+    );
+}
+
+#[test]
+fn a_rig_that_is_not_known_well_says_so() {
+    let truth = ring(3);
+    let mut films = Flaws::none(4).films(&truth);
+    drifting(&mut films, 4.0, 4);
+    let recording = Recording {
+        cameras: &truth,
+        films: &films,
+    };
+    let outcome = estimate(&recording, &settings()).unwrap();
+    assert_eq!(outcome.doubts, []);
+    assert!(!outcome.cautions.is_empty(), "{:?}", outcome.reports);
+    let text = outcome.cautions[0].text(&["a", "b", "c"]);
+    assert!(text.contains("degrees and"), "{text}");
+    // And one that is known well has nothing to say.
+    let outcome = found(&truth, &Flaws::none(4), &settings());
+    assert_eq!(outcome.cautions, []);
 }
 
 #[test]

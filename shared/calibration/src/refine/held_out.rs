@@ -7,7 +7,7 @@ use statistics::Sorted;
 
 use super::Outcome;
 use crate::people::begin::{Choice, Study};
-use crate::people::estimate::BLOCK_S;
+use crate::people::certainty::BLOCK_S;
 use crate::people::sides::{exchange, of_pair, point};
 
 /// A rig is better only where the distance becomes less by this share.

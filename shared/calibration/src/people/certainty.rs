@@ -1,0 +1,176 @@
+//! How well a rig is known: how far blocks of the recording, and its halves, would have it elsewhere.
+
+use fastrand::Rng;
+use geometry::Camera;
+use geometry::bundle::Covariance;
+use nalgebra::{Point3, SymmetricEigen};
+use statistics::Sorted;
+
+use super::adjust::Adjustment;
+use super::begin::{Choice, Study};
+use super::doubt::Doubt;
+use super::estimate::Outcome;
+use super::solve::{Solved, Wanted, solved};
+use crate::align::{Difference, aligned, differences};
+
+/// The most that a camera may be off, one standard deviation: degrees, and share of its distance to the people.
+const MOST_SD: [f64; 2] = [1.5, 0.04];
+/// A camera that is known so well is known well: what calibrations are to reach.
+const GOOD_SD: [f64; 2] = [0.3, 0.01];
+/// Difference of halves: that of a rig which is off by the most, as each half is off by the square root of two times as much as the
+/// whole, and both differ by the square root of two times that.
+pub(crate) const MOST_HALVES: [f64; 2] = [2.0 * MOST_SD[0], 2.0 * MOST_SD[1]];
+/// Blocks of the recording, which the halves take in turns, are at least so long, seconds.
+pub(crate) const BLOCK_S: f64 = 1.0;
+/// Blocks that tell the standard deviations, at least and at most: with 8 a deviation is known to 27 %, with 16 to 18 %, and the longer
+/// a block the more of what errors have in common is within it.
+const BLOCKS: [f64; 2] = [8.0, 16.0];
+
+/// Blocks of time to which the local blocks of an adjustment belong.
+pub(super) fn blocks(problem: &Adjustment, times_s: &[f64]) -> Vec<usize> {
+    let [from, to] = [times_s[0], times_s[times_s.len() - 1]];
+    let n = ((to - from) / BLOCK_S).floor().clamp(BLOCKS[0], BLOCKS[1]);
+    let of = |nth: usize| {
+        let share = (times_s[nth] - from) / (to - from).max(f64::MIN_POSITIVE);
+        (share * n).floor().clamp(0.0, n - 1.0) as usize
+    };
+    problem.numbers().map(of).collect()
+}
+
+/// How far every camera may be from where it is: degrees, and units of the solution. Rigs that are one standard deviation away along
+/// each axis of the covariance are laid upon the one that was found, so that no camera counts as exact.
+pub(super) fn spread(all: &Solved, known: &Covariance) -> Vec<[f64; 2]> {
+    let cameras = all.problem.cameras();
+    let n = cameras.n_parameters();
+    let own = known.matrix.view((0, 0), (n, n)).into_owned();
+    let eigen = SymmetricEigen::new(own);
+    let mut sums = vec![[0.0; 2]; cameras.cameras().len()];
+    for (variance, axis) in eigen
+        .eigenvalues
+        .iter()
+        .zip(eigen.eigenvectors.column_iter())
+    {
+        let step = axis * variance.max(0.0).sqrt();
+        let moved = cameras.moved(step.as_slice());
+        let apart = differences(moved.cameras(), cameras.cameras(), true);
+        for (sum, it) in sums.iter_mut().zip(apart) {
+            sum[0] += it.turn.to_degrees().powi(2);
+            sum[1] += it.way.powi(2);
+        }
+    }
+    sums.iter().map(|it| it.map(f64::sqrt)).collect()
+}
+
+/// The distance of a camera to the people, metres.
+fn distances(outcome: &Outcome) -> Vec<f64> {
+    let all: Vec<&Point3<f64>> = outcome.skeletons.iter().flatten().flatten().collect();
+    let axis =
+        |axis: usize| Sorted::new(all.iter().map(|it| it[axis]).collect::<Vec<_>>()).upper_median();
+    let middle = Point3::new(
+        axis(0).unwrap_or(0.0),
+        axis(1).unwrap_or(0.0),
+        axis(2).unwrap_or(0.0),
+    );
+    let each = outcome.cameras.iter();
+    each.map(|it| (it.centre_in_world() - middle).norm())
+        .collect()
+}
+
+/// What is to be said of the deviations, and of how joints fit.
+pub(super) fn certainty(outcome: &mut Outcome, study: &Study<'_>, all: &Solved) {
+    let distances = distances(outcome);
+    for (camera, report) in outcome.reports.iter().enumerate() {
+        let sd = [report.sd[0], report.sd[1] / distances[camera]];
+        // NaN is not less.
+        let is_within = |limits: [f64; 2]| sd[0] < limits[0] && sd[1] < limits[1];
+        let uncertain = |limits: [f64; 2]| Doubt::Uncertain { camera, sd, limits };
+        if !is_within(MOST_SD) {
+            outcome.doubts.push(uncertain(MOST_SD));
+        } else if !is_within(GOOD_SD) {
+            outcome.cautions.push(uncertain(GOOD_SD));
+        }
+        let size = study.chains[camera][all.choices[camera].chain].size();
+        let fit = Doubt::of_fit(camera, report.residual_px, size);
+        outcome.doubts.extend(fit);
+    }
+}
+
+/// Lets the deviations be as large as halves that differ more than these tell: each camera's by the share of all cameras together.
+fn widen(outcome: &mut Outcome, apart: &[Difference]) {
+    let of = |it: &Difference| [0.5 * it.turn.to_degrees(), 0.5 * it.way];
+    for axis in 0..2 {
+        let told: f64 = outcome.reports.iter().map(|it| it.sd[axis].powi(2)).sum();
+        let seen: f64 = apart.iter().map(|it| of(it)[axis].powi(2)).sum();
+        let share = (seen / told).sqrt();
+        for report in outcome.reports.iter_mut().filter(|_| share > 1.0) {
+            report.sd[axis] *= share;
+        }
+    }
+}
+
+/// Which half an instant belongs to: blocks in turns.
+pub(crate) fn half_of(time_s: f64, [from, to]: [f64; 2]) -> usize {
+    let n = ((to - from) / BLOCK_S).floor().clamp(2.0, 16.0);
+    let n = 2.0 * (n / 2.0).floor();
+    let block = ((time_s - from) / (to - from).max(f64::MIN_POSITIVE) * n).floor();
+    block.clamp(0.0, n - 1.0) as usize % 2
+}
+
+/// Both halves of the recording from the beginning, beside the whole.
+pub(super) fn halves(
+    outcome: &mut Outcome,
+    study: &Study<'_>,
+    all: &Solved,
+    wanted: Wanted,
+    random: &mut Rng,
+) {
+    if outcome.reports.is_empty() {
+        return;
+    }
+    let span = outcome.span_s;
+    let mut rigs = Vec::new();
+    for half in 0..2 {
+        let near = |it: &Choice| vec![*it];
+        let part = Study {
+            times_s: study
+                .times_s
+                .iter()
+                .copied()
+                .filter(|it| half_of(*it, span) == half)
+                .collect(),
+            choices: all.choices.iter().map(near).collect(),
+            ..study.clone()
+        };
+        match solved(&part, wanted, random) {
+            Ok(it) => rigs.push(it.cameras().to_vec()),
+            Err(why) => {
+                let why = Box::new(why);
+                outcome.doubts.push(Doubt::NoHalf { why });
+                return;
+            }
+        }
+    }
+    let laid = rigs.iter().filter_map(|it| {
+        let similarity = aligned(it, &outcome.cameras, true)?;
+        Some(it.iter().map(|it| similarity.camera(it)).collect())
+    });
+    let laid: Vec<Vec<Camera>> = laid.collect();
+    let [one, other] = &laid[..] else { return };
+    let apart = differences(one, other, true);
+    let distances = distances(outcome);
+    widen(outcome, &apart);
+    let mut worst: Option<(f64, usize, [f64; 2])> = None;
+    for (camera, it) in apart.iter().enumerate() {
+        let by = [it.turn.to_degrees(), it.way / distances[camera]];
+        outcome.reports[camera].halves = Some([by[0], it.way]);
+        let excess = (by[0] / MOST_HALVES[0]).max(by[1] / MOST_HALVES[1]);
+        // NaN counts as worst.
+        if worst.is_none_or(|it| excess > it.0 || excess.is_nan()) {
+            worst = Some((excess, camera, by));
+        }
+    }
+    if let Some((_, camera, by)) = worst.filter(|it| it.0 > 1.0 || it.0.is_nan()) {
+        let limits = MOST_HALVES;
+        outcome.doubts.push(Doubt::Halves { camera, by, limits });
+    }
+}
