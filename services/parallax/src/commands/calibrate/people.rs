@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use calibration::people::{Outcome, Recording, Scale, Settings, Vertical, estimate};
+use calibration::people::{Doubt, Outcome, Recording, Scale, Settings, Vertical, estimate};
 use clap::Args;
 use launch::output;
 use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
@@ -15,6 +15,10 @@ use crate::globals::Globals;
 const HINT: &str = "let one person walk through the whole volume, in view of at least two cameras at every moment, for half a minute, \
 with arms and turns; check that the intrinsics are those of the pictures (`parallax calib show`); if the cameras were not started \
 together, search their clocks with --window 2; if there is no telling, calibrate with a board";
+
+/// What to try where it is not known well.
+const CAUTION_HINT: &str = "longer footage, with more of the volume walked through in all directions, makes it better; how much joints in \
+space are off on account of it, a run with this rig tells by its residuals";
 
 /// Options of `parallax calibrate people`.
 #[derive(Debug, Args)]
@@ -29,7 +33,11 @@ which keeps its world as well). Otherwise the world has its floor at z = 0, unde
 gravity: by the feet that stand, or else by upright bodies.
 
 An answer is refused, with exit code 7 and every reason, where two halves of the recording give different rigs, a camera has too \
-little in common with the others, its pose is known too badly, or what was found is no person. Nothing is written then.
+little in common with the others, its pose is known too badly, or what was found is no person. Nothing is written then. Where a \
+camera is known to more than 0.3 degrees or 1 percent of its distance to the people (one standard deviation), the rig is written, \
+and says so; every such camera is printed, and the exit code is 6.
+
+The clocks of the deployment are believed unless joints fit clearly better with others, or --window is given.
 
 With --json one object:
     {\"is_determined\", \"doubts\": [text], \"instants\", \"span_s\", \"vertical\", \"scale_error\", \"stature_metres\", \"exchanged\",
@@ -116,14 +124,45 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     refuse(&outcome.doubts, &names, HINT)?;
     if let Some(file) = &arguments.walk.out {
         let source = format!(
-            "calibrated from a person walking about, {} instants{}",
+            "calibrated from a person walking about, {} instants{}{}",
             outcome.n_instants,
-            source_of_scale(arguments)
+            source_of_scale(arguments),
+            how_sure(&outcome)
         );
         write_rig(file, outcome.cameras.clone(), outcome.up, &source)?;
         output::message(format_args!("wrote {}", file.display()));
     }
+    warn(&outcome.cautions, &names)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// A failure where the answer is known less well than is good: it is written all the same.
+fn warn(cautions: &[Doubt], names: &[&str]) -> Result<(), Failure> {
+    if cautions.is_empty() {
+        return Ok(());
+    }
+    let texts: Vec<String> = cautions.iter().map(|it| it.text(names)).collect();
+    let message = format!(
+        "the rig is usable, but not known well:\n  {}",
+        texts.join("\n  ")
+    );
+    Err(Failure::new(ExitKind::Limit, message).with_hint(CAUTION_HINT))
+}
+
+/// How well the worst camera is known.
+fn how_sure(outcome: &Outcome) -> String {
+    let worst = |axis: usize| {
+        outcome
+            .reports
+            .iter()
+            .map(|it| it.sd[axis])
+            .fold(0.0, f64::max)
+    };
+    format!(
+        ", cameras known to {:.2} degrees and {:.0} mm",
+        worst(0),
+        1e3 * worst(1)
+    )
 }
 
 fn source_of_scale(arguments: &Arguments) -> String {
@@ -185,13 +224,18 @@ fn vertical(outcome: &Outcome) -> &'static str {
 fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
     let [from, to] = outcome.span_s;
     output::line(format_args!(
-        "{} instants over {:.1} s; vertical by {}; scale to {:.1} %; a person of {:.3} m by the bones; sides of {} views exchanged",
+        "{} instants over {:.1} s; vertical by {}; scale to {:.1} %; a person of {:.3} m by the bones; sides of {} views exchanged; clocks {}",
         outcome.n_instants,
         to - from,
         vertical(outcome),
         100.0 * outcome.scale_sd,
         outcome.stature_m.unwrap_or(f64::NAN),
-        outcome.n_exchanged
+        outcome.n_exchanged,
+        if outcome.clocks_are_found {
+            "found"
+        } else {
+            "as given"
+        }
     ))?;
     output::line(format_args!(
         "{:<12} {:>24} {:>8} {:>9} {:>9} {:>8} {:>8} {:>19} {:>16}",
@@ -261,10 +305,14 @@ fn as_json(outcome: &Outcome, names: &[&str], finders: &[String]) -> Value {
         })
         .collect();
     let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
+    let cautions = outcome.cautions.iter().map(|it| it.text(names));
+    let cautions: Vec<String> = cautions.collect();
     json!({
         "schema_version": 1,
         "is_determined": doubts.is_empty(),
         "doubts": doubts,
+        "cautions": cautions,
+        "clocks_are_found": outcome.clocks_are_found,
         "instants": outcome.n_instants,
         "span_s": outcome.span_s,
         "vertical": vertical(outcome),
