@@ -17,6 +17,7 @@ pub(crate) mod estimate;
 mod frame;
 mod instant;
 pub(crate) mod measure;
+mod outcome;
 mod resect;
 pub(crate) mod sides;
 pub(crate) mod sightings;
@@ -29,8 +30,9 @@ pub(crate) mod testing;
 mod tests;
 
 pub use doubt::Doubt;
-pub use estimate::{CameraReport, Outcome, PeopleError, estimate};
+pub use estimate::{PeopleError, estimate};
 pub use frame::{Scale, Vertical};
+pub use outcome::{CameraReport, Outcome};
 
 use synchronisation::Film;
 

@@ -9,7 +9,7 @@ use statistics::Sorted;
 use super::adjust::Adjustment;
 use super::begin::{Choice, Study};
 use super::doubt::Doubt;
-use super::estimate::Outcome;
+use super::outcome::Outcome;
 use super::solve::{Solved, Wanted, solved};
 use crate::align::{Difference, aligned, differences};
 

@@ -4,7 +4,7 @@ use body::N_JOINTS;
 use fastrand::Rng;
 use geometry::Camera;
 use geometry::bundle::{Covariance, clustered};
-use nalgebra::{Point3, UnitVector3};
+use nalgebra::Point3;
 use statistics::Sorted;
 use synchronisation::Film;
 
@@ -13,6 +13,7 @@ use super::certainty::{blocks, certainty, halves, spread};
 use super::doubt::Doubt;
 use super::frame::{Scale, Vertical, World, bone_spread, stature_of, world};
 use super::measure::{CELLS, Fit, fits};
+use super::outcome::{CameraReport, Outcome};
 use super::sightings::{Chain, chains, ideal};
 use super::solve::{Clocks, Solved, Wanted, with_clocks};
 use super::{Recording, Settings};
@@ -23,6 +24,7 @@ pub(crate) const LEAST_SEEN_S: f64 = 0.5;
 pub(crate) const LEAST_INSTANTS: usize = 12;
 /// Change of bones.
 const MOST_BONES: f64 = 0.2;
+
 /// Why nothing was looked at.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PeopleError {
@@ -50,58 +52,6 @@ pub enum PeopleError {
         /// The number.
         metres: f64,
     },
-}
-
-/// What came out for a camera.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CameraReport {
-    /// Joints that took part.
-    pub joints: usize,
-    /// Median residual, pixels.
-    pub residual_px: f64,
-    /// Share of joints within three times their expected error.
-    pub inliers: f64,
-    /// Joints in each of 8 x 8 cells of the picture, row by row.
-    pub cells: Vec<usize>,
-    /// How far it may be from where it is, by the residuals, the rigs being laid upon one another: degrees, metres.
-    pub sd: [f64; 2],
-    /// Standard deviation of the focal length, pixels, where it was estimated.
-    pub focal_sd_px: Option<f64>,
-    /// What halves of the recording differ by: degrees, metres.
-    pub halves: Option<[f64; 2]>,
-    /// What is added to its times, seconds, and the standard deviation.
-    pub offset_s: [f64; 2],
-}
-
-/// What came out.
-#[derive(Debug, Clone)]
-pub struct Outcome {
-    /// The cameras with their new poses; as given where there is no answer at all.
-    pub cameras: Vec<Camera>,
-    /// Against gravity.
-    pub up: Option<UnitVector3<f64>>,
-    /// Where that comes from.
-    pub vertical: Vertical,
-    /// Standard deviation of the scale as a share, as far as the bones tell it.
-    pub scale_sd: f64,
-    /// The standing height of the person by the lengths of the bones, metres.
-    pub stature_m: Option<f64>,
-    /// One for each camera; none where there is no answer.
-    pub reports: Vec<CameraReport>,
-    /// Every reason not to use it.
-    pub doubts: Vec<Doubt>,
-    /// What is to be known by whoever uses it: cameras that are known less well than is good.
-    pub cautions: Vec<Doubt>,
-    /// Whether time offsets were found, the joints contradicting those that were given; else they are as given.
-    pub clocks_are_found: bool,
-    /// Instants that were looked at.
-    pub n_instants: usize,
-    /// Their first and last, seconds on the common clock.
-    pub span_s: [f64; 2],
-    /// Views whose left and right were exchanged.
-    pub n_exchanged: usize,
-    /// The skeletons that were found on the way, metres: by instant and joint.
-    pub skeletons: Vec<Vec<Option<Point3<f64>>>>,
 }
 
 /// Estimates where the cameras stand.
