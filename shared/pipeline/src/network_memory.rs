@@ -45,6 +45,11 @@ impl NetworkMemory {
         &self.seen[..self.n_seen]
     }
 
+    /// What the network tells of the people of this frame, those first who are seen best.
+    pub fn maps(&self) -> impl Iterator<Item = &JointMaps> {
+        self.people().iter().map(|it| &it.maps)
+    }
+
     /// Memory for looking, and for one more person of this frame.
     pub(crate) fn next(&mut self) -> (&mut LookMemory, &mut Seen) {
         if self.seen.len() == self.n_seen {

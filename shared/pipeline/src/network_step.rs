@@ -36,6 +36,8 @@ pub enum Boxes {
     Detector(Box<Detector>),
     /// The search of the filters over the whole picture.
     Filters(Box<ViewStep>),
+    /// Whoever looks, see [`NetworkStep::look_by`]; they count as those of the filters.
+    Caller,
 }
 
 /// Settings of the step.
@@ -128,6 +130,26 @@ impl NetworkStep {
         image: Rgb8View<'_>,
         memory: &mut NetworkMemory,
     ) -> Result<Option<Scope>, LookError> {
+        let Eyes::Network(_, boxes) = &self.eyes else {
+            memory.n_seen = 0;
+            return Ok(None);
+        };
+        self.look_by(image, &mut |values| find(boxes, image, values), memory)
+    }
+
+    /// As [`Self::look`], with boxes that somebody else finds.
+    ///
+    /// * `find`: boxes around the people of the frame, the best first; asked when they are looked for. Its argument is memory.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Self::look`], and those of `find`.
+    pub fn look_by<E: From<LookError>>(
+        &self,
+        image: Rgb8View<'_>,
+        find: &mut dyn FnMut(&mut Vec<f32>) -> Result<Vec<[f64; 4]>, E>,
+        memory: &mut NetworkMemory,
+    ) -> Result<Option<Scope>, E> {
         let Eyes::Network(network, boxes) = &self.eyes else {
             memory.n_seen = 0;
             return Ok(None);
@@ -140,7 +162,7 @@ impl NetworkStep {
         let tracks = core::mem::take(&mut memory.tracks);
         let with = (&**network, image);
         let found = if is_due {
-            find(boxes, image, &mut memory.values)?
+            find(&mut memory.values)?
         } else {
             Vec::new()
         };
@@ -162,7 +184,7 @@ impl NetworkStep {
             self.see_all(with, &found, memory)?;
             if memory.n_seen == 0 && !is_due {
                 memory.has_searched = true;
-                let found = find(boxes, image, &mut memory.values)?;
+                let found = find(&mut memory.values)?;
                 self.see_all(with, &found, memory)?;
             }
         }
@@ -454,6 +476,7 @@ fn find(
             let outline = |it: &Pose| outline_of_parts(step.bounding_box(it));
             Ok(found.candidates.iter().map(outline).collect())
         }
+        Boxes::Caller => Ok(Vec::new()),
     }
 }
 
