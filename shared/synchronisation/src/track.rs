@@ -65,6 +65,13 @@ impl Track {
         self.size
     }
 
+    /// The mean score of its joints; 0 without any.
+    pub fn score(&self) -> f64 {
+        let scores = self.joints.iter().flatten().map(|it| it.score);
+        let n = self.joints.iter().map(Vec::len).sum::<usize>();
+        scores.sum::<f64>() / n.max(1) as f64
+    }
+
     /// Where a joint is at a time: a line through its samples nearby, weighted by a Gaussian in time.
     pub fn place(&self, joint: usize, time_s: f64) -> Option<Place> {
         let samples = &self.joints[joint];

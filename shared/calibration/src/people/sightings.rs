@@ -40,6 +40,13 @@ impl Chain {
         each.map(|[from, to]| to - from).sum()
     }
 
+    /// How much it may be of use: how long it is seen, as large and as surely as it is. What a network takes for a person, a chair say, is
+    /// seen for as long as anybody, but neither large nor surely.
+    fn worth(&self) -> f64 {
+        let of = |it: &Track| (it.span()[1] - it.span()[0]) * it.size() * it.score();
+        self.tracks.iter().map(of).sum()
+    }
+
     /// First and last time, by the clock of the camera.
     pub(crate) fn span(&self) -> [f64; 2] {
         let each = self.tracks.iter().map(Track::span);
@@ -86,7 +93,7 @@ impl Chain {
     }
 }
 
-/// The people that a camera sees longest.
+/// The people that a camera sees longest, those first who are seen best.
 pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: f64) -> Vec<Chain> {
     let own_s = own_interval_s(film).unwrap_or(interval_s);
     let sigma_s = (SMOOTHING[0] * interval_s).max(SMOOTHING[1]);
@@ -104,8 +111,9 @@ pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: 
             }),
         }
     }
-    chains.sort_by(|a, b| b.seen_s().total_cmp(&a.seen_s()));
-    let least = LEAST_SHARE * chains.first().map_or(0.0, Chain::seen_s);
+    chains.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
+    let longest = chains.iter().map(Chain::seen_s).fold(0.0, f64::max);
+    let least = LEAST_SHARE * longest;
     chains.retain(|it| it.seen_s() >= least);
     chains.truncate(MOST_CHAINS);
     chains

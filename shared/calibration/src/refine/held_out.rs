@@ -19,45 +19,59 @@ const LEAST: usize = 20;
 
 /// Of each camera the chain that fits what the others see, by the rig that is given.
 pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
-    let first = |camera: usize| Choice {
-        chain: 0,
+    let choice = |(camera, chain): (usize, usize)| Choice {
+        chain,
         offset_s: offsets_s.get(camera).copied().unwrap_or(0.0),
         is_exchanged: false,
     };
     let n = study.cameras.len();
-    let mut choices: Vec<Choice> = (0..n).map(first).collect();
-    // The person of the camera with fewest others in view is the one that is followed.
-    let anchor = (0..n).min_by_key(|it| study.chains[*it].len()).unwrap_or(0);
-    for camera in (0..n).filter(|it| *it != anchor) {
-        let cost = |chain: usize| {
-            let mut all = vec![None; n];
-            all[anchor] = Some(choices[anchor]);
-            all[camera] = Some(Choice {
-                chain,
-                ..first(camera)
+    let n_chains = |camera: usize| study.chains[camera].len();
+    // Everybody in view of the camera with fewest people may be the one whom all cameras see.
+    let anchor = (0..n).min_by_key(|it| n_chains(*it)).unwrap_or(0);
+    let followed = (0..n_chains(anchor)).map(|chain| {
+        let with = |camera: usize| {
+            let each = (0..n_chains(camera)).map(|it| {
+                let pair = [(anchor, chain), (camera, it)];
+                (distance(study, pair, pair.map(choice)), it)
             });
-            let seen = study.sightings(&all);
-            let mut each = Vec::new();
-            for instant in &seen.seen {
-                let both = instant[camera].iter().zip(&instant[anchor]);
-                for (own, other) in both {
-                    if let Some(it) = *own {
-                        let pair = [anchor, camera];
-                        let away = of_pair(&study.cameras, pair, *other, [it; 2]);
-                        each.extend(away.map(|it| it[0]));
-                    }
-                }
-            }
-            if each.len() < LEAST {
-                return f64::INFINITY;
-            }
-            Sorted::new(each).upper_median().unwrap_or(f64::INFINITY)
+            each.min_by(|a, b| a.0.total_cmp(&b.0))
+                .unwrap_or((f64::INFINITY, 0))
         };
-        let n_chains = study.chains[camera].len();
-        let best = (0..n_chains).min_by(|a, b| cost(*a).total_cmp(&cost(*b)));
-        choices[camera].chain = best.unwrap_or(0);
+        let all: Vec<(f64, usize)> = (0..n)
+            .map(|it| if it == anchor { (0.0, chain) } else { with(it) })
+            .collect();
+        let sum: f64 = all.iter().map(|it| it.0).sum();
+        (sum, all)
+    });
+    let best = followed.min_by(|a, b| a.0.total_cmp(&b.0));
+    let chains = best.map_or_else(|| vec![(0.0, 0); n], |it| it.1);
+    let chains = chains.iter().enumerate();
+    chains.map(|(camera, it)| choice((camera, it.1))).collect()
+}
+
+/// How far joints of somebody in one camera are from where another one sees somebody, median, as a share of the size there; infinite
+/// where too few are seen by both.
+///
+/// * `pair`: each a camera and a chain.
+fn distance(study: &Study<'_>, pair: [(usize, usize); 2], choices: [Choice; 2]) -> f64 {
+    let [(anchor, _), (camera, chain)] = pair;
+    let mut all = vec![None; study.cameras.len()];
+    (all[anchor], all[camera]) = (Some(choices[0]), Some(choices[1]));
+    let seen = study.sightings(&all);
+    let mut each = Vec::new();
+    for instant in &seen.seen {
+        for (own, other) in instant[camera].iter().zip(&instant[anchor]) {
+            if let Some(it) = *own {
+                let away = of_pair(&study.cameras, [anchor, camera], *other, [it; 2]);
+                each.extend(away.map(|it| it[0]));
+            }
+        }
     }
-    choices
+    if each.len() < LEAST {
+        return f64::INFINITY;
+    }
+    let median = Sorted::new(each).upper_median();
+    median.map_or(f64::INFINITY, |it| it / study.chains[camera][chain].size())
 }
 
 /// Distances of joints from where the other cameras see them, by block of time, before and after.
