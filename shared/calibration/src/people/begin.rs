@@ -21,7 +21,7 @@ const LEAST_INLIERS: f64 = 0.4;
 /// An angle between rays at which a pair is as good as any, radians.
 const WIDE: f64 = 0.5;
 /// A camera is placed where the mean cost of a joint, log(1 + (residual / sigma)^2), is less than this.
-const MOST_COST: f64 = 2.5;
+const MOST_COST: f64 = 3.2;
 /// Distance of the offsets that are searched, seconds.
 const STEP_S: f64 = 0.1;
 
