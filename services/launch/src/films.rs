@@ -2,13 +2,14 @@
 //! filters find in the footage.
 
 mod eyes;
+mod upright;
 
 use core::ops::Range;
 
 use capture::Feed;
 use deployment::Deployment;
-use footage::SourceSpec;
-use geometry::Camera;
+use footage::{FrameView, SourceSpec};
+use geometry::{Camera, Rig, upright_roll};
 use keypointfiles::KeypointSource;
 use keypoints::{Keypoint, joint_rows, mirrored};
 use offline::Console;
@@ -19,6 +20,7 @@ use synchronisation::{Film, Joint, Person, Shot};
 use crate::inputs;
 use crate::keypoints as keypoint_files;
 use eyes::Eyes;
+use upright::Upright;
 
 /// Which pictures are looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +31,15 @@ pub struct Part {
     pub from_s: f64,
     /// For how long, seconds; to the end without it.
     pub seconds: Option<f64>,
+}
+
+/// What is known of where the cameras stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Poses {
+    /// What the rig says: people are looked for in pictures that are turned upright, as in a run.
+    OfRig,
+    /// Nothing.
+    Unknown,
 }
 
 /// What all cameras see.
@@ -62,46 +73,49 @@ enum Finder {
 pub fn films(
     deployment: &Deployment,
     part: Part,
-    stop: &Stop,
-    console: &dyn Console,
+    poses: Poses,
+    (stop, console): (&Stop, &dyn Console),
 ) -> Result<Films, Failure> {
-    let cameras = cameras(deployment)?;
+    let rig = inputs::rig_of(deployment)?;
+    let cameras = cameras(deployment, &rig)?;
     let finders = (0..cameras.len()).map(|it| finder(deployment, it));
     let finders: Vec<Finder> = finders.collect::<Result<_, Failure>>()?;
     let names: Vec<Vec<String>> = finders.iter().map(Finder::names).collect();
     let extra = extra(&names);
+    let is_as_seen = finders.iter().any(Finder::as_seen);
+    let texts = finders.iter().map(Finder::text).collect();
     let mut films = Vec::new();
-    for (nth, finder) in finders.iter().enumerate() {
+    for (nth, finder) in finders.into_iter().enumerate() {
         let entry = &deployment.cameras[nth];
         let reader = Reader {
             rows: rows(&names[nth], &extra),
             offset: entry.source_offset_px.unwrap_or([0, 0]).map(f64::from),
             name: &entry.name,
+            roll: roll(deployment, &rig, (&cameras[nth], poses)),
             stop,
             console,
         };
         films.push(match finder {
             Finder::Keypoints(source) => {
                 let rate_hz = keypoint_rate(deployment, nth)?;
-                reader.of_keypoints(source, rate_hz, part)?
+                reader.of_keypoints(&source, rate_hz, part)?
             }
-            Finder::Eyes(eyes) => reader.of_footage(deployment, nth, eyes, part)?,
+            Finder::Eyes(eyes) => reader.of_footage(deployment, nth, *eyes, part)?,
         });
     }
     console.finish();
     Ok(Films {
         cameras,
         n_joints: PARSE14.joints.len() + extra.len(),
-        mirror: finders.iter().any(Finder::as_seen).then(|| mirror(&extra)),
+        mirror: is_as_seen.then(|| mirror(&extra)),
         sides: mirror(&extra),
-        finders: finders.iter().map(Finder::text).collect(),
+        finders: texts,
         films,
     })
 }
 
 /// The cameras of the rig.
-fn cameras(deployment: &Deployment) -> Result<Vec<Camera>, Failure> {
-    let rig = inputs::rig_of(deployment)?;
+fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failure> {
     let of_entry = |it: &deployment::capture::Camera| {
         if inputs::is_live(&it.source) {
             let message = format!(
@@ -123,6 +137,14 @@ fn cameras(deployment: &Deployment) -> Result<Vec<Camera>, Failure> {
         })
     };
     deployment.cameras.iter().map(of_entry).collect()
+}
+
+/// What turns the pictures of a camera upright, radians; 0 where that is not known, or not wanted.
+fn roll(deployment: &Deployment, rig: &Rig, (camera, poses): (&Camera, Poses)) -> f64 {
+    if poses == Poses::Unknown || !deployment.capture.upright {
+        return 0.0;
+    }
+    upright_roll(camera, rig).unwrap_or(0.0)
 }
 
 fn finder(deployment: &Deployment, camera: usize) -> Result<Finder, Failure> {
@@ -223,6 +245,8 @@ struct Reader<'a> {
     /// From pixels of the footage to those of the calibrated picture.
     offset: [f64; 2],
     name: &'a str,
+    /// By which pictures are turned, radians, clockwise as seen.
+    roll: f64,
     stop: &'a Stop,
     console: &'a dyn Console,
 }
@@ -258,7 +282,7 @@ impl Reader<'_> {
         &self,
         deployment: &Deployment,
         camera: usize,
-        eyes: &Eyes,
+        eyes: Eyes,
         part: Part,
     ) -> Result<Film, Failure> {
         let info = Feed::look(&whole(deployment, camera, 0, 1)).or_fail(ExitKind::Input)?;
@@ -270,7 +294,9 @@ impl Reader<'_> {
         }
         let spec = whole(deployment, camera, frames.start, part.every);
         let mut feed = Feed::open(&spec).or_fail(ExitKind::Input)?;
-        let mut memory = eyes::Memory::default();
+        let mut upright = Upright::new(info.size, self.roll)?;
+        let size = upright.as_ref().map_or(info.size, Upright::size);
+        let mut watch = eyes.watch(deployment, size, rate_hz / part.every as f64)?;
         let mut shots = Vec::new();
         loop {
             self.go_on()?;
@@ -280,7 +306,16 @@ impl Reader<'_> {
             if frame.index >= frames.end {
                 break;
             }
-            let people = eyes.people(self.name, &frame, info.size, &mut memory)?;
+            let mut people = match &mut upright {
+                None => watch.people(self.name, &frame, size)?,
+                Some(upright) => {
+                    let rgb = upright.turned(frame.rgb);
+                    watch.people(self.name, &FrameView { rgb, ..frame }, size)?
+                }
+            };
+            if let Some(upright) = &upright {
+                people.iter_mut().for_each(|it| upright.back(it));
+            }
             self.console.advance(1);
             shots.push(Shot {
                 time_s: frame.index as f64 / rate_hz,

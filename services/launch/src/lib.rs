@@ -19,6 +19,7 @@
 #![forbid(unsafe_code)]
 
 mod claim;
+mod find_every;
 mod padding;
 mod planned;
 mod prepare;

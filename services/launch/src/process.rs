@@ -20,6 +20,7 @@ use rayon::ThreadPoolBuilder;
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use viewquality::Forecaster;
 
+use crate::find_every::find_every;
 use crate::hosts;
 use crate::inputs;
 use crate::keypoints;
@@ -217,7 +218,8 @@ fn view_step(
         )));
     }
     let config = &deployment.pose;
-    let find_every = boxes::find_every(resolved);
+    let step = deployment.capture.frame_step.max(1) as f64;
+    let find_every = find_every(config, resolved.frame_rate_hz().map(|it| it / step));
     let settings = NetworkSettings {
         n_people: config.people,
         find_every,

@@ -1,15 +1,19 @@
 //! Who finds the joints in the pictures of a camera: a network, or the filters.
 
+use std::sync::Arc;
+
 use deployment::Deployment;
-use fmp::{CandidateSettings, Search};
+use fmp::{CandidateSettings, Layout, Model, Search, Solver};
 use footage::{FrameView, Size, Turn};
+use kernels::Rgb8View;
 use keypoints::{Keypoint, Sides};
 use offline::pictures::{BOXES_PX, Picture, Searched};
-use offline::{detector, network};
-use posenetwork::{Detector, PoseNetwork, Workspace};
-use runtime::{ExitKind, Failure, OrFail as _};
+use pipeline::{Boxes, NetworkMemory, NetworkSettings, NetworkStep};
+use posenetwork::{Detector, JointMaps, LookError, PoseNetwork};
+use runtime::{ExitKind, Failure, OrFail as _, in_file};
 use skeleton::PARSE14;
 
+use crate::find_every::find_every;
 use crate::inputs;
 
 /// Detections of the filters: the lowest score, and how much of a better one's boxes a worse one may cover.
@@ -18,19 +22,19 @@ const OVERLAP: f64 = 0.1;
 
 /// Who finds the joints.
 pub(super) struct Eyes {
-    /// A network; the filters without it.
-    network: Option<PoseNetwork>,
-    /// Who finds the boxes of the network; the filters without it.
-    detector: Option<Detector>,
+    network: Option<Network>,
+    /// The filters, where there is no network, or nothing else that finds its boxes.
     search: Option<Search>,
     n_people: usize,
 }
 
-/// Memory that is used again.
-#[derive(Default)]
-pub(super) struct Memory {
-    workspace: Workspace,
-    values: Vec<f32>,
+/// A network, and what it needs to follow people.
+struct Network {
+    network: PoseNetwork,
+    /// Who finds the boxes; the filters without it.
+    detector: Option<Detector>,
+    /// The tree that its joints hang in.
+    springs: Arc<Model>,
 }
 
 /// The keypoints of one person, pixels of the picture.
@@ -38,12 +42,15 @@ pub(super) type Found = Vec<Option<Keypoint>>;
 
 impl Eyes {
     pub(super) fn open(deployment: &Deployment, camera: usize) -> Result<Self, Failure> {
-        let network = inputs::pose_network(deployment, camera)?;
-        let detector = match &network {
-            Some(_) => inputs::detector(&deployment.pose)?,
+        let network = match inputs::pose_network(deployment, camera)? {
+            Some(network) => Some(Network {
+                network,
+                detector: inputs::detector(&deployment.pose)?,
+                springs: inputs::springs(&deployment.pose.springs)?,
+            }),
             None => None,
         };
-        let search = if detector.is_some() {
+        let search = if network.as_ref().is_some_and(|it| it.detector.is_some()) {
             None
         } else {
             let model = inputs::model_or_shipped(deployment.model.as_deref())?;
@@ -59,7 +66,6 @@ impl Eyes {
         };
         Ok(Self {
             network,
-            detector,
             search,
             n_people: deployment.pose.people.max(4),
         })
@@ -68,7 +74,7 @@ impl Eyes {
     /// The names of what is found.
     pub(super) fn names(&self) -> Vec<String> {
         if let Some(network) = &self.network {
-            return network.names().to_vec();
+            return network.network.names().to_vec();
         }
         let named = |name: &str| if name == "head" { "head top" } else { name }.to_owned();
         PARSE14.joints.iter().map(|it| named(it.name)).collect()
@@ -77,68 +83,171 @@ impl Eyes {
     /// Whether sides follow the picture.
     pub(super) fn as_seen(&self) -> bool {
         let network = self.network.as_ref();
-        network.is_none_or(|it| it.card().keypoints.sides == Sides::Seen)
+        network.is_none_or(|it| it.network.card().keypoints.sides == Sides::Seen)
     }
 
     pub(super) fn text(&self) -> String {
-        let boxes = match &self.detector {
-            Some(detector) => format!(", boxes by {}", detector.card().name),
-            None if self.network.is_some() => ", boxes by the filters".to_owned(),
-            None => String::new(),
+        let Some(it) = &self.network else {
+            return "filters".to_owned();
         };
-        match &self.network {
-            Some(network) => format!("network {}{boxes}", network.card().name),
-            None => "filters".to_owned(),
-        }
+        let boxes = it.detector.as_ref().map(|it| it.card().name.as_str());
+        let name = &it.network.card().name;
+        format!(
+            "network {name}, boxes by {}",
+            boxes.unwrap_or("the filters")
+        )
     }
 
-    /// The people of a picture.
+    /// Begins to watch the pictures of a film, of one size.
+    ///
+    /// * `rate_hz`: of those that are looked at.
+    pub(super) fn watch(
+        self,
+        deployment: &Deployment,
+        size: Size,
+        rate_hz: f64,
+    ) -> Result<Watch, Failure> {
+        let n_keypoints = self.names().len();
+        let Self {
+            network,
+            search,
+            n_people,
+        } = self;
+        let search = search.map(|search| Filters { search, n_people });
+        let Some(network) = network else {
+            let search = search
+                .ok_or("neither network nor filters")
+                .or_fail(ExitKind::Config)?;
+            return Ok(Watch::Filters(search));
+        };
+        let layout = Layout::new(&network.springs, size.width, size.height);
+        let boxes = match network.detector {
+            Some(it) => Boxes::Detector(Box::new(it)),
+            None => Boxes::Caller,
+        };
+        let settings = NetworkSettings {
+            n_people,
+            find_every: find_every(&deployment.pose, Some(rate_hz)),
+            least_heat: deployment.pose.least_heat,
+            ..NetworkSettings::default()
+        };
+        let eyes = pipeline::Eyes::Network(Box::new(network.network), boxes);
+        let solver = Solver::new(network.springs);
+        let layout = Arc::new(layout.or_fail(ExitKind::Input)?);
+        Ok(Watch::Network(Box::new(Follower {
+            step: NetworkStep::new(eyes, solver, layout, settings),
+            search,
+            n_keypoints,
+            memory: NetworkMemory::default(),
+            responses: Vec::new(),
+        })))
+    }
+}
+
+/// Finds the people of one picture after another.
+pub(super) enum Watch {
+    Filters(Filters),
+    Network(Box<Follower>),
+}
+
+impl Watch {
+    /// The people of the next picture.
     pub(super) fn people(
-        &self,
+        &mut self,
         camera: &str,
         frame: &FrameView<'_>,
         size: Size,
-        memory: &mut Memory,
     ) -> Result<Vec<Found>, Failure> {
-        let picture = Picture {
+        let picture = || Picture {
             path: camera.into(),
             frame: Some(frame.index),
             turn: Turn::default(),
             size,
             rgb: frame.rgb.to_vec(),
         };
-        let Some(network) = &self.network else {
-            return Ok(self
-                .by_filters(&picture)?
-                .into_iter()
-                .map(|it| it.1)
-                .collect());
-        };
-        let outlines = match &self.detector {
-            Some(boxes) => {
-                let mut found = detector::people(boxes, &picture, &mut memory.values)?;
-                found.truncate(self.n_people);
-                found.into_iter().map(|it| it.outline).collect()
+        match self {
+            Self::Filters(search) => {
+                let found = search.people(&picture())?;
+                Ok(found.into_iter().map(|it| it.1).collect())
             }
-            None => self
-                .by_filters(&picture)?
-                .into_iter()
-                .map(|it| it.0)
-                .collect::<Vec<_>>(),
-        };
-        let look = |outline: [f64; 4]| {
-            let sight = network::look(network, &picture, outline, &mut memory.workspace)?;
-            let found = sight.keypoints().or_fail(ExitKind::Input)?;
-            Ok(found.into_iter().map(Some).collect())
-        };
-        outlines.into_iter().map(look).collect()
+            Self::Network(it) => it.people(camera, frame, (size, &picture)),
+        }
     }
+}
 
-    /// The boxes around people, widened, and their joints, by the filters.
-    fn by_filters(&self, picture: &Picture) -> Result<Vec<([f64; 4], Found)>, Failure> {
-        let Some(search) = &self.search else {
+/// The network, which follows people as it does in a run.
+pub(super) struct Follower {
+    step: NetworkStep,
+    /// Who finds the boxes, where no detector does.
+    search: Option<Filters>,
+    n_keypoints: usize,
+    memory: NetworkMemory,
+    responses: Vec<f32>,
+}
+
+/// Why a picture was not looked at.
+enum Trouble {
+    Look(LookError),
+    Boxes(Failure),
+}
+
+impl From<LookError> for Trouble {
+    fn from(error: LookError) -> Self {
+        Self::Look(error)
+    }
+}
+
+impl Follower {
+    fn people(
+        &mut self,
+        camera: &str,
+        frame: &FrameView<'_>,
+        (size, picture): (Size, &dyn Fn() -> Picture),
+    ) -> Result<Vec<Found>, Failure> {
+        let image = Rgb8View::new(size.width, size.height, frame.rgb).or_fail(ExitKind::Input)?;
+        let looked = match &self.search {
+            None => self
+                .step
+                .look(image, &mut self.memory)
+                .map_err(Trouble::from),
+            Some(search) => {
+                let mut find = |_: &mut Vec<f32>| {
+                    let found = search.people(&picture()).map_err(Trouble::Boxes)?;
+                    Ok(found.into_iter().map(|it| it.0).collect())
+                };
+                self.step.look_by(image, &mut find, &mut self.memory)
+            }
+        };
+        let scope = looked.map_err(|trouble| match trouble {
+            Trouble::Look(error) => in_file(camera.as_ref(), &error),
+            Trouble::Boxes(failure) => failure,
+        })?;
+        let Some(scope) = scope else {
             return Ok(Vec::new());
         };
+        let n_values = self.step.layout().n_values(&scope);
+        self.responses
+            .resize(n_values.max(self.responses.len()), 0.0);
+        // Tells the boxes of the next picture.
+        self.step.fill(scope, &mut self.responses, &mut self.memory);
+        let found = |maps: &JointMaps| {
+            let each = (0..self.n_keypoints).map(|it| maps.keypoint(it).map(|it| it.0));
+            each.collect()
+        };
+        Ok(self.memory.maps().map(found).collect())
+    }
+}
+
+/// The filters, which look at every picture by itself.
+pub(super) struct Filters {
+    search: Search,
+    n_people: usize,
+}
+
+impl Filters {
+    /// The boxes around people, widened, and their joints.
+    fn people(&self, picture: &Picture) -> Result<Vec<([f64; 4], Found)>, Failure> {
+        let search = &self.search;
         let searched = Searched::new(picture, Some(BOXES_PX), search)?;
         let layout = searched.layout();
         let settings = CandidateSettings {

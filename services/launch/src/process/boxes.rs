@@ -9,32 +9,6 @@ use crate::inputs;
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;
 
-/// Frames that are farther apart are not of a person whom a box could follow, seconds.
-const FOLLOWED_S: f64 = 0.5;
-
-/// In every n-th frame of a view boxes are looked for; n where the deployment does not say.
-pub(super) fn find_every(resolved: &Resolved) -> u64 {
-    let pose = &resolved.deployment.pose;
-    let step = resolved.deployment.capture.frame_step.max(1) as f64;
-    let rate = resolved.frame_rate_hz().map(|it| it / step);
-    let by_rate = || find_every_at(rate, pose.detector.is_some());
-    pose.find_every.unwrap_or_else(by_rate)
-}
-
-/// In every n-th frame boxes are looked for.
-///
-/// * `rate_hz`: of the frames; not known of pictures in a folder, which may be of any time: nobody is followed in these.
-fn find_every_at(rate_hz: Option<f64>, has_detector: bool) -> u64 {
-    /// Never more often: the network follows who it sees.
-    const OFTEN: f64 = 10.0;
-    let Some(rate_hz) = rate_hz.filter(|it| it * FOLLOWED_S >= 1.0) else {
-        return 1;
-    };
-    // People come and go by time: a detector looks twice a second, the filters, which take longer, once.
-    let seconds = if has_detector { 0.5 } else { 1.0 };
-    (seconds * rate_hz).round().clamp(OFTEN, 1e6) as u64
-}
-
 /// The search of the filters over the whole frame, which finds boxes for a network.
 pub(super) fn filters(
     resolved: &Resolved,
@@ -52,24 +26,4 @@ pub(super) fn filters(
         ..ViewSettings::default()
     };
     ViewStep::new(model, layout, settings).or_fail(ExitKind::Config)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn boxes_are_looked_for_by_time() {
-        assert_eq!(find_every_at(Some(60.0), false), 60);
-        assert_eq!(find_every_at(Some(60.0), true), 30);
-        assert_eq!(find_every_at(Some(15.0), true), 10);
-        assert_eq!(find_every_at(Some(2.5), false), 10);
-    }
-
-    #[test]
-    fn nobody_is_followed_from_one_picture_to_another_that_may_be_of_any_time() {
-        assert_eq!(find_every_at(Some(1.9), false), 1);
-        assert_eq!(find_every_at(Some(1.0), true), 1);
-        assert_eq!(find_every_at(None, false), 1);
-    }
 }

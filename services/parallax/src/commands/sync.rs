@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 use deployment::{ClockKeys, Deployment, with_clocks};
-use launch::films::{Films, Part, films};
+use launch::films::{Films, Part, Poses, films};
 use launch::{load, output};
 use offline::Console as _;
 use offline::unless_stopped;
@@ -111,7 +111,7 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
         from_s: arguments.from,
         seconds: arguments.seconds,
     };
-    let found = films(&deployment, part, &stop, &terminal)?;
+    let found = films(&deployment, part, Poses::OfRig, (&stop, &terminal))?;
     terminal.begin("", "comparing");
     let (outcome, finders) = compared(found, reference, arguments.window, &stop)?;
     terminal.finish();

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use calibration::people::{Doubt, Outcome, Recording, Scale, Settings, Vertical, estimate};
 use clap::Args;
+use launch::films::Poses;
 use launch::output;
 use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use serde_json::{Value, json};
@@ -100,7 +101,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return Err(Failure::new(ExitKind::Usage, message));
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let walk = walk(&arguments.walk, globals, &stop)?;
+    let walk = walk(&arguments.walk, Poses::Unknown, globals, &stop)?;
     let settings = settings(arguments, &walk)?;
     let (cameras, films) = (walk.found.cameras.clone(), walk.found.films.clone());
     let estimated = move || {

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use calibration::people::Recording;
 use calibration::refine::{Outcome, Settings, refine};
 use clap::Args;
+use launch::films::Poses;
 use launch::{inputs, output};
 use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use serde_json::{Value, json};
@@ -66,7 +67,7 @@ fn clock(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let walk = walk(&arguments.walk, globals, &stop)?;
+    let walk = walk(&arguments.walk, Poses::OfRig, globals, &stop)?;
     let settings = Settings {
         n_joints: walk.found.n_joints,
         sides: walk.found.sides.clone(),

@@ -7,7 +7,7 @@ use clap::Args;
 use deployment::Deployment;
 use geometry::files::Format;
 use geometry::{Camera, Rig};
-use launch::films::{Films, Part, films};
+use launch::films::{Films, Part, Poses, films};
 use launch::load;
 use nalgebra::UnitVector3;
 use offline::unless_stopped;
@@ -78,6 +78,7 @@ impl Walk {
 /// Reads or finds the people.
 pub(super) fn walk(
     arguments: &WalkArguments,
+    poses: Poses,
     globals: Globals,
     stop: &Stop,
 ) -> Result<Walk, Failure> {
@@ -92,7 +93,7 @@ pub(super) fn walk(
         from_s: arguments.from,
         seconds: arguments.seconds,
     };
-    let mut found = films(&deployment, part, stop, &terminal)?;
+    let mut found = films(&deployment, part, poses, (stop, &terminal))?;
     for (camera, film) in deployment.cameras.iter().zip(&mut found.films) {
         let pace = 1.0 + 1e-6 * camera.drift_ppm.unwrap_or(0.0);
         for shot in &mut film.shots {
