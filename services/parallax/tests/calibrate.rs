@@ -1,0 +1,74 @@
+//! Rigs from people, from rendered pictures to the file that is written.
+#![cfg(feature = "long-tests")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+/// What takes long; see `.ci/run`.
+mod long {
+    use std::path::Path;
+
+    use calibration::differences;
+    use geometry::files::{Format, ReadOptions};
+    use geometry::{Camera, Rig};
+    use nalgebra::UnitQuaternion;
+
+    use crate::common::{Case, Started};
+
+    /// By how much the second camera of the wrong rig is turned, degrees.
+    const TURNED: f64 = 2.0;
+
+    fn rig(path: &Path) -> Rig {
+        geometry::files::read(path, &ReadOptions::default()).unwrap()
+    }
+
+    /// Writes the rig with the second camera turned where it stands.
+    fn write_turned(case: &Case) {
+        let truth = rig(&case.path("room/rig.toml"));
+        let mut cameras: Vec<Camera> = truth.cameras().to_vec();
+        let centre = cameras[1].centre_in_world();
+        let by = UnitQuaternion::from_euler_angles(0.0, TURNED.to_radians(), 0.0);
+        let pose = &mut cameras[1].camera_from_world;
+        pose.rotation = by * pose.rotation;
+        pose.translation = (-(pose.rotation * centre.coords)).into();
+        let turned = Rig::new(cameras, truth.up_in_world(), "turned").unwrap();
+        let path = case.path("room/turned.toml");
+        geometry::files::write(&path, Format::Own, &turned).unwrap();
+    }
+
+    fn refine(case: &Case, deployment: &str, out: &str) -> Started {
+        let file = format!("room/{deployment}.toml");
+        case.start(&["calibrate", "refine", &file, "--out", out])
+    }
+
+    #[test]
+    fn a_camera_that_was_turned_is_put_right_and_a_rig_that_is_right_is_kept() {
+        let case = Case::new("calibrate", &[1, 1], "");
+        let who = ["--rig", "ring:3", "--subjects", "5", "--seed", "5"];
+        let long = ["--frames", "60", "--rate", "10", "--no-masks"];
+        let words = [&["synth", "room"], &who[..], &long].concat();
+        let ended = case.start(&words).wait();
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        write_turned(&case);
+        let text = std::fs::read_to_string(case.path("room/deployment.toml")).unwrap();
+        let text = text.replace("\"rig.toml\"", "\"turned.toml\"");
+        case.write("room/wrong.toml", text);
+
+        let right = refine(&case, "deployment", "right.toml");
+        let wrong = refine(&case, "wrong", "better.toml");
+        let ended = right.wait();
+        assert_eq!(ended.status.code(), Some(6), "{}", ended.stderr);
+        assert!(ended.stderr.contains("keep the rig"), "{}", ended.stderr);
+        assert!(!case.path("right.toml").exists());
+        let ended = wrong.wait();
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+
+        let truth = rig(&case.path("room/rig-exact.toml"));
+        let worst = |file: &str| {
+            let found = rig(&case.path(file));
+            let apart = differences(found.cameras(), truth.cameras(), true);
+            let turns = apart.iter().map(|it| it.turn.to_degrees());
+            turns.fold(0.0, f64::max)
+        };
+        let [before, after] = [worst("room/turned.toml"), worst("better.toml")];
+        assert!(before > 1.0 && after < 0.5 * before, "{before} {after}");
+    }
+}
