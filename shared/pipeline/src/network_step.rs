@@ -70,6 +70,9 @@ impl Default for NetworkSettings {
     }
 }
 
+/// Boxes around people, pixels, the best first; or why there are none.
+type Outlines<E> = Result<Vec<[f64; 4]>, E>;
+
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
 /// Least score of an extra keypoint: below it, its place is a guess (0.3 is what mmpose and `Pose2Sim` use).
@@ -147,7 +150,7 @@ impl NetworkStep {
     pub fn look_by<E: From<LookError>>(
         &self,
         image: Rgb8View<'_>,
-        find: &mut dyn FnMut(&mut Vec<f32>) -> Result<Vec<[f64; 4]>, E>,
+        find: &mut dyn FnMut(&mut Vec<f32>) -> Outlines<E>,
         memory: &mut NetworkMemory,
     ) -> Result<Option<Scope>, E> {
         let Eyes::Network(network, boxes) = &self.eyes else {
