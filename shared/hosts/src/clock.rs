@@ -275,7 +275,7 @@ impl Line {
             origin: best.at,
             offset: best.offset as f64 + (wy - drift * wx) / w,
             drift,
-            drift_error: drift_error(drift, all),
+            drift_error: drift_error(drift, &all),
         }
     }
 
@@ -285,7 +285,7 @@ impl Line {
 }
 
 /// How far a drift can be from the truth: any two exchanges bound it, since at each the offset is known to half of its round trip.
-fn drift_error(drift: f64, all: impl Iterator<Item = Sample> + Clone) -> f64 {
+fn drift_error(drift: f64, all: &(impl Iterator<Item = Sample> + Clone)) -> f64 {
     let pairs = all
         .clone()
         .enumerate()
@@ -293,7 +293,7 @@ fn drift_error(drift: f64, all: impl Iterator<Item = Sample> + Clone) -> f64 {
     let errors = pairs.filter_map(|(it, other)| {
         let span = time_between(other.at, it.at);
         let change = (i128::from(other.offset) - i128::from(it.offset)) as f64;
-        let unknown = (it.trip as f64 + other.trip as f64) / 2.0 / span.abs();
+        let unknown = f64::midpoint(it.trip as f64, other.trip as f64) / span.abs();
         (span.abs() >= LEAST_SPAN as f64).then(|| (change / span - drift).abs() + unknown)
     });
     errors.fold(MOST_DRIFT + drift.abs(), f64::min)
