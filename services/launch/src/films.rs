@@ -314,7 +314,9 @@ impl Reader<'_> {
                 }
             };
             if let Some(upright) = &upright {
-                people.iter_mut().for_each(|it| upright.back(it));
+                for it in &mut people {
+                    upright.back(it);
+                }
             }
             self.console.advance(1);
             shots.push(Shot {

@@ -172,7 +172,7 @@ impl Clock {
     pub fn estimate(&self, now: u64) -> Option<Estimate> {
         let all = || self.parts.iter().map(|it| it.1);
         let best = all().min_by_key(|it| it.trip)?;
-        let line = Line::through(all(), best);
+        let line = Line::through(&all(), best);
         let at = |time: u64| line.at(time);
         let bound = all().map(|it| {
             // What the exchange itself bounds, how far the line misses it, and what an error of the drift makes since.
@@ -242,7 +242,7 @@ struct Line {
 
 impl Line {
     /// A line through exchanges, each weighted by the square of its round trip; level where they are too close.
-    fn through(all: impl Iterator<Item = Sample> + Clone, best: Sample) -> Self {
+    fn through(all: &(impl Iterator<Item = Sample> + Clone), best: Sample) -> Self {
         let level = Self {
             origin: best.at,
             offset: best.offset as f64,
@@ -275,7 +275,7 @@ impl Line {
             origin: best.at,
             offset: best.offset as f64 + (wy - drift * wx) / w,
             drift,
-            drift_error: drift_error(drift, &all),
+            drift_error: drift_error(drift, all),
         }
     }
 

@@ -30,7 +30,7 @@ pub(super) struct Eyes {
 
 /// A network, and what it needs to follow people.
 struct Network {
-    network: PoseNetwork,
+    joints: PoseNetwork,
     /// Who finds the boxes; the filters without it.
     detector: Option<Detector>,
     /// The tree that its joints hang in.
@@ -43,8 +43,8 @@ pub(super) type Found = Vec<Option<Keypoint>>;
 impl Eyes {
     pub(super) fn open(deployment: &Deployment, camera: usize) -> Result<Self, Failure> {
         let network = match inputs::pose_network(deployment, camera)? {
-            Some(network) => Some(Network {
-                network,
+            Some(joints) => Some(Network {
+                joints,
                 detector: inputs::detector(&deployment.pose)?,
                 springs: inputs::springs(&deployment.pose.springs)?,
             }),
@@ -74,7 +74,7 @@ impl Eyes {
     /// The names of what is found.
     pub(super) fn names(&self) -> Vec<String> {
         if let Some(network) = &self.network {
-            return network.network.names().to_vec();
+            return network.joints.names().to_vec();
         }
         let named = |name: &str| if name == "head" { "head top" } else { name }.to_owned();
         PARSE14.joints.iter().map(|it| named(it.name)).collect()
@@ -83,7 +83,7 @@ impl Eyes {
     /// Whether sides follow the picture.
     pub(super) fn as_seen(&self) -> bool {
         let network = self.network.as_ref();
-        network.is_none_or(|it| it.network.card().keypoints.sides == Sides::Seen)
+        network.is_none_or(|it| it.joints.card().keypoints.sides == Sides::Seen)
     }
 
     pub(super) fn text(&self) -> String {
@@ -91,7 +91,7 @@ impl Eyes {
             return "filters".to_owned();
         };
         let boxes = it.detector.as_ref().map(|it| it.card().name.as_str());
-        let name = &it.network.card().name;
+        let name = &it.joints.card().name;
         format!(
             "network {name}, boxes by {}",
             boxes.unwrap_or("the filters")
@@ -118,7 +118,7 @@ impl Eyes {
             let search = search
                 .ok_or("neither network nor filters")
                 .or_fail(ExitKind::Config)?;
-            return Ok(Watch::Filters(search));
+            return Ok(Watch::Filters(Box::new(search)));
         };
         let layout = Layout::new(&network.springs, size.width, size.height);
         let boxes = match network.detector {
@@ -131,7 +131,7 @@ impl Eyes {
             least_heat: deployment.pose.least_heat,
             ..NetworkSettings::default()
         };
-        let eyes = pipeline::Eyes::Network(Box::new(network.network), boxes);
+        let eyes = pipeline::Eyes::Network(Box::new(network.joints), boxes);
         let solver = Solver::new(network.springs);
         let layout = Arc::new(layout.or_fail(ExitKind::Input)?);
         Ok(Watch::Network(Box::new(Follower {
@@ -146,7 +146,7 @@ impl Eyes {
 
 /// Finds the people of one picture after another.
 pub(super) enum Watch {
-    Filters(Filters),
+    Filters(Box<Filters>),
     Network(Box<Follower>),
 }
 
