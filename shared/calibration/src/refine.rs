@@ -18,9 +18,9 @@ use crate::align::Difference;
 use crate::people::adjust::{Beliefs, PosePrior};
 use crate::people::begin::{Choice, Study};
 use crate::people::certainty::{MOST_HALVES, half_of};
-use crate::people::estimate::{LEAST_INSTANTS, LEAST_SEEN_S, check_joints, instants, interval_s};
+use crate::people::estimate::{LEAST_INSTANTS, LEAST_SEEN_S, check_joints, instants};
 use crate::people::measure::fits;
-use crate::people::sightings::{Chain, chains, ideal};
+use crate::people::sightings::{Chain, chains, ideal, interval_s, longest};
 use crate::people::solve::{Solved, rounds};
 use crate::people::{Doubt, PeopleError, Recording};
 use held_out::{Blocks, chosen};
@@ -109,7 +109,7 @@ pub fn refine(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome,
         .collect();
     let mut outcome = nothing(cameras);
     for (camera, of) in chains.iter().enumerate() {
-        let seen_s = of.first().map_or(0.0, Chain::seen_s);
+        let seen_s = longest(of).map_or(0.0, Chain::seen_s);
         if seen_s < LEAST_SEEN_S {
             let least_s = LEAST_SEEN_S;
             outcome.doubts.push(Doubt::NoPeople {

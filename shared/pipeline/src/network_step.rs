@@ -36,7 +36,7 @@ pub enum Boxes {
     Detector(Box<Detector>),
     /// The search of the filters over the whole picture.
     Filters(Box<ViewStep>),
-    /// Whoever looks, see [`NetworkStep::look_by`]; they count as those of the filters.
+    /// Whoever looks by [`NetworkStep::look_by`]; they count as those of the filters. [`NetworkStep::look`] finds none.
     Caller,
 }
 

@@ -5,7 +5,6 @@ use fastrand::Rng;
 use geometry::Camera;
 use geometry::bundle::{Covariance, clustered};
 use nalgebra::Point3;
-use statistics::Sorted;
 use synchronisation::Film;
 
 use super::begin::{Study, choices};
@@ -14,7 +13,7 @@ use super::doubt::Doubt;
 use super::frame::{Scale, Vertical, World, bone_spread, stature_of, world};
 use super::measure::{CELLS, Fit, fits};
 use super::outcome::{CameraReport, Outcome};
-use super::sightings::{Chain, chains, ideal};
+use super::sightings::{Chain, chains, ideal, interval_s, longest};
 use super::solve::{Clocks, Solved, Wanted, with_clocks};
 use super::{Recording, Settings};
 
@@ -70,7 +69,7 @@ pub fn estimate(recording: &Recording<'_>, settings: &Settings) -> Result<Outcom
         .collect();
     let mut outcome = nothing(cameras, settings);
     for (camera, of) in chains.iter().enumerate() {
-        let seen_s = of.first().map_or(0.0, Chain::seen_s);
+        let seen_s = longest(of).map_or(0.0, Chain::seen_s);
         if seen_s < LEAST_SEEN_S {
             outcome.doubts.push(Doubt::NoPeople {
                 camera,
@@ -154,15 +153,6 @@ pub(crate) fn check_joints(joints: usize, sides: &[usize]) -> Result<(), PeopleE
     Ok(())
 }
 
-pub(crate) fn interval_s(film: &Film) -> Option<f64> {
-    let steps: Vec<f64> = film
-        .shots
-        .array_windows()
-        .map(|[a, b]| b.time_s - a.time_s)
-        .collect();
-    Sorted::new(steps).upper_median()
-}
-
 fn nothing(cameras: &[Camera], settings: &Settings) -> Outcome {
     Outcome {
         cameras: cameras.to_vec(),
@@ -198,7 +188,7 @@ pub(crate) fn instants(
         .enumerate()
         .filter_map(|(camera, it)| {
             let offset_s = offsets_s.get(camera).copied().unwrap_or(0.0);
-            Some(it.first()?.span().map(|it| it + offset_s))
+            Some(longest(it)?.span().map(|it| it + offset_s))
         })
         .collect();
     let mut froms: Vec<f64> = spans.iter().map(|it| it[0]).collect();

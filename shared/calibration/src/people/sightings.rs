@@ -9,7 +9,7 @@ use synchronisation::{Film, Track, tracks};
 const SMOOTHING: [f64; 2] = [0.75, 0.015];
 /// Two tracks of a camera can be one person where the second begins within so many seconds.
 const LONGEST_GAP_S: f64 = 3.0;
-/// Chains of a camera that are looked at, those with most pictures.
+/// Chains of a camera that are looked at, those that are seen best.
 const MOST_CHAINS: usize = 3;
 /// Chains with less than this share of the pictures of the longest one are not.
 const LEAST_SHARE: f64 = 0.15;
@@ -95,7 +95,7 @@ impl Chain {
 
 /// The people that a camera sees longest, those first who are seen best.
 pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: f64) -> Vec<Chain> {
-    let own_s = own_interval_s(film).unwrap_or(interval_s);
+    let own_s = self::interval_s(film).unwrap_or(interval_s);
     let sigma_s = (SMOOTHING[0] * interval_s).max(SMOOTHING[1]);
     let mut found = tracks(film, camera, n_joints, sigma_s);
     found.sort_by(|a, b| a.span()[0].total_cmp(&b.span()[0]));
@@ -112,11 +112,16 @@ pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: 
         }
     }
     chains.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
-    let longest = chains.iter().map(Chain::seen_s).fold(0.0, f64::max);
-    let least = LEAST_SHARE * longest;
+    let least = LEAST_SHARE * longest(&chains).map_or(0.0, Chain::seen_s);
     chains.retain(|it| it.seen_s() >= least);
     chains.truncate(MOST_CHAINS);
     chains
+}
+
+/// Whom a camera sees longest.
+pub(crate) fn longest(chains: &[Chain]) -> Option<&Chain> {
+    let each = chains.iter();
+    each.max_by(|a, b| a.seen_s().total_cmp(&b.seen_s()))
 }
 
 /// A camera without distortion, which sees ideal pixels.
@@ -127,7 +132,7 @@ pub(crate) fn ideal(camera: &Camera) -> Camera {
 }
 
 /// Between two pictures of a film, seconds.
-pub(crate) fn own_interval_s(film: &Film) -> Option<f64> {
+pub(crate) fn interval_s(film: &Film) -> Option<f64> {
     let each = film.shots.array_windows();
     let steps: Vec<f64> = each.map(|[a, b]| b.time_s - a.time_s).collect();
     Sorted::new(steps).upper_median().filter(|it| *it > 0.0)
@@ -204,6 +209,29 @@ mod tests {
         Film {
             shots: (0..300).map(&mut shot).collect(),
         }
+    }
+
+    #[test]
+    fn who_is_seen_large_and_surely_comes_before_what_is_seen_longer() {
+        let mut film = standing();
+        let chair = |it: Joint| Joint {
+            at: it.at.map(|at| 100.0 + 0.3 * (at - 300.0)),
+            score: 0.4,
+        };
+        for (nth, shot) in film.shots.iter_mut().enumerate() {
+            let joints = shot.people[0].joints.iter();
+            let joints = joints.map(|it| it.map(chair)).collect();
+            shot.people.insert(0, Person { joints });
+            if nth >= 240 {
+                shot.people.truncate(1);
+            }
+        }
+        let camera = ideal(&ring(3)[0]);
+        let chains = chains(&film, &camera, N_JOINTS, 0.1);
+        let seen_s = chains.iter().map(Chain::seen_s);
+        assert_eq!(seen_s.map(f64::round).collect::<Vec<_>>(), [24.0, 30.0]);
+        let sizes = [&chains[0], longest(&chains).unwrap()].map(Chain::size);
+        assert!(sizes[0] > 3.0 * sizes[1], "{sizes:?}");
     }
 
     #[test]

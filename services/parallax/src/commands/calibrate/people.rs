@@ -41,7 +41,7 @@ and says so; every such camera is printed, and the exit code is 6.
 The clocks of the deployment are believed unless joints fit clearly better with others, or --window is given.
 
 With --json one object:
-    {\"is_determined\", \"doubts\": [text], \"instants\", \"span_s\", \"vertical\", \"scale_error\", \"stature_metres\", \"exchanged\",
+    {\"is_determined\", \"doubts\": [text], \"cautions\": [text], \"clocks_are_found\", \"instants\", \"span_s\", \"vertical\", \"scale_error\", \"stature_metres\", \"exchanged\",
      \"cameras\": [{\"name\", \"found_by\", \"centre_metres\", \"joints\", \"residual_px\", \"inliers\", \"rotation_sd_degrees\",
                   \"centre_sd_metres\", \"focal_px\", \"focal_sd_px\", \"halves_degrees\", \"halves_metres\", \"offset_ms\",
                   \"offset_sd_ms\"}]}
