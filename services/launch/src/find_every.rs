@@ -2,8 +2,8 @@
 
 use deployment::pose::Config;
 
-/// Frames that are farther apart are not of a person whom a box could follow, seconds.
-const FOLLOWED_S: f64 = 0.5;
+/// Frames that are farther apart are not of a person whom a box could follow, seconds: boxes are looked for in every one.
+pub const FOLLOWED_S: f64 = 0.5;
 
 /// In every n-th frame of a view boxes are looked for: as the deployment says, else by the rate.
 ///

@@ -49,6 +49,7 @@ pub mod recorded;
 pub mod summary;
 
 pub use claim::Claim;
+pub use find_every::FOLLOWED_S;
 pub use planned::Planned;
 pub use prepare::{Prepared, View, frame_scale};
 pub use resolved::{Resolved, SERVICES};

@@ -203,6 +203,21 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
     pose::run(service, &job)
 }
 
+/// The single-view step of a camera that a network looks at, as the process of that camera has it; `None` of one that the filters
+/// look at, or whose keypoints another program found.
+///
+/// # Errors
+///
+/// Model, network or rig cannot be read or used.
+pub fn network_step(resolved: &Resolved, view: usize) -> Result<Option<NetworkStep>, Failure> {
+    let prepared = Prepared::new(resolved)?;
+    let layout = Arc::new(prepared.views[view].plan.layout().clone());
+    Ok(match view_step(resolved, prepared, view, layout)? {
+        pose::Step::Network(step) => Some(*step),
+        pose::Step::Filters(_) | pose::Step::Keypoints(_) => None,
+    })
+}
+
 /// The single-view step: by the network of the deployment, or by the filters.
 fn view_step(
     resolved: &Resolved,

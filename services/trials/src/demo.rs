@@ -17,7 +17,7 @@ use serde_json::Value;
 
 use crate::trial::injection::{Injector, ProcessFault};
 use crate::trial::results;
-use crate::trial::synthetic::{self, N_CAMERAS, SyntheticDeployment, SyntheticSetup};
+use crate::trial::synthetic::{self, Finder, N_CAMERAS, SyntheticDeployment, SyntheticSetup};
 use machine::{FULL_RATE_HZ, Gauge, Machine};
 use report::Report;
 use run::{Run, VICTIM};
@@ -57,6 +57,7 @@ impl Options {
             n_frames: self.n_frames(rate_hz),
             n_cameras: N_CAMERAS,
             deadline_ms: self.deadline_ms.unwrap_or(DEADLINE_MS.max(needed)),
+            finder: Finder::Default,
             name: &self.name,
             command: "demo",
         }

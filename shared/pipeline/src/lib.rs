@@ -15,6 +15,7 @@ mod motion;
 mod network_memory;
 mod network_step;
 mod people;
+mod sightings;
 mod skeleton_settings;
 mod skeleton_step;
 mod space;

@@ -1,5 +1,6 @@
 //! What the step with a network keeps from frame to frame.
 
+use fmp::Layout;
 use multiview::FrontEvidence;
 use posenetwork::{JointMaps, LookMemory};
 
@@ -18,6 +19,8 @@ pub struct NetworkMemory {
     /// The people of this frame; those beyond `n_seen` are memory for more.
     pub(crate) seen: Vec<Seen>,
     pub(crate) n_seen: usize,
+    /// Boxes that showed somebody who is known.
+    pub(crate) shown: Vec<[f64; 4]>,
     /// Frames until boxes are looked for; none before the first frame.
     pub(crate) until: Option<u64>,
     /// Whether they were looked for in this frame.
@@ -61,6 +64,19 @@ impl NetworkMemory {
     /// Whether boxes were looked for in this frame.
     pub fn has_searched(&self) -> bool {
         self.has_searched
+    }
+}
+
+impl Seen {
+    /// Judges what is seen of a person; returns whether the person is seen well, and in the frame.
+    ///
+    /// * `layout`: of the frame; `least_heat`: mean heat of the joints of somebody who is seen well, 0 to 1.
+    pub(crate) fn judge(&mut self, layout: &Layout, least_heat: f64) -> bool {
+        let peaks = self.maps.peaks().iter();
+        let heat: f64 = peaks.flatten().map(|it| it.score.clamp(0.0, 1.0)).sum();
+        self.heat = heat / self.maps.peaks().len().max(1) as f64;
+        self.level = self.maps.level(layout);
+        self.heat >= least_heat && self.maps.region(layout).is_some()
     }
 }
 

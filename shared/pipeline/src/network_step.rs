@@ -12,10 +12,11 @@ use keypoints::Keypoint;
 use multiview::FrontEvidence;
 use posenetwork::{
     Detector, JointMaps, LookError, Looker, MapSettings, PoseNetwork, outline_of_parts,
-    outline_of_pose, overlap,
+    outline_of_pose,
 };
 
-use crate::network_memory::{NetworkMemory, Seen, is_known};
+use crate::network_memory::{NetworkMemory, Seen};
+use crate::sightings::Sightings;
 use crate::tracks::{MUCH_WORSE, Track, wider};
 use crate::view_result::ExtraKeypoint;
 use crate::view_step::{ViewEstimate, ViewStep};
@@ -73,8 +74,6 @@ impl Default for NetworkSettings {
 /// Boxes around people, pixels, the best first; or why there are none.
 type Outlines<E> = Result<Vec<[f64; 4]>, E>;
 
-/// Boxes that overlap by more are of one person.
-const SAME: f64 = 0.5;
 /// Least score of an extra keypoint: below it, its place is a guess (0.3 is what mmpose and `Pose2Sim` use).
 const LEAST_SCORE: f64 = 0.3;
 /// Most response values of a frame; the cells of the evidence become larger rather than more.
@@ -163,32 +162,41 @@ impl NetworkStep {
         memory.has_searched = is_due;
         memory.n_seen = 0;
         let tracks = core::mem::take(&mut memory.tracks);
-        let with = (&**network, image);
+        let sightings = Sightings {
+            looker: Looker {
+                network,
+                springs: &self.solver,
+                layout: &self.layout,
+                settings: &self.settings.maps,
+            },
+            image,
+            n_most: 2 * self.settings.n_people,
+            least_heat: self.settings.least_heat,
+        };
         let found = if is_due {
             find(&mut memory.values)?
         } else {
             Vec::new()
         };
         if is_due && matches!(boxes, Boxes::Detector(_)) {
-            self.see_all(with, &found, memory)?;
+            sightings.see_all(&found, memory)?;
             for track in &tracks {
-                self.see_again(with, track, memory)?;
+                sightings.see_again(track, memory)?;
             }
         } else {
             for track in &tracks {
                 if is_due || track.is_doubtful {
-                    let wider = wider(track.outline, &found);
-                    let usual_score = Some(track.usual_score);
-                    self.see(with, (&[track.outline, wider], usual_score), memory)?;
+                    let boxes = [track.outline, wider(track.outline, &found)];
+                    sightings.see(&boxes, track.usual_score, memory)?;
                 } else {
-                    self.see_again(with, track, memory)?;
+                    sightings.see_again(track, memory)?;
                 }
             }
-            self.see_all(with, &found, memory)?;
+            sightings.see_all(&found, memory)?;
             if memory.n_seen == 0 && !is_due {
                 memory.has_searched = true;
                 let found = find(&mut memory.values)?;
-                self.see_all(with, &found, memory)?;
+                sightings.see_all(&found, memory)?;
             }
         }
         let until = if memory.has_searched {
@@ -205,84 +213,6 @@ impl NetworkStep {
         memory.tracks = tracks;
         memory.tracks.clear();
         Ok(self.scope(memory))
-    }
-
-    /// Looks for people in boxes that were found.
-    fn see_all(
-        &self,
-        with: (&PoseNetwork, Rgb8View<'_>),
-        outlines: &[[f64; 4]],
-        memory: &mut NetworkMemory,
-    ) -> Result<(), LookError> {
-        for outline in outlines {
-            self.see(with, (core::slice::from_ref(outline), None), memory)?;
-        }
-        Ok(())
-    }
-
-    /// Whether there is room for the person in a box, and nobody is known there.
-    fn is_unknown(&self, outline: [f64; 4], memory: &NetworkMemory) -> bool {
-        let is_known = |it: &Seen| overlap(it.outline, outline) > SAME;
-        let has_room = memory.n_seen < 2 * self.settings.n_people;
-        has_room && !memory.people().iter().any(is_known)
-    }
-
-    /// Looks at a person in several boxes and around what is seen there, and keeps the best sight if it is good.
-    ///
-    /// * `outlines`: nothing is done where somebody is known in the first.
-    fn see(
-        &self,
-        (network, image): (&PoseNetwork, Rgb8View<'_>),
-        (outlines, usual_score): (&[[f64; 4]], Option<f32>),
-        memory: &mut NetworkMemory,
-    ) -> Result<(), LookError> {
-        let first = outlines.first();
-        if !first.is_some_and(|it| self.is_unknown(*it, memory)) {
-            return Ok(());
-        }
-        let looker = Looker {
-            network,
-            springs: &self.solver,
-            layout: &self.layout,
-            settings: &self.settings.maps,
-        };
-        let (look, seen) = memory.next();
-        if let Some(best) = looker.best_of((image, outlines), look, &mut seen.maps)? {
-            seen.outline = best.outline;
-            seen.front = best.front;
-            seen.usual_score = usual_score;
-            self.keep(memory);
-        }
-        Ok(())
-    }
-
-    /// Looks at a person of the frame before, where nobody is known yet, and keeps what is seen well.
-    fn see_again(
-        &self,
-        (network, image): (&PoseNetwork, Rgb8View<'_>),
-        track: &Track,
-        memory: &mut NetworkMemory,
-    ) -> Result<(), LookError> {
-        if !self.is_unknown(track.outline, memory) {
-            return Ok(());
-        }
-        let (look, seen) = memory.next();
-        let Some(sight) = network.look(image, track.outline, look.workspace())? else {
-            return Ok(());
-        };
-        seen.maps.read(&sight, &self.settings.maps)?;
-        seen.outline = track.outline;
-        seen.front = sight.front();
-        seen.usual_score = Some(track.usual_score);
-        self.keep(memory);
-        Ok(())
-    }
-
-    /// Keeps the next person if it is seen well and not known yet.
-    fn keep(&self, memory: &mut NetworkMemory) {
-        let (_, seen) = memory.next();
-        let is_new = self.is_well_seen(seen) && !is_known(&memory.seen, memory.n_seen);
-        memory.n_seen += usize::from(is_new);
     }
 
     /// Takes the people of a frame whose keypoints another program found; returns what of the frame the responses will cover, or
@@ -312,21 +242,11 @@ impl NetworkStep {
             let is_there = seen
                 .maps
                 .of_keypoints(keypoints.as_ref(), rows, maps, *keypoint_sigma);
-            if is_there && self.is_well_seen(seen) {
+            if is_there && seen.judge(&self.layout, self.settings.least_heat) {
                 memory.n_seen += 1;
             }
         }
         self.scope(memory)
-    }
-
-    /// Judges what is seen of a person.
-    fn is_well_seen(&self, seen: &mut Seen) -> bool {
-        let peaks = seen.maps.peaks().iter();
-        let heat: f64 = peaks.flatten().map(|it| it.score.clamp(0.0, 1.0)).sum();
-        seen.heat = heat / seen.maps.peaks().len().max(1) as f64;
-        let is_inside = seen.maps.region(&self.layout).is_some();
-        seen.level = seen.maps.level(&self.layout);
-        seen.heat >= self.settings.least_heat && is_inside
     }
 
     /// What the responses of the people of a frame cover: one level, fine enough for the smallest of them if there is room.

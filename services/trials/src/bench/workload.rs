@@ -17,7 +17,7 @@ use super::pictures;
 use crate::spread::Spread;
 use crate::trial::injection::{Injector, ProcessFault};
 use crate::trial::results::{self, FrameResult};
-use crate::trial::synthetic::{self, N_CAMERAS, SyntheticDeployment, SyntheticSetup};
+use crate::trial::synthetic::{self, Finder, N_CAMERAS, SyntheticDeployment, SyntheticSetup};
 
 /// How long a stage waits for a late view of synthetic cameras, milliseconds.
 const DEADLINE_MS: u64 = 500;
@@ -182,6 +182,7 @@ impl Workload {
             n_frames: n_frames.max(1),
             n_cameras: self.n_views,
             deadline_ms: DEADLINE_MS,
+            finder: Finder::TrackingFilters,
             name: "bench",
             command: "bench",
         };

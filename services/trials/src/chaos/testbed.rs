@@ -14,7 +14,7 @@ use super::judge::RunOutcome;
 use super::options::Options;
 use super::resources;
 use crate::trial::results::{self, FrameResult};
-use crate::trial::synthetic::{self, N_CAMERAS, SyntheticDeployment, SyntheticSetup};
+use crate::trial::synthetic::{self, Finder, N_CAMERAS, SyntheticDeployment, SyntheticSetup};
 
 /// Frames per second of the synthetic cameras.
 const RATE_HZ: f64 = 5.0;
@@ -87,6 +87,7 @@ impl Testbed {
             n_frames: (RATE_HZ * f64::from(options.seconds)) as u64,
             n_cameras: N_CAMERAS,
             deadline_ms: DEADLINE_MS,
+            finder: Finder::TrackingFilters,
             name: "chaos",
             command: "chaos",
         };

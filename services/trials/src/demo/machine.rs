@@ -3,15 +3,13 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use geometry::Camera;
 use kernels::Rgb8View;
-use launch::{Prepared, Resolved};
-use pipeline::Estimator;
+use launch::{FOLLOWED_S, Resolved, process};
+use pipeline::{NetworkMemory, NetworkStep};
 use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
 use scene::{Scene, View};
 use serde_json::{Value, json};
-use statistics::Sorted;
 
 use crate::trial::synthetic::SyntheticDeployment;
 
@@ -25,75 +23,98 @@ const MIN_RATE_HZ: f64 = 0.25;
 /// for changes of the load.
 const SHARE: f64 = 0.5;
 
-/// The duration of a measurement, which takes at least two frames.
+/// The duration of a measurement.
 const SPAN: Duration = Duration::from_secs(2);
 
-/// Renders and processes frames of all cameras, as the processes of the run do.
+/// The least number of its frames: in so many every camera looks for the person once.
+const LEAST_FRAMES: u64 = 10;
+
+/// Renders frames of all cameras and finds the person in them, as the processes of the run do.
 pub(super) struct Gauge {
-    views: Vec<View>,
-    pictures: Vec<Vec<u8>>,
-    estimator: Estimator,
+    views: Vec<GaugedView>,
+}
+
+/// One camera.
+struct GaugedView {
+    view: View,
+    picture: Vec<u8>,
+    step: NetworkStep,
+    memory: NetworkMemory,
+    responses: Vec<f32>,
 }
 
 impl Gauge {
-    /// Prepares the scene and the estimator.
+    /// Prepares the scene and the network.
+    ///
+    /// * `resolved`: the deployment at [`FULL_RATE_HZ`].
     pub(super) fn new(
         synthetic: &SyntheticDeployment,
         resolved: &Resolved,
     ) -> Result<Self, Failure> {
         let scene = Arc::new(Scene::new(&synthetic.settings).or_fail(ExitKind::Run)?);
-        let views: Result<Vec<View>, _> = (0..synthetic.rig.cameras().len())
-            .map(|camera| View::new(&scene, camera))
-            .collect();
-        let views = views.or_fail(ExitKind::Run)?;
-        let prepared = Prepared::new(resolved)?;
-        let cameras = prepared.views.iter().map(|it| it.framing.camera().clone());
-        let cameras: Vec<Camera> = cameras.collect();
-        let (up, settings) = (prepared.up_in_world, &prepared.settings);
-        let estimator = Estimator::new(&prepared.model, &cameras, up, settings);
+        let view = |camera: usize| {
+            let view = View::new(&scene, camera).or_fail(ExitKind::Run)?;
+            let step = process::network_step(resolved, camera)?
+                .ok_or("the demo is measured with a network")
+                .or_fail(ExitKind::Run)?;
+            Ok(GaugedView {
+                picture: vec![0; view.size().rgb_bytes()],
+                view,
+                step,
+                memory: NetworkMemory::default(),
+                responses: Vec::new(),
+            })
+        };
+        let views = (0..synthetic.rig.cameras().len()).map(view);
         Ok(Self {
-            pictures: views
-                .iter()
-                .map(|it| vec![0; it.size().rgb_bytes()])
-                .collect(),
-            views,
-            estimator: estimator.or_fail(ExitKind::Run)?,
+            views: views.collect::<Result<_, Failure>>()?,
         })
     }
 
     /// Measures for about two seconds.
     pub(super) fn measure(&mut self) -> Result<Machine, Failure> {
         let load = load();
-        let begin = Instant::now();
-        let mut spans = Vec::new();
-        // The first frame is a warm-up.
-        while spans.len() < 2 || begin.elapsed() < SPAN {
-            let nth = Instant::now();
-            self.frame(spans.len() as u64)?;
-            spans.push(nth.elapsed().as_secs_f64());
+        // A warm-up; then the person is looked for again.
+        self.frame(0)?;
+        for view in &mut self.views {
+            view.memory = NetworkMemory::default();
         }
-        let frame_s = Sorted::new(&spans[1..])
-            .interpolated(0.5)
-            .unwrap_or(f64::INFINITY);
+        let searched = Instant::now();
+        self.frame(1)?;
+        let followed = Instant::now();
+        let mut n_frames = 0;
+        while n_frames < LEAST_FRAMES || followed.elapsed() < SPAN {
+            n_frames += 1;
+            self.frame(1 + n_frames)?;
+        }
         Ok(Machine {
             load,
             n_cores: std::thread::available_parallelism().map_or(1, usize::from),
             n_cameras: self.views.len(),
-            frame_s,
+            search_s: (followed - searched).as_secs_f64(),
+            followed_s: followed.elapsed().as_secs_f64() / n_frames as f64,
         })
     }
 
     fn frame(&mut self, number: u64) -> Result<(), Failure> {
-        let views = self.views.par_iter_mut().zip(&mut self.pictures);
-        views.for_each(|(view, rgb)| {
-            view.picture(number, rgb);
-        });
-        let images = self.views.iter().zip(&self.pictures);
-        let images: Result<Vec<_>, _> = images
-            .map(|(it, rgb)| Rgb8View::new(it.size().width, it.size().height, rgb).map(Some))
-            .collect();
-        let images = images.or_fail(ExitKind::Run)?;
-        self.estimator.estimate(&images, &vec![None; images.len()]);
+        let views = self.views.par_iter_mut();
+        views.map(|it| it.frame(number)).collect()
+    }
+}
+
+impl GaugedView {
+    fn frame(&mut self, number: u64) -> Result<(), Failure> {
+        self.view.picture(number, &mut self.picture);
+        let size = self.view.size();
+        let image = Rgb8View::new(size.width, size.height, &self.picture);
+        let image = image.or_fail(ExitKind::Run)?;
+        let looked = self.step.look(image, &mut self.memory);
+        if let Some(scope) = looked.or_fail(ExitKind::Run)? {
+            let n_values = self.step.layout().n_values(&scope);
+            self.responses
+                .resize(n_values.max(self.responses.len()), 0.0);
+            self.step.fill(scope, &mut self.responses, &mut self.memory);
+        }
         Ok(())
     }
 }
@@ -105,14 +126,26 @@ pub(super) struct Machine {
     load: Option<f64>,
     n_cores: usize,
     n_cameras: usize,
-    /// Median time for one frame of all cameras on all cores, seconds.
-    frame_s: f64,
+    /// Time for one frame of all cameras on all cores in which the person is looked for everywhere, seconds.
+    search_s: f64,
+    /// Mean time where the person is followed from frame to frame, seconds.
+    followed_s: f64,
 }
 
 impl Machine {
+    /// Mean time for one frame of all cameras on all cores, seconds. On a machine that is too slow to follow the person, the network
+    /// looks for the person in every frame.
+    fn frame_s(&self) -> f64 {
+        if self.followed_s <= SHARE * FOLLOWED_S {
+            self.followed_s
+        } else {
+            self.search_s.max(self.followed_s)
+        }
+    }
+
     /// The frame rate of the cameras: at most `FULL_RATE_HZ`, and such that computing takes at most `SHARE` of the time.
     pub(super) fn rate_hz(&self) -> f64 {
-        let most = SHARE / self.frame_s;
+        let most = SHARE / self.frame_s();
         // Rounded to two decimals, for display.
         let rounded = (100.0 * most).floor() / 100.0;
         rounded.clamp(MIN_RATE_HZ, FULL_RATE_HZ)
@@ -120,7 +153,7 @@ impl Machine {
 
     /// Computing time relative to a machine that is fast enough; at least 1.
     pub(super) fn slowness(&self) -> f64 {
-        (FULL_RATE_HZ * self.frame_s / SHARE).max(1.0)
+        (FULL_RATE_HZ * self.frame_s() / SHARE).max(1.0)
     }
 
     /// Interval of frames relative to a machine that is fast enough; 1 to 20.
@@ -130,7 +163,7 @@ impl Machine {
 
     /// The slower of two measurements.
     pub(super) fn slower(self, other: Self) -> Self {
-        if other.frame_s > self.frame_s {
+        if other.frame_s() > self.frame_s() {
             other
         } else {
             self
@@ -148,7 +181,7 @@ impl Machine {
             }
             _ => String::new(),
         };
-        let frame_ms = 1000.0 * self.frame_s;
+        let frame_ms = 1000.0 * self.frame_s();
         let text = format!(
             "{busy}a frame of {n_cameras} cameras takes {frame_ms:.0} ms of the {n_cores} cores together"
         );
@@ -169,7 +202,7 @@ impl Machine {
         json!({
             "load": self.load,
             "cores": self.n_cores,
-            "frame_ms": 1000.0 * self.frame_s,
+            "frame_ms": 1000.0 * self.frame_s(),
             "rate_hz": self.rate_hz(),
             "slowness": self.slowness(),
             "spread": self.spread(),
@@ -187,34 +220,37 @@ fn load() -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn machine(load: f64, frame_s: f64) -> Machine {
+    fn machine(load: f64, followed_s: f64) -> Machine {
         Machine {
             load: Some(load),
             n_cores: 2,
             n_cameras: 4,
-            frame_s,
+            search_s: 3.0 * followed_s,
+            followed_s,
         }
     }
 
     #[test]
     fn the_frame_rate_leaves_half_of_the_time() {
-        for (frame_s, rate_hz, slowness) in [
+        for (followed_s, rate_hz, slowness) in [
             (0.02, 5.0, 1.0),
             (0.1, 5.0, 1.0),
             (0.2, 2.5, 2.0),
-            (0.3, 1.66, 3.0),
-            (1.0, 0.5, 10.0),
-            (4.0, 0.25, 40.0),
+            (0.25, 2.0, 2.5),
+            // The person cannot be followed any more.
+            (0.3, 0.55, 9.0),
+            (0.5, 0.33, 15.0),
+            (4.0, 0.25, 120.0),
         ] {
-            let it = machine(0.0, frame_s);
-            assert_eq!(it.rate_hz(), rate_hz, "{frame_s}");
-            assert!((it.slowness() - slowness).abs() < 1e-9, "{frame_s}");
+            let it = machine(0.0, followed_s);
+            assert_eq!(it.rate_hz(), rate_hz, "{followed_s}");
+            assert!((it.slowness() - slowness).abs() < 1e-9, "{followed_s}");
         }
     }
 
     #[test]
     fn a_busy_machine_is_reported_with_its_numbers() {
-        let text = machine(9.25, 1.0).text();
+        let text = machine(9.25, 1.0 / 3.0).text();
         for words in [
             "busy (load 9.2 on 2 cores)",
             "1000 ms",

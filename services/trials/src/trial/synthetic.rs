@@ -21,6 +21,27 @@ const SCALE: f64 = 0.5;
 /// Every n-th frame has overlays.
 const OVERLAY_EVERY: u64 = 4;
 
+/// Who finds the person.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Finder {
+    /// Who does by default: the network that ships.
+    Default,
+    /// The filters, near the last pose. They need no more time for a person who is hard to find.
+    TrackingFilters,
+}
+
+impl Finder {
+    /// Its part of the deployment file.
+    fn section(self) -> &'static str {
+        match self {
+            Self::Default => "",
+            Self::TrackingFilters => {
+                "[pose]\nsearch = \"tracked\"       # near the last pose, and everywhere now and then\n\n"
+            }
+        }
+    }
+}
+
 /// The settings of a synthetic deployment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SyntheticSetup<'a> {
@@ -38,6 +59,8 @@ pub(crate) struct SyntheticSetup<'a> {
     pub n_cameras: usize,
     /// How long a stage waits for a late view, milliseconds.
     pub deadline_ms: u64,
+    /// Who finds the person.
+    pub finder: Finder,
     /// The name of the deployment.
     pub name: &'a str,
     /// The command that writes it, for a comment in its file.
@@ -114,8 +137,7 @@ impl SyntheticDeployment {
              name = {}\nrig = \"rig.toml\"\noutput = \"run\"\n{}\n\
              [capture]\nmode = \"realtime\"       # keep up with the clock; what there is no time for is dropped and counted\n\
              pace = \"realtime\"\nframe_rate_hz = {:?}\n\n\
-             [pose]\nsearch = \"tracked\"       # near the last pose, and everywhere now and then\n\n\
-             [results]\noverlay_every = {OVERLAY_EVERY}\n\n\
+             {}[results]\noverlay_every = {OVERLAY_EVERY}\n\n\
              [supervise]\ndeadline_ms = {}        # how long a stage waits for a view that is late\n\
              hang_limit_s = 60        # a machine that is busy is slow, not hung\n",
             setup.command,
@@ -124,6 +146,7 @@ impl SyntheticDeployment {
             quoted(setup.name),
             cameras.concat(),
             self.settings.rate_hz,
+            setup.finder.section(),
             setup.deadline_ms,
         )
     }

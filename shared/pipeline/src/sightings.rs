@@ -1,0 +1,128 @@
+//! Looks for the people of a frame with a network, and keeps whom it sees well.
+
+use kernels::Rgb8View;
+use posenetwork::{Look, LookError, Looker, overlap};
+
+use crate::network_memory::{NetworkMemory, Seen, is_known};
+use crate::tracks::Track;
+
+/// Boxes that overlap by more are of one person.
+const SAME: f64 = 0.5;
+
+/// The people of a frame, one after another.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sightings<'a> {
+    pub(crate) looker: Looker<'a>,
+    pub(crate) image: Rgb8View<'a>,
+    /// Most people that are looked at.
+    pub(crate) n_most: usize,
+    /// Least mean heat of the joints of a person who is seen well, 0 to 1.
+    pub(crate) least_heat: f64,
+}
+
+impl Sightings<'_> {
+    /// Looks for people in boxes that were found. One that is much the same as a box that showed somebody known is passed over, and
+    /// one whose first sight is of somebody known gets no closer look: the filters find several boxes around one person.
+    pub(crate) fn see_all(
+        &self,
+        outlines: &[[f64; 4]],
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        memory.shown.clear();
+        for outline in outlines {
+            let is_same = |it: &[f64; 4]| overlap(*it, *outline) > SAME;
+            if !self.is_unknown(*outline, memory) || memory.shown.iter().any(is_same) {
+                continue;
+            }
+            if self.see_new(*outline, memory)? {
+                memory.shown.push(*outline);
+            }
+        }
+        Ok(())
+    }
+
+    /// Looks into a box, and closer if somebody new is seen; returns whether it shows somebody known, or now known.
+    fn see_new(&self, outline: [f64; 4], memory: &mut NetworkMemory) -> Result<bool, LookError> {
+        let (look, seen) = memory.next();
+        let what = (self.image, outline);
+        let Some(first) = self.looker.look(what, look, &mut seen.maps)? else {
+            return Ok(false);
+        };
+        if is_known(&memory.seen, memory.n_seen) {
+            return Ok(true);
+        }
+        let (look, seen) = memory.next();
+        let what = (self.image, first);
+        let best = self.looker.look_closer(what, look, &mut seen.maps)?;
+        Ok(self.keep_look(&best, None, memory))
+    }
+
+    /// Looks at a person of the frame before in several boxes and around what is seen there, and keeps the best sight if it is good.
+    ///
+    /// * `outlines`: nothing is done where somebody is known in the first.
+    pub(crate) fn see(
+        &self,
+        outlines: &[[f64; 4]],
+        usual_score: f32,
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        let first = outlines.first();
+        if !first.is_some_and(|it| self.is_unknown(*it, memory)) {
+            return Ok(());
+        }
+        let (look, seen) = memory.next();
+        let what = (self.image, outlines);
+        if let Some(best) = self.looker.best_of(what, look, &mut seen.maps)? {
+            self.keep_look(&best, Some(usual_score), memory);
+        }
+        Ok(())
+    }
+
+    /// Looks at a person of the frame before, where nobody is known yet, and keeps what is seen well.
+    pub(crate) fn see_again(
+        &self,
+        track: &Track,
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        if !self.is_unknown(track.outline, memory) {
+            return Ok(());
+        }
+        let (look, seen) = memory.next();
+        let network = self.looker.network;
+        let Some(sight) = network.look(self.image, track.outline, look.workspace())? else {
+            return Ok(());
+        };
+        seen.maps.read(&sight, self.looker.settings)?;
+        seen.outline = track.outline;
+        seen.front = sight.front();
+        seen.usual_score = Some(track.usual_score);
+        self.keep(memory);
+        Ok(())
+    }
+
+    /// Whether there is room for the person in a box, and nobody is known there.
+    fn is_unknown(&self, outline: [f64; 4], memory: &NetworkMemory) -> bool {
+        let is_known = |it: &Seen| overlap(it.outline, outline) > SAME;
+        memory.n_seen < self.n_most && !memory.people().iter().any(is_known)
+    }
+
+    /// Keeps the next person, whose maps are read, as [`Self::keep`] does.
+    fn keep_look(&self, look: &Look, usual_score: Option<f32>, memory: &mut NetworkMemory) -> bool {
+        let (_, seen) = memory.next();
+        seen.outline = look.outline;
+        seen.front = look.front;
+        seen.usual_score = usual_score;
+        self.keep(memory)
+    }
+
+    /// Keeps the next person if it is seen well and not known yet; returns whether somebody known, or now known, is seen.
+    fn keep(&self, memory: &mut NetworkMemory) -> bool {
+        let (_, seen) = memory.next();
+        if !seen.judge(self.looker.layout, self.least_heat) {
+            return false;
+        }
+        let is_new = !is_known(&memory.seen, memory.n_seen);
+        memory.n_seen += usize::from(is_new);
+        true
+    }
+}
