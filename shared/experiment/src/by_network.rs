@@ -131,6 +131,7 @@ pub fn name_sides(views: &mut [(Camera, NetworkView)]) -> f64 {
         camera,
         evidence: view,
         exchanged: [false; 2],
+        front: view.front.unwrap_or_default(),
     });
     let each: Vec<SpaceView<'_>> = each.collect();
     let Some(found) = solve_person(&each, &settings) else {
@@ -185,6 +186,7 @@ pub fn joints_by(
                 camera,
                 evidence: *view,
                 exchanged: [false; 2],
+                front: view.front.unwrap_or_default(),
             });
             let each: Vec<SpaceView<'_>> = each.collect();
             let mut settings = SpaceSettings::default();

@@ -1,8 +1,9 @@
 //! A person of whom nothing is known, solved in space: which views name left and right the other way round, which look elsewhere, and
 //! how tall the person is.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
+use crate::front::{front, front_in_view, front_log_ratio};
 use crate::space_solve::solve_in_space;
 use crate::space_tree::{
     LIMBS, N, SpacePose, SpaceSettings, SpaceView, best_on_tree, lengths_of, places,
@@ -23,7 +24,7 @@ pub struct SolvedPerson {
 /// 1. Where pairs of views put the joints, and the bones of people of any stature, give a first solution.
 /// 2. Unless it fits every view: of three views or more, one whose exchange of left and right gives a better first solution is
 ///    exchanged. Where left and right follow the picture ([`SpaceSettings::as_seen`]), those of every view may be exchanged
-///    against those of the first.
+///    against those of the first; then what the views say of the direction in which the person faces counts as well.
 /// 3. The arms or the legs of any view that fit better exchanged are exchanged.
 /// 4. Unless the first solution fits every view: of four views or more, those that contradict all others are left out: their camera
 ///    was moved, or they look at somebody else.
@@ -144,11 +145,31 @@ fn improves(
 ) -> Option<bool> {
     set_exchanged(views, combination);
     let found = coarse(views, settings)?;
-    let is_better = found.energy > best.energy;
+    let with_front = |it: &SpacePose| it.energy + front_agreement(views, it);
+    let is_better = with_front(&found) > with_front(best);
     if is_better {
         *best = found;
     }
     Some(is_better)
+}
+
+/// How well the direction in which a solution faces, or the opposite one, agrees with what the views say of it, nats: whether the names
+/// of all views are exchanged is decided elsewhere.
+///
+/// Shoulders that are turned by an angle to the viewing directions of two pairs of opposite cameras, and shoulders that are turned by as
+/// much the other way, look alike but for their names: where left and right follow the picture, this alone tells them apart.
+fn front_agreement(views: &[SpaceView<'_>], found: &SpacePose) -> f64 {
+    let Some(front) = front(&found.joints) else {
+        return 0.0;
+    };
+    let known: Vec<Point3<f64>> = found.joints.iter().flatten().copied().collect();
+    let sum: Vector3<f64> = known.iter().map(|it| it.coords).sum();
+    let place = Point3::from(sum / known.len().max(1) as f64);
+    let of_view = |it: &SpaceView<'_>| {
+        let in_view = front_in_view(it.camera, &place, &front);
+        front_log_ratio(in_view, it.front) / 2.0
+    };
+    views.iter().map(of_view).sum::<f64>().abs()
 }
 
 fn set_exchanged(views: &mut [SpaceView<'_>], combination: usize) {

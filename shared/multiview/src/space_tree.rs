@@ -14,6 +14,8 @@ use nalgebra::Point3;
 use geometry::{Camera, Ray};
 use kernels::{Isa, LengthSpring, ScoredPoints};
 
+use crate::front::FrontEvidence;
+
 /// Number of joints: those of `skeleton::PARSE14`.
 pub(crate) const N: usize = 14;
 
@@ -57,6 +59,8 @@ pub struct SpaceView<'a> {
     pub evidence: &'a dyn JointEvidence,
     /// Whether left and right are exchanged in its evidence, of the arms and of the legs.
     pub exchanged: [bool; 2],
+    /// What the picture says about the direction in which the person faces; zeros say nothing.
+    pub front: FrontEvidence,
 }
 
 /// The expected length of a bone of [`TREE`].

@@ -197,7 +197,7 @@ impl Space {
 
 /// How much what a view sees of the front counts: the squared cosine of the angle between the trunk in the picture and the
 /// vertical, 0 upside down. Heads of people who bend were not learned.
-fn upright(centres_px: &[[f64; 2]]) -> f64 {
+pub(crate) fn upright(centres_px: &[[f64; 2]]) -> f64 {
     const NECK: usize = 1;
     const HIPS: [usize; 2] = [9, 21];
     let [Some(neck), Some(right), Some(left)] =

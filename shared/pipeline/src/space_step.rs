@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use fmp::{Placement, Pose, Responses, Window};
 use multiview::{
-    AllViewsEstimate, JointEvidence, SeenPerson, SolvedPerson, SpaceSettings, SpaceView, ViewPlan,
-    same_person, solve_person,
+    AllViewsEstimate, FrontEvidence, JointEvidence, SeenPerson, SolvedPerson, SpaceSettings,
+    SpaceView, ViewPlan, same_person, solve_person,
 };
 use nalgebra::{Point2, Point3, Vector2};
 use posenetwork::springs::joint_of;
@@ -16,6 +16,7 @@ use crate::following::Others;
 use crate::fuse_step::{AllViewsHypothesis, AllViewsResult};
 use crate::motion::Motion;
 use crate::network_step::cell_at;
+use crate::space::upright;
 use crate::view_result::ViewResult;
 
 /// Number of joints.
@@ -242,10 +243,11 @@ impl SpaceStep {
         }
         let each: Vec<SpaceView<'_>> = views
             .iter()
-            .map(|(view, _, evidence)| SpaceView {
+            .map(|(view, candidate, evidence)| SpaceView {
                 camera: self.plans[*view].camera(),
                 evidence,
                 exchanged: [false; 2],
+                front: self.front(*view, *candidate, answers),
             })
             .collect();
         if each.len() < 2 {
@@ -253,6 +255,21 @@ impl SpaceStep {
         }
         let found = solve_person(&each, &self.settings)?;
         self.result(&found, &views, &each)
+    }
+
+    /// What a view says of the direction in which the person of a candidate faces.
+    fn front(
+        &self,
+        view: usize,
+        candidate: usize,
+        answers: &[Option<ViewResult>],
+    ) -> FrontEvidence {
+        let told = answers[view].as_ref().and_then(|answer| {
+            let centres = self.plans[view].centres(answer.candidates.get(candidate)?);
+            let weight = upright(&centres) as f32;
+            Some(answer.front.get(candidate)?.map(|it| weight * it))
+        });
+        told.unwrap_or_default()
     }
 
     /// Where a pose has the joints, by what the view calls them.

@@ -4,6 +4,7 @@ use geometry::{Intrinsics, Lens};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::*;
+use crate::front::{front, front_in_view};
 use crate::solve_person;
 use crate::{SeenPerson, same_person};
 
@@ -61,7 +62,11 @@ const EPS: f64 = 0.02;
 
 impl Bumps {
     fn of(camera: &Camera) -> Self {
-        let at = STANDING.map(|it| {
+        Self::of_joints(camera, STANDING)
+    }
+
+    fn of_joints(camera: &Camera, joints: [[f64; 3]; N]) -> Self {
+        let at = joints.map(|it| {
             let at = camera.project(&Point3::from(it)).unwrap();
             Some([at.x, at.y])
         });
@@ -107,6 +112,7 @@ fn solved_by<E: JointEvidence>(
             camera,
             evidence,
             exchanged: [false; 2],
+            front: [0.0; 2],
         })
         .collect();
     solve_person(&views, settings).unwrap().pose
@@ -208,6 +214,7 @@ fn names_that_follow_the_picture_are_brought_together_whichever_views_exchange_t
                 camera,
                 evidence,
                 exchanged: [false; 2],
+                front: [0.0; 2],
             });
         let views: Vec<SpaceView<'_>> = views.collect();
         let mut found = solve_person(&views, &settings).unwrap().pose;
@@ -219,6 +226,48 @@ fn names_that_follow_the_picture_are_brought_together_whichever_views_exchange_t
         }
         let error = worst(&found);
         assert!(error < 0.03, "{n} views, {exchanged:b}: {error}");
+    }
+}
+
+#[test]
+fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say() {
+    let settings = SpaceSettings {
+        as_seen: true,
+        ..SpaceSettings::default()
+    };
+    // Flat and symmetric, so that facing x and facing y look alike from here but for the names.
+    let mut flat = STANDING.map(|[_, y, z]| [0.0, y, z]);
+    for [right, left] in LIMBS.into_iter().flatten() {
+        flat[right] = [0.0, -flat[left][1], flat[left][2]];
+    }
+    let cameras = [45.0, 135.0, 225.0, 315.0].map(camera);
+    let bumps = cameras.each_ref().map(|it| {
+        let mut seen = Bumps::of_joints(it, flat);
+        // The side on the left of the picture is called the right one.
+        for [right, left] in LIMBS.into_iter().flatten() {
+            if seen.at[right].unwrap()[0] > seen.at[left].unwrap()[0] {
+                seen.at.swap(right, left);
+                seen.maxima.swap(right, left);
+            }
+        }
+        seen
+    });
+    let place = Point3::new(0.0, 0.0, 0.9);
+    for facing in [Vector3::x(), Vector3::y()] {
+        let view = |(camera, evidence)| SpaceView {
+            camera,
+            evidence,
+            exchanged: [false; 2],
+            front: front_in_view(camera, &place, &facing).map(|it| 10.0 * it as f32),
+        };
+        let views: Vec<SpaceView<'_>> = cameras
+            .iter()
+            .zip(bumps.iter().map(|it| it as &dyn JointEvidence))
+            .map(view)
+            .collect();
+        let found = solve_person(&views, &settings).unwrap().pose;
+        let found = front(&found.joints).unwrap().dot(&facing);
+        assert!(found.abs() > 0.95, "{facing:?}: {found}");
     }
 }
 
