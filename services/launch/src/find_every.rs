@@ -3,7 +3,7 @@
 use deployment::pose::Config;
 
 /// Frames that are farther apart are not of a person whom a box could follow, seconds: boxes are looked for in every one.
-pub const FOLLOWED_S: f64 = 0.5;
+pub const FOLLOWED_S: f64 = 0.4;
 
 /// In every n-th frame of a view boxes are looked for: as the deployment says, else by the rate.
 ///
@@ -41,7 +41,7 @@ mod tests {
 
     #[test]
     fn nobody_is_followed_from_one_picture_to_another_that_may_be_of_any_time() {
-        assert_eq!(find_every_at(Some(1.9), false), 1);
+        assert_eq!(find_every_at(Some(2.4), false), 1);
         assert_eq!(find_every_at(Some(1.0), true), 1);
         assert_eq!(find_every_at(None, false), 1);
     }

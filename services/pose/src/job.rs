@@ -63,6 +63,8 @@ pub struct Job {
     pub frame_step: u64,
     /// Frame rate of the footage, if known; limits how far a pose may have moved.
     pub frame_rate_hz: Option<f64>,
+    /// `Network`: most frames of the footage from one in which people are seen to the next one in which they can be followed.
+    pub most_apart: Option<u64>,
     /// How long the process waits for receivers.
     pub patience: Duration,
 }

@@ -61,6 +61,12 @@ impl NetworkMemory {
         (&mut self.look, &mut self.seen[self.n_seen])
     }
 
+    /// Has people looked for in the next frame, whenever they were last: so much time has passed that they may be elsewhere.
+    pub fn search_next(&mut self) {
+        // The first frame is searched anyway, and sets its own phase.
+        self.until = self.until.map(|_| 0);
+    }
+
     /// Whether boxes were looked for in this frame.
     pub fn has_searched(&self) -> bool {
         self.has_searched

@@ -1,13 +1,15 @@
 //! Looks for the people of a frame with a network, and keeps whom it sees well.
 
 use kernels::Rgb8View;
-use posenetwork::{Look, LookError, Looker, overlap};
+use posenetwork::{JointMaps, Look, LookError, Looker, outline_of, overlap};
 
 use crate::network_memory::{NetworkMemory, Seen, is_known};
 use crate::tracks::Track;
 
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
+/// Least heat of a joint that says where its person is, 0 to 1.
+const SURE: f64 = 0.2;
 
 /// The people of a frame, one after another.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +20,14 @@ pub(crate) struct Sightings<'a> {
     pub(crate) n_most: usize,
     /// Least mean heat of the joints of a person who is seen well, 0 to 1.
     pub(crate) least_heat: f64,
+}
+
+/// Whether the joints that are seen in a box lie in quite another one: that of a person who moved fast, or of whom the last frame is long
+/// ago. The box then shows only some of the person, and that near its edge.
+fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
+    let sure = maps.peaks().iter().flatten();
+    let sure = sure.filter(|it| it.score >= SURE).map(|it| it.at);
+    outline_of(sure).is_some_and(|it| overlap(it, outline) < SAME)
 }
 
 impl Sightings<'_> {
@@ -78,7 +88,8 @@ impl Sightings<'_> {
         Ok(())
     }
 
-    /// Looks at a person of the frame before, where nobody is known yet, and keeps what is seen well.
+    /// Looks at a person of the frame before, where nobody is known yet, and closer if the person has moved far since; keeps what is
+    /// seen well.
     pub(crate) fn see_again(
         &self,
         track: &Track,
@@ -96,6 +107,15 @@ impl Sightings<'_> {
         seen.outline = track.outline;
         seen.front = sight.front();
         seen.usual_score = Some(track.usual_score);
+        if has_moved(&seen.maps, track.outline) {
+            let first = self
+                .looker
+                .judge(track.outline, seen.front, look, &mut seen.maps);
+            let what = (self.image, first);
+            let best = self.looker.look_closer(what, look, &mut seen.maps)?;
+            seen.outline = best.outline;
+            seen.front = best.front;
+        }
         self.keep(memory);
         Ok(())
     }

@@ -84,14 +84,35 @@ impl Looker<'_> {
             return Ok(None);
         };
         maps.read(&sight, self.settings)?;
-        let front = sight.front();
+        Ok(Some(self.judged((outline, sight.front()), responses, maps)))
+    }
+
+    /// What was seen in a box whose maps are read.
+    ///
+    /// * `front`: what was told of the direction in which the trunk faces.
+    pub fn judge(
+        &self,
+        outline: [f64; 4],
+        front: Option<[f32; 2]>,
+        memory: &mut LookMemory,
+        maps: &mut JointMaps,
+    ) -> Look {
+        self.judged((outline, front), &mut memory.responses, maps)
+    }
+
+    fn judged(
+        &self,
+        (outline, front): ([f64; 4], Option<[f32; 2]>),
+        responses: &mut Vec<f32>,
+        maps: &mut JointMaps,
+    ) -> Look {
         let pose = maps.pose(self.springs, self.layout, responses);
-        Ok(Some(Look {
+        Look {
             outline,
             front,
             score: pose.as_ref().map_or(f32::NEG_INFINITY, |it| it.score),
             around: pose.and_then(|it| outline_of_pose(&it, (self.springs.model(), self.layout))),
-        }))
+        }
     }
 
     /// Looks into the box around the pose that was seen in another one, and so on, as long as that is another box and shows the person

@@ -18,7 +18,7 @@ Nothing is needed but this program: the capture processes render pictures of a s
 `parallax synth --help`), and the network that ships looks at them. Four cameras around the person, 320x240 pixels, capture in \
 real time. Their frame rate is chosen by a measurement: for about two seconds frames are rendered and looked at on all \
 cores, beside whatever else runs. Computing may take half of the time between two frames, up to 5 frames a second; a slow \
-or busy machine is reported with numbers. Below 2 frames a second the person is looked for in every frame, which takes \
+or busy machine is reported with numbers. Below 2.5 frames a second the person is looked for in every frame, which takes \
 longer. Every stage and camera is a process of its own, as in `parallax run`. After two \
 fifths of the frames, the process of camera c3 is killed (SIGKILL), as a crash would: the other three go on, the \
 supervisor restarts it, and it continues with the current frame.
