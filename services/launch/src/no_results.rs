@@ -38,8 +38,8 @@ pub fn reason(summary: &Summary, views: &[ViewReport]) -> Option<String> {
     let has_people = views.iter().any(|it| it.used > 0);
     if summary.frames_with_pose == 0 && views.len() > 1 && has_people {
         return Some(format!(
-            "views show somebody, but none of {} results has a joint in space that a person can have: see \
-             `calib check`, whether the footage is of one moment, and whether people are large enough",
+            "views show somebody, but none of {} results has a joint in space that a person can have: nobody may be \
+             there; else see `calib check`, whether the footage is of one moment, and whether people are large enough",
             summary.frames
         ));
     }

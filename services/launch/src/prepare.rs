@@ -10,6 +10,7 @@ use geometry::{Framing, OutSize, Rig, upright_roll};
 use multiview::ViewPlan;
 use nalgebra::UnitVector3;
 use pipeline::{BodySettings, EstimatorSettings, SkeletonSettings, ViewSettings};
+use posenetwork::MapSettings;
 use runtime::{ExitKind, Failure, OrFail as _};
 use skeleton::JointSet;
 use viewquality::Predictor;
@@ -280,6 +281,7 @@ fn skeleton_settings(
         joints,
         joint_map,
         in_space,
+        least_score: least_score(deployment),
         sigma_cells: if in_space {
             ROUNDING_CELLS
         } else {
@@ -306,4 +308,13 @@ fn skeleton_settings(
 pub fn frame_scale(framing: &Framing) -> f64 {
     let [[a, b, _], [c, d, _]] = framing.source_from_output();
     1.0 / (a * d - b * c).abs().sqrt()
+}
+
+/// Least score of somebody whom a view sees well; none with the filters, which have scores of their own.
+pub(crate) fn least_score(deployment: &Deployment) -> f32 {
+    if deployment.has_maps() {
+        MapSettings::default().score_of_heat(deployment.pose.least_heat)
+    } else {
+        f32::NEG_INFINITY
+    }
 }

@@ -20,11 +20,11 @@ use rayon::ThreadPoolBuilder;
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use viewquality::Forecaster;
 
-use crate::find_every::find_every;
+use crate::find_every::{FOLLOWED_S, find_every};
 use crate::hosts;
 use crate::inputs;
 use crate::keypoints;
-use crate::prepare::{Prepared, frame_scale, framing};
+use crate::prepare::{Prepared, frame_scale, framing, least_score};
 use crate::recorded;
 use crate::resolved::Resolved;
 
@@ -198,6 +198,9 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         start_frame: resolved.deployment.capture.start_frame,
         frame_step: resolved.deployment.capture.frame_step,
         frame_rate_hz: resolved.frame_rate_hz(),
+        most_apart: resolved
+            .frame_rate_hz()
+            .map(|it| (it * FOLLOWED_S).floor() as u64),
         patience: resolved.patience(),
     };
     pose::run(service, &job)
@@ -325,6 +328,8 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
                     ..SpaceSettings::default()
                 },
                 MapSettings::default(),
+                // In space the views have to agree: what is seen badly in one is nobody there.
+                2.0 * resolved.deployment.pose.least_heat,
             )
         }),
         plans,
@@ -380,6 +385,7 @@ fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         views: views.collect(),
         model: prepared.model,
         has_maps: deployment.has_maps(),
+        least_score: least_score(deployment),
         joints: prepared.settings.skeleton.joints,
         extra_keypoints: resolved.extra_keypoints.clone(),
         frame_rate_hz: resolved.frame_rate_hz(),

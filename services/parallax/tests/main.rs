@@ -10,6 +10,7 @@ mod chaos;
 mod demo;
 mod detect;
 mod detectors;
+mod entering;
 mod eval;
 mod eval_networks;
 mod export;

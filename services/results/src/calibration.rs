@@ -180,7 +180,7 @@ impl Calibration {
     }
 }
 
-/// The parts of a view's own best candidate, named after the side of the body, pixels of the frame.
+/// The parts of a view's own best candidate, named after the side of the body, pixels of the frame; `None` where it sees nobody well.
 fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2]>> {
     let pose = &record.pose3d;
     let fused = pose
@@ -191,7 +191,9 @@ fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2
     if fused.is_none() && !scene.has_maps {
         return None;
     }
-    let best = record.own(scene, view)?;
+    let best = record
+        .own(scene, view)
+        .filter(|it| it.score >= scene.least_score)?;
     let mirror = scene
         .model
         .spec()
@@ -233,6 +235,11 @@ mod tests {
         assert_eq!(parts(&scene, &record, 0).unwrap().len(), 1);
         record.pose3d.views[0].status = Status::NO_DETECTION;
         assert_eq!(parts(&scene, &record, 0), None);
+        let strict = Scene {
+            least_score: f32::INFINITY,
+            ..scene.clone()
+        };
+        assert_eq!(parts(&strict, &record, 1), None);
         record.views[1].pose = None;
         assert_eq!(parts(&scene, &record, 1), None);
         record.pose3d.n_views = 0;

@@ -6,6 +6,7 @@ use nalgebra::Point2;
 use skeleton::JointSet;
 
 use crate::bodies::NoJoint;
+use crate::fused_view::FusedView;
 use crate::motion::Motion;
 use crate::space::Space;
 use crate::view_result::ViewResult;
@@ -13,15 +14,17 @@ use crate::view_result::ViewResult;
 /// Measures the joints of a result that was solved in space against the poses that the views found by themselves.
 ///
 /// The poses that come from such a solution are its own projections: they agree with it whatever the views show. What a view found is the
-/// candidate that lies nearest, with its sides as they are or exchanged; of a view that was left out as well. The residuals of
-/// every joint are replaced, and with them their root mean square.
+/// candidate that lies nearest, with its sides as they are or exchanged; of a view that was left out as well, if it sees somebody there
+/// ([`SkeletonSettings::least_score`](crate::SkeletonSettings::least_score)). The residuals of every joint are replaced, and with them
+/// their root mean square.
 ///
+/// * `views`: the poses of the views that have a part in the result.
 /// * `motion`: of what the views show, as the solution has it.
 pub(crate) fn measure(
     space: &Space,
     motion: &mut Motion,
     answers: &[Option<ViewResult>],
-    joints: &mut [Result<Triangulated, NoJoint>],
+    (views, joints): (&[Option<FusedView>], &mut [Result<Triangulated, NoJoint>]),
 ) {
     let set = space.settings.joints;
     for it in joints.iter_mut().flatten() {
@@ -45,7 +48,11 @@ pub(crate) fn measure(
                 *at = at.map(|at| at + by);
             }
         }
-        let nearest = readings(space, view, answer, set)
+        let least_score = match views.get(view) {
+            Some(Some(_)) => f32::NEG_INFINITY,
+            _ => space.settings.least_score,
+        };
+        let nearest = readings(space, (view, least_score), answer, set)
             .map(|points| {
                 let both = projected.iter().zip(&points);
                 let distance = |(at, point): (&Option<Point2<f64>>, &[f64; 2])| {
@@ -70,13 +77,17 @@ pub(crate) fn measure(
 }
 
 /// The joints of all candidates of a view, with their sides as they are and exchanged.
+///
+/// * `least_score`: of a candidate.
 fn readings<'a>(
     space: &'a Space,
-    view: usize,
+    (view, least_score): (usize, f32),
     answer: &'a ViewResult,
     set: &'a JointSet,
 ) -> impl Iterator<Item = Vec<[f64; 2]>> + 'a {
-    let each = answer.candidates.iter().flat_map(move |pose| {
+    let seen = answer.candidates.iter();
+    let seen = seen.filter(move |pose| pose.score >= least_score);
+    let each = seen.flat_map(move |pose| {
         [0, Exchanges::MAX].map(|exchanges| (pose, space.mirror(view, exchanges)))
     });
     each.map(move |(pose, mirror)| {

@@ -165,7 +165,8 @@ impl SkeletonStep {
             .triangulate(&at_instant, n_joints, points, &expected_px);
         let (mut joints, body) = self.as_body(joints, &at_instant, &of_body_px);
         if self.space.settings.in_space {
-            disagreement::measure(&self.space, &mut self.motion, answers, &mut joints);
+            let of_result = (&views[..], &mut joints[..]);
+            disagreement::measure(&self.space, &mut self.motion, answers, of_result);
         }
         Skeleton {
             joints,

@@ -31,6 +31,11 @@ impl MapSettings {
         (self.lambda * self.eps.ln()) as f32
     }
 
+    /// The score of a person all of whose joints have a heat, and whose bones are of the usual lengths.
+    pub fn score_of_heat(&self, heat: f64) -> f32 {
+        (N_JOINTS as f64 * self.lambda * (heat + self.eps).ln()) as f32
+    }
+
     /// The heat, 0 to 1, that gives an amount of evidence.
     pub fn heat(&self, evidence: f32) -> f64 {
         ((f64::from(evidence) / self.lambda).exp() - self.eps).clamp(0.0, 1.0)
