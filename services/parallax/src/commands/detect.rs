@@ -11,7 +11,7 @@ use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use kernels::Rgb8View;
 use launch::inputs::{self, Joints};
 use launch::output;
-use offline::network::NetworkFile;
+use offline::library::Library;
 use offline::pictures::{self, Frames, Picture, Pictures, Searched};
 use offline::sheet::{Sheet, Skeleton, limbs};
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -112,7 +112,7 @@ pub(crate) struct Arguments {
     /// processor with AMX.
     #[arg(long, value_name = "NAME", default_value = "f32", value_parser = precision)]
     precision: Precision,
-    /// Keypoints by this network (.onnx) in place of the filters' parts.
+    /// Keypoints by this network (.onnx) in place of the filters' parts; "shipped": the one that ships.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["joints", "joint_map"])]
     network: Option<PathBuf>,
     /// The card of the network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
@@ -140,7 +140,8 @@ impl Arguments {
         let Some(file) = &self.network else {
             return Ok(None);
         };
-        let network = NetworkFile::open(file, self.card.as_deref())?.fitted()?;
+        let named = (file.as_path(), self.card.as_deref());
+        let network = inputs::open_network(named, &Library::BuiltIn)?.fitted()?;
         let card = self.detector_card.as_deref();
         let detector = self.detector.as_ref();
         let detector = detector.map(|it| offline::detector::open(it, card));
