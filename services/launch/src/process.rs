@@ -198,9 +198,11 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         start_frame: resolved.deployment.capture.start_frame,
         frame_step: resolved.deployment.capture.frame_step,
         frame_rate_hz: resolved.frame_rate_hz(),
-        most_apart: resolved
-            .frame_rate_hz()
-            .map(|it| (it * FOLLOWED_S).floor() as u64),
+        // The next frame is never too far, however rarely the deployment has people looked for.
+        most_apart: resolved.frame_rate_hz().map(|it| {
+            let frames = (it * FOLLOWED_S).floor() as u64;
+            frames.max(resolved.deployment.capture.frame_step)
+        }),
         patience: resolved.patience(),
     };
     pose::run(service, &job)
