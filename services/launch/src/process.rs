@@ -2,31 +2,29 @@
 
 mod boxes;
 mod live;
+mod view_step;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use deployment::Stage;
-use fmp::{Layout, Solver};
 use messages::topic;
 use multiview::SpaceSettings;
-use pipeline::{
-    Boxes, ExtrasStep, Eyes, FuseStep, NetworkSettings, NetworkStep, SkeletonStep, SpaceStep,
-    ViewStep, Views,
-};
+use pipeline::{ExtrasStep, FuseStep, SkeletonStep, SpaceStep, Views};
 use posenetwork::MapSettings;
 use rayon::ThreadPoolBuilder;
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use viewquality::Forecaster;
 
-use crate::find_every::{FOLLOWED_S, find_every};
+use crate::find_every::FOLLOWED_S;
 use crate::hosts;
 use crate::inputs;
-use crate::keypoints;
 use crate::prepare::{Prepared, frame_scale, framing, least_score};
 use crate::recorded;
 use crate::resolved::Resolved;
+
+pub use view_step::network_step;
 
 /// The processes of a deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -191,7 +189,7 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
     let layout = Arc::new(prepared.views[view].plan.layout().clone());
     let job = pose::Job {
         view,
-        step: view_step(resolved, prepared, view, layout)?,
+        step: view_step::of_view(resolved, prepared, view, layout)?,
         n_extras: resolved.extra_keypoints.len(),
         n_pose_consumers: topology.receivers_of(&topic::view_pose(view)),
         n_evidence_consumers: topology.receivers_of(&topic::evidence(view)),
@@ -206,78 +204,6 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         patience: resolved.patience(),
     };
     pose::run(service, &job)
-}
-
-/// The single-view step of a camera that a network looks at, as the process of that camera has it; `None` of one that the filters
-/// look at, or whose keypoints another program found.
-///
-/// # Errors
-///
-/// Model, network or rig cannot be read or used.
-pub fn network_step(resolved: &Resolved, view: usize) -> Result<Option<NetworkStep>, Failure> {
-    let prepared = Prepared::new(resolved)?;
-    let layout = Arc::new(prepared.views[view].plan.layout().clone());
-    Ok(match view_step(resolved, prepared, view, layout)? {
-        pose::Step::Network(step) => Some(*step),
-        pose::Step::Filters(_) | pose::Step::Keypoints(_) => None,
-    })
-}
-
-/// The single-view step: by the network of the deployment, or by the filters.
-fn view_step(
-    resolved: &Resolved,
-    prepared: Prepared,
-    view: usize,
-    layout: Arc<Layout>,
-) -> Result<pose::Step, Failure> {
-    let deployment = &resolved.deployment;
-    if !deployment.has_maps() {
-        let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
-        return Ok(pose::Step::Filters(Box::new(
-            step.or_fail(ExitKind::Config)?,
-        )));
-    }
-    let config = &deployment.pose;
-    let step = deployment.capture.frame_step.max(1) as f64;
-    let find_every = find_every(config, resolved.frame_rate_hz().map(|it| it / step));
-    let settings = NetworkSettings {
-        n_people: config.people,
-        find_every,
-        find_phase: view as u64 * find_every / deployment.cameras.len().max(1) as u64,
-        least_heat: config.least_heat,
-        keypoint_sigma: config.keypoint_sigma,
-        ..NetworkSettings::default()
-    };
-    if let Some(source) = keypoints::of_camera(&deployment.cameras[view])? {
-        let extras = extras(resolved, source.names().names());
-        let eyes = Eyes::Keypoints(::keypoints::joint_rows(source.names().names()));
-        let frame_from_source = prepared.views[view].framing.output_from_source();
-        let solver = Solver::new(prepared.model);
-        return Ok(pose::Step::Keypoints(Box::new(pose::Keypoints {
-            step: NetworkStep::new(eyes, solver, layout, settings).with_extras(extras),
-            source,
-            timeline: resolved.footage[view].timeline,
-            frame_from_source,
-        })));
-    }
-    let network = inputs::pose_network(deployment, view)?
-        .ok_or("the camera has neither a network nor keypoints")
-        .or_fail(ExitKind::Config)?;
-    let boxes = match inputs::detector(config)? {
-        Some(detector) => Boxes::Detector(Box::new(detector)),
-        None => Boxes::Filters(Box::new(boxes::filters(resolved, &prepared, view)?)),
-    };
-    let extras = extras(resolved, network.names());
-    let eyes = Eyes::Network(Box::new(network), boxes);
-    let solver = Solver::new(prepared.model);
-    let step = NetworkStep::new(eyes, solver, layout, settings).with_extras(extras);
-    Ok(pose::Step::Network(Box::new(step)))
-}
-
-/// Of every extra keypoint of the deployment its number among the names of a camera.
-fn extras(resolved: &Resolved, names: &[String]) -> Vec<Option<usize>> {
-    let number = |wanted: &String| names.iter().position(|it| it == wanted);
-    resolved.extra_keypoints.iter().map(number).collect()
 }
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {

@@ -1,0 +1,85 @@
+//! The single-view step of a camera: by a network, by the filters, or of keypoints that another program found.
+
+use std::sync::Arc;
+
+use fmp::{Layout, Solver};
+use pipeline::{Boxes, Eyes, NetworkSettings, NetworkStep, ViewStep};
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use crate::find_every::find_every;
+use crate::inputs;
+use crate::keypoints;
+use crate::prepare::Prepared;
+use crate::resolved::Resolved;
+
+/// The single-view step of a camera that a network looks at, as the process of that camera has it; `None` of one that the filters
+/// look at, or whose keypoints another program found.
+///
+/// # Errors
+///
+/// Model, network or rig cannot be read or used.
+pub fn network_step(resolved: &Resolved, view: usize) -> Result<Option<NetworkStep>, Failure> {
+    let prepared = Prepared::new(resolved)?;
+    let layout = Arc::new(prepared.views[view].plan.layout().clone());
+    Ok(match of_view(resolved, prepared, view, layout)? {
+        pose::Step::Network(step) => Some(*step),
+        pose::Step::Filters(_) | pose::Step::Keypoints(_) => None,
+    })
+}
+
+/// The single-view step: by the network of the deployment, or by the filters.
+pub(super) fn of_view(
+    resolved: &Resolved,
+    prepared: Prepared,
+    view: usize,
+    layout: Arc<Layout>,
+) -> Result<pose::Step, Failure> {
+    let deployment = &resolved.deployment;
+    if !deployment.has_maps() {
+        let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
+        return Ok(pose::Step::Filters(Box::new(
+            step.or_fail(ExitKind::Config)?,
+        )));
+    }
+    let config = &deployment.pose;
+    let step = deployment.capture.frame_step.max(1) as f64;
+    let find_every = find_every(config, resolved.frame_rate_hz().map(|it| it / step));
+    let settings = NetworkSettings {
+        n_people: config.people,
+        find_every,
+        find_phase: view as u64 * find_every / deployment.cameras.len().max(1) as u64,
+        least_heat: config.least_heat,
+        keypoint_sigma: config.keypoint_sigma,
+        ..NetworkSettings::default()
+    };
+    if let Some(source) = keypoints::of_camera(&deployment.cameras[view])? {
+        let extras = extras(resolved, source.names().names());
+        let eyes = Eyes::Keypoints(::keypoints::joint_rows(source.names().names()));
+        let frame_from_source = prepared.views[view].framing.output_from_source();
+        let solver = Solver::new(prepared.model);
+        return Ok(pose::Step::Keypoints(Box::new(pose::Keypoints {
+            step: NetworkStep::new(eyes, solver, layout, settings).with_extras(extras),
+            source,
+            timeline: resolved.footage[view].timeline,
+            frame_from_source,
+        })));
+    }
+    let network = inputs::pose_network(deployment, view)?
+        .ok_or("the camera has neither a network nor keypoints")
+        .or_fail(ExitKind::Config)?;
+    let boxes = match inputs::detector(config)? {
+        Some(detector) => Boxes::Detector(Box::new(detector)),
+        None => Boxes::Filters(Box::new(super::boxes::filters(resolved, &prepared, view)?)),
+    };
+    let extras = extras(resolved, network.names());
+    let eyes = Eyes::Network(Box::new(network), boxes);
+    let solver = Solver::new(prepared.model);
+    let step = NetworkStep::new(eyes, solver, layout, settings).with_extras(extras);
+    Ok(pose::Step::Network(Box::new(step)))
+}
+
+/// Of every extra keypoint of the deployment its number among the names of a camera.
+fn extras(resolved: &Resolved, names: &[String]) -> Vec<Option<usize>> {
+    let number = |wanted: &String| names.iter().position(|it| it == wanted);
+    resolved.extra_keypoints.iter().map(number).collect()
+}
