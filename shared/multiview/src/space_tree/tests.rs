@@ -62,10 +62,10 @@ const EPS: f64 = 0.02;
 
 impl Bumps {
     fn of(camera: &Camera) -> Self {
-        Self::of_joints(camera, STANDING)
+        Self::of_joints(camera, &STANDING)
     }
 
-    fn of_joints(camera: &Camera, joints: [[f64; 3]; N]) -> Self {
+    fn of_joints(camera: &Camera, joints: &[[f64; 3]; N]) -> Self {
         let at = joints.map(|it| {
             let at = camera.project(&Point3::from(it)).unwrap();
             Some([at.x, at.y])
@@ -242,7 +242,7 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
     }
     let cameras = [45.0, 135.0, 225.0, 315.0].map(camera);
     let bumps = cameras.each_ref().map(|it| {
-        let mut seen = Bumps::of_joints(it, flat);
+        let mut seen = Bumps::of_joints(it, &flat);
         // The side on the left of the picture is called the right one.
         for [right, left] in LIMBS.into_iter().flatten() {
             if seen.at[right].unwrap()[0] > seen.at[left].unwrap()[0] {
