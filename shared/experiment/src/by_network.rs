@@ -3,8 +3,8 @@
 use evaluation::Point;
 use geometry::Camera;
 use multiview::{
-    FrontEvidence, JointEvidence, SeenPerson, SpaceSettings, SpaceView, front, front_in_view,
-    front_log_ratio, solve_person,
+    FrontEvidence, JointEvidence, SeenPerson, SpaceSettings, SpaceView, front_log_ratio_of,
+    solve_person,
 };
 use nalgebra::Point3;
 use posenetwork::JointMaps;
@@ -142,21 +142,10 @@ pub fn name_sides(views: &mut [(Camera, NetworkView)]) -> f64 {
             view.exchange_sides();
         }
     }
-    let joints = &found.pose.joints;
-    let known = joints.iter().flatten();
-    let middle: Vec<Point3<f64>> = known.copied().collect();
-    let sum: nalgebra::Vector3<f64> = middle.iter().map(|it| it.coords).sum();
-    let place = Point3::from(sum / middle.len().max(1) as f64);
-    let Some(front) = front(joints) else {
-        return 0.0;
-    };
-    let ratios = views.iter().filter_map(|(camera, view)| {
-        Some(front_log_ratio(
-            front_in_view(camera, &place, &front),
-            view.front?,
-        ))
-    });
-    let ratio: f64 = ratios.sum();
+    let said = views.iter();
+    let said = said.filter_map(|(camera, view)| Some((camera, view.front?)));
+    let said: Vec<(&Camera, FrontEvidence)> = said.collect();
+    let ratio = front_log_ratio_of(&found.pose.joints, &said);
     if ratio < 0.0 {
         for (_, view) in views {
             view.exchange_sides();

@@ -60,6 +60,26 @@ pub fn front_log_ratio(in_view: [f64; 2], evidence: FrontEvidence) -> f64 {
     2.0 * (right * in_view[0] + towards * in_view[1])
 }
 
+/// Logarithm of the likelihood ratio of the direction in which a skeleton faces over its opposite, by the evidence of all views, nats;
+/// 0 without a trunk.
+///
+/// * `joints`: as [`front`] takes them, metres in the world.
+/// * `views`: the camera of every view, and what it says.
+pub fn front_log_ratio_of(
+    joints: &[Option<Point3<f64>>],
+    views: &[(&Camera, FrontEvidence)],
+) -> f64 {
+    let Some(front) = front(joints) else {
+        return 0.0;
+    };
+    let known: Vec<Vector3<f64>> = joints.iter().flatten().map(|it| it.coords).collect();
+    let place = Point3::from(known.iter().sum::<Vector3<f64>>() / known.len().max(1) as f64);
+    let of_view = |(camera, evidence): &(&Camera, FrontEvidence)| {
+        front_log_ratio(front_in_view(camera, &place, &front), *evidence)
+    };
+    views.iter().map(of_view).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use geometry::{Intrinsics, Lens, LensModel};

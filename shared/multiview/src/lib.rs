@@ -143,7 +143,7 @@ pub use facing::{
     Exchanges, Facing, FacingFilter, FacingHypothesis, FacingSettings, PairEnergies, is_exchanged,
     rank_facing,
 };
-pub use front::{FrontEvidence, front, front_in_view, front_log_ratio};
+pub use front::{FrontEvidence, front, front_in_view, front_log_ratio, front_log_ratio_of};
 pub use heat_map::heat_map;
 pub use optimise::{Iteration, PairEstimate, PairStart, estimate_pair};
 pub use pair::PairInput;

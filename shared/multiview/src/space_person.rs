@@ -1,9 +1,10 @@
 //! A person of whom nothing is known, solved in space: which views name left and right the other way round, which look elsewhere, and
 //! how tall the person is.
 
-use nalgebra::{Point3, Vector3};
+use geometry::Camera;
+use nalgebra::Point3;
 
-use crate::front::{front, front_in_view, front_log_ratio};
+use crate::front::{FrontEvidence, front_log_ratio_of};
 use crate::space_solve::solve_in_space;
 use crate::space_tree::{
     LIMBS, N, SpacePose, SpaceSettings, SpaceView, best_on_tree, lengths_of, places,
@@ -159,17 +160,9 @@ fn improves(
 /// Shoulders that are turned by an angle to the viewing directions of two pairs of opposite cameras, and shoulders that are turned by as
 /// much the other way, look alike but for their names: where left and right follow the picture, this alone tells them apart.
 fn front_agreement(views: &[SpaceView<'_>], found: &SpacePose) -> f64 {
-    let Some(front) = front(&found.joints) else {
-        return 0.0;
-    };
-    let known: Vec<Point3<f64>> = found.joints.iter().flatten().copied().collect();
-    let sum: Vector3<f64> = known.iter().map(|it| it.coords).sum();
-    let place = Point3::from(sum / known.len().max(1) as f64);
-    let of_view = |it: &SpaceView<'_>| {
-        let in_view = front_in_view(it.camera, &place, &front);
-        front_log_ratio(in_view, it.front) / 2.0
-    };
-    views.iter().map(of_view).sum::<f64>().abs()
+    let said = views.iter().map(|it| (it.camera, it.front));
+    let said: Vec<(&Camera, FrontEvidence)> = said.collect();
+    front_log_ratio_of(&found.joints, &said).abs() / 2.0
 }
 
 fn set_exchanged(views: &mut [SpaceView<'_>], combination: usize) {
