@@ -16,7 +16,7 @@ impl View<'_> {
         (image, stamp): (Rgb8View<'_>, Stamp),
         state: &mut NetworkState,
     ) -> Result<Result<Found<'_>, Status>, Failure> {
-        state.begin(stamp.frame, self.job.most_apart);
+        state.memory.begin(stamp.frame, self.job.most_apart);
         let looked = step.look(image, &mut state.memory);
         let scope = match looked {
             Ok(scope) => scope,

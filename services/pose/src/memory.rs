@@ -22,8 +22,6 @@ pub(crate) struct NetworkState {
     pub(crate) memory: NetworkMemory,
     /// Responses that do not lie in shared memory.
     pub(crate) responses: Vec<f32>,
-    /// The last frame that was looked at.
-    pub(crate) last: Option<u64>,
     /// When somebody was seen last, or a warning was given, and the number of frames since.
     pub(crate) nobody: Option<(u64, u64)>,
     /// Whether a failure of the network was told.
@@ -31,17 +29,6 @@ pub(crate) struct NetworkState {
 }
 
 impl NetworkState {
-    /// Begins with a frame; people are looked for in it if it is long after the last one: frames between were dropped, or lost.
-    ///
-    /// * `most_apart`: most frames from one in which people are seen to the next one in which they can be followed.
-    pub(crate) fn begin(&mut self, frame: u64, most_apart: Option<u64>) {
-        let apart = self.last.map(|last| frame.saturating_sub(last));
-        if apart.zip(most_apart).is_some_and(|(it, most)| it > most) {
-            self.memory.search_next();
-        }
-        self.last = Some(frame);
-    }
-
     /// Warns if nobody has been seen for a minute.
     pub(crate) fn sees(&mut self, is_somebody: bool, stamp: &Stamp) {
         let now = stamp.captured_at_nanos;

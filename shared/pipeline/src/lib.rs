@@ -41,6 +41,6 @@ pub use network_step::{Boxes, Eyes, MOST_VALUES, NetworkSettings, NetworkStep};
 pub use people::{Person, people};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
-pub use space_step::{SpaceResult, SpaceStep, WELL_SEEN};
+pub use space_step::{SpaceResult, SpaceStep};
 pub use view_result::{ExtraKeypoint, ViewResult};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

@@ -23,6 +23,8 @@ pub struct NetworkMemory {
     pub(crate) shown: Vec<[f64; 4]>,
     /// Frames until boxes are looked for; none before the first frame.
     pub(crate) until: Option<u64>,
+    /// The number of the last frame, where it is told ([`Self::begin`]).
+    last: Option<u64>,
     /// Whether they were looked for in this frame.
     pub(crate) has_searched: bool,
 }
@@ -61,10 +63,17 @@ impl NetworkMemory {
         (&mut self.look, &mut self.seen[self.n_seen])
     }
 
-    /// Has people looked for in the next frame, whenever they were last: so much time has passed that they may be elsewhere.
-    pub fn search_next(&mut self) {
-        // The first frame is searched anyway, and sets its own phase.
-        self.until = self.until.map(|_| 0);
+    /// Begins with a frame; people are looked for in it if it is long after the last one: frames between were dropped, or lost.
+    ///
+    /// * `frame`: its number.
+    /// * `most_apart`: most frames from one in which people are seen to the next one in which they can be followed.
+    pub fn begin(&mut self, frame: u64, most_apart: Option<u64>) {
+        let apart = self.last.map(|last| frame.saturating_sub(last));
+        if apart.zip(most_apart).is_some_and(|(it, most)| it > most) {
+            // The first frame is searched anyway, and sets its own phase.
+            self.until = self.until.map(|_| 0);
+        }
+        self.last = Some(frame);
     }
 
     /// Whether boxes were looked for in this frame.
@@ -100,4 +109,27 @@ pub(crate) fn is_known(seen: &[Seen], n: usize) -> bool {
         let middle = distances.get(distances.len() / 2);
         middle.is_some_and(|it| *it < TWIN * (bottom - top))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn people_are_looked_for_after_frames_that_are_missing() {
+        let after = |frames: &[u64], most_apart: Option<u64>| {
+            let mut memory = NetworkMemory {
+                until: Some(7),
+                ..NetworkMemory::default()
+            };
+            for frame in frames {
+                memory.begin(*frame, most_apart);
+            }
+            memory.until
+        };
+        assert_eq!(after(&[3, 4, 6], Some(2)), Some(7));
+        assert_eq!(after(&[3, 4, 7], Some(2)), Some(0));
+        assert_eq!(after(&[30], Some(2)), Some(7), "the first frame");
+        assert_eq!(after(&[3, 90], None), Some(7), "no rate is known");
+    }
 }

@@ -186,8 +186,7 @@ impl NetworkStep {
         } else {
             for track in &tracks {
                 if is_due || track.is_doubtful {
-                    let boxes = [track.outline, wider(track.outline, &found)];
-                    sightings.see(&boxes, track.usual_score, memory)?;
+                    sightings.see(track, wider(track.outline, &found), memory)?;
                 } else {
                     sightings.see_again(track, memory)?;
                 }

@@ -67,23 +67,21 @@ impl Sightings<'_> {
         Ok(self.keep_look(&best, None, memory))
     }
 
-    /// Looks at a person of the frame before in several boxes and around what is seen there, and keeps the best sight if it is good.
-    ///
-    /// * `outlines`: nothing is done where somebody is known in the first.
+    /// Looks at a person of the frame before, where nobody is known yet, in a wider box as well and around what is seen there, and keeps
+    /// the best sight if it is good.
     pub(crate) fn see(
         &self,
-        outlines: &[[f64; 4]],
-        usual_score: f32,
+        track: &Track,
+        wider: [f64; 4],
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
-        let first = outlines.first();
-        if !first.is_some_and(|it| self.is_unknown(*it, memory)) {
+        if !self.is_unknown(track.outline, memory) {
             return Ok(());
         }
         let (look, seen) = memory.next();
-        let what = (self.image, outlines);
+        let what = (self.image, &[track.outline, wider][..]);
         if let Some(best) = self.looker.best_of(what, look, &mut seen.maps)? {
-            self.keep_look(&best, Some(usual_score), memory);
+            self.keep_look(&best, Some(track.usual_score), memory);
         }
         Ok(())
     }

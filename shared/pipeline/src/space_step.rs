@@ -23,8 +23,8 @@ use crate::view_result::ViewResult;
 /// Number of joints.
 const N: usize = PARSE14.joints.len();
 /// Least number of joints that two views see well of a person: half of it is often hidden. Of what was seen in six empty rooms the
-/// seventh best joint had a heat of 0.41 in two views at most, of people who stood, sat or ran 0.58 at least.
-pub const WELL_SEEN: usize = 7;
+/// seventh best joint had a heat of 0.41 in two views at most, of people who stood, sat or ran before three cameras or four 0.58 at least.
+const WELL_SEEN: usize = 7;
 /// Least number of joints that a view sees of a person in which it has a part.
 const SEEN: usize = 3;
 /// The person of a frame in space.
@@ -51,7 +51,7 @@ impl SpaceStep {
     ///
     /// * `plans`: the views of the rig, in the rig's order, with a tree of [`posenetwork::springs`].
     /// * `maps`: how the maps became evidence.
-    /// * `least_heat`: that the [`WELL_SEEN`] joints of a person that are seen best have in two views each, 0 to 1.
+    /// * `least_heat`: that half of a person's joints have in two views each, 0 to 1.
     pub fn new(
         plans: Vec<Arc<ViewPlan>>,
         settings: SpaceSettings,
@@ -253,7 +253,7 @@ impl SpaceStep {
                 exchanged: *exchanged,
                 ..*space
             };
-            if self.least_heat > 0.0 && !self.shows(found, &space) {
+            if !self.shows(found, &space) {
                 continue;
             }
             let (pose, sigma_px) = self.projected(found, *view, evidence, &space);

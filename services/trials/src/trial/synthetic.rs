@@ -26,7 +26,7 @@ const OVERLAY_EVERY: u64 = 4;
 pub(crate) enum Finder {
     /// Who does by default: the network that ships.
     Default,
-    /// The filters, near the last pose. They need no more time for a person who is hard to find.
+    /// The filters, near the last pose.
     TrackingFilters,
 }
 
