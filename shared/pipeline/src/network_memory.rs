@@ -8,6 +8,9 @@ use crate::tracks::Track;
 
 /// People half of whose joints are nearer to each other, as a share of the height of the network's window, are one.
 const TWIN: f64 = 0.05;
+/// Nobody leaves the box of the last frame within this share of the time for which people can be followed without a frame: a person
+/// who runs moves 0.2 m in 0.07 s.
+const SOON: f64 = 1.0 / 6.0;
 
 /// What the step keeps from frame to frame: memory that is used again, and the boxes of the people it sees.
 #[derive(Debug, Default)]
@@ -25,6 +28,8 @@ pub struct NetworkMemory {
     pub(crate) until: Option<u64>,
     /// The number of the last frame, where it is told ([`Self::begin`]).
     last: Option<u64>,
+    /// Whether the last frame is so short a time ago that nobody has left their box.
+    pub(crate) is_soon: bool,
     /// Whether they were looked for in this frame.
     pub(crate) has_searched: bool,
 }
@@ -69,7 +74,10 @@ impl NetworkMemory {
     /// * `most_apart`: most frames from one in which people are seen to the next one in which they can be followed.
     pub fn begin(&mut self, frame: u64, most_apart: Option<u64>) {
         let apart = self.last.map(|last| frame.saturating_sub(last));
-        if apart.zip(most_apart).is_some_and(|(it, most)| it > most) {
+        let share = apart.zip(most_apart);
+        let share = share.map(|(it, most)| it as f64 / most as f64);
+        self.is_soon = share.is_some_and(|it| it <= SOON);
+        if share.is_some_and(|it| it > 1.0) {
             // The first frame is searched anyway, and sets its own phase.
             self.until = self.until.map(|_| 0);
         }
@@ -131,5 +139,21 @@ mod tests {
         assert_eq!(after(&[3, 4, 7], Some(2)), Some(0));
         assert_eq!(after(&[30], Some(2)), Some(7), "the first frame");
         assert_eq!(after(&[3, 90], None), Some(7), "no rate is known");
+    }
+
+    #[test]
+    fn nobody_leaves_their_box_between_two_frames_of_a_fast_camera() {
+        let is_soon = |frames: &[u64], most_apart: Option<u64>| {
+            let mut memory = NetworkMemory::default();
+            for frame in frames {
+                memory.begin(*frame, most_apart);
+            }
+            memory.is_soon
+        };
+        assert!(is_soon(&[3, 4], Some(24)), "at 60 frames a second");
+        assert!(!is_soon(&[3, 4], Some(2)), "at 5 frames a second");
+        assert!(!is_soon(&[3, 8], Some(24)), "four frames were dropped");
+        assert!(!is_soon(&[3], Some(24)), "the first frame");
+        assert!(!is_soon(&[3, 4], None), "no rate is known");
     }
 }

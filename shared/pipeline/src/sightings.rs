@@ -86,8 +86,8 @@ impl Sightings<'_> {
         Ok(())
     }
 
-    /// Looks at a person of the frame before, where nobody is known yet, and closer if the person has moved far since; keeps what is
-    /// seen well.
+    /// Looks at a person of the frame before, where nobody is known yet, and closer if the person has moved far since, which takes
+    /// some time; keeps what is seen well.
     pub(crate) fn see_again(
         &self,
         track: &Track,
@@ -96,6 +96,7 @@ impl Sightings<'_> {
         if !self.is_unknown(track.outline, memory) {
             return Ok(());
         }
+        let is_soon = memory.is_soon;
         let (look, seen) = memory.next();
         let network = self.looker.network;
         let Some(sight) = network.look(self.image, track.outline, look.workspace())? else {
@@ -105,7 +106,7 @@ impl Sightings<'_> {
         seen.outline = track.outline;
         seen.front = sight.front();
         seen.usual_score = Some(track.usual_score);
-        if has_moved(&seen.maps, track.outline) {
+        if !is_soon && has_moved(&seen.maps, track.outline) {
             let first = self
                 .looker
                 .judge(track.outline, seen.front, look, &mut seen.maps);
