@@ -168,3 +168,139 @@ fn read(finished: &Arc<Finished>, at: usize, shown: &[bool; MAX_VIEWS]) -> Vec<M
     messages.push(Message::Text(moment.text().into()));
     messages
 }
+
+#[cfg(test)]
+mod tests {
+    use geometry::{Camera, Intrinsics, Lens};
+    use nalgebra::{Isometry3, Vector3};
+    use skeleton::PARSE14;
+
+    use super::*;
+    use crate::scene::{Scene, View};
+
+    /// What pages ask.
+    const QUESTIONS: [&str; 8] = [
+        r#"{"pictures":[0,1]}"#,
+        r#"{"pictures":[]}"#,
+        r#"{"pictures":[18446744073709551615,0,0,7]}"#,
+        r#"{"record":true}"#,
+        r#"{"at":12}"#,
+        r#"{"epipolar":[[0,[320.5,240.25]],[1,[-1e300,0]],[9,[0,0]]]}"#,
+        r#"{"pictures":[1],"at":0,"record":false,"epipolar":[[1,[1e308,-1e308]]]}"#,
+        r#"{"epipolar":[[0,[0,0]],[0,[639,479]],[0,[1e5,1e5]],[1,[320,240]]]}"#,
+    ];
+
+    fn page() -> Page {
+        let intrinsics = Intrinsics {
+            size: [640, 480],
+            fx: 500.0,
+            fy: 500.0,
+            cx: 319.5,
+            cy: 239.5,
+            lens: Lens::default(),
+        };
+        let view = |x: f64| View {
+            name: x.to_string(),
+            size: [640, 480],
+            camera: Some(Camera {
+                name: x.to_string(),
+                intrinsics: intrinsics.clone(),
+                camera_from_world: Isometry3::new(
+                    Vector3::new(x, 0.0, 3.0),
+                    Vector3::new(0.0, x, 0.0),
+                ),
+            }),
+        };
+        let scene = Scene {
+            name: "test".to_owned(),
+            views: vec![view(0.0), view(0.5)],
+            joints: &PARSE14,
+            up: [0.0, 0.0, 1.0],
+            frame_rate_hz: None,
+            problem: None,
+        };
+        let board = Board::new();
+        board.begin(&json!({ "type": "hello" }), Some(Arc::new(scene)));
+        Page {
+            site: Site {
+                board: Arc::new(board),
+                finished: None,
+                token: None,
+            },
+            shown: [false; MAX_VIEWS],
+            seen: 0,
+            n_refused: 0,
+        }
+    }
+
+    /// The answers to a question; they must be JSON, and only what is no question is refused.
+    fn ask(page: &mut Page, question: &str) -> Vec<Value> {
+        let refused_before = page.n_refused;
+        let runtime = tokio::runtime::Builder::new_current_thread().build();
+        let answers = runtime.unwrap().block_on(page.answer(question));
+        let is_question = serde_json::from_str::<Question>(question).is_ok();
+        assert_eq!(
+            page.n_refused - refused_before,
+            u32::from(!is_question),
+            "{question:?}"
+        );
+        let answers = answers
+            .iter()
+            .map(|it| serde_json::from_str(it.to_text().unwrap()));
+        let answers: Vec<Value> = answers.collect::<Result<_, _>>().unwrap();
+        assert!(answers.len() <= 1, "{question:?}: {answers:?}");
+        answers
+    }
+
+    #[test]
+    fn lines_are_drawn_for_points_that_exist_and_what_is_no_question_is_refused() {
+        let mut page = page();
+        let lines = ask(&mut page, QUESTIONS[5]);
+        assert_eq!(lines[0]["type"], "epipolar");
+        let between: Vec<[u64; 2]> = lines[0]["lines"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|it| [it[0].as_u64().unwrap(), it[1].as_u64().unwrap()])
+            .collect();
+        assert!(
+            between.contains(&[0, 1]) && between.iter().all(|it| it.iter().all(|it| *it < 2)),
+            "{between:?}"
+        );
+        let refused = ask(&mut page, r#"{"pictures":[-1]}"#);
+        assert_eq!(refused[0]["type"], "refused");
+        assert_eq!(ask(&mut page, r#"{"record":true}"#), Vec::<Value>::new());
+        assert_eq!(page.board().take_record(), Some(true));
+    }
+
+    #[test]
+    fn a_page_stands_whatever_it_is_asked_and_its_counts_end_at_nothing() {
+        let mut random = fastrand::Rng::with_seed(1);
+        let mut page = page();
+        for _ in 0..4000 {
+            let seed = *random.choice(&QUESTIONS).unwrap();
+            let mut bytes = seed.as_bytes().to_vec();
+            for _ in 0..random.usize(0..4) {
+                let at = random.usize(0..=bytes.len());
+                let end = (at + random.usize(0..6)).min(bytes.len());
+                let other = random.choice(&QUESTIONS).unwrap().as_bytes();
+                let from = random.usize(0..other.len());
+                match random.u8(0..4) {
+                    0 => drop(bytes.drain(at..end)),
+                    1 => drop(bytes.splice(at..end, other[from..].iter().copied().take(9))),
+                    2 => drop(bytes.splice(
+                        at..at,
+                        b"-9e]["[random.usize(0..5)..].iter().copied().take(1),
+                    )),
+                    _ => bytes[at..end].fill(random.u8(b' '..b'~')),
+                }
+            }
+            ask(&mut page, &String::from_utf8_lossy(&bytes));
+        }
+        let site = page.site.clone();
+        assert!((0..MAX_VIEWS).any(|it| site.board.wants(it)));
+        site.board.pages().fetch_add(1, Ordering::Relaxed);
+        drop(page);
+        assert!((0..MAX_VIEWS).all(|it| !site.board.wants(it)));
+    }
+}
