@@ -19,6 +19,8 @@ use crate::scene::Scene;
 
 /// How often the state of the processes is read.
 const STATE_PERIOD: Duration = Duration::from_millis(500);
+/// The longest pause between two looks at the cameras while no result comes.
+const PATIENCE: Duration = Duration::from_millis(90);
 
 /// Whether to look again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +43,8 @@ pub(crate) struct Session {
     tape: Option<Tape>,
     /// When the state was read last.
     told: Option<Instant>,
+    /// When the cameras were looked at last.
+    looked: Option<Instant>,
     /// The session in the messages, once it is known.
     run: Option<u64>,
     namespace: Namespace,
@@ -100,6 +104,7 @@ impl Session {
             cameras,
             tape: None,
             told: None,
+            looked: None,
             run: None,
             namespace,
             _bus: bus,
@@ -119,15 +124,19 @@ impl Session {
         })
     }
 
-    /// Puts what is new on the board.
+    /// Puts what is new on the board. The cameras are looked at when a result has come: to make pictures small takes time, and then
+    /// the deployment is most likely to have some.
     ///
     /// # Errors
     ///
     /// Messages cannot be received.
     pub(crate) fn look(&mut self, board: &Board) -> Result<Look, Failure> {
-        self.look_at_poses(board)?;
-        for view in 0..self.cameras.len() {
-            self.look_at(view, board)?;
+        let has_come = self.look_at_poses(board)?;
+        if has_come || self.looked.is_none_or(|it| it.elapsed() >= PATIENCE) {
+            self.looked = Some(Instant::now());
+            for view in 0..self.cameras.len() {
+                self.look_at(view, board)?;
+            }
         }
         if self.told.is_none_or(|it| it.elapsed() >= STATE_PERIOD) {
             self.told = Some(Instant::now());
@@ -146,26 +155,27 @@ impl Session {
         }
     }
 
-    fn look_at_poses(&mut self, board: &Board) -> Result<(), Failure> {
+    /// Whether a result has come.
+    fn look_at_poses(&mut self, board: &Board) -> Result<bool, Failure> {
         let Some(message) = self.poses.latest()? else {
-            return Ok(());
+            return Ok(false);
         };
         let scene = &self.scene;
         if message.status == Status::END {
             board.event(Weight::Note, "the footage has ended");
-            return Ok(());
+            return Ok(true);
         }
         let n_joints = scene.joints.joints.len();
         if let Err(why) = wire::check_pose3d(&message, scene.views.len(), n_joints) {
             self.events.refused(board, &why.to_string());
-            return Ok(());
+            return Ok(true);
         }
         let moment = Moment::of_message(scene, &message);
         self.events.result(board, &moment);
         if board.has_pages() {
             board.moment(moment.text());
         }
-        Ok(())
+        Ok(true)
     }
 
     fn look_at(&mut self, view: usize, board: &Board) -> Result<(), Failure> {
