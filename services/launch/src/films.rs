@@ -114,8 +114,12 @@ pub fn films(
     })
 }
 
-/// The cameras of the rig.
-fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failure> {
+/// The cameras of a deployment of footage, in its order.
+///
+/// # Errors
+///
+/// A camera is live, or not in the rig.
+pub fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failure> {
     let of_entry = |it: &deployment::capture::Camera| {
         if inputs::is_live(&it.source) {
             let message = format!(

@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use core::fmt::Write as _;
+use std::process::Command;
 
 use geometry::Rig;
 use nalgebra::Point3;
@@ -139,4 +140,86 @@ fn what_tells_nothing_is_refused_and_nothing_is_written() {
     let ended = estimate(&still, &[]);
     assert_eq!(ended.status.code(), Some(5), "{}", ended.stderr);
     assert!(ended.stderr.contains("c7"), "{}", ended.stderr);
+}
+
+/// A video of a tenth of a picture a second, with the sounds that begin at some times; false, with a message, without ffmpeg.
+#[expect(clippy::print_stderr, reason = "a skipped test must say so")]
+fn video(case: &Case, name: &str, sounds_s: &[f64], length_s: f64) -> bool {
+    let mut samples = vec![0_i16; (length_s * 8000.0) as usize];
+    for (nth, at_s) in sounds_s.iter().enumerate() {
+        let mut random = fastrand::Rng::with_seed(nth as u64);
+        let from = (at_s * 8000.0) as usize;
+        for (since, sample) in samples.iter_mut().skip(from).take(900).enumerate() {
+            let level = 9000.0 * (-(since as f64) / 200.0).exp();
+            *sample = (level * (random.f64() - 0.5)) as i16;
+        }
+    }
+    let bytes: Vec<u8> = samples.iter().flat_map(|it| it.to_le_bytes()).collect();
+    case.write(&format!("{name}.raw"), bytes);
+    let made = Command::new("ffmpeg")
+        .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i"])
+        .arg(format!("testsrc=size=64x48:rate=25:duration={length_s}"))
+        .args(["-f", "s16le", "-ar", "8000", "-ac", "1", "-i"])
+        .arg(case.path(&format!("{name}.raw")))
+        .arg(case.path(&format!("{name}.mp4")))
+        .status();
+    if made.is_err() {
+        eprintln!("skipped: there is no ffmpeg on the PATH");
+    }
+    made.is_ok_and(|it| it.success())
+}
+
+#[test]
+fn clocks_are_found_by_the_sounds_of_the_videos() {
+    let scene = scene();
+    let rig = scene.rig();
+    let case = case(&scene, rig, |_, _| 0.5);
+    let sounds_s = [2.1, 2.9, 4.4, 4.95, 6.3, 8.0, 8.45, 9.9];
+    for (camera, begin_s) in rig.cameras().iter().zip(BEGIN_S) {
+        let own: Vec<f64> = sounds_s.iter().map(|it| it - begin_s).collect();
+        if !video(&case, &camera.name, &own, 11.0) {
+            return;
+        }
+        let keypoints = format!("keypoints = {:?}", camera.name);
+        let source = format!("source = \"{}.mp4\"", camera.name);
+        case.edit(
+            "deployment.toml",
+            &keypoints,
+            &format!("{source}\n{keypoints}"),
+        );
+    }
+    let ended = estimate(
+        &case,
+        &["--by", "sound", "--out", "clocks.html", "--write", "--json"],
+    );
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let found: Value = serde_json::from_str(&ended.stdout).unwrap();
+    for (camera, begin_s) in found["cameras"].as_array().unwrap().iter().zip(BEGIN_S) {
+        let off_ms = camera["offset_ms"].as_f64().unwrap() - 1e3 * (begin_s - BEGIN_S[0]);
+        assert!(off_ms.abs() < 2.0, "{found:#}");
+        assert_eq!(camera["joints"], 8, "{found:#}");
+    }
+    let page = std::fs::read_to_string(case.path("clocks.html")).unwrap();
+    assert!(page.contains("beginnings of sounds"), "{page:.2000}");
+    let text = std::fs::read_to_string(case.path("deployment.toml")).unwrap();
+    assert_eq!(text.matches("offset_ms = ").count(), 3, "{text}");
+
+    // A camera that heard nothing, and one without a microphone.
+    video(&case, "quiet", &[], 11.0);
+    case.edit("deployment.toml", "c2.mp4", "quiet.mp4");
+    let ended = estimate(&case, &["--by", "sound"]);
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("c2: 0 sounds begin"),
+        "{}",
+        ended.stderr
+    );
+    case.edit("deployment.toml", "source = \"quiet.mp4\"\n", "");
+    let ended = estimate(&case, &["--by", "sound"]);
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("\"c2\": it has no footage"),
+        "{}",
+        ended.stderr
+    );
 }

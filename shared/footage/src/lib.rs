@@ -35,8 +35,8 @@ pub use pixels::PixelFormat;
 pub use remade::RemadeStream;
 pub use size::Size;
 pub use source::{
-    FrameView, LiveAddress, Source, SourceInfo, SourceKind, Turn, is_address, is_image, is_live,
-    read_image, read_upright, without_passwords,
+    FrameView, LiveAddress, RecordedSound, Source, SourceInfo, SourceKind, Turn, is_address,
+    is_image, is_live, read_image, read_sound, read_upright, without_passwords,
 };
 pub use spec::SourceSpec;
 pub use stream::{LiveStream, StreamEnd, StreamFrame, StreamSpec, Transport};

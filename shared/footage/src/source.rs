@@ -7,6 +7,7 @@ mod live;
 pub(crate) mod log;
 pub(crate) mod password;
 pub(crate) mod probe;
+mod sound;
 mod video;
 
 use std::path::Path;
@@ -18,6 +19,7 @@ pub use images::{is_image, read_image, read_upright};
 use listing::Listing;
 pub use live::{LiveAddress, is_address, is_live};
 pub use password::without_passwords;
+pub use sound::{RecordedSound, read_sound};
 use video::Video;
 
 use crate::{FootageError, Size, SourceSpec};

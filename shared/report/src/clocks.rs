@@ -20,6 +20,8 @@ pub struct Page<'a> {
     pub names: &'a [&'a str],
     /// What came out.
     pub outcome: &'a Outcome,
+    /// Whether sounds were compared, and not joints.
+    pub is_heard: bool,
     /// What was looked at: key and value.
     pub about: &'a [(String, String)],
 }
@@ -32,11 +34,16 @@ pub fn html(page: &Page<'_>) -> String {
     verdict(&mut out, ("determined", "not to be used"), &doubts);
     about_table(&mut out, page.about);
     cameras(&mut out, page);
+    let cost = if page.is_heard {
+        "One less the cosine between the beginnings of sounds"
+    } else {
+        "Mean cost of a joint, log(1 + (residual / expected error)&#178;)"
+    };
     put!(
         out,
-        "<h2>Cost of every pair over its offset</h2>\n<p><small>Mean cost of a joint, log(1 + (residual / expected error)&#178;): \
-         lower is better. The offset is what is added to a time of the first camera to have that of the second. Line: the pair's own \
-         best; dashes: its second best; grey: what all cameras together say.</small></p>\n"
+        "<h2>Cost of every pair over its offset</h2>\n<p><small>{}: lower is better. The offset is what is added to a time of the first camera to have that of the second. Line: the pair's own \
+         best; dashes: its second best; grey: what all cameras together say.</small></p>\n",
+        Html::constant(cost)
     );
     for (curve, pair) in page.outcome.curves.iter().zip(&page.outcome.pairs) {
         pair_plot(&mut out, page.names, curve, pair);
@@ -49,7 +56,8 @@ fn cameras(out: &mut Html, page: &Page<'_>) {
     put!(
         out,
         "<h2>Cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>camera<th>offset, ms<th>standard error, ms<th>drift, ppm\
-         <th>standard error, ppm<th>joints<th>residual before, px<th>after, px</tr>\n"
+         <th>standard error, ppm<th>{}<th>residual before, px<th>after, px</tr>\n",
+        if page.is_heard { "sounds" } else { "joints" }
     );
     for (name, it) in page.names.iter().zip(&page.outcome.cameras) {
         let drift_error = it.drift_error;
@@ -216,6 +224,7 @@ mod tests {
             html(&Page {
                 names: &["<left>", "right"],
                 outcome,
+                is_heard: false,
                 about: &[("deployment".to_owned(), "a & b".to_owned())],
             })
         };

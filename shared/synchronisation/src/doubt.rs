@@ -94,6 +94,41 @@ pub enum Doubt {
         /// The largest that is accepted.
         most: f64,
     },
+    /// A camera recorded hardly any sound that begins.
+    Quiet {
+        /// The camera.
+        camera: usize,
+        /// Sounds that begin.
+        n: usize,
+        /// The least.
+        least: usize,
+    },
+    /// A camera did not hear what the others heard, or it fits at several offsets; the pair is the one that fits best.
+    Unheard {
+        /// The cameras.
+        cameras: [usize; 2],
+        /// Beginnings of sounds that fall together.
+        n: usize,
+        /// The least.
+        least: usize,
+        /// The cosine between their beginnings.
+        cosine: f64,
+        /// The least that is accepted.
+        least_cosine: f64,
+        /// How good another offset is, as a share.
+        ratio: f64,
+        /// The largest that is accepted.
+        most_ratio: f64,
+    },
+    /// A pair heard sounds further apart than their way and the offsets of all allow.
+    Heard {
+        /// The cameras.
+        cameras: [usize; 2],
+        /// By how much, seconds.
+        away_s: f64,
+        /// The largest that is accepted.
+        most_s: f64,
+    },
     /// Two parts of the footage tell different offsets.
     Parts {
         /// The camera.
@@ -117,7 +152,9 @@ impl Doubt {
     pub fn cameras(&self) -> Vec<usize> {
         match self {
             Self::Ambiguous { cameras, .. } => cameras.clone(),
-            Self::Pair { cameras, .. } => cameras.to_vec(),
+            Self::Pair { cameras, .. }
+            | Self::Unheard { cameras, .. }
+            | Self::Heard { cameras, .. } => cameras.to_vec(),
             Self::NoPeople { camera, .. }
             | Self::Unconnected { camera, .. }
             | Self::Edge { camera, .. }
@@ -125,6 +162,7 @@ impl Doubt {
             | Self::Still { camera, .. }
             | Self::Misfit { camera, .. }
             | Self::Speed { camera, .. }
+            | Self::Quiet { camera, .. }
             | Self::Parts { camera, .. } => vec![*camera],
         }
     }
@@ -265,6 +303,48 @@ impl Worded<'_> {
                 f,
                 "{}: parts of the footage tell offsets {:.0} ms apart, at most {:.0} ms is accepted: frames missing, or another speed",
                 name(camera),
+                1e3 * *away_s,
+                1e3 * *most_s
+            ),
+            _ => self.sound(f),
+        }
+    }
+
+    /// What was heard.
+    fn sound(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = |it: &usize| self.names.get(*it).map_or("?", |it| it);
+        match self.doubt {
+            Doubt::Quiet { camera, n, least } => write!(
+                f,
+                "{}: {n} sounds begin in its recording, at least {least} are needed: clap a few times, unevenly",
+                name(camera)
+            ),
+            Doubt::Unheard {
+                cameras: [a, b],
+                n,
+                least,
+                cosine,
+                least_cosine,
+                ratio,
+                most_ratio,
+            } => write!(
+                f,
+                "{} and {}: {n} sounds begin together at the best offset (at least {least}), with a cosine of {cosine:.2} (at least \
+                 {least_cosine:.1}); another offset is {:.0} % as good (at most {:.0} %): not of one room, outside the search, or a beat",
+                name(a),
+                name(b),
+                100.0 * ratio,
+                100.0 * most_ratio
+            ),
+            Doubt::Heard {
+                cameras: [a, b],
+                away_s,
+                most_s,
+            } => write!(
+                f,
+                "{} and {}: by themselves {:+.0} ms away from what all cameras say, at most {:.0} ms is accepted",
+                name(a),
+                name(b),
                 1e3 * *away_s,
                 1e3 * *most_s
             ),

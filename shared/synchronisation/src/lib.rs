@@ -1,4 +1,4 @@
-//! Offset and drift of the clocks of cameras, from the movement of people that they see.
+//! Offset and drift of the clocks of cameras, from the movement of people that they see, or from the sounds that they hear.
 //!
 //! A joint that two cameras see at one instant fulfils their epipolar constraint; at two instants it does not, because the
 //! person moves. The offset between two clocks is where the constraint holds best.
@@ -13,6 +13,7 @@
 //! | the offsets of all cameras that agree best, and the second best | `search` |
 //! | offsets and drifts to fractions of a frame, with standard errors | `refine` |
 //! | why an answer is not to be trusted | `doubt` |
+//! | all of this from sounds ([`estimate_by_sound`]) | `sound` |
 //!
 //! Times are seconds, places pixels of the recorded picture. A camera's time `t` by its own clock is
 //! `t + offset + drift * t` on the common clock, which is that of the reference camera. Pure: no clock, file or thread.
@@ -25,6 +26,7 @@ mod film;
 mod pair;
 mod refine;
 mod search;
+mod sound;
 mod track;
 
 #[cfg(test)]
@@ -36,4 +38,5 @@ pub use curve::Curve;
 pub use doubt::Doubt;
 pub use estimate::{CameraClock, Outcome, PairReport, Settings, estimate};
 pub use film::{Film, FilmError, Joint, Person, Shot};
+pub use sound::{Sound, SoundSettings, estimate_by_sound};
 pub use track::{Place, Track, tracks};

@@ -1,9 +1,11 @@
 //! `parallax sync`: the clocks of the cameras of recorded footage.
 
+mod heard;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use deployment::{ClockKeys, Deployment, with_clocks};
 use launch::films::{Films, Part, Poses, films};
 use launch::{load, output};
@@ -23,7 +25,7 @@ const BAR: &str =
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Estimate offset and drift of every camera from the movement of people.
+    /// Estimate offset and drift of every camera from the movement of people, or from sounds.
     Estimate(Box<Arguments>),
 }
 
@@ -39,6 +41,10 @@ An answer is refused, with exit code 7 and the reason, where another offset is n
 is flat (nobody moves), a pair or a part of the footage contradicts the rest, the views do not fit each other, or a camera sees \
 nobody. Nothing is written then. A drift is told apart from none only in footage that is long enough; the table says so.
 
+With --by sound the times at which sounds begin are compared instead: steps, voices, doors, claps. Nobody needs to be seen. Sound \
+needs 2.9 ms for a metre, so that offsets are right to about the distance of two cameras divided by 343 m/s: +- says how much for \
+this rig. What is refused: too few sounds, sounds that only one camera has, a beat, pairs and parts that contradict each other.
+
 With --json one object:
     {\"is_determined\", \"doubts\": [text], \"reference\", \"length_s\", \"second_best\",
      \"cameras\": [{\"name\", \"offset_ms\", \"error_ms\", \"drift_ppm\", \"drift_error_ppm\", \"joints\", \"before_px\", \"after_px\",
@@ -48,10 +54,14 @@ With --json one object:
 Examples:
     parallax sync estimate my.toml
     parallax sync estimate my.toml --window 10 --write
+    parallax sync estimate my.toml --by sound --window 10 --write
     parallax sync estimate my.toml --every 2 --seconds 30 --out clocks.html --json")]
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
+    /// What is compared.
+    #[arg(long, value_enum, default_value_t = By::Movement)]
+    by: By,
     /// How far the clocks of two cameras may be apart, seconds; 10 for footage that was started by hand.
     #[arg(long, value_name = "SECONDS", default_value_t = 2.0, value_parser = window)]
     window: f64,
@@ -79,6 +89,15 @@ pub(crate) struct Arguments {
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// What tells the clocks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum By {
+    /// The movement of people.
+    Movement,
+    /// The beginnings of sounds.
+    Sound,
 }
 
 fn window(text: &str) -> Result<f64, String> {
@@ -111,9 +130,17 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
         from_s: arguments.from,
         seconds: arguments.seconds,
     };
-    let found = films(&deployment, part, Poses::OfRig, (&stop, &terminal))?;
-    terminal.begin("", "comparing");
-    let (outcome, finders) = compared(found, reference, arguments.window, &stop)?;
+    let (outcome, finders) = match arguments.by {
+        By::Movement => {
+            let found = films(&deployment, part, Poses::OfRig, (&stop, &terminal))?;
+            terminal.begin("", "comparing");
+            compared(found, reference, arguments.window, &stop)?
+        }
+        By::Sound => {
+            terminal.begin("", "listening");
+            heard::compared(&deployment, part, (reference, arguments.window), &stop)?
+        }
+    };
     terminal.finish();
     let names: Vec<&str> = deployment
         .cameras
@@ -123,13 +150,13 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
     if arguments.json {
         output::json(&as_json(&outcome, &names, &finders, reference))?;
     } else {
-        table(&outcome, &names, reference)?;
+        table(&outcome, &names, (reference, arguments.by))?;
     }
     if let Some(file) = &arguments.out {
         write_page(file, arguments, &outcome, &names, &finders)?;
         output::message(format_args!("wrote {}", file.display()));
     }
-    refuse(&outcome, &names)?;
+    refuse(&outcome, &names, arguments.by)?;
     if arguments.write {
         write(&arguments.config, &outcome, &names)?;
         output::message(format_args!(
@@ -194,14 +221,18 @@ fn compared(
     Ok((outcome, finders))
 }
 
-fn table(outcome: &Outcome, names: &[&str], reference: usize) -> Result<(), Failure> {
+fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Result<(), Failure> {
+    let counted = match by {
+        By::Movement => "joints",
+        By::Sound => "sounds",
+    };
     output::line(format_args!(
         "offsets against {} from {:.1} s of footage; what is added to a camera's times to have the common ones",
         names[reference], outcome.length_s
     ))?;
     output::line(format_args!(
         "{:<12} {:>12} {:>8} {:>11} {:>8} {:>8} {:>10} {:>9}",
-        "camera", "offset, ms", "+-", "drift, ppm", "+-", "joints", "before, px", "after, px"
+        "camera", "offset, ms", "+-", "drift, ppm", "+-", counted, "before, px", "after, px"
     ))?;
     for (name, it) in names.iter().zip(&outcome.cameras) {
         let drift = it
@@ -213,14 +244,14 @@ fn table(outcome: &Outcome, names: &[&str], reference: usize) -> Result<(), Fail
                 ]
             });
         output::line(format_args!(
-            "{name:<12} {:>12.2} {:>8.2} {:>11} {:>8} {:>8} {:>10.2} {:>9.2}",
+            "{name:<12} {:>12.2} {:>8.2} {:>11} {:>8} {:>8} {:>10} {:>9}",
             1e3 * it.offset_s,
             1e3 * it.error_s,
             drift[0],
             drift[1],
             it.n,
-            it.before_px,
-            it.after_px
+            pixels(it.before_px),
+            pixels(it.after_px)
         ))?;
     }
     if outcome.cameras.iter().all(|it| it.drift_error.is_none()) {
@@ -244,6 +275,15 @@ fn table(outcome: &Outcome, names: &[&str], reference: usize) -> Result<(), Fail
         ))?;
     }
     Ok(())
+}
+
+/// A residual, where there is one.
+fn pixels(it: f64) -> String {
+    if it.is_finite() {
+        format!("{it:.2}")
+    } else {
+        "-".to_owned()
+    }
 }
 
 fn as_json(outcome: &Outcome, names: &[&str], finders: &[String], reference: usize) -> Value {
@@ -307,27 +347,36 @@ fn write_page(
         ("window".to_owned(), format!("+-{} s", arguments.window)),
     ];
     let each = names.iter().zip(finders);
-    about.extend(each.map(|(name, finder)| (format!("joints of {name}"), finder.clone())));
+    if arguments.by == By::Movement {
+        about.extend(each.map(|(name, finder)| (format!("joints of {name}"), finder.clone())));
+    }
     let page = report::clocks::html(&report::clocks::Page {
         names,
         outcome,
+        is_heard: arguments.by == By::Sound,
         about: &about,
     });
     files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))
 }
 
 /// A failure where the answer is not to be used.
-fn refuse(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
+fn refuse(outcome: &Outcome, names: &[&str], by: By) -> Result<(), Failure> {
     if outcome.doubts.is_empty() {
         return Ok(());
     }
     let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
     let message = format!("the clocks are not determined:\n  {}", doubts.join("\n  "));
     let failure = Failure::new(ExitKind::Degraded, message);
-    Err(failure.with_hint(
-        "footage in which people walk through the view of all cameras tells most; --window searches further; \
-         `parallax calib check` looks at the calibration",
-    ))
+    Err(failure.with_hint(match by {
+        By::Movement => {
+            "footage in which people walk through the view of all cameras tells most; --window searches further; --by sound compares \
+             what the cameras heard; `parallax calib check` looks at the calibration"
+        }
+        By::Sound => {
+            "sounds that all cameras hear tell most: clap a few times, unevenly; --window searches further; without --by sound the \
+             movement of people is compared"
+        }
+    }))
 }
 
 fn write(file: &Path, outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {

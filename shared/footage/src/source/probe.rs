@@ -24,17 +24,16 @@ pub(super) struct Probe {
     pub(super) has_fps_mode: bool,
 }
 
+/// The first video stream of a file.
+const PICTURES: &str = "v:0";
 const ENTRIES: &str = "program_version=version:\
     stream=width,height,nb_frames,avg_frame_rate,r_frame_rate:format=duration";
 
 /// Probes the first video stream of `path`. Reads the whole file (without decoding) only if the
 /// container does not have the number of frames, or may not have equally spaced ones.
 pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageError> {
-    let output = run_ffprobe(
-        path,
-        spec,
-        &["-show_program_version", "-show_entries", ENTRIES],
-    )?;
+    let wanted = ["-show_program_version", "-show_entries", ENTRIES];
+    let output = run_ffprobe(path, spec, PICTURES, &wanted)?;
     let stream = &output["streams"][0];
     let side = |key: &str| stream[key].as_u64().unwrap_or(0) as usize;
     let size = Size::new(side("width"), side("height"));
@@ -54,7 +53,12 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
         has_fps_mode: has_fps_mode(output["program_version"]["version"].as_str().unwrap_or("")),
     };
     if probe.n_frames == 0 || rate_hz != fraction(&stream["r_frame_rate"]) {
-        let packets = run_ffprobe(path, spec, &["-show_entries", "packet=pts_time,flags"])?;
+        let packets = run_ffprobe(
+            path,
+            spec,
+            PICTURES,
+            &["-show_entries", "packet=pts_time,flags"],
+        )?;
         let packets = packets["packets"].as_array().map_or(&[][..], Vec::as_slice);
         probe.count(packets, number(&output["format"]["duration"]));
     }
@@ -113,13 +117,19 @@ impl Probe {
     }
 }
 
-fn run_ffprobe(path: &Path, spec: &SourceSpec, wanted: &[&str]) -> Result<Value, FootageError> {
+/// Asks `ffprobe` about a stream of a file.
+pub(super) fn run_ffprobe(
+    path: &Path,
+    spec: &SourceSpec,
+    stream: &str,
+    wanted: &[&str],
+) -> Result<Value, FootageError> {
     let Output {
         status,
         stdout,
         stderr,
     } = Command::new(&spec.ffprobe)
-        .args(["-v", "error", "-select_streams", "v:0", "-of", "json"])
+        .args(["-v", "error", "-select_streams", stream, "-of", "json"])
         .args(wanted)
         .arg(input_name(path))
         .stdin(Stdio::null())
@@ -151,7 +161,7 @@ pub(crate) fn missing(executable: &Path, path: &Path, source: io::Error) -> Foot
     }
 }
 
-fn number(value: &Value) -> Option<f64> {
+pub(super) fn number(value: &Value) -> Option<f64> {
     value.as_str()?.parse().ok()
 }
 

@@ -1,0 +1,71 @@
+//! What the cameras of a deployment heard.
+
+use deployment::Deployment;
+use footage::{RecordedSound, SourceSpec, read_sound};
+use geometry::Camera;
+use launch::films::{Part, cameras};
+use launch::inputs;
+use offline::unless_stopped;
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use synchronisation::{Outcome, Sound, SoundSettings, estimate_by_sound};
+
+/// Samples a second: most of what is heard of a room lies below half of it.
+const RATE_HZ: u32 = 8000;
+
+/// Reads the sound of every camera and compares the beginnings of sounds, which Ctrl-C ends.
+///
+/// * `reference` and `window_s`: as in [`SoundSettings`].
+pub(super) fn compared(
+    deployment: &Deployment,
+    part: Part,
+    (reference, window_s): (usize, f64),
+    stop: &Stop,
+) -> Result<(Outcome, Vec<String>), Failure> {
+    let interrupted = || Failure::new(ExitKind::Interrupted, "interrupted");
+    let cameras = cameras(deployment, &inputs::rig_of(deployment)?)?;
+    let centres = cameras.iter().map(Camera::centre_in_world).collect();
+    let mut sounds = Vec::new();
+    for camera in &deployment.cameras {
+        let name = camera.name.clone();
+        if camera.source.is_empty() {
+            return Err(silent(&name, "it has no footage"));
+        }
+        let spec = inputs::source(camera, &deployment.capture);
+        let sound = unless_stopped(stop, move || sound(&name, &spec, part))?;
+        sounds.push(sound.ok_or_else(interrupted)??);
+    }
+    let settings = SoundSettings {
+        reference,
+        window_s,
+        centres: Some(centres),
+    };
+    let outcome = unless_stopped(stop, move || estimate_by_sound(&sounds, &settings))?;
+    if stop.is_requested() {
+        return Err(interrupted());
+    }
+    let outcome = outcome.ok_or_else(interrupted)?.or_fail(ExitKind::Input)?;
+    Ok((outcome, vec!["sound".to_owned(); deployment.cameras.len()]))
+}
+
+fn sound(name: &str, spec: &SourceSpec, part: Part) -> Result<Sound, Failure> {
+    let recorded = read_sound(spec, RATE_HZ).or_fail(ExitKind::Input)?;
+    let RecordedSound { begins_s, samples } =
+        recorded.ok_or_else(|| silent(name, &format!("{} has no sound", spec.path)))?;
+    let rate_hz = f64::from(RATE_HZ);
+    let nth = |at_s: f64| ((at_s - begins_s) * rate_hz).clamp(0.0, samples.len() as f64) as usize;
+    let from = nth(part.from_s);
+    let to = part
+        .seconds
+        .map_or(samples.len(), |it| nth(part.from_s + it));
+    Ok(Sound {
+        rate_hz,
+        begins_s: begins_s + from as f64 / rate_hz,
+        samples: samples[from..to.max(from)].to_vec(),
+    })
+}
+
+fn silent(name: &str, why: &str) -> Failure {
+    let message = format!("camera {name:?}: {why}");
+    let hint = "without --by sound the movement of people is compared";
+    Failure::new(ExitKind::Input, message).with_hint(hint)
+}
