@@ -1,24 +1,73 @@
 //! Rigs from people, from rendered pictures to the file that is written.
-#![cfg(feature = "long-tests")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-/// What takes long; see `.ci/run`.
-mod long {
-    use std::path::Path;
+use std::path::Path;
 
+use geometry::Rig;
+use geometry::files::ReadOptions;
+
+use crate::sync;
+
+fn rig(path: &Path) -> Rig {
+    geometry::files::read(path, &ReadOptions::default()).unwrap()
+}
+
+#[test]
+fn the_floor_is_found_where_somebody_walked_about_and_not_with_another_rig() {
+    let scene = sync::scene();
+    let case = sync::case(&scene, scene.rig(), 400, |_, frame| {
+        frame as f64 / sync::RATE_HZ
+    });
+    let ended = case.start(&["run", "deployment.toml"]).wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let origin = |rig: &str| {
+        let words = [
+            "calibrate",
+            "origin",
+            rig,
+            "--people",
+            "out",
+            "--out",
+            "room.toml",
+        ];
+        case.start(&words).wait()
+    };
+    let ended = origin("rig.toml");
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let (found, truth) = (rig(&case.path("room.toml")), rig(&case.path("rig.toml")));
+    for (found, truth) in found.cameras().iter().zip(truth.cameras()) {
+        // The floor of the scene is where z is 0.
+        let off = found.centre_in_world().z - truth.centre_in_world().z;
+        assert!(off.abs() < 0.05, "{}: {off} m", found.name);
+    }
+    // The run was made before the rig was put on the floor.
+    case.edit(
+        "rig.toml",
+        "translation_metres = [0.0, ",
+        "translation_metres = [1.5, ",
+    );
+    let ended = origin("rig.toml");
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("no run of this rig"),
+        "{}",
+        ended.stderr
+    );
+}
+
+/// What takes long; see `.ci/run`.
+#[cfg(feature = "long-tests")]
+mod long {
     use calibration::differences;
-    use geometry::files::{Format, ReadOptions};
-    use geometry::{Camera, Rig};
+    use geometry::Camera;
+    use geometry::files::Format;
     use nalgebra::UnitQuaternion;
 
+    use super::*;
     use crate::common::{Case, Started};
 
     /// By how much the second camera of the wrong rig is turned, degrees.
     const TURNED: f64 = 2.0;
-
-    fn rig(path: &Path) -> Rig {
-        geometry::files::read(path, &ReadOptions::default()).unwrap()
-    }
 
     /// Writes the rig with the second camera turned where it stands.
     fn write_turned(case: &Case) {

@@ -11,14 +11,16 @@ use serde_json::Value;
 
 use crate::common::{Case, Ended};
 
-const RATE_HZ: f64 = 25.0;
+/// Frames a second of [`case`].
+pub(crate) const RATE_HZ: f64 = 25.0;
 const N_FRAMES: usize = 150;
 /// When the first frame of every camera was taken, seconds: 13.4 frames apart at most.
 const BEGIN_S: [f64; 3] = [0.2, 0.736, 0.456];
 /// A comment that has to stay.
 const COMMENT: &str = "# the second camera hangs from the ceiling";
 
-fn scene() -> Scene {
+/// Someone who walks, seen by three cameras.
+pub(crate) fn scene() -> Scene {
     let rig = RigChoice::Ring {
         n: 3,
         radius: 4.2,
@@ -34,7 +36,12 @@ fn scene() -> Scene {
 /// A deployment of keypoints alone.
 ///
 /// * `time_s`: when each frame of a camera shows the person.
-fn case(scene: &Scene, rig: &Rig, time_s: impl Fn(usize, usize) -> f64) -> Case {
+pub(crate) fn case(
+    scene: &Scene,
+    rig: &Rig,
+    n_frames: usize,
+    time_s: impl Fn(usize, usize) -> f64,
+) -> Case {
     let case = Case::with_rig(rig, "sync", &[0; 3], "");
     let mut text = format!(
         "name = {:?}\nrig = \"rig.toml\"\noutput = \"out\"\n[capture]\nframe_rate_hz = {RATE_HZ:?}\n[results]\noverlay_every = 0\n",
@@ -42,7 +49,7 @@ fn case(scene: &Scene, rig: &Rig, time_s: impl Fn(usize, usize) -> f64) -> Case 
     );
     for (view, camera) in rig.cameras().iter().enumerate() {
         let name = &camera.name;
-        for frame in 0..N_FRAMES {
+        for frame in 0..n_frames {
             let joints = scene.joints(time_s(view, frame)).into_iter();
             let numbers = joints.map(|it| {
                 let at = camera.project(&Point3::from(it)).unwrap();
@@ -72,7 +79,7 @@ fn estimate(case: &Case, more: &[&str]) -> Ended {
 fn clocks_are_found_written_and_used() {
     let scene = scene();
     let rig = scene.rig();
-    let case = case(&scene, rig, |view, frame| {
+    let case = case(&scene, rig, N_FRAMES, |view, frame| {
         BEGIN_S[view] + frame as f64 / RATE_HZ
     });
     let ended = estimate(
@@ -120,7 +127,7 @@ fn clocks_are_found_written_and_used() {
 fn what_tells_nothing_is_refused_and_nothing_is_written() {
     let scene = scene();
     let rig = scene.rig();
-    let still = case(&scene, rig, |_, _| 0.5);
+    let still = case(&scene, rig, N_FRAMES, |_, _| 0.5);
     let before = std::fs::read_to_string(still.path("deployment.toml")).unwrap();
     let ended = estimate(&still, &["--window", "0.5", "--write"]);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
@@ -173,7 +180,7 @@ fn video(case: &Case, name: &str, sounds_s: &[f64], length_s: f64) -> bool {
 fn clocks_are_found_by_the_sounds_of_the_videos() {
     let scene = scene();
     let rig = scene.rig();
-    let case = case(&scene, rig, |_, _| 0.5);
+    let case = case(&scene, rig, N_FRAMES, |_, _| 0.5);
     let sounds_s = [2.1, 2.9, 4.4, 4.95, 6.3, 8.0, 8.45, 9.9];
     for (camera, begin_s) in rig.cameras().iter().zip(BEGIN_S) {
         let own: Vec<f64> = sounds_s.iter().map(|it| it - begin_s).collect();

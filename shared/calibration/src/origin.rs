@@ -1,4 +1,4 @@
-//! Where the origin of the world is, and which way is up: from a board on the floor, from three points.
+//! Where the origin of the world is, and which way is up: from a board on the floor, from three points, from people who stand.
 //!
 //! The new world has z up and z = 0 on the floor.
 
@@ -8,6 +8,7 @@ use nalgebra::{
 };
 
 use crate::board::{Sight, standing_board};
+use crate::people::Floor;
 
 /// Three points whose triangle is flatter than this (sine of its angle at the origin) tell no floor.
 const FLATTEST: f64 = 0.05;
@@ -137,6 +138,15 @@ pub fn from_board(
     let along = world_from_board * Vector3::x();
     let up = world_from_board * -Vector3::z();
     Ok(frame(world_from_board * Point3::origin(), along, up))
+}
+
+/// The new world by the floor that people stood on: the origin in the middle of where they did, x nearest to that of the old world.
+pub fn from_floor(floor: &Floor) -> Isometry3<f64> {
+    let along = match floor.up.x.abs() {
+        x if x < 0.9 => Vector3::x(),
+        _ => Vector3::y(),
+    };
+    frame(floor.middle, along, floor.up.into_inner())
 }
 
 /// `new_from_old` of a world with this origin, x nearest to `along`, z along `up`.

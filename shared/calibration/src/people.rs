@@ -14,6 +14,7 @@ mod bias;
 pub(crate) mod certainty;
 mod doubt;
 pub(crate) mod estimate;
+mod floor;
 mod frame;
 mod instant;
 pub(crate) mod measure;
@@ -31,7 +32,8 @@ mod tests;
 
 pub use doubt::Doubt;
 pub use estimate::{PeopleError, estimate};
-pub use frame::{Scale, Vertical};
+pub use floor::{Floor, floor};
+pub use frame::{Scale, Skeletons, Vertical};
 pub use outcome::{CameraReport, Outcome};
 
 use synchronisation::Film;

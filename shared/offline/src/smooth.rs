@@ -20,7 +20,7 @@ use runtime::{ExitKind, Failure};
 
 use crate::Console;
 pub use compare::{Comparison, Mean, Row, compare, table};
-pub use folder::settings;
+pub use folder::{read_lines, settings};
 
 /// The files that are written beside the results.
 pub const FILES: [&str; 3] = ["pose3d-smooth.jsonl", "angles.csv", "smooth.json"];

@@ -18,7 +18,7 @@ use crate::globals::Globals;
 pub(crate) enum Command {
     /// Find lenses, and where cameras stand, from a board that is moved around; draw boards to print.
     Board(Box<board::Arguments>),
-    /// Put the origin of a rig on the floor, by a board or three points.
+    /// Put the origin of a rig on the floor, by a board, three points, or people who stand.
     Origin(Box<origin::Arguments>),
     /// Find where the cameras of a deployment stand, from people walking about.
     People(Box<people::Arguments>),

@@ -16,9 +16,9 @@ const FROM_BODIES: f64 = 0.5;
 /// Legs straighter than this are those of someone who stands, radians.
 const STRAIGHT: f64 = 0.35;
 /// Height of the ankle above the floor as a share of the stature (Drillis & Contini 1966).
-const ANKLE: f64 = 0.039;
+pub(crate) const ANKLE: f64 = 0.039;
 /// The fewest skeletons, or feet, that say anything.
-const LEAST: usize = 5;
+pub(crate) const LEAST: usize = 5;
 /// Ankles, knees, hips of both sides, and the neck.
 const LEGS: [[usize; 3]; 2] = [[0, 1, 2], [5, 4, 3]];
 const NECK: usize = 12;
@@ -48,7 +48,7 @@ pub enum Vertical {
 }
 
 /// Skeletons by instant and joint.
-pub(crate) type Skeletons = Vec<Vec<Option<Point3<f64>>>>;
+pub type Skeletons = Vec<Vec<Option<Point3<f64>>>>;
 
 /// Takes the world of a solution to metres, with the floor at z = 0, and says where the vertical comes from.
 pub(crate) struct World {
@@ -175,7 +175,11 @@ fn of_height(skeletons: &Skeletons, metres: f64) -> Option<(f64, f64)> {
 /// The lower ankle of every instant at which it stands, metres.
 ///
 /// * `up`: about against gravity.
-fn standing(times_s: &[f64], skeletons: &Skeletons, up: &UnitVector3<f64>) -> Vec<Point3<f64>> {
+pub(crate) fn standing(
+    times_s: &[f64],
+    skeletons: &Skeletons,
+    up: &UnitVector3<f64>,
+) -> Vec<Point3<f64>> {
     let mut feet = Vec::new();
     for nth in 1..skeletons.len() {
         let passed = times_s[nth] - times_s[nth - 1];
@@ -201,7 +205,10 @@ fn standing(times_s: &[f64], skeletons: &Skeletons, up: &UnitVector3<f64>) -> Ve
 }
 
 /// The direction against gravity.
-fn vertical(times_s: &[f64], skeletons: &Skeletons) -> Option<(UnitVector3<f64>, Vertical)> {
+pub(crate) fn vertical(
+    times_s: &[f64],
+    skeletons: &Skeletons,
+) -> Option<(UnitVector3<f64>, Vertical)> {
     let upright: Vec<Vector3<f64>> = skeletons
         .iter()
         .filter_map(|it| body(it, STRAIGHT))

@@ -30,7 +30,11 @@ pub(super) struct Run {
 ///
 /// * `each`: gets every line and its number, from 0.
 /// * Returns what is missing at the end: a last line that is not whole.
-pub(super) fn read_lines(
+///
+/// # Errors
+///
+/// The file cannot be read, or a line is none.
+pub fn read_lines(
     folder: &Path,
     mut each: impl FnMut(usize, FrameLine) -> Result<(), Failure>,
 ) -> Result<Option<String>, Failure> {

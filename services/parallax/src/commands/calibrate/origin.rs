@@ -1,10 +1,13 @@
 //! `parallax calibrate origin`: a rig put on the floor.
 
+mod stood;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use boards::Board;
-use calibration::origin::{Click, OriginError, from_board, from_points, rebased};
+use calibration::origin::{Click, OriginError, from_board, from_floor, from_points, rebased};
+use calibration::people::Vertical;
 use clap::Args;
 use geometry::Rig;
 use geometry::files::{Format, ReadOptions};
@@ -21,11 +24,15 @@ use crate::terminal::Terminal;
 #[command(after_help = "\
 With a board on the floor, its print up: the origin is its upper left corner, x along its rows, y against its columns, z up.
 With three points on the floor: the origin, one along x, and any other; each as pixels of at least two cameras.
+With --people the floor is found: it is below the ankles of people who stand, in a run of this rig that has ended. The origin is in \
+the middle of where they stood, x as near to the old x as can be. Where somebody walked about, the plane in which the feet stood \
+tells the vertical; if not, people who stand upright do, less surely: the file is written, and the exit code is 7.
 
 Examples:
     parallax calibrate origin rig.toml --board charuco:7x5:40mm cam0.mp4 cam1.mp4 --frames 1 --out room.toml
     parallax calibrate origin rig.toml --out room.toml --at cam0=412,633 --at cam1=820.5,590 \\
-        --x cam0=700,610 --x cam1=1010,566 --floor cam0=500,480 --floor cam1=700,500")]
+        --x cam0=700,610 --x cam1=1010,566 --floor cam0=500,480 --floor cam1=700,500
+    parallax calibrate origin rig.toml --people out/walk --out room.toml")]
 pub(crate) struct Arguments {
     /// The rig, a calibration of any format.
     rig: PathBuf,
@@ -47,26 +54,49 @@ pub(crate) struct Arguments {
     /// Any other point of the floor.
     #[arg(long, value_name = "CAMERA=X,Y")]
     floor: Vec<String>,
+    /// The folder of a finished run of this rig in which somebody walks about.
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["board", "at"])]
+    people: Option<PathBuf>,
+    /// Frames per second, for a run that does not know.
+    #[arg(long, value_name = "HZ", requires = "people", value_parser = rate)]
+    rate: Option<f64>,
     /// The rig file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
 
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|it| (0.1..=1000.0).contains(it));
+    rate.ok_or_else(|| format!("expected 0.1 to 1000 frames a second, got {text:?}"))
+}
+
 /// Runs the subcommand.
 pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let rig = inputs::rig(&[&arguments.rig], &ReadOptions::default())?;
-    let (new_from_old, source) = match &arguments.board {
-        Some(board) => (
+    let mut by_bodies = false;
+    let (new_from_old, source) = match (&arguments.board, &arguments.people) {
+        (Some(board), _) => (
             by_board(arguments, &rig, board, globals)?,
             format!("origin by {board}"),
         ),
-        None if arguments.at.is_empty() => {
-            return Err(
-                Failure::new(ExitKind::Usage, "neither a board nor points on the floor")
-                    .with_hint("--board BOARD FOOTAGE..., or --at, --x and --floor"),
-            );
+        (None, Some(run)) => {
+            let floor = stood::find(&rig, run, arguments.rate)?;
+            by_bodies = floor.vertical != Vertical::Feet;
+            output::message(format_args!(
+                "the floor is below {} feet that stood, whose heights are {:.0} mm apart (median)",
+                floor.n,
+                1e3 * floor.spread_m
+            ));
+            (from_floor(&floor), "origin by people who stood".to_owned())
         }
-        None => {
+        (None, None) if arguments.at.is_empty() => {
+            return Err(Failure::new(
+                ExitKind::Usage,
+                "neither a board, nor points on the floor, nor people",
+            )
+            .with_hint("--board BOARD FOOTAGE..., or --at, --x and --floor, or --people RUN"));
+        }
+        (None, None) => {
             let clicks = [&arguments.at, &arguments.x, &arguments.floor];
             let clicks = clicks.map(|texts| clicks_of(&rig, texts));
             let [at, x, floor] = clicks;
@@ -86,6 +116,11 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     output::message(format_args!("wrote {}", arguments.out.display()));
     let below = new.cameras().iter().find(|it| it.centre_in_world().z < 0.0);
     match below {
+        None if by_bodies => {
+            let message = "the vertical is that of people who stand upright, some degrees sure: their feet stood on one spot";
+            let hint = "a run in which somebody walks about tells it by the feet";
+            Err(Failure::new(ExitKind::Degraded, message).with_hint(hint))
+        }
         None => Ok(ExitCode::SUCCESS),
         Some(camera) => Err(Failure::new(
             ExitKind::Degraded,

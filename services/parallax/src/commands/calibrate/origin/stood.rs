@@ -1,0 +1,122 @@
+//! The floor that people stood on in a finished run.
+
+use std::path::Path;
+
+use calibration::people::{Floor, Skeletons, Vertical, floor};
+use geometry::Rig;
+use nalgebra::{Point2, Point3};
+use offline::smooth::read_lines;
+use runfiles::{Line as _, ViewLine};
+use runtime::{ExitKind, Failure};
+use skeleton::PARSE14;
+use statistics::Sorted;
+
+/// How far the skeletons of a run may be from what its cameras saw, as a share of the size of the person in the picture.
+const MOST_OFF: f64 = 0.15;
+/// The fewest joints in pictures that tell it.
+const LEAST_SEEN: usize = 50;
+
+/// Finds the floor, after a look whether the run is one of this rig.
+///
+/// * `rate_hz`: frames a second, for a run that does not know.
+pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor, Failure> {
+    let mut times_s: Vec<f64> = Vec::new();
+    let mut skeletons: Skeletons = Vec::new();
+    let mut frames = Vec::new();
+    read_lines(run, |_, line| {
+        let time_s = rate_hz.map_or(line.time_s, |it| Some(line.frame as f64 / it));
+        let time_s = time_s.ok_or_else(|| {
+            let message = format!("{}: the frames of the run have no times", run.display());
+            Failure::new(ExitKind::Input, message).with_hint("--rate gives the frames a second")
+        })?;
+        let joints = PARSE14.joints.iter().map(|it| {
+            let placed = line.joints.get(it.name)?.placed()?;
+            Some(Point3::from(placed.position_m))
+        });
+        if times_s.last().is_none_or(|last| time_s > *last) {
+            frames.push(line.frame);
+            times_s.push(time_s);
+            skeletons.push(joints.collect());
+        }
+        Ok(())
+    })?;
+    check(rig, run, &frames, &skeletons)?;
+    let found = floor(&times_s, &skeletons).ok_or_else(|| {
+        let message = format!(
+            "{}: nobody is seen standing on a foot in its {} frames",
+            run.display(),
+            frames.len()
+        );
+        Failure::new(ExitKind::Degraded, message)
+            .with_hint("somebody has to walk about, or to stand")
+    })?;
+    if found.vertical == Vertical::Leaning {
+        let message =
+            "nobody stands upright, and feet stand on one spot: the vertical is not known";
+        let hint = "a run in which somebody walks about tells it";
+        return Err(Failure::new(ExitKind::Degraded, message).with_hint(hint));
+    }
+    Ok(found)
+}
+
+/// A failure where the skeletons are not where the cameras of the rig saw them: the run was made with another rig.
+fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result<(), Failure> {
+    let file = run.join(ViewLine::FILE);
+    let text = runtime::read_text(&file)?;
+    let mut off: Vec<f64> = Vec::new();
+    for line in runfiles::lines::<ViewLine>(&text).filter_map(Result::ok) {
+        let camera = rig.camera(&line.view).ok_or_else(|| {
+            let message = format!("{}: the rig has no camera {:?}", run.display(), line.view);
+            Failure::new(ExitKind::Calibration, message).with_hint("give a run of this rig")
+        })?;
+        let skeleton = frames.binary_search(&line.frame).ok();
+        let parts = line.fused.iter().flat_map(|it| &it.parts);
+        let parts: Option<Vec<[f64; 2]>> = parts.map(|it| Some([it.x?, it.y?])).collect();
+        let Some((skeleton, parts)) = skeleton.zip(parts) else {
+            continue;
+        };
+        if parts.len() != skeleton::N_PARTS {
+            continue;
+        }
+        let seen = PARSE14.from_parts(&parts);
+        let [low, high] =
+            seen.iter()
+                .fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |all, it| {
+                    [
+                        [0, 1].map(|axis| all[0][axis].min(it[axis])),
+                        [0, 1].map(|axis| all[1][axis].max(it[axis])),
+                    ]
+                });
+        let size = (high[0] - low[0]).max(high[1] - low[1]).max(1.0);
+        let both = seen.iter().zip(&skeletons[skeleton]);
+        let both = both.filter_map(|(seen, joint)| {
+            let projected = camera.project(joint.as_ref()?);
+            let away = projected.map(|it| (it - Point2::from(*seen)).norm());
+            Some(away.unwrap_or(f64::INFINITY) / size)
+        });
+        off.extend(both);
+    }
+    let n = off.len();
+    let median = Sorted::new(off).upper_median().filter(|_| n >= LEAST_SEEN);
+    match median {
+        None => {
+            let message = format!(
+                "{}: {n} joints were seen, at least {LEAST_SEEN} are needed",
+                run.display()
+            );
+            Err(Failure::new(ExitKind::Degraded, message))
+        }
+        Some(share) if share > MOST_OFF => {
+            let message = format!(
+                "{}: its joints are {:.0} % of the size of the person away from where the cameras of this rig saw them (median, at most \
+                 {:.0} %): it is no run of this rig",
+                run.display(),
+                100.0 * share,
+                100.0 * MOST_OFF
+            );
+            Err(Failure::new(ExitKind::Degraded, message)
+                .with_hint("run a deployment with the rig as it is now, and give that run"))
+        }
+        Some(_) => Ok(()),
+    }
+}

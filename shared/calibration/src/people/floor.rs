@@ -1,0 +1,110 @@
+//! The floor of a rig that is known already, from where people stood.
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use statistics::Sorted;
+
+use super::frame::{ANKLE, LEAST, Skeletons, Vertical, standing, stature_of, vertical};
+
+/// The floor that people stood on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Floor {
+    /// Against gravity.
+    pub up: UnitVector3<f64>,
+    /// On the floor, in the middle of where people stood.
+    pub middle: Point3<f64>,
+    /// Where the vertical comes from.
+    pub vertical: Vertical,
+    /// Feet that stood.
+    pub n: usize,
+    /// How far their ankles were from one height: the median, metres.
+    pub spread_m: f64,
+}
+
+/// The floor, below the ankles of people who stand; none where hardly anybody does.
+///
+/// * `times_s`: of every instant, ascending.
+/// * `skeletons`: the 14 joints at each, metres in the world of the rig.
+pub fn floor(times_s: &[f64], skeletons: &Skeletons) -> Option<Floor> {
+    let (up, vertical) = vertical(times_s, skeletons)?;
+    let feet = standing(times_s, skeletons, &up);
+    if feet.len() < LEAST {
+        return None;
+    }
+    let median = |value: &dyn Fn(&Point3<f64>) -> f64| {
+        Sorted::new(feet.iter().map(value).collect::<Vec<_>>()).upper_median()
+    };
+    let height = median(&|it| it.coords.dot(&up))?;
+    let spread_m = median(&|it| (it.coords.dot(&up) - height).abs())?;
+    let middle = Vector3::new(
+        median(&|it| it.x)?,
+        median(&|it| it.y)?,
+        median(&|it| it.z)?,
+    );
+    let ankle = ANKLE * stature_of(skeletons).map_or(1.7, |it| it.0);
+    let above = middle.dot(&up) - (height - ankle);
+    Some(Floor {
+        middle: Point3::from(middle - up.scale(above)),
+        up,
+        vertical,
+        n: feet.len(),
+        spread_m,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+    use super::super::testing::walker;
+    use super::*;
+
+    /// Someone who walks on the floor z = 0, in a world that was moved, with errors of joints.
+    fn walk(size: f64, noise: f64) -> (Vec<f64>, Skeletons, Isometry3<f64>) {
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.7, -0.4, 1.1));
+        let moved = Isometry3::from_parts(Translation3::new(2.0, -1.0, 0.5), rotation);
+        let mut random = fastrand::Rng::with_seed(3);
+        let times_s: Vec<f64> = (0..600).map(|it| f64::from(it) / 30.0).collect();
+        let mut error = || noise * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+        let skeletons = times_s.iter().map(|time_s| {
+            let joints = walker(*time_s, size).into_iter();
+            let joints = joints.map(|it| {
+                let at = Point3::from(it) + Vector3::new(error(), error(), error());
+                Some(moved * at)
+            });
+            joints.collect()
+        });
+        (times_s.clone(), skeletons.collect(), moved)
+    }
+
+    #[test]
+    fn the_floor_is_where_people_stand() {
+        for noise in [0.0, 0.004] {
+            let (times_s, skeletons, moved) = walk(1.0, noise);
+            let found = floor(&times_s, &skeletons).unwrap();
+            assert_eq!(found.vertical, Vertical::Feet);
+            let degrees = (moved * Vector3::z()).angle(&found.up).to_degrees();
+            let below = moved.inverse() * found.middle;
+            assert!(degrees < 0.6, "{degrees} degrees, joints off by {noise}");
+            assert!(below.z.abs() < 0.02, "{below}, joints off by {noise}");
+            assert!(below.x.abs() < 1.0 && below.y.abs() < 1.0, "{below}");
+            assert!(found.n > 50 && found.spread_m < 0.02, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn who_stays_on_one_spot_tells_the_vertical_by_the_body_and_nobody_tells_nothing() {
+        let (times_s, skeletons, _) = walk(0.0, 0.002);
+        let found = floor(&times_s, &skeletons).unwrap();
+        assert_ne!(found.vertical, Vertical::Feet);
+        let nobody: Skeletons = vec![vec![None; 14]; times_s.len()];
+        assert_eq!(floor(&times_s, &nobody), None);
+        // Someone who is carried past, and never stands.
+        let mut carried = walk(0.0, 0.0).1;
+        for (skeleton, time_s) in carried.iter_mut().zip(&times_s) {
+            for joint in skeleton.iter_mut().flatten() {
+                joint.x += 2.0 * time_s;
+            }
+        }
+        assert_eq!(floor(&times_s, &carried), None);
+    }
+}
