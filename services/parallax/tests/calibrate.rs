@@ -85,7 +85,16 @@ mod long {
 
     fn refine(case: &Case, deployment: &str, out: &str) -> Started {
         let file = format!("room/{deployment}.toml");
-        case.start(&["calibrate", "refine", &file, "--out", out])
+        let page = format!("{out}.html");
+        case.start(&[
+            "calibrate",
+            "refine",
+            &file,
+            "--out",
+            out,
+            "--report",
+            &page,
+        ])
     }
 
     #[test]
@@ -119,5 +128,9 @@ mod long {
         };
         let [before, after] = [worst("room/turned.toml"), worst("better.toml")];
         assert!(before > 1.0 && after < 0.5 * before, "{before} {after}");
+        let page = std::fs::read_to_string(case.path("better.toml.html")).unwrap();
+        assert!(page.contains("The pictures that fit worst"));
+        let pictures = page.matches("data:image/jpeg;base64,").count();
+        assert_eq!(pictures, 6, "two of each camera");
     }
 }

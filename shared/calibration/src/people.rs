@@ -18,6 +18,7 @@ mod floor;
 mod frame;
 mod instant;
 pub(crate) mod measure;
+pub mod misfit;
 mod outcome;
 mod resect;
 pub(crate) mod sides;

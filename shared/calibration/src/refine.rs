@@ -22,7 +22,7 @@ use crate::people::estimate::{LEAST_INSTANTS, LEAST_SEEN_S, check_joints, instan
 use crate::people::measure::fits;
 use crate::people::sightings::{Chain, chains, ideal, interval_s, longest};
 use crate::people::solve::{Solved, rounds};
-use crate::people::{Doubt, PeopleError, Recording};
+use crate::people::{Doubt, PeopleError, Recording, Skeletons};
 use held_out::{Blocks, chosen};
 
 /// A camera moves where its deviation is less than this share of what was believed.
@@ -86,6 +86,10 @@ pub struct Outcome {
     pub doubts: Vec<Doubt>,
     /// Instants that were looked at.
     pub n_instants: usize,
+    /// These, seconds on the common clock.
+    pub times_s: Vec<f64>,
+    /// The skeletons of the new rig, metres: by instant and joint.
+    pub skeletons: Skeletons,
 }
 
 /// Makes a rig better.
@@ -156,6 +160,8 @@ fn nothing(cameras: &[Camera]) -> Outcome {
         is_better: false,
         doubts: Vec::new(),
         n_instants: 0,
+        times_s: Vec::new(),
+        skeletons: Vec::new(),
     }
 }
 
@@ -366,6 +372,8 @@ fn finish(outcome: &mut Outcome, (given, study): (&[Camera], &Study<'_>), all: &
         camera
     });
     outcome.cameras = placed.collect();
+    outcome.times_s.clone_from(&study.times_s);
+    outcome.skeletons = all.skeletons(study.n_joints);
     if !all.report.is_converged() {
         let iterations = all.report.iterations;
         outcome.doubts.push(Doubt::NotConverged { iterations });

@@ -3,13 +3,11 @@
 mod pictures;
 mod space;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
 use calibration::board::{CameraOutcome, Outcome};
 use nalgebra::Point2;
 
 use crate::html::{Html, put};
-use crate::parts::{about_table, begin, number, verdict};
+use crate::parts::{about_table, begin, number, verdict, worst};
 
 /// The content of the page.
 #[derive(Debug, Clone)]
@@ -60,7 +58,8 @@ pub fn html(page: &Page<'_>) -> String {
         pairs(&mut out, page);
     }
     numbers(&mut out, page);
-    worst(&mut out, page);
+    let drawn = "Ring: the corner as it was seen (purple: left out); line: what it is off, 20 times as long.";
+    worst(&mut out, drawn, page.worst);
     put!(out, "</html>\n");
     out.into_page()
 }
@@ -151,26 +150,6 @@ fn numbers(out: &mut Html, page: &Page<'_>) {
         }
         put!(out, "</table></div>\n");
     }
-}
-
-fn worst(out: &mut Html, page: &Page<'_>) {
-    if page.worst.is_empty() {
-        return;
-    }
-    put!(
-        out,
-        "<h2>The pictures that fit worst</h2>\n<p><small>Ring: the corner as it was seen (purple: left out); line: what it is off, 20 \
-         times as long.</small></p>\n<div class=\"strip\">\n"
-    );
-    for (caption, jpeg) in page.worst {
-        let data = STANDARD.encode(jpeg);
-        put!(
-            out,
-            "<figure><img alt=\"{caption}\" src=\"data:image/jpeg;base64,{data}\"><figcaption>{caption}</figcaption></figure>\n",
-            [caption, data]
-        );
-    }
-    put!(out, "</div>\n");
 }
 
 #[cfg(test)]

@@ -1,5 +1,8 @@
 //! What several pages have: their beginning, the verdict, what was looked at, numbers.
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+
 use crate::html::{Html, STYLE, html, put};
 
 /// The beginning of a page, up to its heading.
@@ -42,6 +45,29 @@ pub(crate) fn about_table(out: &mut Html, about: &[(String, String)]) {
         );
     }
     put!(out, "</table></div>\n");
+}
+
+/// The pictures that fit worst, as JPEG with a caption.
+///
+/// * `drawn`: what is drawn into them.
+pub(crate) fn worst(out: &mut Html, drawn: &'static str, pictures: &[(String, Vec<u8>)]) {
+    if pictures.is_empty() {
+        return;
+    }
+    put!(
+        out,
+        "<h2>The pictures that fit worst</h2>\n<p><small>{}</small></p>\n<div class=\"strip\">\n",
+        Html::constant(drawn)
+    );
+    for (caption, jpeg) in pictures {
+        let data = STANDARD.encode(jpeg);
+        put!(
+            out,
+            "<figure><img alt=\"{caption}\" src=\"data:image/jpeg;base64,{data}\"><figcaption>{caption}</figcaption></figure>\n",
+            [caption, data]
+        );
+    }
+    put!(out, "</div>\n");
 }
 
 /// A number with some decimals; a dash for one that is not finite.

@@ -6,7 +6,7 @@ use geometry::Camera;
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 use crate::html::{Html, put};
-use crate::parts::{about_table, begin, number, verdict};
+use crate::parts::{about_table, begin, number, verdict, worst};
 use crate::run::{Eye, Moment, SCRIPT, Space};
 
 /// Cells of a picture along each axis, and the size of its drawing.
@@ -16,13 +16,21 @@ const WIDTH: f64 = 160.0;
 const UNUSABLE: &str = "not to be used";
 /// What is said of a rig with cautions.
 const ROUGH: &str = "usable, but not known well";
+/// What is drawn into pictures.
+const DRAWN: &str =
+    "Ring: the joint as it was seen; line: to where the rig has it, from what all cameras see.";
 /// The most skeletons that are drawn.
 const MOST_MOMENTS: usize = 150;
 
 /// The page of `calibrate people`.
 ///
-/// * `names`: of the cameras. `about`: what was looked at, key and value.
-pub fn of_people(outcome: &people::Outcome, names: &[&str], about: &[(String, String)]) -> String {
+/// * `names`: of the cameras. `about`: what was looked at, key and value. `pictures`: those that fit worst, as JPEG with a caption.
+pub fn of_people(
+    outcome: &people::Outcome,
+    names: &[&str],
+    about: &[(String, String)],
+    pictures: &[(String, Vec<u8>)],
+) -> String {
     let mut out = begin("Parallax: a rig from people");
     judged(&mut out, outcome, names);
     about_table(&mut out, about);
@@ -80,6 +88,7 @@ pub fn of_people(outcome: &people::Outcome, names: &[&str], about: &[(String, St
         &outcome.skeletons,
         outcome.span_s,
     );
+    worst(&mut out, DRAWN, pictures);
     put!(out, "</html>\n");
     out.into_page()
 }
@@ -97,11 +106,12 @@ fn judged(out: &mut Html, outcome: &people::Outcome, names: &[&str]) {
 
 /// The page of `calibrate refine`.
 ///
-/// * `names`: of the cameras. `about`: what was looked at, key and value.
+/// * `names`, `about`, `pictures`: as in [`of_people`].
 pub fn of_refinement(
     outcome: &refine::Outcome,
     names: &[&str],
     about: &[(String, String)],
+    pictures: &[(String, Vec<u8>)],
 ) -> String {
     let mut out = begin("Parallax: a rig refined");
     let mut doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
@@ -149,7 +159,9 @@ pub fn of_refinement(
             }
         );
     }
-    put!(out, "</table></div>\n</html>\n");
+    put!(out, "</table></div>\n");
+    worst(&mut out, DRAWN, pictures);
+    put!(out, "</html>\n");
     out.into_page()
 }
 
@@ -273,10 +285,11 @@ mod tests {
             n_instants: 0,
             span_s: [0.0; 2],
             n_exchanged: 0,
+            times_s: Vec::new(),
             skeletons: Vec::new(),
         };
         let about = [("a<b".to_owned(), "c&d\"".to_owned())];
-        let page = of_people(&outcome, &["<script>alert(1)"], &about);
+        let page = of_people(&outcome, &["<script>alert(1)"], &about, &[]);
         assert!(
             !page.contains("<script>") && page.contains("&lt;script&gt;alert"),
             "{page}"
@@ -290,9 +303,18 @@ mod tests {
             cautions: outcome.doubts.clone(),
             ..outcome
         };
-        let page = of_people(&rough, &["one"], &about);
+        let page = of_people(
+            &rough,
+            &["one"],
+            &about,
+            &[("one <at> 1 s".to_owned(), vec![1, 2, 3])],
+        );
         assert!(
             page.contains("usable, but not known well") && page.contains("one sees a person"),
+            "{page}"
+        );
+        assert!(
+            page.contains("fit worst") && page.contains("alt=\"one &lt;at&gt; 1 s\""),
             "{page}"
         );
     }

@@ -1,6 +1,7 @@
 //! `parallax calibrate`: cameras calibrated from what they see. One file a subcommand.
 
 mod board;
+mod misfits;
 mod origin;
 mod people;
 mod refine;

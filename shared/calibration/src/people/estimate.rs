@@ -171,6 +171,7 @@ fn nothing(cameras: &[Camera], settings: &Settings) -> Outcome {
         n_instants: 0,
         span_s: [0.0; 2],
         n_exchanged: 0,
+        times_s: Vec::new(),
         skeletons: Vec::new(),
     }
 }
@@ -237,6 +238,7 @@ fn judge(
     });
     outcome.cameras = placed.collect();
     let to_metres_point = |it: &Option<Point3<f64>>| it.map(|it| to_metres.point(&it));
+    outcome.times_s = times_s.to_vec();
     outcome.skeletons = skeletons
         .iter()
         .map(|it| it.iter().map(to_metres_point).collect())

@@ -54,6 +54,8 @@ pub struct Outcome {
     pub span_s: [f64; 2],
     /// Views whose left and right were exchanged.
     pub n_exchanged: usize,
+    /// The instants that were looked at, seconds on the common clock.
+    pub times_s: Vec<f64>,
     /// The skeletons that were found on the way, metres: by instant and joint.
     pub skeletons: Vec<Vec<Option<Point3<f64>>>>,
 }

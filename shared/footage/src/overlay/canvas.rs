@@ -1,8 +1,10 @@
 //! A picture, and the shapes that can be drawn on it.
 
+use core::ops::Range;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder as _, ImageError};
 
@@ -47,6 +49,36 @@ impl Canvas {
             size,
             rgb: colour.repeat(size.width * size.height),
         }
+    }
+
+    /// A part of a picture; none if it is empty, or outside.
+    ///
+    /// * `size` and `rgb`: of the picture; `columns` and `rows`: the part.
+    pub fn part(size: Size, rgb: &[u8], [columns, rows]: [Range<usize>; 2]) -> Option<Self> {
+        let part = Size::new(columns.len(), rows.len());
+        let row = |y: usize| {
+            let at = 3 * y * size.width;
+            rgb.get(at + 3 * columns.start..at + 3 * columns.end)
+        };
+        let is_inside = columns.end <= size.width && part.rgb_bytes() > 0;
+        let pixels: Vec<&[u8]> = rows.filter(|_| is_inside).map(row).collect::<Option<_>>()?;
+        is_inside.then(|| Self::from_rgb(part, &pixels.concat()))
+    }
+
+    /// The picture as a JPEG file; none where it is too large for one.
+    ///
+    /// * `quality`: percent.
+    pub fn jpeg(&self, quality: u8) -> Option<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let encoder = JpegEncoder::new_with_quality(&mut bytes, quality);
+        let [width, height] = [self.size.width, self.size.height].map(u32::try_from);
+        let written = encoder.write_image(
+            self.rgb(),
+            width.ok()?,
+            height.ok()?,
+            ExtendedColorType::Rgb8,
+        );
+        written.ok().map(|()| bytes)
     }
 
     /// A copy of an image.

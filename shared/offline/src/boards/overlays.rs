@@ -2,8 +2,6 @@
 
 use calibration::board::{Outcome, Residual};
 use footage::{ACCENT, Canvas, LEFT, RIGHT, Size, Source, SourceSpec};
-use image::codecs::jpeg::JpegEncoder;
-use image::{ExtendedColorType, ImageEncoder as _};
 use runtime::Failure;
 
 use super::{CameraFootage, Seen, footage_failure};
@@ -110,14 +108,7 @@ fn around(size: Size, rgb: &[u8], residuals: &[Residual]) -> Option<Vec<u8>> {
         [low, high].map(|it| it.clamp(0.0, side as f64) as usize)
     };
     let ([left, right], [top, bottom]) = (extent(0, size.width), extent(1, size.height));
-    let part = Size::new(right.checked_sub(left)?, bottom.checked_sub(top)?);
-    let rows =
-        (top..bottom).map(|y| &rgb[3 * (y * size.width + left)..3 * (y * size.width + right)]);
-    let pixels: Vec<u8> = rows.flatten().copied().collect();
-    if pixels.is_empty() {
-        return None;
-    }
-    let mut canvas = Canvas::from_rgb(part, &pixels);
+    let mut canvas = Canvas::part(size, rgb, [left..right, top..bottom])?;
     for it in residuals {
         let at = [it.at.x - left as f64, it.at.y - top as f64];
         let colour = if it.is_wrong { ACCENT } else { LEFT };
@@ -130,9 +121,5 @@ fn around(size: Size, rgb: &[u8], residuals: &[Residual]) -> Option<Vec<u8>> {
         canvas.line(at, to, 1.5, RIGHT);
         canvas.ring(at, 5.0, 1.5, colour);
     }
-    let mut bytes = Vec::new();
-    let encoder = JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
-    let (width, height) = (part.width as u32, part.height as u32);
-    let written = encoder.write_image(canvas.rgb(), width, height, ExtendedColorType::Rgb8);
-    written.ok().map(|()| bytes)
+    canvas.jpeg(JPEG_QUALITY)
 }

@@ -9,6 +9,7 @@ use launch::output;
 use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use serde_json::{Value, json};
 
+use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 use crate::globals::Globals;
 
@@ -347,6 +348,12 @@ fn write_page(
             .to_owned(),
     ));
     about.push(("vertical".to_owned(), vertical(outcome).to_owned()));
-    let page = report::walk::of_people(outcome, &walk.names(), &about);
+    let offsets_s: Vec<f64> = outcome.reports.iter().map(|it| it.offset_s[0]).collect();
+    let pictures = misfits::of(
+        walk,
+        (&outcome.cameras, &offsets_s),
+        (&outcome.times_s, &outcome.skeletons),
+    )?;
+    let page = report::walk::of_people(outcome, &walk.names(), &about, &pictures);
     files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))
 }

@@ -10,6 +10,7 @@ use launch::{inputs, output};
 use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use serde_json::{Value, json};
 
+use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 use crate::globals::Globals;
 
@@ -94,7 +95,10 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     if let Some(file) = &arguments.walk.report {
         let about = about(arguments, &walk);
-        let page = report::walk::of_refinement(&outcome, &names, &about);
+        let offsets_s: Vec<f64> = outcome.changes.iter().map(|it| it.offset_s).collect();
+        let skeletons = (&outcome.times_s[..], &outcome.skeletons);
+        let pictures = misfits::of(&walk, (&outcome.cameras, &offsets_s), skeletons)?;
+        let page = report::walk::of_refinement(&outcome, &names, &about, &pictures);
         files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))?;
         output::message(format_args!("wrote {}", file.display()));
     }

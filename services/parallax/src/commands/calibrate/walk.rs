@@ -28,7 +28,7 @@ pub(super) struct WalkArguments {
     /// Write the rig file that was found; nothing is written where the answer is refused.
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    /// Write a page: residuals, where in the pictures people were, uncertainties, the rig in space.
+    /// Write a page: residuals, where in the pictures people were, uncertainties, the rig in space, the pictures that fit worst.
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
     /// Look at every n-th picture.

@@ -1,0 +1,117 @@
+//! The pictures in which people fit a rig worst, with what was seen and where the rig has it drawn into them.
+
+use calibration::people::Skeletons;
+use calibration::people::misfit::{Fitted, Misfit};
+use footage::{Canvas, LEFT, RIGHT, Size, Source, SourceSpec};
+use geometry::Camera;
+use launch::inputs;
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use super::walk::Walk;
+
+/// Pictures of a camera, and of all.
+const MOST: [usize; 2] = [2, 9];
+/// Room around the person, as a share of its size.
+const MARGIN: f64 = 0.25;
+const JPEG_QUALITY: u8 = 80;
+
+/// The worst pictures, with captions; none of cameras that have keypoints alone.
+///
+/// * `offsets_s`: what is added to the times of each camera; as many as there are cameras where there is a rig.
+/// * `skeletons`: instants, and the skeleton at each.
+///
+/// # Errors
+///
+/// Footage that cannot be read again.
+pub(super) fn of(
+    walk: &Walk,
+    (cameras, offsets_s): (&[Camera], &[f64]),
+    skeletons: (&[f64], &Skeletons),
+) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+    let fitted = Fitted {
+        cameras,
+        films: &walk.found.films,
+        offsets_s,
+        sides: &walk.found.sides,
+        skeletons,
+    };
+    let mut pictures = Vec::new();
+    if offsets_s.len() != cameras.len() {
+        // There is no rig.
+        return Ok(pictures);
+    }
+    for misfit in fitted.worst(MOST[0]).iter().take(MOST[1]) {
+        if let Some(jpeg) = drawn(walk, misfit)? {
+            let caption = format!(
+                "{} at {:.2} s: {:.1} px off",
+                walk.names()[misfit.camera],
+                misfit.time_s,
+                misfit.residual_px
+            );
+            pictures.push((caption, jpeg));
+        }
+    }
+    Ok(pictures)
+}
+
+fn drawn(walk: &Walk, misfit: &Misfit) -> Result<Option<Vec<u8>>, Failure> {
+    let camera = &walk.deployment.cameras[misfit.camera];
+    if camera.source.is_empty() {
+        return Ok(None);
+    }
+    let whole = SourceSpec {
+        start: 0,
+        step: 1,
+        count: None,
+        ..inputs::source(camera, &walk.deployment.capture)
+    };
+    let rate_hz = Source::open(&whole)
+        .or_fail(ExitKind::Input)?
+        .info()
+        .frame_rate_hz;
+    let Some(rate_hz) = rate_hz else {
+        return Ok(None);
+    };
+    let pace = 1.0 + 1e-6 * camera.drift_ppm.unwrap_or(0.0);
+    let one = SourceSpec {
+        start: (misfit.time_s / pace * rate_hz).round().max(0.0) as u64,
+        count: Some(1),
+        ..whole
+    };
+    let mut source = Source::open(&one).or_fail(ExitKind::Input)?;
+    let size = source.info().size;
+    let Some(picture) = source.next_frame().or_fail(ExitKind::Input)? else {
+        return Ok(None);
+    };
+    let offset = camera.source_offset_px.unwrap_or([0, 0]).map(f64::from);
+    let in_footage = |it: &[f64; 2]| [it[0] - offset[0], it[1] - offset[1]];
+    let joints: Vec<[[f64; 2]; 2]> = misfit
+        .joints
+        .iter()
+        .map(|[seen, expected]| [in_footage(seen), in_footage(expected)])
+        .collect();
+    Ok(around(size, picture.rgb, &joints))
+}
+
+/// The part of a picture around its person, with the joints.
+fn around(size: Size, rgb: &[u8], joints: &[[[f64; 2]; 2]]) -> Option<Vec<u8>> {
+    let ends = |axis: usize| {
+        let values = joints.iter().map(|it| it[0][axis]);
+        let low = values.clone().fold(f64::MAX, f64::min);
+        [low, values.fold(f64::MIN, f64::max)]
+    };
+    let ([left, right], [top, bottom]) = (ends(0), ends(1));
+    let extent = (right - left).max(bottom - top);
+    let margin = MARGIN * extent;
+    let within = |it: f64, side: usize| it.clamp(0.0, side as f64) as usize;
+    let [left, right] = [left - margin, right + margin].map(|it| within(it, size.width));
+    let [top, bottom] = [top - margin, bottom + margin].map(|it| within(it, size.height));
+    let mut canvas = Canvas::part(size, rgb, [left..right, top..bottom])?;
+    let thick = (extent / 250.0).clamp(1.0, 4.0);
+    for [seen, expected] in joints {
+        let [at, to] = [seen, expected].map(|it| [it[0] - left as f64, it[1] - top as f64]);
+        canvas.line(at, to, 1.2 * thick, RIGHT);
+        canvas.ring(at, 3.0 * thick, thick, LEFT);
+    }
+    canvas.jpeg(JPEG_QUALITY)
+}
