@@ -9,6 +9,10 @@ use synchronisation::{Film, Track, tracks};
 const SMOOTHING: [f64; 2] = [0.75, 0.015];
 /// Two tracks of a camera can be one person where the second begins within so many seconds.
 const LONGEST_GAP_S: f64 = 3.0;
+/// Or so many seconds before the first ends, in one place: a person whose pose is seen in two ways for a while.
+const LONGEST_OVERLAP_S: f64 = 0.25;
+/// Two tracks are in one place where joints of the one end nearer than this to where those of the other begin, sizes of the person.
+const ONE_PLACE: f64 = 0.3;
 /// Chains of a camera that are looked at, those that are seen best.
 const MOST_CHAINS: usize = 3;
 /// Chains with less than this share of the pictures of the longest one are not.
@@ -64,8 +68,8 @@ impl Chain {
 
     fn sight(&self, joint: usize, time_s: f64) -> Option<Sight> {
         let is_at = |it: &&Track| (it.span()[0]..=it.span()[1]).contains(&time_s);
-        let track = self.tracks.iter().find(is_at)?;
-        let place = track.place(joint, time_s)?;
+        let mut tracks = self.tracks.iter().filter(is_at);
+        let (track, place) = tracks.find_map(|it| Some((it, it.place(joint, time_s)?)))?;
         Some(Sight {
             at: place.at.into(),
             speed: self.speed(track, joint, time_s),
@@ -86,10 +90,34 @@ impl Chain {
         (after - before) / (2.0 * self.interval_s)
     }
 
-    /// Whether the person of a track may be the one of this chain, and how long the gap is.
-    fn gap(&self, track: &Track) -> Option<f64> {
-        let gap = track.span()[0] - self.span()[1];
-        (0.0..LONGEST_GAP_S).contains(&gap).then_some(gap)
+    /// Whether the person of a track may be the one of this chain, and how long the gap is; less than 0 where both are seen at once.
+    fn gap(&self, track: &Track, n_joints: usize) -> Option<f64> {
+        let [[_, end], [begin, track_end]] = [self.span(), track.span()];
+        let gap = begin - end;
+        let may_be = gap >= 0.0 || (track_end > end && self.is_in_place(track, n_joints));
+        let can_be = (-LONGEST_OVERLAP_S..LONGEST_GAP_S).contains(&gap);
+        (can_be && may_be).then_some(gap)
+    }
+
+    /// Whether a track begins where the last one of the chain then is.
+    fn is_in_place(&self, track: &Track, n_joints: usize) -> bool {
+        let Some(last) = self.tracks.last() else {
+            return false;
+        };
+        // Where a joint is first seen, or last: not all are at the very end.
+        let near = |it: &Track, joint: usize, from_s: f64, sign: f64| {
+            let n = (LONGEST_OVERLAP_S / self.interval_s).ceil() as i32;
+            let times = (0..=n).map(|nth| from_s + sign * self.interval_s * f64::from(nth));
+            let place = times.filter_map(|time_s| it.place(joint, time_s)).next();
+            place.map(|it| Vector2::from(it.at))
+        };
+        let apart = (0..n_joints).filter_map(|joint| {
+            let before = near(last, joint, last.span()[1], -1.0)?;
+            let after = near(track, joint, track.span()[0], 1.0)?;
+            Some((before - after).norm())
+        });
+        let apart = Sorted::new(apart.collect::<Vec<_>>()).upper_median();
+        apart.is_some_and(|it| it < ONE_PLACE * last.size().max(track.size()))
     }
 }
 
@@ -102,7 +130,7 @@ pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: 
     let mut chains: Vec<Chain> = Vec::new();
     for track in found {
         let gaps = chains.iter().enumerate();
-        let gaps = gaps.filter_map(|(nth, it)| Some((nth, it.gap(&track)?)));
+        let gaps = gaps.filter_map(|(nth, it)| Some((nth, it.gap(&track, n_joints)?)));
         match gaps.min_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((nth, _)) => chains[nth].tracks.push(track),
             None => chains.push(Chain {
@@ -232,6 +260,50 @@ mod tests {
         assert_eq!(seen_s.map(f64::round).collect::<Vec<_>>(), [24.0, 30.0]);
         let sizes = [&chains[0], longest(&chains).unwrap()].map(Chain::size);
         assert!(sizes[0] > 3.0 * sizes[1], "{sizes:?}");
+    }
+
+    /// Someone at 60 Hz who is seen in another pose from one second on, and for a moment in both.
+    fn in_two_poses(away_px: f64) -> Film {
+        let mut film = standing();
+        film.shots.truncate(120);
+        for (nth, shot) in film.shots.iter_mut().enumerate() {
+            shot.time_s = nth as f64 / 60.0;
+            let joints = shot.people[0].joints.iter().enumerate();
+            let other = |(joint, it): (usize, &Option<Joint>)| {
+                it.map(|it| Joint {
+                    at: [it.at[0] + if joint < 9 { away_px } else { 0.0 }, it.at[1]],
+                    ..it
+                })
+            };
+            let other = Person {
+                joints: joints.map(other).collect(),
+            };
+            match nth {
+                ..60 => {}
+                60..66 => shot.people.push(other),
+                _ => shot.people = vec![other],
+            }
+        }
+        film
+    }
+
+    #[test]
+    fn a_person_whose_pose_is_seen_in_two_ways_for_a_moment_stays_one() {
+        let camera = ideal(&ring(3)[0]);
+        let size = chains(&standing(), &camera, N_JOINTS, 0.1)[0].size();
+        for (share, n, seen_s) in [(0.28, 1, 2.0), (0.5, 2, 1.0)] {
+            let film = in_two_poses(share * size);
+            let chains = chains(&film, &camera, N_JOINTS, 1.0 / 60.0);
+            assert_eq!(chains.len(), n, "{share} of the size away");
+            let chain = &chains[0];
+            assert!(
+                chain.span()[1] - chain.span()[0] > 0.9 * seen_s,
+                "{chain:?}"
+            );
+            let times = (3..57).map(|it| chain.span()[0] + seen_s * f64::from(it) / 60.0);
+            let n = times.filter(|it| chain.sight(12, *it).is_some()).count();
+            assert!(n > 50, "{n} of 54");
+        }
     }
 
     #[test]
