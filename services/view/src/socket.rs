@@ -204,7 +204,7 @@ mod tests {
             size: [640, 480],
             camera: Some(Camera {
                 name: x.to_string(),
-                intrinsics: intrinsics.clone(),
+                intrinsics,
                 camera_from_world: Isometry3::new(
                     Vector3::new(x, 0.0, 3.0),
                     Vector3::new(0.0, x, 0.0),

@@ -107,8 +107,8 @@ impl Chain {
         // Where a joint is first seen, or last: not all are at the very end.
         let near = |it: &Track, joint: usize, from_s: f64, sign: f64| {
             let n = (LONGEST_OVERLAP_S / self.interval_s).ceil() as i32;
-            let times = (0..=n).map(|nth| from_s + sign * self.interval_s * f64::from(nth));
-            let place = times.filter_map(|time_s| it.place(joint, time_s)).next();
+            let mut times = (0..=n).map(|nth| from_s + sign * self.interval_s * f64::from(nth));
+            let place = times.find_map(|time_s| it.place(joint, time_s));
             place.map(|it| Vector2::from(it.at))
         };
         let apart = (0..n_joints).filter_map(|joint| {

@@ -108,11 +108,6 @@ fn offsets_are_found_as_far_as_the_way_of_the_sound_allows() {
         }
     }
     errors.sort_by(f64::total_cmp);
-    println!(
-        "median {:.1} ms, most {:.1} ms",
-        1e3 * errors[30],
-        1e3 * errors[59]
-    );
     assert!(errors[30] < 0.008, "{errors:?}");
 }
 
