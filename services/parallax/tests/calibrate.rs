@@ -6,6 +6,7 @@ use std::path::Path;
 use geometry::Rig;
 use geometry::files::ReadOptions;
 
+use crate::common::Case;
 use crate::sync;
 
 fn rig(path: &Path) -> Rig {
@@ -55,6 +56,39 @@ fn the_floor_is_found_where_somebody_walked_about_and_not_with_another_rig() {
     );
 }
 
+#[test]
+fn a_room_from_people_is_made_step_by_step() {
+    let case = Case::new("new", &[1, 1], "");
+    let cameras = ["--camera", "a=a.mp4", "--camera", "b=b.mp4"];
+    let rig = ["--rig", "rig.toml"];
+    let new = |more: &[&str]| {
+        let words = [&["new", "room", "--dry-run"], &cameras[..], &rig, more].concat();
+        case.start(&words).wait()
+    };
+    let ended = new(&["--people", "1.8", "--sync"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let lines = ended.stdout.lines();
+    let steps: Vec<&str> = lines.filter(|it| it.starts_with("parallax")).collect();
+    let people = "parallax calibrate people room/deployment.toml --set rig=lenses.toml --height-m 1.8 --out room/rig.toml \
+                  --report room/rig.html --window 2";
+    assert_eq!(
+        steps[..2],
+        [
+            "parallax calib convert rig.toml --out room/lenses.toml",
+            people
+        ],
+        "{steps:#?}"
+    );
+    assert!(!case.path("room").exists());
+    let ended = new(&["--people", "18"]);
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("0.8 to 2.4 metres"),
+        "{}",
+        ended.stderr
+    );
+}
+
 /// What takes long; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
@@ -64,7 +98,7 @@ mod long {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::common::{Case, Started};
+    use crate::common::Started;
 
     /// By how much the second camera of the wrong rig is turned, degrees.
     const TURNED: f64 = 2.0;

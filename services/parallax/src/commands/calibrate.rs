@@ -13,6 +13,7 @@ use clap::Subcommand;
 use runtime::Failure;
 
 use crate::globals::Globals;
+pub(crate) use people::height;
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]

@@ -10,6 +10,7 @@ use launch::output;
 use offline::boards::CameraFootage;
 use runtime::{ExitKind, Failure, OrFail as _, in_file};
 
+use crate::commands::calibrate::height;
 use crate::globals::Globals;
 
 /// Options of `parallax new`.
@@ -21,15 +22,16 @@ where it ended. A step that fails ends it, with its exit code; one whose answer 
     1  the rig: --rig converts one; --board with --show finds it (`parallax calibrate board`)
     2  the floor: --floor puts the rig on it (`parallax calibrate origin`)
     3  ROOM/deployment.toml, which is yours from then on (`parallax config check`)
-    4  clocks: --sync finds offsets of recorded cameras from people (`parallax sync estimate --write`)
-    5  a first run: --run (`parallax run`)
-
-A rig from people walking about, without a board: write the deployment with --rig and lenses, then `parallax calibrate people`.
+    4  with --people where the cameras stand is found from the person who walks about in their footage (`parallax calibrate people`),
+       and the floor; of --rig, or of the board, the lenses count alone, and nothing needs to lie on the floor
+    5  clocks: --sync finds offsets of recorded cameras from people (`parallax sync estimate --write`)
+    6  a first run: --run (`parallax run`)
 
 Examples:
     parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --rig Calib.toml --run
     parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --board charuco:7x5:40mm --show a=board/a.mp4 --show b=board/b.mp4 \\
         --floor a=floor/a.mp4 --floor b=floor/b.mp4 --sync --run
+    parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --camera c=walk/c.mp4 --rig lenses.toml --people 1.78 --run
     parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --rig Calib.toml --dry-run")]
 #[expect(
     clippy::struct_excessive_bools,
@@ -54,6 +56,9 @@ pub(crate) struct Arguments {
     /// Footage of a camera with the board lying on the floor.
     #[arg(long, value_name = "NAME=PATH", requires = "board")]
     floor: Vec<String>,
+    /// Find where the cameras stand from a person of this height, metres, who walks about in their footage.
+    #[arg(long, value_name = "METRES", conflicts_with = "floor", value_parser = height)]
+    people: Option<f64>,
     /// Find offset and drift of the cameras' clocks.
     #[arg(long)]
     sync: bool,
@@ -67,6 +72,9 @@ pub(crate) struct Arguments {
     #[arg(long)]
     dry_run: bool,
 }
+
+/// The file with the lenses alone.
+const LENSES: &str = "lenses.toml";
 
 /// A command, and the file that shows that it has been done.
 struct Step {
@@ -140,9 +148,16 @@ impl Step {
         }
         let status = command.status().or_fail(ExitKind::Run)?;
         let code = status.code().unwrap_or(1);
-        let is_doubt = code == i32::from(ExitKind::Degraded.status());
+        let doubts = [ExitKind::Degraded, ExitKind::Limit].map(|it| i32::from(it.status()));
+        let is_doubt = doubts.contains(&code);
         if status.success() || (is_doubt && arguments.go_on) {
             return Ok(None);
+        }
+        if let Some(file) = self.done.as_ref().filter(|it| is_doubt && it.exists()) {
+            output::message(format_args!(
+                "{} is written: the same command again goes on with it",
+                file.display()
+            ));
         }
         Ok(Some(ExitCode::from(u8::try_from(code).unwrap_or(1))))
     }
@@ -152,7 +167,9 @@ impl Step {
 fn rig_steps(arguments: &Arguments) -> Vec<Step> {
     let room = &arguments.room;
     let rig = room.join("rig.toml");
-    let raw = if arguments.floor.is_empty() {
+    let raw = if arguments.people.is_some() {
+        room.join(LENSES)
+    } else if arguments.floor.is_empty() {
         rig.clone()
     } else {
         room.join("rig-of-board.toml")
@@ -161,8 +178,8 @@ fn rig_steps(arguments: &Arguments) -> Vec<Step> {
     let mut steps = Vec::new();
     if let Some(file) = &arguments.rig {
         let file = file.display().to_string();
-        let words = ["calib", "convert", &file, "--out", &rig_text];
-        steps.push(Step::new(&words, Some(rig)));
+        let words = ["calib", "convert", &file, "--out", &raw_text];
+        steps.push(Step::new(&words, Some(raw)));
         return steps;
     }
     let board = arguments
@@ -170,8 +187,16 @@ fn rig_steps(arguments: &Arguments) -> Vec<Step> {
         .as_ref()
         .map(ToString::to_string)
         .unwrap_or_default();
-    let report = room.join("rig.html").display().to_string();
+    let report = if arguments.people.is_some() {
+        room.join("lenses.html")
+    } else {
+        room.join("rig.html")
+    };
+    let report = report.display().to_string();
     let mut words = vec!["calibrate", "board", "--board", &board];
+    if arguments.people.is_some() {
+        words.push("--intrinsics");
+    }
     words.extend(arguments.show.iter().map(String::as_str));
     words.extend(["--out", &raw_text, "--report", &report]);
     steps.push(Step::new(&words, Some(raw.clone())));
@@ -186,7 +211,21 @@ fn rig_steps(arguments: &Arguments) -> Vec<Step> {
 
 fn later_steps(arguments: &Arguments, deployment: &Path) -> Vec<Step> {
     let file = deployment.display().to_string();
-    let mut steps = vec![Step::new(&["config", "check", &file], None)];
+    let mut steps = Vec::new();
+    if let Some(metres) = arguments.people {
+        let in_room = |name: &str| arguments.room.join(name).display().to_string();
+        let rig = arguments.room.join("rig.toml");
+        let (height, out, page) = (metres.to_string(), in_room("rig.toml"), in_room("rig.html"));
+        // Paths in the file are those of its folder.
+        let lenses = format!("rig={LENSES}");
+        let mut words = vec!["calibrate", "people", &file, "--set", &lenses];
+        words.extend(["--height-m", &height, "--out", &out, "--report", &page]);
+        if arguments.sync {
+            words.extend(["--window", "2"]);
+        }
+        steps.push(Step::new(&words, Some(rig)));
+    }
+    steps.push(Step::new(&["config", "check", &file], None));
     if arguments.sync {
         let page = arguments.room.join("clocks.html");
         let page_text = page.display().to_string();

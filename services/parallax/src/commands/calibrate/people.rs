@@ -74,7 +74,8 @@ pub(crate) struct Arguments {
     seed: u64,
 }
 
-fn height(text: &str) -> Result<f64, String> {
+/// The standing height of a person, metres.
+pub(crate) fn height(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|it| (0.8..=2.4).contains(it));
     number.ok_or_else(|| format!("expected 0.8 to 2.4 metres, got {text:?}"))
 }
