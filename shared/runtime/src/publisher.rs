@@ -8,7 +8,7 @@ use std::time::Instant;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher as IoxPublisher;
-use iceoryx2::port::update_connections::UpdateConnections as _;
+use iceoryx2::port::update_connections::{ConnectionFailure, UpdateConnections as _};
 use iceoryx2::port::{BackpressureAction, LoanError as IoxLoanError, SendError as IoxSendError};
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, ipc};
 use iceoryx2::sample_mut::SampleMut;
@@ -19,6 +19,7 @@ use crate::losses::{Losses, Patience};
 use crate::memory;
 use crate::onlookers::{self, Onlookers};
 use crate::payload::{Element, Header, Message};
+use crate::room::{connections, short_of_room};
 use crate::service::{self, Messages, PortError};
 use crate::{Copies, ExitKind, Fault, Progress, Stop};
 
@@ -63,6 +64,15 @@ pub enum SendError {
         /// For how long.
         waited: Duration,
     },
+    /// It cannot connect to a receiver.
+    #[error("cannot connect to a receiver of topic {topic:?}")]
+    Connection {
+        /// Name of the topic.
+        topic: Arc<str>,
+        /// Why.
+        #[source]
+        source: ConnectionFailure,
+    },
     /// iceoryx2 failed.
     #[error("cannot send on topic {topic:?}")]
     Transport {
@@ -80,6 +90,13 @@ impl Fault for SendError {
             ExitKind::Interrupted
         } else {
             ExitKind::Run
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::Connection { .. } | Self::Transport { .. } => short_of_room(),
+            _ => None,
         }
     }
 }
@@ -281,6 +298,7 @@ impl<E: Message, H: Header> Port<E, H> {
             .override_sample_preallocation(move |_| extras.chunks)
             .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
             .set_backpressure_handler(patience(bus, &onlookers))
+            .set_degradation_handler(connections())
             .create()
             .map_err(|source| match memory::refused(bus.namespace().prefix()) {
                 Some(source) => PortError::Memory {
@@ -327,9 +345,8 @@ impl<E: Message, H: Header> Port<E, H> {
         }
         self.progress.tick();
         // Chunks held by a dead receiver are released when the connections are updated.
-        if let Err(error) = self.publisher.update_connections() {
-            tracing::debug!(topic = %self.topic, ?error, "cannot update the connections");
-        }
+        let updated = self.publisher.update_connections();
+        updated.map_err(|source| SendError::Connection { topic, source })?;
         std::thread::sleep(CHUNK_PAUSE);
         Ok(())
     }

@@ -23,6 +23,8 @@ const TMPFS_MAGIC: u64 = 0x0102_1994;
 
 /// The last size that was refused, bytes; 0 if none was.
 static REFUSED: AtomicU64 = AtomicU64::new(0);
+/// How often one was refused.
+static N_REFUSED: AtomicU64 = AtomicU64::new(0);
 /// Whether it exceeded the limit on the size of a file.
 static IS_LIMITED: AtomicBool = AtomicBool::new(false);
 
@@ -47,6 +49,11 @@ pub(crate) fn refused() -> Option<Refused> {
     }
 }
 
+/// How often a size was refused in this process.
+pub(crate) fn n_refused() -> u64 {
+    N_REFUSED.load(Ordering::Relaxed)
+}
+
 /// ftruncate(2), which also allocates the memory of a file on tmpfs.
 #[unsafe(no_mangle)]
 extern "C" fn ftruncate(fd: RawFd, len: libc::off_t) -> c_int {
@@ -63,6 +70,7 @@ extern "C" fn ftruncate(fd: RawFd, len: libc::off_t) -> c_int {
         Err(error) => {
             if matches!(error, Errno::NOSPC | Errno::FBIG) {
                 REFUSED.store(len, Ordering::Relaxed);
+                N_REFUSED.fetch_add(1, Ordering::Relaxed);
                 IS_LIMITED.store(error == Errno::FBIG, Ordering::Relaxed);
             }
             failed(error)

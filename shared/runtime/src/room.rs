@@ -1,9 +1,12 @@
 //! Room in the shared memory: what a process needs besides its topics, and what to try where there is none.
 
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use iceoryx2::port::{DegradationAction, DegradationCause, DegradationInfo};
 use rustix::process::{Resource, getrlimit};
 
 use crate::memory::free_shared_memory;
-use crate::reserve::{Refused, refused};
+use crate::reserve::{Refused, n_refused, refused};
 
 /// Queues and management of one process, bytes: ten times the measured size.
 pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
@@ -28,4 +31,31 @@ pub(crate) fn no_room() -> Option<String> {
             getrlimit(Resource::Fsize).current.unwrap_or(0) / 1000
         ),
     })
+}
+
+/// The same, or that hardly any room is left.
+pub(crate) fn short_of_room() -> Option<String> {
+    no_room().or_else(|| {
+        let free_bytes = free_shared_memory().ok()?;
+        let is_short = free_bytes < OVERHEAD_BYTES;
+        is_short.then(|| format!("{} KB are free in /dev/shm: {ROOM}", free_bytes / 1000))
+    })
+}
+
+/// What a port does where it cannot connect to another one, which iceoryx2 tries once: without room it fails, since sender and receiver
+/// would wait for one another for ever. Any other reason is that the other one has just ended.
+pub(crate) fn connections()
+-> impl Fn(DegradationCause, &DegradationInfo) -> DegradationAction + Send + 'static {
+    let known = AtomicU64::new(n_refused());
+    move |cause, _| {
+        let n = n_refused();
+        let is_refused = known.swap(n, Ordering::Relaxed) < n;
+        let is_full = || free_shared_memory().is_ok_and(|it| it < OVERHEAD_BYTES);
+        match cause {
+            DegradationCause::FailedToEstablishConnection if is_refused || is_full() => {
+                DegradationAction::DegradeAndFail
+            }
+            _ => DegradationAction::Warn,
+        }
+    }
 }

@@ -8,6 +8,7 @@ use iceoryx2::port::listener::ListenerCreateError;
 use iceoryx2::port::notifier::NotifierCreateError;
 use iceoryx2::port::publisher::PublisherCreateError;
 use iceoryx2::port::subscriber::SubscriberCreateError;
+use iceoryx2::port::update_connections::ConnectionFailure;
 use iceoryx2::prelude::{
     AttributeSet, AttributeSpecifier, Node, PortFactory as _, SemanticString as _, ServiceName, ipc,
 };
@@ -21,7 +22,7 @@ use crate::Fault;
 use crate::delivery::Delivery;
 use crate::memory::MemoryError;
 use crate::payload::{Header, Message};
-use crate::room::{ROOM, no_room};
+use crate::room::{ROOM, short_of_room};
 
 /// How long to wait for a service that another process is creating or removing.
 const IN_FLUX_LIMIT: Duration = Duration::from_secs(5);
@@ -118,6 +119,15 @@ pub enum PortError {
         #[source]
         source: ListenerCreateError,
     },
+    /// The subscriber cannot connect to a publisher.
+    #[error("cannot connect to a sender of topic {topic:?}")]
+    Connection {
+        /// Name of the topic.
+        topic: String,
+        /// Why.
+        #[source]
+        source: ConnectionFailure,
+    },
     /// The memory of the publisher cannot be reserved.
     #[error("cannot reserve the memory of topic {topic:?}")]
     Memory {
@@ -138,7 +148,7 @@ pub enum PortError {
 impl Fault for PortError {
     fn hint(&self) -> Option<String> {
         let is_known = matches!(self, Self::Memory { .. });
-        no_room().or_else(|| is_known.then(|| ROOM.to_owned()))
+        short_of_room().or_else(|| is_known.then(|| ROOM.to_owned()))
     }
 }
 

@@ -15,6 +15,7 @@ use iceoryx2::sample::Sample as IoxSample;
 use crate::bus::Bus;
 use crate::delivery::Delivery;
 use crate::payload::{Element, Header, Message};
+use crate::room::{connections, short_of_room};
 use crate::service::{self, Messages, PortError};
 use crate::{Copies, Fault, Waiter};
 
@@ -38,7 +39,14 @@ pub enum ReceiveError {
     },
 }
 
-impl Fault for ReceiveError {}
+impl Fault for ReceiveError {
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::Transport { .. } => short_of_room(),
+            Self::TooManyHeld { .. } => None,
+        }
+    }
+}
 
 /// Receives messages as copies.
 #[derive(Debug)]
@@ -220,7 +228,9 @@ impl<E: Message, H: Header> Port<E, H> {
         } else if extras.wakes {
             waiter.watch(bus.listener(topic)?);
         }
-        let mut builder = messages.subscriber_builder();
+        let mut builder = messages
+            .subscriber_builder()
+            .set_degradation_handler(connections());
         if bus.looks_on() {
             builder = builder.name(&onlooker());
         }
@@ -236,20 +246,22 @@ impl<E: Message, H: Header> Port<E, H> {
             known_publishers: RefCell::new(Vec::new()),
             copies: bus.copies().clone(),
         };
-        port.connect();
+        port.connect()?;
         Ok(port)
     }
 
     /// Connects to the existing publishers.
-    fn connect(&self) {
+    fn connect(&self) -> Result<(), PortError> {
         // Listed before connecting, so that only connected publishers are acknowledged: a new one may
         // appear in between.
         let publishers = self.publishers();
-        match self.subscriber.update_connections() {
-            Ok(()) => self.acknowledge(publishers),
-            // Connecting is tried again at the next receive.
-            Err(error) => tracing::debug!(topic = %self.topic, %error, "cannot connect"),
-        }
+        let connected = self.subscriber.update_connections();
+        connected.map_err(|source| PortError::Connection {
+            topic: self.topic.to_string(),
+            source,
+        })?;
+        self.acknowledge(publishers);
+        Ok(())
     }
 
     fn receive(&self) -> Result<Option<IoxSample<ipc::Service, [E], H>>, ReceiveError> {
