@@ -43,7 +43,7 @@ nobody. Nothing is written then. A drift is told apart from none only in footage
 
 With --by sound the times at which sounds begin are compared instead: steps, voices, doors, claps. Nobody needs to be seen. Sound \
 needs 2.9 ms for a metre, so that offsets are right to about the distance of two cameras divided by 343 m/s: +- says how much for \
-this rig. What is refused: too few sounds, sounds that only one camera has, a beat, pairs and parts that contradict each other.
+this rig; in JSON `joints` counts sounds then, and pixels are null. What is refused: too few sounds, sounds that only one camera has, a beat, pairs and parts that contradict each other.
 
 With --json one object:
     {\"is_determined\", \"doubts\": [text], \"reference\", \"length_s\", \"second_best\",

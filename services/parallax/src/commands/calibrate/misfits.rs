@@ -4,7 +4,7 @@ use calibration::people::Skeletons;
 use calibration::people::misfit::{Fitted, Misfit};
 use footage::{Canvas, LEFT, RIGHT, Size, Source, SourceSpec};
 use geometry::Camera;
-use launch::inputs;
+use launch::{inputs, output};
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::walk::Walk;
@@ -19,15 +19,12 @@ const JPEG_QUALITY: u8 = 80;
 ///
 /// * `offsets_s`: what is added to the times of each camera; as many as there are cameras where there is a rig.
 /// * `skeletons`: instants, and the skeleton at each.
-///
-/// # Errors
-///
-/// Footage that cannot be read again.
+/// * A picture that cannot be read again is left out, and named.
 pub(super) fn of(
     walk: &Walk,
     (cameras, offsets_s): (&[Camera], &[f64]),
     skeletons: (&[f64], &Skeletons),
-) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+) -> Vec<(String, Vec<u8>)> {
     let fitted = Fitted {
         cameras,
         films: &walk.found.films,
@@ -38,20 +35,21 @@ pub(super) fn of(
     let mut pictures = Vec::new();
     if offsets_s.len() != cameras.len() {
         // There is no rig.
-        return Ok(pictures);
+        return pictures;
     }
     for misfit in fitted.worst(MOST[0]).iter().take(MOST[1]) {
-        if let Some(jpeg) = drawn(walk, misfit)? {
-            let caption = format!(
-                "{} at {:.2} s: {:.1} px off",
-                walk.names()[misfit.camera],
-                misfit.time_s,
-                misfit.residual_px
-            );
-            pictures.push((caption, jpeg));
+        let name = walk.names()[misfit.camera];
+        match drawn(walk, misfit) {
+            Ok(None) => {}
+            Ok(Some(jpeg)) => {
+                let (time_s, off_px) = (misfit.time_s, misfit.residual_px);
+                let caption = format!("{name} at {time_s:.2} s: {off_px:.1} px off");
+                pictures.push((caption, jpeg));
+            }
+            Err(why) => output::message(format_args!("a picture of {name} is left out: {why}")),
         }
     }
-    Ok(pictures)
+    pictures
 }
 
 fn drawn(walk: &Walk, misfit: &Misfit) -> Result<Option<Vec<u8>>, Failure> {

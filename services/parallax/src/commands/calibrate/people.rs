@@ -354,7 +354,7 @@ fn write_page(
         walk,
         (&outcome.cameras, &offsets_s),
         (&outcome.times_s, &outcome.skeletons),
-    )?;
+    );
     let page = report::walk::of_people(outcome, &walk.names(), &about, &pictures);
     files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))
 }
