@@ -146,6 +146,13 @@ fn check(cameras: &[Camera], films: &[Film], settings: &Settings) -> Result<(), 
             cameras: n,
         });
     }
+    check_settings(n, reference, window_s)?;
+    let mut each = films.iter().enumerate();
+    each.try_for_each(|(camera, it)| it.check(camera))
+}
+
+/// Refuses what no clocks can be compared with.
+pub(crate) fn check_settings(n: usize, reference: usize, window_s: f64) -> Result<(), FilmError> {
     if n < 2 {
         return Err(FilmError::OneCamera { cameras: n });
     }
@@ -158,8 +165,7 @@ fn check(cameras: &[Camera], films: &[Film], settings: &Settings) -> Result<(), 
     if !(0.1..=60.0).contains(&window_s) {
         return Err(FilmError::Window { window_s });
     }
-    let mut each = films.iter().enumerate();
-    each.try_for_each(|(camera, it)| it.check(camera))
+    Ok(())
 }
 
 /// For how long someone is followed, seconds.

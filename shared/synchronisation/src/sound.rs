@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, Point3};
 
 use crate::curve::Curve;
 use crate::doubt::Doubt;
-use crate::estimate::{CameraClock, Outcome, PairReport};
+use crate::estimate::{CameraClock, Outcome, PairReport, check_settings};
 use crate::film::FilmError;
 use beginnings::{Beginnings, HOP_S, Match};
 use parts::parts;
@@ -70,20 +70,7 @@ pub struct SoundSettings {
 ///
 /// [`FilmError`]: fewer than two cameras, a reference that does not exist, a window that makes no sense.
 pub fn estimate_by_sound(sounds: &[Sound], settings: &SoundSettings) -> Result<Outcome, FilmError> {
-    let n = sounds.len();
-    let (reference, window_s) = (settings.reference, settings.window_s);
-    if n < 2 {
-        return Err(FilmError::OneCamera { cameras: n });
-    }
-    if reference >= n {
-        return Err(FilmError::Reference {
-            reference,
-            cameras: n,
-        });
-    }
-    if !(0.1..=60.0).contains(&window_s) {
-        return Err(FilmError::Window { window_s });
-    }
+    check_settings(sounds.len(), settings.reference, settings.window_s)?;
     let heard: Vec<Beginnings> = sounds.iter().map(Beginnings::of).collect();
     Ok(Study { heard, settings }.outcome())
 }
