@@ -105,6 +105,23 @@ impl Gather {
         }
     }
 
+    /// Whether expected errors of a frame are still on their way: fusion used them, and their sender gives them to one receiver after
+    /// another.
+    pub(crate) fn awaits_quality(&self, frame: u64) -> bool {
+        let Some(parts) = self.frames.get(&frame) else {
+            return false;
+        };
+        let is_absent = |view: u32| {
+            let record = parts.views.get(view as usize);
+            record.is_some_and(|it| it.quality.is_none())
+        };
+        parts.pairs.iter().any(|pair| {
+            // An age of 1: predicted in this frame.
+            let mut used = pair.views.iter().zip(pair.sigma_age);
+            used.any(|(view, age)| age == 1 && is_absent(*view))
+        })
+    }
+
     /// The record of a frame whose result has been received; earlier frames get no result any more. `None` if the frame has
     /// been settled already: a restarted sender may send a result again.
     pub(crate) fn result(&mut self, pose3d: &Pose3d) -> Option<Settled> {
@@ -229,6 +246,34 @@ mod tests {
             gather.result(&pose3d(4)).unwrap().record.views[1].pose,
             Some(pose(4))
         );
+    }
+
+    #[test]
+    fn expected_errors_that_fusion_used_are_awaited_and_no_others() {
+        let mut gather = Gather::new(2, 0, 1, false);
+        let stamp = pose(3).stamp;
+        let pair = |sigma_age: [u16; 2]| PairPose {
+            stamp,
+            views: [0, 1],
+            sigma_age,
+            ..PairPose::default()
+        };
+        assert!(!gather.awaits_quality(3), "nothing is known of the frame");
+        gather.pair(&pair([0, 4]));
+        assert!(
+            !gather.awaits_quality(3),
+            "none were used, or those of an earlier frame"
+        );
+        gather.pair(&pair([0, 1]));
+        assert!(gather.awaits_quality(3));
+        let quality = ViewQuality {
+            stamp,
+            ..ViewQuality::default()
+        };
+        gather.quality(0, &quality);
+        assert!(gather.awaits_quality(3), "those of the other view");
+        gather.quality(1, &quality);
+        assert!(!gather.awaits_quality(3));
     }
 
     #[test]

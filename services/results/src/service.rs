@@ -4,6 +4,7 @@
 //! cannot keep up, the newest results are dropped and counted.
 
 use core::time::Duration;
+use std::time::Instant;
 
 use messages::{Cause, FrameHeader, PairPose, Pose3d, Span, Status, ViewPose, ViewQuality, topic};
 use runtime::{Failure, Service, SliceSubscriber, Subscriber, Waiter, Woken, now_nanos};
@@ -13,6 +14,10 @@ use crate::gather::Gather;
 use crate::job::Job;
 use crate::writer::Writer;
 use crate::{Folder, FrameRecord, Picture};
+
+/// How long expected errors that were used are waited for, and the pause between two looks.
+const AWAITED: Duration = Duration::from_millis(200);
+const AWAIT_PAUSE: Duration = Duration::from_micros(500);
 
 /// Writes what is published, until the footage ends or a stop is requested.
 ///
@@ -31,12 +36,20 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let writer = Writer::start(job, service)?;
     let mut gather = Gather::new(n_views, writer.next, frame_step, service.epoch() > 0);
     let context = Context::of(service);
-    let mut is_over = false;
+    let (mut is_over, mut may_await) = (false, true);
     while !is_over && waiter.wait(Duration::from_millis(50))? != Woken::Stop {
         ports.receive_inputs(&context, &mut gather, &writer)?;
         while let Some(pose3d) = ports.pose3d.receive::<Pose3d>(&context)? {
-            // The inputs of a result were sent before it, so they can all be received now.
+            // The inputs of a result were sent before it, so they can all be received now; but for expected errors that fusion
+            // was given first.
             ports.receive_inputs(&context, &mut gather, &writer)?;
+            let begin = Instant::now();
+            while may_await && gather.awaits_quality(pose3d.stamp.frame) {
+                std::thread::sleep(AWAIT_PAUSE);
+                ports.receive_inputs(&context, &mut gather, &writer)?;
+                // They do not come: they were lost, and others may be.
+                may_await = begin.elapsed() < AWAITED;
+            }
             if pose3d.status == Status::END {
                 writer.rest(gather.rest());
                 is_over = true;
