@@ -34,10 +34,14 @@ fn missed(report: &Value) -> Vec<&str> {
 #[test]
 fn a_killed_camera_is_restarted_and_the_report_counts_the_lost_frames() {
     // As slow as a machine with little left needs it, with limits that allow for frames that it drops.
-    let limits = "--max-return-ms 90000 --max-pause-ms 90000 --min-results 5 --min-skeletons 10 --min-pcp3d 2";
+    let limits = "--min-results 5 --min-skeletons 10 --min-pcp3d 5";
     let at = |rate_hz: f64| {
-        let deadline_ms = 8000.0 / rate_hz;
-        let options = format!("--frames 20 --rate {rate_hz} --deadline-ms {deadline_ms} {limits}");
+        let [deadline_ms, return_ms, pause_ms] =
+            [8.0, 24.0, 16.0].map(|frames| 1000.0 * frames / rate_hz);
+        let times = format!(
+            "--deadline-ms {deadline_ms} --max-return-ms {return_ms} --max-pause-ms {pause_ms}"
+        );
+        let options = format!("--frames 20 --rate {rate_hz} {times} {limits}");
         demo("demo", &options.split(' ').collect::<Vec<_>>())
     };
     let mut rate_hz = 0.8;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use calibration::people::{Floor, Skeletons, Vertical, floor};
 use geometry::Rig;
+use launch::output;
 use nalgebra::{Point2, Point3};
 use offline::smooth::read_lines;
 use runfiles::{Line as _, ViewLine};
@@ -23,7 +24,7 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
     let mut times_s: Vec<f64> = Vec::new();
     let mut skeletons: Skeletons = Vec::new();
     let mut frames = Vec::new();
-    read_lines(run, |_, line| {
+    let cut = read_lines(run, |_, line| {
         let time_s = rate_hz.map_or(line.time_s, |it| Some(line.frame as f64 / it));
         let time_s = time_s.ok_or_else(|| {
             let message = format!("{}: the frames of the run have no times", run.display());
@@ -40,6 +41,9 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
         }
         Ok(())
     })?;
+    if let Some(cut) = cut {
+        output::message(cut);
+    }
     check(rig, run, &frames, &skeletons)?;
     let found = floor(&times_s, &skeletons).ok_or_else(|| {
         let message = format!(
