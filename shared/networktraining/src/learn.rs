@@ -1,11 +1,10 @@
-//! Runs and trains the network with burn.
+//! Runs and trains the network: in Rust with burn, or on `LibTorch`.
 
-mod forward;
+mod flex;
+#[cfg(feature = "libtorch")]
+mod torch;
 
-use burn_tensor::{DType, Device, Tensor, TensorData, activation};
-
-use self::forward::Forward;
-use crate::network::{self, N_JOINTS, STRIDE, Shape};
+use crate::network::{N_JOINTS, STRIDE, Shape};
 use crate::parameters::{Parameter, Role};
 use crate::settings::{Backend, Precision};
 
@@ -123,8 +122,8 @@ impl Memory {
 #[derive(Debug)]
 pub struct Learner {
     shape: Shape,
-    device: Device,
-    numbers: DType,
+    backend: Backend,
+    precision: Precision,
     memory: Memory,
 }
 
@@ -133,11 +132,8 @@ impl Learner {
     pub fn new(shape: Shape, (backend, precision): (Backend, Precision), memory: Memory) -> Self {
         Self {
             shape,
-            device: device(backend),
-            numbers: match precision {
-                Precision::F32 => DType::F32,
-                Precision::Bf16 => DType::BF16,
-            },
+            backend,
+            precision,
             memory,
         }
     }
@@ -154,14 +150,11 @@ impl Learner {
 
     /// What the averaged network finds in pictures, `[n, 3, height, width]`.
     pub fn find(&self, n: usize, pictures: &[f32]) -> Found {
-        let tensors = tensors(&self.memory.averages, &self.device);
-        let sides = [self.shape.width, self.shape.height];
-        let mut forward = self.forward((n, sides, pictures), &tensors, &self.device);
-        let found = network::run(&mut forward, &self.shape);
-        Found {
-            maps: numbers(found.maps.map().cast(DType::F32).reshape([-1])),
-            fronts: numbers(found.front.list().reshape([-1])),
-            errors: numbers(found.error.list().reshape([-1])),
+        let network = self.network(&self.memory.averages);
+        match self.backend {
+            Backend::Flex => flex::find(network, n, pictures),
+            #[cfg(feature = "libtorch")]
+            Backend::LibTorch => torch::find(network, n, pictures),
         }
     }
 
@@ -169,50 +162,22 @@ impl Learner {
     ///
     /// * Returns the cost before it.
     pub fn learn(&mut self, batch: &Batch, step: Step) -> Cost {
-        let device = self.device.clone().autodiff();
-        let parameters = &self.memory.parameters;
-        let of_error = |it: &Parameter| it.name.starts_with("error");
-        let learned = |it: &Parameter| !step.error_only || of_error(it);
-        let tensors: Vec<Tensor<1>> = tensors(parameters, &device)
-            .into_iter()
-            .zip(parameters)
-            .map(|(tensor, it)| {
-                if learned(it) {
-                    tensor.require_grad()
-                } else {
-                    tensor
-                }
-            })
-            .collect();
-        let pictures = (batch.n, batch.sides, batch.pictures.as_slice());
-        let mut forward = self.forward(pictures, &tensors, &device);
-        let found = network::run(&mut forward, &self.shape);
-        let maps = found.maps.map().cast(DType::F32);
-        let places: Vec<f32> = numbers(maps.clone().detach().reshape([-1]));
-        let targets = Targets {
-            batch,
-            device: &device,
-            cells: batch.sides.map(|it| it / STRIDE),
+        let network = self.network(&self.memory.parameters);
+        let (gradients, cost) = match self.backend {
+            Backend::Flex => flex::gradients(network, batch, step),
+            #[cfg(feature = "libtorch")]
+            Backend::LibTorch => torch::gradients(network, batch, step),
         };
-        let of_maps = targets.of_maps(maps);
-        let of_front = targets.of_front(found.front.list());
-        let of_error = targets.of_error(found.error.list(), &places);
-        let cost = if step.error_only {
-            of_error.clone() * step.error
-        } else {
-            of_maps.clone() + of_front.clone() * step.front + of_error.clone() * step.error
-        };
-        let mut gradients = cost.backward();
-        let gradients: Vec<Option<Vec<f32>>> = tensors
-            .iter()
-            .map(|it| it.grad_remove(&mut gradients).map(numbers))
-            .collect();
         self.change(&gradients, step);
-        let [maps, front, error] = [of_maps, of_front, of_error].map(|it| {
-            let value = numbers(it.reshape([-1]));
-            value.first().copied().unwrap_or(f32::NAN)
-        });
-        Cost { maps, front, error }
+        cost
+    }
+
+    fn network<'a>(&'a self, parameters: &'a [Parameter]) -> Network<'a> {
+        Network {
+            shape: &self.shape,
+            precision: self.precision,
+            parameters,
+        }
     }
 
     /// Changes the parameters; a gradient that is not finite changes nothing.
@@ -256,87 +221,42 @@ impl Learner {
             }
         }
     }
+}
 
-    fn forward<'a>(
-        &'a self,
-        (n, [width, height], pictures): (usize, [usize; 2], &[f32]),
-        tensors: &'a [Tensor<1>],
-        device: &Device,
-    ) -> Forward<'a> {
-        let data = TensorData::new(pictures.to_vec(), [n, 3, height, width]);
-        Forward {
-            parameters: &self.memory.parameters,
-            tensors,
-            picture: Tensor::from_data(data, device),
-            numbers: self.numbers,
-            next: 0,
-        }
+/// A network with its parameters.
+#[derive(Clone, Copy)]
+struct Network<'a> {
+    shape: &'a Shape,
+    precision: Precision,
+    parameters: &'a [Parameter],
+}
+
+/// Of every parameter, nothing of those that are not learned.
+type Gradients = Vec<Option<Vec<f32>>>;
+
+impl Step {
+    /// Whether the step changes a parameter.
+    fn learns(&self, parameter: &Parameter) -> bool {
+        !self.error_only || parameter.name.starts_with("error")
     }
 }
 
-/// Where the tensors of a backend live.
-fn device(backend: Backend) -> Device {
-    match backend {
-        Backend::Flex => Device::flex(),
-        #[cfg(feature = "libtorch")]
-        Backend::LibTorch => Device::libtorch(),
-    }
-}
-
-fn tensors(parameters: &[Parameter], device: &Device) -> Vec<Tensor<1>> {
-    let tensor = |it: &Parameter| {
-        Tensor::from_data(
-            TensorData::new(it.values.clone(), [it.values.len()]),
-            device,
-        )
-    };
-    parameters.iter().map(tensor).collect()
-}
-
-/// The values of a tensor of `f32`.
-fn numbers(of: Tensor<1>) -> Vec<f32> {
-    of.into_data_as::<f32>().try_into_vec().unwrap_or_default()
-}
-
-/// What should be found, and the cost of what is found in its place.
-struct Targets<'a> {
-    batch: &'a Batch,
-    device: &'a Device,
-    cells: [usize; 2],
-}
-
-impl Targets<'_> {
-    /// Cross-entropy of the maps, heat counting tenfold: the mean over joints, a cell of heat 1 worth.
-    fn of_maps(&self, maps: Tensor<4>) -> Tensor<1> {
-        let dims = maps.dims();
-        let target: Tensor<4> = self.tensor(&self.batch.maps, dims);
-        let weights: Tensor<4> = self.tensor(&self.batch.weights, [dims[0], dims[1], 1, 1]);
-        let sum_of_weights = self.batch.weights.iter().sum::<f32>().max(1.0);
-        // log(1 + exp(x)) - x t, without overflow.
-        let soft = activation::relu(maps.clone()) + ((maps.clone().abs() * -1.0).exp() + 1.0).log();
-        let entropy = soft - maps * target.clone();
-        (entropy * (target * 9.0 + 1.0) * weights).sum() / (sum_of_weights * 40.0)
+impl Batch {
+    /// How much all maps count.
+    fn sum_of_weights(&self) -> f32 {
+        self.weights.iter().sum::<f32>().max(1.0)
     }
 
-    /// Surprise about the direction, weighted by its certainty.
-    fn of_front(&self, evidence: Tensor<2>) -> Tensor<1> {
-        let fronts = &self.batch.fronts;
-        let lengths: Vec<f32> = fronts
-            .chunks_exact(2)
-            .map(|it| it[0].hypot(it[1]))
-            .collect();
-        let n = self.batch.n;
-        let certain = lengths.iter().sum::<f32>().max(1.0);
-        let direction: Tensor<2> = self.tensor(fronts, [n, 2]);
-        let lengths: Tensor<2> = self.tensor(&lengths, [n, 1]);
-        let ratio = (evidence * direction).sum_dim(1) * 2.0 / (lengths.clone() + 1e-6);
-        (activation::softplus(ratio * -1.0, 1.0) * lengths).sum() / certain
+    /// How certain the direction of every sample is.
+    fn certainties(&self) -> Vec<f32> {
+        let each = self.fronts.chunks_exact(2);
+        each.map(|it| it[0].hypot(it[1])).collect()
     }
 
-    /// Surprise about the errors of the maxima, if they are distributed exponentially with the expected error as mean.
-    fn of_error(&self, logarithms: Tensor<2>, maps: &[f32]) -> Tensor<1> {
-        let [columns, rows] = self.cells;
-        let known = self.batch.places.chunks_exact(2);
+    /// How far off the maxima of maps are, heights of the input, 0 where the joint is not certain; 1 where it is and 0 elsewhere.
+    fn off(&self, maps: &[f32]) -> [Vec<f32>; 2] {
+        let [columns, rows] = self.sides.map(|it| it / STRIDE);
+        let known = self.places.chunks_exact(2);
         let off = maps
             .chunks_exact(columns * rows)
             .zip(known)
@@ -345,24 +265,9 @@ impl Targets<'_> {
                 (x - place[0]).hypot(y - place[1]) / rows as f32
             });
         let off: Vec<f32> = off.collect();
-        let is_known: Vec<f32> = off
-            .iter()
-            .map(|it| f32::from(u8::from(it.is_finite())))
-            .collect();
-        let off: Vec<f32> = off
-            .iter()
-            .map(|it| if it.is_finite() { *it } else { 0.0 })
-            .collect();
-        let n_known = is_known.iter().sum::<f32>().max(1.0);
-        let dims = [self.batch.n, N_JOINTS];
-        let off: Tensor<2> = self.tensor(&off, dims);
-        let is_known: Tensor<2> = self.tensor(&is_known, dims);
-        let logarithms = logarithms.clamp(-8.0, 2.0);
-        let surprise = off * (logarithms.clone() * -1.0).exp() + logarithms;
-        (surprise * is_known).sum() / n_known
-    }
-
-    fn tensor<const D: usize>(&self, values: &[f32], dims: [usize; D]) -> Tensor<D> {
-        Tensor::from_data(TensorData::new(values.to_vec(), dims), self.device)
+        let is_known = off.iter().map(|it| f32::from(u8::from(it.is_finite())));
+        let is_known = is_known.collect();
+        let off = off.iter().map(|it| if it.is_finite() { *it } else { 0.0 });
+        [off.collect(), is_known]
     }
 }

@@ -110,6 +110,47 @@ fn it_learns_and_a_training_that_was_interrupted_ends_with_the_same_bits() {
     assert_eq!(whole.averages(), resumed.averages());
 }
 
+/// Sums in another order: some steps end near each other, not with the same bits.
+#[cfg(feature = "libtorch")]
+#[test]
+fn both_backends_learn_the_same() {
+    let (learnt, kept) = (people(10, 1), people(3, 2));
+    let settings = Settings {
+        steps: 6,
+        ..small()
+    };
+    let [flex, torch] = [Backend::Flex, Backend::LibTorch].map(|backend| {
+        let mut trainer = Trainer::new((&settings, backend), [&learnt, &kept], None).unwrap();
+        // Six steps of everything, four of the expected error alone.
+        for _ in 0..10 {
+            assert!(trainer.pass(1, false, &mut |_| true));
+        }
+        let seen = plain(&kept[0], &settings.shape).unwrap();
+        (trainer.passes().to_vec(), trainer.find(1, &seen.picture))
+    });
+    for (a, b) in flex.0.iter().zip(&torch.0) {
+        let costs = [
+            [a.cost.maps, b.cost.maps],
+            [a.cost.front, b.cost.front],
+            [a.cost.error, b.cost.error],
+        ];
+        for [a, b] in costs {
+            assert!((a - b).abs() < 1e-3 * (1.0 + a.abs()), "{a} and {b}");
+        }
+    }
+    let pairs = [
+        (&flex.1.maps, &torch.1.maps),
+        (&flex.1.fronts, &torch.1.fronts),
+        (&flex.1.errors, &torch.1.errors),
+    ];
+    for (a, b) in pairs {
+        assert_eq!(a.len(), b.len());
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() < 5e-3 * (1.0 + a.abs()), "{a} and {b}");
+        }
+    }
+}
+
 #[test]
 fn what_is_shown_lies_where_the_heat_is() {
     let person = &people(1, 3)[0];

@@ -1,9 +1,9 @@
 //! The forward pass of the network in burn, recorded for the backward pass.
 
 use burn_tensor::ops::{ConvOptions, InterpolateMode, InterpolateOptions};
-use burn_tensor::{DType, Tensor, activation, module};
+use burn_tensor::{DType, Tensor, TensorData, activation, module};
 
-use crate::network::{Conv, Ops};
+use crate::network::{Conv, Ops, grid};
 use crate::parameters::{EPSILON, GAIN_OF_RELU, Parameter};
 
 /// A map or a list of every sample.
@@ -133,6 +133,16 @@ impl Ops for Forward<'_> {
         let [_, channels, _] = features.dims();
         let looked = weights.matmul(features.swap_dims(1, 2));
         Value::List(looked.reshape([n, n_maps * channels]))
+    }
+
+    fn place(&mut self, maps: &Value, sharpness: f32) -> Value {
+        let maps = maps.map();
+        let [n, n_maps, n_rows, n_columns] = maps.dims();
+        let grid = TensorData::new(grid(n_columns, n_rows), [1, n_rows * n_columns, 3]);
+        let grid: Tensor<3> = Tensor::from_data(grid, &maps.device());
+        let weights = activation::softmax(rows(maps) * sharpness, 2);
+        let places = weights.matmul(grid.repeat_dim(0, n));
+        Value::List(places.reshape([n, 3 * n_maps]))
     }
 
     fn highest(&mut self, of: &Value) -> Value {
