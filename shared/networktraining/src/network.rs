@@ -20,6 +20,8 @@ pub(crate) const MULTIPLE: usize = 32;
 
 /// How much the logits of a map are sharpened where features are looked up at its maximum.
 const SHARPNESS: f32 = 2.0;
+/// How much they are sharpened where lower maxima should count, too.
+const WIDE: f32 = 1.0;
 
 /// A convolution with a bias, padded so that the size stays at stride 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +63,10 @@ pub(crate) trait Ops {
     ///
     /// The weights are the softmax over the cells of `maps` times `sharpness`.
     fn look(&mut self, of: &Self::Value, maps: &Self::Value, sharpness: f32) -> Self::Value;
+    /// Where the maxima of maps are: a list of x, y and x² + y² of the first maximum, of the second, and so on.
+    ///
+    /// The means over the cells with the weights of [`Self::look`]; x and y as [`grid`] says.
+    fn place(&mut self, maps: &Self::Value, sharpness: f32) -> Self::Value;
     /// The largest value of every channel of a map: a list.
     fn highest(&mut self, of: &Self::Value) -> Self::Value;
     /// Concatenates lists.
@@ -94,8 +100,8 @@ impl Default for Shape {
             height: 160,
             stem: 32,
             channels: [64, 128, 192, 256],
-            blocks: [2, 3, 3, 3],
-            hidden: 64,
+            blocks: [2, 3, 6, 4],
+            hidden: 96,
         }
     }
 }
@@ -211,6 +217,19 @@ fn block<O: Ops>(
     ops.add(of, &x)
 }
 
+/// x, y and x² + y² of every cell, row by row: -1 to 1 from the left to the right, and from the top down.
+pub(crate) fn grid(columns: usize, rows: usize) -> Vec<f32> {
+    let middle = |at: usize, n: usize| (2 * at + 1) as f32 / n as f32 - 1.0;
+    let mut all = Vec::with_capacity(3 * columns * rows);
+    for row in 0..rows {
+        for column in 0..columns {
+            let [x, y] = [middle(column, columns), middle(row, rows)];
+            all.extend([x, y, x * x + y * y]);
+        }
+    }
+    all
+}
+
 /// By the features at the joints and the deepest features of the whole picture.
 fn front<O: Ops>(
     ops: &mut O,
@@ -224,7 +243,7 @@ fn front<O: Ops>(
     ops.dense(&hidden, "front2", 2)
 }
 
-/// The same, from which the features learn nothing, and how high the maps are.
+/// The same, from which the features learn nothing, and how high the maps are, where, and how far their heat is spread.
 fn error<O: Ops>(
     ops: &mut O,
     shape: &Shape,
@@ -234,7 +253,9 @@ fn error<O: Ops>(
     let overall = ops.fixed(overall);
     let seen = ops.look(&features, places, SHARPNESS);
     let heights = ops.highest(places);
-    let all = ops.join(&[&seen, &heights, &overall]);
+    let near = ops.place(places, SHARPNESS);
+    let wide = ops.place(places, WIDE);
+    let all = ops.join(&[&seen, &heights, &near, &wide, &overall]);
     let hidden = ops.dense(&all, "error1", shape.hidden);
     let hidden = ops.relu(&hidden);
     ops.dense(&hidden, "error2", N_JOINTS)

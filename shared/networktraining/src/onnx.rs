@@ -2,7 +2,7 @@
 
 use onnx::{Attribute, Network, Side};
 
-use crate::network::{self, Conv, Ops, Shape};
+use crate::network::{self, Conv, Ops, Shape, grid};
 use crate::parameters::{Dims, Parameter, convolved, standardised};
 
 /// Name of the input, `[n, 3, height, width]`.
@@ -116,6 +116,17 @@ impl<'a> Writer<'a> {
         self.reshaped(of, &dims)
     }
 
+    /// The softmax over the cells of every map.
+    fn softmax(&mut self, maps: &Value, sharpness: f32) -> Value {
+        let factor = format!("sharpness_{}", self.n);
+        self.graph.floats(&factor, &[1], vec![sharpness]);
+        let maps = self.rows(maps);
+        let dims = maps.dims.clone();
+        let sharp = self.node("Mul", &[&maps.name, &factor], vec![], dims.clone());
+        let axis = vec![("axis", Attribute::Int(2))];
+        self.node("Softmax", &[&sharp.name], axis, dims)
+    }
+
     fn flat(&mut self, of: &Value) -> Value {
         let dims = vec![of.dims.iter().product()];
         let axis = vec![("axis", Attribute::Int(1))];
@@ -180,13 +191,8 @@ impl Ops for Writer<'_> {
     }
 
     fn look(&mut self, of: &Value, maps: &Value, sharpness: f32) -> Value {
-        let factor = format!("sharpness_{}", self.n);
-        self.graph.floats(&factor, &[1], vec![sharpness]);
-        let maps = self.rows(maps);
-        let dims = maps.dims.clone();
-        let sharp = self.node("Mul", &[&maps.name, &factor], vec![], dims.clone());
-        let axis = vec![("axis", Attribute::Int(2))];
-        let weights = self.node("Softmax", &[&sharp.name], axis, dims.clone());
+        let weights = self.softmax(maps, sharpness);
+        let dims = weights.dims.clone();
         let features = self.rows(of);
         let turned = vec![features.dims[1], features.dims[0]];
         let turn = vec![("perm", ints(&[0, 2, 1]))];
@@ -194,6 +200,17 @@ impl Ops for Writer<'_> {
         let dims = vec![dims[0], features.dims[1]];
         let looked = self.node("MatMul", &[&weights.name, &features.name], vec![], dims);
         self.flat(&looked)
+    }
+
+    fn place(&mut self, maps: &Value, sharpness: f32) -> Value {
+        let weights = self.softmax(maps, sharpness);
+        let dims = weights.dims.clone();
+        let cells = format!("grid_{}", self.n);
+        let values = grid(maps.dims[2], maps.dims[1]);
+        self.graph.floats(&cells, &[dims[1], 3], values);
+        let dims = vec![dims[0], 3];
+        let places = self.node("MatMul", &[&weights.name, &cells], vec![], dims);
+        self.flat(&places)
     }
 
     fn highest(&mut self, of: &Value) -> Value {

@@ -162,6 +162,10 @@ impl Ops for Plan<'_> {
         vec![of[0] * maps[0]]
     }
 
+    fn place(&mut self, maps: &Dims, _: f32) -> Dims {
+        vec![3 * maps[0]]
+    }
+
     fn highest(&mut self, of: &Dims) -> Dims {
         vec![of[0]]
     }

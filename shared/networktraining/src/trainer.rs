@@ -18,12 +18,14 @@ const CHECKPOINT: Envelope = Envelope {
     magic: *b"PLXPOSNT",
     version: 2,
 };
+/// People in a row that belong together.
+const RUN: usize = 16;
 /// People that are judged at once.
 const JUDGED_AT_ONCE: usize = 32;
 /// Share of the steps in which their length rises.
 const RISING: f32 = 0.1;
 /// Length of the steps that learn the expected error alone.
-const ERROR_RATE: f32 = 1e-3;
+const ERROR_RATE: f32 = 3e-4;
 
 /// What some steps of a training came to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -32,7 +34,7 @@ pub struct Pass {
     pub step: usize,
     /// Their mean cost.
     pub cost: Cost,
-    /// How good the averaged network is on people who are kept apart.
+    /// How good the averaged network is on half of the people who are kept apart; the expected error is learned on the others.
     pub score: Option<Score>,
 }
 
@@ -43,6 +45,38 @@ struct State {
     memory: Memory,
     step: usize,
     passes: Vec<Pass>,
+}
+
+/// People who are kept apart: the expected error is learned on some of them and judged on the others, with everything else.
+#[derive(Debug)]
+struct Kept<'a> {
+    calibrating: Vec<&'a Person>,
+    judged: Vec<&'a Person>,
+}
+
+impl<'a> Kept<'a> {
+    /// In turn [`RUN`] for the one and for the other: neighbours in a list can be pictures of one person. All for both where
+    /// they are too few.
+    fn of(people: &'a [Person]) -> Self {
+        let (calibrating, judged): (Vec<_>, Vec<_>) = people
+            .iter()
+            .enumerate()
+            .partition(|(at, _)| at / RUN % 2 == 0);
+        let people_of = |numbered: Vec<(usize, &'a Person)>| -> Vec<&'a Person> {
+            numbered.into_iter().map(|(_, person)| person).collect()
+        };
+        if judged.len() < RUN {
+            let all: Vec<&Person> = people.iter().collect();
+            return Self {
+                calibrating: all.clone(),
+                judged: all,
+            };
+        }
+        Self {
+            calibrating: people_of(calibrating),
+            judged: people_of(judged),
+        }
+    }
 }
 
 /// Why a training cannot start or resume.
@@ -72,8 +106,8 @@ pub enum TrainError {
 pub struct Trainer<'a> {
     settings: &'a Settings,
     backend: Backend,
-    learnt: &'a [Person],
-    kept: &'a [Person],
+    learnt: Vec<&'a Person>,
+    kept: Kept<'a>,
     state: State,
 }
 
@@ -116,8 +150,8 @@ impl<'a> Trainer<'a> {
         Ok(Self {
             settings,
             backend,
-            learnt,
-            kept,
+            learnt: learnt.iter().collect(),
+            kept: Kept::of(kept),
             state,
         })
     }
@@ -191,7 +225,7 @@ impl<'a> Trainer<'a> {
             front: sum.front / n,
             error: sum.error / n,
         };
-        let score = judge.then(|| score(&learner, self.settings, self.kept));
+        let score = judge.then(|| score(&learner, self.settings, &self.kept.judged));
         self.state.memory = learner.into_memory();
         self.state.step = until;
         self.state.passes.push(Pass {
@@ -207,7 +241,7 @@ impl<'a> Trainer<'a> {
         score(
             &self.learner(self.state.memory.clone()),
             self.settings,
-            people,
+            &people.iter().collect::<Vec<&Person>>(),
         )
     }
 
@@ -266,9 +300,9 @@ impl<'a> Trainer<'a> {
     /// The samples of a step: they follow from its number alone.
     fn batch(&self, nth: usize) -> Batch {
         let people = if nth < self.settings.steps {
-            self.learnt
+            &self.learnt
         } else {
-            self.kept
+            &self.kept.calibrating
         };
         let n = self.settings.batch;
         let shape = self.shown(nth);
@@ -280,13 +314,13 @@ impl<'a> Trainer<'a> {
     }
 
     /// The sample with a number: everybody once before anybody twice.
-    fn sample(&self, people: &[Person], at: usize, shape: &Shape) -> Option<NetworkSample> {
+    fn sample(&self, people: &[&Person], at: usize, shape: &Shape) -> Option<NetworkSample> {
         let (settings, seed) = (self.settings, self.settings.seed);
         let [pass, place] = [at / people.len(), at % people.len()];
         let person = shuffled(place, people.len(), seed.wrapping_add(pass as u64));
         let mut rng = Rng::with_seed(seed ^ (at as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let other = &people[rng.usize(0..people.len())];
-        varied(&people[person], other, (shape, &settings.vary), &mut rng)
+        let other = people[rng.usize(0..people.len())];
+        varied(people[person], other, (shape, &settings.vary), &mut rng)
     }
 }
 
@@ -331,7 +365,7 @@ fn batch_of(seen: &[NetworkSample], shape: &Shape) -> Batch {
     }
 }
 
-fn score(learner: &Learner, settings: &Settings, people: &[Person]) -> Score {
+fn score(learner: &Learner, settings: &Settings, people: &[&Person]) -> Score {
     let [columns, rows] = settings.shape.cells();
     let judged = people.chunks(JUDGED_AT_ONCE).flat_map(|people| {
         let seen: Vec<NetworkSample> = people

@@ -333,17 +333,25 @@ fn sample(person: &Person, shape: &Shape, view: &View, rgb: &[[f32; 3]]) -> Netw
                 places[joint] = at;
             }
         }
+        let Some(known) = is_known.then_some([Some(at), or]) else {
+            maps.resize(maps.len() + columns * rows, 0.0);
+            continue;
+        };
+        let known: Vec<[f32; 2]> = known.into_iter().flatten().collect();
+        let share = 1.0 / known.len() as f32;
+        let heats = |axis: usize, n: usize| -> Vec<Vec<f32>> {
+            let of = |at: &[f32; 2]| {
+                let heat = |cell: usize| (-0.5 * (at[axis] - cell as f32).powi(2)).exp();
+                (0..n).map(heat).collect()
+            };
+            known.iter().map(of).collect()
+        };
+        let [across, down] = [heats(0, columns), heats(1, rows)];
         for row in 0..rows {
             for column in 0..columns {
-                let heat = |[x, y]: [f32; 2]| {
-                    let squared = (x - column as f32).powi(2) + (y - row as f32).powi(2);
-                    (-0.5 * squared).exp()
-                };
-                maps.push(match (is_known, or) {
-                    (false, _) => 0.0,
-                    (true, None) => heat(at),
-                    (true, Some(or)) => 0.5 * (heat(at) + heat(or)),
-                });
+                let each = across.iter().zip(&down);
+                let sum: f32 = each.map(|(across, down)| across[column] * down[row]).sum();
+                maps.push(share * sum);
             }
         }
     }
