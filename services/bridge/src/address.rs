@@ -9,6 +9,8 @@ pub struct Address {
     pub deployment: String,
     /// This host.
     pub host: String,
+    /// All hosts.
+    pub hosts: Vec<String>,
     /// The address of the host that fuses: name or number, and port.
     pub address: String,
     /// Whether this is that host.

@@ -83,7 +83,7 @@ pub fn join(
         if said.is_none_or(|it| it.elapsed() > SAY_EVERY) {
             if said.is_some() {
                 let what = if address.keys.is_some() {
-                    " (does it run, is it reachable, and are its keys of the same authority?)"
+                    " (does it run, is it reachable, are its keys of the same authority, and is the common name of our certificate that of this host?)"
                 } else {
                     ""
                 };

@@ -8,6 +8,7 @@ use zenoh::Wait as _;
 use zenoh::qos::{CongestionControl, Priority};
 
 use crate::address::{Address, LinkError};
+use crate::topics::Topics;
 
 /// How long a link without any sign of life lasts.
 const LEASE: Duration = Duration::from_secs(2);
@@ -130,7 +131,7 @@ fn config(address: &Address) -> Value {
     } else {
         link["protocols"] = json!(["tcp"]);
     }
-    json!({
+    let mut config = json!({
         "mode": "peer",
         "listen": { "endpoints": listen },
         "connect": {
@@ -141,6 +142,63 @@ fn config(address: &Address) -> Value {
         },
         "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
         "transport": { "link": link },
+    });
+    if address.listens && address.keys.is_some() {
+        config["access_control"] = access(address);
+    }
+    config
+}
+
+/// What every host may say to the one that fuses: what is its own, by the common name of its certificate. Whoever has the keys of one host
+/// cannot speak for another.
+fn access(address: &Address) -> Value {
+    let topics = Topics::of(&address.deployment);
+    let everything = [
+        "put",
+        "delete",
+        "declare_subscriber",
+        "query",
+        "declare_queryable",
+        "reply",
+        "liveliness_token",
+        "declare_liveliness_subscriber",
+        "liveliness_query",
+    ];
+    let mut rules = vec![json!({
+        "id": "out",
+        "permission": "allow",
+        "flows": ["egress"],
+        "messages": everything,
+        "key_exprs": ["**"],
+    })];
+    let mut subjects = vec![json!({ "id": "anybody" })];
+    let mut policies = vec![json!({ "rules": ["out"], "subjects": ["anybody"] })];
+    for host in &address.hosts {
+        let said = format!("said by {host}");
+        let heard = format!("heard by {host}");
+        rules.push(json!({
+            "id": said,
+            "permission": "allow",
+            "flows": ["ingress"],
+            "messages": ["put"],
+            "key_exprs": [topics.data(host), topics.up(host), topics.hello(host)],
+        }));
+        rules.push(json!({
+            "id": heard,
+            "permission": "allow",
+            "flows": ["ingress"],
+            "messages": ["declare_subscriber", "query"],
+            "key_exprs": [topics.down(host), topics.answer(host), topics.status()],
+        }));
+        subjects.push(json!({ "id": host, "cert_common_names": [host] }));
+        policies.push(json!({ "rules": [said, heard], "subjects": [host] }));
+    }
+    json!({
+        "enabled": true,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": subjects,
+        "policies": policies,
     })
 }
 
@@ -154,6 +212,7 @@ mod tests {
         Address {
             deployment: "a".to_owned(),
             host: "desk".to_owned(),
+            hosts: vec!["desk".to_owned(), "rack".to_owned()],
             address: "10.0.0.1:7447".to_owned(),
             listens,
             keys: keys.then(|| KeyFiles {
@@ -180,7 +239,74 @@ mod tests {
                 let tls = &text["transport"]["link"]["tls"];
                 assert_eq!(tls["enable_mtls"].as_bool(), keys.then_some(true));
                 zenoh::Config::from_json5(&text.to_string()).unwrap();
+                let is_checked = !text["access_control"].is_null();
+                assert_eq!(is_checked, listens && keys, "who speaks for whom");
             }
         }
+    }
+
+    /// A free port of this machine.
+    fn port() -> u16 {
+        let listener = std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        listener.local_addr().unwrap().port()
+    }
+
+    #[test]
+    fn a_host_speaks_and_hears_for_itself_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let names = ["desk", "rack", "shelf"];
+        let of_desk = vec!["127.0.0.1".to_owned()];
+        let made: Vec<(String, Vec<String>)> = names
+            .iter()
+            .map(|it| ((*it).to_owned(), of_desk.clone()))
+            .collect();
+        crate::keys::make_keys(folder.path(), &made).unwrap();
+        let at = format!("127.0.0.1:{}", port());
+        // `who` has the certificate of `keys`.
+        let open = |who: &str, keys: &str| {
+            let address = Address {
+                deployment: "a".to_owned(),
+                host: who.to_owned(),
+                hosts: names.map(str::to_owned).to_vec(),
+                address: at.clone(),
+                listens: who == "desk",
+                keys: Some(KeyFiles::find(folder.path(), keys).unwrap()),
+            };
+            Link::open(&address).unwrap()
+        };
+        let topics = Topics::of("a");
+        let desk = open("desk", "desk");
+        let (heard, arrived) = crossbeam::channel::unbounded();
+        let on_data = move |key: &str, _: &[u8]| heard.send(key.to_owned()).unwrap();
+        desk.subscribe(&topics.data("*"), on_data).unwrap();
+        desk.answer(&topics.status(), || b"well".to_vec()).unwrap();
+        let rack = open("rack", "rack");
+        let (told, orders) = crossbeam::channel::unbounded();
+        for host in ["shelf", "rack"] {
+            let told = told.clone();
+            let on = move |key: &str, _: &[u8]| told.send(key.to_owned()).unwrap();
+            rack.subscribe(&topics.down(host), on).unwrap();
+        }
+        // A host needs a moment to be heard; what is said in another's name is never heard.
+        let limit = Duration::from_secs(20);
+        let began = std::time::Instant::now();
+        while arrived.is_empty() || orders.is_empty() {
+            assert!(began.elapsed() < limit, "heard by the other side");
+            for host in ["shelf", "rack"] {
+                rack.send(&topics.data(host), vec![1], true);
+                desk.send(&topics.down(host), vec![1], true);
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        assert_eq!(rack.ask(&topics.status(), limit), Some(b"well".to_vec()));
+        rack.close();
+        desk.close();
+        let said: Vec<String> = arrived.try_iter().collect();
+        assert!(said.iter().all(|it| *it == topics.data("rack")), "{said:?}");
+        let heard: Vec<String> = orders.try_iter().collect();
+        assert!(
+            heard.iter().all(|it| *it == topics.down("rack")),
+            "{heard:?}"
+        );
     }
 }

@@ -80,6 +80,7 @@ pub fn address(deployment: &Deployment, host: &Host) -> Result<Address, Failure>
     Ok(Address {
         deployment: deployment.name.clone(),
         host: host.name.clone(),
+        hosts: deployment.hosts.iter().map(|it| it.name.clone()).collect(),
         address: fusing.unwrap_or_default(),
         listens: host.fuses,
         keys,
