@@ -32,7 +32,7 @@ pub use joints::Joints;
 pub(crate) use live::{footage, lead_nanos};
 pub use live::{is_live, live_camera};
 pub(crate) use maps::{check_maps, network_card};
-pub use maps::{detector, open_network, pose_network, springs};
+pub use maps::{detector, mirrored, open_network, pose_network, springs};
 pub use runtime::{in_file, read_text as text};
 
 /// Reads the named model, or the shipped model if none is named.

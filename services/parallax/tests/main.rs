@@ -16,6 +16,7 @@ mod eval_networks;
 mod export;
 mod faults;
 mod full;
+mod handstand;
 mod live;
 mod maps;
 #[cfg(feature = "long-tests")]

@@ -46,6 +46,9 @@ pub struct Config {
     pub keypoint_sigma: f64,
     /// `network`: most people of a view that it looks at.
     pub people: usize,
+    /// `network`: whether it looks at the mirror image of every person as well, and the mean of both counts. That is more exact,
+    /// and takes its time twice; not for networks that give positions in place of maps.
+    pub mirror: bool,
     /// `network`: the library of ONNX Runtime (`libonnxruntime.so`) that runs it and the detector; without it `rten`, which is built in.
     pub onnx_runtime: Option<PathBuf>,
     /// Threads of one pose process.
@@ -110,6 +113,7 @@ impl Default for Config {
             least_heat: 0.2,
             keypoint_sigma: 0.02,
             people: 3,
+            mirror: false,
             onnx_runtime: None,
             threads: 1,
             precision: Precision::F32,

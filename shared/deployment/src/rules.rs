@@ -170,6 +170,7 @@ fn maps(deployment: &Deployment) -> Result<(), Complaint> {
             it.network.is_some(),
         ),
         ("pose.detector", it.detector.is_some(), has_network),
+        ("pose.mirror", it.mirror, has_network),
         ("pose.onnx_runtime", it.onnx_runtime.is_some(), has_network),
     ];
     for (key, is_given, has_network) in beside {

@@ -39,8 +39,19 @@ impl Window {
     /// * `outline`: the box: left, top, right, bottom, pixels of the picture.
     /// * Returns `None` for a box without an extent, or with numbers that are not finite.
     pub fn new(card: &Card, outline: [f64; 4]) -> Option<Self> {
+        Self::of_input(card, outline, [card.input.width, card.input.height])
+    }
+
+    /// The window around a person who lies in the picture: as high as the input is wide, and as wide as it is high. What it shows is
+    /// turned by a quarter before it becomes the input.
+    ///
+    /// * the others as for [`Self::new`].
+    pub fn sideways(card: &Card, outline: [f64; 4]) -> Option<Self> {
+        Self::of_input(card, outline, [card.input.height, card.input.width])
+    }
+
+    fn of_input(card: &Card, outline: [f64; 4], input: [usize; 2]) -> Option<Self> {
         let [left, top, right, bottom] = outline;
-        let input = [card.input.width, card.input.height];
         let mut size = [right - left, bottom - top].map(|it| it * card.crop.margin);
         let is_box = outline.iter().all(|it| it.is_finite()) && size.iter().all(|it| *it > 0.0);
         if !is_box {

@@ -6,7 +6,7 @@ use fmp::{Layout, Pose, Search, Solver};
 use keypoints::Keypoint;
 use pipeline::ViewSettings;
 use posenetwork::springs::joint_of;
-use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of};
+use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Turn, outline_of};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use skeleton::PARSE14;
 
@@ -133,7 +133,7 @@ impl NetworkReader {
         let look = match (&self.finder, outline_of(truth(person))) {
             (Some(finder), _) => {
                 let outlines = found_boxes(finder, person, &picture)?;
-                looker.best_of((image, &outlines), memory, maps)
+                looker.best_of((image, &outlines), Turn::Up, memory, maps)
             }
             (None, Some(outline)) => looker.look((image, outline), memory, maps),
             (None, None) => Ok(None),

@@ -2,7 +2,7 @@
 
 use fmp::Layout;
 use multiview::FrontEvidence;
-use posenetwork::{JointMaps, LookMemory};
+use posenetwork::{JointMaps, LookMemory, Turn};
 
 use crate::tracks::Track;
 
@@ -39,6 +39,8 @@ pub struct NetworkMemory {
 pub(crate) struct Seen {
     pub(crate) maps: JointMaps,
     pub(crate) outline: [f64; 4],
+    /// How the picture was turned for the network.
+    pub(crate) turn: Turn,
     /// The score that the person's poses had in the frames before; `None` for somebody new.
     pub(crate) usual_score: Option<f32>,
     /// Mean heat of the joints at their peaks, 0 to 1.
@@ -95,9 +97,7 @@ impl Seen {
     ///
     /// * `layout`: of the frame; `least_heat`: mean heat of the joints of somebody who is seen well, 0 to 1.
     pub(crate) fn judge(&mut self, layout: &Layout, least_heat: f64) -> bool {
-        let peaks = self.maps.peaks().iter();
-        let heat: f64 = peaks.flatten().map(|it| it.score.clamp(0.0, 1.0)).sum();
-        self.heat = heat / self.maps.peaks().len().max(1) as f64;
+        self.heat = self.maps.heat();
         self.level = self.maps.level(layout);
         self.heat >= least_heat && self.maps.region(layout).is_some()
     }

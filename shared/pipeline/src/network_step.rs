@@ -11,12 +11,13 @@ use kernels::Rgb8View;
 use keypoints::Keypoint;
 use multiview::FrontEvidence;
 use posenetwork::{
-    Detector, JointMaps, LookError, Looker, MapSettings, PoseNetwork, outline_of_parts,
+    Detector, JointMaps, LookError, Looker, MapSettings, PoseNetwork, Turn, outline_of_parts,
     outline_of_pose,
 };
 
 use crate::network_memory::{NetworkMemory, Seen};
 use crate::sightings::Sightings;
+use crate::space::trunk_upward;
 use crate::tracks::{MUCH_WORSE, Track, wider};
 use crate::view_result::ExtraKeypoint;
 use crate::view_step::{ViewEstimate, ViewStep};
@@ -238,6 +239,7 @@ impl NetworkStep {
                 keypoint_sigma,
                 ..
             } = &self.settings;
+            seen.turn = Turn::Up;
             let is_there = seen
                 .maps
                 .of_keypoints(keypoints.as_ref(), rows, maps, *keypoint_sigma);
@@ -292,7 +294,7 @@ impl NetworkStep {
             } else {
                 seen.maps.raise(&self.layout, &scope, responses);
             }
-            let (looked_at, usual_score) = (seen.outline, seen.usual_score);
+            let (looked_at, usual_score) = ((seen.outline, seen.turn), seen.usual_score);
             let pose = if n_seen == 1 && seen.level == level {
                 self.best(responses, scope)
             } else {
@@ -316,7 +318,9 @@ impl NetworkStep {
             .flat_map(|(_, nth)| self.extras_of(&memory.seen[*nth].maps));
         let extras: Vec<ExtraKeypoint> = extras.collect();
         // Of every candidate, or of none.
-        let fronts = found.iter().map(|(_, nth)| memory.seen[*nth].front);
+        let fronts = found
+            .iter()
+            .map(|(pose, nth)| self.front_of(pose, &memory.seen[*nth]));
         let front: Option<Vec<FrontEvidence>> = fronts.collect();
         let candidates: Vec<Pose> = found.into_iter().map(|it| it.0).collect();
         let best = candidates.first();
@@ -334,6 +338,19 @@ impl NetworkStep {
             bounds: Bounds::new(vec![Bound::UNKNOWN; self.layout.levels.len()]),
             scope,
         }
+    }
+
+    /// In which direction a person faces; nothing of one who is seen head down in a picture that was not turned.
+    fn front_of(&self, pose: &Pose, seen: &Seen) -> Option<FrontEvidence> {
+        let front = seen.front?;
+        let centre = |part| pose.centre(self.solver.model(), &self.layout, part);
+        let centres: Vec<[f64; 2]> = (0..pose.parts.len()).map(centre).collect();
+        let is_told = seen.turn != Turn::Up || trunk_upward(&centres) > 0.0;
+        Some(if is_told {
+            front
+        } else {
+            FrontEvidence::default()
+        })
     }
 
     /// The extra keypoints of a person.

@@ -80,14 +80,17 @@ impl Sightings<'_> {
         }
         let (look, seen) = memory.next();
         let what = (self.image, &[track.outline, wider][..]);
-        if let Some(best) = self.looker.best_of(what, look, &mut seen.maps)? {
+        let best = self
+            .looker
+            .best_of(what, track.turn, look, &mut seen.maps)?;
+        if let Some(best) = best {
             self.keep_look(&best, Some(track.usual_score), memory);
         }
         Ok(())
     }
 
     /// Looks at a person of the frame before, where nobody is known yet, and closer if the person has moved far since, which takes
-    /// some time; keeps what is seen well.
+    /// some time, or with the picture turned if the person lies or gets up; keeps what is seen well.
     pub(crate) fn see_again(
         &self,
         track: &Track,
@@ -99,20 +102,27 @@ impl Sightings<'_> {
         let is_soon = memory.is_soon;
         let (look, seen) = memory.next();
         let network = self.looker.network;
-        let Some(sight) = network.look(self.image, track.outline, look.workspace())? else {
+        let boxed = (track.outline, track.turn);
+        let Some(sight) = network.look_turned(self.image, boxed, look.workspace())? else {
             return Ok(());
         };
         seen.maps.read(&sight, self.looker.settings)?;
         seen.outline = track.outline;
+        seen.turn = track.turn;
         seen.front = sight.front();
         seen.usual_score = Some(track.usual_score);
-        if !is_soon && has_moved(&seen.maps, track.outline) {
-            let first = self
-                .looker
-                .judge(track.outline, seen.front, look, &mut seen.maps);
+        let has_moved = !is_soon && has_moved(&seen.maps, track.outline);
+        if has_moved || seen.maps.turn(track.turn) != track.turn {
+            let first = (track.outline, track.turn, seen.front);
+            let first = self.looker.judge(first, look, &mut seen.maps);
             let what = (self.image, first);
-            let best = self.looker.look_closer(what, look, &mut seen.maps)?;
+            let best = if has_moved {
+                self.looker.look_closer(what, look, &mut seen.maps)?
+            } else {
+                self.looker.look_upright(what, look, &mut seen.maps)?
+            };
             seen.outline = best.outline;
+            seen.turn = best.turn;
             seen.front = best.front;
         }
         self.keep(memory);
@@ -129,6 +139,7 @@ impl Sightings<'_> {
     fn keep_look(&self, look: &Look, usual_score: Option<f32>, memory: &mut NetworkMemory) -> bool {
         let (_, seen) = memory.next();
         seen.outline = look.outline;
+        seen.turn = look.turn;
         seen.front = look.front;
         seen.usual_score = usual_score;
         self.keep(memory)

@@ -197,7 +197,13 @@ impl Space {
 
 /// How much what a view sees of the front counts: the squared cosine of the angle between the trunk in the picture and the
 /// vertical, 0 upside down. Heads of people who bend were not learned.
-pub(crate) fn upright(centres_px: &[[f64; 2]]) -> f64 {
+fn upright(centres_px: &[[f64; 2]]) -> f64 {
+    let cosine = trunk_upward(centres_px);
+    if cosine > 0.0 { cosine * cosine } else { 0.0 }
+}
+
+/// The cosine of the angle between the trunk in the picture and upward: -1 upside down.
+pub(crate) fn trunk_upward(centres_px: &[[f64; 2]]) -> f64 {
     const NECK: usize = 1;
     const HIPS: [usize; 2] = [9, 21];
     let [Some(neck), Some(right), Some(left)] =
@@ -206,8 +212,7 @@ pub(crate) fn upright(centres_px: &[[f64; 2]]) -> f64 {
         return 1.0;
     };
     let [x, y] = [0, 1].map(|axis| neck[axis] - f64::midpoint(right[axis], left[axis]));
-    let cosine = -y / x.hypot(y);
-    if cosine > 0.0 { cosine * cosine } else { 0.0 }
+    -y / x.hypot(y)
 }
 
 /// How good an assumption about the sides of the views is.

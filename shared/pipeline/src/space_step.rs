@@ -17,7 +17,7 @@ use crate::fuse_step::{AllViewsHypothesis, AllViewsResult};
 use crate::motion::Motion;
 use crate::network_step::cell_at;
 use crate::person_evidence::PersonEvidence;
-use crate::space::upright;
+use crate::space::trunk_upward;
 use crate::view_result::ViewResult;
 
 /// Number of joints.
@@ -152,8 +152,10 @@ impl SpaceStep {
     ) -> FrontEvidence {
         let told = answers[view].as_ref().and_then(|answer| {
             let centres = self.plans[view].centres(answer.candidates.get(candidate)?);
-            let weight = upright(&centres) as f32;
-            Some(answer.front.get(candidate)?.map(|it| weight * it))
+            // Who stands on the hands was upright for the network. Of who lies it tells nothing of up and down in the picture.
+            let weight = trunk_upward(&centres).powi(2) as f32;
+            let told = answer.front.get(candidate)?.map(|it| weight * it);
+            told.iter().all(|it| it.is_finite()).then_some(told)
         });
         told.unwrap_or_default()
     }

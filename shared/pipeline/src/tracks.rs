@@ -1,5 +1,7 @@
 //! Where the people of a view are looked for in the next frame.
 
+use posenetwork::Turn;
+
 /// Which share of the way to the box around a pose a side moves in a frame, inward.
 const INWARD: f64 = 0.5;
 /// A pose is much worse than usual if so many joints are lost that were seen at their best.
@@ -16,6 +18,8 @@ const MOST: f64 = 0.5;
 pub(crate) struct Track {
     /// The box, pixels.
     pub(crate) outline: [f64; 4],
+    /// How the picture is turned for the network.
+    pub(crate) turn: Turn,
     /// The score that the person's poses usually have.
     pub(crate) usual_score: f32,
     /// Whether this frame's is so much lower that the box may not fit.
@@ -28,11 +32,12 @@ impl Track {
     /// In the box around the pose, but a side moves inward step by step: a pose that leaves out the head or a leg in one frame does not
     /// put it beyond the edge of the next one. One that is much worse than the person's poses usually are moves no side at all.
     ///
-    /// * `looked_at`: the box of this frame; `usual_score`: of the person's poses before; `None` for somebody new.
+    /// * `looked_at`: the box of this frame, and how the picture was turned; `usual_score`: of the person's poses before; `None` for
+    ///   somebody new.
     /// * `around`, `score`: the box around the pose that was seen, and its score.
     /// * `most_lost`: by how much a score may be lower than usual.
     pub(crate) fn next(
-        (looked_at, usual_score): ([f64; 4], Option<f32>),
+        ((looked_at, turn), usual_score): (([f64; 4], Turn), Option<f32>),
         (around, score): ([f64; 4], f32),
         most_lost: f32,
     ) -> Self {
@@ -49,6 +54,7 @@ impl Track {
             } else {
                 core::array::from_fn(moved)
             },
+            turn,
             usual_score: usual_score + NEW_SCORE * (score - usual_score),
             is_doubtful,
         }
@@ -87,7 +93,7 @@ mod tests {
     #[test]
     fn a_side_moves_outward_at_once_and_inward_step_by_step() {
         let around = [90.0, 150.0, 170.0, 260.0];
-        let next = Track::next((BOX, None), (around, -20.0), 6.0);
+        let next = Track::next(((BOX, Turn::Up), None), (around, -20.0), 6.0);
         assert_eq!(next.outline, [90.0, 100.0, 175.0, 260.0]);
         assert!(!next.is_doubtful, "nothing is usual for somebody new");
     }
@@ -95,20 +101,24 @@ mod tests {
     #[test]
     fn a_pose_that_is_much_worse_than_usual_moves_no_side() {
         let legs = [120.0, 150.0, 200.0, 250.0];
-        let next = Track::next((BOX, Some(-18.0)), (legs, -25.0), 6.0);
+        let next = Track::next(((BOX, Turn::Up), Some(-18.0)), (legs, -25.0), 6.0);
         assert_eq!(next.outline, BOX);
         assert!(next.is_doubtful);
-        assert!(!Track::next((BOX, Some(-18.0)), (legs, -23.0), 6.0).is_doubtful);
+        assert!(!Track::next(((BOX, Turn::Up), Some(-18.0)), (legs, -23.0), 6.0).is_doubtful);
     }
 
     #[test]
     fn what_stays_worse_becomes_usual() {
-        let mut track = Track::next((BOX, Some(-18.0)), (BOX, -30.0), 6.0);
+        let mut track = Track::next(((BOX, Turn::Up), Some(-18.0)), (BOX, -30.0), 6.0);
         let mut n_doubtful = 0;
         while track.is_doubtful {
             n_doubtful += 1;
             assert!(n_doubtful < 20);
-            track = Track::next((track.outline, Some(track.usual_score)), (BOX, -30.0), 6.0);
+            track = Track::next(
+                ((track.outline, track.turn), Some(track.usual_score)),
+                (BOX, -30.0),
+                6.0,
+            );
         }
         assert!(n_doubtful > 2);
     }

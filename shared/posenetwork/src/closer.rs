@@ -4,7 +4,7 @@ use fmp::{Layout, Solver};
 use kernels::Rgb8View;
 
 use crate::maps::{JointMaps, MapSettings};
-use crate::network::{LookError, PoseNetwork, Workspace};
+use crate::network::{LookError, PoseNetwork, Turn, Workspace};
 use crate::outline::{outline_of_pose, overlap};
 
 /// Boxes that cover each other by more show the same to a network: another look tells nothing new.
@@ -46,6 +46,8 @@ pub struct Look {
     pub score: f32,
     /// The box around that pose.
     pub around: Option<[f64; 4]>,
+    /// How the picture was turned.
+    pub turn: Turn,
 }
 
 impl LookMemory {
@@ -71,38 +73,43 @@ impl Looker<'_> {
         memory: &mut LookMemory,
         maps: &mut JointMaps,
     ) -> Result<Option<Look>, LookError> {
-        self.look_in(what, (&mut memory.workspace, &mut memory.responses), maps)
+        let memory = (&mut memory.workspace, &mut memory.responses);
+        self.look_in(what, Turn::Up, memory, maps)
     }
 
     fn look_in(
         &self,
         (image, outline): (Rgb8View<'_>, [f64; 4]),
+        turn: Turn,
         (workspace, responses): (&mut Workspace, &mut Vec<f32>),
         maps: &mut JointMaps,
     ) -> Result<Option<Look>, LookError> {
-        let Some(sight) = self.network.look(image, outline, workspace)? else {
+        let sight = self
+            .network
+            .look_turned(image, (outline, turn), workspace)?;
+        let Some(sight) = sight else {
             return Ok(None);
         };
         maps.read(&sight, self.settings)?;
-        Ok(Some(self.judged((outline, sight.front()), responses, maps)))
+        let front = sight.front();
+        Ok(Some(self.judged((outline, turn, front), responses, maps)))
     }
 
     /// What was seen in a box whose maps are read.
     ///
-    /// * `front`: what was told of the direction in which the trunk faces.
+    /// * `turn`: how the picture was turned; `front`: what was told of the direction in which the trunk faces.
     pub fn judge(
         &self,
-        outline: [f64; 4],
-        front: Option<[f32; 2]>,
+        seen: ([f64; 4], Turn, Option<[f32; 2]>),
         memory: &mut LookMemory,
         maps: &mut JointMaps,
     ) -> Look {
-        self.judged((outline, front), &mut memory.responses, maps)
+        self.judged(seen, &mut memory.responses, maps)
     }
 
     fn judged(
         &self,
-        (outline, front): ([f64; 4], Option<[f32; 2]>),
+        (outline, turn, front): ([f64; 4], Turn, Option<[f32; 2]>),
         responses: &mut Vec<f32>,
         maps: &mut JointMaps,
     ) -> Look {
@@ -112,6 +119,7 @@ impl Looker<'_> {
             front,
             score: pose.as_ref().map_or(f32::NEG_INFINITY, |it| it.score),
             around: pose.and_then(|it| outline_of_pose(&it, (self.springs.model(), self.layout))),
+            turn,
         }
     }
 
@@ -130,13 +138,13 @@ impl Looker<'_> {
         memory: &mut LookMemory,
         maps: &mut JointMaps,
     ) -> Result<Look, LookError> {
-        let mut best = seen;
+        let mut best = self.look_upright((image, seen), memory, maps)?;
         for _ in 0..MOST_MORE {
             let next = best.around.filter(|it| overlap(*it, best.outline) <= FITS);
             let Some(next) = next else {
                 break;
             };
-            let more = self.look_beside((image, next), memory)?;
+            let more = self.look_beside((image, next), best.turn, memory)?;
             let Some(more) = more.filter(|it| it.score > best.score) else {
                 break;
             };
@@ -146,9 +154,35 @@ impl Looker<'_> {
         Ok(best)
     }
 
+    /// Looks at a person who is seen lying, or head down, once more, with the picture turned; what is seen better counts.
+    ///
+    /// * `seen`, `maps`: what was seen in the box; the maps are replaced by better ones.
+    ///
+    /// # Errors
+    ///
+    /// [`LookError`].
+    pub fn look_upright(
+        &self,
+        (image, seen): (Rgb8View<'_>, Look),
+        memory: &mut LookMemory,
+        maps: &mut JointMaps,
+    ) -> Result<Look, LookError> {
+        let turn = maps.turn(seen.turn);
+        if turn == seen.turn || !self.network.may_turn() {
+            return Ok(seen);
+        }
+        let outline = seen.around.unwrap_or(seen.outline);
+        let turned = self.look_beside((image, outline), turn, memory)?;
+        let Some(turned) = turned.filter(|_| memory.other.heat() > maps.heat()) else {
+            return Ok(seen);
+        };
+        core::mem::swap(maps, &mut memory.other);
+        Ok(turned)
+    }
+
     /// Looks into several boxes, and closer at the person whom the springs fit best there.
     ///
-    /// * `outlines`: of the boxes.
+    /// * `outlines`: of the boxes; `turn`: how the picture is turned at first.
     /// * `maps`: of the joints of that person, filled.
     /// * Returns `None` if no box has an extent.
     ///
@@ -158,12 +192,13 @@ impl Looker<'_> {
     pub fn best_of(
         &self,
         (image, outlines): (Rgb8View<'_>, &[[f64; 4]]),
+        turn: Turn,
         memory: &mut LookMemory,
         maps: &mut JointMaps,
     ) -> Result<Option<Look>, LookError> {
         let mut best: Option<Look> = None;
         for outline in outlines {
-            let look = self.look_beside((image, *outline), memory)?;
+            let look = self.look_beside((image, *outline), turn, memory)?;
             if let Some(look) = look.filter(|it| best.is_none_or(|best| it.score > best.score)) {
                 core::mem::swap(maps, &mut memory.other);
                 best = Some(look);
@@ -177,6 +212,7 @@ impl Looker<'_> {
     fn look_beside(
         &self,
         what: (Rgb8View<'_>, [f64; 4]),
+        turn: Turn,
         memory: &mut LookMemory,
     ) -> Result<Option<Look>, LookError> {
         let LookMemory {
@@ -184,6 +220,6 @@ impl Looker<'_> {
             other,
             responses,
         } = memory;
-        self.look_in(what, (workspace, responses), other)
+        self.look_in(what, turn, (workspace, responses), other)
     }
 }

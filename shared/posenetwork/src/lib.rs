@@ -22,5 +22,5 @@ pub use closer::{Look, LookMemory, Looker};
 pub use detector::Detector;
 pub use expected::expected_error;
 pub use maps::{JointMaps, MapSettings};
-pub use network::{FitError, LookError, PoseNetwork, Sight, Workspace};
+pub use network::{FitError, LookError, PoseNetwork, Sight, Turn, Workspace};
 pub use outline::{OF_FILTERS, outline_of, outline_of_parts, outline_of_pose, overlap};

@@ -109,7 +109,7 @@ impl JointMaps {
         let keypoints = sight.keypoints()?;
         let rows = joint_rows(sight.network().names());
         let read = sight.read()?;
-        let size = sight.network().size();
+        let size = sight.window().input();
         let window = sight.maps_window()?;
         self.window = Some(window);
         self.floor = settings.floor();
@@ -246,7 +246,7 @@ impl JointMaps {
         settings: &MapSettings,
     ) {
         let (area, columns, step) = (self.rows * self.columns, self.columns, self.step);
-        let size = sight.network().size();
+        let size = sight.window().input();
         let floor = self.floor;
         let heat = |value: f64| settings.of_heat(value, floor);
         let lines = self.values[joint * area..(joint + 1) * area].chunks_exact_mut(columns);
@@ -276,7 +276,7 @@ impl JointMaps {
                 }
             }
             _ => {
-                let sigma = settings.point_sigma * size[1] as f64;
+                let sigma = settings.point_sigma * sight.network().size()[1] as f64;
                 self.fill_bump(joint, (peak.at, peak.score), sigma, settings);
             }
         }

@@ -1,12 +1,22 @@
 //! A network with its card: a picture and a box in, keypoints and maps out.
 
+mod errors;
+mod mirror;
+mod ports;
 mod taken;
+mod turn;
 
+pub use errors::{FitError, LookError};
+pub(crate) use ports::{input_of, only};
 pub(crate) use taken::as_taken;
+pub use turn::Turn;
 
-use inference::{Input, Port, RunError, Session, written};
+use inference::{Input, Session};
 use kernels::Rgb8View;
 use keypoints::{Card, Codec, HeatMaps, Keypoint, Layout, List, OutputError, SimCc, Window};
+
+use self::mirror::Mirror;
+use self::ports::outputs_of;
 
 /// A network that fits its card.
 #[derive(Debug)]
@@ -16,66 +26,7 @@ pub struct PoseNetwork {
     names: Vec<String>,
     input: String,
     outputs: Vec<String>,
-}
-
-/// Why a network does not fit its card.
-#[derive(Debug, thiserror::Error)]
-pub enum FitError {
-    /// Names on the card are not those of the network.
-    #[error("the card names the {what} `{wanted}`, but the network has {has}")]
-    Name {
-        /// `input` or `output`.
-        what: &'static str,
-        /// The name on the card.
-        wanted: String,
-        /// The names in the file.
-        has: String,
-    },
-    /// There are several, and the card does not say which one is meant.
-    #[error("the network has the {what}s {has}: the card must name one (`{key}`)")]
-    Several {
-        /// `input` or `output`.
-        what: &'static str,
-        /// The names in the file.
-        has: String,
-        /// The key of the card.
-        key: &'static str,
-    },
-    /// The input has other sides.
-    #[error("the input `{name}` of the network is {got}, but the card says {expected}")]
-    InputShape {
-        /// Its name.
-        name: String,
-        /// Its sides in the file.
-        got: String,
-        /// Its sides by the card.
-        expected: String,
-    },
-    /// It could not be tried.
-    #[error(transparent)]
-    Look(#[from] LookError),
-}
-
-/// Why a network says nothing about a picture.
-#[derive(Debug, thiserror::Error)]
-pub enum LookError {
-    /// The library could not run it.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// An output is not what the card says.
-    #[error("output `{name}`: {error}")]
-    Output {
-        /// Its name.
-        name: String,
-        /// What is wrong.
-        error: OutputError,
-    },
-    /// An output does not consist of numbers in single precision.
-    #[error("output `{name}` is not of type f32")]
-    Type {
-        /// Its name.
-        name: String,
-    },
+    mirror: Option<Mirror>,
 }
 
 /// Memory that is used again from picture to picture.
@@ -85,6 +36,10 @@ pub struct Workspace {
     whole: Vec<i32>,
     bytes: Vec<u8>,
     outputs: Vec<Tensor>,
+    /// What is seen in the mirror image.
+    mirrored: Vec<Tensor>,
+    /// Of the input, while it is turned.
+    turned: Vec<f32>,
 }
 
 /// An output.
@@ -130,14 +85,30 @@ impl PoseNetwork {
             card,
             input,
             outputs,
+            mirror: None,
         };
         let mut workspace = Workspace::default();
         workspace.values.resize(network.n_values(), 0.0);
         let [width, height] = network.size().map(|it| it as f64);
         if let Some(window) = Window::new(&network.card, [0.0, 0.0, width, height]) {
-            network.run(window, &mut workspace)?;
+            network.run(&mut workspace)?;
+            network.sight(window, &workspace)?;
         }
         Ok(network)
+    }
+
+    /// The same network, which looks at the mirror image of every window as well: what it sees is the mean of both. That is better by
+    /// what two looks are better than one, and takes twice as long.
+    ///
+    /// # Errors
+    ///
+    /// [`FitError::Mirror`]: it gives positions, or a keypoint has no partner on the other side.
+    pub fn mirrored(self) -> Result<Self, FitError> {
+        let mirror = Mirror::new(&self.card, &self.names).map_err(FitError::Mirror)?;
+        Ok(Self {
+            mirror: Some(mirror),
+            ..self
+        })
     }
 
     /// Its card.
@@ -160,6 +131,11 @@ impl PoseNetwork {
         [self.card.input.width, self.card.input.height]
     }
 
+    /// Whether it can look at turned pictures: it gives maps or distributions.
+    pub fn may_turn(&self) -> bool {
+        !matches!(self.card.output, Codec::Keypoints { .. })
+    }
+
     fn n_values(&self) -> usize {
         let [width, height] = self.size();
         3 * width * height
@@ -179,20 +155,58 @@ impl PoseNetwork {
         outline: [f64; 4],
         workspace: &'a mut Workspace,
     ) -> Result<Option<Sight<'a>>, LookError> {
-        let Some(window) = Window::new(&self.card, outline) else {
+        self.look_turned(image, (outline, Turn::Up), workspace)
+    }
+
+    /// Looks at the person in a box whose head points somewhere. The maps are those of the picture, whatever was turned for the network;
+    /// one that [gives positions](Self::may_turn) sees the picture as it is.
+    ///
+    /// * the others as for [`Self::look`].
+    ///
+    /// # Errors
+    ///
+    /// As for [`Self::look`].
+    pub fn look_turned<'a>(
+        &'a self,
+        image: Rgb8View<'_>,
+        (outline, turn): ([f64; 4], Turn),
+        workspace: &'a mut Workspace,
+    ) -> Result<Option<Sight<'a>>, LookError> {
+        let turn = if self.may_turn() { turn } else { Turn::Up };
+        let window = if turn.is_sideways() {
+            Window::sideways(&self.card, outline)
+        } else {
+            Window::new(&self.card, outline)
+        };
+        let Some(window) = window else {
             return Ok(None);
         };
         workspace.values.resize(self.n_values(), 0.0);
         let size = [image.width(), image.height()];
         window.fill(&self.card, image.data(), size, &mut workspace.values);
-        self.run(window, workspace).map(Some)
+        if turn != Turn::Up {
+            let Workspace { values, turned, .. } = workspace;
+            turn.turn_input(&self.card, window.input(), values, turned);
+        }
+        self.run(workspace)?;
+        if let Some(mirror) = &self.mirror {
+            mirror.flip(&self.card, &mut workspace.values);
+            core::mem::swap(&mut workspace.outputs, &mut workspace.mirrored);
+            self.run(workspace)?;
+            core::mem::swap(&mut workspace.outputs, &mut workspace.mirrored);
+            let Workspace {
+                outputs, mirrored, ..
+            } = workspace;
+            mirror.blend(self, outputs, mirrored);
+        }
+        if turn != Turn::Up {
+            turn.turn_back(self, &mut workspace.outputs);
+        }
+        self.sight(window, workspace).map(Some)
     }
 
-    fn run<'a>(
-        &'a self,
-        window: Window,
-        workspace: &'a mut Workspace,
-    ) -> Result<Sight<'a>, LookError> {
+    /// Runs on the values of a workspace.
+    fn run(&self, workspace: &mut Workspace) -> Result<(), LookError> {
         let [width, height] = self.size();
         let shape = match self.card.input.layout {
             Layout::Planes => [1, 3, height, width],
@@ -203,6 +217,7 @@ impl PoseNetwork {
             whole,
             bytes,
             outputs,
+            ..
         } = workspace;
         let values = as_taken(self.card.input.numbers, values, (whole, bytes));
         let input = Input {
@@ -221,7 +236,16 @@ impl PoseNetwork {
             held.values
                 .extend_from_slice(output.values.unwrap_or_default());
         })?;
-        let outputs = &*outputs;
+        Ok(())
+    }
+
+    /// What the outputs of a workspace say, checked.
+    fn sight<'a>(
+        &'a self,
+        window: Window,
+        workspace: &'a Workspace,
+    ) -> Result<Sight<'a>, LookError> {
+        let outputs = &workspace.outputs[..];
         if let Some(at) = outputs.iter().position(|it| !it.is_f32) {
             let name = self.outputs[at].clone();
             return Err(LookError::Type { name });
@@ -263,7 +287,7 @@ impl<'a> Sight<'a> {
                     udp, centred: true, ..
                 },
             ) => {
-                let cell = maps.step(self.network.size(), *udp);
+                let cell = maps.step(self.window.input(), *udp);
                 let step = self.window.step();
                 [0, 1].map(|axis| 0.5 * (cell[axis] - 1.0) * step[axis])
             }
@@ -280,7 +304,7 @@ impl<'a> Sight<'a> {
     pub fn read(&self) -> Result<Read<'a>, LookError> {
         let card = &self.network.card;
         let n = self.network.names.len();
-        let [width, height] = self.network.size();
+        let [width, height] = self.window.input();
         let first = &self.outputs[0];
         let read = match &card.output {
             Codec::HeatMap {
@@ -367,7 +391,7 @@ impl<'a> Sight<'a> {
     ///
     /// As [`Self::read`].
     pub fn keypoints(&self) -> Result<Vec<Keypoint>, LookError> {
-        let size = self.network.size();
+        let size = self.window.input();
         let mut found = match (self.read()?, &self.network.card.output) {
             (
                 Read::Maps(maps),
@@ -391,105 +415,9 @@ impl<'a> Sight<'a> {
     }
 }
 
-fn listed(ports: &[Port]) -> String {
-    let names: Vec<String> = ports
-        .iter()
-        .map(|it| format!("`{}` {}", it.name, written(&it.sides)))
-        .collect();
-    names.join(", ")
-}
-
-/// The name of the input, checked against the card.
-pub(crate) fn input_of(input_card: &keypoints::Input, inputs: &[Port]) -> Result<String, FitError> {
-    let input = match (&input_card.name, inputs) {
-        (Some(name), _) => {
-            inputs
-                .iter()
-                .find(|it| it.name == *name)
-                .ok_or_else(|| FitError::Name {
-                    what: "input",
-                    wanted: name.clone(),
-                    has: listed(inputs),
-                })?
-        }
-        (None, [input]) => input,
-        (None, _) => {
-            return Err(FitError::Several {
-                what: "input",
-                has: listed(inputs),
-                key: "input.name",
-            });
-        }
-    };
-    let keypoints::Input {
-        width,
-        height,
-        layout,
-        ..
-    } = input_card;
-    let expected = match layout {
-        Layout::Planes => [1, 3, *height, *width],
-        Layout::Pixels => [1, *height, *width, 3],
-    };
-    let sides = &input.sides;
-    let fits = sides.len() == 4 && sides.iter().zip(expected).all(|(side, n)| side.may_be(n));
-    if !sides.is_empty() && !fits {
-        return Err(FitError::InputShape {
-            name: input.name.clone(),
-            got: written(sides),
-            expected: format!("{expected:?}"),
-        });
-    }
-    Ok(input.name.clone())
-}
-
-/// The names of the outputs that the codec reads, and of those beside them.
-fn outputs_of(card: &Card, outputs: &[Port]) -> Result<Vec<String>, FitError> {
-    let mut names = outputs_of_codec(card, outputs)?;
-    let also = [
-        (&card.also.front, "also.front"),
-        (&card.also.error, "also.error"),
-    ];
-    for (name, key) in also {
-        if name.is_some() {
-            names.push(only(name.as_ref(), outputs, key)?);
-        }
-    }
-    Ok(names)
-}
-
-fn outputs_of_codec(card: &Card, outputs: &[Port]) -> Result<Vec<String>, FitError> {
-    match &card.output {
-        Codec::HeatMap { maps, .. } => Ok(vec![only(maps.as_ref(), outputs, "output.maps")?]),
-        Codec::Simcc { x, y, .. } => Ok(vec![
-            only(Some(x), outputs, "output.x")?,
-            only(Some(y), outputs, "output.y")?,
-        ]),
-        Codec::Keypoints { list, .. } => Ok(vec![only(list.as_ref(), outputs, "output.list")?]),
-    }
-}
-
-/// The output of a name, or the only one.
-pub(crate) fn only(
-    name: Option<&String>,
-    outputs: &[Port],
-    key: &'static str,
-) -> Result<String, FitError> {
-    match (name, outputs) {
-        (Some(name), _) if outputs.iter().any(|it| it.name == *name) => Ok(name.clone()),
-        (Some(name), _) => Err(FitError::Name {
-            what: "output",
-            wanted: name.clone(),
-            has: listed(outputs),
-        }),
-        (None, [output]) => Ok(output.name.clone()),
-        (None, _) => Err(FitError::Several {
-            what: "output",
-            has: listed(outputs),
-            key,
-        }),
-    }
-}
-
+#[cfg(test)]
+mod mirror_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod turn_tests;

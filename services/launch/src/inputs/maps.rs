@@ -45,7 +45,26 @@ pub fn pose_network(
         return Ok(None);
     };
     let library = library(&deployment.pose)?;
-    open_network((file, card), &library)?.fitted().map(Some)
+    let network = open_network((file, card), &library)?.fitted()?;
+    if deployment.pose.mirror {
+        return mirrored(network, "pose.mirror").map(Some);
+    }
+    Ok(Some(network))
+}
+
+/// The same network, which looks at mirror images as well.
+///
+/// * `asked`: the setting or option that asks for it.
+///
+/// # Errors
+///
+/// [`ExitKind::Config`]: it cannot.
+pub fn mirrored(network: PoseNetwork, asked: &str) -> Result<PoseNetwork, Failure> {
+    let name = network.card().name.clone();
+    network.mirrored().map_err(|error| {
+        let message = format!("{asked}: {name}: {error}");
+        Failure::new(ExitKind::Config, message)
+    })
 }
 
 /// Reads a network that finds keypoints and its card; `shipped` stands for the one that ships.

@@ -5,7 +5,7 @@ use onnx::{Attribute, Network, Side};
 use super::*;
 use crate::maps::{JointMaps, MapSettings};
 
-const CARD: &str = r#"
+pub(super) const CARD: &str = r#"
 format = "parallax-keypoint-network"
 version = 1
 name = "three colours"
@@ -21,12 +21,12 @@ refine = "none"
 names = ["a", "b", "c"]
 "#;
 
-fn sides(sides: &[usize]) -> Vec<Side> {
+pub(super) fn sides(sides: &[usize]) -> Vec<Side> {
     sides.iter().map(|it| Side::Fixed(*it)).collect()
 }
 
 /// Gives what `operator` makes of its input as three maps.
-fn network(operator: &str) -> Network {
+pub(super) fn network(operator: &str) -> Network {
     let mut net = Network::default();
     net.inputs
         .push(("picture".to_owned(), sides(&[1, 3, 16, 12])));
@@ -36,7 +36,7 @@ fn network(operator: &str) -> Network {
     net
 }
 
-fn fitted(net: &Network, card: &str) -> Result<PoseNetwork, FitError> {
+pub(super) fn fitted(net: &Network, card: &str) -> Result<PoseNetwork, FitError> {
     let session = Session::parse(net.file()).unwrap();
     PoseNetwork::new(session, Card::parse(card).unwrap())
 }

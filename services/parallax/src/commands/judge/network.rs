@@ -38,8 +38,12 @@ pub(super) fn run(
         let model = inputs::model_or_shipped(None)?;
         Ok::<_, Failure>(Search::new(model))
     });
+    let mut network = file.fitted()?;
+    if arguments.mirror {
+        network = inputs::mirrored(network, "--mirror")?;
+    }
     let reader = NetworkReader {
-        network: file.fitted()?,
+        network,
         springs: Solver::new(inputs::springs(springs)?),
         sides: arguments.sides,
         finder: finder.transpose()?,

@@ -17,6 +17,7 @@ pub(super) const OTHERS: &[&str] = &[
     "pose.network",
     "pose.network_card",
     "pose.detector",
+    "pose.mirror",
     "pose.detector_card",
     "pose.springs",
     "pose.onnx_runtime",

@@ -1,0 +1,148 @@
+//! Somebody who stands on the hands, and somebody who lies: from rendered pictures to the skeletons of a run in which nothing is set.
+#![cfg(feature = "long-tests")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+/// What takes long; see `.ci/run`.
+mod long {
+    use std::collections::BTreeMap;
+
+    use geometry::{Camera, Rig, files};
+    use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+    use serde_json::Value;
+
+    use crate::common::Case;
+
+    const N_FRAMES: usize = 40;
+
+    /// Turns the world upside down: its floor is two metres up, and everybody in it hangs from there. So do the cameras; their pictures are
+    /// turned, so that they see it as cameras would that stand upright.
+    fn turn_world(case: &Case) -> Isometry3<f64> {
+        let half = |axis| {
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(
+                &axis,
+                core::f64::consts::PI,
+            ))
+        };
+        let turned =
+            Isometry3::from_parts(Translation3::new(0.0, 0.0, 2.0), half(Vector3::x_axis()));
+        let path = case.path("room/rig.toml");
+        let rig = files::read(&path, &files::ReadOptions::default()).unwrap();
+        let picture = Isometry3::from_parts(Translation3::identity(), half(Vector3::z_axis()));
+        // The tangential distortion of these lenses is below a tenth of a pixel: it is not turned.
+        let camera = |it: &Camera| Camera {
+            camera_from_world: picture * it.camera_from_world * turned.inverse(),
+            ..it.clone()
+        };
+        let cameras = rig.cameras().iter().map(camera).collect();
+        let rig = Rig::new(cameras, rig.up_in_world(), rig.source()).unwrap();
+        std::fs::write(&path, files::own::write(&rig)).unwrap();
+        for camera in rig.cameras() {
+            for frame in 0..N_FRAMES {
+                let name = format!("room/cameras/{}/{frame:06}.png", camera.name);
+                let picture = image::open(case.path(&name)).unwrap();
+                picture.rotate180().save(case.path(&name)).unwrap();
+            }
+        }
+        turned
+    }
+
+    fn point(of: &Value) -> Option<Point3<f64>> {
+        let at: Vec<f64> = of.as_array()?.iter().filter_map(Value::as_f64).collect();
+        (at.len() == 3).then(|| Point3::new(at[0], at[1], at[2]))
+    }
+
+    /// Median distance of the joints that were found from the truth, metres, and the share that was found.
+    fn judged(case: &Case, turned: &Isometry3<f64>) -> (f64, f64) {
+        let truth = std::fs::read_to_string(case.path("room/truth.jsonl")).unwrap();
+        let mut lines = truth
+            .lines()
+            .map(|it| serde_json::from_str::<Value>(it).unwrap());
+        let names = lines.next().unwrap()["joints"].clone();
+        let mut places = BTreeMap::new();
+        for line in lines {
+            let frame = line["frame"].as_u64().unwrap();
+            let both = names
+                .as_array()
+                .unwrap()
+                .iter()
+                .zip(line["joints"].as_array().unwrap());
+            for (name, at) in both {
+                let at = turned * point(at).unwrap();
+                places.insert((frame, name.as_str().unwrap().to_owned()), at);
+            }
+        }
+        let n = places.len();
+        let mut errors = Vec::new();
+        for line in case.lines("pose3d.jsonl") {
+            let frame = line["frame"].as_u64().unwrap();
+            let joints = line["joints"].as_object().unwrap();
+            for (name, joint) in joints {
+                if let (Some(at), Some(truth)) = (
+                    point(&joint["position_m"]),
+                    places.get(&(frame, name.clone())),
+                ) {
+                    errors.push((at - truth).norm());
+                }
+            }
+        }
+        errors.sort_by(f64::total_cmp);
+        (errors[errors.len() / 2], errors.len() as f64 / n as f64)
+    }
+
+    fn case(name: &str, action: &str) -> Case {
+        let case = Case::new(name, &[1, 1], "");
+        let who = [
+            "--rig",
+            "ring:4",
+            "--subjects",
+            "901",
+            "--seed",
+            "77",
+            "--actions",
+            action,
+        ];
+        let frames = ["--frames", &N_FRAMES.to_string(), "--rate", "15"];
+        let ended = case
+            .start(&[&["synth", "room"], &who[..], &frames].concat())
+            .wait();
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        case
+    }
+
+    fn run(case: &Case) {
+        let words = [
+            "run",
+            "room/deployment.toml",
+            "--out",
+            "out",
+            "--set",
+            "capture.mode=lossless",
+        ];
+        let ended = case.start(&words).wait();
+        // Good enough, or said to be doubtful.
+        let code = ended.status.code();
+        assert!(
+            matches!(code, Some(0 | 7)),
+            "{}\n{}",
+            ended.stdout,
+            ended.stderr
+        );
+    }
+
+    #[test]
+    fn who_stands_on_the_hands_is_found() {
+        let case = case("handstand", "gestures");
+        let turned = turn_world(&case);
+        run(&case);
+        let (error, share) = judged(&case, &turned);
+        assert!(error < 0.08 && share > 0.85, "{error} m, {share}");
+    }
+
+    #[test]
+    fn who_lies_is_found() {
+        let case = case("lying", "lying");
+        run(&case);
+        let (error, share) = judged(&case, &Isometry3::identity());
+        assert!(error < 0.08 && share > 0.85, "{error} m, {share}");
+    }
+}

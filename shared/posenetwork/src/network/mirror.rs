@@ -1,0 +1,157 @@
+//! What a network sees in the mirror image of a window, beside what it sees in the window.
+
+use keypoints::{Card, Codec, Layout, mirrored};
+
+use super::{PoseNetwork, Tensor};
+
+/// How the output for a mirror image becomes that for the picture.
+#[derive(Debug)]
+pub(super) struct Mirror {
+    /// The keypoint of the picture that every keypoint of the mirror image is.
+    partner: Vec<usize>,
+}
+
+impl Mirror {
+    /// * `names`: of the keypoints.
+    /// * Returns what is wrong with a network that cannot be used so.
+    pub(super) fn new(card: &Card, names: &[String]) -> Result<Self, String> {
+        if matches!(card.output, Codec::Keypoints { .. }) {
+            return Err("positions cannot be compared with those of a mirror image".to_owned());
+        }
+        let partner = |name: &String| {
+            let Some(other) = mirrored(name) else {
+                return Ok(None);
+            };
+            let at = names.iter().position(|it| *it == other);
+            at.map(Some)
+                .ok_or_else(|| format!("there is a keypoint `{name}`, but no `{other}`"))
+        };
+        let partners: Result<Vec<Option<usize>>, String> = names.iter().map(partner).collect();
+        let numbered = partners?.into_iter().enumerate();
+        Ok(Self {
+            partner: numbered.map(|(at, it)| it.unwrap_or(at)).collect(),
+        })
+    }
+
+    /// Mirrors an input.
+    pub(super) fn flip(&self, card: &Card, values: &mut [f32]) {
+        let width = card.input.width;
+        match card.input.layout {
+            Layout::Planes => values.chunks_exact_mut(width).for_each(<[f32]>::reverse),
+            Layout::Pixels => {
+                for row in values.chunks_exact_mut(3 * width) {
+                    row.reverse();
+                    // The colours of every pixel are the other way round now.
+                    row.chunks_exact_mut(3).for_each(<[f32]>::reverse);
+                }
+            }
+        }
+    }
+
+    /// Replaces the outputs for the picture by the mean of both. Outputs of an unexpected shape are left as they are: they are refused
+    /// later.
+    pub(super) fn blend(&self, network: &PoseNetwork, outputs: &mut [Tensor], seen: &[Tensor]) {
+        let card = &network.card;
+        let n_outputs = if matches!(card.output, Codec::Simcc { .. }) {
+            2
+        } else {
+            1
+        };
+        for (at, (to, from)) in outputs.iter_mut().zip(seen).enumerate() {
+            if to.shape != from.shape || to.values.len() != from.values.len() {
+                continue;
+            }
+            let name = Some(network.outputs[at].as_str());
+            if at >= n_outputs {
+                if name == card.also.front.as_deref() {
+                    blend_front(to, from);
+                } else {
+                    self.blend_errors(to, from);
+                }
+                continue;
+            }
+            match &card.output {
+                Codec::HeatMap {
+                    layout,
+                    udp,
+                    centred,
+                    ..
+                } => {
+                    let is_symmetric = *udp || *centred;
+                    self.blend_maps(to, from, (*layout, is_symmetric, card.input.width));
+                }
+                Codec::Simcc { bins_per_pixel, .. } => {
+                    let bins = (at == 0).then(|| bins_per_pixel.round() as usize);
+                    self.blend_bins(to, from, bins);
+                }
+                Codec::Keypoints { .. } => {}
+            }
+        }
+    }
+
+    /// * `is_symmetric`: whether the cells of a mirror image lie on cells of the picture. Those that lie on the first of their pixels
+    ///   are moved by a cell, to less than half a cell from there.
+    fn blend_maps(
+        &self,
+        to: &mut Tensor,
+        from: &Tensor,
+        (layout, is_symmetric, width): (Layout, bool, usize),
+    ) {
+        let &[_, second, third, fourth] = &to.shape[..] else {
+            return;
+        };
+        let (channels, rows, columns) = match layout {
+            Layout::Planes => (second, third, fourth),
+            Layout::Pixels => (fourth, second, third),
+        };
+        if to.values.len() != channels * rows * columns || channels < self.partner.len() {
+            return;
+        }
+        let index = |channel: usize, row: usize, column: usize| match layout {
+            Layout::Planes => (channel * rows + row) * columns + column,
+            Layout::Pixels => (row * columns + column) * channels + channel,
+        };
+        let beyond = usize::from(!is_symmetric && columns < width);
+        for (channel, &partner) in self.partner.iter().enumerate() {
+            for row in 0..rows {
+                for column in beyond..columns {
+                    let it = &mut to.values[index(channel, row, column)];
+                    let other = index(partner, row, columns - 1 - column + beyond);
+                    *it = f32::midpoint(*it, from.values[other]);
+                }
+            }
+        }
+    }
+
+    /// * `bins`: for a pixel, of a distribution over columns; that over rows is the same in a mirror image.
+    fn blend_bins(&self, to: &mut Tensor, from: &Tensor, bins: Option<usize>) {
+        let n = to.values.len() / self.partner.len().max(1);
+        for (at, &partner) in self.partner.iter().enumerate() {
+            for bin in 0..n {
+                let other = match bins {
+                    // Pixel x is pixel width - 1 - x.
+                    Some(bins) => (n - bin).checked_sub(bins),
+                    None => Some(bin),
+                };
+                if let Some(other) = other.filter(|it| *it < n) {
+                    let it = &mut to.values[at * n + bin];
+                    *it = f32::midpoint(*it, from.values[partner * n + other]);
+                }
+            }
+        }
+    }
+
+    fn blend_errors(&self, to: &mut Tensor, from: &Tensor) {
+        let both = to.values.iter_mut().zip(&self.partner);
+        for (it, &partner) in both {
+            *it = f32::midpoint(*it, from.values.get(partner).copied().unwrap_or(*it));
+        }
+    }
+}
+
+/// Towards the right is towards the left in a mirror image.
+fn blend_front(to: &mut Tensor, from: &Tensor) {
+    for ((it, other), sign) in to.values.iter_mut().zip(&from.values).zip([-1.0, 1.0]) {
+        *it = f32::midpoint(*it, sign * other);
+    }
+}

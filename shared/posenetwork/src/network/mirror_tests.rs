@@ -1,0 +1,123 @@
+//! Networks that look at mirror images: what looks the same on both sides is seen as without them.
+
+use onnx::{Attribute, Network};
+
+use super::tests::{CARD, fitted, network, sides};
+use super::*;
+
+/// A picture of 12 x 16 pixels in which no two pixels are alike.
+fn picture() -> Vec<u8> {
+    (0..3 * 12 * 16).map(|it| (it * 37 % 251) as u8).collect()
+}
+
+/// The first output without and with mirror images.
+fn both(net: &Network, card: &str) -> [Vec<Vec<f32>>; 2] {
+    let rgb = picture();
+    let image = Rgb8View::new(12, 16, &rgb).unwrap();
+    [false, true].map(|is_mirrored| {
+        let mut network = fitted(net, card).unwrap();
+        if is_mirrored {
+            network = network.mirrored().unwrap();
+        }
+        let mut workspace = Workspace::default();
+        let outline = [0.0, 0.0, 12.0, 16.0];
+        let sight = network.look(image, outline, &mut workspace).unwrap();
+        let outputs = sight.unwrap().outputs;
+        outputs.iter().map(|it| it.values.clone()).collect()
+    })
+}
+
+fn pooled() -> Network {
+    let mut net = network("Relu");
+    net.nodes.clear();
+    net.outputs[0].1 = sides(&[1, 3, 4, 3]);
+    let of_four = || Attribute::Ints(vec![4, 4]);
+    let pool = vec![("kernel_shape", of_four()), ("strides", of_four())];
+    net.node("MaxPool", &["picture"], "maps", pool);
+    net
+}
+
+#[test]
+fn a_network_that_treats_both_sides_alike_sees_the_same() {
+    let [plain, mirrored] = both(&network("Relu"), CARD);
+    assert_eq!(plain, mirrored);
+    let centred = CARD.replace("refine", "centred = true\nrefine");
+    let [plain, mirrored] = both(&pooled(), &centred);
+    assert_eq!(plain, mirrored);
+}
+
+#[test]
+fn columns_of_bins_are_mirrored_and_rows_are_not() {
+    let mut net = network("Relu");
+    net.nodes.clear();
+    net.outputs = vec![
+        ("across".to_owned(), sides(&[1, 3, 12])),
+        ("down".to_owned(), sides(&[1, 3, 16])),
+    ];
+    for (axis, name) in [(2, "across"), (3, "down")] {
+        let along = vec![
+            ("axes", Attribute::Ints(vec![axis])),
+            ("keepdims", Attribute::Int(0)),
+        ];
+        net.node("ReduceMax", &["picture"], name, along);
+    }
+    let simcc = "codec = \"simcc\"\nx = \"across\"\ny = \"down\"\nbins_per_pixel = 1";
+    let simcc = CARD.replace("codec = \"heat-map\"\nrefine = \"none\"", simcc);
+    let [plain, mirrored] = both(&net, &simcc);
+    assert_eq!(plain, mirrored);
+}
+
+#[test]
+fn left_and_right_are_the_mean_of_both() {
+    let card = CARD.replace(
+        "[\"a\", \"b\", \"c\"]",
+        "[\"left hip\", \"right hip\", \"c\"]",
+    );
+    let [plain, mirrored] = both(&network("Relu"), &card);
+    let n = 12 * 16;
+    let (left, right) = (&plain[0][..n], &plain[0][n..2 * n]);
+    let mean: Vec<f32> = left.iter().zip(right).map(|(a, b)| (a + b) / 2.0).collect();
+    assert_eq!(mirrored[0][..n], mean[..]);
+    assert_eq!(mirrored[0][n..2 * n], mean[..]);
+    assert_eq!(mirrored[0][2 * n..], plain[0][2 * n..]);
+}
+
+#[test]
+fn towards_the_right_is_towards_the_left_in_a_mirror() {
+    let mut net = network("Relu");
+    net.outputs.push(("front".to_owned(), sides(&[1, 2])));
+    net.floats("constant", &[1, 2], vec![0.5, 1.5]);
+    net.node("Identity", &["constant"], "front", vec![]);
+    net.outputs.push(("error".to_owned(), sides(&[1, 3])));
+    net.floats("errors", &[1, 3], vec![0.1, 0.3, 0.5]);
+    net.node("Identity", &["errors"], "error", vec![]);
+    let card = CARD.replace("refine", "maps = \"maps\"\nrefine").replace(
+        "[\"a\", \"b\", \"c\"]",
+        "[\"left hip\", \"right hip\", \"c\"]",
+    );
+    let card = format!("{card}[also]\nfront = \"front\"\nerror = \"error\"\n");
+    let [_, mirrored] = both(&net, &card);
+    assert_eq!(mirrored[1], [0.0, 1.5]);
+    assert_eq!(mirrored[2], [0.2, 0.2, 0.5]);
+}
+
+#[test]
+fn cells_on_the_first_of_their_pixels_are_moved_by_one() {
+    let [plain, mirrored] = both(&pooled(), CARD);
+    // The first column has no partner; the second one's is the third of the mirror image, which is the first of the picture.
+    for row in 0..12 {
+        let [first, second, third] = [0, 1, 2].map(|it| plain[0][3 * row + it]);
+        let expected = [first, (second + first) / 2.0, (third + second) / 2.0];
+        assert_eq!(mirrored[0][3 * row..3 * row + 3], expected, "{row}");
+    }
+}
+
+#[test]
+fn a_network_that_cannot_is_refused() {
+    let lonely = CARD.replace("\"a\"", "\"left hip\"");
+    let refused = fitted(&network("Relu"), &lonely).unwrap().mirrored();
+    assert_eq!(
+        refused.unwrap_err().to_string(),
+        "it cannot look at mirror images as well: there is a keypoint `left hip`, but no `right hip`"
+    );
+}

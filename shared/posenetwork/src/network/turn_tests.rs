@@ -1,0 +1,87 @@
+//! Networks that see turned pictures: what does not care how a picture is turned sees the same.
+
+use onnx::{Attribute, Network};
+
+use super::tests::{CARD, fitted, network, sides};
+use super::*;
+use crate::maps::{JointMaps, MapSettings};
+
+const TURNS: [Turn; 4] = [Turn::Up, Turn::Right, Turn::Down, Turn::Left];
+
+/// A picture of 16 x 16 pixels in which no two pixels are alike.
+fn picture() -> Vec<u8> {
+    (0..3 * 16 * 16).map(|it| (it * 37 % 251) as u8).collect()
+}
+
+/// The keypoints in a square box of the picture.
+fn found(net: &Network, card: &str, turn: Turn) -> Vec<Keypoint> {
+    let rgb = picture();
+    let image = Rgb8View::new(16, 16, &rgb).unwrap();
+    let network = fitted(net, card).unwrap();
+    let mut workspace = Workspace::default();
+    let boxed = ([0.0, 0.0, 16.0, 16.0], turn);
+    let sight = network.look_turned(image, boxed, &mut workspace).unwrap();
+    let sight = sight.unwrap();
+    // The maps have their maxima where the keypoints are.
+    let mut maps = JointMaps::default();
+    maps.read(&sight, &MapSettings::default()).unwrap();
+    sight.keypoints().unwrap()
+}
+
+#[test]
+fn whoever_does_not_care_sees_the_same_in_every_turn() {
+    // The window is 12 x 16 or 16 x 12 pixels, widened to hold the box.
+    let upright = found(&network("Relu"), CARD, Turn::Up);
+    let place = |it: &Keypoint| it.at.map(|it| it.round() as i64);
+    for turn in TURNS {
+        for (a, b) in found(&network("Relu"), CARD, turn).iter().zip(&upright) {
+            assert_eq!(place(a), place(b), "{turn:?}");
+        }
+    }
+}
+
+#[test]
+fn distributions_over_columns_and_rows_are_turned_too() {
+    let mut net = network("Relu");
+    net.nodes.clear();
+    net.outputs = vec![
+        ("across".to_owned(), sides(&[1, 3, 12])),
+        ("down".to_owned(), sides(&[1, 3, 16])),
+    ];
+    for (axis, name) in [(2, "across"), (3, "down")] {
+        let along = vec![
+            ("axes", Attribute::Ints(vec![axis])),
+            ("keepdims", Attribute::Int(0)),
+        ];
+        net.node("ReduceMax", &["picture"], name, along);
+    }
+    let simcc = "codec = \"simcc\"\nx = \"across\"\ny = \"down\"\nbins_per_pixel = 1";
+    let simcc = CARD.replace("codec = \"heat-map\"\nrefine = \"none\"", simcc);
+    let upright = found(&net, &simcc, Turn::Up);
+    let place = |it: &Keypoint| it.at.map(|it| it.round() as i64);
+    for turn in TURNS {
+        for (a, b) in found(&net, &simcc, turn).iter().zip(&upright) {
+            assert_eq!(place(a), place(b), "{turn:?}");
+        }
+    }
+}
+
+#[test]
+fn the_direction_turns_with_the_picture() {
+    let mut net = network("Relu");
+    net.outputs.push(("front".to_owned(), sides(&[1, 2])));
+    net.floats("constant", &[1, 2], vec![0.5, 1.5]);
+    net.node("Identity", &["constant"], "front", vec![]);
+    let card = CARD.replace("refine", "maps = \"maps\"\nrefine");
+    let card = format!("{card}[also]\nfront = \"front\"\n");
+    let rgb = picture();
+    let image = Rgb8View::new(16, 16, &rgb).unwrap();
+    let network = fitted(&net, &card).unwrap();
+    let fronts = TURNS.map(|turn| {
+        let mut workspace = Workspace::default();
+        let boxed = ([0.0, 0.0, 16.0, 16.0], turn);
+        let sight = network.look_turned(image, boxed, &mut workspace).unwrap();
+        sight.unwrap().front().unwrap()
+    });
+    assert_eq!(fronts, [[0.5, 1.5], [0.0, 1.5], [-0.5, 1.5], [0.0, 1.5]]);
+}
