@@ -25,7 +25,6 @@ pub fn card(shape: &Shape, about: &About) -> String {
         both_ends,
         front,
         area,
-        ..
     } = about.score;
     let [mean_of_ends, both_ends, front] = [mean_of_ends, both_ends, front].map(|it| 100.0 * it);
     let Shape { width, height, .. } = shape;

@@ -4,7 +4,7 @@ mod flex;
 #[cfg(feature = "libtorch")]
 mod torch;
 
-use crate::network::{N_JOINTS, STRIDE, Shape};
+use crate::network::{STRIDE, Shape};
 use crate::parameters::{Parameter, Role};
 use crate::settings::{Backend, Precision};
 

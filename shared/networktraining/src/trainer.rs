@@ -61,7 +61,7 @@ impl<'a> Kept<'a> {
         let (calibrating, judged): (Vec<_>, Vec<_>) = people
             .iter()
             .enumerate()
-            .partition(|(at, _)| at / RUN % 2 == 0);
+            .partition(|(at, _)| (at / RUN).is_multiple_of(2));
         let people_of = |numbered: Vec<(usize, &'a Person)>| -> Vec<&'a Person> {
             numbered.into_iter().map(|(_, person)| person).collect()
         };

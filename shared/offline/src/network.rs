@@ -9,7 +9,7 @@ use footage::Size;
 use inference::{Description, Session};
 use kernels::Rgb8View;
 use keypoints::Card;
-use posenetwork::{PoseNetwork, Sight, Workspace};
+use posenetwork::{PoseNetwork, Sight, Turn, Workspace};
 use runtime::{ExitKind, Failure, in_file};
 
 use crate::cards::{CardPlace, OnnxFile, misfit};
@@ -112,19 +112,21 @@ impl NetworkFile {
 
 /// What a network sees in a box of a picture: left, top, right, bottom, pixels.
 ///
+/// * `turn`: how the picture is turned for the network.
+///
 /// # Errors
 ///
 /// The network cannot be run, or gives values that are not finite; the box has no extent.
 pub fn look<'a>(
     network: &'a PoseNetwork,
     picture: &Picture,
-    outline: [f64; 4],
+    (outline, turn): ([f64; 4], Turn),
     workspace: &'a mut Workspace,
 ) -> Result<Sight<'a>, Failure> {
     let Size { width, height } = picture.size;
     let image = Rgb8View::new(width, height, &picture.rgb);
     let image = image.map_err(|error| in_file(&picture.path, &error))?;
-    let sight = network.look(image, outline, workspace);
+    let sight = network.look_turned(image, (outline, turn), workspace);
     let sight = sight.map_err(|error| refused(&picture.path, &error))?;
     sight.ok_or_else(|| {
         let message = format!("{}: a box without an extent", picture.path.display());

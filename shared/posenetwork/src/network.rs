@@ -190,7 +190,7 @@ impl PoseNetwork {
         }
         self.run(workspace)?;
         if let Some(mirror) = &self.mirror {
-            mirror.flip(&self.card, &mut workspace.values);
+            Mirror::flip(&self.card, &mut workspace.values);
             core::mem::swap(&mut workspace.outputs, &mut workspace.mirrored);
             self.run(workspace)?;
             core::mem::swap(&mut workspace.outputs, &mut workspace.mirrored);

@@ -13,7 +13,7 @@ use offline::cards::CardPlace;
 use offline::described::Described;
 use offline::network::{self, NetworkFile};
 use offline::pictures::{Frames, Picture, Pictures};
-use posenetwork::{PoseNetwork, Sight, Workspace};
+use posenetwork::{PoseNetwork, Sight, Turn, Workspace};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 use skeleton::PARSE14;
@@ -140,7 +140,7 @@ fn look(network: &PoseNetwork, image: &Path, arguments: &Arguments) -> Result<Ve
     let whole = [0.0, 0.0, whole[0] - 1.0, whole[1] - 1.0];
     let outline = arguments.outline.map_or(whole, |it| it.0);
     let mut workspace = Workspace::default();
-    let sight = network::look(network, &picture, outline, &mut workspace)?;
+    let sight = network::look(network, &picture, (outline, Turn::Up), &mut workspace)?;
     if let Some(out) = &arguments.out {
         let sheet = network::sheet(&picture, &sight).or_fail(ExitKind::Input)?;
         sheet.save_png(out).or_fail(ExitKind::Input)?;

@@ -34,7 +34,7 @@ impl Mirror {
     }
 
     /// Mirrors an input.
-    pub(super) fn flip(&self, card: &Card, values: &mut [f32]) {
+    pub(super) fn flip(card: &Card, values: &mut [f32]) {
         let width = card.input.width;
         match card.input.layout {
             Layout::Planes => values.chunks_exact_mut(width).for_each(<[f32]>::reverse),

@@ -6,7 +6,7 @@ use offline::pictures::{Picture, Searched};
 use offline::sheet::{Sheet, Skeleton};
 use offline::{detector, network};
 use posenetwork::{
-    Detector as BoxDetector, JointMaps, MapSettings, OF_FILTERS, PoseNetwork, Workspace,
+    Detector as BoxDetector, JointMaps, MapSettings, OF_FILTERS, PoseNetwork, Turn, Workspace,
 };
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Map, Value, json};
@@ -33,6 +33,7 @@ enum From {
 }
 
 /// A box to look into.
+#[derive(Clone, Copy)]
 struct Outline {
     /// Left, top, right, bottom, pixels of the picture.
     sides: [f64; 4],
@@ -196,27 +197,49 @@ impl Detector<'_> {
 }
 
 impl Person {
+    /// Of who lies, or stands on the hands, the picture is looked at once more, turned; what is seen better counts.
     fn seen(
         network: &PoseNetwork,
         picture: &Picture,
         outline: Outline,
         workspace: &mut Workspace,
     ) -> Result<Self, Failure> {
-        let sight = network::look(network, picture, outline.sides, workspace)?;
+        let (first, turn) = Self::turned(network, picture, (outline, Turn::Up), workspace)?;
+        if turn == Turn::Up || !network.may_turn() {
+            return Ok(first);
+        }
+        let (turned, _) = Self::turned(network, picture, (outline, turn), workspace)?;
+        Ok(if turned.score > first.score {
+            turned
+        } else {
+            first
+        })
+    }
+
+    /// Also returns how the picture should be turned.
+    fn turned(
+        network: &PoseNetwork,
+        picture: &Picture,
+        (outline, turn): (Outline, Turn),
+        workspace: &mut Workspace,
+    ) -> Result<(Self, Turn), Failure> {
+        let sight = network::look(network, picture, (outline.sides, turn), workspace)?;
         let mut maps = JointMaps::default();
         let settings = MapSettings::default();
         maps.read(&sight, &settings).or_fail(ExitKind::Input)?;
+        let next = maps.turn(turn);
         maps.name_sides(network, sight.front());
         let scores: Vec<f64> = maps.peaks().iter().flatten().map(|it| it.score).collect();
         let joints = maps.peaks().iter();
-        Ok(Self {
+        let person = Self {
             outline,
             keypoints: keypoints_json(&sight)?,
             joints: joints
                 .map(|it| it.map_or([f64::NAN; 2], |it| it.at))
                 .collect(),
             score: scores.iter().sum::<f64>() / scores.len().max(1) as f64,
-        })
+        };
+        Ok((person, next))
     }
 
     fn skeleton(&self) -> Skeleton {
