@@ -53,6 +53,10 @@ height of the maxima tells how far off the joints are: {\"joints\", \"off_by_hal
 Examples:
     parallax model judge person.fmp PARSE --only 101-200
     parallax model judge pose.onnx PARSE --card configs/networks/rtmpose-coco17.toml --only 101-200")]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a switch of the command line"
+)]
 pub(crate) struct Arguments {
     /// The model file, of 26 parts; or a network that finds keypoints (.onnx).
     model: PathBuf,
