@@ -76,7 +76,11 @@ fn left_and_right_are_the_mean_of_both() {
     let [plain, mirrored] = both(&network("Relu"), &card);
     let n = 12 * 16;
     let (left, right) = (&plain[0][..n], &plain[0][n..2 * n]);
-    let mean: Vec<f32> = left.iter().zip(right).map(|(a, b)| (a + b) / 2.0).collect();
+    let mean: Vec<f32> = left
+        .iter()
+        .zip(right)
+        .map(|(a, b)| f32::midpoint(*a, *b))
+        .collect();
     assert_eq!(mirrored[0][..n], mean[..]);
     assert_eq!(mirrored[0][n..2 * n], mean[..]);
     assert_eq!(mirrored[0][2 * n..], plain[0][2 * n..]);
@@ -107,7 +111,11 @@ fn cells_on_the_first_of_their_pixels_are_moved_by_one() {
     // The first column has no partner; the second one's is the third of the mirror image, which is the first of the picture.
     for row in 0..12 {
         let [first, second, third] = [0, 1, 2].map(|it| plain[0][3 * row + it]);
-        let expected = [first, (second + first) / 2.0, (third + second) / 2.0];
+        let expected = [
+            first,
+            f32::midpoint(second, first),
+            f32::midpoint(third, second),
+        ];
         assert_eq!(mirrored[0][3 * row..3 * row + 3], expected, "{row}");
     }
 }
