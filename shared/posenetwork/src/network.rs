@@ -50,6 +50,19 @@ struct Tensor {
     is_f32: bool,
 }
 
+impl Tensor {
+    /// Channels, rows and columns of maps; `None` if they are none.
+    fn map_sides(&self, layout: Layout) -> Option<[usize; 3]> {
+        let sides = match (layout, &self.shape[..]) {
+            (Layout::Planes, &[_, channels, rows, columns])
+            | (Layout::Pixels, &[_, rows, columns, channels]) => [channels, rows, columns],
+            _ => return None,
+        };
+        let n = sides.iter().product::<usize>();
+        (n > 0 && self.values.len() == n).then_some(sides)
+    }
+}
+
 /// What a network sees in a window of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Sight<'a> {

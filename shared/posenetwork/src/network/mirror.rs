@@ -97,14 +97,10 @@ impl Mirror {
         from: &Tensor,
         (layout, is_symmetric, width): (Layout, bool, usize),
     ) {
-        let &[_, second, third, fourth] = &to.shape[..] else {
+        let Some([channels, rows, columns]) = to.map_sides(layout) else {
             return;
         };
-        let (channels, rows, columns) = match layout {
-            Layout::Planes => (second, third, fourth),
-            Layout::Pixels => (fourth, second, third),
-        };
-        if to.values.len() != channels * rows * columns || channels < self.partner.len() {
+        if channels < self.partner.len() {
             return;
         }
         let index = |channel: usize, row: usize, column: usize| match layout {

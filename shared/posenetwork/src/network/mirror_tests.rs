@@ -2,7 +2,7 @@
 
 use onnx::{Attribute, Network};
 
-use super::tests::{CARD, fitted, network, sides};
+use super::tests::{CARD, distributions, fitted, network, sides};
 use super::*;
 
 /// A picture of 12 x 16 pixels in which no two pixels are alike.
@@ -48,21 +48,7 @@ fn a_network_that_treats_both_sides_alike_sees_the_same() {
 
 #[test]
 fn columns_of_bins_are_mirrored_and_rows_are_not() {
-    let mut net = network("Relu");
-    net.nodes.clear();
-    net.outputs = vec![
-        ("across".to_owned(), sides(&[1, 3, 12])),
-        ("down".to_owned(), sides(&[1, 3, 16])),
-    ];
-    for (axis, name) in [(2, "across"), (3, "down")] {
-        let along = vec![
-            ("axes", Attribute::Ints(vec![axis])),
-            ("keepdims", Attribute::Int(0)),
-        ];
-        net.node("ReduceMax", &["picture"], name, along);
-    }
-    let simcc = "codec = \"simcc\"\nx = \"across\"\ny = \"down\"\nbins_per_pixel = 1";
-    let simcc = CARD.replace("codec = \"heat-map\"\nrefine = \"none\"", simcc);
+    let (net, simcc) = distributions();
     let [plain, mirrored] = both(&net, &simcc);
     assert_eq!(plain, mirrored);
 }

@@ -170,8 +170,8 @@ fn whole_numbers_as_output_are_refused() {
     assert_eq!(refused(&net, CARD), "output `maps` is not of type f32");
 }
 
-#[test]
-fn columns_and_rows_are_read_from_two_outputs() {
+/// Gives distributions over columns and rows, by the brightest pixel of each; and its card.
+pub(super) fn distributions() -> (Network, String) {
     let mut net = network("Relu");
     net.nodes.clear();
     net.outputs = vec![
@@ -187,6 +187,12 @@ fn columns_and_rows_are_read_from_two_outputs() {
     }
     let simcc = "codec = \"simcc\"\nx = \"across\"\ny = \"down\"\nbins_per_pixel = 1";
     let simcc = CARD.replace("codec = \"heat-map\"\nrefine = \"none\"", simcc);
+    (net, simcc)
+}
+
+#[test]
+fn columns_and_rows_are_read_from_two_outputs() {
+    let (net, simcc) = distributions();
     let found = keypoints(&net, &simcc, &[[5, 9]]);
     assert_eq!((found[2].at, found[2].score), ([5.0, 9.0], 1.0));
     let exchanged = simcc

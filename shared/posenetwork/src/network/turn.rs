@@ -141,16 +141,9 @@ impl Turn {
     /// * `is_symmetric`: whether the cells of a turned picture lie on cells of the picture. Those that lie on the first of their pixels
     ///   are moved by a cell, to less than half a cell from there.
     fn turn_maps(self, maps: &mut Tensor, (layout, is_symmetric, width): (Layout, bool, usize)) {
-        let &[_, second, third, fourth] = &maps.shape[..] else {
+        let Some([channels, rows, columns]) = maps.map_sides(layout) else {
             return;
         };
-        let (channels, rows, columns) = match layout {
-            Layout::Planes => (second, third, fourth),
-            Layout::Pixels => (fourth, second, third),
-        };
-        if maps.values.len() != channels * rows * columns || maps.values.is_empty() {
-            return;
-        }
         let beyond = usize::from(!is_symmetric && columns < width);
         let [across, down] = if self.is_sideways() {
             [rows, columns]

@@ -1,10 +1,9 @@
 //! Networks that see turned pictures: what does not care how a picture is turned sees the same.
 
-use onnx::{Attribute, Network};
+use onnx::Network;
 
-use super::tests::{CARD, fitted, network, sides};
+use super::tests::{CARD, distributions, fitted, network, sides};
 use super::*;
-use crate::maps::{JointMaps, MapSettings};
 
 const TURNS: [Turn; 4] = [Turn::Up, Turn::Right, Turn::Down, Turn::Left];
 
@@ -21,11 +20,7 @@ fn found(net: &Network, card: &str, turn: Turn) -> Vec<Keypoint> {
     let mut workspace = Workspace::default();
     let boxed = ([0.0, 0.0, 16.0, 16.0], turn);
     let sight = network.look_turned(image, boxed, &mut workspace).unwrap();
-    let sight = sight.unwrap();
-    // The maps have their maxima where the keypoints are.
-    let mut maps = JointMaps::default();
-    maps.read(&sight, &MapSettings::default()).unwrap();
-    sight.keypoints().unwrap()
+    sight.unwrap().keypoints().unwrap()
 }
 
 #[test]
@@ -42,21 +37,7 @@ fn whoever_does_not_care_sees_the_same_in_every_turn() {
 
 #[test]
 fn distributions_over_columns_and_rows_are_turned_too() {
-    let mut net = network("Relu");
-    net.nodes.clear();
-    net.outputs = vec![
-        ("across".to_owned(), sides(&[1, 3, 12])),
-        ("down".to_owned(), sides(&[1, 3, 16])),
-    ];
-    for (axis, name) in [(2, "across"), (3, "down")] {
-        let along = vec![
-            ("axes", Attribute::Ints(vec![axis])),
-            ("keepdims", Attribute::Int(0)),
-        ];
-        net.node("ReduceMax", &["picture"], name, along);
-    }
-    let simcc = "codec = \"simcc\"\nx = \"across\"\ny = \"down\"\nbins_per_pixel = 1";
-    let simcc = CARD.replace("codec = \"heat-map\"\nrefine = \"none\"", simcc);
+    let (net, simcc) = distributions();
     let upright = found(&net, &simcc, Turn::Up);
     let place = |it: &Keypoint| it.at.map(|it| it.round() as i64);
     for turn in TURNS {
