@@ -1,5 +1,7 @@
 //! How often boxes around people are looked for.
 
+use deployment::Deployment;
+use deployment::capture::Mode;
 use deployment::pose::Config;
 
 /// Frames that are farther apart are not of a person whom a box could follow, seconds: boxes are looked for in every one.
@@ -25,6 +27,14 @@ fn find_every_at(rate_hz: Option<f64>, has_detector: bool) -> u64 {
     // People come and go by time: a detector looks twice a second, the filters, which take longer, once.
     let seconds = if has_detector { 0.5 } else { 1.0 };
     (seconds * rate_hz).round().clamp(OFTEN, 1e6) as u64
+}
+
+/// Most of the time that searches for boxes may take while people are seen well, a share. None where the deployment says how often they
+/// are made, and where no frame is left out, however long it takes.
+pub(crate) fn search_share(deployment: &Deployment) -> Option<f64> {
+    const SHARE: f64 = 0.125;
+    let is_free = deployment.pose.find_every.is_none() && deployment.capture.mode == Mode::Realtime;
+    is_free.then_some(SHARE)
 }
 
 #[cfg(test)]

@@ -137,7 +137,7 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
                 .product::<usize>()
                 * 3,
             evidence_values: if resolved.deployment.has_maps() {
-                it.plan.layout().n_responses().min(pipeline::MOST_VALUES)
+                pipeline::most_values(it.plan.layout())
             } else {
                 it.plan.layout().n_responses()
             },

@@ -17,7 +17,7 @@ use rayon::ThreadPoolBuilder;
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use viewquality::Forecaster;
 
-use crate::find_every::FOLLOWED_S;
+use crate::find_every::{self, FOLLOWED_S};
 use crate::hosts;
 use crate::inputs;
 use crate::prepare::{Prepared, frame_scale, framing, least_score};
@@ -196,11 +196,12 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         start_frame: resolved.deployment.capture.start_frame,
         frame_step: resolved.deployment.capture.frame_step,
         frame_rate_hz: resolved.frame_rate_hz(),
-        // The next frame is never too far, however rarely the deployment has people looked for.
+        // Nobody is lost from one frame to the next, however rarely the deployment has people looked for.
         most_apart: resolved.frame_rate_hz().map(|it| {
-            let frames = (it * FOLLOWED_S).floor() as u64;
-            frames.max(resolved.deployment.capture.frame_step)
+            let step = resolved.deployment.capture.frame_step as f64;
+            (it * FOLLOWED_S).max(step / pipeline::LOST)
         }),
+        search_share: find_every::search_share(&resolved.deployment),
         patience: resolved.patience(),
     };
     pose::run(service, &job)

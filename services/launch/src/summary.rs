@@ -3,6 +3,7 @@
 mod cameras;
 mod people;
 mod recorded;
+mod slow;
 mod trust;
 mod watcher;
 
@@ -270,6 +271,9 @@ impl Report {
                 "  3D            {} of {} frames",
                 it.frames_with_pose, self.n_frames
             )?;
+            if let Some(slow) = slow::text(it, self.n_frames, self.seconds, self.is_lossless) {
+                writeln!(text, "  slow          {slow}")?;
+            }
             writeln!(text, "  people        {}", it.people.text())?;
             text.push_str(&trust::text(it, &self.doubts()));
             self.write_views(text, it)?;

@@ -2,8 +2,8 @@
 
 use kernels::Rgb8View;
 use messages::{Searched, Stamp, Status};
-use pipeline::NetworkStep;
-use runtime::Failure;
+use pipeline::{NetworkMemory, NetworkStep};
+use runtime::{Failure, now_nanos};
 
 use crate::memory::NetworkState;
 use crate::view::{Found, View};
@@ -17,7 +17,9 @@ impl View<'_> {
         state: &mut NetworkState,
     ) -> Result<Result<Found<'_>, Status>, Failure> {
         state.memory.begin(stamp.frame, self.job.most_apart);
+        let begin = now_nanos();
         let looked = step.look(image, &mut state.memory);
+        self.put_off_search(now_nanos() - begin, &mut state.memory);
         let scope = match looked {
             Ok(scope) => scope,
             Err(error) => {
@@ -47,5 +49,13 @@ impl View<'_> {
         } = state;
         let fill = |responses: &mut [f32]| step.fill(scope, responses, memory);
         self.fill(&scope, searched, responses, fill).map(Ok)
+    }
+
+    /// Puts off the next search for boxes where this one took long: of a slow machine the others need the cores as well.
+    fn put_off_search(&self, took_nanos: u64, memory: &mut NetworkMemory) {
+        let limits = self.job.search_share.zip(self.job.frame_rate_hz);
+        if let Some((share, rate_hz)) = limits.filter(|_| memory.has_searched()) {
+            memory.put_off(took_nanos as f64 * 1e-9 * rate_hz, share);
+        }
     }
 }

@@ -36,7 +36,8 @@ pub struct Config {
     pub springs: PathBuf,
     /// `network`: people are looked for in every n-th frame, and wherever nobody is seen; between, the network looks where they were.
     /// Without it twice a second with a `detector`, once by the filters, which take longer, and at most in every tenth; in every frame
-    /// if these are more than 0.4 s apart or their rate is not known.
+    /// if these are more than 0.4 s apart or their rate is not known. With realtime delivery searches then take at most an eighth of the time of
+    /// a view that sees somebody.
     pub find_every: Option<u64>,
     /// `network`, keypoints: least mean heat (or confidence) of the joints of somebody who is seen, 0 to 1. In space, seven joints of a
     /// person need twice as much in two views.

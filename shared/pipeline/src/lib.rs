@@ -36,8 +36,8 @@ pub use fuse_step::{
 };
 pub use fused_view::FusedView;
 pub use motion::Motion;
-pub use network_memory::NetworkMemory;
-pub use network_step::{Boxes, Eyes, MOST_VALUES, NetworkSettings, NetworkStep};
+pub use network_memory::{LOST, NetworkMemory};
+pub use network_step::{Boxes, Eyes, NetworkSettings, NetworkStep, most_values};
 pub use people::{Person, people};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};

@@ -11,6 +11,8 @@ const TWIN: f64 = 0.05;
 /// Nobody leaves the box of the last frame within this share of the time for which people can be followed without a frame: a person
 /// who runs moves 0.2 m in 0.07 s.
 const SOON: f64 = 1.0 / 6.0;
+/// After so many times that time (2 s) a person may be anywhere.
+pub const LOST: f64 = 5.0;
 
 /// What the step keeps from frame to frame: memory that is used again, and the boxes of the people it sees.
 #[derive(Debug, Default)]
@@ -28,8 +30,15 @@ pub struct NetworkMemory {
     pub(crate) until: Option<u64>,
     /// The number of the last frame, where it is told ([`Self::begin`]).
     last: Option<u64>,
+    /// The frame before which nobody is looked for.
+    rest_until: Option<u64>,
+    /// The frame before which boxes are looked for only where nobody is seen well.
+    due_from: Option<u64>,
     /// Whether the last frame is so short a time ago that nobody has left their box.
     pub(crate) is_soon: bool,
+    /// How many times the longest time for which people are followed without a frame has passed since the last frame, where it is more
+    /// than once: people are looked for around their boxes first.
+    pub(crate) apart: Option<f64>,
     /// Whether they were looked for in this frame.
     pub(crate) has_searched: bool,
 }
@@ -70,20 +79,46 @@ impl NetworkMemory {
         (&mut self.look, &mut self.seen[self.n_seen])
     }
 
-    /// Begins with a frame; people are looked for in it if it is long after the last one: frames between were dropped, or lost.
+    /// Begins with a frame. If it is long after the last one, frames between were dropped or lost: people are then looked for around
+    /// the boxes in which they were, and after very long everywhere, unless the last frame was searched as well. Where a search takes that long
+    /// itself, no frame would be looked at in any other way.
     ///
     /// * `frame`: its number.
-    /// * `most_apart`: most frames from one in which people are seen to the next one in which they can be followed.
-    pub fn begin(&mut self, frame: u64, most_apart: Option<u64>) {
+    /// * `most_apart`: most frames from one in which people are seen to the next one in which they are in their boxes.
+    pub fn begin(&mut self, frame: u64, most_apart: Option<f64>) {
         let apart = self.last.map(|last| frame.saturating_sub(last));
         let share = apart.zip(most_apart);
-        let share = share.map(|(it, most)| it as f64 / most as f64);
+        let share = share.map(|(it, most)| it as f64 / most);
         self.is_soon = share.is_some_and(|it| it <= SOON);
-        if share.is_some_and(|it| it > 1.0) {
+        self.apart = share.filter(|it| *it > 1.0);
+        if share.is_some_and(|it| it > LOST) && !self.has_searched {
             // The first frame is searched anyway, and sets its own phase.
             self.until = self.until.map(|_| 0);
         }
         self.last = Some(frame);
+    }
+
+    /// Whether nobody is looked for in this frame.
+    pub(crate) fn rests(&self) -> bool {
+        let until = self.rest_until.zip(self.last);
+        until.is_some_and(|(until, frame)| frame < until)
+    }
+
+    /// Whether boxes are to be looked for in this frame, whoever is seen.
+    pub(crate) fn is_due(&self) -> bool {
+        let from = self.due_from.zip(self.last);
+        let is_put_off = from.is_some_and(|(from, frame)| frame < from);
+        self.until.is_none_or(|it| it == 0) && !is_put_off && !self.rests()
+    }
+
+    /// Puts off the next search for boxes: it may take a share of the time where somebody is seen well, and half of it where nobody is.
+    /// Of a slow machine the other views need the cores as well.
+    ///
+    /// * `took`: how long this frame's took, frames; `share`: above 0.
+    pub fn put_off(&mut self, took: f64, share: f64) {
+        let after = |frames: f64| self.last.map(|it| it.saturating_add(frames.ceil() as u64));
+        self.due_from = after(took / share);
+        self.rest_until = after(2.0 * took).filter(|_| self.n_seen == 0);
     }
 
     /// Whether boxes were looked for in this frame.
@@ -125,7 +160,7 @@ mod tests {
 
     #[test]
     fn people_are_looked_for_after_frames_that_are_missing() {
-        let after = |frames: &[u64], most_apart: Option<u64>| {
+        let after = |frames: &[u64], most_apart: Option<f64>| {
             let mut memory = NetworkMemory {
                 until: Some(7),
                 ..NetworkMemory::default()
@@ -135,25 +170,73 @@ mod tests {
             }
             memory.until
         };
-        assert_eq!(after(&[3, 4, 6], Some(2)), Some(7));
-        assert_eq!(after(&[3, 4, 7], Some(2)), Some(0));
-        assert_eq!(after(&[30], Some(2)), Some(7), "the first frame");
+        assert_eq!(after(&[3, 4, 14], Some(2.0)), Some(7));
+        assert_eq!(after(&[3, 4, 15], Some(2.0)), Some(0));
+        assert_eq!(after(&[30], Some(2.0)), Some(7), "the first frame");
         assert_eq!(after(&[3, 90], None), Some(7), "no rate is known");
     }
 
     #[test]
+    fn a_frame_after_a_searched_one_is_not_searched_because_that_took_long() {
+        let mut memory = NetworkMemory {
+            until: Some(7),
+            ..NetworkMemory::default()
+        };
+        memory.begin(3, Some(2.0));
+        memory.has_searched = true;
+        memory.begin(30, Some(2.0));
+        assert_eq!((memory.until, memory.apart), (Some(7), Some(13.5)));
+        memory.has_searched = false;
+        memory.begin(32, Some(2.0));
+        assert_eq!((memory.until, memory.apart), (Some(7), None));
+        memory.begin(60, Some(2.0));
+        assert_eq!(memory.until, Some(0));
+    }
+
+    #[test]
+    fn a_search_that_took_long_puts_off_the_next() {
+        let mut memory = NetworkMemory {
+            until: Some(0),
+            ..NetworkMemory::default()
+        };
+        let mut is_due = |frame: u64, took: Option<f64>| {
+            memory.begin(frame, Some(4.0));
+            let is_due = memory.is_due();
+            memory.n_seen = 1;
+            if let Some(took) = took {
+                memory.put_off(took, 0.25);
+            }
+            assert!(!memory.rests());
+            is_due
+        };
+        assert!(is_due(5, Some(2.0)) && !is_due(6, None) && !is_due(12, None) && is_due(13, None));
+    }
+
+    #[test]
+    fn after_a_search_in_vain_nobody_is_looked_for_as_long_as_it_took() {
+        let mut memory = NetworkMemory::default();
+        memory.begin(0, Some(4.0));
+        memory.put_off(3.5, 0.25);
+        let mut rests = |frame: u64| {
+            memory.begin(frame, Some(4.0));
+            memory.rests()
+        };
+        assert!(rests(4) && rests(6) && !rests(7));
+    }
+
+    #[test]
     fn nobody_leaves_their_box_between_two_frames_of_a_fast_camera() {
-        let is_soon = |frames: &[u64], most_apart: Option<u64>| {
+        let is_soon = |frames: &[u64], most_apart: Option<f64>| {
             let mut memory = NetworkMemory::default();
             for frame in frames {
                 memory.begin(*frame, most_apart);
             }
             memory.is_soon
         };
-        assert!(is_soon(&[3, 4], Some(24)), "at 60 frames a second");
-        assert!(!is_soon(&[3, 4], Some(2)), "at 5 frames a second");
-        assert!(!is_soon(&[3, 8], Some(24)), "four frames were dropped");
-        assert!(!is_soon(&[3], Some(24)), "the first frame");
+        assert!(is_soon(&[3, 4], Some(24.0)), "at 60 frames a second");
+        assert!(!is_soon(&[3, 4], Some(2.0)), "at 5 frames a second");
+        assert!(!is_soon(&[3, 8], Some(24.0)), "four frames were dropped");
+        assert!(!is_soon(&[3], Some(24.0)), "the first frame");
         assert!(!is_soon(&[3, 4], None), "no rate is known");
     }
 }

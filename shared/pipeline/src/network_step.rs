@@ -18,7 +18,7 @@ use posenetwork::{
 use crate::network_memory::{NetworkMemory, Seen};
 use crate::sightings::Sightings;
 use crate::space::trunk_upward;
-use crate::tracks::{MUCH_WORSE, Track, wider};
+use crate::tracks::{MUCH_WORSE, Track, moved, wider};
 use crate::view_result::ExtraKeypoint;
 use crate::view_step::{ViewEstimate, ViewStep};
 
@@ -78,7 +78,12 @@ type Outlines<E> = Result<Vec<[f64; 4]>, E>;
 /// Least score of an extra keypoint: below it, its place is a guess (0.3 is what mmpose and `Pose2Sim` use).
 const LEAST_SCORE: f64 = 0.3;
 /// Most response values of a frame; the cells of the evidence become larger rather than more.
-pub const MOST_VALUES: usize = 1 << 20;
+const MOST_VALUES: usize = 1 << 20;
+
+/// Most response values of a frame of a view with a network.
+pub fn most_values(layout: &Layout) -> usize {
+    layout.n_responses().min(MOST_VALUES)
+}
 
 /// The single-view step by a network, for frames of one size.
 #[derive(Debug)]
@@ -159,7 +164,7 @@ impl NetworkStep {
         };
         let first = self.settings.find_every - self.settings.find_phase % self.settings.find_every;
         let next = memory.until.map_or(first, |_| self.settings.find_every);
-        let is_due = memory.until.is_none_or(|it| it == 0);
+        let (rests, is_due) = (memory.rests(), memory.is_due());
         memory.has_searched = is_due;
         memory.n_seen = 0;
         let tracks = core::mem::take(&mut memory.tracks);
@@ -186,14 +191,17 @@ impl NetworkStep {
             }
         } else {
             for track in &tracks {
-                if is_due || track.is_doubtful {
+                if let Some(apart) = memory.apart.filter(|_| !is_due) {
+                    let around = (moved(track.outline, apart), self.most_lost());
+                    sightings.see_later(track, around, memory)?;
+                } else if is_due || track.is_doubtful {
                     sightings.see(track, wider(track.outline, &found), memory)?;
                 } else {
                     sightings.see_again(track, memory)?;
                 }
             }
             sightings.see_all(&found, memory)?;
-            if memory.n_seen == 0 && !is_due {
+            if memory.n_seen == 0 && !is_due && !rests {
                 memory.has_searched = true;
                 let found = find(&mut memory.values)?;
                 sightings.see_all(&found, memory)?;
@@ -250,6 +258,11 @@ impl NetworkStep {
         self.scope(memory)
     }
 
+    /// By how much the score of a pose may be lower than those of its person usually are.
+    fn most_lost(&self) -> f32 {
+        -MUCH_WORSE * self.settings.maps.floor()
+    }
+
     /// What the responses of the people of a frame cover: one level, fine enough for the smallest of them if there is room.
     fn scope(&self, memory: &NetworkMemory) -> Option<Scope> {
         let join = |a: Region, b: Region| {
@@ -286,7 +299,7 @@ impl NetworkStep {
     ) -> ViewEstimate {
         let level = scope.levels().start;
         let n_seen = memory.n_seen;
-        let most_lost = -MUCH_WORSE * self.settings.maps.floor();
+        let most_lost = self.most_lost();
         let mut found: Vec<(Pose, usize)> = Vec::with_capacity(n_seen);
         for (nth, seen) in memory.seen[..n_seen].iter_mut().enumerate() {
             if nth == 0 {

@@ -4,7 +4,7 @@ use kernels::Rgb8View;
 use posenetwork::{JointMaps, Look, LookError, Looker, outline_of, overlap};
 
 use crate::network_memory::{NetworkMemory, Seen, is_known};
-use crate::tracks::Track;
+use crate::tracks::{Track, wider};
 
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
@@ -84,6 +84,32 @@ impl Sightings<'_> {
             .looker
             .best_of(what, track.turn, look, &mut seen.maps)?;
         if let Some(best) = best {
+            self.keep_look(&best, Some(track.usual_score), memory);
+        }
+        Ok(())
+    }
+
+    /// Looks for a person of a frame long before, where nobody is known yet, around the box of then; keeps who is seen well, and not much
+    /// worse than the person usually is.
+    ///
+    /// * `around`: the box, enlarged for the time that has passed.
+    /// * `most_lost`: by how much a score may be lower than usual.
+    pub(crate) fn see_later(
+        &self,
+        track: &Track,
+        (around, most_lost): ([f64; 4], f32),
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        if !self.is_unknown(track.outline, memory) {
+            return Ok(());
+        }
+        let (look, seen) = memory.next();
+        let boxes = [track.outline, wider(track.outline, &[]), around];
+        let what = (self.image, &boxes[..]);
+        let best = self
+            .looker
+            .best_of(what, track.turn, look, &mut seen.maps)?;
+        if let Some(best) = best.filter(|it| it.score >= track.usual_score - most_lost) {
             self.keep_look(&best, Some(track.usual_score), memory);
         }
         Ok(())

@@ -10,6 +10,10 @@ pub(crate) const MUCH_WORSE: f32 = 1.5;
 const NEW_SCORE: f32 = 0.1;
 /// By how much a box is enlarged to see whether there is more of a person, share of the longer side.
 const WIDER: f64 = 0.25;
+/// By how much it is enlarged for a person who may have moved on, share of the longer side for every time for which people are followed
+/// without a frame (0.4 s, in which who runs gets half of the own height on); and by how much at most.
+const MOVED: f64 = 0.5;
+const MOST_MOVED: f64 = 1.0;
 /// Most of a box.
 const MOST: f64 = 0.5;
 
@@ -80,7 +84,19 @@ pub(crate) fn wider(outline: [f64; 4], found: &[[f64; 4]]) -> [f64; 4] {
             bottom.max(it[3]),
         ];
     }
-    let more = WIDER * (right - left).max(bottom - top);
+    enlarged(outline, WIDER)
+}
+
+/// A box in which a person of the frame before still is.
+///
+/// * `apart`: how many times the longest time for which people are followed without a frame has passed.
+pub(crate) fn moved(outline: [f64; 4], apart: f64) -> [f64; 4] {
+    enlarged(outline, (MOVED * apart).min(MOST_MOVED))
+}
+
+/// A box enlarged all around, by a share of its longer side.
+fn enlarged([left, top, right, bottom]: [f64; 4], share: f64) -> [f64; 4] {
+    let more = share * (right - left).max(bottom - top);
     [left - more, top - more, right + more, bottom + more]
 }
 
@@ -121,6 +137,12 @@ mod tests {
             );
         }
         assert!(n_doubtful > 2);
+    }
+
+    #[test]
+    fn who_may_have_moved_on_is_in_a_box_that_grows_with_the_time() {
+        assert_eq!(moved(BOX, 1.5), [-50.0, -100.0, 330.0, 400.0]);
+        assert_eq!(moved(BOX, 90.0), [-100.0, -150.0, 380.0, 450.0]);
     }
 
     #[test]

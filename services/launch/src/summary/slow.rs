@@ -1,0 +1,51 @@
+//! Whether the machine had time for the frames of a run.
+
+use runfiles::Summary;
+
+/// A run that has a result for a smaller share of its frames says so.
+const MOST: f64 = 0.8;
+
+/// How many frames the machine had time for, and what helps. None where it had time for most of them, and with lossless delivery.
+///
+/// * `n_frames`: of the footage, as far as the run got; `seconds`: how long it took.
+pub(super) fn text(
+    summary: &Summary,
+    n_frames: u64,
+    seconds: f64,
+    is_lossless: bool,
+) -> Option<String> {
+    let n = summary.frames;
+    let is_slow = !is_lossless && n > 0 && (n as f64) < MOST * n_frames as f64;
+    is_slow.then(|| {
+        format!(
+            "this machine had time for {n} of {n_frames} frames, {:.1} a second: smaller pictures (capture.scale), fewer cameras, less \
+             work beside it, a detector (pose.detector) or more cores would help; `latency` below shows which stage takes long",
+            n as f64 / seconds.max(1e-3)
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn summary(frames: u64) -> Summary {
+        Summary {
+            frames,
+            ..Summary::default()
+        }
+    }
+
+    #[test]
+    fn a_machine_that_had_time_for_few_frames_is_told() {
+        let told = text(&summary(6), 60, 8.0, false).unwrap();
+        assert!(told.contains("6 of 60 frames, 0.8 a second"), "{told}");
+        assert_eq!(text(&summary(50), 60, 8.0, false), None);
+        assert_eq!(text(&summary(6), 60, 8.0, true), None);
+        assert_eq!(
+            text(&summary(0), 60, 8.0, false),
+            None,
+            "it has a reason of its own"
+        );
+    }
+}
