@@ -2,10 +2,10 @@
 
 use datasets::{People, Person, Picture, Sides};
 use experiment::{Joints, Pictures};
-use fmp::{Layout, Pose, Search, Solver};
+use fmp::{Layout, Pose, Search};
 use keypoints::Keypoint;
 use pipeline::ViewSettings;
-use posenetwork::springs::joint_of;
+use posenetwork::springs::{TurnedSprings, joint_of};
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Turn, outline_of};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use skeleton::PARSE14;
@@ -26,8 +26,8 @@ const SAME: f64 = 1.5;
 pub struct NetworkReader {
     /// The network.
     pub network: PoseNetwork,
-    /// Solves the tree of springs.
-    pub springs: Solver,
+    /// Solve the tree of springs.
+    pub springs: TurnedSprings,
     /// What left and right mean in the marks.
     pub sides: Sides,
     /// Finds the boxes; the box around the marked joints is used without it.
@@ -145,7 +145,7 @@ impl NetworkReader {
             maps.name_sides(&self.network, look.front);
         }
         let peaks = at_peaks(maps.peaks());
-        let pose = maps.pose(&self.springs, &layout, &mut Vec::new());
+        let pose = maps.pose(self.springs.of(look.turn), &layout, &mut Vec::new());
         let held = pose.map(|pose| self.joints(&layout, &pose, maps.peaks()));
         Ok([Some(peaks), held])
     }

@@ -10,6 +10,7 @@ use fmp::{Bound, Bounds, Layout, Placement, Pose, Region, Responses, Scope, Solv
 use kernels::Rgb8View;
 use keypoints::Keypoint;
 use multiview::FrontEvidence;
+use posenetwork::springs::TurnedSprings;
 use posenetwork::{
     Detector, JointMaps, LookError, Looker, MapSettings, PoseNetwork, Turn, outline_of_parts,
     outline_of_pose,
@@ -89,7 +90,7 @@ pub fn most_values(layout: &Layout) -> usize {
 #[derive(Debug)]
 pub struct NetworkStep {
     eyes: Eyes,
-    solver: Solver,
+    springs: TurnedSprings,
     layout: Arc<Layout>,
     settings: NetworkSettings,
     extras: Vec<Option<usize>>,
@@ -98,12 +99,12 @@ pub struct NetworkStep {
 impl NetworkStep {
     /// Prepares the step.
     ///
-    /// * `solver`: of a tree of [`posenetwork::springs`].
+    /// * `solver`: of a tree of [`posenetwork::springs`], which is turned for people who lie or stand on their hands.
     /// * `layout`: of the frames, for that tree.
     pub fn new(eyes: Eyes, solver: Solver, layout: Arc<Layout>, settings: NetworkSettings) -> Self {
         Self {
             eyes,
-            solver,
+            springs: TurnedSprings::new(solver.model()),
             layout,
             settings,
             extras: Vec::new(),
@@ -171,7 +172,7 @@ impl NetworkStep {
         let sightings = Sightings {
             looker: Looker {
                 network,
-                springs: &self.solver,
+                springs: &self.springs,
                 layout: &self.layout,
                 settings: &self.settings.maps,
             },
@@ -309,15 +310,19 @@ impl NetworkStep {
             }
             let (looked_at, usual_score) = ((seen.outline, seen.turn), seen.usual_score);
             let pose = if n_seen == 1 && seen.level == level {
-                self.best(responses, scope)
+                self.best(responses, scope, seen.turn)
             } else {
                 let Seen {
-                    maps, responses, ..
+                    maps,
+                    responses,
+                    turn,
+                    ..
                 } = seen;
-                maps.pose(&self.solver, &self.layout, responses)
+                let solver = self.springs.of(*turn);
+                maps.pose(solver, &self.layout, responses)
             };
             if let Some(pose) = pose {
-                let tree = (&**self.solver.model(), &*self.layout);
+                let tree = (&**self.springs.model(), &*self.layout);
                 let around = outline_of_pose(&pose, tree);
                 let before = (looked_at, usual_score);
                 let next = around.map(|it| Track::next(before, (it, pose.score), most_lost));
@@ -340,7 +345,7 @@ impl NetworkStep {
         let local = best.map(|pose| {
             let levels = [level];
             let evidence = Responses::within(&self.layout, responses, &levels, scope);
-            local_scores(self.solver.model(), &evidence, pose)
+            local_scores(self.springs.model(), &evidence, pose)
         });
         ViewEstimate {
             local: local.unwrap_or_default(),
@@ -356,7 +361,7 @@ impl NetworkStep {
     /// In which direction a person faces; nothing of one who is seen head down in a picture that was not turned.
     fn front_of(&self, pose: &Pose, seen: &Seen) -> Option<FrontEvidence> {
         let front = seen.front?;
-        let centre = |part| pose.centre(self.solver.model(), &self.layout, part);
+        let centre = |part| pose.centre(self.springs.model(), &self.layout, part);
         let centres: Vec<[f64; 2]> = (0..pose.parts.len()).map(centre).collect();
         let is_told = seen.turn != Turn::Up || trunk_upward(&centres) > 0.0;
         Some(if is_told {
@@ -376,10 +381,10 @@ impl NetworkStep {
         })
     }
 
-    fn best(&self, responses: &[f32], scope: Scope) -> Option<Pose> {
+    fn best(&self, responses: &[f32], scope: Scope, turn: Turn) -> Option<Pose> {
         let levels: Vec<u16> = scope.levels().collect();
         let evidence = Responses::within(&self.layout, responses, &levels, scope);
-        self.solver.best(&evidence, None)
+        self.springs.of(turn).best(&evidence, None)
     }
 
     /// The same pose on the level of a scope.
@@ -392,7 +397,7 @@ impl NetworkStep {
         let mut moved = pose.clone();
         moved.level = level;
         for (part, at) in moved.parts.iter_mut().enumerate() {
-            let centre = pose.centre(self.solver.model(), &self.layout, part);
+            let centre = pose.centre(self.springs.model(), &self.layout, part);
             let cell = cell_at(&self.layout, level, centre);
             let within = |it: f64, first: usize, n: usize| {
                 it.round().clamp(first as f64, (first + n - 1) as f64) as u16

@@ -1,11 +1,12 @@
 //! Looking at people in boxes that may not fit: into several, and closer where somebody is seen.
 
-use fmp::{Layout, Solver};
+use fmp::Layout;
 use kernels::Rgb8View;
 
 use crate::maps::{JointMaps, MapSettings};
 use crate::network::{LookError, PoseNetwork, Turn, Workspace};
 use crate::outline::{outline_of_pose, overlap};
+use crate::springs::TurnedSprings;
 
 /// Boxes that cover each other by more show the same to a network: another look tells nothing new.
 const FITS: f64 = 0.8;
@@ -17,8 +18,8 @@ const MOST_MORE: usize = 2;
 pub struct Looker<'a> {
     /// The network.
     pub network: &'a PoseNetwork,
-    /// Solves the tree of springs, which says where a whole person is.
-    pub springs: &'a Solver,
+    /// Solve the tree of springs, which says where a whole person is.
+    pub springs: &'a TurnedSprings,
     /// Of the picture, for that tree.
     pub layout: &'a Layout,
     /// How maps become evidence.
@@ -113,7 +114,7 @@ impl Looker<'_> {
         responses: &mut Vec<f32>,
         maps: &mut JointMaps,
     ) -> Look {
-        let pose = maps.pose(self.springs, self.layout, responses);
+        let pose = maps.pose(self.springs.of(turn), self.layout, responses);
         Look {
             outline,
             front,

@@ -1,5 +1,9 @@
 //! The tree that holds joints together: springs learned from annotated people.
 
+mod turned;
+
+pub use turned::TurnedSprings;
+
 use fmp::{Edge, Filter, Model, ModelError, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs};
 use skeleton::{MIRROR, N_PARTS, PARENT, PARSE14, PART_NAMES};
 

@@ -5,12 +5,13 @@ use experiment::{
     Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
     projected,
 };
-use fmp::{Layout, Pose, Search, Solver};
+use fmp::{Layout, Pose, Search};
 use geometry::Camera;
 use kernels::Rgb8View;
 use keypoints::Sides;
 use multiview::{SeenPerson, same_person};
 use pipeline::ViewSettings;
+use posenetwork::springs::TurnedSprings;
 use posenetwork::{
     Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
 };
@@ -36,8 +37,8 @@ pub struct EvidenceJob<'a> {
     pub network: &'a PoseNetwork,
     /// What finds the boxes.
     pub boxes: Boxes<'a>,
-    /// Solves the tree of springs, which tells better boxes.
-    pub springs: &'a Solver,
+    /// Solve the tree of springs, which tells better boxes.
+    pub springs: &'a TurnedSprings,
     /// What goes wrong.
     pub stress: &'a [Stress],
     /// How the frames are derived.

@@ -19,7 +19,8 @@ pub enum Turn {
 }
 
 impl Turn {
-    const ALL: [Self; 4] = [Self::Up, Self::Right, Self::Down, Self::Left];
+    /// All of them, in order.
+    pub(crate) const ALL: [Self; 4] = [Self::Up, Self::Right, Self::Down, Self::Left];
 
     /// The direction, radians clockwise from upward, -pi to pi.
     fn angle(self) -> f64 {

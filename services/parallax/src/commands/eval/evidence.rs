@@ -6,10 +6,11 @@ use std::process::ExitCode;
 use clap::Args;
 use evaluation::Bootstrap;
 use experiment::{FilmSettings, Stress};
-use fmp::{Search, Solver};
+use fmp::Search;
 use launch::{Claim, inputs, no_results, output};
 use offline::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
 use offline::library::Library;
+use posenetwork::springs::TurnedSprings;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
 use super::Arguments;
@@ -75,7 +76,7 @@ pub(super) fn run(
     let detector = detector.map(|it| offline::detector::open(it, options.detector_card.as_deref()));
     let detector = detector.transpose()?;
     let filters = Search::new(inputs::model_or_shipped(None)?);
-    let springs = Solver::new(inputs::springs(Path::new(deployment::SHIPPED))?);
+    let springs = TurnedSprings::new(&inputs::springs(Path::new(deployment::SHIPPED))?);
     let _claim = Claim::of(&arguments.out, "eval")?;
     let job = EvidenceJob {
         network: &network,

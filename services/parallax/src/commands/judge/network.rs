@@ -6,12 +6,13 @@ use std::process::ExitCode;
 
 use evaluation::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
 use experiment::{Intervals, Judged, Pictures};
-use fmp::{Search, Solver};
+use fmp::Search;
 use launch::{inputs, output};
 use offline::Console;
 use offline::judged;
 use offline::judged_network::{self, JointError, NetworkReader, Seen};
 use offline::library::Library;
+use posenetwork::springs::TurnedSprings;
 use runtime::{ExitKind, Failure, Stop};
 use serde_json::{Value, json};
 
@@ -44,7 +45,7 @@ pub(super) fn run(
     }
     let reader = NetworkReader {
         network,
-        springs: Solver::new(inputs::springs(springs)?),
+        springs: TurnedSprings::new(&inputs::springs(springs)?),
         sides: arguments.sides,
         finder: finder.transpose()?,
     };
