@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use crossbeam::channel::{Receiver as ChannelReceiver, Sender, bounded};
 use hosts::{Answer, Content, Grid, Head, Hello, Outbox, Packet, Parcel, Signal, VERSION};
-use messages::{Cause, FrameHeader, Stamp, Status, Timing, topic};
+use messages::{Cause, EvidenceHeader, FrameHeader, Stamp, Status, Timing, topic};
 use recording::{Envelope, Kind, Message};
 use runtime::{ExitKind, Failure, OrFail as _, Service, SliceSubscriber, Waiter, Woken, now_nanos};
 use stage::any::Receiver;
@@ -15,6 +15,7 @@ use crate::job::{Far, Job};
 use crate::join::listed;
 use crate::jpeg;
 use crate::link::Link;
+use crate::maps::{self, ViewMaps};
 use crate::topics::Topics;
 
 /// How often the host introduces itself: the other may have been started again.
@@ -39,6 +40,8 @@ enum Item {
         content: Content,
         envelope: Envelope,
         data: Vec<u8>,
+        /// The maps of poses, where they cross.
+        maps: Vec<u8>,
     },
 }
 
@@ -48,10 +51,44 @@ enum Port {
     Message(Content, Receiver),
 }
 
+/// The evidence of a view, which crosses as Gaussians with its poses.
+struct Evidence {
+    port: SliceSubscriber<f32, EvidenceHeader>,
+    maps: ViewMaps,
+    /// The frame of the newest, and its bytes.
+    newest: Option<(u64, Vec<u8>)>,
+}
+
+impl Evidence {
+    /// Adds the maps of its frame to the poses of a view. They were sent before.
+    fn add_to(&mut self, item: &mut Item, session: u64) -> Result<(), Failure> {
+        while let Some(sample) = self.port.receive()? {
+            let header = sample.header();
+            if header.stamp.session != session || header.status != Status::OK {
+                continue;
+            }
+            match self.maps.pack(header, sample.payload()) {
+                Ok(bytes) => self.newest = Some((header.stamp.frame, bytes)),
+                Err(error) => tracing::warn!(%error, "evidence that does not cross"),
+            }
+        }
+        if let Item::Message { envelope, maps, .. } = item
+            && let Some((frame, bytes)) = &self.newest
+            && *frame == envelope.stamp.frame
+            && envelope.status == Status::OK
+        {
+            maps.clone_from(bytes);
+        }
+        Ok(())
+    }
+}
+
 /// A topic of a view.
 struct Lane {
     view: usize,
     port: Port,
+    /// What crosses with its messages.
+    evidence: Option<Evidence>,
     /// The end of its stream, once it came.
     end: Option<Item>,
     /// The sequence from which on an acknowledgement means that the end has arrived.
@@ -136,10 +173,11 @@ fn lanes(
     let mut lanes = Vec::new();
     let bus = service.bus();
     for &view in &role.views {
-        let mut add = |port| {
+        let mut add = |port, evidence| {
             lanes.push(Lane {
                 view,
                 port,
+                evidence,
                 end: None,
                 end_sequence: None,
                 has_ended: false,
@@ -148,18 +186,28 @@ fn lanes(
         };
         match job.carry {
             deployment::hosts::Carry::Frames => {
-                add(Port::Frame(
-                    bus.slice_subscriber(&topic::frame(view), waiter)?,
-                ));
+                let port = bus.slice_subscriber(&topic::frame(view), waiter)?;
+                add(Port::Frame(port), None);
             }
             deployment::hosts::Carry::Poses => {
                 let name = topic::view_pose(view);
                 let port = Receiver::open(bus, Kind::ViewPose, &name, waiter, false)?;
-                add(Port::Message(Content::ViewPose, port));
+                let evidence = job.maps.get(view).map(|maps| {
+                    let port = bus.slice_subscriber(&topic::evidence(view), waiter)?;
+                    Ok::<_, Failure>(Evidence {
+                        port,
+                        maps: maps.clone(),
+                        newest: None,
+                    })
+                });
+                add(
+                    Port::Message(Content::ViewPose, port),
+                    evidence.transpose()?,
+                );
                 if job.has_quality {
                     let name = topic::view_quality(view);
                     let port = Receiver::open(bus, Kind::ViewQuality, &name, waiter, false)?;
-                    add(Port::Message(Content::ViewQuality, port));
+                    add(Port::Message(Content::ViewQuality, port), None);
                 }
             }
         }
@@ -234,11 +282,14 @@ impl Sending<'_> {
         let session = self.service.session();
         let health = self.service.health();
         for (index, lane) in self.lanes.iter_mut().enumerate() {
-            while let Some((of, status, item)) = next(&lane.port)? {
+            while let Some((of, status, mut item)) = next(&lane.port)? {
                 if of != session {
                     continue;
                 }
                 health.received(1);
+                if let Some(evidence) = &mut lane.evidence {
+                    evidence.add_to(&mut item, session)?;
+                }
                 if status == Status::END {
                     lane.end = Some(item);
                 } else {
@@ -306,6 +357,15 @@ impl Sending<'_> {
                 (&encoded[..], size, header.n_dropped, header.skew_nanos)
             }
             Item::Frame { header, .. } => (&[][..], [0; 2], header.n_dropped, 0),
+            Item::Message {
+                content: Content::ViewPose,
+                data,
+                maps,
+                ..
+            } => {
+                encoded = maps::join(data, maps);
+                (&encoded[..], [0; 2], 0, 0)
+            }
             Item::Message { data, .. } => (&data[..], [0; 2], 0, 0),
         };
         let stamp = envelope.stamp;
@@ -391,6 +451,7 @@ fn next(port: &Port) -> Result<Option<(u64, Status, Item)>, Failure> {
                 content,
                 envelope,
                 data,
+                maps: Vec::new(),
             };
             Ok(Some((received.session, received.status, item)))
         }

@@ -7,6 +7,7 @@ use deployment::hosts::Carry;
 use hosts::{Fingerprint, Grid};
 
 use crate::address::Address;
+use crate::maps::ViewMaps;
 
 /// What the process has to do.
 #[derive(Debug)]
@@ -19,6 +20,8 @@ pub struct Job {
     pub carry: Carry,
     /// Whether expected errors cross with poses.
     pub has_quality: bool,
+    /// By view, where the maps of the views cross with their poses; else empty.
+    pub maps: Vec<ViewMaps>,
     /// Width and height of the frames of every view of the deployment, pixels.
     pub sizes: Vec<[u32; 2]>,
     /// From the session to the first instant, nanoseconds.

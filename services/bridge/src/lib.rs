@@ -3,7 +3,7 @@
 //!
 //! | host | what its bridge does | where |
 //! |---|---|---|
-//! | with cameras | sends frames as JPEG, or poses; the newest wins | `far` |
+//! | with cameras | sends frames as JPEG, or poses with the maps they are from as Gaussians; the newest wins | `far` |
 //! | that fuses | publishes them for the frames of its run, and says why where one is missing | `near` |
 //!
 //! The engine is Zenoh, behind the feature `zenoh`; what crosses, and the rules for it, are in `hosts`.
@@ -15,6 +15,7 @@ mod job;
 mod join;
 mod jpeg;
 mod keys;
+mod maps;
 mod near;
 mod timing;
 mod topics;
@@ -29,6 +30,7 @@ pub use address::{Address, LinkError};
 pub use job::{Far, Job, Near, NearHost, Role};
 pub use join::{JoinError, join, status};
 pub use keys::{KeyError, KeyFiles, make_keys};
+pub use maps::ViewMaps;
 
 use runtime::{Failure, Service};
 

@@ -1,16 +1,17 @@
 //! Deployments of several hosts: which of them this machine is, what must be the same on all, and the job of the bridge.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use bridge::{Address, KeyFiles, NearHost};
+use bridge::{Address, KeyFiles, NearHost, ViewMaps};
 use deployment::Deployment;
-use deployment::hosts::Host;
+use deployment::hosts::{Carry, Host};
 use hosts::Fingerprint;
 use messages::topic;
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use crate::inputs;
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, View};
 use crate::resolved::Resolved;
 
 /// The host that this machine is: the one that is named, or the one with the name of the machine. None for a deployment without
@@ -97,17 +98,40 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     all.add_text("version of Parallax", env!("CARGO_PKG_VERSION"));
     all.add("rig", &read(&deployment.rig)?);
     all.add("model", &inputs::model_bytes(deployment.model.as_deref())?);
-    let networks = [
-        ("pose.network", &deployment.pose.network),
-        ("pose.detector", &deployment.pose.detector),
+    let pose = &deployment.pose;
+    let springs = deployment.has_maps().then(|| pose.springs.clone());
+    let named = [
+        ("pose.network", &pose.network),
+        ("pose.network_card", &pose.network_card),
+        ("pose.detector", &pose.detector),
+        ("pose.detector_card", &pose.detector_card),
+        ("pose.springs", &springs),
         ("quality.network", &deployment.quality.network),
     ];
-    for (what, file) in networks {
-        match file.as_deref() {
-            None => {}
-            Some(file) if deployment::is_shipped(file) => all.add_text(what, "shipped"),
-            Some(file) => all.add(what, &read(file)?),
+    let mut files: Vec<(String, &Path)> = Vec::new();
+    for (what, file) in named {
+        files.extend(file.as_deref().map(|file| (what.to_owned(), file)));
+    }
+    for camera in &deployment.cameras {
+        let own = [
+            ("network", &camera.network),
+            ("network_card", &camera.network_card),
+        ];
+        for (what, file) in own {
+            let what = format!("{what} of camera {:?}", camera.name);
+            files.extend(file.as_deref().map(|file| (what, file)));
         }
+    }
+    for (what, file) in files {
+        if deployment::is_shipped(file) {
+            all.add_text(&what, "shipped");
+        } else {
+            all.add(&what, &read(file)?);
+        }
+    }
+    if deployment.link.carry == Carry::Poses {
+        let settings = serde_json::to_vec(&results_settings(pose));
+        all.add("pose", &settings.or_fail(ExitKind::Run)?);
     }
     let hosts = deployment.hosts.iter();
     let views: Vec<String> = hosts
@@ -127,6 +151,21 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     ));
     all.add("capture", &settings.or_fail(ExitKind::Run)?);
     Ok(all)
+}
+
+/// The settings of the search that its results depend on, without the names of files, which may lie elsewhere on every host.
+fn results_settings(pose: &deployment::pose::Config) -> deployment::pose::Config {
+    deployment::pose::Config {
+        orientation: PathBuf::new(),
+        network: None,
+        network_card: None,
+        detector: None,
+        detector_card: None,
+        springs: PathBuf::new(),
+        onnx_runtime: None,
+        threads: 1,
+        ..pose.clone()
+    }
 }
 
 fn read(file: &Path) -> Result<Vec<u8>, Failure> {
@@ -168,8 +207,8 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
         let topology = resolved.topology();
         let others = deployment.hosts.iter().filter(|it| !it.fuses);
         let topic = |view: usize| match deployment.link.carry {
-            deployment::hosts::Carry::Frames => topic::frame(view),
-            deployment::hosts::Carry::Poses => topic::view_pose(view),
+            Carry::Frames => topic::frame(view),
+            Carry::Poses => topic::view_pose(view),
         };
         let views = 0..prepared.views.len();
         bridge::Role::Near(bridge::Near {
@@ -198,6 +237,11 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
         fingerprint: fingerprint(deployment)?,
         carry: deployment.link.carry,
         has_quality: deployment.has_quality(),
+        maps: if deployment.maps_cross() {
+            prepared.views.iter().map(view_maps).collect()
+        } else {
+            Vec::new()
+        },
         sizes: sizes.collect(),
         lead_nanos: inputs::lead_nanos(deployment),
         period_nanos: 1e9 / rate_hz,
@@ -205,6 +249,15 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
         frame_step: step,
         role,
     })
+}
+
+/// The maps of a view, where they cross.
+fn view_maps(view: &View) -> ViewMaps {
+    let layout = view.plan.layout();
+    ViewMaps {
+        longest: pipeline::most_values(layout),
+        layout: Arc::new(layout.clone()),
+    }
 }
 
 #[cfg(test)]

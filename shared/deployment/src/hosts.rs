@@ -32,7 +32,8 @@ pub enum Carry {
     /// Frames at search size as JPEG; poses are found on the host that fuses.
     #[default]
     Frames,
-    /// Poses of single views; these views take no part in the search over several views, only in the triangulation.
+    /// Poses of single views. With a network, the maxima of its maps cross with them, and the views are solved in space as those of one
+    /// machine. Views of filters take no part in the search over several views, only in the triangulation.
     Poses,
 }
 
@@ -40,8 +41,8 @@ pub enum Carry {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Link {
-    /// What crosses: `frames` (JPEG, poses are found on the host that fuses) or `poses` (found where the camera is; less
-    /// data and less accurate).
+    /// What crosses: `frames` (JPEG, poses are found on the host that fuses) or `poses` (found where the camera is: less data, and
+    /// less work for the host that fuses; with filters in place of a network less accurate).
     pub carry: Carry,
     /// Quality of the JPEG, 1 to 100.
     pub jpeg_quality: u8,
@@ -96,6 +97,11 @@ impl Deployment {
     pub fn host_of(&self, view: usize) -> Option<&Host> {
         let name = &self.cameras.get(view)?.name;
         self.hosts.iter().find(|it| it.views.contains(name))
+    }
+
+    /// Whether the maps of networks cross between hosts with the poses, as Gaussians.
+    pub fn maps_cross(&self) -> bool {
+        self.link.carry == Carry::Poses && self.views() == fuse::Views::Space
     }
 
     /// The name of the part of a deployment that runs on a host: its processes share memory under it.
@@ -237,10 +243,11 @@ fn real_time(it: &Deployment) -> Result<(), Complaint> {
         "none: the clocks of hosts are compared while they run",
     )?;
     demand(
-        it.link.carry == Carry::Frames || it.views() == fuse::Views::Pairs,
+        it.link.carry == Carry::Frames || it.views() != fuse::Views::All,
         "link.carry",
-        "\"poses\", with `fuse.views` other than \"pairs\"",
-        "\"frames\": all views at once are solved on their evidence, which poses alone do not have",
+        "\"poses\", where `fuse.views` is \"all\"",
+        "\"frames\"; or a network (`fuse.views` = \"space\"), or `fuse.views` = \"pairs\": the evidence of filters, on which all views at \
+         once are solved, does not cross",
     )
 }
 

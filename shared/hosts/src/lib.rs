@@ -5,6 +5,7 @@
 //! | a message of a view as bytes, checked | [`Packet`] |
 //! | questions and answers between two hosts | [`Signal`], [`Hello`], [`Answer`] |
 //! | how far another host's clock is from ours, with a bound | [`Clock`] |
+//! | the maps of a view as Gaussians, after its poses | [`Maps`] |
 //! | what waits to be sent: the newest of every lane, and no more than a few on their way | [`Outbox`] |
 //! | which frame of the run a message is for, and what became of the others | [`Arrivals`] |
 //! | whether two hosts have the same files | [`Fingerprint`] |
@@ -18,6 +19,7 @@ mod clock;
 mod fingerprint;
 mod forecast;
 mod hello;
+mod maps;
 mod outbox;
 mod packet;
 mod signal;
@@ -27,9 +29,10 @@ pub use clock::{Clock, Estimate, Exchange, ExchangeError};
 pub use fingerprint::{Difference, Fingerprint};
 pub use forecast::{Costs, Forecast, Load, forecast};
 pub use hello::{Answer, Hello, HelloError, Welcome};
+pub use maps::{Gaussian, MOST_GAUSSIANS, Maps, MapsError};
 pub use outbox::{Outbox, Parcel, Sent};
 pub use packet::{Content, Expected, HEAD_BYTES, Head, Packet, PacketError};
 pub use signal::{Signal, SignalError};
 
 /// The version of everything here: two hosts with different ones do not talk.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;

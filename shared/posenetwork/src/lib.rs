@@ -8,6 +8,7 @@
 
 mod alone;
 mod between;
+mod bumps;
 mod closer;
 mod detector;
 mod expected;
@@ -18,6 +19,7 @@ mod outline;
 pub mod springs;
 
 pub use between::interpolate;
+pub use bumps::{Bump, MOST_OF_A_JOINT, bumps, fill_from_bumps};
 pub use closer::{Look, LookMemory, Looker};
 pub use detector::Detector;
 pub use expected::expected_error;

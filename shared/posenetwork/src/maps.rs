@@ -44,7 +44,7 @@ impl MapSettings {
     /// The evidence of a heat. One below a hundred-thousandth counts as none, which spares most cells the logarithm.
     ///
     /// * `floor`: [`Self::floor`].
-    fn of_heat(&self, heat: f64, floor: f32) -> f32 {
+    pub(crate) fn of_heat(&self, heat: f64, floor: f32) -> f32 {
         if heat < 1e-5 {
             return floor;
         }

@@ -1,6 +1,6 @@
-//! What another host sends: packets, signals, introductions.
+//! What another host sends: packets, maps, signals, introductions.
 
-use ::hosts::{Answer, Clock, Content, Exchange, Expected, Head, Hello, Packet, Signal};
+use ::hosts::{Answer, Clock, Content, Exchange, Expected, Head, Hello, Maps, Packet, Signal};
 use messages::Status;
 
 const EXPECTED: Expected<'static> = Expected {
@@ -28,6 +28,9 @@ pub fn host_messages(input: &[u8]) {
     }
     if let Ok(answer) = Answer::parse(input) {
         assert_eq!(Answer::parse(&answer.to_bytes()).ok(), Some(answer));
+    }
+    if let Ok(maps) = Maps::parse(input) {
+        assert_eq!(maps.to_bytes(), input);
     }
     let numbers = Numbers(input);
     packet_of(numbers, input);

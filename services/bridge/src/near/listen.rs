@@ -15,6 +15,7 @@ use super::remote::Remote;
 use crate::job::{Job, Near};
 use crate::jpeg;
 use crate::link::Link;
+use crate::maps::{self, ViewMaps};
 use crate::topics::{Topics, host_of};
 
 /// Packets of a view that wait to be decoded: more than a host that keeps to the rules has on its way.
@@ -27,6 +28,8 @@ pub(super) struct Arrived {
     pub(super) head: Head,
     /// Pixels, or the message as in a recording; empty without either.
     pub(super) body: Vec<u8>,
+    /// The maps that came with poses.
+    pub(super) maps: Option<maps::Checked>,
     /// When it came, and when it was decoded.
     pub(super) came_at: u64,
     pub(super) decoded_at: u64,
@@ -81,6 +84,7 @@ pub(super) fn listen(
                 remote: index,
                 down: topics.down(&host.name),
                 size: job.sizes.get(view).copied().unwrap_or_default(),
+                maps: job.maps.get(view).cloned(),
                 arrived: sender.clone(),
             };
             let thread = std::thread::Builder::new().name(format!("decode-{view}"));
@@ -180,6 +184,8 @@ struct Decoder {
     /// Where acknowledgements go.
     down: String,
     size: [u32; 2],
+    /// Of its maps, where they cross.
+    maps: Option<ViewMaps>,
     arrived: Sender<Arrived>,
 }
 
@@ -205,6 +211,7 @@ impl Decoder {
 
     fn decode(&self, it: Waiting) -> Option<Arrived> {
         let remote = &self.remotes[self.remote];
+        let mut checked = None;
         let body = match it.head.content {
             Content::Frame if it.head.status == Status::OK => {
                 let pixels = jpeg::decode(&it.body, self.size);
@@ -214,22 +221,44 @@ impl Decoder {
                 pixels?
             }
             Content::Frame => Vec::new(),
-            Content::ViewPose | Content::ViewQuality => {
-                let kind = kind_of(it.head.content)?;
-                if let Err(error) = Message::parse(kind, &it.body) {
-                    remote.malformed(&error);
+            Content::ViewPose => {
+                let Some((poses, maps)) = maps::split(&it.body) else {
+                    remote.malformed(&"poses that are cut off");
                     return None;
-                }
-                it.body
+                };
+                let maps = self.check(maps);
+                checked = maps.inspect_err(|it| remote.malformed(it)).ok()?;
+                self.message(Kind::ViewPose, poses)?
             }
+            Content::ViewQuality => self.message(Kind::ViewQuality, it.body)?,
         };
         Some(Arrived {
             head: it.head,
             body,
+            maps: checked,
             came_at: it.came_at,
             decoded_at: now_nanos(),
             n_bytes: it.n_bytes,
         })
+    }
+
+    /// A message as in a recording.
+    fn message(&self, kind: Kind, bytes: Vec<u8>) -> Option<Vec<u8>> {
+        let parsed = Message::parse(kind, &bytes).map(|_| ());
+        let parsed = parsed.inspect_err(|error| self.remotes[self.remote].malformed(error));
+        parsed.ok().map(|()| bytes)
+    }
+
+    /// The maps after poses; none where there are none.
+    fn check(&self, bytes: &[u8]) -> Result<Option<maps::Checked>, String> {
+        match &self.maps {
+            _ if bytes.is_empty() => Ok(None),
+            Some(maps) => maps.unpack(bytes).map(Some).map_err(|it| it.to_string()),
+            None => Err(format!(
+                "{} bytes after poses, where no maps cross",
+                bytes.len()
+            )),
+        }
     }
 }
 

@@ -2,13 +2,14 @@
 
 use deployment::hosts::Carry;
 use hosts::{Content, Estimate, Head};
-use messages::{FrameHeader, Stamp, Status, Timing, topic};
+use messages::{EvidenceHeader, FrameHeader, Stamp, Status, Timing, topic};
 use recording::{Envelope, Kind, Message};
 use runtime::{ExitKind, Failure, OrFail as _, Patience, Service, SlicePublisher, now_nanos};
 use stage::any::Sender;
 
 use super::listen::{Arrived, kind_of};
 use crate::job::Job;
+use crate::maps::{Checked, ViewMaps};
 
 /// The topics of a view.
 pub(super) struct Publisher {
@@ -21,7 +22,28 @@ enum Port {
     Pose {
         pose: Box<Sender>,
         quality: Option<Box<Sender>>,
+        evidence: Option<Box<Evidence>>,
     },
+}
+
+/// Where the evidence of a view goes, whose maps cross.
+struct Evidence {
+    port: SlicePublisher<f32, EvidenceHeader>,
+    maps: ViewMaps,
+}
+
+impl Evidence {
+    fn send(&self, maps: &Checked, stamp: Stamp, timing: Timing) -> Result<(), Failure> {
+        let mut loan = self.port.loan(self.maps.n_values(maps))?;
+        let header = self.maps.fill(maps, loan.payload_mut());
+        *loan.header_mut() = EvidenceHeader {
+            stamp,
+            timing,
+            ..header.or_fail(ExitKind::Run)?
+        };
+        loan.send()?;
+        Ok(())
+    }
 }
 
 /// The times of a message, by our clock, nanoseconds. None lies in the future, whatever the error of the clock.
@@ -57,7 +79,13 @@ impl Publisher {
             Carry::Frames => Port::Frame(Box::new(bus.slice_publisher(&topic::frame(view))?)),
             Carry::Poses => {
                 let quality = || Sender::open(bus, Kind::ViewQuality, &topic::view_quality(view));
+                let evidence = |maps: &ViewMaps| {
+                    let port = bus.slice_publisher(&topic::evidence(view))?;
+                    let maps = maps.clone();
+                    Ok::<_, Failure>(Box::new(Evidence { port, maps }))
+                };
                 Port::Pose {
+                    evidence: job.maps.get(view).map(evidence).transpose()?,
                     pose: Box::new(Sender::open(bus, Kind::ViewPose, &topic::view_pose(view))?),
                     quality: job.has_quality.then(quality).transpose()?.map(Box::new),
                 }
@@ -136,7 +164,15 @@ impl Publisher {
                 };
                 loan.send()?;
             }
-            Port::Pose { pose, quality } => {
+            Port::Pose {
+                pose,
+                quality,
+                evidence,
+            } => {
+                // The evidence is sent first: a receiver of the candidates may rely on it.
+                if let (Some(evidence), Some(maps)) = (evidence, &arrived.maps) {
+                    evidence.send(maps, stamp, timing)?;
+                }
                 let kind = kind_of(arrived.head.content).unwrap_or(Kind::ViewPose);
                 let message = Message::parse(kind, &arrived.body).or_fail(ExitKind::Run)?;
                 let envelope = Envelope {
@@ -182,7 +218,7 @@ impl Publisher {
                 };
                 loan.send()?;
             }
-            Port::Pose { pose, quality } => {
+            Port::Pose { pose, quality, .. } => {
                 let envelope = Envelope {
                     stamp,
                     timing,

@@ -2,7 +2,7 @@
 
 use messages::topic;
 
-use super::{BRIDGE, Process, Role, Stage, Topology, process};
+use super::{BRIDGE, Process, RECORD, Role, Stage, Topology, process};
 use crate::Deployment;
 use crate::hosts::{Carry, Host};
 
@@ -15,8 +15,7 @@ impl Topology {
     pub fn on_host(mut self, deployment: &Deployment, host: &Host) -> Self {
         let own = deployment.views_of(host);
         let carry = deployment.link.carry;
-        let has_quality = deployment.has_quality();
-        let crosses = |view: &usize| crossing(*view, carry, has_quality);
+        let crosses = |view: &usize| crossing(*view, deployment);
         if host.fuses {
             let remote = (0..self.n_views).filter(|view| !own.contains(view));
             let outputs: Vec<String> = remote.flat_map(|view| crosses(&view)).collect();
@@ -35,15 +34,47 @@ impl Topology {
             self.processes.push(bridge);
         } else {
             let is_here = |it: &Process| {
-                is_at_camera(it.service, carry) && it.index.is_some_and(|it| own.contains(&it))
+                let is_own = it.index.is_some_and(|it| own.contains(&it));
+                it.service == RECORD || is_at_camera(it.service, carry) && is_own
             };
             self.processes.retain(is_here);
             self.n_workers = 0;
+            let outputs: Vec<String> = self
+                .processes
+                .iter()
+                .flat_map(|it| it.outputs.clone())
+                .collect();
+            for it in &mut self.processes {
+                it.inputs.retain(|input| outputs.contains(input));
+            }
             let inputs = own.iter().flat_map(crosses).collect();
             let bridge = process(BRIDGE, None, Role::Essential, inputs, Vec::new());
             self.processes.insert(0, bridge);
         }
         self
+    }
+}
+
+impl Topology {
+    /// Topics that none of these processes publishes: on a host of several, what stays on the others.
+    pub fn topics_elsewhere(&self) -> Vec<String> {
+        let of_views = (0..self.n_views).flat_map(|view| {
+            let small = [topic::view_pose(view), topic::view_quality(view)];
+            let large = [
+                topic::frame(view),
+                topic::evidence(view),
+                topic::picture(view),
+            ];
+            small.into_iter().chain(large)
+        });
+        let fused = (0..self.n_workers).map(topic::pair_pose);
+        let is_published = |it: &String| {
+            let mut processes = self.processes.iter();
+            processes.any(|process| process.outputs.contains(it))
+        };
+        let mut all: Vec<String> = of_views.chain(fused).chain([topic::pose3d()]).collect();
+        all.retain(|it| !is_published(it));
+        all
     }
 }
 
@@ -54,15 +85,15 @@ fn is_at_camera(service: &str, carry: Carry) -> bool {
 }
 
 /// The topics of a view that cross from its host to the one that fuses.
-fn crossing(view: usize, carry: Carry, has_quality: bool) -> Vec<String> {
-    match carry {
+fn crossing(view: usize, deployment: &Deployment) -> Vec<String> {
+    match deployment.link.carry {
         Carry::Frames => vec![topic::frame(view)],
         Carry::Poses => {
-            let quality = has_quality.then(|| topic::view_quality(view));
-            [topic::view_pose(view)]
-                .into_iter()
-                .chain(quality)
-                .collect()
+            let quality = deployment.has_quality();
+            let mut topics = vec![topic::view_pose(view)];
+            topics.extend(quality.then(|| topic::view_quality(view)));
+            topics.extend(deployment.maps_cross().then(|| topic::evidence(view)));
+            topics
         }
     }
 }
@@ -75,13 +106,17 @@ mod tests {
     use crate::{AnyMachine, Loaded};
 
     fn deployment(more: &str) -> Deployment {
+        solved("pairs", more)
+    }
+
+    fn solved(views: &str, more: &str) -> Deployment {
         let text = format!(
             "name = 'a'\nrig = 'r'\noutput = 'o'\n\
              [[camera]]\nname = 'c0'\nsource = 's'\n[[camera]]\nname = 'c1'\nsource = 's'\n\
              [[camera]]\nname = 'c2'\nsource = 's'\n\
              [capture]\nmode = 'realtime'\npace = 'realtime'\nframe_rate_hz = 5.0\n\
              [[host]]\nname = 'desk'\nfuses = true\naddress = 'x:1'\nviews = ['c1']\n\
-             [[host]]\nname = 'far'\nviews = ['c0', 'c2']\n[fuse]\nviews = 'pairs'\n[link]\ninsecure = true\n{more}"
+             [[host]]\nname = 'far'\nviews = ['c0', 'c2']\n[fuse]\nviews = '{views}'\n[link]\ninsecure = true\n{more}"
         );
         let loaded = Loaded::parse(&text, Path::new("d.toml"), &[], &AnyMachine);
         loaded.unwrap().deployment
@@ -145,6 +180,48 @@ mod tests {
         let expected = ["bridge", "pose-0", "pose-2", "capture-0", "capture-2"];
         assert_eq!(names(&far), expected);
         assert_eq!(far.receivers_of("evidence/v3/0"), 0);
+    }
+
+    #[test]
+    fn the_maps_of_a_network_cross_with_its_poses() {
+        let it = solved("space", "carry = 'poses'\n[pose]\nnetwork = 'shipped'\n");
+        let whole = Topology::new(&it, None, None);
+        let [desk, far] = [0, 1].map(|host| whole.clone().on_host(&it, &it.hosts[host]));
+        let crosses = [0, 2].map(|view| [topic::view_pose(view), topic::evidence(view)]);
+        assert_eq!(
+            desk.process(BRIDGE).unwrap().outputs,
+            crosses.as_flattened()
+        );
+        assert_eq!(far.process(BRIDGE).unwrap().inputs, crosses.as_flattened());
+        assert_eq!(far.receivers_of(&topic::evidence(0)), 1);
+        assert_eq!(desk.receivers_of(&topic::evidence(0)), 1, "fusion");
+    }
+
+    #[test]
+    fn a_host_records_what_its_own_processes_send() {
+        let it = deployment("");
+        let recording = crate::RecordingPlan::default();
+        let whole = Topology::new(&it, Some(&recording), None);
+        let [desk, far] = [0, 1].map(|host| whole.clone().on_host(&it, &it.hosts[host]));
+        let inputs = |it: &Topology| it.process(RECORD).unwrap().inputs.clone();
+        assert_eq!(inputs(&far), [0, 2].map(topic::frame));
+        assert_eq!(
+            far.receivers_of(&topic::frame(0)),
+            2,
+            "the bridge, and what records"
+        );
+        assert!(far.topics_elsewhere().contains(&topic::frame(1)));
+        assert!(inputs(&desk).contains(&topic::frame(0)), "from the bridge");
+        assert!(!desk.topics_elsewhere().contains(&topic::frame(0)));
+        assert!(
+            desk.topics_elsewhere().contains(&topic::picture(1)),
+            "no live camera"
+        );
+        assert_eq!(
+            whole.topics_elsewhere().len(),
+            6,
+            "pictures and expected errors"
+        );
     }
 
     #[test]

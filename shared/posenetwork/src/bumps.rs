@@ -1,0 +1,262 @@
+//! The maps of a view as a few Gaussians: joints with their uncertainty, in place of all cells.
+
+use fmp::{Layout, Responses, Scope, Window};
+use nalgebra::{Matrix6, Vector6};
+
+use crate::MapSettings;
+use crate::maps::N_JOINTS;
+
+/// Least heat of a Gaussian: what is left below it is not told.
+const LEAST_HEAT: f64 = 0.03;
+/// Least height of a Gaussian whose neighbours take its heat over.
+const LEAST_HEIGHT: f64 = 0.002;
+/// How often the heights of all are fitted after one more.
+const SWEEPS: usize = 6;
+/// Most Gaussians of a joint's map.
+pub const MOST_OF_A_JOINT: usize = 8;
+/// Cells on each side of a maximum that its Gaussian is fitted to.
+const REACH: i64 = 2;
+/// Of these cells, those that have at least this share of the maximum.
+const SHARE: f64 = 0.5;
+/// Least and largest standard deviation along any axis, cells.
+const SIGMAS: [f64; 2] = [0.4, 12.0];
+/// A Gaussian ends where it has fallen to this: what [`MapSettings::of_heat`] counts as none.
+const NOTHING: f64 = 1e-5;
+
+/// A Gaussian of the heat of a joint's map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bump {
+    /// The joint of `skeleton::PARSE14`.
+    pub joint: usize,
+    /// Where it is highest: column and row, cells of the level.
+    pub at: [f32; 2],
+    /// The heat there, above 0 and at most 1.
+    pub heat: f32,
+    /// The inverse of its covariance: across, both, down; per square cell.
+    pub precision: [f32; 3],
+}
+
+impl Bump {
+    /// Whether it is one that [`bumps`] can give: finite, positive definite, neither wider nor narrower than it makes them.
+    pub fn is_sound(&self) -> bool {
+        let [xx, xy, yy] = self.precision.map(f64::from);
+        let numbers = [self.at[0], self.at[1], self.heat];
+        let [low, high] = precisions();
+        let (trace, determinant) = (xx + yy, xx * yy - xy * xy);
+        let spread = (trace * trace / 4.0 - determinant).max(0.0).sqrt();
+        self.joint < N_JOINTS
+            && numbers.iter().all(|it| it.is_finite())
+            && self.at.iter().all(|it| it.abs() <= 65_536.0)
+            && self.heat > 0.0
+            && self.heat <= 1.0
+            && [xx, xy, yy].iter().all(|it| it.is_finite())
+            && trace / 2.0 - spread >= 0.9 * low
+            && trace / 2.0 + spread <= 1.1 * high
+    }
+
+    /// The heat at a cell of the level.
+    fn heat_at(&self, [column, row]: [f64; 2]) -> f64 {
+        let [xx, xy, yy] = self.precision.map(f64::from);
+        let [x, y] = [column - f64::from(self.at[0]), row - f64::from(self.at[1])];
+        f64::from(self.heat) * (-0.5 * (xx * x * x + 2.0 * xy * x * y + yy * y * y)).exp()
+    }
+
+    /// The cells of a window where it is anything: first column and row, and those after the last.
+    fn extent(&self, window: &Window) -> [[usize; 2]; 2] {
+        let [xx, xy, yy] = self.precision.map(f64::from);
+        let reach = (2.0 * (f64::from(self.heat) / NOTHING).ln().max(0.0)).sqrt();
+        let determinant = xx * yy - xy * xy;
+        let sigma = [(yy / determinant).sqrt(), (xx / determinant).sqrt()];
+        let firsts = [window.left, window.top];
+        let counts = [window.cols, window.rows];
+        [0, 1].map(|axis| {
+            let middle = f64::from(self.at[axis]) - firsts[axis] as f64;
+            let within = |it: f64| it.clamp(0.0, counts[axis] as f64) as usize;
+            let away = reach * sigma[axis];
+            [
+                within((middle - away).floor()),
+                within((middle + away).ceil() + 1.0),
+            ]
+        })
+    }
+}
+
+/// Least and largest eigenvalue of a precision.
+fn precisions() -> [f64; 2] {
+    let [narrow, wide] = SIGMAS;
+    [1.0 / (wide * wide), 1.0 / (narrow * narrow)]
+}
+
+/// The maps of all joints as sums of Gaussians: the highest first, each fitted to what those before it leave.
+///
+/// * `responses`: of maps that [`JointMaps::fill`](crate::JointMaps::fill) wrote, on one level. Of several the first is read.
+pub fn bumps(responses: &Responses<'_>, settings: &MapSettings) -> Vec<Bump> {
+    let Some(level) = responses.levels().first() else {
+        return Vec::new();
+    };
+    let level = usize::from(*level);
+    let window = responses.window(level);
+    let mut found = Vec::new();
+    let mut heats = Vec::new();
+    for joint in 0..N_JOINTS.min(responses.layout().n_filters) {
+        heats.clear();
+        let floor = settings.floor();
+        heats.extend(
+            responses
+                .map(level, joint)
+                .iter()
+                .map(|it| if *it > floor { settings.heat(*it) } else { 0.0 }),
+        );
+        let first = found.len();
+        while found.len() < first + MOST_OF_A_JOINT
+            && let Some(bump) = highest(joint, &heats, &window)
+        {
+            for_each_cell(&bump, &window, |cell, heat| heats[cell] -= heat);
+            found.push(bump);
+            fit_heights(&mut found[first..], &mut heats, &window);
+        }
+    }
+    found
+}
+
+/// Fills the responses of a scope from Gaussians, as [`JointMaps::fill`](crate::JointMaps::fill) does from maps. What no Gaussian
+/// reaches is the floor; filters beyond the joints respond with 0.
+///
+/// * `bumps`: sound ones ([`Bump::is_sound`]); of a scope of one level.
+/// * `responses`: [`Layout::n_values`] values, overwritten.
+///
+/// # Panics
+///
+/// If there are fewer values.
+pub fn fill_from_bumps(
+    bumps: &[Bump],
+    (layout, scope): (&Layout, &Scope),
+    settings: &MapSettings,
+    responses: &mut [f32],
+) {
+    let floor = settings.floor();
+    for level in scope.levels().map(usize::from) {
+        let window = layout.window(scope, level);
+        let maps = &mut responses[layout.maps_in(scope, level)];
+        let area = (window.rows * window.cols).max(1);
+        maps.fill(0.0);
+        for bump in bumps {
+            if let Some(map) = maps.chunks_exact_mut(area).nth(bump.joint) {
+                for_each_cell(bump, &window, |cell, heat| map[cell] += heat as f32);
+            }
+        }
+        for map in maps.chunks_exact_mut(area).take(N_JOINTS) {
+            for value in map {
+                *value = settings.of_heat(f64::from(value.clamp(0.0, 1.0)), floor);
+            }
+        }
+    }
+}
+
+fn for_each_cell(bump: &Bump, window: &Window, mut cell: impl FnMut(usize, f64)) {
+    let [[left, right], [top, bottom]] = bump.extent(window);
+    for row in top..bottom {
+        for column in left..right {
+            let at = [(window.left + column) as f64, (window.top + row) as f64];
+            cell(row * window.cols + column, bump.heat_at(at));
+        }
+    }
+}
+
+/// Makes the heights of the Gaussians of a map those of the least squares together, one after the other: neighbours share the heat between them.
+///
+/// * `left`: what they leave of the map.
+fn fit_heights(bumps: &mut [Bump], left: &mut [f64], window: &Window) {
+    for _ in 0..SWEEPS {
+        for bump in &mut *bumps {
+            let (mut along, mut square) = (0.0, 0.0);
+            for_each_cell(bump, window, |cell, heat| {
+                along += left[cell] * heat;
+                square += heat * heat;
+            });
+            let height = f64::from(bump.heat);
+            let wanted = height * (1.0 + along / square.max(f64::MIN_POSITIVE));
+            let next = wanted.clamp(LEAST_HEIGHT, 1.0) as f32;
+            let change = f64::from(next) / height - 1.0;
+            for_each_cell(bump, window, |cell, heat| left[cell] -= change * heat);
+            bump.heat = next;
+        }
+    }
+}
+
+/// The Gaussian of the highest cell of a map.
+fn highest(joint: usize, heats: &[f64], window: &Window) -> Option<Bump> {
+    let (cell, top) = heats.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    if *top < LEAST_HEAT {
+        return None;
+    }
+    let [column, row] = [cell % window.cols, cell / window.cols];
+    let around = |across: i64, down: i64| {
+        let at = [column as i64 + across, row as i64 + down];
+        let is_inside =
+            (0..window.cols as i64).contains(&at[0]) && (0..window.rows as i64).contains(&at[1]);
+        is_inside.then(|| heats[at[1] as usize * window.cols + at[0] as usize])
+    };
+    let fitted = fit(&around, *top);
+    // Where no Gaussian fits, one as narrow as a cell takes its maximum away.
+    let (away, heat, precision) = fitted.unwrap_or(([0.0; 2], *top, [1.0, 0.0, 1.0]));
+    Some(Bump {
+        joint,
+        at: [
+            ((window.left + column) as f64 + away[0]) as f32,
+            ((window.top + row) as f64 + away[1]) as f32,
+        ],
+        heat: heat as f32,
+        precision: precision.map(|it| it as f32),
+    })
+}
+
+/// Where a Gaussian lies from a maximum, its height and its precision: logarithms of the heats around it, fitted by a square function
+/// with the squares of the heats as weights, which is least squares of the heats to first order.
+fn fit(around: &impl Fn(i64, i64) -> Option<f64>, top: f64) -> Option<([f64; 2], f64, [f64; 3])> {
+    let mut left = Matrix6::<f64>::zeros();
+    let mut right = Vector6::<f64>::zeros();
+    for down in -REACH..=REACH {
+        for across in -REACH..=REACH {
+            let Some(heat) = around(across, down).filter(|it| *it >= SHARE * top) else {
+                continue;
+            };
+            let [x, y] = [across as f64, down as f64];
+            let row = Vector6::new(1.0, x, y, -0.5 * x * x, -x * y, -0.5 * y * y);
+            left += heat * heat * row * row.transpose();
+            right += heat * heat * heat.ln() * row;
+        }
+    }
+    let it = left.cholesky()?.solve(&right);
+    let (height, slope, bend) = (it[0], [it[1], it[2]], [it[3], it[4], it[5]]);
+    let precision = bounded(bend)?;
+    let [xx, xy, yy] = precision;
+    let determinant = xx * yy - xy * xy;
+    let away = [
+        (yy * slope[0] - xy * slope[1]) / determinant,
+        (xx * slope[1] - xy * slope[0]) / determinant,
+    ];
+    if !away.iter().all(|it| it.abs() <= 1.5) {
+        return None;
+    }
+    let heat = (height + 0.5 * (slope[0] * away[0] + slope[1] * away[1])).exp();
+    let is_near = heat >= 0.5 * top && heat <= 2.0 * top;
+    is_near.then_some((away, heat.min(1.0), precision))
+}
+
+/// The nearest precision whose eigenvalues are those of a Gaussian that is neither too narrow nor too wide.
+fn bounded([xx, xy, yy]: [f64; 3]) -> Option<[f64; 3]> {
+    if ![xx, xy, yy].iter().all(|it| it.is_finite()) {
+        return None;
+    }
+    let eigen = nalgebra::Matrix2::new(xx, xy, xy, yy).symmetric_eigen();
+    let [low, high] = precisions();
+    let values = eigen.eigenvalues.map(|it| it.clamp(low, high));
+    let it = eigen.eigenvectors
+        * nalgebra::Matrix2::from_diagonal(&values)
+        * eigen.eigenvectors.transpose();
+    Some([it[(0, 0)], it[(0, 1)], it[(1, 1)]])
+}
+
+#[cfg(test)]
+mod tests;

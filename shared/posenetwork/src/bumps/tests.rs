@@ -1,0 +1,194 @@
+//! Tests of maps as Gaussians.
+
+use std::sync::Arc;
+
+use fmp::{Model, Region};
+
+use super::*;
+use crate::springs::{SpringSettings, learn};
+
+const SETTINGS: MapSettings = MapSettings {
+    lambda: 1.0,
+    eps: 0.02,
+    point_sigma: 0.0,
+};
+
+fn model() -> Arc<Model> {
+    let person = |nth: usize| {
+        core::array::from_fn(|joint| {
+            [
+                (joint * 3 + nth % 3) as f64,
+                (joint * 5 % 60 + nth % 2) as f64,
+            ]
+        })
+    };
+    let people: Vec<_> = (0..30).map(person).collect();
+    Arc::new(learn(&people, &SpringSettings::default()).unwrap())
+}
+
+/// A layout, and a scope of its finest level that does not begin with the picture.
+fn place(model: &Model) -> (Layout, Scope) {
+    let layout = Layout::new(model, 160, 200).unwrap();
+    let region = Region {
+        x: [20, 150],
+        y: [30, 180],
+    };
+    let scope = Scope::new(&layout, 0..1, region).unwrap();
+    (layout, scope)
+}
+
+fn bump(joint: usize, at: [f32; 2], heat: f32, sigma: [f32; 2], turned: f32) -> Bump {
+    let [p, q] = sigma.map(|it| 1.0 / (it * it));
+    let (sin, cos) = turned.sin_cos();
+    Bump {
+        joint,
+        at,
+        heat,
+        precision: [
+            p * cos * cos + q * sin * sin,
+            (p - q) * sin * cos,
+            p * sin * sin + q * cos * cos,
+        ],
+    }
+}
+
+/// The responses of Gaussians, and those of the Gaussians that are found in them.
+fn there_and_back(given: &[Bump]) -> (Vec<f32>, Vec<Bump>, Vec<f32>) {
+    let model = model();
+    let (layout, scope) = place(&model);
+    let mut sent = vec![7.0; layout.n_values(&scope)];
+    fill_from_bumps(given, (&layout, &scope), &SETTINGS, &mut sent);
+    let found = bumps(&Responses::within(&layout, &sent, &[0], scope), &SETTINGS);
+    let mut received = vec![7.0; sent.len()];
+    fill_from_bumps(&found, (&layout, &scope), &SETTINGS, &mut received);
+    (sent, found, received)
+}
+
+/// The largest difference of heat.
+fn off(a: &[f32], b: &[f32]) -> f64 {
+    let each = a.iter().zip(b);
+    let each = each.map(|(a, b)| (SETTINGS.heat(*a) - SETTINGS.heat(*b)).abs());
+    each.fold(0.0, f64::max)
+}
+
+#[test]
+fn a_gaussian_comes_back_as_it_was() {
+    for given in [
+        bump(0, [40.3, 50.8], 0.9, [2.0, 2.0], 0.0),
+        bump(13, [30.0, 41.5], 0.2, [1.2, 3.5], 0.6),
+        bump(5, [50.49, 60.51], 1.0, [4.0, 1.5], -1.1),
+    ] {
+        let (sent, found, received) = there_and_back(&[given]);
+        let first = found[0];
+        assert_eq!(first.joint, given.joint);
+        let away = (first.at[0] - given.at[0]).hypot(first.at[1] - given.at[1]);
+        assert!(away < 0.02, "{given:?}: {first:?}");
+        assert!(
+            (first.heat - given.heat).abs() < 0.02,
+            "{given:?}: {first:?}"
+        );
+        assert!(off(&sent, &received) < 0.02, "{found:?}");
+        assert!(
+            found.len() <= 2 && found.iter().all(Bump::is_sound),
+            "{found:?}"
+        );
+    }
+}
+
+#[test]
+fn two_people_and_a_ridge_come_back_to_a_few_hundredths() {
+    let mut given = vec![
+        bump(3, [35.0, 50.0], 0.8, [2.0, 2.0], 0.0),
+        bump(3, [38.5, 52.0], 0.6, [1.5, 1.5], 0.0),
+        bump(4, [25.0, 40.0], 0.5, [2.0, 2.0], 0.0),
+        bump(4, [55.0, 70.0], 0.4, [2.0, 2.0], 0.0),
+    ];
+    // A limb along which the joint may lie anywhere.
+    given.extend((0..6).map(|it| {
+        bump(
+            8,
+            [30.0 + 2.0 * it as f32, 45.0 + it as f32],
+            0.12,
+            [1.5, 1.5],
+            0.0,
+        )
+    }));
+    let (sent, found, received) = there_and_back(&given);
+    assert!(
+        off(&sent, &received) < 0.06,
+        "{}: {found:?}",
+        off(&sent, &received)
+    );
+    assert!(found.len() < 20, "{}", found.len());
+}
+
+#[test]
+fn nothing_is_the_floor_and_parts_between_joints_are_0() {
+    let model = model();
+    let (layout, scope) = place(&model);
+    let mut values = vec![7.0; layout.n_values(&scope)];
+    fill_from_bumps(&[], (&layout, &scope), &SETTINGS, &mut values);
+    let window = layout.window(&scope, 0);
+    let area = window.rows * window.cols;
+    for (filter, map) in values.chunks_exact(area).enumerate() {
+        let due = if filter < N_JOINTS {
+            SETTINGS.floor()
+        } else {
+            0.0
+        };
+        assert!(map.iter().all(|it| *it == due), "{filter}");
+    }
+    let evidence = Responses::within(&layout, &values, &[0], scope);
+    assert_eq!(bumps(&evidence, &SETTINGS), []);
+}
+
+#[test]
+fn a_gaussian_at_the_edge_or_beyond_it_stays_within_the_window() {
+    let given = [
+        bump(1, [10.0, 15.0], 0.9, [2.0, 2.0], 0.0),
+        bump(2, [-500.0, 9000.0], 0.9, [2.0, 2.0], 0.0),
+    ];
+    let (sent, found, received) = there_and_back(&given);
+    assert!(found.iter().all(|it| it.joint == 1), "{found:?}");
+    assert!(off(&sent, &received) < 0.03, "{found:?}");
+}
+
+#[test]
+fn what_is_no_gaussian_is_not_sound() {
+    let good = bump(1, [10.0, 15.0], 0.9, [2.0, 2.0], 0.3);
+    assert!(good.is_sound());
+    for bad in [
+        Bump {
+            joint: N_JOINTS,
+            ..good
+        },
+        Bump {
+            at: [f32::NAN, 0.0],
+            ..good
+        },
+        Bump {
+            at: [1e9, 0.0],
+            ..good
+        },
+        Bump { heat: 0.0, ..good },
+        Bump { heat: 1.1, ..good },
+        Bump {
+            precision: [1.0, 2.0, 1.0],
+            ..good
+        },
+        Bump {
+            precision: [f32::INFINITY, 0.0, 1.0],
+            ..good
+        },
+        Bump {
+            precision: [0.0, 0.0, 0.0],
+            ..good
+        },
+        Bump {
+            precision: [1e6, 0.0, 1e6],
+            ..good
+        },
+    ] {
+        assert!(!bad.is_sound(), "{bad:?}");
+    }
+}
