@@ -17,6 +17,7 @@ mod jpeg;
 mod keys;
 mod maps;
 mod near;
+mod one_thread;
 mod timing;
 mod topics;
 
@@ -31,6 +32,7 @@ pub use job::{Far, Job, Near, NearHost, Role};
 pub use join::{JoinError, join, status};
 pub use keys::{KeyError, KeyFiles, make_keys};
 pub use maps::ViewMaps;
+pub use one_thread::{ONE_THREAD, has_one_thread};
 
 use runtime::{Failure, Service};
 

@@ -8,6 +8,7 @@ use zenoh::Wait as _;
 use zenoh::qos::{CongestionControl, Priority};
 
 use crate::address::{Address, LinkError};
+use crate::one_thread::has_one_thread;
 use crate::topics::Topics;
 
 /// How long a link without any sign of life lasts.
@@ -29,6 +30,11 @@ impl Link {
             address: address.address.clone(),
             message,
         };
+        if address.keys.is_some() && !has_one_thread() {
+            tracing::warn!(
+                "the link has several threads: a host that dies can take this process along"
+            );
+        }
         let config = zenoh::Config::from_json5(&config(address).to_string());
         let config = config.map_err(|it| failed(it.to_string()))?;
         let session = zenoh::open(config).wait();

@@ -4,13 +4,11 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use deployment::Deployment;
-use deployment::hosts::Host;
 use runtime::{Failure, Scheduling, Stop};
 use supervise::{Event, Plan};
 use tracing::Level;
 
 use crate::claim::Claim;
-use crate::hosts;
 use crate::inputs;
 use crate::plan;
 use crate::prepare::Prepared;
@@ -38,25 +36,6 @@ impl Planned {
     /// An input cannot be read or used; see [`plan::resolve`] and [`Self::of`].
     pub fn new(deployment: &Deployment, log: Level) -> Result<Self, Failure> {
         Self::of(plan::resolve(deployment)?, log)
-    }
-
-    /// As [`Self::new`], of the part of a deployment that one of its hosts runs.
-    ///
-    /// * `session`: when the run began, which the host that fuses says; none for that host itself.
-    ///
-    /// # Errors
-    ///
-    /// As for [`Self::new`].
-    pub fn on_host(
-        deployment: &Deployment,
-        host: &Host,
-        session: Option<u64>,
-        log: Level,
-    ) -> Result<Self, Failure> {
-        let resolved = plan::resolve_on(&hosts::part(deployment, host), Some(host))?;
-        let mut planned = Self::of(resolved, log)?;
-        planned.plan.session = session.unwrap_or(planned.plan.session);
-        Ok(planned)
     }
 
     /// Plans the processes and topics of a resolved deployment.
@@ -101,6 +80,15 @@ impl Planned {
     /// The names of its processes.
     pub fn processes(&self) -> impl Iterator<Item = &str> {
         self.plan.processes.iter().map(|it| it.name.as_str())
+    }
+
+    /// The same run, which has begun elsewhere.
+    ///
+    /// * `session`: when it began, as the host that fuses says; none if it begins here.
+    #[must_use]
+    pub fn begun(mut self, session: Option<u64>) -> Self {
+        self.plan.session = session.unwrap_or(self.plan.session);
+        self
     }
 
     /// Makes a process enter an endless loop in epoch 0, once it has sent a message about a frame after `after_frame`.

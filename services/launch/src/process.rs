@@ -354,6 +354,7 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
                 .iter()
                 .map(|it| it.name.clone())
                 .collect(),
+            elsewhere: topology.topics_elsewhere(),
         },
         queue_bytes: plan.queue_mb.saturating_mul(1_000_000),
         foxglove: (!plan.without_foxglove).then(|| recorded::stage(&prepared)),

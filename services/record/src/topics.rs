@@ -16,6 +16,8 @@ pub struct Topics {
     pub pictures: Vec<usize>,
     /// Names of all processes.
     pub processes: Vec<String>,
+    /// Topics that no process of this machine publishes, as of a host of several; they are not recorded.
+    pub elsewhere: Vec<String>,
 }
 
 /// A topic, and the process that publishes it.
@@ -31,7 +33,14 @@ impl Topics {
     /// All topics, heartbeats first: when a heartbeat has been read, every message that it counts can be received.
     pub(crate) fn channels(&self, without: Without) -> Vec<Channel> {
         let mut channels = Vec::new();
-        let mut add = |kind, name, sender| channels.push(Channel { kind, name, sender });
+        // What comes from another host is published by the bridge, whose heartbeats count all of it together.
+        let is_here = |it: &String| self.processes.contains(it);
+        let mut add = |kind, name: String, sender: Option<String>| {
+            if !self.elsewhere.contains(&name) {
+                let sender = sender.filter(is_here);
+                channels.push(Channel { kind, name, sender });
+            }
+        };
         for process in &self.processes {
             add(Kind::Health, topic::health(process), None);
         }
@@ -98,8 +107,35 @@ mod tests {
             has_quality: true,
             pictures: vec![1],
             processes: ["results", "pose-1", "fuse-0"].map(str::to_owned).into(),
+            elsewhere: Vec::new(),
         };
         topics.channels(without)
+    }
+
+    #[test]
+    fn what_no_process_of_this_host_publishes_is_not_recorded_nor_counted_by_one() {
+        let topics = Topics {
+            n_views: 2,
+            n_workers: 0,
+            has_quality: false,
+            pictures: Vec::new(),
+            processes: ["bridge", "pose-0"].map(str::to_owned).into(),
+            elsewhere: vec![topic::frame(1), topic::evidence(1), topic::pose3d()],
+        };
+        let all = topics.channels(Without::default());
+        let names: Vec<&str> = all.iter().map(|it| it.name.as_str()).collect();
+        let [near, far] = [0, 1].map(topic::view_pose);
+        assert!(names.contains(&near.as_str()) && names.contains(&far.as_str()));
+        assert!(!names.contains(&topic::frame(1).as_str()), "{names:?}");
+        let sender = |name: &str| {
+            all.iter()
+                .find(|it| it.name == name)
+                .unwrap()
+                .sender
+                .clone()
+        };
+        assert_eq!(sender(&near).as_deref(), Some("pose-0"));
+        assert_eq!(sender(&far), None);
     }
 
     #[test]

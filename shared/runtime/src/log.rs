@@ -25,6 +25,7 @@ pub fn init_logging(process: &str, level: Level) {
         .log_internal_errors(false)
         .event_format(Line {
             process: Arc::from(process),
+            is_detailed: level >= Level::DEBUG,
         })
         .try_init();
     adopt_transport_log();
@@ -46,6 +47,14 @@ pub(crate) fn adopt_transport_log() {
 /// `2026-01-31T12:00:00.000000Z WARN pose-2: message key=value`.
 struct Line {
     process: Arc<str>,
+    /// Whether details are logged.
+    is_detailed: bool,
+}
+
+/// Whether an event is of the link between hosts, whose warnings are details: what they mean for a run the bridge says itself.
+fn is_of_link(event: &Event<'_>) -> bool {
+    let about = event.metadata();
+    about.target().starts_with("zenoh") && *about.level() != Level::ERROR
 }
 
 impl<S, N> FormatEvent<S, N> for Line
@@ -59,6 +68,9 @@ where
         mut writer: Writer<'_>,
         event: &Event<'_>,
     ) -> fmt::Result {
+        if is_of_link(event) && !self.is_detailed {
+            return Ok(());
+        }
         SystemTime.format_time(&mut writer)?;
         write!(writer, " {} {}: ", event.metadata().level(), self.process)?;
         context.format_fields(writer.by_ref(), event)?;

@@ -2,16 +2,15 @@
 
 use core::fmt::Write as _;
 use core::time::Duration;
+use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
-use std::process::ExitCode;
+use std::process::{Command as Program, ExitCode};
 
 use clap::{Args, Subcommand};
 use deployment::Deployment;
-use launch::{Planned, hosts, load, output};
+use launch::{Resolved, hosts, load, output, plan};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::Value;
-
-use crate::globals::Globals;
 
 /// How long `status` waits for the host that fuses.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -67,19 +66,22 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Plans the run of this machine: of a whole deployment, or of the part of one of its hosts. One with cameras waits for the host that
-/// fuses; none on a stop request.
+/// Resolves what this machine runs: a whole deployment, or the part of one of its hosts; and when the run began, where another host
+/// says so. A host with cameras waits for the one that fuses; none on a stop request.
 ///
 /// * `chosen`: the host that was asked for, and whether nothing is to be started.
-pub(crate) fn plan(
+pub(crate) fn resolve(
     deployment: &Deployment,
     (named, is_dry): (Option<&str>, bool),
     stop: &Stop,
-    globals: Globals,
-) -> Result<Option<Planned>, Failure> {
+) -> Result<Option<(Resolved, Option<u64>)>, Failure> {
     let Some(host) = hosts::choose(deployment, named, &machine())? else {
-        return Planned::new(deployment, globals.level()).map(Some);
+        let resolved = plan::resolve(deployment)?;
+        return Ok(Some((resolved, None)));
     };
+    if !is_dry {
+        in_one_thread()?;
+    }
     let session = if host.fuses || is_dry {
         None
     } else {
@@ -92,7 +94,28 @@ pub(crate) fn plan(
             None => return Ok(None),
         }
     };
-    Planned::on_host(deployment, host, session, globals.level()).map(Some)
+    let resolved = plan::resolve_on(&hosts::part(deployment, host), Some(host))?;
+    Ok(Some((resolved, session)))
+}
+
+/// Starts this program anew, in the same process, with what makes its link run in one thread ([`bridge::ONE_THREAD`]); processes that it starts
+/// inherit that.
+fn in_one_thread() -> Result<(), Failure> {
+    if bridge::has_one_thread() {
+        return Ok(());
+    }
+    let (name, value) = bridge::ONE_THREAD;
+    let program = std::env::current_exe().or_fail(ExitKind::Run)?;
+    let arguments = std::env::args_os().skip(1);
+    // Returns only if it fails.
+    let error = Program::new(program)
+        .args(arguments)
+        .env(name, value)
+        .exec();
+    Err(Failure::new(
+        ExitKind::Run,
+        format!("this program cannot be started anew: {error}"),
+    ))
 }
 
 /// The name of this machine.
@@ -109,6 +132,7 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     let host = host
         .ok_or("the deployment has no [[host]]")
         .or_fail(ExitKind::Usage)?;
+    in_one_thread()?;
     let mut address = hosts::address(deployment, host)?;
     // The host that fuses asks itself: its bridge listens already.
     address.listens = false;

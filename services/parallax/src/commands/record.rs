@@ -8,9 +8,10 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use deployment::RecordingPlan;
-use launch::{Planned, Resolved, load, output, plan, recorded};
+use launch::{Planned, Resolved, load, output, recorded};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
+use super::hosts;
 use crate::globals::Globals;
 use disk_space::{Forecast, Growth, PerFrame};
 
@@ -34,6 +35,9 @@ them later. No camera ever waits for the disk.
 
 Foxglove opens the file as it is, and shows skeletons with their uncertainty, cameras and pictures: beside its own topics it
 holds `foxglove.SceneUpdate`, `foxglove.FrameTransforms`, `foxglove.CameraCalibration` and `foxglove.CompressedImage`.
+
+Of several hosts (`[[host]]`) the one that fuses records what comes to it: all messages but frames that do not cross. One with
+cameras records what its own cameras and processes give, which `source = \"FILE#NAME\"` of a deployment takes later.
 
 Before the run it prints how much a frame and a second will take at most, and how much is free; it does not start
 if there is no space for ten frames (or for all, if they are fewer).
@@ -63,6 +67,9 @@ pub(crate) struct Arguments {
     /// Replace a value, for example `--set fuse.workers=2`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// The host that this machine is, of a deployment with several `[[host]]`; without it the one with the name of the machine.
+    #[arg(long, value_name = "NAME")]
+    host: Option<String>,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
@@ -96,12 +103,11 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         pictures: Vec::new(),
         without_foxglove: arguments.without.contains(&Bulk::Foxglove),
     };
-    if !loaded.deployment.hosts.is_empty() {
-        let message = "the deployment has several hosts, whose messages are not recorded";
-        let failure = Failure::new(ExitKind::Config, message);
-        return Err(failure.with_hint("`parallax run --host NAME` runs it"));
-    }
-    let resolved = plan::resolve(&loaded.deployment)?;
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let chosen = (arguments.host.as_deref(), false);
+    let Some((resolved, session)) = hosts::resolve(&loaded.deployment, chosen, &stop)? else {
+        return Ok(ExitCode::from(ExitKind::Interrupted.status()));
+    };
     let pictures = if arguments.without.contains(&Bulk::Camera) {
         Vec::new()
     } else {
@@ -111,7 +117,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         recording: Some(RecordingPlan { pictures, ..plan }),
         ..resolved
     };
-    let planned = Planned::of(resolved, globals.level())?;
+    let planned = Planned::of(resolved, globals.level())?.begun(session);
     let forecast = forecast(&planned, &file, arguments)?;
     forecast.check(&file)?;
     remove_existing(&file, arguments.force)?;
@@ -121,7 +127,6 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         }
         output::message(forecast.text(&file));
     }
-    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let mut growth = Growth::new(&file, &forecast);
     let report = planned.run(globals.quiet, &stop, &mut |_| growth.message())?;
     let recording = recorded::open(&file)?;

@@ -9,6 +9,7 @@ use launch::{
     Planned, Resolved, Shipped, load, output, plan,
     recorded::{self, Settings},
 };
+use messages::topic;
 use recording::{Kind, Recording};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
@@ -77,6 +78,8 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         output::message(recorded::text(&file, &recording));
     }
     let mut settings = recorded::settings(&file, &recording)?;
+    // On one machine, whatever it was recorded on.
+    settings.resolved.deployment.hosts.clear();
     let from = arguments.from;
     live::settle(
         &mut settings.resolved,
@@ -149,7 +152,6 @@ fn resolve(
         (Some(Speed::Max), _) | (None, deployment::capture::Mode::Lossless) => None,
     };
     Ok(Resolved {
-        // On one machine, whatever it was recorded on.
         host: None,
         footage: recorded.footage,
         deployment,
@@ -216,7 +218,13 @@ fn check(
         })
     };
     let Some((kind, what)) = missing else {
-        return Ok(());
+        return check_views(
+            file,
+            recording,
+            resolved,
+            from,
+            (needs_pixels, needs_evidence),
+        );
     };
     let message = format!(
         "{} lacks {what}, which --from {} needs",
@@ -230,6 +238,50 @@ fn check(
         )),
         None => failure,
     })
+}
+
+/// Checks that the recording has the frames, evidence or poses of every view: one of a host of several has not.
+///
+/// * `needs`: whether pixels and evidence are needed.
+fn check_views(
+    file: &Path,
+    recording: &Recording,
+    resolved: &Resolved,
+    from: Stage,
+    needs: (bool, bool),
+) -> Result<(), Failure> {
+    let cameras = resolved.deployment.cameras.iter().enumerate();
+    let lacks = |topic: fn(usize) -> String| {
+        let is_empty = move |view: usize| {
+            let track = recording.tracks.get(&topic(view));
+            track.is_none_or(|it| it.entries.is_empty())
+        };
+        let names = cameras.clone().filter(|(view, _)| is_empty(*view));
+        names.map(|(_, it)| it.name.as_str()).collect::<Vec<_>>()
+    };
+    let poses = from > Stage::Pose;
+    let wanted = [
+        (needs.0, topic::frame as fn(usize) -> String, "frames"),
+        (needs.1, topic::evidence, "evidence"),
+        (poses, topic::view_pose, "single-view poses"),
+    ];
+    for (is_needed, topic, what) in wanted {
+        let names = lacks(topic);
+        if is_needed && !names.is_empty() {
+            let message = format!(
+                "{} has no {what} of {}, which --from {} needs",
+                file.display(),
+                names.join(", "),
+                from.name()
+            );
+            let failure = Failure::new(ExitKind::Input, message);
+            return Err(failure.with_hint(
+                "a host of several records what comes to it: where poses cross, `--from fuse` needs no frames; pictures of live cameras are in \
+                 the recordings of their own hosts",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// The kinds of messages that the stages before `from` send, with their names for the user.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::{load, output};
+use launch::{Planned, load, output};
 use runtime::{ExitKind, Failure, OrFail as _, Stop, free_shared_memory, needed_bytes, preflight};
 use supervise::Plan;
 
@@ -81,9 +81,14 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let chosen = (arguments.host.as_deref(), arguments.dry_run);
-    let Some(planned) = hosts::plan(&loaded.deployment, chosen, &stop, globals)? else {
+    let Some((resolved, session)) = hosts::resolve(&loaded.deployment, chosen, &stop)? else {
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
+    if resolved.is_far() && (arguments.view || !arguments.publish.is_empty()) {
+        let message = "--view and --publish are for the host that fuses: this one has no skeletons";
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    let planned = Planned::of(resolved, globals.level())?.begun(session);
     if arguments.dry_run {
         if let Some(size) = &planned.resolved().search_size {
             output::line(size.text())?;

@@ -57,6 +57,7 @@ impl Tape {
                 has_quality: resolved.deployment.has_quality(),
                 pictures: Vec::new(),
                 processes: processes.collect(),
+                elsewhere: topology.topics_elsewhere(),
             },
             queue_bytes: plan.queue_mb * 1_000_000,
             foxglove: Some(recorded::stage(&Prepared::new(resolved)?)),
