@@ -43,6 +43,8 @@ pub struct Report {
     /// Peak memory of every process, including shared memory, bytes.
     peaks: Vec<(String, u64)>,
     n_dropped: u64,
+    /// Processor time of every process in its last life, seconds.
+    processor_s: BTreeMap<String, f64>,
     /// Messages that each process refused, by cause.
     refused: Vec<(String, [u64; Refusal::N])>,
     is_lossless: bool,
@@ -88,6 +90,13 @@ impl Report {
             peaks: processes
                 .iter()
                 .map(|it| (it.name.clone(), it.counts.peak_memory_bytes))
+                .collect(),
+            processor_s: processes
+                .iter()
+                .filter_map(|it| {
+                    let last = it.last.as_ref()?;
+                    Some((it.name.clone(), f64::from(last.cpu_millis) * 1e-3))
+                })
                 .collect(),
             n_dropped: processes.iter().map(|it| it.counts.n_dropped).sum(),
             refused: processes
@@ -228,6 +237,7 @@ impl Report {
             "given_up": self.given_up,
             "restarts": self.restarts.iter().map(|(name, n)| json!({ "process": name, "restarts": n })).collect::<Vec<_>>(),
             "peak_memory_bytes": self.peaks.iter().cloned().collect::<BTreeMap<_, _>>(),
+            "processor_s": self.processor_s,
             "dropped": self.n_dropped,
             "refused": self.refused.iter().map(|(name, counts)| (name.as_str(), by_cause(counts))).collect::<BTreeMap<_, _>>(),
             "views": self.views,

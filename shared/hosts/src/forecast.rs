@@ -43,6 +43,8 @@ pub struct Load {
     pub network_bytes_s: f64,
     /// Whether poses cross in place of frames.
     pub with_poses: bool,
+    /// Views of the host that fuses; none where they are to be spread.
+    pub near: Option<usize>,
 }
 
 /// What it takes.
@@ -63,9 +65,12 @@ pub struct Forecast {
 }
 
 /// What a number of cameras on a number of hosts takes. Cameras are spread evenly over the hosts, by their cost: the host that fuses gets
-/// fewer where it has more to do.
+/// fewer where it has more to do, unless its views are given.
 pub fn forecast(costs: &Costs, load: &Load) -> Forecast {
     let n_far = load.n_hosts.saturating_sub(1);
+    if let Some(near) = load.near.filter(|it| n_far > 0 && *it <= load.n_cameras) {
+        return with_views(costs, load, near, n_far);
+    }
     let options = (0..=load.n_cameras).filter(|near| n_far > 0 || *near == load.n_cameras);
     let all = options.map(|near| with_views(costs, load, near, n_far));
     let worst = |it: &Forecast| it.cores[0].max(it.cores[1]);
@@ -158,6 +163,7 @@ mod tests {
         rate_hz: 10.0,
         network_bytes_s: 100e6,
         with_poses: false,
+        near: None,
     };
 
     #[test]
@@ -202,6 +208,16 @@ mod tests {
         // All poses are still found on one host: more hosts do not help there.
         assert!(got.cores[0] > 16.0 * 0.4, "{got:?}");
         assert!(!got.fits);
+    }
+
+    #[test]
+    fn views_that_are_given_are_not_spread() {
+        let load = Load {
+            n_hosts: 3,
+            near: Some(3),
+            ..LOAD
+        };
+        assert_eq!(forecast(&COSTS, &load).views, [3, 1]);
     }
 
     #[test]

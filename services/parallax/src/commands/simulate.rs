@@ -1,5 +1,8 @@
 //! `parallax simulate`: what a deployment will take, worked out from measured costs.
 
+mod report;
+
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use ::hosts::{Costs, Forecast, Load, forecast};
@@ -7,6 +10,19 @@ use clap::{Args, Subcommand};
 use launch::output;
 use runtime::Failure;
 use serde_json::json;
+
+/// The costs of the machine that the guide names, with the network that ships.
+const DEFAULT: Costs = Costs {
+    capture_ms: 3.0,
+    pose_ms: 30.0,
+    encode_ms: 4.0,
+    decode_ms: 2.0,
+    fuse_ms_per_view: 3.0,
+    fuse_ms: 2.0,
+    frame_bytes: 30_000.0,
+    pose_bytes: 4_400.0,
+    network_ms: 0.5,
+};
 
 /// The commands.
 #[derive(Debug, Subcommand)]
@@ -18,10 +34,13 @@ pub(crate) enum Command {
 /// Options of `parallax simulate hosts`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A model, no measurement: costs of one frame of one view are multiplied. Its costs are those of the machine that the guide names; measure
-your own (`parallax run` prints the time of every stage, and `hosts.json` that of the link) and give them.
+A model, no measurement: costs of one frame of one view are multiplied. Without --report they are those of the machine that the guide names.
+With it they are those of a run on your machine, of a minute or more: processor time of every stage, and, of a run with hosts, bytes
+and codec. What is given by its own option counts first.
 
-Example:
+Examples:
+    parallax run my.toml --json > run.json
+    parallax simulate hosts --report run.json --cameras 8,16 --cores 8
     parallax simulate hosts --cameras 16 --hosts 1,2,3,4 --cores 16 --rate 30 --pose-ms 20")]
 pub(crate) struct Arguments {
     /// Numbers of cameras, separated by commas.
@@ -30,6 +49,9 @@ pub(crate) struct Arguments {
     /// Numbers of hosts, separated by commas; the one that fuses is among them.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1,2,3,4", value_parser = clap::value_parser!(u16).range(1..=256))]
     hosts: Vec<u16>,
+    /// Views of the host that fuses; without it they are spread so that no host has more to do than it must.
+    #[arg(long, value_name = "N")]
+    near: Option<u16>,
     /// Cores of each host.
     #[arg(long, value_name = "N", default_value_t = 16.0)]
     cores: f64,
@@ -39,24 +61,30 @@ pub(crate) struct Arguments {
     /// What the network carries, megabits per second.
     #[arg(long, value_name = "MBIT", default_value_t = 1000.0)]
     network: f64,
+    /// The costs of a run: what `parallax run --json` printed, on the host that fuses if there are several.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     /// `capture` for a frame of a view, milliseconds.
-    #[arg(long, value_name = "MS", default_value_t = 3.0)]
-    capture_ms: f64,
+    #[arg(long, value_name = "MS")]
+    capture_ms: Option<f64>,
     /// `pose` for a frame of a view, milliseconds.
-    #[arg(long, value_name = "MS", default_value_t = 30.0)]
-    pose_ms: f64,
+    #[arg(long, value_name = "MS")]
+    pose_ms: Option<f64>,
     /// To JPEG, milliseconds.
-    #[arg(long, value_name = "MS", default_value_t = 4.0)]
-    encode_ms: f64,
+    #[arg(long, value_name = "MS")]
+    encode_ms: Option<f64>,
     /// From JPEG, milliseconds.
-    #[arg(long, value_name = "MS", default_value_t = 2.0)]
-    decode_ms: f64,
+    #[arg(long, value_name = "MS")]
+    decode_ms: Option<f64>,
     /// Fusion for every view of a frame, milliseconds.
-    #[arg(long, value_name = "MS", default_value_t = 3.0)]
-    fuse_ms: f64,
+    #[arg(long, value_name = "MS")]
+    fuse_ms: Option<f64>,
     /// A frame as JPEG, bytes.
-    #[arg(long, value_name = "N", default_value_t = 30_000.0)]
-    frame_bytes: f64,
+    #[arg(long, value_name = "N")]
+    frame_bytes: Option<f64>,
+    /// The poses of a view, bytes.
+    #[arg(long, value_name = "N")]
+    pose_bytes: Option<f64>,
     /// Print as JSON.
     #[arg(long)]
     json: bool,
@@ -65,16 +93,17 @@ pub(crate) struct Arguments {
 /// Runs a command.
 pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     let Command::Hosts(it) = command;
+    let measured = it.report.as_deref().map(report::costs).transpose()?;
+    let known = measured.unwrap_or(DEFAULT);
     let costs = Costs {
-        capture_ms: it.capture_ms,
-        pose_ms: it.pose_ms,
-        encode_ms: it.encode_ms,
-        decode_ms: it.decode_ms,
-        fuse_ms_per_view: it.fuse_ms,
-        fuse_ms: 2.0,
-        frame_bytes: it.frame_bytes,
-        pose_bytes: 8_000.0,
-        network_ms: 0.5,
+        capture_ms: it.capture_ms.unwrap_or(known.capture_ms),
+        pose_ms: it.pose_ms.unwrap_or(known.pose_ms),
+        encode_ms: it.encode_ms.unwrap_or(known.encode_ms),
+        decode_ms: it.decode_ms.unwrap_or(known.decode_ms),
+        fuse_ms_per_view: it.fuse_ms.unwrap_or(known.fuse_ms_per_view),
+        frame_bytes: it.frame_bytes.unwrap_or(known.frame_bytes),
+        pose_bytes: it.pose_bytes.unwrap_or(known.pose_bytes),
+        ..known
     };
     let mut rows = Vec::new();
     for &n_cameras in &it.cameras {
@@ -90,6 +119,7 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
                     rate_hz: it.rate,
                     network_bytes_s: it.network * 1e6 / 8.0,
                     with_poses,
+                    near: it.near.map(usize::from),
                 };
                 rows.push((load, forecast(&costs, &load)));
             }
