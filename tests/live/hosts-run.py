@@ -5,10 +5,12 @@ import json, math, os, random, re, signal, subprocess, sys, time
 parallax, out, n_cameras, seconds, rate, carry = sys.argv[1:7]
 n_cameras, seconds, rate = int(n_cameras), int(seconds), float(rate)
 n_frames = int(seconds * rate)
-# Light enough for a busy machine: small frames, the filters, tracked.
-LIGHT = ["pose.network=none", "pose.search=tracked", "capture.scale=0.4", "capture.upright=true"]
-if carry == "poses":
-    LIGHT.append("fuse.views=pairs")
+SET = os.environ.get("SET", "").split()
+if os.environ.get("FILTERS"):
+    # Light enough for a busy machine: small frames, the filters, tracked.
+    SET += ["pose.network=none", "pose.search=tracked", "capture.scale=0.4", "capture.upright=true"]
+    if carry == "poses":
+        SET.append("fuse.views=pairs")
 # By how much the hosts' monotonic clocks are ahead of the fusing one's, seconds.
 CLOCKS = {"left": 5000, "right": 900000}
 LIMBS = [("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist")]
@@ -36,22 +38,25 @@ def write(folder, keys):
     open(f"{folder}/one.toml", "w").write(text)
     text += f'\n[link]\ncarry = "{carry}"\n' + (f'keys = "{keys}"\n' if keys else "insecure = true\n")
     text += f'[[host]]\nname = "desk"\nfuses = true\naddress = "10.77.0.1:7447"\nviews = {quoted(near)}\n'
+    open(f"{folder}/two.toml", "w").write(text + f'[[host]]\nname = "left"\nviews = {quoted(far)}\n')
     text += f'[[host]]\nname = "left"\nviews = {quoted(left)}\n[[host]]\nname = "right"\nviews = {quoted(right)}\n'
     open(f"{folder}/hosts.toml", "w").write(text)
     return [int(it[1:]) - 1 for it in left], [int(it[1:]) - 1 for it in right]
 
 
-def run(file, out, *more, ns=None, clock=0, log=None):
-    command = [parallax, "run", file, "--out", out, "--set", "supervise.deadline_ms=1500",
+def run(file, out, *more, ns=None, clock=0, log=None, errors=None, record=None):
+    what = ["record", file, "--results", out, "--out", record, "--force"] if record else ["run", file, "--out", out]
+    command = [parallax, *what, "--set", "supervise.deadline_ms=1500",
                "--set", "supervise.hang_limit_s=120", "--set", "results.overlay_every=0"]
-    for it in LIGHT:
+    for it in SET:
         command += ["--set", it]
     command += list(more)
     if clock:
         command = ["unshare", "--fork", "--time", "--monotonic", str(clock)] + command
     if ns:
         command = ["ip", "netns", "exec", f"px-{ns}"] + command
-    return subprocess.Popen(command, stdout=open(log or os.devnull, "a"), stderr=subprocess.STDOUT, start_new_session=True)
+    errors = open(errors, "a") if errors else subprocess.STDOUT
+    return subprocess.Popen(command, stdout=open(log or os.devnull, "a"), stderr=errors, start_new_session=True)
 
 
 def lines(folder):
@@ -76,6 +81,16 @@ def score(folder, truth):
             total += 1
             good += sum(math.dist(g, true[it]) for g, it in zip(got, (a, b))) / 2 <= limb / 2
     return {"pcp3d": round(100 * good / max(total, 1), 2), "limbs": total}
+
+
+def latency(folder):
+    """Median and 99th percentile from capture to result, and of the computing time of every stage, ms."""
+    try:
+        it = json.load(open(f"{folder}/latency.json"))
+    except OSError:
+        return None
+    both = lambda row: [round(row[key], 1) if row[key] is not None else None for key in ("p50_ms", "p99_ms")]
+    return {"end_to_end": both(it["end_to_end"]), **{name: both(row) for name, row in it["stages"].items()}}
 
 
 def truth_of(folder):
@@ -109,13 +124,14 @@ def stop(process):
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def three(file, out, fault=None):
-    """A run on three hosts; `fault(out, processes)` is called once all views came."""
+def three(file, out, fault=None, far=("left", "right"), records=False):
+    """A run on several hosts; `fault(out, processes)` is called once all views came."""
     os.makedirs(out, exist_ok=True)
     log = f"{out}/log"
-    desk = run(file, out, "--host", "desk", ns="desk", log=log)
-    start = lambda name: run(file, out, "--host", name, ns=name, clock=CLOCKS[name], log=f"{out}/log-{name}")
-    processes = {"desk": desk, "left": start("left"), "right": start("right")}
+    recording = lambda name: f"{out}/{name}.mcap" if records else None
+    desk = run(file, out, "--host", "desk", ns="desk", log=log, record=recording("desk"))
+    start = lambda name: run(file, out, "--host", name, ns=name, clock=CLOCKS[name], log=f"{out}/log-{name}", record=recording(name))
+    processes = {"desk": desk, **{name: start(name) for name in far}}
     processes["start"] = start
     begin = time.time()
     try:
@@ -127,7 +143,7 @@ def three(file, out, fault=None):
         said = fault(out, processes) if fault else {}
         status = desk.wait(seconds * 3 + 120)
     finally:
-        for name in ("left", "right", "desk"):
+        for name in (*far, "desk"):
             stop(processes[name])
     return {"exit": status, **said}
 
@@ -268,6 +284,66 @@ def endurance(folder, processes):
             "back_p50_s": back and back[len(back) // 2], "back_max_s": back and back[-1], "first_and_last_quarter": flat}
 
 
+def processor_s(roots):
+    """Processor time of all processes below these, seconds."""
+    tick, total = os.sysconf("SC_CLK_TCK"), 0
+    for it in descendants(roots):
+        try:
+            words = open(f"/proc/{it}/stat").read().rsplit(")", 1)[1].split()
+            total += int(words[11]) + int(words[12])
+        except (OSError, IndexError):
+            pass
+    return total / tick
+
+
+def busy(folder, processes):
+    """How many cores each host uses, from when all views came until a few frames before the end."""
+    hosts = [it for it in processes if it != "start"]
+    spent = lambda: {it: processor_s([processes[it].pid]) for it in hosts}
+    before, begin = spent(), time.time()
+    time.sleep(max(seconds - 15, 5))
+    after, took = spent(), time.time() - begin
+    return {"cores": {it: round((after[it] - before[it]) / took, 3) for it in hosts}}
+
+
+def model(data):
+    """The forecast of `parallax simulate hosts`, from the costs of the run on one host, beside what two and three hosts took."""
+    near = n_cameras // 2
+    for n_hosts, file, far in ((2, "two", ["left"]), (3, "hosts", ["left", "right"])):
+        folder = f"{out}/model-{n_hosts}"
+        # These hosts share the cores of one machine.
+        cores = max(len(os.sched_getaffinity(0)) / n_hosts, 1)
+        said = three(f"{data}/{file}.toml", folder, busy, far)
+        it = state(folder)
+        views = [view for host in it["hosts"] for view in host["views"]]
+        # Codec and bytes are the link's own: of the run itself.
+        frame = sum(view["bytes"] for view in views) / max(sum(view["used"] for view in views), 1)
+        median = lambda key: sum(view[key]["p50_ms"] for view in views) / len(views)
+        told = [f"--{'pose' if carry == 'poses' else 'frame'}-bytes", str(frame)]
+        if carry == "frames":
+            told += ["--encode-ms", str(median("encode")), "--decode-ms", str(median("decode"))]
+        got = json.loads(sh(parallax, "simulate", "hosts", "--report", f"{out}/one.json", "--cameras", str(n_cameras), "--hosts",
+                            str(n_hosts), "--near", str(near), "--cores", str(cores), "--rate", str(rate), "--json", *told).stdout)
+        row = next(row for row in got["rows"] if row["load"]["with_poses"] == (carry == "poses"))["forecast"]
+        far_cores = max(said["cores"][name] for name in far)
+        say(f"model-{n_hosts}", **said, measured={"cores": [said["cores"]["desk"], far_cores],
+            "mb_s": round(sum(view["bytes"] for view in views) / it["seconds"] / 1e6, 3), "latency_ms": latency(folder)["end_to_end"][0]},
+            forecast={"cores": [round(it, 3) for it in row["cores"]], "mb_s": round(row["bytes_s"][0] / 1e6, 3),
+                      "latency_ms": round(row["latency_ms"], 1)}, costs=got["costs"])
+
+
+def record(data, truth):
+    """Hosts that record: the one that fuses has what came to it, one with cameras its own views."""
+    folder = f"{out}/record"
+    said = three(f"{data}/hosts.toml", folder, records=True)
+    from_stage = "fuse" if carry == "poses" else "pose"
+    again = sh(parallax, "replay", f"{folder}/desk.mcap", "--from", from_stage, "--out", f"{folder}/again", "--set", "capture.mode=lossless", check=False)
+    far = sh(parallax, "replay", f"{folder}/left.mcap", "--from", "pose", "--out", f"{folder}/far", check=False)
+    say("record", **said, **score(folder, truth), replayed={"exit": again.returncode, **score(f"{folder}/again", truth)},
+        far={"exit": far.returncode, "said": far.stderr.strip().splitlines()[-2:]},
+        mb={name: round(os.path.getsize(f"{folder}/{name}.mcap") / 1e6, 1) for name in ("desk", "left", "right")})
+
+
 def clear():
     sh("ip", "link", "set", "px-left", "up")
     sh("ip", "netns", "exec", "px-desk", "nft", "flush", "ruleset", check=False)
@@ -284,9 +360,13 @@ def main():
         sh(parallax, "hosts", "keys", f"{data}/hosts.toml")
     wanted = os.environ.get("PARTS", "one,three,cut-1,cut-10,cut,loss-1,loss-10,slow,kill,thief").split(",")
     if "one" in wanted:
-        one = run(f"{data}/one.toml", f"{out}/one", "--quiet", log=f"{out}/one.log")
+        one = run(f"{data}/one.toml", f"{out}/one", "--quiet", "--json", log=f"{out}/one.json", errors=f"{out}/one.log")
+        said = {}
+        if "model" in wanted:
+            time.sleep(5)
+            said = busy(f"{out}/one", {"one": one})
         status = one.wait(seconds * 3 + 120)
-        say("one", exit=status, **score(f"{out}/one", truth))
+        say("one", exit=status, **said, **score(f"{out}/one", truth), latency=latency(f"{out}/one"))
     parts = {"three": None, "cut-1": cable(1), "cut-10": cable(10), "cut": for_ever, "loss-1": loss(1), "loss-10": loss(10),
              "slow": slow(int(os.environ.get("KBIT", "200"))), "kill": kill_host, "endurance": endurance}
     for part, fault in parts.items():
@@ -298,7 +378,11 @@ def main():
         it = state(folder)
         link = [{key: view[key] for key in ("view", "bytes", "encode", "network", "decode", "all")} for host in it["hosts"] for view in host["views"]]
         clocks = {host["name"]: host["clock"] for host in it["hosts"]}
-        say(part, **said, **score(folder, truth), accounted=accounted(folder), link=link, clocks=clocks, seconds=round(it["seconds"], 1))
+        say(part, **said, **score(folder, truth), latency=latency(folder), accounted=accounted(folder), link=link, clocks=clocks, seconds=round(it["seconds"], 1))
+    if "record" in wanted:
+        record(data, truth)
+    if "model" in wanted:
+        model(data)
     if "thief" in wanted and keys:
         thief(data)
 
