@@ -211,6 +211,20 @@ def kill_host(folder, processes):
     return watch(folder, "left", restore, 3)
 
 
+def kills(folder, processes):
+    """Hosts killed again and again, each with the link in use."""
+    begin, all = time.time(), []
+    while processes["desk"].poll() is None and time.time() - begin < seconds - 20:
+        all.append(kill_host(folder, processes))
+        time.sleep(2)
+    return {"kills": len(all), "came_back": sum(it["back_s"] is not None for it in all)}
+
+
+def died(folder):
+    """Processes of the fusing host that died."""
+    return sum(" ended by signal " in line for line in open(f"{folder}/log"))
+
+
 def descendants(roots):
     """All processes below these, by their parents."""
     below, parents = set(roots), {}
@@ -368,7 +382,7 @@ def main():
         status = one.wait(seconds * 3 + 120)
         say("one", exit=status, **said, **score(f"{out}/one", truth), latency=latency(f"{out}/one"))
     parts = {"three": None, "cut-1": cable(1), "cut-10": cable(10), "cut": for_ever, "loss-1": loss(1), "loss-10": loss(10),
-             "slow": slow(int(os.environ.get("KBIT", "200"))), "kill": kill_host, "endurance": endurance}
+             "slow": slow(int(os.environ.get("KBIT", "200"))), "kill": kill_host, "kills": kills, "endurance": endurance}
     for part, fault in parts.items():
         if part not in wanted:
             continue
@@ -378,7 +392,7 @@ def main():
         it = state(folder)
         link = [{key: view[key] for key in ("view", "bytes", "encode", "network", "decode", "all")} for host in it["hosts"] for view in host["views"]]
         clocks = {host["name"]: host["clock"] for host in it["hosts"]}
-        say(part, **said, **score(folder, truth), latency=latency(folder), accounted=accounted(folder), link=link, clocks=clocks, seconds=round(it["seconds"], 1))
+        say(part, **said, died=died(folder), **score(folder, truth), latency=latency(folder), accounted=accounted(folder), link=link, clocks=clocks, seconds=round(it["seconds"], 1))
     if "record" in wanted:
         record(data, truth)
     if "model" in wanted:
