@@ -6,6 +6,7 @@ use datasets::{Person, Picture, ReadOptions, Selection};
 use evaluation::{PcpRule, evaluate};
 use fmp::{Extractor, Layout, Model, Responses, Solver};
 use offline::network::NetworkFile;
+use posenetwork::springs::TurnedSprings;
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, outline_of, overlap};
 use rayon::prelude::*;
 use skeleton::PARSE14;
@@ -63,7 +64,7 @@ fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_bett
     let network = network.fitted().unwrap();
     let springs = std::fs::read(models.join("person.springs")).unwrap();
     let springs = fmp::files::own::decode(&springs).unwrap();
-    let springs = Solver::new(Arc::new(Model::new(springs).unwrap()));
+    let springs = TurnedSprings::new(&Arc::new(Model::new(springs).unwrap()));
     let options = ReadOptions {
         only: Some(Selection::from_argument("101-130").unwrap()),
         ..ReadOptions::default()

@@ -158,6 +158,7 @@ pub(crate) fn split(body: &[u8]) -> Option<(Vec<u8>, &[u8])> {
 #[cfg(test)]
 mod tests {
     use fmp::Responses;
+    use posenetwork::springs::{SpringSettings, learn};
 
     use super::*;
 
@@ -167,7 +168,7 @@ mod tests {
 
     fn view(longest: usize) -> ViewMaps {
         let people: Vec<_> = (0..30).map(person).collect();
-        let model = posenetwork::springs::learn(&people, &Default::default()).unwrap();
+        let model = learn(&people, &SpringSettings::default()).unwrap();
         ViewMaps {
             layout: Arc::new(Layout::new(&model, 160, 200).unwrap()),
             longest,
@@ -224,7 +225,8 @@ mod tests {
         assert!(refused(|it| it.gaussians[3].heat = f32::NAN, room).contains("Gaussian 3"));
         assert!(refused(|it| it.gaussians[2].joint = 14, room).contains("Gaussian 2"));
         let cut = maps().to_bytes();
-        assert!(view(room).unpack(&cut[..30]).is_err());
+        let cut = view(room).unpack(&cut[..30]).unwrap_err().to_string();
+        assert!(cut.contains("30 bytes"), "{cut}");
     }
 
     #[test]

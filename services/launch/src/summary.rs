@@ -281,9 +281,8 @@ impl Report {
                 "  3D            {} of {} frames",
                 it.frames_with_pose, self.n_frames
             )?;
-            if let Some(slow) = slow::text(it, self.n_frames, self.seconds, self.is_lossless) {
-                writeln!(text, "  slow          {slow}")?;
-            }
+            let slow = slow::text(it, self.n_frames, self.seconds, self.is_lossless);
+            text.extend(slow);
             writeln!(text, "  people        {}", it.people.text())?;
             text.push_str(&trust::text(it, &self.doubts()));
             self.write_views(text, it)?;

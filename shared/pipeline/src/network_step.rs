@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use fmp::{Bound, Bounds, Layout, Placement, Pose, Region, Responses, Scope, Solver, local_scores};
+use fmp::{Bound, Bounds, Layout, Placement, Pose, Region, Responses, Scope, local_scores};
 use kernels::Rgb8View;
 use keypoints::Keypoint;
 use multiview::FrontEvidence;
@@ -99,12 +99,17 @@ pub struct NetworkStep {
 impl NetworkStep {
     /// Prepares the step.
     ///
-    /// * `solver`: of a tree of [`posenetwork::springs`], which is turned for people who lie or stand on their hands.
+    /// * `springs`: of a tree of [`posenetwork::springs`].
     /// * `layout`: of the frames, for that tree.
-    pub fn new(eyes: Eyes, solver: Solver, layout: Arc<Layout>, settings: NetworkSettings) -> Self {
+    pub fn new(
+        eyes: Eyes,
+        springs: TurnedSprings,
+        layout: Arc<Layout>,
+        settings: NetworkSettings,
+    ) -> Self {
         Self {
             eyes,
-            springs: TurnedSprings::new(solver.model()),
+            springs,
             layout,
             settings,
             extras: Vec::new(),
@@ -191,17 +196,12 @@ impl NetworkStep {
                 sightings.see_again(track, memory)?;
             }
         } else {
+            let found = (is_due, &found[..]);
             for track in &tracks {
-                if let Some(apart) = memory.apart.filter(|_| !is_due) {
-                    let around = (moved(track.outline, apart), self.most_lost());
-                    sightings.see_later(track, around, memory)?;
-                } else if is_due || track.is_doubtful {
-                    sightings.see(track, wider(track.outline, &found), memory)?;
-                } else {
-                    sightings.see_again(track, memory)?;
-                }
+                self.see_once_more(&sightings, track, found, memory)?;
             }
-            sightings.see_all(&found, memory)?;
+            let (_, found) = found;
+            sightings.see_all(found, memory)?;
             if memory.n_seen == 0 && !is_due && !rests {
                 memory.has_searched = true;
                 let found = find(&mut memory.values)?;
@@ -222,6 +222,27 @@ impl NetworkStep {
         memory.tracks = tracks;
         memory.tracks.clear();
         Ok(self.scope(memory))
+    }
+
+    /// Looks at a person of the frame before: around the box of then if that is long ago, in a wider box where boxes were looked for or the
+    /// last pose was doubtful, else in the same.
+    ///
+    /// * `found`: whether boxes were looked for in this frame, and those that were found.
+    fn see_once_more(
+        &self,
+        sightings: &Sightings<'_>,
+        track: &Track,
+        (is_due, found): (bool, &[[f64; 4]]),
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        if let Some(apart) = memory.apart.filter(|_| !is_due) {
+            let around = (moved(track.outline, apart), self.most_lost());
+            sightings.see_later(track, around, memory)
+        } else if is_due || track.is_doubtful {
+            sightings.see(track, wider(track.outline, found), memory)
+        } else {
+            sightings.see_again(track, memory)
+        }
     }
 
     /// Takes the people of a frame whose keypoints another program found; returns what of the frame the responses will cover, or

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use deployment::Deployment;
-use fmp::{CandidateSettings, Layout, Model, Search, Solver};
+use fmp::{CandidateSettings, Layout, Model, Search};
 use footage::{FrameView, Size, Turn};
 use kernels::Rgb8View;
 use keypoints::{Keypoint, Sides};
 use offline::pictures::{BOXES_PX, Picture, Searched};
 use pipeline::{Boxes, NetworkMemory, NetworkSettings, NetworkStep};
+use posenetwork::springs::TurnedSprings;
 use posenetwork::{Detector, JointMaps, LookError, PoseNetwork};
 use runtime::{ExitKind, Failure, OrFail as _, in_file};
 use skeleton::PARSE14;
@@ -132,10 +133,10 @@ impl Eyes {
             ..NetworkSettings::default()
         };
         let eyes = pipeline::Eyes::Network(Box::new(network.joints), boxes);
-        let solver = Solver::new(network.springs);
+        let springs = TurnedSprings::new(&network.springs);
         let layout = Arc::new(layout.or_fail(ExitKind::Input)?);
         Ok(Watch::Network(Box::new(Follower {
-            step: NetworkStep::new(eyes, solver, layout, settings),
+            step: NetworkStep::new(eyes, springs, layout, settings),
             search,
             n_keypoints,
             memory: NetworkMemory::default(),

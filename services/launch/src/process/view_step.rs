@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use fmp::{Layout, Solver};
+use fmp::Layout;
 use pipeline::{Boxes, Eyes, NetworkSettings, NetworkStep, ViewStep};
+use posenetwork::springs::TurnedSprings;
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use crate::find_every::find_every;
@@ -56,9 +57,9 @@ pub(super) fn of_view(
         let extras = extras(resolved, source.names().names());
         let eyes = Eyes::Keypoints(::keypoints::joint_rows(source.names().names()));
         let frame_from_source = prepared.views[view].framing.output_from_source();
-        let solver = Solver::new(prepared.model);
+        let springs = TurnedSprings::new(&prepared.model);
         return Ok(pose::Step::Keypoints(Box::new(pose::Keypoints {
-            step: NetworkStep::new(eyes, solver, layout, settings).with_extras(extras),
+            step: NetworkStep::new(eyes, springs, layout, settings).with_extras(extras),
             source,
             timeline: resolved.footage[view].timeline,
             frame_from_source,
@@ -73,8 +74,8 @@ pub(super) fn of_view(
     };
     let extras = extras(resolved, network.names());
     let eyes = Eyes::Network(Box::new(network), boxes);
-    let solver = Solver::new(prepared.model);
-    let step = NetworkStep::new(eyes, solver, layout, settings).with_extras(extras);
+    let springs = TurnedSprings::new(&prepared.model);
+    let step = NetworkStep::new(eyes, springs, layout, settings).with_extras(extras);
     Ok(pose::Step::Network(Box::new(step)))
 }
 

@@ -5,7 +5,7 @@ use runfiles::Summary;
 /// A run that has a result for a smaller share of its frames says so.
 const MOST: f64 = 0.8;
 
-/// How many frames the machine had time for, and what helps. None where it had time for most of them, and with lossless delivery.
+/// A line of how many frames the machine had time for, and what helps. None where it had time for most of them, and with lossless delivery.
 ///
 /// * `n_frames`: of the footage, as far as the run got; `seconds`: how long it took.
 pub(super) fn text(
@@ -18,8 +18,8 @@ pub(super) fn text(
     let is_slow = !is_lossless && n > 0 && (n as f64) < MOST * n_frames as f64;
     is_slow.then(|| {
         format!(
-            "this machine had time for {n} of {n_frames} frames, {:.1} a second: smaller pictures (capture.scale), fewer cameras, less \
-             work beside it, a detector (pose.detector) or more cores would help; `latency` below shows which stage takes long",
+            "  slow          this machine had time for {n} of {n_frames} frames, {:.1} a second: smaller pictures (capture.scale), fewer cameras, less \
+             work beside it, a detector (pose.detector) or more cores would help; `latency` below shows which stage takes long\n",
             n as f64 / seconds.max(1e-3)
         )
     })

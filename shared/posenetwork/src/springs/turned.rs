@@ -31,14 +31,12 @@ fn turned(model: &Arc<Model>, turn: Turn) -> Arc<Model> {
     let mut spec = model.spec().clone();
     let edges = spec.parts.iter_mut().filter_map(|it| it.edge.as_mut());
     for springs in edges.map(|it| &mut it.springs) {
-        match springs {
-            Springs::PerChildType(all) => {
-                all.iter_mut().for_each(|it| *it = turned_spring(*it, turn))
-            }
-            Springs::PerTypePair(all) => {
-                let all = all.iter_mut().flatten().flatten();
-                all.for_each(|it| *it = turned_spring(*it, turn));
-            }
+        let all: Vec<&mut Spring> = match springs {
+            Springs::PerChildType(all) => all.iter_mut().collect(),
+            Springs::PerTypePair(all) => all.iter_mut().flatten().flatten().collect(),
+        };
+        for it in all {
+            *it = turned_spring(*it, turn);
         }
     }
     // A tree stays one when its springs are turned.
