@@ -281,8 +281,7 @@ impl Report {
                 "  3D            {} of {} frames",
                 it.frames_with_pose, self.n_frames
             )?;
-            let slow = slow::text(it, self.n_frames, self.seconds, self.is_lossless);
-            text.extend(slow);
+            self.write_slow(text, it);
             writeln!(text, "  people        {}", it.people.text())?;
             text.push_str(&trust::text(it, &self.doubts()));
             self.write_views(text, it)?;
@@ -308,9 +307,8 @@ impl Report {
         self.write_memory(text)?;
         let restarts = self.restarts.iter();
         let restarts: Vec<String> = restarts.map(|(name, n)| format!("{name} {n}")).collect();
-        let none = || "none".to_owned();
         let restarts = if restarts.is_empty() {
-            none()
+            "none".to_owned()
         } else {
             restarts.join(", ")
         };
@@ -326,6 +324,11 @@ impl Report {
         writeln!(text, "  results       on the host that fuses")?;
         self.write_live(text);
         self.write_memory(text)
+    }
+
+    fn write_slow(&self, text: &mut String, summary: &Summary) {
+        let slow = slow::text(summary, self.n_frames, self.seconds, self.is_lossless);
+        text.extend(slow);
     }
 
     fn write_live(&self, text: &mut String) {

@@ -53,31 +53,31 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
     let fused = mean("fuse").map_or(0.0, |it| it * workers)
         + needed("triangulate")?
         + mean("results").unwrap_or(0.0);
-    let mut costs = Costs {
+    let costs = Costs {
         capture_ms: needed("capture")?,
         pose_ms: mean("pose").unwrap_or(DEFAULT.pose_ms) + mean("quality").unwrap_or(0.0),
         fuse_ms_per_view: fused / n_views as f64,
         fuse_ms: 0.0,
         ..DEFAULT
     };
-    let far = hosts
-        .and_then(|it| it["hosts"].as_array())
-        .into_iter()
-        .flatten();
+    let n_pose = spent.keys().filter(|it| it.starts_with("pose-")).count();
+    // Where poses cross, some are found elsewhere.
+    let carries_poses = n_pose > 0 && n_pose < n_views;
+    Ok(hosts.map_or(costs, |hosts| with_link(costs, hosts, carries_poses)))
+}
+
+/// The costs with what the link took.
+///
+/// * `hosts`: what `hosts.json` says; `carries_poses`: whether poses cross, and no frames.
+fn with_link(mut costs: Costs, hosts: &Value, carries_poses: bool) -> Costs {
+    let far = hosts["hosts"].as_array().into_iter().flatten();
     let far = far.filter_map(|it| it["views"].as_array()).flatten();
     let far: Vec<&Value> = far.filter(|it| it["used"].as_f64() > Some(0.0)).collect();
-    if far.is_empty() {
-        return Ok(costs);
-    }
     let over_views = |value: &dyn Fn(&Value) -> Option<f64>| {
         let all: Vec<f64> = far.iter().filter_map(|it| value(it)).collect();
         (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
     };
-    let bytes = over_views(&|it| Some(it["bytes"].as_f64()? / it["used"].as_f64()?));
-    // Frames are large, poses are not, whatever they are called.
-    let carries_poses = mean("pose").is_some()
-        && spent.keys().filter(|it| it.starts_with("pose-")).count() < n_views;
-    if let Some(bytes) = bytes {
+    if let Some(bytes) = over_views(&|it| Some(it["bytes"].as_f64()? / it["used"].as_f64()?)) {
         if carries_poses {
             costs.pose_bytes = bytes;
         } else {
@@ -90,7 +90,7 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
         costs.decode_ms = median("decode").unwrap_or(costs.decode_ms);
     }
     costs.network_ms = median("network").unwrap_or(costs.network_ms);
-    Ok(costs)
+    costs
 }
 
 #[cfg(test)]
