@@ -296,7 +296,7 @@ mod tests {
     use super::*;
 
     /// People who stand, each a little different.
-    fn people() -> Vec<[[f64; 2]; N_JOINTS]> {
+    pub(super) fn people() -> Vec<[[f64; 2]; N_JOINTS]> {
         let standing = [
             [10.0, 60.0],
             [10.0, 48.0],

@@ -70,36 +70,8 @@ mod tests {
 
     use super::*;
     use crate::maps::N_JOINTS;
+    use crate::springs::tests::people;
     use crate::springs::{SpringSettings, learn};
-
-    /// People who stand, of other proportions each.
-    fn people() -> Vec<[[f64; 2]; N_JOINTS]> {
-        let standing = [
-            [12.0, 60.0],
-            [11.0, 48.0],
-            [10.0, 36.0],
-            [16.0, 36.0],
-            [17.0, 47.0],
-            [18.0, 58.0],
-            [4.0, 36.0],
-            [5.0, 26.0],
-            [8.0, 16.0],
-            [18.0, 16.0],
-            [21.0, 25.0],
-            [24.0, 34.0],
-            [13.0, 14.0],
-            [14.0, 6.0],
-        ];
-        let moved = |nth: usize| {
-            let mut person = standing;
-            for (joint, at) in person.iter_mut().enumerate() {
-                at[0] += ((nth * 7 + joint * 3) % 5) as f64 - 2.0;
-                at[1] += ((nth * 5 + joint * 2) % 3) as f64 - 1.0;
-            }
-            person
-        };
-        (0..60).map(moved).collect()
-    }
 
     /// A point about the middle of the picture, turned.
     fn rotated([x, y]: [f64; 2], turn: Turn) -> [f64; 2] {
