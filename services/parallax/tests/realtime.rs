@@ -132,6 +132,8 @@ fn a_process_in_an_endless_computation_is_detected_by_its_missing_progress() {
     let run = Finished::new(&case, &ended);
     let restarts = json!([{ "process": "capture-1", "restarts": 1 }]);
     assert_eq!(run.report["restarts"], restarts, "{}", ended.stderr);
-    let last = run.lines.last().unwrap();
-    assert_eq!(last["views_present"], json!(["a", "b"]), "it is not back");
+    // Which of the last frames the views take depends on the load: every one, or every second or fourth.
+    let both = json!(["a", "b"]);
+    let mut last = run.lines.iter().rev().take(40);
+    assert!(last.any(|it| it["views_present"] == both), "it is not back");
 }

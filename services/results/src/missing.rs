@@ -9,7 +9,7 @@ pub enum Missing {
     Empty(Status),
     /// Its message came too late, or had not come yet.
     Late,
-    /// It skipped the frame.
+    /// It skipped the frame: a later pose came, or the end of its poses.
     Dropped,
     /// Its process, or the one that fuses the views, had died.
     Lost,
@@ -42,6 +42,8 @@ pub(crate) struct ViewHistory {
     /// A port has disappeared, and no pose has come since.
     lost_process: bool,
     last_frame: Option<u64>,
+    /// Its pose process has sent the end of its stream: no pose will come any more.
+    has_sent_all: bool,
     /// The latest epoch of its capture process, and the last frame of that epoch.
     captured: Option<(u32, u64)>,
     /// The port of its capture process has disappeared, and no frame of the next epoch has come.
@@ -78,6 +80,7 @@ impl ViewHistory {
         self.lost_process = false;
         if pose.status == Status::END {
             self.end = Some(pose.stamp.frame);
+            self.has_sent_all = true;
             return;
         }
         self.epoch = self.epoch.max(pose.stamp.epoch);
@@ -114,7 +117,7 @@ impl ViewHistory {
             Some(pose) if pose.status != Status::OK => Missing::Empty(pose.status),
             None if self.end.is_some_and(|end| end <= frame) => Missing::Ended,
             _ if was_lost => Missing::Lost,
-            None if self.last_frame > Some(frame) => Missing::Dropped,
+            None if self.last_frame > Some(frame) || self.has_sent_all => Missing::Dropped,
             _ => Missing::Late,
         }
     }
@@ -268,10 +271,23 @@ mod tests {
     }
 
     #[test]
+    fn the_last_frame_was_dropped_if_the_poses_ended_without_it() {
+        let mut history = history();
+        let mut end = captured(3, 0);
+        end.status = Status::END;
+        history.note_frame(&end);
+        let sent = pose(2, 0, Status::OK);
+        assert_eq!(history.clone().note_result(2, None, false), Missing::Late);
+        history.note_pose(&pose(3, 0, Status::END));
+        assert_eq!(history.note_result(2, None, false), Missing::Dropped);
+        assert_eq!(history.note_result(2, Some(&sent), false), Missing::Late);
+    }
+
+    #[test]
     fn frames_after_the_end_of_the_footage_are_not_lost() {
         let mut history = history();
         history.note_pose(&pose(3, 0, Status::END));
-        assert_eq!(history.note_result(2, None, false), Missing::Late);
+        assert_eq!(history.note_result(2, None, false), Missing::Dropped);
         assert_eq!(history.note_result(3, None, false), Missing::Ended);
     }
 }
