@@ -240,6 +240,61 @@ fn without_a_box_the_filters_find_it_and_that_is_said() {
     assert!(ended.stderr.contains(said), "{}", ended.stderr);
 }
 
+/// What the network that ships is for: nothing is given but the picture.
+#[test]
+fn with_the_network_that_ships_everybody_is_found_once_and_where_they_are() {
+    let case = Case::new("net-ships", &[1, 1], PLAIN);
+    let who = ["--rig", "ring:3", "--subjects", "901", "--seed", "77"];
+    let one = ["--actions", "walking", "--frames", "1"];
+    let ended = case
+        .start(&[&["synth", "room"], &who[..], &one].concat())
+        .wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let rig = case.path("room/rig.toml");
+    let rig = geometry::files::read(&rig, &geometry::files::ReadOptions::default()).unwrap();
+    let truth = std::fs::read_to_string(case.path("room/truth.jsonl")).unwrap();
+    let mut truth = truth
+        .lines()
+        .map(|it| serde_json::from_str::<Value>(it).unwrap());
+    let names = truth.next().unwrap()["joints"].clone();
+    let places = truth.next().unwrap()["joints"].clone();
+    let named = |name: &str| {
+        let number = names.as_array().unwrap().iter().position(|it| it == name);
+        let at: Vec<f64> = serde_json::from_value(places[number.unwrap()].clone()).unwrap();
+        nalgebra::Point3::new(at[0], at[1], at[2])
+    };
+    for camera in rig.cameras() {
+        let picture = format!("room/cameras/{}/000000.png", camera.name);
+        let ended = run(
+            &case,
+            &["detect", &picture, "--network", "shipped", "--json"],
+        );
+        let line = json(&ended);
+        let found = line["detections"].as_array().unwrap();
+        assert_eq!(found.len(), 1, "{line:#}");
+        let distance = |joint: &str, of: &str| {
+            let truth = camera.project(&named(of)).unwrap();
+            let at: Vec<f64> = serde_json::from_value(found[0]["joints"][joint].clone()).unwrap();
+            (at[0] - truth.x).hypot(at[1] - truth.y)
+        };
+        // One view may name the sides the other way round.
+        let off = |sides: [&str; 2]| {
+            let joints = ["ankle", "knee", "hip", "shoulder", "elbow", "wrist"];
+            let each = joints.iter().flat_map(|joint| {
+                ["left", "right"]
+                    .into_iter()
+                    .zip(sides)
+                    .map(move |(a, b)| distance(&format!("{a} {joint}"), &format!("{b} {joint}")))
+            });
+            let mut each: Vec<f64> = each.collect();
+            each.sort_by(f64::total_cmp);
+            each[6]
+        };
+        let off = off(["left", "right"]).min(off(["right", "left"]));
+        assert!(off < 8.0, "{}: {off} pixels, {line:#}", camera.name);
+    }
+}
+
 #[test]
 fn a_network_is_judged_on_marked_people() {
     let case = case("network-judge");

@@ -5,11 +5,15 @@ mod nearest;
 
 use std::path::{Path, PathBuf};
 
+use fmp::Layout;
 use footage::Size;
 use inference::{Description, Session};
 use kernels::Rgb8View;
 use keypoints::Card;
-use posenetwork::{PoseNetwork, Sight, Turn, Workspace};
+use posenetwork::springs::TurnedSprings;
+use posenetwork::{
+    JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Sight, Turn, Workspace,
+};
 use runtime::{ExitKind, Failure, in_file};
 
 use crate::cards::{CardPlace, OnnxFile, misfit};
@@ -132,6 +136,41 @@ pub fn look<'a>(
         let message = format!("{}: a box without an extent", picture.path.display());
         Failure::new(ExitKind::Input, message)
     })
+}
+
+/// The box that fits a person best who is seen in another one, as a deployment looks for it ([`Looker::look_closer`]), and how the
+/// picture is to be turned there.
+///
+/// * `outline`: the box in which the person is seen, pixels of the picture.
+/// * Returns that box itself in a picture that is too small for the tree of springs.
+///
+/// # Errors
+///
+/// As for [`look`].
+pub fn closest(
+    (network, springs): (&PoseNetwork, &TurnedSprings),
+    picture: &Picture,
+    outline: [f64; 4],
+    memory: &mut LookMemory,
+) -> Result<([f64; 4], Turn), Failure> {
+    let Size { width, height } = picture.size;
+    let image = Rgb8View::new(width, height, &picture.rgb);
+    let image = image.map_err(|error| in_file(&picture.path, &error))?;
+    let as_it_is = (outline, Turn::Up);
+    let Ok(layout) = Layout::new(springs.model(), width, height) else {
+        return Ok(as_it_is);
+    };
+    let looker = Looker {
+        network,
+        springs,
+        layout: &layout,
+        settings: &MapSettings::default(),
+    };
+    let mut maps = JointMaps::default();
+    let outlines = &[outline][..];
+    let seen = looker.best_of((image, outlines), Turn::Up, memory, &mut maps);
+    let seen = seen.map_err(|error| refused(&picture.path, &error))?;
+    Ok(seen.map_or(as_it_is, |it| (it.outline, it.turn)))
 }
 
 #[cfg(test)]

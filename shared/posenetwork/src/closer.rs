@@ -10,6 +10,8 @@ use crate::springs::TurnedSprings;
 
 /// Boxes that cover each other by more show the same to a network: another look tells nothing new.
 const FITS: f64 = 0.8;
+/// By how much the mean heat of the joints may be lower in a box that fits better, 0 to 1.
+const FAINTER: f64 = 0.1;
 /// Most looks at one person beside the first.
 const MOST_MORE: usize = 2;
 
@@ -42,8 +44,10 @@ pub struct Look {
     pub outline: [f64; 4],
     /// In which direction the trunk faces ([`Sight::front`](crate::Sight::front)).
     pub front: Option<[f32; 2]>,
-    /// Of the best pose of the springs on the maps: how much a person this is. Negative infinity where the maps lie beyond the
-    /// picture.
+    /// Mean heat of the joints ([`JointMaps::heat`]): how well the person is seen, also compared with boxes of other sizes.
+    pub heat: f64,
+    /// Of the best pose of the springs on the maps: how much a person this is, compared with boxes of the same size. Negative infinity
+    /// where the maps lie beyond the picture.
     pub score: f32,
     /// The box around that pose.
     pub around: Option<[f64; 4]>,
@@ -118,6 +122,7 @@ impl Looker<'_> {
         Look {
             outline,
             front,
+            heat: maps.heat(),
             score: pose.as_ref().map_or(f32::NEG_INFINITY, |it| it.score),
             around: pose.and_then(|it| outline_of_pose(&it, (self.springs.model(), self.layout))),
             turn,
@@ -125,8 +130,8 @@ impl Looker<'_> {
     }
 
     /// Looks into the box around the pose that was seen in another one, and so on, as long as that is another box and shows the person
-    /// better: a box in which a person is small or at the edge is left for a better one. One that cuts off the feet stays: a network
-    /// puts them at its edge.
+    /// about as well or better: a box in which a person is small or at the edge is left for one that fits. One that cuts off the feet
+    /// stays: a network puts them at its edge.
     ///
     /// * `seen`, `maps`: what was seen in the first box; the maps are replaced by better ones.
     ///
@@ -140,13 +145,14 @@ impl Looker<'_> {
         maps: &mut JointMaps,
     ) -> Result<Look, LookError> {
         let mut best = self.look_upright((image, seen), memory, maps)?;
+        let least = best.heat - FAINTER;
         for _ in 0..MOST_MORE {
             let next = best.around.filter(|it| overlap(*it, best.outline) <= FITS);
             let Some(next) = next else {
                 break;
             };
             let more = self.look_beside((image, next), best.turn, memory)?;
-            let Some(more) = more.filter(|it| it.score > best.score) else {
+            let Some(more) = more.filter(|it| it.heat > least) else {
                 break;
             };
             core::mem::swap(maps, &mut memory.other);
@@ -174,14 +180,14 @@ impl Looker<'_> {
         }
         let outline = seen.around.unwrap_or(seen.outline);
         let turned = self.look_beside((image, outline), turn, memory)?;
-        let Some(turned) = turned.filter(|_| memory.other.heat() > maps.heat()) else {
+        let Some(turned) = turned.filter(|it| it.heat > seen.heat) else {
             return Ok(seen);
         };
         core::mem::swap(maps, &mut memory.other);
         Ok(turned)
     }
 
-    /// Looks into several boxes, and closer at the person whom the springs fit best there.
+    /// Looks into several boxes, and closer at the person who is seen best there.
     ///
     /// * `outlines`: of the boxes; `turn`: how the picture is turned at first.
     /// * `maps`: of the joints of that person, filled.
@@ -200,7 +206,7 @@ impl Looker<'_> {
         let mut best: Option<Look> = None;
         for outline in outlines {
             let look = self.look_beside((image, *outline), turn, memory)?;
-            if let Some(look) = look.filter(|it| best.is_none_or(|best| it.score > best.score)) {
+            if let Some(look) = look.filter(|it| best.is_none_or(|best| it.heat > best.heat)) {
                 core::mem::swap(maps, &mut memory.other);
                 best = Some(look);
             }

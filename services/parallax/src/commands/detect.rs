@@ -14,6 +14,7 @@ use launch::output;
 use offline::library::Library;
 use offline::pictures::{self, Frames, Picture, Pictures, Searched};
 use offline::sheet::{Sheet, Skeleton, limbs};
+use posenetwork::springs::TurnedSprings;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 use skeleton::JointSet;
@@ -50,7 +51,8 @@ Pixels of the whole image as it is seen, the centre of its top-left pixel is (0,
 
 With --network a network of your own says where the keypoints are (docs/networks.md). It looks into the box that --box gives, \
 or into those that --detector finds, as they are; without either into the boxes that the filters find on the picture at 640 \
-pixels (or --size, if smaller), widened by 10 %. It looks into every box by itself, at most --max of them. A detection is then
+pixels (or --size, if smaller), widened by 10 %, and then into the box around who is seen there, as a deployment does; each person \
+is told once, those who are seen best first. It looks into every other box by itself, at most --max of them. A detection is then
     {\"score\": the mean of its joints', \"box\", \"box_from\": \"given\", \"detector\" or \"filters\", \"box_score\" (of a detector),
      \"keypoints\": [{\"name\", \"x\", \"y\", \"score\"}], \"joints\": {name: [x, y]}}
 
@@ -151,8 +153,10 @@ impl Arguments {
         let card = self.detector_card.as_deref();
         let detector = self.detector.as_ref();
         let detector = detector.map(|it| offline::detector::open(it, card));
+        let springs = inputs::springs(Path::new(deployment::SHIPPED))?;
         Ok(Some(Eyes {
             network,
+            springs: TurnedSprings::new(&springs),
             detector: detector.transpose()?,
         }))
     }

@@ -5,8 +5,10 @@ use launch::output;
 use offline::pictures::{Picture, Searched};
 use offline::sheet::{Sheet, Skeleton};
 use offline::{detector, network};
+use posenetwork::springs::TurnedSprings;
 use posenetwork::{
-    Detector as BoxDetector, JointMaps, MapSettings, OF_FILTERS, PoseNetwork, Turn, Workspace,
+    Detector as BoxDetector, JointMaps, LookMemory, MapSettings, OF_FILTERS, PoseNetwork, Turn,
+    Workspace, overlap,
 };
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Map, Value, json};
@@ -15,9 +17,14 @@ use skeleton::PARSE14;
 use super::Detector;
 use crate::commands::network::keypoints_json;
 
+/// Boxes that overlap by more are of one person.
+const SAME: f64 = 0.5;
+
 /// The network that finds keypoints, and the detector of the boxes if there is one.
 pub(super) struct Eyes {
     pub(super) network: PoseNetwork,
+    /// Tell how well a box of the filters fits.
+    pub(super) springs: TurnedSprings,
     pub(super) detector: Option<BoxDetector>,
 }
 
@@ -75,15 +82,30 @@ impl Detector<'_> {
         Ok(Ok(()))
     }
 
-    /// The people, in the order of their boxes: those of whoever found the boxes, the best first.
+    /// The people: in the order of their boxes, or where the filters found these, those who are seen best first, each once.
     fn people(&self, eyes: &Eyes, picture: &Picture) -> Result<(Vec<Person>, From), Failure> {
         let (outlines, from) = self.outlines(eyes, picture)?;
-        let mut workspace = Workspace::default();
-        let people: Result<Vec<Person>, Failure> = outlines
-            .into_iter()
-            .map(|it| Person::seen(&eyes.network, picture, it, &mut workspace))
-            .collect();
-        Ok((people?, from))
+        let mut memory = LookMemory::default();
+        let mut see = |it| match from {
+            From::Filters(_) => Person::seen_closer(eyes, picture, it, &mut memory),
+            From::Given | From::Detector => {
+                Person::seen(&eyes.network, picture, it, memory.workspace())
+            }
+        };
+        let people: Result<Vec<Person>, Failure> = outlines.into_iter().map(&mut see).collect();
+        let mut people = people?;
+        if let From::Filters(_) = from {
+            people.sort_by(|a, b| b.score.total_cmp(&a.score));
+            let mut apart: Vec<Person> = Vec::with_capacity(people.len());
+            for person in people {
+                let is_same = |it: &Person| overlap(it.outline.sides, person.outline.sides) > SAME;
+                if !apart.iter().any(is_same) {
+                    apart.push(person);
+                }
+            }
+            people = apart;
+        }
+        Ok((people, from))
     }
 
     fn outlines(&self, eyes: &Eyes, picture: &Picture) -> Result<(Vec<Outline>, From), Failure> {
@@ -126,7 +148,7 @@ impl Detector<'_> {
         }
         let how = match (from, &eyes.detector) {
             (From::Filters([width, height]), _) => format!(
-                "boxes by the filters at {width}x{height} of {}, widened by {:.0} %",
+                "boxes by the filters at {width}x{height} of {}, widened by {:.0} % and left for closer ones",
                 picture.size,
                 100.0 * OF_FILTERS
             ),
@@ -197,6 +219,22 @@ impl Detector<'_> {
 }
 
 impl Person {
+    /// The box of the filters is left for one that fits better, as in a deployment.
+    fn seen_closer(
+        eyes: &Eyes,
+        picture: &Picture,
+        outline: Outline,
+        memory: &mut LookMemory,
+    ) -> Result<Self, Failure> {
+        let Eyes {
+            network, springs, ..
+        } = eyes;
+        let (sides, turn) = network::closest((network, springs), picture, outline.sides, memory)?;
+        let closer = Outline { sides, ..outline };
+        let (person, _) = Self::turned(network, picture, (closer, turn), memory.workspace())?;
+        Ok(person)
+    }
+
     /// Of who lies, or stands on the hands, the picture is looked at once more, turned; what is seen better counts.
     fn seen(
         network: &PoseNetwork,
