@@ -350,12 +350,14 @@ mod tests {
     fn frames_after_the_last_result_are_listed_up_to_the_end_of_footage() {
         let mut gather = Gather::new(2, 0, 1, false);
         gather.result(&pose3d(0)).unwrap();
+        // Its result came too late; there is none of frame 2, and none of the other view.
+        gather.pose(0, &pose(1));
         for (view, end) in [(0, 3), (1, 2)] {
             let mut last = pose(end);
             last.status = Status::END;
             gather.pose(view, &last);
         }
-        let expected = [(1, "late"), (2, "end of footage, late")];
+        let expected = [(1, "dropped, late"), (2, "dropped, end of footage")];
         assert_eq!(reasons(&gather.rest()), expected);
     }
 
