@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 use common::started::signal;
-use common::{Case, Ended, PACED, Started, planted};
+use common::{Case, Ended, PACED, Started, last_taken, planted};
 use messages::{
     EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, MAX_JOINTS, MAX_KEYPOINTS, MAX_VIEWS,
     PairPose, Pose3d, Searched, Stamp, Status, Timing, ViewPose, topic,
@@ -202,9 +202,8 @@ fn refused(case: &Case, ended: &Ended) -> BTreeSet<String> {
     let lines = case.lines("pose3d.jsonl");
     let last = lines.last().unwrap();
     assert_eq!(last["frame"], N_FRAMES as u64 - 1, "{}", ended.stderr);
-    // Which of the last frames the views take depends on the load: every one, or every second or fourth.
-    let has_both = |it: &Value| it["views_present"].as_array().unwrap().len() == 2;
-    assert!(lines.iter().rev().take(40).any(has_both), "{last}");
+    let last = last_taken(&lines);
+    assert_eq!(last["views_present"].as_array().unwrap().len(), 2, "{last}");
     let processes = report["refused"].as_object().unwrap().iter();
     let all = processes.flat_map(|(process, causes)| {
         let causes = causes.as_object().unwrap().keys();

@@ -14,6 +14,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use geometry::Rig;
 use geometry::files::Format;
 use runtime::Namespace;
+use serde_json::Value;
 use tempfile::TempDir;
 
 pub(crate) use started::{Ended, Started};
@@ -25,6 +26,16 @@ pub(crate) const PLAIN: &str =
 /// The same at 20 frames per second, which leaves time to interfere.
 pub(crate) const PACED: &str = "[capture]\nupright = false\npace = \"realtime\"\n\
      frame_rate_hz = 20\n[results]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
+
+/// The last line of a frame that every view took: on a loaded machine a view takes every second frame, or fourth, and drops the
+/// others.
+pub(crate) fn last_taken(lines: &[Value]) -> &Value {
+    let is_taken = |it: &&Value| {
+        let mut missing = it["views_missing"].as_object().unwrap().values();
+        missing.all(|why| why != "dropped")
+    };
+    lines.iter().rev().find(is_taken).unwrap()
+}
 
 /// Footage, rig, model and deployment file in a folder.
 pub(crate) struct Case {
@@ -139,7 +150,7 @@ impl Case {
     }
 
     /// The complete lines of a results file, also while the run is writing it.
-    pub(crate) fn lines(&self, name: &str) -> Vec<serde_json::Value> {
+    pub(crate) fn lines(&self, name: &str) -> Vec<Value> {
         let whole = self.path("out").join(name);
         let part = self.path("out").join(format!("{name}.part"));
         let text = fs::read_to_string(part).or_else(|_| fs::read_to_string(whole));
