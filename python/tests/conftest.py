@@ -74,7 +74,8 @@ def deploy(executable, live, tmp_path):
     """Starts deployments, and stops them."""
     started = []
 
-    def start(seconds=120, name=None):
+    # Longer than a test takes on a machine that does much else: each is stopped when its test is over.
+    def start(seconds=1800, name=None):
         made = Deployment(executable, tmp_path / f"out-{len(started)}", seconds, name)
         started.append(made)
         return made

@@ -8,14 +8,11 @@ use std::time::Instant;
 
 use client::{Client, ClientError, State, Wish};
 use common::started::signal;
-use common::{Case, PACED, PLAIN};
+use common::{Case, PACED, PLAIN, WATCHDOG};
 use runtime::GuestError;
 use serde_json::Value;
 
 use crate::common;
-
-/// Anything that takes longer is stuck.
-const WATCHDOG: Duration = Duration::from_mins(2);
 
 /// The next moment.
 fn next(client: &mut Client) -> client::Moment {

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 use common::started::signal;
-use common::{Case, Ended, PACED, Started, last_taken, planted};
+use common::{Case, Ended, PACED, Started, WATCHDOG, last_taken, planted};
 use messages::{
     EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, MAX_JOINTS, MAX_KEYPOINTS, MAX_VIEWS,
     PairPose, Pose3d, Searched, Stamp, Status, Timing, ViewPose, topic,
@@ -18,8 +18,6 @@ use runtime::{Bus, Namespace, PortError, Publisher, SlicePublisher, Stop, Waiter
 use serde_json::Value;
 
 const N_FRAMES: usize = 200;
-/// Anything that takes longer is stuck.
-const WATCHDOG: Duration = Duration::from_mins(2);
 
 /// A process of the same user that is not part of the deployment, but has access to its shared memory.
 struct Rogue {

@@ -3,19 +3,15 @@
 
 use crate::common;
 
-use core::time::Duration;
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::Instant;
 
 use common::started::signal;
-use common::{Case, PACED, Started};
+use common::{Case, PACED, Started, WATCHDOG};
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket, client};
-
-/// Anything that takes longer is stuck.
-const PATIENCE: Duration = Duration::from_mins(1);
 
 /// The side of the browser.
 struct Page {
@@ -50,7 +46,7 @@ impl View {
 
     fn open(&self) -> Page {
         let stream = TcpStream::connect(&self.address).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        stream.set_read_timeout(Some(WATCHDOG)).unwrap();
         let (socket, _) = client(format!("ws://{}/ws", self.address), stream).unwrap();
         Page { socket }
     }
@@ -58,7 +54,7 @@ impl View {
     /// Status line and content of what is asked for.
     fn get(&self, path: &str, host: &str, more: &str) -> (u16, String) {
         let mut stream = TcpStream::connect(&self.address).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        stream.set_read_timeout(Some(WATCHDOG)).unwrap();
         let asked =
             format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n{more}\r\n");
         // The other side may have refused and closed before all was sent.
@@ -87,7 +83,7 @@ impl Page {
     fn until<T>(&mut self, what: &str, mut take: impl FnMut(&Message) -> Option<T>) -> T {
         let begin = Instant::now();
         loop {
-            assert!(begin.elapsed() < PATIENCE, "no {what}");
+            assert!(begin.elapsed() < WATCHDOG, "no {what}");
             let message = self.socket.read().unwrap();
             if let Some(taken) = take(&message) {
                 return taken;

@@ -17,7 +17,7 @@ use runtime::Namespace;
 use serde_json::Value;
 use tempfile::TempDir;
 
-pub(crate) use started::{Ended, Started};
+pub(crate) use started::{Ended, Started, WATCHDOG};
 
 /// No overlays and no rotation, so that frames equal the generated pictures.
 pub(crate) const PLAIN: &str =

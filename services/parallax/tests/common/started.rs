@@ -8,8 +8,8 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Anything that takes longer is stuck.
-const WATCHDOG: Duration = Duration::from_mins(4);
+/// Anything that takes longer is stuck, also on a slow machine that does much else.
+pub(crate) const WATCHDOG: Duration = Duration::from_mins(15);
 
 /// A running `parallax`.
 pub(crate) struct Started {
