@@ -100,14 +100,13 @@ fn a_picture_is_searched_with_its_orientation_tag_applied() {
     assert_eq!(lines[1]["detections"], lines[0]["detections"]);
     let drawn = |name: &str| image::open(case.path("drawn").join(name)).unwrap();
     assert_eq!(drawn("turned.png").width(), 96);
-    let ended = case
-        .start(&["detect", "turned.png", "--model", "model.plx"])
-        .wait();
-    assert!(
-        ended.stdout.contains("90 degrees to the right"),
-        "{}",
-        ended.stdout
-    );
+    for by in [["--model", "model.plx"], ["--box", "0,0,90,120"]] {
+        let ended = case
+            .start(&[&["detect", "turned.png"], &by[..]].concat())
+            .wait();
+        let said = "90 degrees to the right";
+        assert!(ended.stdout.contains(said), "{by:?}: {}", ended.stdout);
+    }
 
     // A calibration refers to the pixels as stored: a deployment does not apply the tag, and reports that.
     fs::copy(case.path("turned.png"), case.path("a/0000.png")).unwrap();

@@ -265,11 +265,8 @@ fn with_the_network_that_ships_everybody_is_found_once_and_where_they_are() {
     };
     for camera in rig.cameras() {
         let picture = format!("room/cameras/{}/000000.png", camera.name);
-        let ended = run(
-            &case,
-            &["detect", &picture, "--network", "shipped", "--json"],
-        );
-        let line = json(&ended);
+        let line = json(&run(&case, &["detect", &picture, "--json"]));
+        assert_eq!(line["network"], "shipped", "{line:#}");
         let found = line["detections"].as_array().unwrap();
         assert_eq!(found.len(), 1, "{line:#}");
         let distance = |joint: &str, of: &str| {
@@ -388,6 +385,26 @@ fn a_network_that_is_cut_short_or_gives_no_numbers_is_refused() {
             assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
         }
     }
-    let ended = run(&case, &["detect", "blocks.png", "--box", "0,0,9,9"]);
-    assert_eq!(ended.status.code(), Some(2), "a box without a network");
+}
+
+#[test]
+fn what_is_about_a_network_is_refused_where_the_filters_find_the_parts_and_the_other_way_round() {
+    let case = case("network-or-filters");
+    let bring = ["--network", "net.onnx", "--card", "card.toml"];
+    for (more, words) in [
+        (&["--network", "none", "--box", "0,0,9,9"][..], "--box"),
+        (&["--model", "model.plx", "--mirror"], "--mirror"),
+        (&[&bring[..], &["--joints", "umpm15"]].concat(), "--joints"),
+    ] {
+        let ended = run(&case, &[&["detect", "blocks.png"], more].concat());
+        assert_eq!(ended.status.code(), Some(2), "{more:?}: {}", ended.stderr);
+        assert!(ended.stderr.contains(words), "{more:?}: {}", ended.stderr);
+    }
+    for more in [&["--network", "none"][..], &["--model", "model.plx"]] {
+        let line = json(&run(
+            &case,
+            &[&["detect", "a/0000.png", "--json"], more].concat(),
+        ));
+        assert!(line["network"].is_null(), "{line}");
+    }
 }

@@ -17,7 +17,7 @@ use offline::sheet::{Sheet, Skeleton, limbs};
 use posenetwork::springs::TurnedSprings;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
-use skeleton::JointSet;
+use skeleton::{JointSet, PARSE14};
 
 use super::network::{Outline, outline};
 use crate::describe::{self, NamedJoints, Placed};
@@ -44,17 +44,21 @@ person each (PARSE, every second of 101-200) it finds something in 48, and exact
 with 0 none; others about three times as many. Of \
 another model it is the trained one, but at most -1.
 
-With --json one line per image, best detection first:
-    {\"image\", \"frame\" (of videos), \"width\", \"height\", \"searched\": [width, height], \"detections\": [{\"score\",
-     \"level\", \"scale\", \"parts\": [{\"x\", \"y\", \"type\", \"box\": [x1, y1, x2, y2]}], \"joints\": {name: [x, y]}}]}
-Pixels of the whole image as it is seen, the centre of its top-left pixel is (0, 0); types and levels count from 1.
+The filters find who is there, and the network that ships says where the joints are, better than their parts do \
+(`model judge` on PARSE 101-200: 80.6 % of the limbs, by the parts 73.9 %). It looks into every box of the filters, widened by 10 %, and then into the \
+box around who is seen there, as a deployment does; each person is told once, those who are seen best first. How well somebody is \
+seen does not tell whether it is somebody: that is what --threshold is for. --network names a network of your own (docs/networks.md). \
+Into a box that --box gives, or those that --detector finds, it looks as they are, at most --max of them.
+With --network none the parts of the filters are told, as with --model, --precision, --joints and --joint-map.
 
-With --network a network of your own says where the keypoints are (docs/networks.md). It looks into the box that --box gives, \
-or into those that --detector finds, as they are; without either into the boxes that the filters find on the picture at 640 \
-pixels (or --size, if smaller), widened by 10 %, and then into the box around who is seen there, as a deployment does; each person \
-is told once, those who are seen best first. It looks into every other box by itself, at most --max of them. A detection is then
-    {\"score\": the mean of its joints', \"box\", \"box_from\": \"given\", \"detector\" or \"filters\", \"box_score\" (of a detector),
-     \"keypoints\": [{\"name\", \"x\", \"y\", \"score\"}], \"joints\": {name: [x, y]}}
+With --json one line per image, best detection first:
+    {\"image\", \"frame\" (of videos), \"width\", \"height\", \"network\", \"searched\": [width, height], \"detections\": [{\"score\": the
+     mean of its joints', \"box\": [x1, y1, x2, y2], \"box_from\": \"given\", \"detector\" or \"filters\", \"box_score\" (of a detector),
+     \"keypoints\": [{\"name\", \"x\", \"y\", \"score\"}], \"joints\": {name: [x, y]}}]}
+and by the filters alone
+    {\"image\", \"frame\", \"width\", \"height\", \"searched\", \"detections\": [{\"score\", \"level\", \"scale\",
+     \"parts\": [{\"x\", \"y\", \"type\", \"box\": [x1, y1, x2, y2]}], \"joints\": {name: [x, y]}}]}
+Pixels of the whole image as it is seen, the centre of its top-left pixel is (0, 0); types and levels count from 1.
 
 Examples:
     parallax detect photo.jpg
@@ -103,34 +107,34 @@ pub(crate) struct Arguments {
     /// files, numbered before the extension.
     #[arg(long, value_name = "FILE")]
     sheet: Option<PathBuf>,
-    /// Joints: parse14, umpm15 or humaneva20.
-    #[arg(long, value_name = "NAME", default_value = "parse14", value_parser = describe::joint_set)]
-    joints: &'static JointSet,
-    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
-    /// "none": a joint is the centre of its part, as for other models.
-    #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
-    joint_map: PathBuf,
-    /// Precision of the filter responses: f32, or bf16, which is faster, changes scores by some thousandths and needs a
-    /// processor with AMX.
-    #[arg(long, value_name = "NAME", default_value = "f32", value_parser = precision)]
-    precision: Precision,
-    /// Keypoints by this network (.onnx) in place of the filters' parts; "shipped": the one that ships.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["joints", "joint_map"])]
+    /// Joints of the filters: parse14 (if not given), umpm15 or humaneva20.
+    #[arg(long, value_name = "NAME", value_parser = describe::joint_set)]
+    joints: Option<&'static JointSet>,
+    /// Where joints lie among the filters' parts: a file that `train joints` made; "shipped" (if not given): the one for the
+    /// model that ships; "none": a joint is the centre of its part, as for other models.
+    #[arg(long, value_name = "FILE")]
+    joint_map: Option<PathBuf>,
+    /// Precision of the filter responses: f32 (if not given), or bf16, which is faster, changes scores by some thousandths and
+    /// needs a processor with AMX.
+    #[arg(long, value_name = "NAME", value_parser = precision)]
+    precision: Option<Precision>,
+    /// Keypoints by this network (.onnx); "shipped": the one that ships; "none": parts by the filters. If not given, the one that
+    /// ships, unless --model, --precision, --joints or --joint-map is.
+    #[arg(long, value_name = "FILE")]
     network: Option<PathBuf>,
     /// The card of the network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
     #[arg(long, value_name = "CARD", requires = "network")]
     card: Option<PathBuf>,
     /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the filters find it.
-    #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, requires = "network", allow_hyphen_values = true)]
+    #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, allow_hyphen_values = true)]
     outline: Option<Outline>,
     /// The network looks at the mirror image of every person as well: more exact, and takes its time twice.
-    #[arg(long, requires = "network")]
+    #[arg(long)]
     mirror: bool,
     /// Boxes by this detector of people (.onnx) in place of the filters.
     #[arg(
         long,
         value_name = "FILE",
-        requires = "network",
         conflicts_with_all = ["outline", "model", "threshold", "overlap", "size", "full", "precision"]
     )]
     detector: Option<PathBuf>,
@@ -140,12 +144,58 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// The network, if one is named, and the detector.
-    fn eyes(&self) -> Result<Option<Eyes>, Failure> {
-        let Some(file) = &self.network else {
+    /// The network that finds the keypoints; none: the filters do.
+    ///
+    /// # Errors
+    ///
+    /// An option of the one, where the other does it.
+    fn network(&self) -> Result<Option<&Path>, Failure> {
+        let of_filters = [
+            (self.joints.is_some(), "--joints"),
+            (self.joint_map.is_some(), "--joint-map"),
+            (self.model.is_some(), "--model"),
+            (self.precision.is_some(), "--precision"),
+        ];
+        let of_network = [
+            (self.outline.is_some(), "--box"),
+            (self.mirror, "--mirror"),
+            (self.detector.is_some(), "--detector"),
+            (self.card.is_some(), "--card"),
+        ];
+        let given = |options: &[(bool, &'static str)]| {
+            let mut given = options.iter().filter(|it| it.0);
+            given.next().map(|it| it.1)
+        };
+        let network = match self.network.as_deref() {
+            Some(file) => (!deployment::is_none(file)).then_some(file),
+            None => given(&of_filters)
+                .is_none()
+                .then(|| Path::new(deployment::SHIPPED)),
+        };
+        let wrong =
+            match network {
+                // The model and its precision are those of the filters that find the boxes.
+                Some(_) => given(&of_filters[..2])
+                    .map(|it| (it, "the filters' parts", "a network", "none")),
+                None => given(&of_network)
+                    .map(|it| (it, "a network", "the filters", deployment::SHIPPED)),
+            };
+        match wrong {
+            None => Ok(network),
+            Some((option, of, by, other)) => {
+                let message = format!("{option} is about {of}, but {by} finds the keypoints here");
+                let hint = format!("leave {option} out, or give --network {other}");
+                Err(Failure::new(ExitKind::Usage, message).with_hint(hint))
+            }
+        }
+    }
+
+    /// The network, unless the filters find the parts, and the detector.
+    fn eyes(&self, network: Option<&Path>) -> Result<Option<Eyes>, Failure> {
+        let Some(file) = network else {
             return Ok(None);
         };
-        let named = (file.as_path(), self.card.as_deref());
+        let named = (file, self.card.as_deref());
         let mut network = inputs::open_network(named, &Library::BuiltIn)?.fitted()?;
         if self.mirror {
             network = inputs::mirrored(network, "--mirror")?;
@@ -155,19 +205,11 @@ impl Arguments {
         let detector = detector.map(|it| offline::detector::open(it, card));
         let springs = inputs::springs(Path::new(deployment::SHIPPED))?;
         Ok(Some(Eyes {
+            file: file.to_path_buf(),
             network,
             springs: TurnedSprings::new(&springs),
             detector: detector.transpose()?,
         }))
-    }
-
-    /// The longest side that is searched; none: all pixels.
-    fn longest(&self) -> Option<usize> {
-        let size = match self.network {
-            Some(_) => self.size.min(pictures::BOXES_PX),
-            None => self.size,
-        };
-        (!self.full).then_some(size)
     }
 
     /// The frames of a video to search.
@@ -204,20 +246,25 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         None => SHIPPED_THRESHOLD,
         Some(_) => model.detection_threshold(),
     };
-    let joints = Joints::of(&arguments.joint_map, arguments.model.as_deref())?;
+    let network = arguments.network()?;
+    let joint_map = arguments.joint_map.as_deref();
+    let joint_map = joint_map.unwrap_or(Path::new(deployment::SHIPPED));
+    let joints = Joints::of(joint_map, arguments.model.as_deref())?;
+    let set = arguments.joints.unwrap_or(&PARSE14);
+    let precision = arguments.precision.unwrap_or(Precision::F32);
     let detector = Detector {
         arguments,
         joints: NamedJoints {
-            set: arguments.joints,
-            map: joints.map(None, arguments.joints),
+            set,
+            map: joints.map(None, set),
         },
         settings: CandidateSettings {
             threshold: arguments.threshold.unwrap_or(default) as f32,
             overlap: arguments.overlap,
             max: arguments.max,
         },
-        search: Search::in_precision(arguments.precision, model).or_fail(ExitKind::Usage)?,
-        eyes: arguments.eyes()?,
+        search: Search::in_precision(precision, model).or_fail(ExitKind::Usage)?,
+        eyes: arguments.eyes(network)?,
     };
     if let Some(folder) = &arguments.overlay {
         inputs::make_folder(folder)?;
@@ -298,7 +345,7 @@ impl Detector<'_> {
                 }
                 continue;
             }
-            let size = self.arguments.longest();
+            let size = self.longest();
             let searched = match Searched::new(&picture, size, &self.search) {
                 Ok(searched) => searched,
                 Err(failure) => return Ok(Err(failure)),
@@ -312,6 +359,11 @@ impl Detector<'_> {
                 sheet.add(&picture.title(), picture.size, &picture.rgb, best.as_ref())?;
             }
         }
+    }
+
+    /// The longest side that is searched; none: all pixels.
+    fn longest(&self) -> Option<usize> {
+        (!self.arguments.full).then_some(self.arguments.size)
     }
 
     fn report(

@@ -1,5 +1,7 @@
 //! People in boxes, by a network that finds keypoints. The boxes are given, or found by a detector or by the filters.
 
+use std::path::PathBuf;
+
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use launch::output;
 use offline::pictures::{Picture, Searched};
@@ -22,6 +24,8 @@ const SAME: f64 = 0.5;
 
 /// The network that finds keypoints, and the detector of the boxes if there is one.
 pub(super) struct Eyes {
+    /// As it is named on the command line.
+    pub(super) file: PathBuf,
     pub(super) network: PoseNetwork,
     /// Tell how well a box of the filters fits.
     pub(super) springs: TurnedSprings,
@@ -122,7 +126,7 @@ impl Detector<'_> {
             });
             return Ok((outlines.collect(), From::Detector));
         }
-        let searched = Searched::new(picture, self.arguments.longest(), &self.search)?;
+        let searched = Searched::new(picture, self.longest(), &self.search)?;
         let found = self.detect(searched.image(picture)?, searched.layout());
         let model = &self.search.model;
         let outlines = found.iter().map(|it| plain(searched.outline(model, it)));
@@ -136,7 +140,8 @@ impl Detector<'_> {
         (eyes, from): (&Eyes, From),
         found: &[Person],
     ) -> Result<(), Failure> {
-        if found.is_empty() {
+        // Who named no network hears of the filters as before: by the number of detections.
+        if found.is_empty() && self.arguments.network.is_some() {
             output::message(format_args!(
                 "{}: {}, so the network was not asked; --box says where to look",
                 picture.title(),
@@ -144,7 +149,7 @@ impl Detector<'_> {
             ));
         }
         if self.arguments.json {
-            return self.report_json(picture, from, found);
+            return self.report_json(picture, (eyes, from), found);
         }
         let how = match (from, &eyes.detector) {
             (From::Filters([width, height]), _) => format!(
@@ -155,13 +160,17 @@ impl Detector<'_> {
             (From::Detector, Some(boxes)) => format!("boxes by {}", boxes.card().name),
             _ => "box given".to_owned(),
         };
+        let turned = match picture.turn.is_none() {
+            true => String::new(),
+            false => format!("; {}", picture.turn),
+        };
         let n = found.len();
         let detections = if n == 1 { "detection" } else { "detections" };
         let frame = picture
             .frame
             .map_or(String::new(), |it| format!(" frame {it}"));
         output::line(format_args!(
-            "{}{frame}: {n} {detections} by the network; {how}",
+            "{}{frame}: {n} {detections} by the network; {how}{turned}",
             picture.path.display()
         ))?;
         for person in found {
@@ -177,7 +186,12 @@ impl Detector<'_> {
         Ok(())
     }
 
-    fn report_json(&self, picture: &Picture, from: From, found: &[Person]) -> Result<(), Failure> {
+    fn report_json(
+        &self,
+        picture: &Picture,
+        (eyes, from): (&Eyes, From),
+        found: &[Person],
+    ) -> Result<(), Failure> {
         let (from, searched) = match from {
             From::Given => ("given", None),
             From::Detector => ("detector", None),
@@ -188,7 +202,7 @@ impl Detector<'_> {
             "image": picture.path,
             "width": picture.size.width,
             "height": picture.size.height,
-            "network": self.arguments.network,
+            "network": eyes.file,
             "searched": searched,
             "detections": detections,
         });
