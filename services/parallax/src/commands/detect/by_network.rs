@@ -160,9 +160,10 @@ impl Detector<'_> {
             (From::Detector, Some(boxes)) => format!("boxes by {}", boxes.card().name),
             _ => "box given".to_owned(),
         };
-        let turned = match picture.turn.is_none() {
-            true => String::new(),
-            false => format!("; {}", picture.turn),
+        let turned = if picture.turn.is_none() {
+            String::new()
+        } else {
+            format!("; {}", picture.turn)
         };
         let n = found.len();
         let detections = if n == 1 { "detection" } else { "detections" };
