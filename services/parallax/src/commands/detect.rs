@@ -241,31 +241,7 @@ fn precision(name: &str) -> Result<Precision, String> {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let model = inputs::model_or_shipped(arguments.model.as_deref())?;
-    let default = match arguments.model {
-        None => SHIPPED_THRESHOLD,
-        Some(_) => model.detection_threshold(),
-    };
-    let network = arguments.network()?;
-    let joint_map = arguments.joint_map.as_deref();
-    let joint_map = joint_map.unwrap_or(Path::new(deployment::SHIPPED));
-    let joints = Joints::of(joint_map, arguments.model.as_deref())?;
-    let set = arguments.joints.unwrap_or(&PARSE14);
-    let precision = arguments.precision.unwrap_or(Precision::F32);
-    let detector = Detector {
-        arguments,
-        joints: NamedJoints {
-            set,
-            map: joints.map(None, set),
-        },
-        settings: CandidateSettings {
-            threshold: arguments.threshold.unwrap_or(default) as f32,
-            overlap: arguments.overlap,
-            max: arguments.max,
-        },
-        search: Search::in_precision(precision, model).or_fail(ExitKind::Usage)?,
-        eyes: arguments.eyes(network)?,
-    };
+    let detector = Detector::new(arguments)?;
     if let Some(folder) = &arguments.overlay {
         inputs::make_folder(folder)?;
     }
@@ -314,6 +290,37 @@ struct Detector<'a> {
     search: Search,
     settings: CandidateSettings,
     eyes: Option<Eyes>,
+}
+
+impl<'a> Detector<'a> {
+    /// Reads the model, the joints and the network.
+    fn new(arguments: &'a Arguments) -> Result<Self, Failure> {
+        let model = inputs::model_or_shipped(arguments.model.as_deref())?;
+        let threshold = match arguments.model {
+            None => SHIPPED_THRESHOLD,
+            Some(_) => model.detection_threshold(),
+        };
+        let network = arguments.network()?;
+        let joint_map = arguments.joint_map.as_deref();
+        let joint_map = joint_map.unwrap_or(Path::new(deployment::SHIPPED));
+        let joints = Joints::of(joint_map, arguments.model.as_deref())?;
+        let set = arguments.joints.unwrap_or(&PARSE14);
+        let precision = arguments.precision.unwrap_or(Precision::F32);
+        Ok(Self {
+            arguments,
+            joints: NamedJoints {
+                set,
+                map: joints.map(None, set),
+            },
+            settings: CandidateSettings {
+                threshold: arguments.threshold.unwrap_or(threshold) as f32,
+                overlap: arguments.overlap,
+                max: arguments.max,
+            },
+            search: Search::in_precision(precision, model).or_fail(ExitKind::Usage)?,
+            eyes: arguments.eyes(network)?,
+        })
+    }
 }
 
 impl Detector<'_> {
