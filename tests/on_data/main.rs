@@ -1,6 +1,6 @@
 //! Tests on real data: they run only where the data folder lies beside the repository.
 //!
-//! `cargo test --release -p system-tests --features data --test on_data`
+//! `cargo test --workspace --features system-tests/data --test on_data`
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(
