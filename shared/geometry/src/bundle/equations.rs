@@ -163,12 +163,15 @@ impl Equations {
             let lower = factor.l_dirty();
             lower.solve_lower_triangular_mut(&mut half);
             lower.solve_lower_triangular_mut(&mut of_gradient);
-            let square = half.tr_mul(&half);
-            let share = half.tr_mul(&of_gradient);
+            // The product of the half with itself: one triangle, which is the other as well.
             for (i, row) in block.shared.iter().enumerate() {
-                gradient[*row] -= share[i];
-                for (j, column) in block.shared.iter().enumerate() {
-                    matrix[(*row, *column)] -= square[(i, j)];
+                let of_row = half.column(i);
+                gradient[*row] -= of_row.dot(&of_gradient);
+                matrix[(*row, *row)] -= of_row.dot(&of_row);
+                for (j, column) in block.shared.iter().enumerate().take(i) {
+                    let square = of_row.dot(&half.column(j));
+                    matrix[(*row, *column)] -= square;
+                    matrix[(*column, *row)] -= square;
                 }
             }
             factors.push(factor);
