@@ -4,6 +4,7 @@
 //!   teacher found.
 //! * [`varied`], [`plain`]: what the network is shown of a person, and what it should find.
 //! * `Trainer`: learns from people, step by step (with the feature `burn`; `libtorch` for real trainings).
+//! * `begun`: the parameters of a network that was trained before, to go on from.
 //! * [`write()`]: the trained network as an ONNX file.
 //! * [`Score`]: how good it is on people.
 //!
@@ -24,10 +25,14 @@ mod settings;
 mod vary;
 
 #[cfg(feature = "burn")]
+mod begun;
+#[cfg(feature = "burn")]
 mod learn;
 #[cfg(feature = "burn")]
 mod trainer;
 
+#[cfg(feature = "burn")]
+pub use begun::{BeginError, begun};
 pub use card::{About, card};
 #[cfg(feature = "burn")]
 pub use learn::{Batch, Cost, Found, Learner, Memory, Step};

@@ -97,7 +97,9 @@ pub enum TrainError {
     #[error("the checkpoint cannot be read")]
     Decode(#[from] bincode::error::DecodeError),
     /// It is of another training.
-    #[error("the checkpoint is of a training with other people or settings")]
+    #[error(
+        "the checkpoint is of a training with other people or settings, or from another network"
+    )]
     Other,
 }
 
@@ -115,6 +117,7 @@ impl<'a> Trainer<'a> {
     /// Prepares a training, from the start or from a checkpoint.
     ///
     /// * `learnt`, `kept`: people to learn from, and others, on whom it is judged and on whom the expected error is learned.
+    /// * `from`: the parameters of [`begun`](crate::begun) to begin with, in place of random ones.
     /// * `checkpoint`: bytes of [`Self::checkpoint`].
     ///
     /// # Errors
@@ -123,13 +126,14 @@ impl<'a> Trainer<'a> {
     pub fn new(
         (settings, backend): (&'a Settings, Backend),
         [learnt, kept]: [&'a [Person]; 2],
+        from: Option<Vec<Parameter>>,
         checkpoint: Option<&[u8]>,
     ) -> Result<Self, TrainError> {
         if learnt.is_empty() || kept.is_empty() {
             let [learnt, kept] = [learnt.len(), kept.len()];
             return Err(TrainError::TooFew { learnt, kept });
         }
-        let stamp = stamp(settings, [learnt, kept]);
+        let stamp = stamp(settings, [learnt, kept], from.as_deref());
         let state = match checkpoint {
             Some(bytes) => {
                 let config = bincode::config::standard();
@@ -140,12 +144,15 @@ impl<'a> Trainer<'a> {
                 }
                 state
             }
-            None => State {
-                stamp,
-                memory: Memory::new(initial(&settings.shape, settings.seed)),
-                step: 0,
-                passes: Vec::new(),
-            },
+            None => {
+                let begin = || initial(&settings.shape, settings.seed);
+                State {
+                    stamp,
+                    memory: Memory::new(from.unwrap_or_else(begin)),
+                    step: 0,
+                    passes: Vec::new(),
+                }
+            }
         };
         Ok(Self {
             settings,
@@ -400,11 +407,14 @@ fn judged(
 }
 
 /// A hash of everything that the result depends on.
-fn stamp(settings: &Settings, people: [&[Person]; 2]) -> u64 {
+fn stamp(settings: &Settings, people: [&[Person]; 2], from: Option<&[Parameter]>) -> u64 {
     let mut bytes = format!("{settings:?}").into_bytes();
     for it in people.into_iter().flatten() {
         bytes.extend(checksum::fnv1a(&it.rgb).to_le_bytes());
         bytes.extend(format!("{:?}{:?}", it.targets, it.front).into_bytes());
+    }
+    for value in from.into_iter().flatten().flat_map(|it| &it.values) {
+        bytes.extend(value.to_bits().to_le_bytes());
     }
     checksum::fnv1a(&bytes)
 }

@@ -80,7 +80,7 @@ fn it_learns_and_a_training_that_was_interrupted_ends_with_the_same_bits() {
     let settings = small();
     let new = |checkpoint: Option<&[u8]>| {
         let how = (&settings, Backend::Flex);
-        Trainer::new(how, [&learnt, &kept], checkpoint).unwrap()
+        Trainer::new(how, [&learnt, &kept], None, checkpoint).unwrap()
     };
     let mut whole = new(None);
     for _ in 0..4 {
@@ -120,7 +120,7 @@ fn both_backends_learn_the_same() {
         ..small()
     };
     let [flex, torch] = [Backend::Flex, Backend::LibTorch].map(|backend| {
-        let mut trainer = Trainer::new((&settings, backend), [&learnt, &kept], None).unwrap();
+        let mut trainer = Trainer::new((&settings, backend), [&learnt, &kept], None, None).unwrap();
         // Six steps of everything, four of the expected error alone.
         for _ in 0..10 {
             assert!(trainer.pass(1, false, &mut |_| true));
@@ -172,7 +172,7 @@ fn the_file_that_is_written_finds_what_the_trained_network_found() {
     let people = people(6, 4);
     let settings = small();
     let how = (&settings, Backend::Flex);
-    let mut trainer = Trainer::new(how, [&people[..5], &people[5..]], None).unwrap();
+    let mut trainer = Trainer::new(how, [&people[..5], &people[5..]], None, None).unwrap();
     assert!(trainer.pass(30, false, &mut |_| true));
     let sample = plain(&people[0], &settings.shape).unwrap();
     let found = trainer.find(1, &sample.picture);
@@ -214,10 +214,10 @@ fn a_checkpoint_that_was_changed_or_is_of_another_training_is_refused() {
     let settings = small();
     let new = |settings: &Settings, bytes: Option<&[u8]>| {
         let how = (settings, Backend::Flex);
-        Trainer::new(how, [&people[..3], &people[3..]], bytes).map(|it| it.step())
+        Trainer::new(how, [&people[..3], &people[3..]], None, bytes).map(|it| it.step())
     };
     let how = (&settings, Backend::Flex);
-    let whole = Trainer::new(how, [&people[..3], &people[3..]], None).unwrap();
+    let whole = Trainer::new(how, [&people[..3], &people[3..]], None, None).unwrap();
     let bytes = whole.checkpoint().unwrap();
     assert_eq!(new(&settings, Some(&bytes)).unwrap(), 0);
     let mut changed = bytes.clone();
@@ -231,4 +231,69 @@ fn a_checkpoint_that_was_changed_or_is_of_another_training_is_refused() {
     };
     let refused = new(&other, Some(&bytes)).unwrap_err().to_string();
     assert!(refused.contains("other people or settings"), "{refused}");
+    let from = networktraining::begun(&settings.shape, 1, &whole.onnx(&[])).unwrap();
+    let begun = Trainer::new(how, [&people[..3], &people[3..]], Some(from), Some(&bytes));
+    let refused = begun.unwrap_err().to_string();
+    assert!(refused.contains("from another network"), "{refused}");
+}
+
+#[test]
+fn a_training_goes_on_from_a_network_that_was_written() {
+    let people = people(6, 4);
+    let settings = small();
+    let (how, shown) = ((&settings, Backend::Flex), [&people[..5], &people[5..]]);
+    let mut trainer = Trainer::new(how, shown, None, None).unwrap();
+    assert!(trainer.pass(30, false, &mut |_| true));
+    let file = trainer.onnx(&[]);
+    let from = networktraining::begun(&settings.shape, 7, &file).unwrap();
+    let mut begun = Trainer::new(how, shown, Some(from), None).unwrap();
+    let sample = plain(&people[0], &settings.shape).unwrap();
+    let [before, after] = [&trainer, &begun].map(|it| it.find(1, &sample.picture).maps);
+    let scale = before.iter().fold(0.0f32, |most, it| most.max(it.abs()));
+    for (a, b) in before.iter().zip(&after) {
+        assert!((a - b).abs() < 0.01 * scale, "{a} and {b} of {scale}");
+    }
+    assert!(begun.pass(4, false, &mut |_| true));
+    let [first, on] = [&trainer, &begun].map(|it| it.passes()[0].cost.maps);
+    assert!(on < 0.9 * first, "it has not begun anew: {on}, {first}");
+}
+
+#[test]
+fn a_file_that_is_not_such_a_network_is_refused_with_what_it_lacks() {
+    let settings = small();
+    let file = networktraining::write(
+        &settings.shape,
+        &networktraining::initial(&settings.shape, 1),
+        &[],
+    );
+    let refused = |shape: &Shape, file: &[u8]| {
+        let refused = networktraining::begun(shape, 1, file).unwrap_err();
+        refused.to_string()
+    };
+    networktraining::begun(&settings.shape, 1, &file).unwrap();
+    let wider = Shape {
+        stem: 16,
+        ..settings.shape.clone()
+    };
+    let said = refused(&wider, &file);
+    assert!(
+        said.contains("stem1.weight") && said.contains("[8, 3, 3, 3]"),
+        "{said}"
+    );
+    let deeper = Shape {
+        blocks: [1, 1, 1, 2],
+        ..settings.shape.clone()
+    };
+    let said = refused(&deeper, &file);
+    assert!(said.contains("level3.1.narrow.weight"), "{said}");
+    for n in [0, 1, 100, file.len() / 2] {
+        refused(&settings.shape, &file[..n]);
+    }
+    refused(&settings.shape, b"no network");
+    // The last bytes of a weight as what is not a number.
+    let mut broken = file.clone();
+    let middle = broken.len() / 2;
+    broken[middle..middle + 64].fill(0xff);
+    let said = refused(&settings.shape, &broken);
+    assert!(!said.is_empty(), "{said}");
 }

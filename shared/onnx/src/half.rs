@@ -22,22 +22,22 @@ pub(crate) fn bits_of(value: f32) -> u16 {
     sign | ((kept + 0xfff + is_odd) >> 13) as u16
 }
 
+/// The value of bits of half precision.
+pub fn value_of(bits: u16) -> f32 {
+    let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
+    let exponent = i32::from(bits >> 10 & 31);
+    let fraction = f32::from(bits & 0x3ff) / 1024.0;
+    sign * match exponent {
+        0 => fraction * 2.0_f32.powi(-14),
+        31 if fraction == 0.0 => f32::INFINITY,
+        31 => f32::NAN,
+        _ => (1.0 + fraction) * 2.0_f32.powi(exponent - 15),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The value of bits of half precision.
-    fn value_of(bits: u16) -> f32 {
-        let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
-        let exponent = i32::from(bits >> 10 & 31);
-        let fraction = f32::from(bits & 0x3ff) / 1024.0;
-        sign * match exponent {
-            0 => fraction * 2.0_f32.powi(-14),
-            31 if fraction == 0.0 => f32::INFINITY,
-            31 => f32::NAN,
-            _ => (1.0 + fraction) * 2.0_f32.powi(exponent - 15),
-        }
-    }
 
     #[test]
     fn every_half_number_keeps_its_bits() {

@@ -6,6 +6,7 @@
 mod half;
 mod message;
 
+pub use half::value_of as value_of_half;
 use message::Message;
 
 const IR_VERSION: i64 = 8;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use networktraining::{About, Backend, Pass, Score, Settings, Trainer};
+use networktraining::{About, Backend, Parameter, Pass, Score, Settings, Trainer};
 use report::curves::{self, Line, Panel};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
@@ -16,15 +16,34 @@ const STEPS: usize = 100;
 /// Passes of so many steps between two looks at the people who are kept apart.
 const JUDGED: usize = 10;
 
+/// A network that was trained before.
+#[derive(Debug, Clone)]
+pub struct From {
+    /// Its file, for errors.
+    pub file: PathBuf,
+    /// The bytes of the file.
+    pub bytes: Vec<u8>,
+}
+
 /// What is written, and how.
 #[derive(Debug, Clone)]
 pub struct Job {
     /// The ONNX file.
     pub out: PathBuf,
+    /// A network that was trained before, to go on from.
+    pub from: Option<From>,
     /// Whether to go on from the checkpoint of an interrupted training.
     pub resume: bool,
     /// What calculates.
     pub backend: Backend,
+}
+
+/// The parameters of a network that was trained before.
+fn begun(from: &From, settings: &Settings) -> Result<Vec<Parameter>, Failure> {
+    networktraining::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
+        let hint = "--from takes a network of `train network` that has the `shape` of the settings";
+        runtime::in_file(&from.file, &error).with_hint(hint)
+    })
 }
 
 /// A file beside the one that is written.
@@ -93,7 +112,9 @@ pub fn train(
     };
     let how = (settings, job.backend);
     let learnt = [people.learnt.as_slice(), people.kept.as_slice()];
-    let mut trainer = Trainer::new(how, learnt, kept.as_deref()).or_fail(ExitKind::Input)?;
+    let from = job.from.as_ref().map(|it| begun(it, settings));
+    let mut trainer =
+        Trainer::new(how, learnt, from.transpose()?, kept.as_deref()).or_fail(ExitKind::Input)?;
     let (began, from) = (Instant::now(), trainer.step());
     while trainer.step() < trainer.n_steps() {
         let to_end_of = |end: usize| end.saturating_sub(trainer.step());

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+#[cfg(feature = "train-quality")]
+use launch::Shipped;
 use launch::output;
 use networktraining::Settings;
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -16,6 +18,9 @@ the expected error of every joint; the ONNX file carries its card.
 
 After every hundred steps everything that the training knows is in OUT.checkpoint: what is stopped by Ctrl-C, or killed, goes on with \
 --resume and ends with the same network, bit for bit, on the same kind of machine.
+
+--from trains a network further: give a lower `rate` in --settings then, half of the default or less, or what it knows is lost before \
+it learns anew. --from shipped means the network that ships.
 
 A real training needs LibTorch: build with --features libtorch (docs/guide/train.md says how). The built-in backend is \
 many times slower, and for small trainings.
@@ -51,6 +56,9 @@ pub(crate) struct Arguments {
     /// What calculates: `flex`, built in; `libtorch`, if this executable was built with it.
     #[arg(long, value_name = "NAME", default_value = "flex", value_parser = ["flex", "libtorch"])]
     backend: String,
+    /// A network of this command to go on from, in place of random weights: more steps, or people of your own.
+    #[arg(long, value_name = "NETWORK")]
+    from: Option<PathBuf>,
     /// Continue from the checkpoint of an interrupted training; start anew if there is none.
     #[arg(long)]
     resume: bool,
@@ -83,6 +91,7 @@ fn train(
     let terminal = Terminal::without_bar(globals.quiet || arguments.json, arguments.json);
     let job = posetraining::Job {
         out: arguments.out.clone().unwrap_or_default(),
+        from: arguments.from.as_deref().map(from).transpose()?,
         resume: arguments.resume,
         backend: backend(&arguments.backend)?,
     };
@@ -94,6 +103,15 @@ fn train(
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The network to go on from.
+#[cfg(feature = "train-quality")]
+fn from(file: &std::path::Path) -> Result<offline::posetraining::From, Failure> {
+    Ok(offline::posetraining::From {
+        bytes: Shipped::PoseNetwork.read(file)?.into_owned(),
+        file: file.to_path_buf(),
+    })
 }
 
 #[cfg(feature = "train-quality")]
