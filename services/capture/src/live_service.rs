@@ -27,6 +27,8 @@ struct Live<'a, 'b> {
     source: Source,
     grid: Grid,
     phase: Phase,
+    /// Whether the camera's own clock says when its pictures are taken.
+    is_own_time: bool,
     guard: Guard,
     counts: CameraCounts,
     /// The next instant.
@@ -60,6 +62,7 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
         wanted: live,
         source: Source::start(&live.camera, live.size, kept.as_ref().map(Kept::originals))?,
         phase: Phase::new(grid.period_nanos()),
+        is_own_time: false,
         grid,
         guard: Guard::new(job.frozen_after, Some(live.rate_hz)),
         counts: CameraCounts::default(),
@@ -131,6 +134,10 @@ impl Live<'_, '_> {
         let index = self.index(nth);
         let time_s = self.grid.seconds(picture.at_nanos);
         self.counts.off_grid_nanos = self.grid.off_nanos(picture.at_nanos, nth);
+        if picture.is_own_time != self.is_own_time {
+            self.is_own_time = picture.is_own_time;
+            self.phase = Phase::new(self.grid.period_nanos());
+        }
         if self.phase.add(picture.at_nanos, self.counts.off_grid_nanos) {
             self.warn_of_skew();
         }
@@ -238,6 +245,7 @@ impl Live<'_, '_> {
             n_refused: self.counts.n_refused + tally.n_damaged,
             skew_nanos: self.phase.skew_nanos().unwrap_or(UNMEASURED),
             drift_ppb: self.phase.drift_ppb().unwrap_or(UNMEASURED),
+            delay_nanos: tally.delay_nanos.unwrap_or(UNMEASURED),
             rate_microhertz: tally.rate_hz.map_or(0, |it| (it * 1e6).round() as u64),
             ..self.counts
         };

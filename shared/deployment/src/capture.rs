@@ -51,6 +51,9 @@ pub struct Camera {
     pub controls: BTreeMap<String, i64>,
     /// RTSP cameras: how packets travel, `tcp` or `udp`; without it as the camera and the reader agree.
     pub transport: Option<Transport>,
+    /// RTSP cameras: when pictures were taken. `camera`: as the camera tells, where it does and its clock can be right; `arrival`: by when
+    /// they come, less the shortest delay among them. Without it `camera`.
+    pub clock: Option<CameraClock>,
     /// Footage: how long after the instants of the frames its pictures were taken, milliseconds, negative for before; without it 0, or
     /// what a `synth://` source says. Joints are moved to the instants by it, and by what `offset_ms` and `drift_ppm` leave after whole frames.
     /// For a live camera it is measured.
@@ -69,6 +72,16 @@ pub enum Transport {
     Tcp,
     /// Those that are late are lost.
     Udp,
+}
+
+/// By which clock an RTSP camera has taken its pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum CameraClock {
+    /// Its own, where it tells and can be right.
+    Camera,
+    /// That of this machine when they come.
+    Arrival,
 }
 
 /// What happens when a stage is slower than its input.

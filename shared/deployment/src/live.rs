@@ -126,6 +126,13 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
         "camera.transport",
         &format!("given for the video device {:?}", camera.name),
         "none: it is for RTSP cameras",
+    )?;
+    let is_rtsp = camera.source.starts_with("rtsp:") || camera.source.starts_with("rtsps:");
+    demand(
+        is_rtsp || camera.clock.is_none(),
+        "camera.clock",
+        &format!("given for {:?}", camera.name),
+        "none: it is for RTSP cameras",
     )
 }
 
@@ -137,6 +144,7 @@ fn no_keys_of_live(camera: &Camera) -> Result<(), Complaint> {
         ("camera.frame_rate_hz", camera.frame_rate_hz.is_some()),
         ("camera.controls", !camera.controls.is_empty()),
         ("camera.transport", camera.transport.is_some()),
+        ("camera.clock", camera.clock.is_some()),
     ];
     for (key, is_given) in keys {
         demand(
@@ -215,6 +223,7 @@ mod tests {
                 "`camera.frame_rate_hz` is 0",
             ),
             (["", "transport = 'tcp'", ""], "RTSP"),
+            (["", "clock = 'arrival'", ""], "`camera.clock`"),
             (["", "skew_ms = 3", ""], "it is measured"),
             (
                 ["", "", "format = 'MJPG'"],

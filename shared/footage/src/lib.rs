@@ -14,6 +14,7 @@ mod spec;
 mod pieces;
 mod pixels;
 mod remade;
+mod sender;
 mod stream;
 mod warp;
 

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use crate::source::log::Log;
 use crate::source::probe::missing;
-use crate::stream::{SHARE, outputs};
+use crate::stream::{SHARE, outputs, version_of};
 use crate::{FootageError, Size, StreamEnd};
 
 /// A running decoder of pieces. It is killed when this is dropped.
@@ -41,7 +41,7 @@ impl RemadeStream {
             .args([
                 "-nostdin", "-v", "error", "-copyts", "-f", "matroska", "-i", "pipe:0",
             ])
-            .args(outputs(&ffmpeg))
+            .args(outputs(&version_of(&ffmpeg)))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -3,6 +3,7 @@
 use core::fmt;
 use std::ffi::OsString;
 use std::io::{self, ErrorKind, Read, pipe};
+use std::os::fd::AsRawFd as _;
 use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
@@ -11,10 +12,11 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use crate::sender::{SenderClock, inherited_pipe, times_of_sender};
 use crate::source::LiveAddress;
 use crate::source::log::{Log, summary};
 use crate::source::password::without_password_of;
-use crate::source::probe::{fraction, has_fps_mode, missing};
+use crate::source::probe::{fraction, is_5_1, missing};
 use crate::{FootageError, Pieces, Size};
 
 /// How long a stream may be silent before it counts as gone, seconds.
@@ -73,6 +75,9 @@ pub struct StreamFrame {
     /// Its presentation time on the clock of the camera, nanoseconds after any moment; none where the stream has no
     /// times of its own.
     pub presented_nanos: Option<i64>,
+    /// When it was taken by the clock of the camera, nanoseconds since 1970 began; none where the camera does not tell, which RTSP
+    /// cameras do some seconds after they were opened.
+    pub unix_nanos: Option<i64>,
     /// Its time as the decoder has it, nanoseconds, also where that is made up: [`Piece::nanos`](crate::Piece::nanos) to a
     /// millisecond.
     pub label_nanos: i64,
@@ -88,6 +93,7 @@ pub struct LiveStream {
     child: StreamEnd,
     stdout: ChildStdout,
     log: Log,
+    clock: Option<SenderClock>,
     pieces: Option<Pieces>,
 }
 
@@ -165,13 +171,23 @@ impl StreamSpec {
         } else {
             (None, None)
         };
+        let version = version_of(&self.ffmpeg);
+        let times = if self.is_rtsp() && is_5_1(&version) {
+            Some(inherited_pipe().map_err(not_started)?)
+        } else {
+            None
+        };
+        let to_tell = times
+            .as_ref()
+            .map(|it| format!("pipe\\:{}", it.1.as_raw_fd()));
         let mut child = Command::new(&self.ffmpeg)
             .args(["-nostdin", "-v", "error"])
             .args(self.input_options())
             .args(["-copyts", "-i"])
             .arg(&self.address)
-            .args(outputs(&self.ffmpeg))
+            .args(outputs(&version))
             .args(to_keep.iter().flat_map(|_| AS_IT_CAME))
+            .args(to_tell.iter().flat_map(|it| times_of_sender(it)))
             .stdin(to_keep.map_or_else(Stdio::null, Stdio::from))
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -183,8 +199,11 @@ impl StreamSpec {
         let stdout = child.stdout.take().ok_or_else(no_pipe)?;
         let stderr = child.stderr.take().ok_or_else(no_pipe)?;
         let pieces = kept.map(Pieces::follow).transpose().map_err(not_started)?;
+        // The end of the decoder closes the pipe, once this process has no end to write to.
+        let clock = times.map(|(reader, _closed)| SenderClock::follow(reader));
         Ok(LiveStream {
             pieces,
+            clock: clock.transpose().map_err(not_started)?,
             address: self.address.clone(),
             shown: self.shown(),
             size,
@@ -210,6 +229,10 @@ impl StreamSpec {
         own.eq_ignore_ascii_case(scheme)
     }
 
+    fn is_rtsp(&self) -> bool {
+        self.is("rtsp") || self.is("rtsps")
+    }
+
     /// Whether the frames have times of their own: those of JPEG pictures over HTTP are made up by the decoder.
     fn has_times(&self) -> bool {
         !self.is("http") && !self.is("https")
@@ -223,7 +246,7 @@ impl StreamSpec {
             // A JPEG picture that is cut short is left out; otherwise its lower part would be grey.
             options.extend(["-err_detect", "explode"]);
         }
-        let is_rtsp = self.is("rtsp") || self.is("rtsps");
+        let is_rtsp = self.is_rtsp();
         let listens = self.address.contains("listen");
         if is_rtsp {
             options.extend(self.transport.map_or(&[][..], |it| match it {
@@ -244,8 +267,10 @@ impl StreamSpec {
 }
 
 /// The pixels; and time and size of each frame on standard error.
-pub(crate) fn outputs(ffmpeg: &PathBuf) -> Vec<String> {
-    let mode = if has_fps_mode(&version_of(ffmpeg)) {
+///
+/// * `version`: of `ffmpeg`.
+pub(crate) fn outputs(version: &str) -> Vec<String> {
+    let mode = if is_5_1(version) {
         "-fps_mode"
     } else {
         "-vsync"
@@ -313,7 +338,7 @@ fn output_within(mut command: Command, limit: Duration) -> io::Result<Option<Out
 }
 
 /// The version of `ffmpeg`; empty if it does not tell.
-fn version_of(ffmpeg: &PathBuf) -> String {
+pub(crate) fn version_of(ffmpeg: &PathBuf) -> String {
     let said = Command::new(ffmpeg)
         .arg("-version")
         .stdin(Stdio::null())
@@ -381,9 +406,12 @@ impl LiveStream {
         }
         // Not a number becomes 0.
         let nanos = (time.time_s * 1e9).round() as i64;
+        let presented = (self.has_times && time.time_s.is_finite()).then_some(nanos);
+        let offset = self.clock.as_ref().and_then(SenderClock::offset_nanos);
         Ok(StreamFrame {
             label_nanos: nanos,
-            presented_nanos: (self.has_times && time.time_s.is_finite()).then_some(nanos),
+            presented_nanos: presented,
+            unix_nanos: presented.zip(offset).map(|it| it.0.saturating_add(it.1)),
         })
     }
 

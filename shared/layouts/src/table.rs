@@ -183,11 +183,11 @@ structs! {
     Health, "Health.v4":
         session pid epoch n_loops at_nanos n_received n_sent n_dropped last_frame p50_micros p99_micros
         peak_memory_bytes finished cpu_millis n_total refused;
-    CameraCounts, "CameraCounts.v2":
+    CameraCounts, "CameraCounts.v3":
         n_connections n_made n_lost n_delivered n_used n_surplus n_overtaken n_refused rate_microhertz off_grid_nanos
-        skew_nanos drift_ppb;
+        skew_nanos drift_ppb delay_nanos;
     MetricsRow, "MetricsRow.v1": span view count millihertz p50_nanos p99_nanos p99_9_nanos max_nanos;
-    Metrics, "Metrics.v4":
+    Metrics, "Metrics.v5":
         session pid epoch began_at_nanos at_nanos n_received n_sent sent_millihertz n_dropped evidence_bytes
         memory_bytes peak_memory_bytes queue longest_queue view finished name n_rows n_people camera rows;
 }

@@ -64,5 +64,5 @@ const _: () = {
     assert!(size_of::<Pose3d>() == 11640 + MAX_KEYPOINTS * 88);
     assert!(size_of::<Health>() == 152);
     assert!(size_of::<MetricsRow>() == 56);
-    assert!(size_of::<Metrics>() == 272 + MAX_ROWS * 56);
+    assert!(size_of::<Metrics>() == 280 + MAX_ROWS * 56);
 };

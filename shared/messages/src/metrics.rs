@@ -23,7 +23,7 @@ pub const UNMEASURED: i64 = i64::MIN;
 /// when a subscriber connects, and at its end. Percentiles are taken over the whole time, from a
 /// histogram with two significant digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("Metrics.v4")]
+#[type_name("Metrics.v5")]
 #[repr(C)]
 pub struct Metrics {
     /// Run of the deployment.
@@ -76,7 +76,7 @@ pub struct Metrics {
 /// Every picture that the camera made is lost by it or delivered; every one that was delivered is used, surplus, overtaken
 /// or refused, but for those under way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
-#[type_name("CameraCounts.v2")]
+#[type_name("CameraCounts.v3")]
 #[repr(C)]
 pub struct CameraCounts {
     /// How often the camera was opened; 0 for footage.
@@ -104,6 +104,9 @@ pub struct CameraCounts {
     /// By how much the camera falls behind the common instants, parts per billion, negative for one that is faster; or
     /// [`UNMEASURED`].
     pub drift_ppb: i64,
+    /// The shortest time from capture to arrival over the last ten seconds, by the clock of the camera, nanoseconds; [`UNMEASURED`]
+    /// where it does not tell, or is not believed.
+    pub delay_nanos: i64,
 }
 
 impl Default for Metrics {

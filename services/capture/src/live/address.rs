@@ -21,6 +21,8 @@ pub struct LiveCamera {
     pub controls: BTreeMap<String, i64>,
     /// How packets of an RTSP camera travel.
     pub transport: Option<Transport>,
+    /// Whether the times that an RTSP camera tells of its pictures are used, where they can be right.
+    pub has_own_clock: bool,
 }
 
 /// Why a live camera cannot be used.
@@ -102,6 +104,7 @@ impl LiveCamera {
             rate_hz: None,
             controls: BTreeMap::new(),
             transport: None,
+            has_own_clock: true,
         }
     }
 

@@ -7,13 +7,44 @@ const WINDOW_NANOS: u64 = 10_000_000_000;
 /// A change of the offset by which the camera's clock was set, nanoseconds.
 const JUMP_NANOS: u64 = 2_000_000_000;
 
+/// Shortest and longest delay that is believed of the clock of a camera, nanoseconds: nothing arrives before it was taken, and
+/// what comes later is given up.
+const DELAYS_NANOS: [i64; 2] = [0, 150_000_000];
+/// By how much a clock that was believed may leave these, so that it is not left for a moment.
+const SLACK_NANOS: i64 = 5_000_000;
+/// Pictures before the clock of a camera is believed or not.
+const N_FOR_VERDICT: u32 = 30;
+
+/// The least of the numbers of the last ten seconds: times and numbers, both ascending.
+#[derive(Debug, Default)]
+struct Least(VecDeque<(u64, i64)>);
+
+impl Least {
+    /// Adds a number; one that is far from those before stands for another clock.
+    ///
+    /// * Returns the least.
+    fn add(&mut self, at_nanos: u64, number: i64) -> i64 {
+        let all = &mut self.0;
+        let is_jump = |&(_, least): &(u64, i64)| number.abs_diff(least) > JUMP_NANOS;
+        if all.back().is_some_and(is_jump) {
+            all.clear();
+        }
+        while all.back().is_some_and(|it| it.1 >= number) {
+            all.pop_back();
+        }
+        all.push_back((at_nanos, number));
+        let begin = at_nanos.saturating_sub(WINDOW_NANOS);
+        while all.front().is_some_and(|it| it.0 < begin) {
+            all.pop_front();
+        }
+        all.front().map_or(number, |it| it.1)
+    }
+}
+
 /// Moves presentation times to `CLOCK_MONOTONIC`: by the least delay of the last ten seconds, so that frames that were held up
 /// on the way keep their distances.
 #[derive(Debug, Default)]
-pub(super) struct ClockMap {
-    /// Arrival and offset, both ascending: the first is the least offset of the window.
-    least: VecDeque<(u64, i64)>,
-}
+pub(super) struct ClockMap(Least);
 
 impl ClockMap {
     /// When a picture was taken, but for the delay that every picture has; never later than it arrived.
@@ -24,20 +55,66 @@ impl ClockMap {
         let offset = arrived_at_nanos
             .cast_signed()
             .saturating_sub(presented_nanos);
-        let is_jump = |&(_, least): &(u64, i64)| offset.abs_diff(least) > JUMP_NANOS;
-        if self.least.back().is_some_and(is_jump) {
-            self.least.clear();
-        }
-        while self.least.back().is_some_and(|it| it.1 >= offset) {
-            self.least.pop_back();
-        }
-        self.least.push_back((arrived_at_nanos, offset));
-        let begin = arrived_at_nanos.saturating_sub(WINDOW_NANOS);
-        while self.least.front().is_some_and(|it| it.0 < begin) {
-            self.least.pop_front();
-        }
-        let least = self.least.front().map_or(offset, |it| it.1);
+        let least = self.0.add(arrived_at_nanos, offset);
         presented_nanos.saturating_add(least).max(0).cast_unsigned()
+    }
+}
+
+/// What the clock of a camera is taken for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum Verdict {
+    /// Too few pictures so far.
+    #[default]
+    Unknown,
+    /// That of this machine.
+    Right,
+    /// Another, or its pictures come too late.
+    Wrong,
+}
+
+/// Judges the clock of a camera that tells when its pictures were taken, by their delays.
+///
+/// How far a clock is off cannot be told from how long a picture is under way, if it is off by little; by much, pictures would
+/// come from the future, or so late that nobody waits for them.
+#[derive(Debug, Default)]
+pub(super) struct OwnClock {
+    least: Least,
+    n: u32,
+    /// What it is taken for.
+    pub(super) verdict: Verdict,
+    /// The shortest delay of the last ten seconds, nanoseconds.
+    pub(super) delay_nanos: i64,
+}
+
+impl OwnClock {
+    /// When a picture was taken, `CLOCK_MONOTONIC`; never later than it arrived. None while the clock is not believed.
+    ///
+    /// * `taken_unix`: by the clock of the camera, nanoseconds since 1970 began; `arrived_unix`: by that of this machine.
+    /// * `arrived_at_nanos`: by `CLOCK_MONOTONIC`.
+    pub(super) fn taken_at(
+        &mut self,
+        [taken_unix, arrived_unix]: [i64; 2],
+        arrived_at_nanos: u64,
+    ) -> Option<u64> {
+        let delay = arrived_unix.saturating_sub(taken_unix);
+        self.delay_nanos = self.least.add(arrived_at_nanos, delay);
+        self.n = self.n.saturating_add(1);
+        let slack = if self.verdict == Verdict::Right {
+            SLACK_NANOS
+        } else {
+            0
+        };
+        let [least, most] = DELAYS_NANOS;
+        if self.n >= N_FOR_VERDICT {
+            let is_right = (least - slack..=most + slack).contains(&self.delay_nanos);
+            self.verdict = if is_right {
+                Verdict::Right
+            } else {
+                Verdict::Wrong
+            };
+        }
+        let taken = arrived_at_nanos.saturating_sub_signed(delay.max(0));
+        (self.verdict == Verdict::Right).then_some(taken)
     }
 }
 
@@ -86,7 +163,71 @@ mod tests {
         assert_eq!(last, 399 * 40 * MS + 20 * MS);
     }
 
+    /// Judges a camera whose clock is ahead by some milliseconds and whose pictures take some: verdict, delay, last time.
+    fn judged(ahead_ms: i64, delay_ms: impl Fn(u64) -> u64) -> (Verdict, i64, Option<u64>) {
+        let mut clock = OwnClock::default();
+        let mut last = None;
+        for nth in 0..100_u64 {
+            let taken = 1_000 * MS + nth * 40 * MS;
+            let arrived = taken + delay_ms(nth) * MS;
+            let unix = |nanos: u64| 1_700_000_000 * 1_000_000_000 + nanos.cast_signed();
+            let shown = unix(taken) + ahead_ms * MS as i64;
+            last = clock.taken_at([shown, unix(arrived)], arrived);
+            assert!(last.is_none_or(|it| it <= arrived));
+        }
+        (clock.verdict, clock.delay_nanos / MS as i64, last)
+    }
+
+    #[test]
+    fn a_camera_on_the_clock_of_this_machine_has_its_delay_taken_out() {
+        let taken = 1_000 * MS + 99 * 40 * MS;
+        let held_up = |nth: u64| if nth.is_multiple_of(9) { 30 } else { 140 };
+        assert_eq!(judged(0, held_up), (Verdict::Right, 30, Some(taken)));
+    }
+
+    #[test]
+    fn a_clock_by_which_pictures_come_from_the_future_or_much_too_late_is_not_believed() {
+        assert_eq!(judged(50, |_| 30), (Verdict::Wrong, -20, None));
+        assert_eq!(judged(-3_600_000, |_| 30).0, Verdict::Wrong);
+        assert_eq!(judged(0, |_| 151), (Verdict::Wrong, 151, None));
+    }
+
+    #[test]
+    fn a_clock_that_was_believed_is_not_left_for_a_moment_and_one_that_was_set_is_judged_anew() {
+        let mut clock = OwnClock::default();
+        let mut at = 0;
+        let mut seconds = |n: u64, ahead: i64, clock: &mut OwnClock| {
+            for _ in 0..25 * n {
+                at += 40 * MS;
+                let arrived = at.cast_signed();
+                clock.taken_at([arrived - 3 * MS as i64 + ahead, arrived], at);
+            }
+            clock.verdict
+        };
+        assert_eq!(seconds(2, 0, &mut clock), Verdict::Right);
+        assert_eq!(
+            seconds(2, 6 * MS as i64, &mut clock),
+            Verdict::Right,
+            "-3 ms"
+        );
+        assert_eq!(
+            seconds(2, 9 * MS as i64, &mut clock),
+            Verdict::Wrong,
+            "-6 ms"
+        );
+        assert_eq!(seconds(20, 0, &mut clock), Verdict::Right);
+    }
+
     proptest! {
+        #[test]
+        fn any_times_of_a_camera_are_judged(times in prop::collection::vec(any::<(i64, i64, u64)>(), 1..50)) {
+            let mut clock = OwnClock::default();
+            for (taken, arrived, at) in times {
+                let got = clock.taken_at([taken, arrived], at);
+                prop_assert!(got.is_none_or(|it| it <= at));
+            }
+        }
+
         #[test]
         fn nothing_is_taken_after_it_arrived(times in prop::collection::vec(any::<(i64, u32)>(), 1..50)) {
             let mut map = ClockMap::default();

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use footage::{LiveAddress, LiveStream, PixelFormat, Size, StreamEnd, StreamSpec};
 use runtime::{VideoAbout, VideoDevice, VideoStream, now_nanos, video_devices};
 
 use super::address::{LiveCamera, LiveError, size_of};
-use super::clock::ClockMap;
+use super::clock::{ClockMap, OwnClock, Verdict};
 use super::originals::{KeptStream, Original, Originals};
 
 /// Longest wait for a picture of a device, so that a stop is noticed.
@@ -33,6 +34,8 @@ pub(super) struct Taken {
     pub n_overtaken: u64,
     /// Whether its pixels are good.
     pub is_whole: bool,
+    /// The shortest delay of its pictures by the camera's own clock, nanoseconds; none where that is not known, or not believed.
+    pub delay_nanos: Option<i64>,
 }
 
 /// A camera that is open.
@@ -64,6 +67,8 @@ impl Input {
                 .open(size)?,
                 kept: originals.map(|it| KeptStream::new(Arc::clone(it), size)),
                 clock: ClockMap::default(),
+                own_clock: camera.has_own_clock.then(OwnClock::default),
+                address: camera.address.to_string(),
                 period_nanos: camera.rate_hz.map(|it| 1e9 / it),
                 last: None,
             }))),
@@ -172,6 +177,7 @@ impl Device {
             n_lost: if is_ours { 0 } else { n_missing },
             n_overtaken: if is_ours { n_missing } else { 0 },
             is_whole,
+            delay_nanos: None,
         }))
     }
 }
@@ -216,6 +222,10 @@ pub(super) struct Stream {
     decoder: LiveStream,
     kept: Option<KeptStream>,
     clock: ClockMap,
+    /// The clock of a camera that tells when its pictures were taken; none if it is not used.
+    own_clock: Option<OwnClock>,
+    /// Without a password.
+    address: String,
     period_nanos: Option<f64>,
     last: Option<i64>,
 }
@@ -230,6 +240,7 @@ impl Stream {
             n_lost: 0,
             n_overtaken: 0,
             is_whole: true,
+            delay_nanos: None,
         };
         if let Some(presented) = frame.presented_nanos {
             let last = self.last.replace(presented);
@@ -237,12 +248,47 @@ impl Stream {
             taken.n_lost = self.period_nanos.map_or(0, |it| missing_by_time(gap, it));
             taken.at_nanos = self.clock.taken_at(presented, arrived_at_nanos);
         }
+        if let (Some(unix), Some(clock)) = (frame.unix_nanos, &mut self.own_clock) {
+            let before = clock.verdict;
+            if let Some(at_nanos) = clock.taken_at([unix, unix_nanos()], arrived_at_nanos) {
+                taken.at_nanos = at_nanos;
+                taken.delay_nanos = Some(clock.delay_nanos);
+            }
+            if clock.verdict != before {
+                say_of_clock(clock, &self.address);
+            }
+        }
         if let (Some(kept), Some(pieces)) = (&mut self.kept, self.decoder.pieces()) {
             kept.decoded(frame.label_nanos, taken.at_nanos);
             kept.put_all(pieces, arrived_at_nanos);
         }
         Ok(taken)
     }
+}
+
+/// Logs whether the clock of a camera is believed.
+fn say_of_clock(clock: &OwnClock, camera: &str) {
+    let delay_ms = clock.delay_nanos as f64 * 1e-6;
+    if clock.verdict == Verdict::Right {
+        tracing::info!(
+            camera,
+            delay_ms,
+            "this camera tells when its pictures were taken"
+        );
+    } else {
+        tracing::warn!(
+            camera,
+            delay_ms,
+            "by its own clock the pictures of this camera come before they were taken, or too late to be waited for: they count as \
+             taken when they came; set its clock and that of this machine by one time server"
+        );
+    }
+}
+
+/// The clock of this machine, nanoseconds since 1970 began; 0 before.
+fn unix_nanos() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    i64::try_from(since.unwrap_or_default().as_nanos()).unwrap_or(i64::MAX)
 }
 
 /// How many pictures are missing in a gap between two, nanoseconds.

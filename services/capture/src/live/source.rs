@@ -35,6 +35,8 @@ pub(crate) struct Picture {
     pub arrived_at_nanos: u64,
     /// Pictures before it that it has overtaken: this process was slow.
     pub n_overtaken: u64,
+    /// Whether it is the camera's own clock that says when it was taken.
+    pub is_own_time: bool,
 }
 
 /// What became of the pictures up to here.
@@ -48,6 +50,8 @@ pub(crate) struct Tally {
     pub n_damaged: u64,
     /// Pictures per second since the camera was opened.
     pub rate_hz: Option<f64>,
+    /// [`Taken::delay_nanos`] of the last.
+    pub delay_nanos: Option<i64>,
 }
 
 #[derive(Debug, Default)]
@@ -214,7 +218,7 @@ impl Keeper {
             originals.connected();
         }
         let mut spare = None;
-        let mut pace = Pace::default();
+        let (mut pace, mut is_own_time) = (Pace::default(), false);
         loop {
             let mut rgb = spare.take().unwrap_or_else(|| self.room());
             let read = input.next(&mut rgb);
@@ -229,6 +233,10 @@ impl Keeper {
                         self.shared.state().tally.n_connections += 1;
                     }
                     *n_read += 1;
+                    // Times of another clock are counted anew.
+                    if is_own_time != taken.delay_nanos.is_some() {
+                        (pace, is_own_time) = (Pace::default(), !is_own_time);
+                    }
                     let made = 1 + taken.n_lost + taken.n_overtaken;
                     let rate_hz = pace.rate_hz(made, taken.at_nanos);
                     spare = self.post(taken, rgb, rate_hz);
@@ -256,6 +264,7 @@ impl Keeper {
         tally.n_lost += taken.n_lost;
         tally.n_overtaken += taken.n_overtaken;
         tally.rate_hz = rate_hz;
+        tally.delay_nanos = taken.delay_nanos;
         if !taken.is_whole {
             tally.n_damaged += 1;
             return Some(rgb);
@@ -265,6 +274,7 @@ impl Keeper {
             at_nanos: taken.at_nanos,
             arrived_at_nanos: taken.arrived_at_nanos,
             n_overtaken: 0,
+            is_own_time: taken.delay_nanos.is_some(),
         });
         state.n_overtaken += taken.n_overtaken;
         let overtaken = if state.waiting.len() > N_WAITING {
@@ -324,6 +334,7 @@ mod tests {
             n_lost,
             n_overtaken: 0,
             is_whole,
+            delay_nanos: None,
         }
     }
 

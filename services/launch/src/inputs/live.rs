@@ -4,7 +4,7 @@ use std::path::Path;
 use std::thread;
 
 use capture::{Feed, LiveCamera, LiveError, Retimed};
-use deployment::capture::{Camera, Config, Transport};
+use deployment::capture::{Camera, CameraClock, Config, Transport};
 use deployment::{Deployment, Timeline};
 use footage::LiveAddress;
 use runtime::{ExitKind, Failure, Fault as _};
@@ -33,6 +33,7 @@ pub fn live_camera(camera: &Camera) -> Option<LiveCamera> {
             Transport::Tcp => footage::Transport::Tcp,
             Transport::Udp => footage::Transport::Udp,
         }),
+        has_own_clock: camera.clock != Some(CameraClock::Arrival),
     })
 }
 

@@ -75,6 +75,7 @@ fn camera(it: &CameraCounts) -> Value {
         "off_grid_ms": it.off_grid_nanos as f64 / 1e6,
         "skew_ms": measured_value(it.skew_nanos, 1e6),
         "drift_ppm": measured_value(it.drift_ppb, 1e3),
+        "delay_ms": measured_value(it.delay_nanos, 1e6),
     })
 }
 

@@ -48,7 +48,7 @@ pub fn table(snapshot: &Snapshot) -> String {
     text
 }
 
-const CAMERAS: [&str; 11] = [
+const CAMERAS: [&str; 12] = [
     "<CAMERA",
     "OPENED",
     "MADE",
@@ -60,6 +60,7 @@ const CAMERAS: [&str; 11] = [
     "RATE Hz",
     "SKEW ms",
     "DRIFT ppm",
+    "DELAY ms",
 ];
 
 /// What became of the pictures of live cameras; empty without any.
@@ -89,7 +90,11 @@ fn cameras(snapshot: &Snapshot) -> String {
             } else {
                 NONE.to_owned()
             });
-            for (value, per) in [(it.skew_nanos, 1e6), (it.drift_ppb, 1e3)] {
+            for (value, per) in [
+                (it.skew_nanos, 1e6),
+                (it.drift_ppb, 1e3),
+                (it.delay_nanos, 1e6),
+            ] {
                 row.push(if value == UNMEASURED {
                     NONE.to_owned()
                 } else {
@@ -308,12 +313,13 @@ results  waiting     all       100   20.0  ";
             n_connections: 1,
             skew_nanos: -3_200_000,
             drift_ppb: UNMEASURED,
+            delay_nanos: 41_000_000,
             ..messages::CameraCounts::default()
         };
         snapshot.processes[2].reading.as_mut().unwrap().camera = Some(camera);
         let text = table(&snapshot);
         let line = text.lines().find(|it| it.starts_with("left")).unwrap();
-        assert!(line.ends_with("-3.2          -"), "{text}");
+        assert!(line.ends_with("-3.2          -     +41.0"), "{text}");
     }
 
     #[test]

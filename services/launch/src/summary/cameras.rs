@@ -84,6 +84,10 @@ pub(super) fn live(outcome: &Outcome) -> Vec<String> {
             };
             parts.push(format!("{slow:.0} ppm {what}"));
         }
+        if it.delay_nanos != UNMEASURED {
+            let ms = it.delay_nanos as f64 / 1e6;
+            parts.push(format!("{ms:.0} ms from camera to here by its own clock"));
+        }
         if it.n_connections > 1 {
             parts.push(format!("opened {} times", it.n_connections));
         }

@@ -50,7 +50,7 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
         n_frames: number(&stream["nb_frames"]).map_or(0, |it| it as u64),
         n_promised: 0,
         times_s: None,
-        has_fps_mode: has_fps_mode(output["program_version"]["version"].as_str().unwrap_or("")),
+        has_fps_mode: is_5_1(output["program_version"]["version"].as_str().unwrap_or("")),
     };
     if probe.n_frames == 0 || rate_hz != fraction(&stream["r_frame_rate"]) {
         let packets = run_ffprobe(
@@ -172,8 +172,10 @@ pub(crate) fn fraction(value: &Value) -> Option<f64> {
     (rate.is_finite() && rate > 0.0).then_some(rate)
 }
 
-/// `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`; builds without a number are assumed to be recent.
-pub(crate) fn has_fps_mode(version: &str) -> bool {
+/// Whether `ffmpeg` is of version 5.1 or later, which has `-fps_mode` and writes the times of sender reports.
+///
+/// * `version`: `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`; builds without a number are assumed to be recent.
+pub(crate) fn is_5_1(version: &str) -> bool {
     let mut numbers = version
         .trim_start_matches('n')
         .split(|it: char| !it.is_ascii_digit())
@@ -198,7 +200,7 @@ mod tests {
             ("N-112345-gabcdef", true),
             ("", true),
         ] {
-            assert_eq!(has_fps_mode(version), expect, "{version}");
+            assert_eq!(is_5_1(version), expect, "{version}");
         }
     }
 

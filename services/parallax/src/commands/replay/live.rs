@@ -48,7 +48,7 @@ pub(super) fn settle(
         }
         camera.source = Recorded::address(file, &camera.name);
         (camera.format, camera.size, camera.frame_rate_hz) = (None, None, None);
-        camera.transport = None;
+        (camera.transport, camera.clock) = (None, None);
         camera.controls.clear();
         recorded.footage[view].frame_rate_hz = Some(rate_hz / step);
     }
