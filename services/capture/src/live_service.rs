@@ -27,8 +27,6 @@ struct Live<'a, 'b> {
     source: Source,
     grid: Grid,
     phase: Phase,
-    /// Whether the camera's own clock says when its pictures are taken.
-    is_own_time: bool,
     guard: Guard,
     counts: CameraCounts,
     /// The next instant.
@@ -62,7 +60,6 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
         wanted: live,
         source: Source::start(&live.camera, live.size, kept.as_ref().map(Kept::originals))?,
         phase: Phase::new(grid.period_nanos()),
-        is_own_time: false,
         grid,
         guard: Guard::new(job.frozen_after, Some(live.rate_hz)),
         counts: CameraCounts::default(),
@@ -134,10 +131,7 @@ impl Live<'_, '_> {
         let index = self.index(nth);
         let time_s = self.grid.seconds(picture.at_nanos);
         self.counts.off_grid_nanos = self.grid.off_nanos(picture.at_nanos, nth);
-        if picture.is_own_time != self.is_own_time {
-            self.is_own_time = picture.is_own_time;
-            self.phase = Phase::new(self.grid.period_nanos());
-        }
+        self.phase.by_clock(picture.is_own_time);
         if self.phase.add(picture.at_nanos, self.counts.off_grid_nanos) {
             self.warn_of_skew();
         }

@@ -114,6 +114,11 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
         &rate.to_string(),
         "0.1 to 1000",
     )?;
+    keys_of_kind(camera)
+}
+
+/// Refuses keys of a live camera that are for another kind.
+fn keys_of_kind(camera: &Camera) -> Result<(), Complaint> {
     let is_device = camera.source.starts_with("/dev/") || camera.source.starts_with("v4l2:");
     demand(
         is_device || (camera.format.is_none() && camera.controls.is_empty()),
@@ -127,7 +132,10 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
         &format!("given for the video device {:?}", camera.name),
         "none: it is for RTSP cameras",
     )?;
-    let is_rtsp = camera.source.starts_with("rtsp:") || camera.source.starts_with("rtsps:");
+    let scheme = camera.source.split(':').next().unwrap_or_default();
+    let is_rtsp = ["rtsp", "rtsps"]
+        .iter()
+        .any(|it| scheme.eq_ignore_ascii_case(it));
     demand(
         is_rtsp || camera.clock.is_none(),
         "camera.clock",

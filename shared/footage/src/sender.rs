@@ -177,11 +177,11 @@ fn bytes<const N: usize>(of: &[u8], at: usize) -> Option<[u8; N]> {
 }
 
 /// Of the boxes one after the other in `of` the body of the first of a kind.
-fn inside<'a>(mut of: &'a [u8], kind: &[u8; 4]) -> Option<&'a [u8]> {
+fn inside(mut of: &[u8], kind: [u8; 4]) -> Option<&[u8]> {
     loop {
         let length = u32::from_be_bytes(bytes(of, 0)?) as usize;
         let body = of.get(8..length)?;
-        if &bytes::<4>(of, 4)? == kind {
+        if bytes(of, 4)? == kind {
             return Some(body);
         }
         of = &of[length..];
@@ -190,15 +190,15 @@ fn inside<'a>(mut of: &'a [u8], kind: &[u8; 4]) -> Option<&'a [u8]> {
 
 /// Units of time in a second, of the only track.
 fn units_per_s(moov: &[u8]) -> Option<u32> {
-    let media = inside(inside(moov, b"trak")?, b"mdia")?;
-    let head = inside(media, b"mdhd")?;
-    let is_long = head.first()? == &1;
+    let media = inside(inside(moov, *b"trak")?, *b"mdia")?;
+    let head = inside(media, *b"mdhd")?;
+    let is_long = *head.first()? == 1;
     bytes(head, if is_long { 20 } else { 12 }).map(u32::from_be_bytes)
 }
 
 /// What a `prft` box tells.
 fn told(body: &[u8], units_per_s: u32) -> Option<Told> {
-    let is_long = body.first()? == &1;
+    let is_long = *body.first()? == 1;
     let ntp = u64::from_be_bytes(bytes(body, 8)?);
     let units = if is_long {
         u64::from_be_bytes(bytes(body, 16)?).cast_signed()
@@ -224,30 +224,30 @@ mod tests {
 
     const MS: i64 = 1_000_000;
 
-    fn boxed(kind: &[u8; 4], body: &[u8]) -> Vec<u8> {
+    fn boxed(kind: [u8; 4], body: &[u8]) -> Vec<u8> {
         let length = (body.len() + 8) as u32;
-        [&length.to_be_bytes()[..], kind, body].concat()
+        [&length.to_be_bytes()[..], &kind, body].concat()
     }
 
     fn head() -> Vec<u8> {
         let media = [&[0; 12][..], &90_000_u32.to_be_bytes(), &[0; 8]].concat();
         let media = boxed(
-            b"mdia",
-            &[boxed(b"abcd", &[7]), boxed(b"mdhd", &media)].concat(),
+            *b"mdia",
+            &[boxed(*b"abcd", &[7]), boxed(*b"mdhd", &media)].concat(),
         );
-        boxed(b"moov", &boxed(b"trak", &media))
+        boxed(*b"moov", &boxed(*b"trak", &media))
     }
 
     /// * `ms`: after 1970 began.
     fn time(units: u64, ms: u64) -> Vec<u8> {
         let seconds = (ms / 1000 + NTP_TO_UNIX_S as u64) << 32;
-        let ntp = seconds | ((ms % 1000) << 32) / 1000;
+        let ntp = seconds | (((ms % 1000) << 32) / 1000);
         let body = [
             &[1, 0, 0, 24, 0, 0, 0, 1][..],
             &ntp.to_be_bytes(),
             &units.to_be_bytes(),
         ];
-        boxed(b"prft", &body.concat())
+        boxed(*b"prft", &body.concat())
     }
 
     fn read(stream: &[u8]) -> Vec<Told> {
@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn times_are_read_between_the_packets() {
-        let packet = boxed(b"mdat", &[9; 500]);
+        let packet = boxed(*b"mdat", &[9; 500]);
         let stream = [head(), time(90_000, 5_250), packet, time(93_600, 5_290)].concat();
         let got = read(&stream);
         let expected = [(1_000, 5_250), (1_040, 5_290)];
@@ -326,7 +326,7 @@ mod tests {
         #[test]
         fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
             let mut offsets = Offsets::default();
-            for stream in [bytes.clone(), [head(), bytes.clone()].concat(), [head(), boxed(b"prft", &bytes)].concat()] {
+            for stream in [bytes.clone(), [head(), bytes.clone()].concat(), [head(), boxed(*b"prft", &bytes)].concat()] {
                 for told in read(&stream) {
                     offsets.add(told);
                 }

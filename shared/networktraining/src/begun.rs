@@ -4,7 +4,7 @@ use onnx::value_of_half;
 use rten_onnx::onnx::{DataType, ModelProto, TensorProto};
 
 use crate::network::Shape;
-use crate::parameters::{GAIN_OF_RELU, Parameter, Role, initial};
+use crate::parameters::{GAIN_OF_RELU, Parameter, initial};
 
 /// Why a training cannot go on from a network.
 #[derive(Debug, thiserror::Error)]
@@ -56,23 +56,23 @@ pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Vec<Parameter>, Be
     let constants = graph.initializer;
     let mut all = initial(shape, seed);
     for at in 0..all.len() {
-        let is_gain = all[at].name.ends_with(".gain");
-        if is_gain {
+        if is_gain(&all[at]) {
             continue;
         }
         let values = numbers(&constants, &all[at])?;
-        let gains = all.get(at + 1).filter(|it| it.name.ends_with(".gain"));
-        if all[at].role == Role::Weight && gains.is_some() {
-            let [weights, gains] = all.get_disjoint_mut([at, at + 1]).map_or_else(
-                |_| unreachable!("two places that are not the same"),
-                |it| it.map(|it| &mut it.values),
-            );
-            split(&values, weights, gains);
-        } else {
-            all[at].values = values;
+        let (these, next) = all.split_at_mut(at + 1);
+        let own = &mut these[at].values;
+        match next.first_mut().filter(|it| is_gain(it)) {
+            // The gains of a convolution follow its weights.
+            Some(gains) => split(&values, own, &mut gains.values),
+            None => *own = values,
         }
     }
     Ok(all)
+}
+
+fn is_gain(it: &Parameter) -> bool {
+    it.name.rsplit_once('.').is_some_and(|it| it.1 == "gain")
 }
 
 /// Standardised weights as weights and gains.

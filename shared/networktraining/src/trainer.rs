@@ -134,24 +134,21 @@ impl<'a> Trainer<'a> {
             return Err(TrainError::TooFew { learnt, kept });
         }
         let stamp = stamp(settings, [learnt, kept], from.as_deref());
-        let state = match checkpoint {
-            Some(bytes) => {
-                let config = bincode::config::standard();
-                let bytes = CHECKPOINT.open(bytes)?;
-                let (state, _): (State, usize) = bincode::serde::decode_from_slice(bytes, config)?;
-                if state.stamp != stamp {
-                    return Err(TrainError::Other);
-                }
-                state
+        let state = if let Some(bytes) = checkpoint {
+            let config = bincode::config::standard();
+            let bytes = CHECKPOINT.open(bytes)?;
+            let (state, _): (State, usize) = bincode::serde::decode_from_slice(bytes, config)?;
+            if state.stamp != stamp {
+                return Err(TrainError::Other);
             }
-            None => {
-                let begin = || initial(&settings.shape, settings.seed);
-                State {
-                    stamp,
-                    memory: Memory::new(from.unwrap_or_else(begin)),
-                    step: 0,
-                    passes: Vec::new(),
-                }
+            state
+        } else {
+            let begin = || initial(&settings.shape, settings.seed);
+            State {
+                stamp,
+                memory: Memory::new(from.unwrap_or_else(begin)),
+                step: 0,
+                passes: Vec::new(),
             }
         };
         Ok(Self {

@@ -20,6 +20,8 @@ pub(crate) struct Phase {
     measured: VecDeque<(u64, i64)>,
     /// Periods that were added so far, nanoseconds.
     added: i64,
+    /// Whether the times are those of the camera's own clock.
+    is_own_time: bool,
 }
 
 impl Phase {
@@ -30,6 +32,19 @@ impl Phase {
             newest: Vec::with_capacity(N_PICTURES),
             measured: VecDeque::new(),
             added: 0,
+            is_own_time: false,
+        }
+    }
+
+    /// Begins anew if the pictures that follow have their times from another clock than those before.
+    ///
+    /// * `is_own_time`: whether they are from the camera's own.
+    pub(crate) fn by_clock(&mut self, is_own_time: bool) {
+        if is_own_time != self.is_own_time {
+            *self = Self {
+                is_own_time,
+                ..Self::new(self.period_nanos)
+            };
         }
     }
 
@@ -132,6 +147,19 @@ mod tests {
         let phase = after(60, PERIOD as f64 * (1.0 - 30e-6), 500_000);
         let ppm = phase.drift_ppb().unwrap() as f64 / 1e3;
         assert!((ppm + 30.0).abs() < 5.0, "{ppm}");
+    }
+
+    #[test]
+    fn a_change_of_clock_is_no_drift() {
+        let mut phase = after(60, PERIOD as f64, 0);
+        phase.by_clock(true);
+        assert_eq!((phase.skew_nanos(), phase.drift_ppb()), (None, None));
+        for nth in 0..600 {
+            phase.by_clock(true);
+            phase.add(70_000_000_000 + nth * PERIOD, -9_000_000);
+        }
+        assert_eq!(phase.skew_nanos(), Some(-9_000_000));
+        assert!(phase.drift_ppb().unwrap().abs() < 1000);
     }
 
     #[test]

@@ -146,14 +146,11 @@ pub fn train(
         }
     }
     let passes = trainer.passes().to_vec();
+    let score = passes.iter().rev().find_map(|it| it.score);
     let about = About {
         people: learnt.map(<[_]>::len),
         samples: settings.steps * settings.batch,
-        score: passes
-            .iter()
-            .rev()
-            .find_map(|it| it.score)
-            .unwrap_or_default(),
+        score: score.unwrap_or_default(),
     };
     let card = networktraining::card(&settings.shape, &about);
     write(&job.out, &trainer.onnx(&[(METADATA_KEY.to_owned(), card)]))?;
