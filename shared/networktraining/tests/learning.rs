@@ -243,7 +243,7 @@ fn a_training_goes_on_from_a_network_that_was_written() {
     let settings = small();
     let (how, shown) = ((&settings, Backend::Flex), [&people[..5], &people[5..]]);
     let mut trainer = Trainer::new(how, shown, None, None).unwrap();
-    assert!(trainer.pass(30, false, &mut |_| true));
+    assert!(trainer.pass(60, false, &mut |_| true));
     let file = trainer.onnx(&[]);
     let from = networktraining::begun(&settings.shape, 7, &file).unwrap();
     let mut begun = Trainer::new(how, shown, Some(from), None).unwrap();
@@ -253,9 +253,12 @@ fn a_training_goes_on_from_a_network_that_was_written() {
     for (a, b) in before.iter().zip(&after) {
         assert!((a - b).abs() < 0.01 * scale, "{a} and {b} of {scale}");
     }
-    assert!(begun.pass(4, false, &mut |_| true));
-    let [first, on] = [&trainer, &begun].map(|it| it.passes()[0].cost.maps);
-    assert!(on < 0.9 * first, "it has not begun anew: {on}, {first}");
+    let mut anew = Trainer::new(how, shown, None, None).unwrap();
+    let costs = [&mut begun, &mut anew].map(|it| {
+        assert!(it.pass(4, false, &mut |_| true));
+        it.passes()[0].cost.maps
+    });
+    assert!(costs[0] < 0.8 * costs[1], "it has begun anew: {costs:?}");
 }
 
 #[test]
