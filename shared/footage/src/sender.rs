@@ -298,7 +298,7 @@ mod tests {
     #[test]
     fn every_picture_of_the_real_program_has_a_time() {
         let folder = tempfile::tempdir().unwrap();
-        let clip = folder.path().join("clip.ts");
+        let clip = folder.path().join("clip.mp4");
         let made = Command::new("ffmpeg")
             .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i"])
             .args(["testsrc=size=64x48:rate=10:duration=3", "-c:v", "mpeg4"])

@@ -7,4 +7,5 @@ mod bad_input;
 mod conformance;
 mod kept;
 mod overlay;
+mod prompt;
 mod warp;
