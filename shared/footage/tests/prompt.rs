@@ -46,7 +46,7 @@ fn the_last_picture_that_was_sent_is_there_though_no_other_follows() {
     let (is_here, wait) = sync_channel::<()>(1);
     let server = std::thread::Builder::new().spawn(move || {
         let (mut client, _) = listener.accept().unwrap();
-        client.read(&mut [0; 4096]).unwrap();
+        assert!(client.read(&mut [0; 4096]).unwrap() > 0, "it asks");
         let head =
             "HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=next\r\n\r\n";
         client.write_all(head.as_bytes()).unwrap();

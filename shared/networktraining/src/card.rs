@@ -12,6 +12,8 @@ pub struct About {
     pub people: [usize; 2],
     /// Samples that the network was shown.
     pub samples: usize,
+    /// Whether it went on from a network that was trained before.
+    pub goes_on: bool,
     /// How good it is on those who were kept apart.
     pub score: Score,
 }
@@ -28,10 +30,15 @@ pub fn card(shape: &Shape, about: &About) -> String {
     } = about.score;
     let [mean_of_ends, both_ends, front] = [mean_of_ends, both_ends, front].map(|it| 100.0 * it);
     let Shape { width, height, .. } = shape;
+    let before = if about.goes_on {
+        ", after those of another network that it began with"
+    } else {
+        ""
+    };
     let fill = FILL as u8;
     format!(
         "\
-# A network of `parallax train network`: {learnt} people, {samples} samples. Of {judged} of {kept} people who were kept apart it finds
+# A network of `parallax train network`: {learnt} people, {samples} samples{before}. Of {judged} of {kept} people who were kept apart it finds
 # {mean_of_ends:.1} % of the limbs by the mean of both ends and {both_ends:.1} % by both, and tells {front:.1} % of the directions from their
 # opposites; joints that are off by more than half a head are told from others with an area under the curve of {area:.3}.
 format = \"parallax-keypoint-network\"

@@ -22,7 +22,7 @@ use crate::person::Chosen;
 use crate::scenes::Scenes;
 
 #[cfg(feature = "burn")]
-pub use train::{From, Job, train};
+pub use train::{Earlier, Job, train};
 
 /// Who is learned from.
 #[derive(Debug)]

@@ -18,7 +18,7 @@ const JUDGED: usize = 10;
 
 /// A network that was trained before.
 #[derive(Debug, Clone)]
-pub struct From {
+pub struct Earlier {
     /// Its file, for errors.
     pub file: PathBuf,
     /// The bytes of the file.
@@ -31,7 +31,7 @@ pub struct Job {
     /// The ONNX file.
     pub out: PathBuf,
     /// A network that was trained before, to go on from.
-    pub from: Option<From>,
+    pub from: Option<Earlier>,
     /// Whether to go on from the checkpoint of an interrupted training.
     pub resume: bool,
     /// What calculates.
@@ -39,7 +39,7 @@ pub struct Job {
 }
 
 /// The parameters of a network that was trained before.
-fn begun(from: &From, settings: &Settings) -> Result<Vec<Parameter>, Failure> {
+fn begun(from: &Earlier, settings: &Settings) -> Result<Vec<Parameter>, Failure> {
     networktraining::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
         let hint = "--from takes a network of `train network` that has the `shape` of the settings";
         runtime::in_file(&from.file, &error).with_hint(hint)
@@ -150,6 +150,7 @@ pub fn train(
     let about = About {
         people: learnt.map(<[_]>::len),
         samples: settings.steps * settings.batch,
+        goes_on: job.from.is_some(),
         score: score.unwrap_or_default(),
     };
     let card = networktraining::card(&settings.shape, &about);

@@ -107,8 +107,8 @@ fn train(
 
 /// The network to go on from.
 #[cfg(feature = "train-quality")]
-fn from(file: &std::path::Path) -> Result<offline::posetraining::From, Failure> {
-    Ok(offline::posetraining::From {
+fn from(file: &std::path::Path) -> Result<offline::posetraining::Earlier, Failure> {
+    Ok(offline::posetraining::Earlier {
         bytes: Shipped::PoseNetwork.read(file)?.into_owned(),
         file: file.to_path_buf(),
     })
