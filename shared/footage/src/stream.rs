@@ -276,7 +276,7 @@ pub(crate) fn outputs(version: &str) -> Vec<String> {
         "-vsync"
     };
     let common = ["-map", "0:v:0", mode, "passthrough", "-autoscale", "0"];
-    // With more threads, what copies the pixels holds a picture back for each of them.
+    // With more threads, what copies the pixels holds a picture back until the next one comes.
     let alone = ["-threads", "1"];
     let shrink = format!("crop=iw:trunc(ih/{SHARE}):0:0:exact=1,format=gray");
     let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];

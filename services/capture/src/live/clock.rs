@@ -8,7 +8,7 @@ const WINDOW_NANOS: u64 = 10_000_000_000;
 const JUMP_NANOS: u64 = 2_000_000_000;
 
 /// Shortest and longest delay that is believed of the clock of a camera, nanoseconds: nothing arrives before it was taken, and
-/// what comes later is given up.
+/// what comes much later is not waited for.
 const DELAYS_NANOS: [i64; 2] = [0, 150_000_000];
 /// By how much a clock that was believed may leave these, so that it is not left for a moment.
 const SLACK_NANOS: i64 = 5_000_000;

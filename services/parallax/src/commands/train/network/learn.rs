@@ -19,8 +19,7 @@ the expected error of every joint; the ONNX file carries its card.
 After every hundred steps everything that the training knows is in OUT.checkpoint: what is stopped by Ctrl-C, or killed, goes on with \
 --resume and ends with the same network, bit for bit, on the same kind of machine.
 
---from trains a network further: give a lower `rate` in --settings then, half of the default or less, or what it knows is lost before \
-it learns anew. --from shipped means the network that ships.
+--from trains a network further; a lower `rate` in --settings is for this. --from shipped means the network that ships.
 
 A real training needs LibTorch: build with --features libtorch (docs/guide/train.md says how). The built-in backend is \
 many times slower, and for small trainings.
