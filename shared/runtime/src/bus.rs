@@ -11,7 +11,7 @@ use iceoryx2::prelude::{
 
 use crate::bus_error::BusError;
 use crate::log::adopt_transport_log;
-use crate::room::OVERHEAD_BYTES;
+use crate::room::{OVERHEAD_BYTES, note_room};
 use crate::service::{self, PortError};
 use crate::topic::{Topic, TopicPlan};
 use crate::{Copies, Namespace, Progress, Stop, free_shared_memory, private};
@@ -54,6 +54,7 @@ impl Bus {
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
+            .inspect_err(note_room)
             .map_err(|source| BusError::Node {
                 process: process.to_owned(),
                 root: namespace.root().to_owned(),
@@ -160,6 +161,7 @@ impl Bus {
         service::open_wake_up(&self.node, name)?
             .notifier_builder()
             .create()
+            .inspect_err(note_room)
             .map_err(|source| PortError::Notifier {
                 topic: name.to_owned(),
                 source,

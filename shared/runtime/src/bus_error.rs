@@ -7,7 +7,7 @@ use iceoryx2::node::NodeCreationFailure;
 use iceoryx2::service::builder::event::EventCreateError;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeCreateError;
 
-use crate::room::{ROOM, no_room};
+use crate::room::{ROOM, short_of_room};
 use crate::{Fault, NamespaceError, PrivacyError};
 
 /// The deployment's shared memory cannot be reached, or a topic not be created.
@@ -85,7 +85,7 @@ impl Fault for BusError {
         match self {
             Self::Privacy(error) => error.hint(),
             Self::Full { .. } => Some(ROOM.to_owned()),
-            _ => no_room(),
+            _ => short_of_room(),
         }
     }
 }

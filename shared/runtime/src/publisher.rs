@@ -19,7 +19,7 @@ use crate::losses::{Losses, Patience};
 use crate::memory;
 use crate::onlookers::{self, Onlookers};
 use crate::payload::{Element, Header, Message};
-use crate::room::{connections, short_of_room};
+use crate::room::{connections, note_room, short_of_room};
 use crate::service::{self, Messages, PortError};
 use crate::{Copies, ExitKind, Fault, Progress, Stop};
 
@@ -300,6 +300,7 @@ impl<E: Message, H: Header> Port<E, H> {
             .set_backpressure_handler(patience(bus, &onlookers))
             .set_degradation_handler(connections())
             .create()
+            .inspect_err(note_room)
             .map_err(|source| match memory::refused(bus.namespace().prefix()) {
                 Some(source) => PortError::Memory {
                     topic: topic.to_owned(),
@@ -346,6 +347,7 @@ impl<E: Message, H: Header> Port<E, H> {
         self.progress.tick();
         // Chunks held by a dead receiver are released when the connections are updated.
         let updated = self.publisher.update_connections();
+        let updated = updated.inspect_err(note_room);
         updated.map_err(|source| SendError::Connection { topic, source })?;
         std::thread::sleep(CHUNK_PAUSE);
         Ok(())
@@ -375,7 +377,8 @@ impl<E: Message, H: Header> Port<E, H> {
             // Receivers check their buffers from time to time in any case.
             tracing::debug!(topic = %self.topic, ?error, "cannot wake the receivers");
         }
-        if sent.is_err() {
+        if let Err(error) = &sent {
+            note_room(error);
             self.stop.wait_for_unasked_end();
         }
         let topic = || Arc::clone(&self.topic);

@@ -33,13 +33,25 @@ pub(crate) fn no_room() -> Option<String> {
     })
 }
 
-/// The same, or that hardly any room is left.
+/// What was free when something of the transport failed last, bytes; more than there is if nothing has failed.
+static FREE_AT_FAILURE: AtomicU64 = AtomicU64::new(u64::MAX);
+
+/// Notes how much room there is at a failure of the transport, which need not tell its reason. To be called at once: what failed
+/// gives back what it had, and the next moment there may be room again.
+pub(crate) fn note_room<E>(_: &E) {
+    let free_bytes = free_shared_memory().unwrap_or(u64::MAX);
+    FREE_AT_FAILURE.store(free_bytes, Ordering::Relaxed);
+}
+
+/// The same, or that hardly any room was left at the last failure, or is now.
 pub(crate) fn short_of_room() -> Option<String> {
-    no_room().or_else(|| {
-        let free_bytes = free_shared_memory().ok()?;
+    let short = |words: &str, free_bytes: u64| {
         let is_short = free_bytes < OVERHEAD_BYTES;
-        is_short.then(|| format!("{} KB are free in /dev/shm: {ROOM}", free_bytes / 1000))
-    })
+        is_short.then(|| format!("{} KB {words} free in /dev/shm: {ROOM}", free_bytes / 1000))
+    };
+    no_room()
+        .or_else(|| short("were", FREE_AT_FAILURE.load(Ordering::Relaxed)))
+        .or_else(|| short("are", free_shared_memory().ok()?))
 }
 
 /// What a port does where it cannot connect to another one, which iceoryx2 tries once: without room it fails, since sender and receiver

@@ -22,7 +22,7 @@ use crate::Fault;
 use crate::delivery::Delivery;
 use crate::memory::MemoryError;
 use crate::payload::{Header, Message};
-use crate::room::{ROOM, short_of_room};
+use crate::room::{ROOM, note_room, short_of_room};
 
 /// How long to wait for a service that another process is creating or removing.
 const IN_FLUX_LIMIT: Duration = Duration::from_secs(5);
@@ -285,7 +285,7 @@ pub(crate) fn patiently<T, E>(
             Err(error) if in_flux(&error) && begin.elapsed() < IN_FLUX_LIMIT => {
                 sleep(IN_FLUX_PAUSE);
             }
-            result => return result,
+            result => return result.inspect_err(note_room),
         }
     }
 }

@@ -15,7 +15,7 @@ use iceoryx2::sample::Sample as IoxSample;
 use crate::bus::Bus;
 use crate::delivery::Delivery;
 use crate::payload::{Element, Header, Message};
-use crate::room::{connections, short_of_room};
+use crate::room::{connections, note_room, short_of_room};
 use crate::service::{self, Messages, PortError};
 use crate::{Copies, Fault, Waiter};
 
@@ -234,10 +234,14 @@ impl<E: Message, H: Header> Port<E, H> {
         if bus.looks_on() {
             builder = builder.name(&onlooker());
         }
-        let subscriber = builder.create().map_err(|source| PortError::Subscriber {
-            topic: topic.to_owned(),
-            source,
-        })?;
+        let subscriber =
+            builder
+                .create()
+                .inspect_err(note_room)
+                .map_err(|source| PortError::Subscriber {
+                    topic: topic.to_owned(),
+                    source,
+                })?;
         let port = Self {
             topic: Arc::from(topic),
             subscriber,
@@ -256,10 +260,12 @@ impl<E: Message, H: Header> Port<E, H> {
         // appear in between.
         let publishers = self.publishers();
         let connected = self.subscriber.update_connections();
-        connected.map_err(|source| PortError::Connection {
-            topic: self.topic.to_string(),
-            source,
-        })?;
+        connected
+            .inspect_err(note_room)
+            .map_err(|source| PortError::Connection {
+                topic: self.topic.to_string(),
+                source,
+            })?;
         self.acknowledge(publishers);
         Ok(())
     }
@@ -268,13 +274,19 @@ impl<E: Message, H: Header> Port<E, H> {
         // Listed before connecting, as in `connect`.
         let publishers = self.ready.as_ref().map(|_| self.publishers());
         let topic = || Arc::clone(&self.topic);
-        let sample = self.subscriber.receive().map_err(|source| match source {
-            IoxReceiveError::ExceedsMaxBorrows => ReceiveError::TooManyHeld { topic: topic() },
-            source @ IoxReceiveError::ConnectionFailure(_) => ReceiveError::Transport {
-                topic: topic(),
-                source,
-            },
-        })?;
+        let sample =
+            self.subscriber
+                .receive()
+                .inspect_err(note_room)
+                .map_err(|source| match source {
+                    IoxReceiveError::ExceedsMaxBorrows => {
+                        ReceiveError::TooManyHeld { topic: topic() }
+                    }
+                    source @ IoxReceiveError::ConnectionFailure(_) => ReceiveError::Transport {
+                        topic: topic(),
+                        source,
+                    },
+                })?;
         if let Some(publishers) = publishers {
             self.acknowledge(publishers);
         }

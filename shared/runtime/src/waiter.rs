@@ -15,6 +15,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
 use crate::bus::Bus;
+use crate::room::note_room;
 use crate::service::{self, PortError};
 use crate::{Fault, Progress, Stop};
 
@@ -74,6 +75,7 @@ impl Bus {
         service::open_wake_up(self.node(), name)?
             .listener_builder()
             .create()
+            .inspect_err(note_room)
             .map_err(|source| PortError::Listener {
                 topic: name.to_owned(),
                 source,
