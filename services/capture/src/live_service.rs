@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use messages::{CameraCounts, Status, UNMEASURED};
+use messages::{CameraCounts, Status, TimedBy, UNMEASURED};
 use runtime::{Failure, Service, now_nanos};
 
 use crate::camera::{Camera, Shot};
@@ -131,7 +131,7 @@ impl Live<'_, '_> {
         let index = self.index(nth);
         let time_s = self.grid.seconds(picture.at_nanos);
         self.counts.off_grid_nanos = self.grid.off_nanos(picture.at_nanos, nth);
-        self.phase.by_clock(picture.is_own_time);
+        self.phase.by_clock(picture.timed_by == TimedBy::CAMERA);
         if self.phase.add(picture.at_nanos, self.counts.off_grid_nanos) {
             self.warn_of_skew();
         }
@@ -240,6 +240,7 @@ impl Live<'_, '_> {
             skew_nanos: self.phase.skew_nanos().unwrap_or(UNMEASURED),
             drift_ppb: self.phase.drift_ppb().unwrap_or(UNMEASURED),
             delay_nanos: tally.delay_nanos.unwrap_or(UNMEASURED),
+            timed_by: tally.timed_by,
             rate_microhertz: tally.rate_hz.map_or(0, |it| (it * 1e6).round() as u64),
             ..self.counts
         };

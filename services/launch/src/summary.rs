@@ -59,7 +59,7 @@ pub struct Report {
     /// The summary of the process `results`: `summary.json`.
     recorded: Recorded,
     /// What became of the pictures of live cameras, a line each.
-    live: Vec<String>,
+    live: String,
     /// Whether another host fuses, and has the results.
     is_far: bool,
 }
@@ -332,8 +332,7 @@ impl Report {
     }
 
     fn write_live(&self, text: &mut String) {
-        let live = self.live.iter();
-        text.extend(live.map(|it| format!("  live camera   {it}\n")));
+        text.push_str(&self.live);
     }
 
     fn write_views(&self, text: &mut String, summary: &Summary) -> core::fmt::Result {

@@ -5,7 +5,7 @@ use core::mem::offset_of;
 use messages::{
     CameraCounts, EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, Kept, LocalMessage,
     Metrics, MetricsRow, PairHypothesis, PairPose, PictureHeader, Pose3d, PoseMessage, Searched,
-    Sides, Span, Stamp, Status, Timing, ViewPose, ViewQuality, topic,
+    Sides, Span, Stamp, Status, TimedBy, Timing, ViewPose, ViewQuality, topic,
 };
 
 /// The type of a field.
@@ -106,16 +106,17 @@ impl<T: Shape, const N: usize> Shape for [T; N] {
 
 /// Numbers with a name of their own are numbers in other languages.
 macro_rules! names_of_numbers {
-    ($($name:ty),*) => {
+    ($number:ty: $($name:ty),*) => {
         $(impl Shape for $name {
             fn shape() -> (Kind, Vec<usize>) {
-                u32::shape()
+                <$number>::shape()
             }
         })*
     };
 }
 
-names_of_numbers!(Status, Searched, Sides, Kept, Span);
+names_of_numbers!(u32: Status, Searched, Sides, Kept, Span);
+names_of_numbers!(u64: TimedBy);
 
 /// The field that `of` leads to; the type is the compiler's.
 fn field<S, T: Shape>(name: &'static str, offset: usize, _of: fn(&S) -> &T) -> Field {
@@ -185,7 +186,7 @@ structs! {
         peak_memory_bytes finished cpu_millis n_total refused;
     CameraCounts, "CameraCounts.v3":
         n_connections n_made n_lost n_delivered n_used n_surplus n_overtaken n_refused rate_microhertz off_grid_nanos
-        skew_nanos drift_ppb delay_nanos;
+        skew_nanos drift_ppb delay_nanos timed_by;
     MetricsRow, "MetricsRow.v1": span view count millihertz p50_nanos p99_nanos p99_9_nanos max_nanos;
     Metrics, "Metrics.v5":
         session pid epoch began_at_nanos at_nanos n_received n_sent sent_millihertz n_dropped evidence_bytes

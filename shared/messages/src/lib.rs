@@ -24,7 +24,7 @@ pub use frame::FrameHeader;
 pub use health::Health;
 pub use metrics::{
     CameraCounts, Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE,
-    NO_VIEW, Span, UNMEASURED,
+    NO_VIEW, Span, TimedBy, UNMEASURED,
 };
 pub use picture::{NO_SEQUENCE, PictureHeader};
 pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
@@ -64,5 +64,5 @@ const _: () = {
     assert!(size_of::<Pose3d>() == 11640 + MAX_KEYPOINTS * 88);
     assert!(size_of::<Health>() == 152);
     assert!(size_of::<MetricsRow>() == 56);
-    assert!(size_of::<Metrics>() == 280 + MAX_ROWS * 56);
+    assert!(size_of::<Metrics>() == 288 + MAX_ROWS * 56);
 };

@@ -105,8 +105,48 @@ pub struct CameraCounts {
     /// [`UNMEASURED`].
     pub drift_ppb: i64,
     /// The shortest time from capture to arrival over the last ten seconds, by the clock of the camera, nanoseconds; [`UNMEASURED`]
-    /// where it does not tell, or is not believed.
+    /// where it does not tell.
     pub delay_nanos: i64,
+    /// What says when the last picture was taken.
+    pub timed_by: TimedBy,
+}
+
+/// What says when the pictures of a camera were taken. A transparent number, as [`Status`](crate::Status).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, ZeroCopySend, Pod, Zeroable)]
+#[type_name("TimedBy.v1")]
+#[repr(C)]
+pub struct TimedBy(pub u64);
+
+impl TimedBy {
+    /// There is no picture yet, or it is footage.
+    pub const NOTHING: Self = Self(0);
+    /// The kernel, when it had the picture from the camera.
+    pub const DRIVER: Self = Self(1);
+    /// The clock of the camera.
+    pub const CAMERA: Self = Self(2);
+    /// Their arrival: they were taken earlier, by how long they are under way.
+    pub const ARRIVAL: Self = Self(3);
+    /// Their arrival, since the camera tells a time that cannot be.
+    pub const DISBELIEVED: Self = Self(4);
+
+    /// The name for people.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NOTHING => "-",
+            Self::DRIVER => "driver",
+            Self::CAMERA => "camera",
+            Self::ARRIVAL => "arrival",
+            Self::DISBELIEVED => "arrival (its clock is wrong)",
+            Self(_) => "unknown",
+        }
+    }
+
+    /// Whether pictures count as taken when they came.
+    #[must_use]
+    pub fn is_arrival(self) -> bool {
+        matches!(self, Self::ARRIVAL | Self::DISBELIEVED)
+    }
 }
 
 impl Default for Metrics {

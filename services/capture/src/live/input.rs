@@ -8,6 +8,7 @@ use std::thread;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use footage::{LiveAddress, LiveStream, PixelFormat, Size, StreamEnd, StreamSpec};
+use messages::TimedBy;
 use runtime::{VideoAbout, VideoDevice, VideoStream, now_nanos, video_devices};
 
 use super::address::{LiveCamera, LiveError, size_of};
@@ -34,7 +35,9 @@ pub(super) struct Taken {
     pub n_overtaken: u64,
     /// Whether its pixels are good.
     pub is_whole: bool,
-    /// The shortest delay of its pictures by the camera's own clock, nanoseconds; none where that is not known, or not believed.
+    /// What says when it was taken.
+    pub timed_by: TimedBy,
+    /// The shortest delay of its pictures by the camera's own clock, believed or not, nanoseconds; none where that is not known.
     pub delay_nanos: Option<i64>,
 }
 
@@ -156,7 +159,11 @@ impl Device {
         self.last_nanos = arrived_at_nanos;
         let is_whole =
             !picture.is_damaged && self.format.to_rgb(picture.bytes, stride, self.size, rgb);
-        let at_nanos = picture.at_nanos.unwrap_or(arrived_at_nanos);
+        let (at_nanos, timed_by) = picture
+            .at_nanos
+            .map_or((arrived_at_nanos, TimedBy::ARRIVAL), |it| {
+                (it, TimedBy::DRIVER)
+            });
         if let Some(originals) = &self.originals {
             originals.put(Original {
                 format: self.format.letters(),
@@ -177,6 +184,7 @@ impl Device {
             n_lost: if is_ours { 0 } else { n_missing },
             n_overtaken: if is_ours { n_missing } else { 0 },
             is_whole,
+            timed_by,
             delay_nanos: None,
         }))
     }
@@ -240,6 +248,7 @@ impl Stream {
             n_lost: 0,
             n_overtaken: 0,
             is_whole: true,
+            timed_by: TimedBy::ARRIVAL,
             delay_nanos: None,
         };
         if let Some(presented) = frame.presented_nanos {
@@ -252,8 +261,13 @@ impl Stream {
             let before = clock.verdict;
             if let Some(at_nanos) = clock.taken_at([unix, unix_nanos()], arrived_at_nanos) {
                 taken.at_nanos = at_nanos;
-                taken.delay_nanos = Some(clock.delay_nanos);
             }
+            taken.timed_by = match clock.verdict {
+                Verdict::Unknown => TimedBy::ARRIVAL,
+                Verdict::Right => TimedBy::CAMERA,
+                Verdict::Wrong => TimedBy::DISBELIEVED,
+            };
+            taken.delay_nanos = (clock.verdict != Verdict::Unknown).then_some(clock.delay_nanos);
             if clock.verdict != before {
                 say_of_clock(clock, &self.address);
             }

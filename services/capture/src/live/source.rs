@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Instant;
 
 use footage::{Size, StreamEnd};
-use messages::Status;
+use messages::{Status, TimedBy};
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::address::{LiveCamera, LiveError};
@@ -35,8 +35,8 @@ pub(crate) struct Picture {
     pub arrived_at_nanos: u64,
     /// Pictures before it that it has overtaken: this process was slow.
     pub n_overtaken: u64,
-    /// Whether it is the camera's own clock that says when it was taken.
-    pub is_own_time: bool,
+    /// What says when it was taken.
+    pub timed_by: TimedBy,
 }
 
 /// What became of the pictures up to here.
@@ -50,7 +50,8 @@ pub(crate) struct Tally {
     pub n_damaged: u64,
     /// Pictures per second since the camera was opened.
     pub rate_hz: Option<f64>,
-    /// [`Taken::delay_nanos`] of the last.
+    /// [`Taken::timed_by`] and [`Taken::delay_nanos`] of the last.
+    pub timed_by: TimedBy,
     pub delay_nanos: Option<i64>,
 }
 
@@ -234,7 +235,7 @@ impl Keeper {
                     }
                     *n_read += 1;
                     // Times of another clock are counted anew.
-                    if is_own_time != taken.delay_nanos.is_some() {
+                    if is_own_time != (taken.timed_by == TimedBy::CAMERA) {
                         (pace, is_own_time) = (Pace::default(), !is_own_time);
                     }
                     let made = 1 + taken.n_lost + taken.n_overtaken;
@@ -264,7 +265,7 @@ impl Keeper {
         tally.n_lost += taken.n_lost;
         tally.n_overtaken += taken.n_overtaken;
         tally.rate_hz = rate_hz;
-        tally.delay_nanos = taken.delay_nanos;
+        (tally.timed_by, tally.delay_nanos) = (taken.timed_by, taken.delay_nanos);
         if !taken.is_whole {
             tally.n_damaged += 1;
             return Some(rgb);
@@ -274,7 +275,7 @@ impl Keeper {
             at_nanos: taken.at_nanos,
             arrived_at_nanos: taken.arrived_at_nanos,
             n_overtaken: 0,
-            is_own_time: taken.delay_nanos.is_some(),
+            timed_by: taken.timed_by,
         });
         state.n_overtaken += taken.n_overtaken;
         let overtaken = if state.waiting.len() > N_WAITING {
@@ -334,6 +335,7 @@ mod tests {
             n_lost,
             n_overtaken: 0,
             is_whole,
+            timed_by: TimedBy::DRIVER,
             delay_nanos: None,
         }
     }

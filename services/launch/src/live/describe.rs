@@ -76,6 +76,7 @@ fn camera(it: &CameraCounts) -> Value {
         "skew_ms": measured_value(it.skew_nanos, 1e6),
         "drift_ppm": measured_value(it.drift_ppb, 1e3),
         "delay_ms": measured_value(it.delay_nanos, 1e6),
+        "timed_by": it.timed_by.name(),
     })
 }
 

@@ -48,7 +48,7 @@ pub fn table(snapshot: &Snapshot) -> String {
     text
 }
 
-const CAMERAS: [&str; 12] = [
+const CAMERAS: [&str; 13] = [
     "<CAMERA",
     "OPENED",
     "MADE",
@@ -61,6 +61,7 @@ const CAMERAS: [&str; 12] = [
     "SKEW ms",
     "DRIFT ppm",
     "DELAY ms",
+    "<TIMED BY",
 ];
 
 /// What became of the pictures of live cameras; empty without any.
@@ -101,6 +102,7 @@ fn cameras(snapshot: &Snapshot) -> String {
                     format!("{:+.1}", value as f64 / per)
                 });
             }
+            row.push(it.timed_by.name().to_owned());
             Some(row)
         })
         .collect();
@@ -314,12 +316,16 @@ results  waiting     all       100   20.0  ";
             skew_nanos: -3_200_000,
             drift_ppb: UNMEASURED,
             delay_nanos: 41_000_000,
+            timed_by: messages::TimedBy::CAMERA,
             ..messages::CameraCounts::default()
         };
         snapshot.processes[2].reading.as_mut().unwrap().camera = Some(camera);
         let text = table(&snapshot);
         let line = text.lines().find(|it| it.starts_with("left")).unwrap();
-        assert!(line.ends_with("-3.2          -     +41.0"), "{text}");
+        assert!(
+            line.ends_with("-3.2          -     +41.0  camera"),
+            "{text}"
+        );
     }
 
     #[test]

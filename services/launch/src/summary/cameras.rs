@@ -1,6 +1,6 @@
 //! Text on cameras that contradict each other.
 
-use messages::UNMEASURED;
+use messages::{CameraCounts, TimedBy, UNMEASURED};
 use metrics::Reading;
 use runfiles::{CameraFit, Contradicted, Exchanged};
 use supervise::Outcome;
@@ -48,58 +48,161 @@ pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
     )
 }
 
-/// What became of the pictures of every live camera, a line each; of a process that was restarted since then.
-pub(super) fn live(outcome: &Outcome) -> Vec<String> {
+/// What became of the pictures of every live camera, a line each; of a process that was restarted since then. Then whether the
+/// times of some can be compared with those of others.
+pub(super) fn live(outcome: &Outcome) -> String {
     let readings = outcome
         .processes
         .iter()
         .filter_map(|it| Reading::from_message(it.measured.as_ref()?).ok());
-    let lines = readings.filter_map(|reading| {
-        let it = reading.camera?;
+    let cameras = readings.filter_map(|reading| {
         let name = reading.view.map_or_else(String::new, |it| it.name);
-        let mut parts = vec![format!(
-            "{} pictures made, {} lost by the camera, {} used",
-            it.n_made, it.n_lost, it.n_used
-        )];
-        let more = [
-            (it.n_surplus, "surplus"),
-            (it.n_overtaken, "overtaken by newer ones"),
-            (it.n_refused, "refused"),
-        ];
-        let more = more.into_iter().filter(|it| it.0 > 0);
-        parts.extend(more.map(|(n, what)| format!("{n} {what}")));
-        if it.rate_microhertz > 0 {
-            parts.push(format!("{:.3} a second", it.rate_microhertz as f64 / 1e6));
-        }
-        if it.skew_nanos != UNMEASURED {
-            let skew = format!("{:+.1} ms from the instants", it.skew_nanos as f64 / 1e6);
-            parts.push(skew);
-        }
-        if it.drift_ppb != UNMEASURED {
-            let ppm = it.drift_ppb as f64 / 1e3;
-            let (slow, what) = if ppm < 0.0 {
-                (-ppm, "fast")
-            } else {
-                (ppm, "slow")
-            };
-            parts.push(format!("{slow:.0} ppm {what}"));
-        }
-        if it.delay_nanos != UNMEASURED {
-            let ms = it.delay_nanos as f64 / 1e6;
-            parts.push(format!("{ms:.0} ms from camera to here by its own clock"));
-        }
-        if it.n_connections > 1 {
-            parts.push(format!("opened {} times", it.n_connections));
-        }
-        let line = format!("{name}: {}", parts.join(", "));
-        Some(line)
+        Some((name, reading.camera?))
     });
-    lines.collect()
+    let cameras: Vec<_> = cameras.collect();
+    let mut text: String = cameras.iter().map(line).collect();
+    text.extend(unlike_times(&cameras));
+    text
+}
+
+/// What became of the pictures of a live camera.
+fn line((name, it): &(String, CameraCounts)) -> String {
+    let mut parts = vec![format!(
+        "{} pictures made, {} lost by the camera, {} used",
+        it.n_made, it.n_lost, it.n_used
+    )];
+    let more = [
+        (it.n_surplus, "surplus"),
+        (it.n_overtaken, "overtaken by newer ones"),
+        (it.n_refused, "refused"),
+    ];
+    let more = more.into_iter().filter(|it| it.0 > 0);
+    parts.extend(more.map(|(n, what)| format!("{n} {what}")));
+    if it.rate_microhertz > 0 {
+        parts.push(format!("{:.3} a second", it.rate_microhertz as f64 / 1e6));
+    }
+    if it.skew_nanos != UNMEASURED {
+        let skew = format!("{:+.1} ms from the instants", it.skew_nanos as f64 / 1e6);
+        parts.push(skew);
+    }
+    if it.drift_ppb != UNMEASURED {
+        let ppm = it.drift_ppb as f64 / 1e3;
+        let (slow, what) = if ppm < 0.0 {
+            (-ppm, "fast")
+        } else {
+            (ppm, "slow")
+        };
+        parts.push(format!("{slow:.0} ppm {what}"));
+    }
+    parts.extend(times(it));
+    if it.n_connections > 1 {
+        parts.push(format!("opened {} times", it.n_connections));
+    }
+    format!("  live camera   {name}: {}\n", parts.join(", "))
+}
+
+/// Text on what says when the pictures of a camera were taken, unless that is the kernel.
+fn times(it: &CameraCounts) -> Option<String> {
+    let ms = it.delay_nanos as f64 / 1e6;
+    match it.timed_by {
+        TimedBy::CAMERA => Some(format!("{ms:.0} ms from camera to here by its own clock")),
+        TimedBy::ARRIVAL => Some("counted as taken when they came".to_owned()),
+        TimedBy::DISBELIEVED => Some(format!(
+            "counted as taken when they came, since its own clock makes that {ms:.0} ms from camera to here (set it by the time \
+             server of this machine)"
+        )),
+        _ => None,
+    }
+}
+
+/// Text on live cameras of which some say when their pictures were taken and others do not; none where all are alike.
+///
+/// * `cameras`: name and counts.
+fn unlike_times(cameras: &[(String, CameraCounts)]) -> Option<String> {
+    let named = |which: fn(TimedBy) -> bool| -> Vec<&str> {
+        let those = cameras.iter().filter(|(_, it)| which(it.timed_by));
+        those.map(|(name, _)| name.as_str()).collect()
+    };
+    let told = named(|it| matches!(it, TimedBy::CAMERA | TimedBy::DRIVER));
+    let late = named(TimedBy::is_arrival);
+    if told.is_empty() || late.is_empty() {
+        return None;
+    }
+    let own = named(|it| it == TimedBy::CAMERA);
+    let remedy = if own.len() == told.len() {
+        format!(
+            "; where their delays are alike, `clock = \"arrival\"` of {} is better",
+            own.join(", ")
+        )
+    } else {
+        String::new()
+    };
+    Some(format!(
+        "  clock         the times of {} are those of capture, the times of {} those of arrival: later by how long a picture is under \
+         way{remedy}\n",
+        told.join(", "),
+        late.join(", "),
+    ))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn camera(name: &str, timed_by: TimedBy) -> (String, CameraCounts) {
+        let counts = CameraCounts {
+            timed_by,
+            delay_nanos: 41_000_000,
+            ..CameraCounts::default()
+        };
+        (name.to_owned(), counts)
+    }
+
+    #[test]
+    fn cameras_of_which_some_tell_the_time_are_named() {
+        let streams = [
+            camera("left", TimedBy::CAMERA),
+            camera("middle", TimedBy::DISBELIEVED),
+            camera("right", TimedBy::CAMERA),
+        ];
+        let text = unlike_times(&streams).unwrap();
+        assert!(
+            text.contains("of left, right are those of capture, the times of middle"),
+            "{text}"
+        );
+        assert!(
+            text.contains("`clock = \"arrival\"` of left, right"),
+            "{text}"
+        );
+        let with_device = [
+            camera("usb", TimedBy::DRIVER),
+            camera("net", TimedBy::ARRIVAL),
+        ];
+        let text = unlike_times(&with_device).unwrap();
+        assert!(
+            text.contains("of usb are those of capture, the times of net"),
+            "{text}"
+        );
+        assert!(!text.contains("clock ="), "{text}");
+        for alike in [
+            [TimedBy::CAMERA, TimedBy::DRIVER],
+            [TimedBy::ARRIVAL, TimedBy::DISBELIEVED],
+            [TimedBy::ARRIVAL, TimedBy::NOTHING],
+        ] {
+            let pair = alike.map(|it| camera("any", it));
+            assert_eq!(unlike_times(&pair), None, "{alike:?}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_is_not_believed_is_told_with_what_it_says() {
+        let (_, mut it) = camera("left", TimedBy::DISBELIEVED);
+        it.delay_nanos = -90_000_000_000;
+        let text = times(&it).unwrap();
+        assert!(text.contains("-90000 ms from camera to here"), "{text}");
+        let (_, usb) = camera("usb", TimedBy::DRIVER);
+        assert_eq!(times(&usb), None);
+    }
 
     #[test]
     fn a_camera_that_is_out_of_step_is_named_with_its_offset() {
