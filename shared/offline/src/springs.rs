@@ -27,7 +27,7 @@ pub struct Learned {
     pub n_bytes: usize,
 }
 
-/// Reads the marks of people, learns the springs, and writes them as a model file.
+/// Reads the marks of people, learns the springs of them and their mirror images, and writes them as a model file.
 ///
 /// # Errors
 ///
@@ -59,6 +59,9 @@ pub fn train(
         let message = format!("only {} people, expected {FEWEST} or more", people.len());
         return Err(Failure::new(ExitKind::Input, message));
     }
+    let mirrored = people.iter().map(|it| mirrored(it, table.joint_mirror()));
+    let mirrored: Vec<_> = mirrored.collect();
+    people.extend(mirrored);
     let model = learn(&people, settings).or_fail(ExitKind::Input)?;
     let bytes = fmp::files::own::encode(&model).or_fail(ExitKind::Run)?;
     files::replace(out, &bytes).map_err(|error| runtime::in_file(out, &error))?;
@@ -69,10 +72,42 @@ pub fn train(
     })
 }
 
+/// The joints of a person in a mirror: what was on the left of the picture is on the right, and of the other side of the body.
+///
+/// * `other_side`: the joint on the other side of the body, of every joint.
+fn mirrored(joints: &[[f64; 2]; 14], other_side: &[usize]) -> [[f64; 2]; 14] {
+    core::array::from_fn(|joint| {
+        let [x, y] = joints[other_side[joint]];
+        [-x, y]
+    })
+}
+
 /// The joints of a person in cells of the window that a network sees; `None` if they have no extent.
 fn in_cells(joints: &[[f64; 2]; 14]) -> Option<[[f64; 2]; 14]> {
     let [left, top, right, bottom] = posenetwork::outline_of(*joints)?;
     let [shape, margin] = WINDOW;
     let height = (bottom - top).max((right - left) / shape) * margin;
     Some(joints.map(|at| at.map(|it| it * WINDOW_CELLS / height)))
+}
+
+#[cfg(test)]
+mod tests {
+    use skeleton::PARSE14;
+
+    use super::*;
+
+    #[test]
+    fn a_mirror_exchanges_left_and_right_of_picture_and_body() {
+        let table = SkeletonTable::published();
+        let named = |of: &str| PARSE14.joints.iter().position(|it| it.name == of).unwrap();
+        let mut joints = [[0.0; 2]; 14];
+        joints[named("right wrist")] = [-8.0, 3.0];
+        joints[named("left wrist")] = [5.0, 1.0];
+        joints[named("head")] = [1.0, -20.0];
+        let image = mirrored(&joints, table.joint_mirror());
+        assert_eq!(image[named("left wrist")], [8.0, 3.0]);
+        assert_eq!(image[named("right wrist")], [-5.0, 1.0]);
+        assert_eq!(image[named("head")], [-1.0, -20.0]);
+        assert_eq!(mirrored(&image, table.joint_mirror()), joints);
+    }
 }

@@ -32,7 +32,7 @@ impl Default for SpringSettings {
         Self {
             n_types: 6,
             least_sigma: 1.0,
-            weight: 0.2,
+            weight: 0.1,
         }
     }
 }
