@@ -126,7 +126,7 @@ impl TimedBy {
     pub const CAMERA: Self = Self(2);
     /// Their arrival: they were taken earlier, by how long they are under way.
     pub const ARRIVAL: Self = Self(3);
-    /// Their arrival, since the camera tells a time that cannot be.
+    /// Their arrival, since the time that the camera tells is not believed.
     pub const DISBELIEVED: Self = Self(4);
 
     /// The name for people.
@@ -137,7 +137,7 @@ impl TimedBy {
             Self::DRIVER => "driver",
             Self::CAMERA => "camera",
             Self::ARRIVAL => "arrival",
-            Self::DISBELIEVED => "arrival (its clock is wrong)",
+            Self::DISBELIEVED => "arrival (its clock is not believed)",
             Self(_) => "unknown",
         }
     }

@@ -108,8 +108,8 @@ fn times(it: &CameraCounts) -> Option<String> {
         TimedBy::CAMERA => Some(format!("{ms:.0} ms from camera to here by its own clock")),
         TimedBy::ARRIVAL => Some("counted as taken when they came".to_owned()),
         TimedBy::DISBELIEVED => Some(format!(
-            "counted as taken when they came, since its own clock makes that {ms:.0} ms from camera to here (set it by the time \
-             server of this machine)"
+            "counted as taken when they came, since its own clock makes that {ms:.0} ms from camera to here, which is not \
+             believed (set it by the time server of this machine)"
         )),
         _ => None,
     }
