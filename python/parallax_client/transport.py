@@ -172,6 +172,8 @@ class Guest:
                 if begin == about and rest.split("/")[0] != str(ours):
                     return VersionMismatch(self.name, about, rest.split("/")[0], ours)
             return NoSuchTopic(f"deployment {self.name!r} has no topic {topic!r}")
+        if "HangsInCreation" in str(error) or "ServiceInCorruptedState" in str(error):
+            return NoSuchTopic(f"topic {topic!r} of deployment {self.name!r} is being made: {error}")
         if "IncompatibleTypes" in str(error):
             return ClientError(
                 f"topic {topic!r} of deployment {self.name!r} has another layout than this package knows: "

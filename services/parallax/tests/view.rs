@@ -114,7 +114,7 @@ impl Page {
 
 #[test]
 fn a_page_follows_a_run_from_before_its_begin_until_after_its_end() {
-    let case = Case::new("view", &[70; 2], PACED);
+    let case = Case::new("view", &[160; 2], PACED);
     let view = View::start(&case, &["deployment.toml"]);
     let mut page = view.open();
     page.text("hello", |it| it["mode"] == "waiting");

@@ -49,7 +49,8 @@ pub struct Losses {
     pub refused: u64,
     /// Parts that came after their frame, and frames without a skeleton where one was asked for.
     pub late: u64,
-    /// Moments that were passed over, because newer ones came before the caller asked.
+    /// Moments that were passed over, because newer ones came before the caller asked, or the deployment ended and had to have its
+    /// pictures back.
     pub passed_over: u64,
 }
 
@@ -282,7 +283,9 @@ impl Reader {
         let mut inner = lock(&self.shared.inner);
         inner.state = State::Waiting;
         // Pictures in place would keep the deployment from ending.
+        let n_ready = inner.ready.len();
         inner.ready.retain(|it| !it.is_in_place());
+        inner.losses.passed_over += (n_ready - inner.ready.len()) as u64;
     }
 }
 

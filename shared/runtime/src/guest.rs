@@ -250,7 +250,7 @@ impl Guest {
         })
     }
 
-    /// Why a topic is not there: the deployment has ended, or has another version of it.
+    /// Why a topic is not there: the deployment has ended, has another version of it, or has not made it yet.
     fn absent(&self, topic: &str) -> GuestError {
         let name = self.namespace.name();
         if self.is_over() {
@@ -259,8 +259,9 @@ impl Guest {
         let (ours, all) = (parts_of(topic), self.topics());
         let theirs = all.iter().filter_map(|it| parts_of(it));
         let other = ours.and_then(|ours| {
-            let mut same = theirs.filter(|it| (it.0, it.2) == (ours.0, ours.2));
-            Some((ours, same.next()?))
+            // One of the same version was made since this one was not there.
+            let mut others = theirs.filter(|it| (it.0, it.2) == (ours.0, ours.2) && it.1 != ours.1);
+            Some((ours, others.next()?))
         });
         match other {
             Some((ours, theirs)) => GuestError::Version {

@@ -83,6 +83,9 @@ fn another_version_and_another_type_are_told_apart() {
         "{version}"
     );
     assert!(refused("frame/v1/0").contains("has no topic \"frame/v1/0\""));
+    // It was not there when it was opened, and is now.
+    let late = guest.absent("pose3d/v9");
+    assert!(matches!(late, GuestError::NoSuchTopic { .. }), "{late}");
     let other = guest.port::<u8, messages::FrameHeader>("pose3d/v9");
     assert!(matches!(other, Err(GuestError::WrongType { .. })));
     drop((topics, bus, lock));
