@@ -9,7 +9,7 @@ import numpy as np
 from . import layout
 from .errors import ClientError, NotRunning
 from .place import running_deployments
-from .transport import Guest, NoSuchTopic, TooManyHeld
+from .transport import Guest, TooManyHeld
 
 __all__ = ["Client", "Joint", "Moment", "Picture", "Skeleton", "connect", "running_deployments"]
 
@@ -235,17 +235,6 @@ class Client:
         self.close()
 
     def _join(self):
-        """One that is about to start has no topics yet: they are waited for."""
-        end = time.monotonic() + 5
-        while True:
-            try:
-                return self._try_to_join()
-            except NoSuchTopic:
-                if time.monotonic() > end:
-                    raise
-                time.sleep(0.05)
-
-    def _try_to_join(self):
         guest = Guest(self.name)
         try:
             run = _Run(guest, self._wish, self._cameras)

@@ -55,6 +55,11 @@ def running_deployments():
     return [it.name for it in folders if it.is_dir() and supervisor(it) is not None]
 
 
+def is_described(name):
+    """Whether a deployment has said what it is."""
+    return (root(name) / "deployment.json").exists()
+
+
 def description(name):
     """What a running deployment says about itself, as a dictionary."""
     try:

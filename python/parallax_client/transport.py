@@ -1,6 +1,7 @@
 """The topics of a running deployment, as NumPy views on shared memory. Nothing here can send."""
 
 import threading
+import time
 import weakref
 import warnings
 
@@ -17,10 +18,6 @@ except ImportError:  # folders can be read without it
 
 class TooManyHeld(ClientError):
     """Another message cannot be taken before one that is held is given back."""
-
-
-class NoSuchTopic(ClientError):
-    """The deployment has no such topic, or does not have it yet."""
 
 
 class _Owner:
@@ -111,6 +108,10 @@ class Guest:
         self._folder, self.supervisor = folder, place.supervisor(folder)
         if self.supervisor is None:
             raise NotRunning(name, place.running_deployments())
+        # One that is starting says what it is when all its topics are there.
+        end = time.monotonic() + 5
+        while not place.is_described(name) and not self.is_over() and time.monotonic() < end:
+            time.sleep(0.02)
         self.running = place.description(name)
         self._seat = place.Seat(name)
         try:
@@ -171,9 +172,7 @@ class Guest:
                 begin, _, rest = other.partition("/v")
                 if begin == about and rest.split("/")[0] != str(ours):
                     return VersionMismatch(self.name, about, rest.split("/")[0], ours)
-            return NoSuchTopic(f"deployment {self.name!r} has no topic {topic!r}")
-        if "HangsInCreation" in str(error) or "ServiceInCorruptedState" in str(error):
-            return NoSuchTopic(f"topic {topic!r} of deployment {self.name!r} is being made: {error}")
+            return ClientError(f"deployment {self.name!r} has no topic {topic!r}")
         if "IncompatibleTypes" in str(error):
             return ClientError(
                 f"topic {topic!r} of deployment {self.name!r} has another layout than this package knows: "

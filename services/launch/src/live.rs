@@ -8,7 +8,10 @@ use core::time::Duration;
 use std::path::Path;
 use std::time::Instant;
 
-use runtime::{ExitKind, Failure, Namespace, Observer, OrFail as _, deployments, now_nanos};
+use runtime::{
+    ExitKind, Failure, Namespace, Observer, ObserverError, OrFail as _, deployments, now_nanos,
+    wait_for_description,
+};
 
 pub use describe::{describe, measured};
 pub use snapshot::{ProcessSnapshot, Snapshot, State};
@@ -17,6 +20,8 @@ pub use table::table;
 use crate::load;
 use crate::resolved::Resolved;
 
+/// How long a deployment may take to begin: until it says what it is, its topics are not all there.
+const STARTING: Duration = Duration::from_secs(10);
 /// How long to wait for the first metrics of all processes.
 const PATIENCE: Duration = Duration::from_secs(2);
 const PAUSE: Duration = Duration::from_millis(20);
@@ -29,12 +34,17 @@ pub struct Live {
 }
 
 impl Live {
-    /// Connects to a running deployment.
+    /// Connects to a running deployment. One that is starting is waited for, at most ten seconds: before, it would be seen with a part
+    /// of its processes.
     ///
     /// # Errors
     ///
     /// The deployment does not run, or its topics cannot be opened.
     pub fn open(namespace: &Namespace) -> Result<Self, Failure> {
+        if !wait_for_description(namespace, STARTING) {
+            let name = namespace.name().to_owned();
+            return Err(ObserverError::NotRunning { name }.into());
+        }
         Ok(Self {
             name: namespace.name().to_owned(),
             observer: Observer::open(namespace)?,

@@ -109,6 +109,34 @@ fn every_process_and_view_of_a_run_is_shown_with_rates_and_times() {
 }
 
 #[test]
+fn whoever_looks_at_a_run_that_begins_sees_all_its_processes() {
+    for _ in 0..3 {
+        let case = Case::new("begins", &[600; 2], PACED);
+        let mut started = case.start(&["run", "deployment.toml"]);
+        let mut shown = String::new();
+        started.until("an answer", |_| {
+            let ended = case.start(&["status", &case.name, "--json"]);
+            let ended = ended.wait_among_others();
+            let is_there = ended.status.code() == Some(0);
+            assert!(
+                is_there || ended.stderr.contains("does not run"),
+                "{}",
+                ended.stderr
+            );
+            shown = ended.stdout;
+            is_there
+        });
+        let shown: Value = serde_json::from_str(&shown).unwrap();
+        let shown = shown["deployment"]["processes"].as_array().unwrap();
+        let names = shown.iter().map(|it| it["process"].as_str().unwrap());
+        assert!(names.eq(PROCESSES), "{shown:#?}");
+        signal("INT", started.id());
+        started.wait();
+        case.assert_nothing_left();
+    }
+}
+
+#[test]
 fn a_process_that_was_killed_is_shown_with_its_restart() {
     let case = Case::new("restarted", &[600; 2], PACED);
     let mut started = case.start(&["run", "deployment.toml"]);

@@ -4,11 +4,13 @@
 use core::time::Duration;
 use std::collections::BTreeSet;
 use std::net::UdpSocket;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use client::{Client, ClientError, State, Wish};
 use common::started::signal;
-use common::{Case, PACED, WATCHDOG};
+use common::{Case, PACED, PLAIN, WATCHDOG};
 use runtime::GuestError;
 use serde_json::Value;
 
@@ -168,6 +170,32 @@ fn as_many_clients_as_there_are_places_and_no_more() {
     clients.push(Client::open(&case.name, &wish).unwrap());
     signal("INT", started.id());
     started.wait();
+    case.assert_nothing_left();
+}
+
+#[test]
+fn a_client_across_short_runs_is_told_of_no_error() {
+    let case = Case::new("across", &[4; 2], PLAIN);
+    let wish = Wish::skeletons().with_poses().every_frame(64);
+    let mut client = Client::wait_for(&case.name, &wish).unwrap();
+    let is_ended = Arc::new(AtomicBool::new(false));
+    let ended = Arc::clone(&is_ended);
+    let listening = std::thread::Builder::new()
+        .name("listening".to_owned())
+        .spawn(move || {
+            // Whether it joins in time does not matter here: what begins or ends under its hands is no error.
+            while !ended.load(Ordering::Relaxed) {
+                client.next(Duration::from_millis(50)).unwrap();
+            }
+            client.losses().refused
+        })
+        .unwrap();
+    for _ in 0..5 {
+        let ended = case.start(&["run", "deployment.toml", "--json"]).wait();
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    }
+    is_ended.store(true, Ordering::Relaxed);
+    assert_eq!(listening.join().unwrap(), 0);
     case.assert_nothing_left();
 }
 

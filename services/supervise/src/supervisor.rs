@@ -122,9 +122,10 @@ pub fn run(
     // Dropped in reverse: ports, topics, bus, and the lock last, which removes every file.
     let lock = plan.namespace.acquire()?;
     preflight(&plan.topics)?;
-    lock.describe(&plan.description)?;
     let bus = Bus::open(&plan.namespace, "supervisor", stop)?;
     let _topics = bus.create_topics(&plan.topics)?;
+    // Says to others that all topics are there.
+    lock.describe(&plan.description)?;
     let mut waiter = bus.waiter();
     let now = Instant::now();
     let mut watches = Vec::new();

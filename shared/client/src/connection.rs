@@ -7,7 +7,10 @@ use std::time::Instant;
 
 use messages::{FrameHeader, Pose3d, Status, ViewPose, topic};
 use runfiles::Running;
-use runtime::{Guest, GuestError, GuestPort, Namespace, ReceiveError, running_deployments};
+use runtime::{
+    Guest, GuestError, GuestPort, Namespace, ReceiveError, running_deployments,
+    wait_for_description,
+};
 
 use crate::check;
 use crate::error::ClientError;
@@ -17,10 +20,8 @@ use crate::wish::Wish;
 
 /// Messages that are taken from one port in one turn, so that a turn ends.
 const MOST_A_TURN: usize = 64;
-/// How long a deployment that is starting may be without topics.
+/// How long a deployment may take to begin.
 const STARTING: Duration = Duration::from_secs(5);
-/// Pause between two attempts.
-const PAUSE: Duration = Duration::from_millis(50);
 
 /// The ports of one run of a deployment. Its description stays the same, and so does its session.
 #[derive(Debug)]
@@ -52,23 +53,11 @@ pub(crate) enum Turn {
 }
 
 impl Connection {
-    /// Joins a deployment. One that is about to start has no topics yet: they are waited for.
+    /// Joins a deployment. One that is about to start is waited for, until it says what it is and all topics are there.
     pub(crate) fn open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
-        let begin = Instant::now();
-        loop {
-            match Self::try_open(deployment, wish) {
-                Err(ClientError::Guest(GuestError::NoSuchTopic { .. }))
-                    if begin.elapsed() < STARTING =>
-                {
-                    std::thread::sleep(PAUSE);
-                }
-                opened => return opened,
-            }
-        }
-    }
-
-    fn try_open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
         let namespace = Namespace::new(deployment)?;
+        // Where it does not, the guest says why.
+        wait_for_description(&namespace, STARTING);
         let guest = Guest::open(&namespace)?;
         let text = namespace
             .description()

@@ -165,6 +165,18 @@ impl Guest {
         let Some(supervisor) = running_supervisor(namespace) else {
             return Err(not_running(name));
         };
+        Self::open_of(namespace, supervisor).map_err(|error| {
+            // What fails while the deployment ends fails because of that.
+            if running_supervisor(namespace) == Some(supervisor) {
+                error
+            } else {
+                not_running(name)
+            }
+        })
+    }
+
+    fn open_of(namespace: &Namespace, supervisor: u32) -> Result<Self, GuestError> {
+        let name = namespace.name();
         let seat = seat(namespace)?;
         let failed = |what: String| GuestError::Transport {
             name: name.to_owned(),
@@ -203,8 +215,18 @@ impl Guest {
     /// # Errors
     ///
     /// [`GuestError::NoSuchTopic`], [`GuestError::Version`], [`GuestError::WrongType`], [`GuestError::Full`],
-    /// [`GuestError::Transport`].
+    /// [`GuestError::Transport`]; [`GuestError::NotRunning`] if the deployment has ended.
     pub fn port<E: Message, H: Header>(&self, topic: &str) -> Result<GuestPort<E, H>, GuestError> {
+        self.try_port(topic).map_err(|error| {
+            if self.is_over() {
+                not_running(self.namespace.name())
+            } else {
+                error
+            }
+        })
+    }
+
+    fn try_port<E: Message, H: Header>(&self, topic: &str) -> Result<GuestPort<E, H>, GuestError> {
         let deployment = || self.namespace.name().to_owned();
         let failed = |what: String| GuestError::Transport {
             name: deployment(),
@@ -250,12 +272,9 @@ impl Guest {
         })
     }
 
-    /// Why a topic is not there: the deployment has ended, has another version of it, or has not made it yet.
+    /// Why a topic is not there: the deployment has another version of it, or has not made it yet.
     fn absent(&self, topic: &str) -> GuestError {
         let name = self.namespace.name();
-        if self.is_over() {
-            return not_running(name);
-        }
         let (ours, all) = (parts_of(topic), self.topics());
         let theirs = all.iter().filter_map(|it| parts_of(it));
         let other = ours.and_then(|ours| {

@@ -62,7 +62,7 @@ pub use losses::{Losses, Patience};
 pub use mapped::{Mapped, mapped_at};
 pub use memory::{MemoryError, free_shared_memory, free_space, peak_memory};
 pub use namespace::{Namespace, NamespaceError};
-pub use observer::{ObservedProcess, Observer, ObserverError};
+pub use observer::{ObservedProcess, Observer, ObserverError, wait_for_description};
 pub use payload::{Element, Header, Message};
 pub use place::Place;
 pub use preflight::{PreflightError, needed_bytes, preflight, process_topics};

@@ -11,7 +11,7 @@ use std::time::Instant;
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeView as _;
 use iceoryx2::prelude::{CallbackProgression, Node, NodeState, ipc};
-use rustix::fs::{FlockOperation, flock};
+use rustix::fs::{FlockOperation, flock, renameat};
 use rustix::io::Errno;
 
 use crate::bus::prepare;
@@ -21,6 +21,8 @@ use crate::{BusError, ExitKind, Fault, Namespace, beneath};
 
 /// Tells observers that the deployment is ending.
 pub(crate) const ENDING_FILE: &str = "ending";
+/// The description until all of it is written.
+const UNFINISHED_FILE: &str = "deployment.json.new";
 /// How long observers are given to leave.
 const OBSERVER_LIMIT: Duration = Duration::from_secs(1);
 /// How long the processes of a killed supervisor are given to end.
@@ -131,7 +133,7 @@ impl DeploymentLock {
     }
 
     /// Writes the description of the deployment, which others of this user can read while it runs
-    /// ([`Namespace::description`]).
+    /// ([`Namespace::description`]). Whoever reads it finds all of it, and all topics if they were made before.
     ///
     /// # Errors
     ///
@@ -141,10 +143,12 @@ impl DeploymentLock {
             path: self.namespace.root().join(DESCRIPTION_FILE),
             source,
         };
-        let file = beneath::file_in(&self.root, DESCRIPTION_FILE);
+        let file = beneath::file_in(&self.root, UNFINISHED_FILE);
         let mut file = file.map_err(|error| failed(error.into()))?;
         file.set_len(0).map_err(failed)?;
-        file.write_all(text).map_err(failed)
+        file.write_all(text).map_err(failed)?;
+        renameat(&self.root, UNFINISHED_FILE, &self.root, DESCRIPTION_FILE)
+            .map_err(|error| failed(error.into()))
     }
 
     /// Returns at once if there is no observer.

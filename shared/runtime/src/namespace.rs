@@ -156,7 +156,8 @@ impl Namespace {
         self.root.join("config").join("iceoryx2.toml")
     }
 
-    /// What the deployment says about itself while it runs ([`crate::DeploymentLock::describe`]).
+    /// What the deployment says about itself while it runs ([`crate::DeploymentLock::describe`]); of one that is starting
+    /// [`wait_for_description`](crate::wait_for_description).
     ///
     /// # Errors
     ///

@@ -1,7 +1,9 @@
 //! Observing a running deployment from a process that is not part of it.
 
+use core::time::Duration;
 use std::fs;
 use std::io;
+use std::time::Instant;
 
 use iceoryx2::prelude::{CallbackProgression, Service as _, ipc};
 use iceoryx2::service::ServiceListError;
@@ -11,6 +13,9 @@ use crate::lock::{ENDING_FILE, living};
 use crate::private::LOCK_FILE;
 use crate::remains::supervisor;
 use crate::{Bus, BusError, ExitKind, Fault, Namespace, PortError, ReceiveError, Stop, Subscriber};
+
+/// Pause between two looks at a deployment that is starting.
+const PAUSE: Duration = Duration::from_millis(20);
 
 /// A deployment cannot be observed.
 #[derive(Debug, thiserror::Error)]
@@ -105,6 +110,17 @@ impl Observer {
         };
         // Checked before anything is opened, since opening creates the files.
         let supervisor = running_supervisor(namespace).ok_or_else(not_running)?;
+        Self::open_of(namespace, supervisor).map_err(|error| {
+            // What fails while the deployment ends fails because of that.
+            if running_supervisor(namespace) == Some(supervisor) {
+                error
+            } else {
+                not_running()
+            }
+        })
+    }
+
+    fn open_of(namespace: &Namespace, supervisor: u32) -> Result<Self, ObserverError> {
         let stop = Stop::new().map_err(ObserverError::Stop)?;
         let name = format!("observer-{}", std::process::id());
         let bus = Bus::open(namespace, &name, &stop)?.as_onlooker();
@@ -122,16 +138,7 @@ impl Observer {
                     metrics: None,
                 })
             })
-            .collect::<Result<_, PortError>>();
-        let processes = match processes {
-            // The deployment has ended in the meantime.
-            Err(PortError::NoSuchTopic { .. })
-                if running_supervisor(namespace) != Some(supervisor) =>
-            {
-                return Err(not_running());
-            }
-            opened => opened?,
-        };
+            .collect::<Result<_, PortError>>()?;
         Ok(Self {
             processes,
             supervisor,
@@ -173,6 +180,25 @@ impl Observer {
     /// Whether the deployment is ending, so that this observer has to be dropped.
     pub fn is_over(&self) -> bool {
         running_supervisor(self.bus.namespace()) != Some(self.supervisor)
+    }
+}
+
+/// Waits until a deployment that is starting says what it is ([`Namespace::description`]): before, its topics are not all there.
+///
+/// * Returns whether it does. One that does not run is not waited for.
+pub fn wait_for_description(namespace: &Namespace, patience: Duration) -> bool {
+    let begin = Instant::now();
+    loop {
+        if running_supervisor(namespace).is_none() {
+            return false;
+        }
+        if namespace.description().is_ok() {
+            return true;
+        }
+        if begin.elapsed() >= patience {
+            return false;
+        }
+        std::thread::sleep(PAUSE);
     }
 }
 

@@ -7,7 +7,7 @@ use std::time::Instant;
 use launch::Resolved;
 use launch::live::{self, Live};
 use messages::{FrameHeader, MAX_VIEWS, Pose3d, Status, topic};
-use runtime::{Bus, ExitKind, Failure, Namespace, SliceSubscriber, Stop, Subscriber};
+use runtime::{Bus, Failure, Namespace, SliceSubscriber, Stop, Subscriber};
 use serde_json::{Value, json};
 
 use super::events::Events;
@@ -75,13 +75,8 @@ impl Session {
     ) -> Result<Self, Failure> {
         let namespace = live::namespace(named)?;
         // Fails if it does not run, before anything is made in its folder.
-        let mut live = Live::open(&namespace)?;
+        let live = Live::open(&namespace)?;
         let resolved = live::description(&namespace)?;
-        let n_processes = resolved.topology().processes().len();
-        if live.snapshot()?.processes.len() < n_processes {
-            let text = format!("deployment {:?} is starting", namespace.name());
-            return Err(Failure::new(ExitKind::Run, text));
-        }
         let scene = Scene::of_frames(&resolved)?;
         let name = format!("view-{}", std::process::id());
         let bus = Bus::open(&namespace, &name, stop)?.as_onlooker();

@@ -1,9 +1,11 @@
 //! Guests of a deployment: who is let in, and that nobody waits for them.
 
+use core::time::Duration;
+
 use messages::Health;
 
 use super::*;
-use crate::{Bus, Delivery, DeploymentLock, Limits, Stop, Topic, TopicPlan};
+use crate::{Bus, Delivery, DeploymentLock, Limits, Stop, Topic, TopicPlan, wait_for_description};
 
 #[test]
 fn a_topic_is_told_apart_from_its_version() {
@@ -30,6 +32,28 @@ fn what_does_not_run_is_told_with_what_runs() {
         "{error}"
     );
     assert!(!namespace.root().exists(), "nothing is created");
+}
+
+#[test]
+fn a_deployment_that_is_starting_is_waited_for_and_one_that_does_not_run_is_not() {
+    const WATCHDOG: Duration = Duration::from_mins(10);
+    let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+    let namespace = Namespace::below("slow", base.path()).unwrap();
+    assert!(!wait_for_description(&namespace, WATCHDOG));
+    let lock = namespace.acquire().unwrap();
+    assert!(!wait_for_description(&namespace, Duration::from_millis(50)));
+    let waits = namespace.clone();
+    let waiting = std::thread::Builder::new()
+        .name("waiting".to_owned())
+        .spawn(move || {
+            assert!(wait_for_description(&waits, WATCHDOG));
+            waits.description().unwrap()
+        })
+        .unwrap();
+    lock.describe(b"what it is").unwrap();
+    assert_eq!(waiting.join().unwrap(), "what it is");
+    lock.describe(b"else").unwrap();
+    assert_eq!(namespace.description().unwrap(), "else");
 }
 
 /// A deployment of one lossless topic, and its bus.
