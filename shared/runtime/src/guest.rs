@@ -20,7 +20,7 @@ use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use rustix::fs::{FlockOperation, flock};
 
 use crate::log::adopt_transport_log;
-use crate::observer::running_supervisor;
+use crate::observer::{running_supervisor, unless_over};
 use crate::payload::{Header, Message};
 use crate::service::patiently;
 use crate::subscriber::onlooker;
@@ -165,14 +165,8 @@ impl Guest {
         let Some(supervisor) = running_supervisor(namespace) else {
             return Err(not_running(name));
         };
-        Self::open_of(namespace, supervisor).map_err(|error| {
-            // What fails while the deployment ends fails because of that.
-            if running_supervisor(namespace) == Some(supervisor) {
-                error
-            } else {
-                not_running(name)
-            }
-        })
+        Self::open_of(namespace, supervisor)
+            .map_err(|error| unless_over((namespace, supervisor), error, || not_running(name)))
     }
 
     fn open_of(namespace: &Namespace, supervisor: u32) -> Result<Self, GuestError> {
@@ -217,13 +211,9 @@ impl Guest {
     /// [`GuestError::NoSuchTopic`], [`GuestError::Version`], [`GuestError::WrongType`], [`GuestError::Full`],
     /// [`GuestError::Transport`]; [`GuestError::NotRunning`] if the deployment has ended.
     pub fn port<E: Message, H: Header>(&self, topic: &str) -> Result<GuestPort<E, H>, GuestError> {
-        self.try_port(topic).map_err(|error| {
-            if self.is_over() {
-                not_running(self.namespace.name())
-            } else {
-                error
-            }
-        })
+        let run = (&self.namespace, self.supervisor);
+        self.try_port(topic)
+            .map_err(|error| unless_over(run, error, || not_running(self.namespace.name())))
     }
 
     fn try_port<E: Message, H: Header>(&self, topic: &str) -> Result<GuestPort<E, H>, GuestError> {

@@ -110,14 +110,8 @@ impl Observer {
         };
         // Checked before anything is opened, since opening creates the files.
         let supervisor = running_supervisor(namespace).ok_or_else(not_running)?;
-        Self::open_of(namespace, supervisor).map_err(|error| {
-            // What fails while the deployment ends fails because of that.
-            if running_supervisor(namespace) == Some(supervisor) {
-                error
-            } else {
-                not_running()
-            }
-        })
+        Self::open_of(namespace, supervisor)
+            .map_err(|error| unless_over((namespace, supervisor), error, not_running))
     }
 
     fn open_of(namespace: &Namespace, supervisor: u32) -> Result<Self, ObserverError> {
@@ -199,6 +193,21 @@ pub fn wait_for_description(namespace: &Namespace, patience: Duration) -> bool {
             return false;
         }
         std::thread::sleep(PAUSE);
+    }
+}
+
+/// An error; but that the deployment does not run if it is ending or has ended, since what fails then fails because of that.
+///
+/// * The deployment and the supervisor that it had.
+pub(crate) fn unless_over<E>(
+    (namespace, supervisor): (&Namespace, u32),
+    error: E,
+    not_running: impl FnOnce() -> E,
+) -> E {
+    if running_supervisor(namespace) == Some(supervisor) {
+        error
+    } else {
+        not_running()
     }
 }
 
