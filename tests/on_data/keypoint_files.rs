@@ -7,7 +7,7 @@
 
 use keypointfiles::KeypointSource;
 use keypoints::files::NameSet;
-use keypoints::joint_rows;
+use keypoints::joint_ways;
 use posenetwork::{JointMaps, MapSettings};
 use std::time::Instant;
 
@@ -24,7 +24,7 @@ fn keypoints_of_the_balancing_person_become_maps_whose_maxima_lie_on_them() {
         let names = NameSet::of_set("body-25b").ok();
         let source = KeypointSource::open(&path, names).unwrap();
         assert_eq!(source.n_frames(), 70);
-        let rows = joint_rows(source.names().names());
+        let rows = joint_ways(source.names().names());
         let (mut maps, mut people) = (JointMaps::default(), Vec::new());
         let (mut n, mut n_peaks, mut seconds) = (0, 0, 0.0);
         for frame in 0..source.n_frames() {

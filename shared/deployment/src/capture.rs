@@ -20,11 +20,12 @@ pub struct Camera {
     /// it may be left out.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub source: String,
-    /// Keypoints that another program found in the footage: a folder with a JSON file for every frame, in the layout of OpenPose,
-    /// or one JSON file in that of COCO.
+    /// Keypoints that another program found in the footage: a folder with a JSON file for every frame, in the layout of OpenPose
+    /// or mmpose, or one JSON file in that of COCO or mmpose.
     pub keypoints: Option<PathBuf>,
-    /// What these are called: `coco-17`, `halpe-26`, `body-25`, `body-25b`, `openpose-18`, `mpii-16` or `lsp-14`; without
-    /// it what their number tells, or the file itself.
+    /// What these are called: `coco-17`, `halpe-26`, `body-25`, `body-25b`, `openpose-18`, `mpii-16` or `lsp-14`; of the whole body
+    /// `coco-wholebody-133`, `halpe-136` or `body-135`, whose face and hands are not read; without it what their number tells, or the
+    /// file itself.
     pub keypoint_names: Option<String>,
     /// A network of this camera's own, in the place of `pose.network`.
     pub network: Option<PathBuf>,

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | OpenPose's | one for every frame | [`openpose::parse`] |
 //! | COCO's, a data set or a list of results | one for all frames | [`coco::parse`] |
+//! | mmpose's | one for every frame, or for all | either of the two |
 //!
 //! Positions are pixels of the footage with the centre of the top-left pixel at (0, 0). Nothing here reads a file; what is read
 //! is checked: numbers, lengths and counts have limits.
@@ -11,6 +12,8 @@
 pub mod coco;
 pub mod openpose;
 
+mod json;
+mod mmpose;
 mod names;
 mod seen;
 

@@ -31,8 +31,8 @@ pub use card::{
 pub use decode::{HeatMaps, Keypoint, List, OutputError, SimCc};
 pub use detector::{Boxes, DetectorCard, PersonBox};
 pub use names::{
-    BODY_25, BODY_25B, COCO_17, HALPE_26, LSP_14, MPII_16, OPENPOSE_18, SETS, is_joint, joint_rows,
-    mirrored,
+    BODY_25, BODY_25B, COCO_17, COCO_FEET_23, HALPE_26, LSP_14, MPII_16, OPENPOSE_18, SETS,
+    WHOLE_BODIES, Way, is_joint, joint_rows, joint_ways, mirrored,
 };
 pub use shipped::{SHIPPED, SHIPPED_DETECTORS};
 pub use window::{Window, outline};

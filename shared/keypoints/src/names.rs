@@ -182,34 +182,122 @@ pub const SETS: [(&str, &[&str]); 7] = [
     ("lsp-14", &LSP_14),
 ];
 
+/// The first of COCO-WholeBody's 133 keypoints: COCO's, and those of the feet. Face and hands follow.
+pub const COCO_FEET_23: [&str; 23] = [
+    "nose",
+    "left eye",
+    "right eye",
+    "left ear",
+    "right ear",
+    "left shoulder",
+    "right shoulder",
+    "left elbow",
+    "right elbow",
+    "left wrist",
+    "right wrist",
+    "left hip",
+    "right hip",
+    "left knee",
+    "right knee",
+    "left ankle",
+    "right ankle",
+    "left big toe",
+    "left small toe",
+    "left heel",
+    "right big toe",
+    "right small toe",
+    "right heel",
+];
+
+/// Sets of files that have face and hands after the body: name, the keypoints that are read, and how many a person has.
+///
+/// `coco-wholebody-133` of mmpose, `RTMLib` and `AlphaPose`; `halpe-136` of `AlphaPose`; `body-135` of `OpenPose`.
+pub const WHOLE_BODIES: [(&str, &[&str], usize); 3] = [
+    ("coco-wholebody-133", &COCO_FEET_23, 133),
+    ("halpe-136", &HALPE_26, 136),
+    ("body-135", &BODY_25B, 135),
+];
+
 /// From the neck to the top of the head, in lengths of the way from the neck to the middle of eyes and ears.
 const HEAD_TOP: f64 = 1.6;
 
-/// Every joint of `skeleton::PARSE14` as a weighted sum of keypoints: their numbers, and weights that sum to 1; `None` for a
-/// joint that does not follow from them.
+/// A way in which a joint follows from keypoints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Way {
+    /// The numbers of the keypoints, and weights that sum to 1.
+    pub row: Vec<(usize, f64)>,
+    /// Standard deviation along one axis that this way adds to that of its keypoints, share of the height of the person's box enlarged
+    /// by a quarter.
+    pub spread: f64,
+}
+
+/// Ways from a part of the face to the top of the head: keypoints, lengths of the way from the neck to their middle, spread.
 ///
-/// A keypoint of the joint's name is the joint. Without a neck it is the middle of the shoulders; without the top of the head it
-/// lies beyond the middle of eyes and ears, as seen from the neck, by 0.6 of the way there.
-pub fn joint_rows(names: &[String]) -> Vec<Option<Vec<(usize, f64)>>> {
-    let find = |name: &str| names.iter().position(|it| it == name);
+/// Factors of both ears and all spreads are measured: the keypoints of `body-25b`, which has the top of the head, in 421 people of the
+/// demonstration of Pose2Sim. The order is that of the spreads.
+const FACES: [(&[&str], f64, f64); 8] = [
+    (
+        &["left eye", "right eye", "left ear", "right ear"],
+        HEAD_TOP,
+        0.0,
+    ),
+    (&["left ear", "right ear"], 1.8, 0.01),
+    (&["left eye", "right eye"], HEAD_TOP, 0.035),
+    (&["left ear"], HEAD_TOP, 0.05),
+    (&["right ear"], HEAD_TOP, 0.05),
+    (&["left eye"], HEAD_TOP, 0.05),
+    (&["right eye"], HEAD_TOP, 0.05),
+    (&["nose"], HEAD_TOP, 0.07),
+];
+
+/// The ways in which every joint of `skeleton::PARSE14` follows from keypoints, the best first; none for a joint that does not.
+///
+/// A keypoint of the joint's name is the joint. A neck is also the middle of the shoulders. The top of the head also lies beyond a part of
+/// the face, as seen from the neck: beyond the middle of eyes and ears by 0.6 of the way there.
+pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
+    let find = |name: &str| names.iter().position(|known| known == name);
     let mean = |wanted: &[&str]| -> Option<Vec<(usize, f64)>> {
-        let found: Option<Vec<usize>> = wanted.iter().map(|it| find(it)).collect();
+        let found: Option<Vec<usize>> = wanted.iter().map(|name| find(name)).collect();
         let share = 1.0 / wanted.len() as f64;
-        Some(found?.into_iter().map(|it| (it, share)).collect())
+        Some(found?.into_iter().map(|nth| (nth, share)).collect())
     };
-    let neck = || mean(&["neck"]).or_else(|| mean(&["left shoulder", "right shoulder"]));
-    let head = || {
-        let face = mean(&["left eye", "right eye", "left ear", "right ear"])?;
-        let mut row: Vec<(usize, f64)> = face.iter().map(|it| (it.0, HEAD_TOP * it.1)).collect();
-        row.extend(neck()?.iter().map(|it| (it.0, (1.0 - HEAD_TOP) * it.1)));
-        Some(row)
+    let way = |row| Way { row, spread: 0.0 };
+    let necks = || [mean(&["neck"]), mean(&["left shoulder", "right shoulder"])];
+    let heads = || {
+        FACES.into_iter().flat_map(move |(face, length, spread)| {
+            let beyond = move |neck: Vec<(usize, f64)>| {
+                let mut row = mean(face)?;
+                row.iter_mut().for_each(|term| term.1 *= length);
+                row.extend(neck.iter().map(|term| (term.0, (1.0 - length) * term.1)));
+                Some(Way { row, spread })
+            };
+            necks().into_iter().flatten().filter_map(beyond)
+        })
     };
-    let joint = |name: &str| match name {
-        "neck" => neck(),
-        "head" => mean(&["head top"]).or_else(head),
-        name => mean(&[name]),
+    let ways = |name: &str| -> Vec<Way> {
+        match name {
+            "neck" => necks().into_iter().flatten().map(way).collect(),
+            "head" => mean(&["head top"])
+                .map(way)
+                .into_iter()
+                .chain(heads())
+                .collect(),
+            name => mean(&[name]).map(way).into_iter().collect(),
+        }
     };
-    PARSE14.joints.iter().map(|it| joint(it.name)).collect()
+    PARSE14
+        .joints
+        .iter()
+        .map(|joint| ways(joint.name))
+        .collect()
+}
+
+/// The best way of every joint where all keypoints are there, as a weighted sum of them: the first of [`joint_ways`]; `None` for a joint
+/// that does not follow from them.
+pub fn joint_rows(names: &[String]) -> Vec<Option<Vec<(usize, f64)>>> {
+    let ways = joint_ways(names).into_iter();
+    ways.map(|ways| Some(ways.into_iter().next()?.row))
+        .collect()
 }
 
 /// Whether a keypoint is a joint of `skeleton::PARSE14` by its name; all others are extra keypoints.
@@ -293,6 +381,26 @@ mod tests {
         let head = rows[13].as_ref().unwrap();
         let top: f64 = head.iter().map(|it| it.1 * height(it.0)).sum();
         assert!((top - 1.72).abs() < 1e-12, "{top}");
+    }
+
+    #[test]
+    fn a_head_follows_from_one_ear_or_the_nose_alone_and_says_that_it_is_worse() {
+        let names = owned(&OPENPOSE_18);
+        let ways = &joint_ways(&names)[13];
+        let spread = |seen: &[&str]| {
+            let is_seen = |way: &&Way| way.row.iter().all(|term| seen.contains(&&*names[term.0]));
+            ways.iter().find(is_seen).map(|way| way.spread)
+        };
+        let all = spread(&["neck", "left eye", "right eye", "left ear", "right ear"]);
+        let ear = spread(&["neck", "right ear", "nose"]);
+        let nose = spread(&["left shoulder", "right shoulder", "nose"]);
+        assert_eq!(all, Some(0.0));
+        assert!(all < ear && ear < nose, "{all:?} {ear:?} {nose:?}");
+        assert_eq!(
+            spread(&["nose"]),
+            None,
+            "without a neck there is no direction"
+        );
     }
 
     #[test]

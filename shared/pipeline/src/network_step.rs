@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use fmp::{Bound, Bounds, Layout, Placement, Pose, Region, Responses, Scope, local_scores};
 use kernels::Rgb8View;
-use keypoints::Keypoint;
+use keypoints::{Keypoint, Way};
 use multiview::FrontEvidence;
 use posenetwork::springs::TurnedSprings;
 use posenetwork::{
@@ -28,8 +28,8 @@ use crate::view_step::{ViewEstimate, ViewStep};
 pub enum Eyes {
     /// A network that looks into boxes, and what finds these.
     Network(Box<PoseNetwork>, Boxes),
-    /// Keypoints that another program found: how the joints follow from them (`keypoints::joint_rows` of their names).
-    Keypoints(Vec<Option<Vec<(usize, f64)>>>),
+    /// Keypoints that another program found: how the joints follow from them (`keypoints::joint_ways` of their names).
+    Keypoints(Vec<Vec<Way>>),
 }
 
 /// Where boxes around people come from.

@@ -96,7 +96,7 @@ impl JointMaps {
 
 #[cfg(test)]
 mod tests {
-    use keypoints::{Keypoint, LSP_14, joint_rows};
+    use keypoints::{Keypoint, LSP_14, joint_ways};
 
     use super::*;
     use crate::maps::MapSettings;
@@ -128,7 +128,7 @@ mod tests {
         let all: Vec<Option<Keypoint>> = joints.map(keypoint).map(Some).to_vec();
         let mut maps = JointMaps::default();
         let settings = MapSettings::default();
-        assert!(maps.of_keypoints(&all, &joint_rows(&names), &settings, 0.02));
+        assert!(maps.of_keypoints(&all, &joint_ways(&names), &settings, 0.02));
         maps
     }
 

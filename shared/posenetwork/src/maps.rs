@@ -3,7 +3,7 @@
 mod sides;
 
 use fmp::{Layout, Placement, Scope};
-use keypoints::{Codec, Keypoint, Window, joint_rows};
+use keypoints::{Codec, Keypoint, Way, Window, joint_rows};
 use skeleton::PARSE14;
 
 use crate::between::{Tap, between, for_each_row};
@@ -164,8 +164,8 @@ impl JointMaps {
     /// over the floor. Where nobody was found, everything is the floor, and no joint has a peak.
     ///
     /// * `keypoints`: pixels of the picture; `None` for those that were not found, as for those with a score of 0.
-    /// * `rows`: how the joints follow from them: [`joint_rows`] of their names. A joint has a peak where all keypoints of its
-    ///   row were found.
+    /// * `ways`: how the joints follow from them: [`joint_ways`](keypoints::joint_ways) of their names. A joint has a peak where all
+    ///   keypoints of one of its ways were found; of several the first counts.
     /// * `settings`: its `point_sigma` is not used.
     /// * `sigma`: standard deviation, share of the height of the enlarged box, as [`MapSettings::point_sigma`] is.
     /// * Returns whether there is anybody.
@@ -176,7 +176,7 @@ impl JointMaps {
     pub fn of_keypoints(
         &mut self,
         keypoints: &[Option<Keypoint>],
-        rows: &[Option<Vec<(usize, f64)>>],
+        ways: &[Vec<Way>],
         settings: &MapSettings,
         sigma: f64,
     ) -> bool {
@@ -200,16 +200,23 @@ impl JointMaps {
             return false;
         };
         let [_, top, _, bottom] = self.extent();
-        self.sigma_px = Some(sigma * (bottom - top));
-        let sigma = (sigma * self.rows as f64).max(LEAST_SIGMA);
-        for (joint, row) in rows.iter().enumerate().take(N_JOINTS) {
+        let height = bottom - top;
+        self.sigma_px = Some(sigma * height);
+        self.told.resize(N_JOINTS, None);
+        for (joint, ways) in ways.iter().enumerate().take(N_JOINTS) {
             let found = |at: usize| keypoints[at].filter(|it| it.score > 0.0);
-            let peak = row.as_ref().and_then(|row| weighted(row, found));
-            self.peaks[joint] = peak;
-            if let Some(peak) = peak {
-                let at = window.in_input(peak.at);
-                self.fill_bump(joint, (at, peak.score), sigma, settings);
+            let seen = |way: &Way| Some((weighted(&way.row, found)?, way.spread));
+            let Some((peak, spread)) = ways.iter().find_map(seen) else {
+                continue;
+            };
+            self.peaks[joint] = Some(peak);
+            if spread > 0.0 {
+                let error = expected_error(peak.score).hypot(spread) * height;
+                self.told[joint] = Some(error / ALONG_AN_AXIS);
             }
+            let sigma = (sigma.hypot(spread) * self.rows as f64).max(LEAST_SIGMA);
+            let at = window.in_input(peak.at);
+            self.fill_bump(joint, (at, peak.score), sigma, settings);
         }
         true
     }

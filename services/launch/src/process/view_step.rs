@@ -55,7 +55,7 @@ pub(super) fn of_view(
     };
     if let Some(source) = keypoints::of_camera(&deployment.cameras[view])? {
         let extras = extras(resolved, source.names().names());
-        let eyes = Eyes::Keypoints(::keypoints::joint_rows(source.names().names()));
+        let eyes = Eyes::Keypoints(::keypoints::joint_ways(source.names().names()));
         let frame_from_source = prepared.views[view].framing.output_from_source();
         let springs = TurnedSprings::new(&prepared.model);
         return Ok(pose::Step::Keypoints(Box::new(pose::Keypoints {

@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
+use crate::files::json::{Numbers, from_json};
+use crate::files::mmpose;
 use crate::files::names::NameSet;
 use crate::files::seen::{
     FileError, MAX_FRAMES, MAX_PEOPLE, SeenKeypoints, at_most, person, told_by,
@@ -43,7 +45,7 @@ struct Entry {
     image_id: ImageId,
     category_id: Option<u64>,
     #[serde(default)]
-    keypoints: Vec<f64>,
+    keypoints: Numbers,
 }
 
 /// A number, or a text such as `000012`, `cam01_000012` or `000012.jpg`.
@@ -92,7 +94,7 @@ pub struct Film {
     pub frames: BTreeMap<u64, Vec<SeenKeypoints>>,
 }
 
-/// Reads a file.
+/// Reads a file, of mmpose too.
 ///
 /// The frames of a data set are its images in the order of their `id`; those of results are their `image_id` itself. A third
 /// number of a data set is 0 for a keypoint that is not labelled, else counts as a score, at most 1; of results it is the score.
@@ -105,12 +107,14 @@ pub struct Film {
 /// [`FileError`], naming the entry.
 pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Film, FileError> {
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-    let malformed = |layout: &'static str| move |source| FileError::Json { layout, source };
+    if mmpose::is_mmpose(text) {
+        return mmpose::film(text, names);
+    }
     if text.trim_ascii_start().starts_with(b"[") {
-        let entries: Vec<Entry> = serde_json::from_slice(text).map_err(malformed(RESULTS))?;
+        let entries: Vec<Entry> = from_json(text, RESULTS)?;
         return results(&entries, names);
     }
-    let set: DataSet = serde_json::from_slice(text).map_err(malformed(DATA_SET))?;
+    let set: DataSet = from_json(text, DATA_SET)?;
     data_set(&set, names)
 }
 

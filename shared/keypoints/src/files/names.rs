@@ -1,19 +1,23 @@
 //! The names of the keypoints of a file.
 
-use crate::names::{BODY_25, COCO_17, HALPE_26, OPENPOSE_18, SETS, joint_rows};
+use crate::names::{BODY_25, COCO_17, HALPE_26, OPENPOSE_18, SETS, WHOLE_BODIES, joint_rows};
 
 /// Most keypoints of a person.
 const MAX_KEYPOINTS: usize = 256;
 
 /// The names of keypoints, each once, in the order of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NameSet(Vec<String>);
+pub struct NameSet {
+    names: Vec<String>,
+    /// Keypoints of a person in the file: those after the named ones are not read.
+    in_file: usize,
+}
 
 /// Why texts are not the names of keypoints.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NamesError {
     /// No set of this name is known.
-    #[error("{name:?} is no known set of keypoints, expected one of {}", SETS.map(|it| it.0).join(", "))]
+    #[error("{name:?} is no known set of keypoints, expected one of {}", NameSet::known_sets().join(", "))]
     UnknownSet {
         /// The name.
         name: String,
@@ -67,46 +71,62 @@ impl NameSet {
                 names: first.join(", "),
             });
         }
-        Ok(Self(names))
+        let in_file = names.len();
+        Ok(Self { names, in_file })
     }
 
-    /// A known set: one of [`SETS`].
+    /// The names of all known sets: [`SETS`] and [`WHOLE_BODIES`].
+    pub fn known_sets() -> Vec<&'static str> {
+        let whole = WHOLE_BODIES.iter().map(|set| set.0);
+        SETS.iter().map(|set| set.0).chain(whole).collect()
+    }
+
+    /// A known set: one of [`SETS`] or [`WHOLE_BODIES`].
     ///
     /// # Errors
     ///
     /// [`NamesError::UnknownSet`].
     pub fn of_set(name: &str) -> Result<Self, NamesError> {
-        let known = SETS.iter().find(|it| it.0 == name);
-        let unknown = || NamesError::UnknownSet {
-            name: name.chars().take(64).collect(),
-        };
-        let (_, names) = known.ok_or_else(unknown)?;
-        Ok(Self::known(names))
+        let body = SETS.iter().find(|set| set.0 == name);
+        let whole = WHOLE_BODIES.iter().find(|set| set.0 == name);
+        body.map(|set| Self::known(set.1, set.1.len()))
+            .or_else(|| whole.map(|set| Self::known(set.1, set.2)))
+            .ok_or_else(|| NamesError::UnknownSet {
+                name: name.chars().take(64).collect(),
+            })
     }
 
-    /// The set that programs write with this number of keypoints: 17 `coco-17`, 18 `openpose-18`, 25 `body-25`, 26 `halpe-26`.
+    /// The set that programs write with this number of keypoints: 17 `coco-17`, 18 `openpose-18`, 25 `body-25`, 26 `halpe-26`, and
+    /// those of [`WHOLE_BODIES`].
     pub fn of_number(n: usize) -> Option<Self> {
-        match n {
-            17 => Some(Self::known(&COCO_17)),
-            18 => Some(Self::known(&OPENPOSE_18)),
-            25 => Some(Self::known(&BODY_25)),
-            26 => Some(Self::known(&HALPE_26)),
-            _ => None,
-        }
+        let body: &[&str] = match n {
+            17 => &COCO_17,
+            18 => &OPENPOSE_18,
+            25 => &BODY_25,
+            26 => &HALPE_26,
+            _ => WHOLE_BODIES.iter().find(|set| set.2 == n)?.1,
+        };
+        Some(Self::known(body, n))
     }
 
-    fn known(names: &[&str]) -> Self {
-        Self(names.iter().map(|&it| it.to_owned()).collect())
+    fn known(names: &[&str], in_file: usize) -> Self {
+        let names = names.iter().map(|&name| name.to_owned()).collect();
+        Self { names, in_file }
     }
 
     /// The names, in order.
     pub fn names(&self) -> &[String] {
-        &self.0
+        &self.names
     }
 
     /// How many there are.
     pub fn n(&self) -> usize {
-        self.0.len()
+        self.names.len()
+    }
+
+    /// How many keypoints a person has in the file: the named ones, and others after them that are not read.
+    pub fn n_in_file(&self) -> usize {
+        self.in_file
     }
 }
 
@@ -121,11 +141,17 @@ mod tests {
             (18, "openpose-18"),
             (25, "body-25"),
             (26, "halpe-26"),
+            (133, "coco-wholebody-133"),
+            (135, "body-135"),
+            (136, "halpe-136"),
         ] {
             let found = NameSet::of_number(n).unwrap();
-            assert_eq!((found.n(), &found), (n, &NameSet::of_set(set).unwrap()));
+            assert_eq!(
+                (found.n_in_file(), &found),
+                (n, &NameSet::of_set(set).unwrap())
+            );
         }
-        assert_eq!(NameSet::of_number(133), None);
+        assert_eq!(NameSet::of_number(134), None);
     }
 
     #[test]

@@ -2,23 +2,34 @@
 
 use serde::Deserialize;
 
+use crate::files::json::{Numbers, from_json};
+use crate::files::mmpose;
 use crate::files::names::NameSet;
 use crate::files::seen::{FileError, MAX_PEOPLE, SeenKeypoints, at_most, person, told_by};
 
 /// What is expected, for errors.
 const LAYOUT: &str = "`{\"people\": [{\"pose_keypoints_2d\": [x, y, confidence, ...]}]}`";
 
+/// `bodies` and `joints` are `AlphaPose`'s.
 #[derive(Deserialize)]
 struct File {
+    #[serde(alias = "bodies")]
     people: Vec<Person>,
 }
 
 /// Its identity, and the keypoints of face and hands, are not read.
 #[derive(Deserialize)]
 struct Person {
-    /// Left out, or empty, where a program keeps the place of a person whom it did not find.
-    #[serde(default)]
-    pose_keypoints_2d: Vec<f64>,
+    /// Left out, or empty, where a program keeps the place of a person whom it did not find. Before its version 1.4 `OpenPose` called it
+    /// `pose_keypoints`.
+    #[serde(alias = "pose_keypoints", alias = "joints", alias = "keypoints")]
+    pose_keypoints_2d: Option<Numbers>,
+}
+
+impl Person {
+    fn numbers(&self) -> &[Option<f64>] {
+        self.pose_keypoints_2d.as_deref().unwrap_or_default()
+    }
 }
 
 /// The people of a frame.
@@ -30,7 +41,7 @@ pub struct Frame {
     pub people: Vec<SeenKeypoints>,
 }
 
-/// Reads the file of a frame. A keypoint whose three numbers are 0 was not found.
+/// Reads the file of a frame, of mmpose too. A keypoint whose three numbers are 0, or of which one is no number, was not found.
 ///
 /// * `names`: what the keypoints are called; `None`: what their number tells ([`NameSet::of_number`]).
 ///
@@ -39,33 +50,72 @@ pub struct Frame {
 /// [`FileError`], naming the entry.
 pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Frame, FileError> {
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-    let file: File = serde_json::from_slice(text).map_err(|source| FileError::Json {
-        layout: LAYOUT,
-        source,
-    })?;
+    if mmpose::is_mmpose(text) {
+        return mmpose::frame(text, names);
+    }
+    if text.trim_ascii() == b"[]" {
+        // A picture of mmpose in which nobody was found.
+        return people_of(&[], names, |_| String::new());
+    }
+    let file: File = from_json(text, LAYOUT)?;
     at_most(file.people.len(), MAX_PEOPLE, "people in a frame")?;
+    if file.people.iter().any(|it| it.pose_keypoints_2d.is_none()) {
+        other_keys(text)?;
+    }
     let entry = |nth: usize| format!("people[{nth}].pose_keypoints_2d");
-    let lists = file.people.iter().map(|it| &it.pose_keypoints_2d);
-    let told = lists.enumerate().find(|it| !it.1.is_empty());
+    let lists: Vec<&[Option<f64>]> = file.people.iter().map(Person::numbers).collect();
+    people_of(&lists, names, entry)
+}
+
+/// The people of lists of numbers.
+///
+/// * `entry`: what the list of a person is called, for errors.
+pub(super) fn people_of(
+    lists: &[&[Option<f64>]],
+    names: Option<&NameSet>,
+    entry: impl Fn(usize) -> String,
+) -> Result<Frame, FileError> {
+    let told = lists.iter().enumerate().find(|list| !list.1.is_empty());
     let names = match (names, told) {
         (Some(names), _) => Some(names.clone()),
         (None, Some((nth, values))) => Some(told_by(values.len(), || entry(nth))?),
         (None, None) => None,
     };
-    let read = |(nth, it): (usize, &Person)| match &names {
-        Some(names) => person(
-            &it.pose_keypoints_2d,
-            names,
-            || entry(nth),
-            |it| it != [0.0; 3],
-        ),
+    let read = |(nth, values): (usize, &&[Option<f64>])| match &names {
+        Some(names) => person(values, names, || entry(nth), |it| it != [0.0; 3]),
         None => Ok(SeenKeypoints::default()),
     };
-    let people: Result<_, _> = file.people.iter().enumerate().map(read).collect();
+    let people: Result<_, _> = lists.iter().enumerate().map(read).collect();
     Ok(Frame {
         people: people?,
         names,
     })
+}
+
+/// Refuses a person whose keypoints stand under keys that are not read.
+fn other_keys(text: &[u8]) -> Result<(), FileError> {
+    #[derive(Deserialize)]
+    struct Whole {
+        #[serde(alias = "bodies")]
+        people: Vec<serde_json::Map<String, serde_json::Value>>,
+    }
+    const BODY: [&str; 4] = ["pose_keypoints_2d", "pose_keypoints", "joints", "keypoints"];
+    let whole: Whole = from_json(text, LAYOUT)?;
+    for (nth, person) in whole.people.iter().enumerate() {
+        let has_body = BODY.iter().any(|key| person.contains_key(*key));
+        let is_list = |value: &serde_json::Value| value.as_array().is_some_and(|it| it.len() > 2);
+        let full = person.iter().filter(|(_, value)| is_list(value));
+        let keys: Vec<String> = full
+            .map(|(key, _)| key.chars().take(64).collect())
+            .collect();
+        if !has_body && !keys.is_empty() {
+            return Err(FileError::OtherKeys {
+                entry: format!("people[{nth}]"),
+                keys,
+            });
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -164,9 +214,8 @@ mod tests {
     fn what_is_no_json_of_the_layout_is_refused_with_line_and_column() {
         for text in [
             "",
-            "[]",
+            "[1]",
             "{}",
-            "{\"people\":[{\"pose_keypoints_2d\":[NaN]}]}",
             "{\"people\":[{\"pose_keypoints_2d\":[1e999]}]}",
             "{\"people\":[{\"pose_keypoints_2d\":\"x\"}]}",
         ] {
@@ -175,6 +224,53 @@ mod tests {
                 refused.contains("pose_keypoints_2d") && refused.contains("line 1"),
                 "{text}: {refused}"
             );
+        }
+    }
+
+    #[test]
+    fn keypoints_under_the_keys_of_older_programs_are_read() {
+        let text = file(&[&[1.0; 54]]);
+        let plain = parse(text.as_bytes(), None).unwrap();
+        assert_eq!(plain.people[0].keypoints.iter().flatten().count(), 18);
+        let old = text.replace("pose_keypoints_2d", "pose_keypoints");
+        assert_eq!(parse(old.as_bytes(), None).unwrap(), plain);
+        let alpha = text.replace("people", "bodies");
+        let alpha = alpha.replace("pose_keypoints_2d", "joints");
+        assert_eq!(parse(alpha.as_bytes(), None).unwrap(), plain);
+    }
+
+    #[test]
+    fn keypoints_under_keys_that_are_not_read_are_refused_with_the_keys() {
+        let text = file(&[&[1.0; 54]]).replace("pose_keypoints_2d", "pose_keypoints_3d");
+        let other = refused(&text);
+        assert!(
+            other.contains("people[0]") && other.contains("`pose_keypoints_3d`"),
+            "{other}"
+        );
+        let hands = "{\"people\":[{\"pose_keypoints_2d\":[],\"face_keypoints_2d\":[1,1,1]}]}";
+        assert!(parse(hands.as_bytes(), None).is_ok());
+    }
+
+    #[test]
+    fn what_is_no_number_was_not_found() {
+        let text = file(&[&[1.0; 51]]);
+        for nothing in ["NaN", "null", "Infinity", "-Infinity", "nan"] {
+            let text = text.replacen("1.0", nothing, 1);
+            let frame = parse(text.as_bytes(), None).unwrap();
+            assert_eq!(frame.people[0].keypoints[0], None, "{nothing}");
+            assert!(frame.people[0].keypoints[1].is_some(), "{nothing}");
+        }
+        let named = "{\"people\":[{\"who\":\"NaN, \\\"NaN\",\"pose_keypoints_2d\":[]}]}";
+        assert!(parse(named.as_bytes(), None).is_ok());
+    }
+
+    #[test]
+    fn of_133_keypoints_those_of_the_body_and_the_feet_are_read() {
+        for (n, read, last) in [(133, 23, "right heel"), (136, 26, "right heel")] {
+            let frame = parse(file(&[&vec![1.0; 3 * n]]).as_bytes(), None).unwrap();
+            let names = frame.names.unwrap();
+            assert_eq!(names.names().last().map(String::as_str), Some(last));
+            assert_eq!(frame.people[0].keypoints.len(), read);
         }
     }
 

@@ -60,13 +60,26 @@ pub enum FileError {
     },
     /// The number of keypoints tells no set.
     #[error(
-        "`{entry}` has {n} keypoints, which no known program writes (17, 18, 25 or 26 are known): say what they are called"
+        "`{entry}` has {n} keypoints; 17, 18, 25, 26, 133, 135 or 136 say what they are called by their number: else give `keypoint_names`, \
+         one of {}",
+        NameSet::known_sets().join(", ")
     )]
     UnknownSet {
         /// The list.
         entry: String,
         /// Number of keypoints.
         n: usize,
+    },
+    /// People have keypoints, but not of the body, or under another key.
+    #[error(
+        "`{entry}` has no `pose_keypoints_2d` with keypoints of the body in the picture, but {}",
+        .keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
+    )]
+    OtherKeys {
+        /// The person.
+        entry: String,
+        /// What it has.
+        keys: Vec<String>,
     },
     /// The names of the keypoints cannot be used.
     #[error("`{entry}`: {source}")]
@@ -110,13 +123,13 @@ pub(crate) fn at_most(got: usize, most: usize, what: &str) -> Result<(), FileErr
     })
 }
 
-/// A person of a list of numbers: column, row and a third one for every keypoint. No numbers at all are a person without
-/// keypoints.
+/// A person of a list of numbers: column, row and a third one for every keypoint. A keypoint with a number that is not there was not
+/// found. No numbers at all are a person without keypoints; those after the named keypoints are not read.
 ///
 /// * `entry`: the list, for errors.
 /// * `is_found`: whether three numbers are a keypoint that was found.
 pub(crate) fn person(
-    values: &[f64],
+    values: &[Option<f64>],
     names: &NameSet,
     entry: impl Fn() -> String,
     is_found: fn([f64; 3]) -> bool,
@@ -127,15 +140,17 @@ pub(crate) fn person(
             keypoints: vec![None; n],
         });
     }
-    if values.len() != 3 * n {
+    let in_file = names.n_in_file();
+    if values.len() != 3 * in_file {
         return Err(FileError::Length {
             entry: entry(),
             got: values.len(),
-            expected: format!("{}: 3 for each of {n} keypoints", 3 * n),
+            expected: format!("{}: 3 for each of {in_file} keypoints", 3 * in_file),
         });
     }
-    for (index, &value) in values.iter().enumerate() {
-        // Not-a-number is within no range.
+    let values = &values[..3 * n];
+    for (index, value) in values.iter().enumerate() {
+        let value = value.unwrap_or(0.0);
         if !(-FARTHEST_PX..=FARTHEST_PX).contains(&value) {
             return Err(FileError::Number {
                 entry: entry(),
@@ -145,10 +160,13 @@ pub(crate) fn person(
             });
         }
     }
-    let keypoint = |it: &[f64; 3]| {
-        is_found(*it).then_some(Keypoint {
-            at: [it[0], it[1]],
-            score: it[2].clamp(0.0, 1.0),
+    let keypoint = |triple: &[Option<f64>; 3]| {
+        let [Some(x), Some(y), Some(third)] = *triple else {
+            return None;
+        };
+        is_found([x, y, third]).then_some(Keypoint {
+            at: [x, y],
+            score: third.clamp(0.0, 1.0),
         })
     };
     let (triples, _) = values.as_chunks::<3>();

@@ -1,6 +1,6 @@
 //! Tests of the maps of keypoints that another program saw.
 
-use keypoints::{BODY_25, COCO_17};
+use keypoints::{BODY_25, COCO_17, joint_ways};
 
 use super::*;
 use crate::found::NOWHERE;
@@ -17,14 +17,14 @@ fn person() -> Vec<Option<Keypoint>> {
     (0..25).map(|nth| Some(keypoint(nth))).collect()
 }
 
-fn rows(names: &[&str]) -> Vec<Option<Vec<(usize, f64)>>> {
+fn ways(names: &[&str]) -> Vec<Vec<Way>> {
     let names: Vec<String> = names.iter().map(|&it| it.to_owned()).collect();
-    joint_rows(&names)
+    joint_ways(&names)
 }
 
 fn maps(keypoints: &[Option<Keypoint>]) -> JointMaps {
     let mut maps = JointMaps::default();
-    maps.of_keypoints(keypoints, &rows(&BODY_25), &SETTINGS, 0.02);
+    maps.of_keypoints(keypoints, &ways(&BODY_25), &SETTINGS, 0.02);
     maps
 }
 
@@ -70,7 +70,7 @@ fn a_keypoint_that_is_no_joint_is_told_with_its_deviation() {
     );
     assert_eq!(maps.keypoint(25), None);
     keypoints[heel] = None;
-    maps.of_keypoints(&keypoints, &rows(&BODY_25), &SETTINGS, 0.02);
+    maps.of_keypoints(&keypoints, &ways(&BODY_25), &SETTINGS, 0.02);
     assert_eq!(maps.keypoint(heel), None);
     assert_eq!(JointMaps::default().keypoint(0), None);
 }
@@ -90,6 +90,7 @@ fn a_keypoint_that_was_not_found_takes_its_joints_with_it() {
     for lost in [None, Some(NOWHERE)] {
         let mut keypoints = person();
         keypoints[NECK_25] = lost;
+        keypoints[2] = lost;
         let maps = maps(&keypoints);
         assert_eq!(maps.peaks()[NECK], None);
         assert_eq!(maps.maxima(NECK, 3), []);
@@ -97,6 +98,23 @@ fn a_keypoint_that_was_not_found_takes_its_joints_with_it() {
         assert_eq!(maps.peaks()[13], None);
         assert!(maps.peaks()[3].is_some());
     }
+}
+
+#[test]
+fn a_head_by_one_ear_is_there_and_says_that_it_is_less_sure() {
+    let mut keypoints = person();
+    let all = maps(&keypoints);
+    // Both eyes and the left ear of a profile are not seen.
+    for hidden in [15, 16, 18] {
+        keypoints[hidden] = None;
+    }
+    let one = maps(&keypoints);
+    assert!(one.peaks()[13].is_some());
+    let sigma = |maps: &JointMaps| maps.expected_px(13).unwrap();
+    let added = (sigma(&one).powi(2) - sigma(&all).powi(2)).sqrt();
+    assert!((added - 0.05 * 500.0).abs() < 1e-6, "{added}");
+    keypoints[17] = None;
+    assert!(maps(&keypoints).expected_px(13).unwrap() > sigma(&one));
 }
 
 #[test]
@@ -112,7 +130,7 @@ fn a_derived_joint_has_the_lowest_score_of_its_keypoints() {
         score: 0.9,
     });
     let mut maps = JointMaps::default();
-    assert!(maps.of_keypoints(&keypoints, &rows(&COCO_17), &SETTINGS, 0.02));
+    assert!(maps.of_keypoints(&keypoints, &ways(&COCO_17), &SETTINGS, 0.02));
     let neck = maps.peaks()[NECK].unwrap();
     assert_eq!((neck.at, neck.score), ([220.0, 160.0], 0.3));
     let here = maps.at(NECK, neck.at);
@@ -123,7 +141,7 @@ fn a_derived_joint_has_the_lowest_score_of_its_keypoints() {
 fn nobody_leaves_the_floor_and_nothing_of_an_earlier_frame() {
     let mut maps = maps(&person());
     for keypoints in [vec![None; 25], vec![Some(NOWHERE); 25]] {
-        let is_there = maps.of_keypoints(&keypoints, &rows(&BODY_25), &SETTINGS, 0.02);
+        let is_there = maps.of_keypoints(&keypoints, &ways(&BODY_25), &SETTINGS, 0.02);
         assert!(!is_there);
         assert_eq!(maps.peaks(), [None; N_JOINTS]);
         assert_eq!(maps.at(NECK, [300.0, 116.0]), maps.floor());
@@ -165,7 +183,7 @@ fn frames_after_the_first_need_no_further_memory() {
             score: 1.0,
         });
     }
-    maps.of_keypoints(&wide, &rows(&BODY_25), &SETTINGS, 0.02);
+    maps.of_keypoints(&wide, &ways(&BODY_25), &SETTINGS, 0.02);
     assert_eq!([maps.values.capacity(), maps.peaks.capacity()], before);
 }
 
