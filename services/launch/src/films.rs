@@ -76,7 +76,10 @@ pub fn films(
     poses: Poses,
     (stop, console): (&Stop, &dyn Console),
 ) -> Result<Films, Failure> {
-    let rig = inputs::rig_of(deployment)?;
+    let rig = match poses {
+        Poses::OfRig => inputs::rig_of(deployment)?,
+        Poses::Unknown => inputs::lenses_of(deployment)?,
+    };
     let cameras = cameras(deployment, &rig)?;
     let finders = (0..cameras.len()).map(|it| finder(deployment, it));
     let finders: Vec<Finder> = finders.collect::<Result<_, Failure>>()?;
@@ -129,16 +132,7 @@ pub fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failur
             let failure = Failure::new(ExitKind::Config, message);
             return Err(failure.with_hint("name footage that was recorded with it"));
         }
-        rig.camera(&it.name).cloned().ok_or_else(|| {
-            let known: Vec<&str> = rig.cameras().iter().map(|it| it.name.as_str()).collect();
-            let file = deployment.rig.display();
-            let message = format!(
-                "{file} has no camera {:?}; it has {}",
-                it.name,
-                known.join(", ")
-            );
-            Failure::new(ExitKind::Calibration, message)
-        })
+        inputs::camera_of(rig, &it.name, deployment).cloned()
     };
     deployment.cameras.iter().map(of_entry).collect()
 }

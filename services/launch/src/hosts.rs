@@ -141,7 +141,7 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     let settings = serde_json::to_vec(&(
         &deployment.capture,
         &deployment.link.carry,
-        deployment.unit,
+        &deployment.unit,
         deployment.up,
         deployment
             .cameras

@@ -14,8 +14,8 @@ use consistency::{Appearance, Learned, Shape};
 use deployment::{Deployment, Timeline};
 use fmp::Model;
 use footage::{SourceSpec, Turn};
-use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
+use geometry::{Camera, Rig};
 use multiview::{Compatibility, TypeTables};
 use nalgebra::UnitVector3;
 use orientation::Detector;
@@ -102,19 +102,55 @@ pub fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<Rig, Fai
 ///
 /// # Errors
 ///
-/// As for [`rig`]; or the rig is invalid with the deployment's `up`.
+/// As for [`rig`].
 pub fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
+    rig_with(deployment, ReadOptions::default())
+}
+
+/// As [`rig_of`], for what needs the lenses alone: a camera without a place stands at the origin.
+///
+/// # Errors
+///
+/// As for [`rig`].
+pub fn lenses_of(deployment: &Deployment) -> Result<Rig, Failure> {
     let options = ReadOptions {
-        unit: deployment.unit.map(Into::into),
+        lenses_suffice: true,
         ..ReadOptions::default()
+    };
+    rig_with(deployment, options)
+}
+
+fn rig_with(deployment: &Deployment, options: ReadOptions) -> Result<Rig, Failure> {
+    let unit = deployment.unit.as_deref().map(str::parse).transpose();
+    let options = ReadOptions {
+        unit: unit.or_fail(ExitKind::Config)?,
+        ..options
     };
     let read = rig(&[&deployment.rig], &options)?;
     let up = deployment
         .up
         .and_then(|up| UnitVector3::try_new(up.into(), 1e-9));
-    let Some(up) = up else { return Ok(read) };
-    let with_up = Rig::new(read.cameras().to_vec(), Some(up), read.source());
-    with_up.or_fail(ExitKind::Calibration)
+    Ok(match up {
+        Some(up) => read.with_up(Some(up)),
+        None => read,
+    })
+}
+
+/// A camera of a deployment in its rig.
+///
+/// # Errors
+///
+/// The rig has no such camera, or not its place.
+pub(crate) fn camera_of<'a>(
+    rig: &'a Rig,
+    name: &str,
+    deployment: &Deployment,
+) -> Result<&'a Camera, Failure> {
+    rig.camera(name).ok_or_else(|| {
+        let file = deployment.rig.display();
+        let message = format!("{file} has {}", rig.lacks(name));
+        Failure::new(ExitKind::Calibration, message)
+    })
 }
 
 /// Metadata of a camera's footage.

@@ -1,12 +1,9 @@
 //! The keypoints that another program found in the footage of cameras, and grey footage for cameras that have them alone.
 
-use std::path::Path;
-
 use capture::Blank;
 use deployment::Deployment;
 use deployment::capture::{Camera, Config};
 use footage::Size;
-use geometry::Rig;
 use keypointfiles::KeypointSource;
 use keypoints::Sides;
 use keypoints::files::NameSet;
@@ -112,31 +109,18 @@ pub(crate) fn with_pictures(
     if deployment.cameras.iter().all(|it| !it.source.is_empty()) {
         return Ok(deployment);
     }
-    let rig = inputs::rig_of(&deployment)?;
+    let rig = inputs::lenses_of(&deployment)?;
     let rate_hz = deployment.capture.frame_rate_hz;
-    for (camera, n_frames) in deployment.cameras.iter_mut().zip(lengths) {
-        if let (true, Some(n_frames)) = (camera.source.is_empty(), n_frames) {
-            let size = size(camera, &rig, &deployment.rig)?;
-            camera.source = grey(&camera.name, size, *n_frames, rate_hz)?.to_string();
+    for (nth, n_frames) in lengths.iter().enumerate() {
+        let entry = &deployment.cameras[nth];
+        if let (true, Some(n_frames)) = (entry.source.is_empty(), n_frames) {
+            let camera = inputs::camera_of(&rig, &entry.name, &deployment)?;
+            let [width, height] = camera.intrinsics.size.map(|side| side as usize);
+            let grey = grey(&entry.name, Size::new(width, height), *n_frames, rate_hz)?;
+            deployment.cameras[nth].source = grey.to_string();
         }
     }
     Ok(deployment)
-}
-
-/// The size of a camera's pictures, as the rig says.
-fn size(camera: &Camera, rig: &Rig, file: &Path) -> Result<Size, Failure> {
-    let of_rig = rig.camera(&camera.name).ok_or_else(|| {
-        let names: Vec<&str> = rig.cameras().iter().map(|it| it.name.as_str()).collect();
-        let message = format!(
-            "{} has no camera {:?}; it has {}",
-            file.display(),
-            camera.name,
-            names.join(", ")
-        );
-        Failure::new(ExitKind::Calibration, message)
-    })?;
-    let [width, height] = of_rig.intrinsics.size.map(|side| side as usize);
-    Ok(Size::new(width, height))
 }
 
 fn grey(name: &str, size: Size, n_frames: u64, rate_hz: Option<f64>) -> Result<Blank, Failure> {

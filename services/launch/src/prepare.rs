@@ -172,16 +172,7 @@ impl Prepared {
 pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Framing, Failure> {
     let deployment = &resolved.deployment;
     let entry = &deployment.cameras[index];
-    let camera = rig.camera(&entry.name).ok_or_else(|| {
-        let known: Vec<&str> = rig.cameras().iter().map(|it| it.name.as_str()).collect();
-        let message = format!(
-            "{} has no camera {:?}; it has {}",
-            deployment.rig.display(),
-            entry.name,
-            known.join(", ")
-        );
-        Failure::new(ExitKind::Calibration, message)
-    })?;
+    let camera = inputs::camera_of(rig, &entry.name, deployment)?;
     let out_size = match (deployment.capture.size, deployment.capture.scale) {
         (Some(size), _) => OutSize::Exact(size.map(|it| it as u32)),
         (None, Some(scale)) => OutSize::Scale(scale),

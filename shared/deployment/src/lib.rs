@@ -72,8 +72,9 @@ pub struct Deployment {
     pub name: String,
     /// Calibration of the cameras.
     pub rig: PathBuf,
-    /// Unit of the lengths in the calibration, where it is not what its format tells.
-    pub unit: Option<Unit>,
+    /// Unit of the lengths in the calibration, where it is not what its format tells: `"m"`, `"cm"`, `"mm"`, `"ft"`, `"in"`, or a length
+    /// such as `"30mm"`, of a calibration in squares of the board.
+    pub unit: Option<String>,
     /// Direction against gravity in the world of the calibration, `[x, y, z]`; replaces what the file has; found from
     /// cameras and people where neither gives it.
     pub up: Option<[f64; 3]>,
@@ -122,28 +123,6 @@ pub struct Deployment {
     /// Cores, priorities, and how processes wait.
     #[serde(default)]
     pub runtime: Runtime,
-}
-
-/// A unit of lengths.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Unit {
-    /// Metres.
-    M,
-    /// Centimetres.
-    Cm,
-    /// Millimetres.
-    Mm,
-}
-
-impl From<Unit> for geometry::files::Unit {
-    fn from(from: Unit) -> Self {
-        match from {
-            Unit::M => Self::Metres,
-            Unit::Cm => Self::Centimetres,
-            Unit::Mm => Self::Millimetres,
-        }
-    }
 }
 
 /// Section `[supervise]`: how long to wait, and how often to try again.

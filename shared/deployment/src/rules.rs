@@ -10,6 +10,14 @@ use crate::{
 /// Checks the values that the types alone do not.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     name(&it.name)?;
+    if let Some(unit) = &it.unit {
+        demand(
+            unit.parse::<geometry::files::Unit>().is_ok(),
+            "unit",
+            &format!("{unit:?}"),
+            "\"m\", \"cm\", \"mm\", \"ft\", \"in\", or a length such as \"30mm\", the squares of the board",
+        )?;
+    }
     cameras(it)?;
     capture(&it.capture)?;
     pose(&it.pose)?;
@@ -108,7 +116,7 @@ fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
         &format!("given for camera {:?}", camera.name),
         "none without `keypoints`",
     )?;
-    let known = keypoints::SETS.map(|it| it.0);
+    let known = keypoints::files::NameSet::known_sets();
     demand(
         known.contains(&names.as_str()),
         "camera.keypoint_names",

@@ -271,7 +271,7 @@ mod tests {
         assert_eq!(takes("pose.evidence_window"), "whole number or \"all\"");
         assert_eq!(takes("capture.size"), "list of 2, each: whole number");
         assert_eq!(takes("up"), "list of 3, each: number");
-        assert_eq!(takes("unit"), "\"m\" or \"cm\" or \"mm\"");
+        assert_eq!(takes("unit"), "text");
         assert_eq!(takes("rig"), "text");
     }
 }

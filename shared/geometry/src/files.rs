@@ -11,6 +11,7 @@ use nalgebra::UnitVector3;
 use crate::Rig;
 
 mod detect;
+mod entry;
 mod error;
 mod numbers;
 mod toml_fields;
@@ -73,7 +74,7 @@ impl Format {
 }
 
 /// The unit of lengths in a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Unit {
     /// Metres.
     Metres,
@@ -81,6 +82,53 @@ pub enum Unit {
     Centimetres,
     /// Millimetres.
     Millimetres,
+    /// Feet.
+    Feet,
+    /// Inches.
+    Inches,
+    /// So many metres: the squares of a calibration board.
+    Length(f64),
+}
+
+/// Why a text is no unit of lengths.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{text:?} is no unit: expected m, cm, mm, ft, in, or a length such as 30mm, the squares of the board"
+)]
+pub struct UnitError {
+    /// The text.
+    pub text: String,
+}
+
+impl core::str::FromStr for Unit {
+    type Err = UnitError;
+
+    fn from_str(text: &str) -> Result<Self, UnitError> {
+        let named = |name: &str| match name {
+            "m" => Some(Self::Metres),
+            "cm" => Some(Self::Centimetres),
+            "mm" => Some(Self::Millimetres),
+            "ft" => Some(Self::Feet),
+            "in" => Some(Self::Inches),
+            _ => None,
+        };
+        let name = text.trim_start_matches(|it: char| it.is_ascii_digit() || it == '.');
+        let number = &text[..text.len() - name.len()];
+        let unit = named(name.trim());
+        let found = match (number, unit) {
+            ("", unit) => unit,
+            (number, Some(unit)) => {
+                let metres = number.parse().ok().map(|it: f64| it / unit.per_metre());
+                metres
+                    .filter(|metres| (1e-6..=1e3).contains(metres))
+                    .map(Self::Length)
+            }
+            (_, None) => None,
+        };
+        found.ok_or_else(|| UnitError {
+            text: text.chars().take(32).collect(),
+        })
+    }
 }
 
 impl Unit {
@@ -90,6 +138,9 @@ impl Unit {
             Self::Metres => 1.0,
             Self::Centimetres => 100.0,
             Self::Millimetres => 1000.0,
+            Self::Feet => 1.0 / 0.3048,
+            Self::Inches => 1.0 / 0.0254,
+            Self::Length(metres) => 1.0 / metres,
         }
     }
 }
@@ -103,6 +154,8 @@ pub struct ReadOptions {
     pub up: Option<UnitVector3<f64>>,
     /// Image size, where the file does not state it.
     pub size: Option<[u32; 2]>,
+    /// Whether a camera without a place is read too, with its lens alone; it stands at the origin.
+    pub lenses_suffice: bool,
 }
 
 /// Reads a calibration file of any known format.
@@ -268,9 +321,11 @@ fn combine(
             .map(|(d, stem)| (stem.as_str(), d.text.as_str()));
         let rig = opencv::parse(&texts.collect::<Vec<_>>(), options);
         let rig = rig.map_err(|source| first.error(source))?;
-        return rebuild(rig.cameras().to_vec(), rig.up_in_world(), &source, first);
+        let left_out = rig.left_out().to_vec();
+        let rig = rebuild(rig.cameras().to_vec(), rig.up_in_world(), &source, first)?;
+        return Ok(rig.with_left_out(left_out));
     }
-    let mut cameras = Vec::new();
+    let (mut cameras, mut left_out) = (Vec::new(), Vec::new());
     let mut up = None;
     let mut written = None;
     for document in documents {
@@ -278,9 +333,10 @@ fn combine(
         up = up.or(rig.up_in_world());
         written = Some(rig.source().to_owned()).filter(|source| !source.is_empty());
         cameras.extend_from_slice(rig.cameras());
+        left_out.extend_from_slice(rig.left_out());
     }
     let source = written.filter(|_| documents.len() == 1).unwrap_or(source);
-    rebuild(cameras, up, &source, first)
+    Ok(rebuild(cameras, up, &source, first)?.with_left_out(left_out))
 }
 
 fn rebuild(

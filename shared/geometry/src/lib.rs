@@ -41,7 +41,9 @@ pub use camera::{Camera, Intrinsics, Ray};
 pub use extent::longer_side;
 pub use framing::{Framing, FramingError, OutSize, upright_roll};
 pub use lens::{Lens, LensModel};
-pub use rig::{NotARotation, PLAIN_NAME, Rig, RigError, is_plain_name, rotation_from_matrix};
+pub use rig::{
+    LeftOut, NotARotation, PLAIN_NAME, Rig, RigError, is_plain_name, rotation_from_matrix,
+};
 pub use rig_watch::{Contradiction, RigWatch, Suspect, Swap, SwapWatch};
 pub use step_watch::{OUT_OF_STEP_MS, Step, StepWatch};
 pub use triangulate::{

@@ -172,12 +172,22 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
     ))
 }
 
+/// A camera of a calibration file whose place the file does not say.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LeftOut {
+    /// Its name.
+    pub camera: String,
+    /// Why its place is not known; for the user.
+    pub why: &'static str,
+}
+
 /// Calibrated cameras in one world frame, validated on construction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rig {
     cameras: Vec<Camera>,
     up_in_world: Option<UnitVector3<f64>>,
     source: String,
+    left_out: Vec<LeftOut>,
 }
 
 impl Rig {
@@ -219,7 +229,40 @@ impl Rig {
             cameras,
             up_in_world,
             source: source.into(),
+            left_out: Vec::new(),
         })
+    }
+
+    /// The rig with the cameras of its file whose place is not known.
+    #[must_use]
+    pub fn with_left_out(self, left_out: Vec<LeftOut>) -> Self {
+        Self { left_out, ..self }
+    }
+
+    /// The rig with another direction against gravity.
+    #[must_use]
+    pub fn with_up(self, up_in_world: Option<UnitVector3<f64>>) -> Self {
+        Self {
+            up_in_world,
+            ..self
+        }
+    }
+
+    /// The cameras of its file whose place is not known. Where lenses are enough, they are among [`cameras`](Self::cameras), at the
+    /// origin.
+    pub fn left_out(&self) -> &[LeftOut] {
+        &self.left_out
+    }
+
+    /// What the rig lacks of a camera and what it has, for errors: `no camera "c"; it has a, b`.
+    pub fn lacks(&self, name: &str) -> String {
+        match self.left_out.iter().find(|camera| camera.camera == name) {
+            Some(LeftOut { why, .. }) => format!("no place of camera {name:?}: {why}"),
+            None => {
+                let names: Vec<&str> = self.cameras.iter().map(|it| &*it.name).collect();
+                format!("no camera {name:?}; it has {}", names.join(", "))
+            }
+        }
     }
 
     /// The cameras, in the order of the file.

@@ -27,6 +27,10 @@ pub fn check(rig: &Rig) -> Vec<Finding> {
         }
     }
     findings.extend(one_place(cameras).or_else(|| nothing_shared(cameras)));
+    findings.extend(rig.left_out().iter().map(|it| Finding::LeftOut {
+        camera: it.camera.clone(),
+        why: it.why,
+    }));
     if rig.up_in_world().is_none() {
         findings.push(Finding::UpUnknown);
     }

@@ -20,11 +20,19 @@ pub fn detect(path: &Path, text: &str) -> Option<Format> {
         "yml" | "yaml" => return Some(Format::OpenCv),
         _ => {}
     }
-    if start.starts_with("%YAML") {
+    if start.starts_with("%YAML") || start.contains("<opencv_storage") {
         return Some(Format::OpenCv);
     }
     if extension == "json" || panoptic::is_panoptic(text) {
-        return panoptic::is_panoptic(text).then_some(Format::Panoptic);
+        let has_lens = ["camera_matrix", "cameraMatrix", "\"mtx\"", "\"K\""];
+        return if panoptic::is_panoptic(text) {
+            Some(Format::Panoptic)
+        } else {
+            has_lens
+                .iter()
+                .any(|key| text.contains(key))
+                .then_some(Format::OpenCv)
+        };
     }
     if start.starts_with('<') {
         return start.contains("<camera").then_some(Format::Qualisys);

@@ -121,6 +121,23 @@ pub enum ParseError {
         /// What describes a camera in this format.
         expected: &'static str,
     },
+    /// No camera of the file has a place.
+    #[error(
+        "camera {camera:?}: {why}{}",
+        if *.has_lens {
+            ": `parallax calibrate board` with `--known` and this file, or `parallax calibrate people`, finds where the cameras stand"
+        } else {
+            ""
+        }
+    )]
+    NoPlace {
+        /// The first of them.
+        camera: String,
+        /// Why it has none.
+        why: &'static str,
+        /// Whether the file has the lens of a camera.
+        has_lens: bool,
+    },
     /// The cameras cannot be combined into a rig.
     #[error("the cameras make no rig")]
     Rig(#[source] RigError),

@@ -1,13 +1,14 @@
 //! YAML storage of `OpenCV`, and the pair `intri.yml` + `extri.yml` of `EasyMocap`.
 //!
 //! One camera in a file: `camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`, `R`
-//! (matrix or Rodrigues) and `T`. Several, after `EasyMocap`: a list `names`, and for each name `K_n`,
+//! (matrix or Rodrigues) and `T`; without these two, as `OpenCV`'s calibration program and ROS's `camera_info` leave them out, it has a lens
+//! and no place. `fisheye_model: 1` of that program, and `distortion_model: equidistant` of ROS, are fisheye lenses. Several, after `EasyMocap`: a list `names`, and for each name `K_n`,
 //! `dist_n`, `Rot_n` (or `R_n`, Rodrigues), `T_n`; sizes as `W_n`, `H_n`, which `EasyMocap` itself may
 //! leave out: then [`ReadOptions::size`] must say. Metres, unless [`ReadOptions::unit`] says otherwise.
 
 use nalgebra::UnitQuaternion;
 
-use super::{ParseError, ReadOptions, Unit, UnwritableRig, numbers};
+use super::{ParseError, ReadOptions, Unit, UnwritableRig, entry::Entry as RigEntry, numbers};
 use crate::{Camera, LensModel, Rig};
 
 mod storage;
@@ -40,14 +41,15 @@ pub fn parse(files: &[(&str, &str)], options: &ReadOptions) -> Result<Rig, Parse
             expected: "camera_matrix, or names and K_<name>",
         });
     }
-    Rig::new(cameras, options.up, "").map_err(ParseError::Rig)
+    super::entry::rig(cameras, options.up, "", options)
 }
 
 /// The possible names of the entries of a camera.
 struct Keys {
     matrix: Vec<String>,
     distortion: Vec<String>,
-    fisheye: String,
+    fisheye: [String; 2],
+    model: String,
     width: Vec<String>,
     height: Vec<String>,
     rotation: Vec<String>,
@@ -57,11 +59,28 @@ struct Keys {
 fn single() -> Keys {
     let keys = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
     Keys {
-        matrix: keys(&["camera_matrix", "cameraMatrix", "K"]),
-        distortion: keys(&["distortion_coefficients", "distCoeffs", "dist", "D"]),
-        fisheye: "fisheye".to_owned(),
-        width: keys(&["image_width", "width"]),
-        height: keys(&["image_height", "height"]),
+        matrix: keys(&[
+            "camera_matrix",
+            "cameraMatrix",
+            "Camera_Matrix",
+            "K",
+            "k",
+            "mtx",
+        ]),
+        distortion: keys(&[
+            "distortion_coefficients",
+            "Distortion_Coefficients",
+            "distCoeffs",
+            "dist_coeffs",
+            "dist_coeff",
+            "dist",
+            "D",
+            "d",
+        ]),
+        fisheye: ["fisheye".to_owned(), "fisheye_model".to_owned()],
+        model: "distortion_model".to_owned(),
+        width: keys(&["image_width", "image_Width", "width"]),
+        height: keys(&["image_height", "image_Height", "height"]),
         rotation: keys(&["R", "rotation", "Rot", "rvec"]),
         translation: keys(&["T", "translation", "tvec"]),
     }
@@ -72,7 +91,8 @@ fn suffixed(name: &str) -> Keys {
     Keys {
         matrix: keys(&["K"]),
         distortion: keys(&["dist", "D"]),
-        fisheye: format!("fisheye_{name}"),
+        fisheye: [format!("fisheye_{name}"), format!("fisheye_model_{name}")],
+        model: format!("distortion_model_{name}"),
         width: keys(&["W"]),
         height: keys(&["H"]),
         rotation: keys(&["Rot", "R"]),
@@ -85,30 +105,57 @@ fn camera(
     storage: &Storage,
     keys: &Keys,
     options: &ReadOptions,
-) -> Result<Camera, ParseError> {
+) -> Result<RigEntry, ParseError> {
     let (matrix_key, k) = storage.numbers(&keys.matrix)?;
     let k: [f64; 9] = sized(matrix_key, k, "9 numbers")?;
     let lens = match storage.find(&keys.distortion) {
         None => LensModel::Pinhole,
-        Some((key, entry)) => {
-            let fisheye = storage
-                .number(&keys.fisheye)?
-                .is_some_and(|flag| flag != 0.0);
-            numbers::lens(key, &entry.numbers(key)?, fisheye)?
-        }
+        Some((key, entry)) => numbers::lens(key, &entry.numbers(key)?, is_fisheye(storage, keys)?)?,
     };
     let size = size(storage, keys, options)?;
     let intrinsics = numbers::intrinsics(matrix_key, &numbers::matrix_of_nine(&k), size, lens)?;
+    // The `R` of ROS's `camera_info` rectifies stereo pictures, and stands beside `P`.
+    let is_rectification = storage.find(&keys.translation).is_none()
+        && ["P", "p", "projection_matrix"]
+            .iter()
+            .any(|key| storage.find(&[(*key).to_owned()]).is_some());
+    let has_no_place = storage.find(&keys.translation).is_none()
+        && (is_rectification || storage.find(&keys.rotation).is_none());
+    if has_no_place {
+        return Ok(RigEntry::lens(name, intrinsics));
+    }
     let rotation = rotation(storage, keys)?;
     let (key, translation) = storage.numbers(&keys.translation)?;
     let translation = sized(key, translation, "3 numbers")?;
     let unit = options.unit.unwrap_or(Unit::Metres);
     let camera_from_world = numbers::pose(key, rotation, translation, unit)?;
-    Ok(Camera {
+    Ok(RigEntry::Placed(Camera {
         name: name.to_owned(),
         intrinsics,
         camera_from_world,
-    })
+    }))
+}
+
+/// Whether the distortion is that of a fisheye lens.
+///
+/// # Errors
+///
+/// The file names a model that is neither.
+fn is_fisheye(storage: &Storage, keys: &Keys) -> Result<bool, ParseError> {
+    for key in &keys.fisheye {
+        if storage.number(key)?.is_some_and(|flag| flag != 0.0) {
+            return Ok(true);
+        }
+    }
+    match storage.text(&keys.model) {
+        None | Some("plumb_bob" | "rational_polynomial" | "radtan" | "") => Ok(false),
+        Some("equidistant" | "fisheye" | "kannala_brandt" | "kannala_brandt4") => Ok(true),
+        Some(other) => Err(ParseError::Shape {
+            field: keys.model.clone(),
+            expected: "plumb_bob, rational_polynomial or equidistant",
+            found: format!("{other:?}"),
+        }),
+    }
 }
 
 fn size(storage: &Storage, keys: &Keys, options: &ReadOptions) -> Result<[u32; 2], ParseError> {

@@ -14,7 +14,7 @@
 //! radial = [-0.0462, 0.14]           # k1 to k6, or k1 to k4 of the fisheye; missing ones are 0
 //! tangential = [0.0006, 0.0007]      # p1, p2; not for the fisheye
 //! rotation_rad = [1.69, 1.05, -0.42] # Rodrigues, world to camera; or `rotation`, three rows of three
-//! translation_metres = [0.32, 0.96, 2.89]
+//! translation_metres = [0.32, 0.96, 2.89] # both left out where only the lens is known
 //! ```
 //!
 //! A point X of the world is `R X + t` in the camera, which looks along +z with y down (`OpenCV`).
@@ -23,7 +23,7 @@ use std::fmt::Debug;
 
 use serde::Deserialize;
 
-use super::{ParseError, ReadOptions, Unit, numbers};
+use super::{ParseError, ReadOptions, Unit, entry::Entry, numbers};
 use crate::{Camera, LensModel, Rig};
 
 const FORMAT: &str = "parallax-rig";
@@ -51,7 +51,7 @@ struct CameraFile {
     tangential: Option<[f64; 2]>,
     rotation_rad: Option<[f64; 3]>,
     rotation: Option<[[f64; 3]; 3]>,
-    translation_metres: [f64; 3],
+    translation_metres: Option<[f64; 3]>,
 }
 
 #[derive(Deserialize, Default, Clone, Copy, PartialEq)]
@@ -105,14 +105,21 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
         .into_iter()
         .map(|fields| camera(fields, options.unit.unwrap_or(Unit::Metres)))
         .collect::<Result<_, _>>()?;
-    Rig::new(cameras, up, file.source.unwrap_or_default()).map_err(ParseError::Rig)
+    super::entry::rig(cameras, up, &file.source.unwrap_or_default(), options)
 }
 
-fn camera(file: CameraFile, unit: Unit) -> Result<Camera, ParseError> {
+fn camera(file: CameraFile, unit: Unit) -> Result<Entry, ParseError> {
     let field = |key: &str| format!("camera {:?}: {key}", file.name);
+    let lens = lens(&file, &field)?;
+    let ([fx, fy], [cx, cy]) = (file.focal_px, file.principal_point_px);
+    let k = nalgebra::Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
+    let intrinsics = numbers::intrinsics(&field("focal_px"), &k, file.size_px, lens)?;
     let rotation = match (file.rotation_rad, file.rotation) {
         (Some(vector), None) => numbers::rodrigues(&field("rotation_rad"), vector)?,
         (None, Some(rows)) => numbers::rotation(&field("rotation"), &numbers::matrix(rows))?,
+        (None, None) if file.translation_metres.is_none() => {
+            return Ok(Entry::lens(&file.name, intrinsics));
+        }
         (None, None) => {
             return Err(ParseError::Missing {
                 field: field("rotation_rad"),
@@ -127,16 +134,16 @@ fn camera(file: CameraFile, unit: Unit) -> Result<Camera, ParseError> {
         }
     };
     let place = field("translation_metres");
-    let pose = numbers::pose(&place, rotation, file.translation_metres, unit)?;
-    let lens = lens(&file, &field)?;
-    let ([fx, fy], [cx, cy]) = (file.focal_px, file.principal_point_px);
-    let k = nalgebra::Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
-    let intrinsics = numbers::intrinsics(&field("focal_px"), &k, file.size_px, lens)?;
-    Ok(Camera {
+    let translation = file.translation_metres;
+    let translation = translation.ok_or_else(|| ParseError::Missing {
+        field: place.clone(),
+    })?;
+    let pose = numbers::pose(&place, rotation, translation, unit)?;
+    Ok(Entry::Placed(Camera {
         name: file.name,
         intrinsics,
         camera_from_world: pose,
-    })
+    }))
 }
 
 fn lens(file: &CameraFile, field: &dyn Fn(&str) -> String) -> Result<LensModel, ParseError> {
@@ -209,6 +216,9 @@ pub fn write(rig: &Rig) -> String {
                 "lens = \"kannala-brandt\"".to_owned(),
                 format!("radial = {}", list(k)),
             ]),
+        }
+        if rig.left_out().iter().any(|it| it.camera == camera.name) {
+            continue;
         }
         let pose = &camera.camera_from_world;
         lines.extend([

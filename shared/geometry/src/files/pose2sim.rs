@@ -8,7 +8,9 @@
 
 use toml::{Table, Value};
 
-use super::{ParseError, ReadOptions, Unit, UnwritableRig, numbers, toml_fields::Fields};
+use super::{
+    ParseError, ReadOptions, Unit, UnwritableRig, entry::Entry, numbers, toml_fields::Fields,
+};
 use crate::{Camera, Rig};
 
 /// Whether a text is TOML with at least one camera.
@@ -21,7 +23,8 @@ pub(super) fn is_pose2sim(text: &str) -> bool {
 ///
 /// # Errors
 ///
-/// See [`ParseError`]. Tables with `ignore = true` are no cameras.
+/// See [`ParseError`]. Tables with `ignore = true` are no cameras; cameras without rotation and translation, as Caliscope leaves those that
+/// it could not place, are left out.
 pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
     let table: Table = text
         .parse()
@@ -38,7 +41,7 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
             expected: "a table with the key matrix for each view",
         });
     }
-    Rig::new(cameras, options.up, "").map_err(ParseError::Rig)
+    super::entry::rig(cameras, options.up, "", options)
 }
 
 /// The tables that are cameras, each with its default name.
@@ -69,7 +72,7 @@ fn nested_name(key: &str) -> String {
     }
 }
 
-fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Camera, ParseError> {
+fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Entry, ParseError> {
     let name = match fields.table.get("name") {
         None => key,
         Some(Value::String(name)) => name.clone(),
@@ -81,6 +84,12 @@ fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Cam
             });
         }
     };
+    if !fields.has("matrix") {
+        return Ok(Entry::name(
+            &name,
+            "its file has neither its lens nor its place",
+        ));
+    }
     let [width, height] = fields.array::<2>("size")?;
     let size_field = fields.field("size");
     let size = [
@@ -100,6 +109,9 @@ fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Cam
         size,
         lens,
     )?;
+    if !fields.has("rotation") && !fields.has("translation") {
+        return Ok(Entry::lens(&name, intrinsics));
+    }
     let is_matrix = fields.get("rotation")?.get(0).is_some_and(Value::is_array);
     let rotation_field = fields.field("rotation");
     let rotation = if is_matrix {
@@ -110,11 +122,11 @@ fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Cam
     let unit = options.unit.unwrap_or(Unit::Metres);
     let translation = fields.array("translation")?;
     let pose = numbers::pose(&fields.field("translation"), rotation, translation, unit)?;
-    Ok(Camera {
+    Ok(Entry::Placed(Camera {
         name,
         intrinsics,
         camera_from_world: pose,
-    })
+    }))
 }
 
 /// Writes a Pose2Sim file, in metres. The up direction and the source of the rig are lost.
@@ -156,7 +168,7 @@ fn camera_table(camera: &Camera, unit: Unit) -> Result<String, UnwritableRig> {
     // Pose2Sim writes floats; anipose takes the size of an image only as whole numbers.
     let size = match unit {
         Unit::Metres => format!("{width}.0, {height}.0"),
-        Unit::Centimetres | Unit::Millimetres => format!("{width}, {height}"),
+        _ => format!("{width}, {height}"),
     };
     Ok(format!(
         "[{key}]\nname = {name}\nsize = [{size}]\nmatrix = [{k}]\n\

@@ -10,7 +10,7 @@
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
-use super::{ParseError, ReadOptions, Unit, numbers};
+use super::{ParseError, ReadOptions, Unit, entry::Entry, numbers};
 use crate::{Camera, Rig};
 
 /// Units of the file per pixel.
@@ -20,7 +20,7 @@ const SUBPIXELS: f64 = 64.0;
 ///
 /// # Errors
 ///
-/// See [`ParseError`]. A camera that is turned in the viewer (`viewrotation`) is refused: its pixel
+/// See [`ParseError`]. A camera that was not calibrated is left out. A camera that is turned in the viewer (`viewrotation`) is refused: its pixel
 /// convention is not documented.
 pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
     // Files of older versions start with a byte order mark.
@@ -40,14 +40,21 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
             expected: "an active <camera> element for each view",
         });
     }
-    Rig::new(cameras, options.up, "").map_err(ParseError::Rig)
+    super::entry::rig(cameras, options.up, "", options)
 }
 
-fn camera(node: Node<'_, '_>, options: &ReadOptions) -> Result<Camera, ParseError> {
+fn camera(node: Node<'_, '_>, options: &ReadOptions) -> Result<Entry, ParseError> {
     let serial = node.attribute("serial");
     let name = serial.ok_or_else(|| ParseError::Missing {
         field: "camera serial".to_owned(),
     })?;
+    let calibrated = node.attribute("calibrated").unwrap_or("true");
+    if ["false", "0"].contains(&&*calibrated.trim().to_ascii_lowercase()) {
+        return Ok(Entry::name(
+            name,
+            "its file says that it was not calibrated",
+        ));
+    }
     let child = |tag: &str| {
         let found = node.children().find(|child| child.has_tag_name(tag));
         let field = format!("camera {name:?}: {tag}");
@@ -69,11 +76,11 @@ fn camera(node: Node<'_, '_>, options: &ReadOptions) -> Result<Camera, ParseErro
         &child("transform")?,
         options.unit.unwrap_or(Unit::Millimetres),
     )?;
-    Ok(Camera {
+    Ok(Entry::Placed(Camera {
         name: name.to_owned(),
         intrinsics,
         camera_from_world,
-    })
+    }))
 }
 
 fn intrinsics(

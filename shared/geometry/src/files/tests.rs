@@ -11,6 +11,7 @@ use crate::{
 
 mod extremes;
 mod fuzz;
+mod no_place;
 mod refusals;
 
 const BARREL: LensModel = LensModel::BrownConrady {

@@ -16,6 +16,12 @@ impl<'a> Fields<'a> {
         format!("{}.{key}", self.path)
     }
 
+    /// Whether a key is there; Caliscope writes `"null"` for what it does not know.
+    pub(super) fn has(&self, key: &str) -> bool {
+        let value = self.table.get(key);
+        value.is_some_and(|value| value.as_str() != Some("null"))
+    }
+
     pub(super) fn get(&self, key: &str) -> Result<&'a Value, ParseError> {
         self.table.get(key).ok_or_else(|| ParseError::Missing {
             field: self.field(key),

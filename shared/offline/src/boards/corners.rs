@@ -59,7 +59,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
         let cell = |which: usize| row.get(columns[which]).unwrap_or_default().trim();
         let wrong = |which: usize| format!("row {}: {:?} is no number", nth + 2, cell(which));
         let whole = |which: usize| {
-            cell(which)
+            without_fraction(cell(which))
                 .parse::<usize>()
                 .map_err(|_not_whole| wrong(which))
         };
@@ -93,8 +93,21 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
     Ok((sights.collect(), board))
 }
 
+/// A whole number without the fraction that tables of floating-point numbers give it: `3` of `3.0`.
+pub(super) fn without_fraction(number: &str) -> &str {
+    match number.split_once('.') {
+        Some((whole, zeros)) if is_digits(whole) && zeros.bytes().all(|it| it == b'0') => whole,
+        _ => number,
+    }
+}
+
+fn is_digits(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|it| it.is_ascii_digit())
+}
+
 fn camera_named(names: &[String], id: &str) -> Option<usize> {
     let exactly = names.iter().position(|it| it == id);
+    let id = without_fraction(id);
     exactly.or_else(|| {
         let number = |name: &String| {
             let before = name.trim_end_matches(|it: char| it.is_ascii_digit()).len();
@@ -156,6 +169,11 @@ mod tests {
         assert_eq!(read_corners(&path, &names).unwrap(), (sights, board));
         let text = std::fs::read_to_string(&path).unwrap();
         parse_corners(&text.replace("cam_7", "7"), &names).unwrap();
+        // As pandas writes columns that had a gap.
+        let floats = text.replace("35,cam_7,0,", "35.0,7.0,0.00,");
+        assert_ne!(floats, text);
+        let floats = parse_corners(&floats.replace("cam_7", "7.0"), &names).unwrap();
+        assert_eq!(floats.0.len(), 1);
         for wrong in [
             "",
             "a,b\n",

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::corners::without_fraction;
 use runtime::{ExitKind, Failure, OrFail as _};
 
 /// The most rows of a table.
@@ -56,11 +57,11 @@ fn table(text: &str) -> Result<FrameTable, String> {
     for (nth, row) in reader.records().take(MOST_ROWS).enumerate() {
         let row = row.map_err(|error| error.to_string())?;
         let cell = |column: usize| row.get(column).unwrap_or_default().trim();
-        let frame = cell(sync).parse::<usize>();
+        let frame = without_fraction(cell(sync)).parse::<usize>();
         let frame = frame
             .map_err(|error| format!("row {}: sync_index {:?}: {error}", nth + 2, cell(sync)))?;
         frames
-            .entry(cell(camera).to_owned())
+            .entry(without_fraction(cell(camera)).to_owned())
             .or_default()
             .push(frame);
     }
@@ -114,6 +115,8 @@ mod tests {
         assert_eq!(table.of("cam_2"), Some(&[35, 36, 38][..]));
         assert_eq!(table.of("3"), Some(&[35][..]));
         assert_eq!(table.of("cam_1"), None);
+        let floats = table("sync_index,cam_id\n35.0,2.0\n").unwrap();
+        assert_eq!(floats.cameras().collect::<Vec<_>>(), ["2"]);
         for wrong in ["", "a,b\n1,2\n", "sync_index,cam_id\nx,0\n"] {
             assert!(self::table(wrong).is_err(), "{wrong:?}");
         }

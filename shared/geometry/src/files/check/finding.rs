@@ -79,6 +79,13 @@ pub enum Finding {
         /// The same with it.
         bent_degrees: f64,
     },
+    /// A camera of the file has no place.
+    LeftOut {
+        /// Name of the camera.
+        camera: String,
+        /// Why.
+        why: &'static str,
+    },
     /// The rig has no up direction, so that pictures cannot be turned upright.
     UpUnknown,
     /// A camera is upside down, or the up direction is wrong.
@@ -121,7 +128,7 @@ impl Finding {
                 let is_outside = fraction.iter().any(|part| !(0.0..=1.0).contains(part));
                 (false, is_outside)
             }
-            Self::UpUnknown => (false, false),
+            Self::UpUnknown | Self::LeftOut { .. } => (false, false),
             Self::SamePose { .. }
             | Self::FarAway { .. }
             | Self::UpsideDown { .. }
@@ -155,6 +162,7 @@ impl fmt::Display for Finding {
             | Self::FieldOfView { .. }
             | Self::LensRange { .. }
             | Self::LensStrength { .. } => self.fmt_intrinsics(f),
+            Self::LeftOut { camera, why } => write!(f, "{camera} is left out: {why}"),
             Self::UpUnknown => {
                 write!(
                     f,
@@ -186,7 +194,10 @@ impl Finding {
                 metres,
             } => {
                 let metres = Metres(*metres);
-                write!(f, "{a} and {b} are {metres} m apart: is the unit right?")
+                write!(
+                    f,
+                    "{a} and {b} are {metres} m apart: is the unit right? `unit` is m, cm, mm, ft, in, or the squares of the board such as 30mm"
+                )
             }
             Self::OnePlace { n_cameras, metres } => write!(
                 f,

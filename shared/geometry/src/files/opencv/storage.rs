@@ -9,6 +9,8 @@ use serde::{
 
 use super::ParseError;
 
+mod xml;
+
 /// What is stored under one name.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Entry {
@@ -150,7 +152,12 @@ impl<'de> Visitor<'de> for EntryVisitor {
 pub(super) struct Storage(BTreeMap<String, Entry>);
 
 impl Storage {
+    /// Reads YAML, JSON or XML.
     pub(super) fn parse(text: &str) -> Result<Self, ParseError> {
+        let text = text.trim_start_matches('\u{feff}');
+        if text.trim_start().starts_with('<') {
+            return xml::parse(text).map(Self);
+        }
         let syntax = |error| ParseError::Syntax {
             format: "YAML",
             source: Box::new(error),
@@ -207,6 +214,14 @@ impl Storage {
             field: keys.join(" or "),
         })?;
         Ok((key, entry.numbers(key)?))
+    }
+
+    /// The text under `key`, if it is there.
+    pub(super) fn text(&self, key: &str) -> Option<&str> {
+        match self.0.get(key)? {
+            Entry::Text(text) => Some(text),
+            _ => None,
+        }
     }
 
     /// The number under `key`, if it is there.

@@ -1,0 +1,75 @@
+//! What a calibration file says of one camera, and the rig of those whose place it says.
+
+use nalgebra::{Isometry3, UnitVector3};
+
+use super::{ParseError, ReadOptions};
+use crate::rig::LeftOut;
+use crate::{Camera, Intrinsics, Rig};
+
+/// Why a camera with a lens is left out.
+const NO_PLACE: &str = "its file has a lens and no place";
+
+/// A camera of a file.
+pub(super) enum Entry {
+    /// Its lens and its place.
+    Placed(Camera),
+    /// Its lens alone; it stands at the origin.
+    Lens(Camera),
+    /// Its name alone, and why.
+    Name(LeftOut),
+}
+
+impl Entry {
+    /// A camera whose place is not known.
+    pub(super) fn lens(name: &str, intrinsics: Intrinsics) -> Self {
+        Self::Lens(Camera {
+            name: name.to_owned(),
+            intrinsics,
+            camera_from_world: Isometry3::identity(),
+        })
+    }
+
+    /// A camera of which nothing is known.
+    pub(super) fn name(name: &str, why: &'static str) -> Self {
+        Self::Name(LeftOut {
+            camera: name.to_owned(),
+            why,
+        })
+    }
+}
+
+/// The rig of the cameras that have a place; where lenses are enough, of those too that have none.
+pub(super) fn rig(
+    entries: Vec<Entry>,
+    up: Option<UnitVector3<f64>>,
+    source: &str,
+    options: &ReadOptions,
+) -> Result<Rig, ParseError> {
+    let (mut cameras, mut left_out) = (Vec::new(), Vec::new());
+    let mut has_lens = false;
+    for entry in entries {
+        match entry {
+            Entry::Placed(camera) => cameras.push(camera),
+            Entry::Lens(camera) => {
+                has_lens = true;
+                left_out.push(LeftOut {
+                    camera: camera.name.clone(),
+                    why: NO_PLACE,
+                });
+                if options.lenses_suffice {
+                    cameras.push(camera);
+                }
+            }
+            Entry::Name(camera) => left_out.push(camera),
+        }
+    }
+    if let (true, Some(first)) = (cameras.is_empty(), left_out.first()) {
+        return Err(ParseError::NoPlace {
+            camera: first.camera.clone(),
+            why: first.why,
+            has_lens,
+        });
+    }
+    let rig = Rig::new(cameras, up, source).map_err(ParseError::Rig)?;
+    Ok(rig.with_left_out(left_out))
+}
