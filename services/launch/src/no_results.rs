@@ -19,7 +19,7 @@ pub fn require(is_found: bool, message: &str) -> Result<ExitCode, Failure> {
     is_found.then_some(ExitCode::SUCCESS).ok_or_else(failure)
 }
 
-/// Why a run has no joints in space. None if it has some, or if no person was detected.
+/// Why a run has no joints in space. None if it has some, or if its only view shows somebody.
 ///
 /// * `summary`: the summary that the process `results` wrote.
 /// * `views`: the reports of all views.
@@ -35,11 +35,21 @@ pub fn reason(summary: &Summary, views: &[ViewReport]) -> Option<String> {
             views.join("; ")
         ));
     }
-    let has_people = views.iter().any(|it| it.used > 0);
-    if summary.frames_with_pose == 0 && views.len() > 1 && has_people {
+    if summary.frames_with_pose > 0 {
+        return None;
+    }
+    if views.iter().all(|it| it.used == 0) {
+        return Some(format!(
+            "nobody was found in any of {} frames of any view: is somebody there, upright and large enough? `parallax detect` shows what is \
+             found in a picture",
+            summary.frames
+        ));
+    }
+    if views.len() > 1 {
         return Some(format!(
             "views show somebody, but none of {} results has a joint in space that a person can have: nobody may be \
-             there; else see `calib check`, whether the footage is of one moment, and whether people are large enough",
+             there; else see `calib check`, whether the unit of the calibration is right (`unit`: m, mm, ft, or 30mm for squares of \
+             the board), whether the footage is of one moment, and whether people are large enough",
             summary.frames
         ));
     }
@@ -88,8 +98,9 @@ mod tests {
     }
 
     #[test]
-    fn a_room_without_people_and_a_single_view_are_no_failure() {
-        assert_eq!(reason_of(3, 0, &[view(3, 0), view(3, 0)]), "");
+    fn a_room_without_people_is_a_reason_and_a_single_view_is_none() {
+        let nobody = reason_of(3, 0, &[view(3, 0), view(3, 0)]);
+        assert!(nobody.contains("nobody was found"), "{nobody}");
         assert_eq!(reason_of(3, 0, &[view(3, 3)]), "");
         assert_eq!(reason_of(3, 1, &[view(3, 3), view(3, 3)]), "");
     }

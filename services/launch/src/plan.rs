@@ -19,7 +19,7 @@ use tracing::Level;
 use crate::hosts;
 use crate::inputs;
 use crate::keypoints;
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, framing};
 use crate::process::Name;
 use crate::programs;
 use crate::resolved::Resolved;
@@ -67,6 +67,7 @@ pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolv
         replay: None,
     };
     sanity::warn(&resolved, &lengths)?;
+    check_names_and_sizes(&resolved, &is_here)?;
     // Stored in the deployment, so that every process and a replay use the same vertical.
     if let Some(found) = vertical::find(deployment)? {
         if host.is_some() {
@@ -83,6 +84,18 @@ pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolv
     let rig = inputs::rig_of(&resolved.deployment)?;
     resolved.search_size = SearchSize::of(&resolved.deployment, &rig);
     Ok(resolved)
+}
+
+/// Refuses cameras that the calibration lacks, and pictures of other sizes than it says, before anything that takes long.
+fn check_names_and_sizes(
+    resolved: &Resolved,
+    is_here: &dyn Fn(usize) -> bool,
+) -> Result<(), Failure> {
+    let rig = inputs::rig_of(&resolved.deployment)?;
+    for camera in (0..resolved.deployment.cameras.len()).filter(|it| is_here(*it)) {
+        framing(resolved, &rig, camera)?;
+    }
+    Ok(())
 }
 
 /// Reads all inputs of a deployment, and describes them in one line.

@@ -1,14 +1,17 @@
-//! Finds the vertical if neither calibration nor deployment gives it: from the roll of the cameras, and from the scores of
-//! the people in their first images.
+//! Finds the vertical if neither calibration nor deployment gives it: from people, whose heads are above their ankles in the keypoints
+//! of files, or who are found in pictures that are turned so.
 
-use capture::Feed;
+mod kept;
+mod keypoints;
+
+use capture::{Blank, Feed};
 use deployment::Deployment;
 use fmp::{Layout, Search};
 use footage::{Fill, Size, SourceSpec, Warp};
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
 use nalgebra::{Matrix3, SymmetricEigen, UnitVector3, Vector3};
-use runtime::Failure;
+use runtime::{ExitKind, Failure};
 
 use crate::inputs;
 
@@ -26,9 +29,8 @@ const SAME_ROLL: f64 = 12.0;
 const NEAR_AXIS: f64 = 6.0;
 /// Directions within this angle of each other are tried once, degrees.
 const SAME_DIRECTION: f64 = 10.0;
-/// The score of another direction must exceed that of level cameras by `MIN_GAIN + MIN_GAIN_SHARE * |score|`.
-const MIN_GAIN: f64 = 0.1;
-const MIN_GAIN_SHARE: f64 = 0.2;
+/// Scores that differ by less are equal: of these the first direction is taken, that of level cameras before the others.
+const SAME_SCORE: f64 = 0.02;
 
 /// The direction against gravity that was found, and why it was chosen.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +50,12 @@ struct Hypothesis {
 }
 
 /// Finds the vertical of a deployment. None if the rig or the deployment gives it, or if frames are not turned upright.
+///
+/// The keypoints of files tell at once. A search of pictures takes a while; what it finds is kept beside the rig, and not searched again.
+///
+/// # Errors
+///
+/// Inputs cannot be read, or nothing shows which way is up: no keypoints of people, and no pictures.
 pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure> {
     let rig = inputs::rig_of(deployment)?;
     if rig.up_in_world().is_some() || !deployment.capture.upright {
@@ -58,40 +66,72 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
         .iter()
         .filter_map(|it| rig.camera(&it.name));
     let cameras: Vec<Camera> = named.cloned().collect();
+    if let Some(found) = keypoints::find(deployment, &cameras)? {
+        return Ok(Some(found));
+    }
+    if let Some(kept) = kept::read(&deployment.rig, &cameras) {
+        return Ok(Some(kept));
+    }
     let directions = directions(&cameras);
     let Some(level) = directions.first().copied() else {
         return Ok(None);
     };
     let mut images = Images::new(deployment, &cameras)?;
-    let tried: Vec<Hypothesis> = directions
-        .iter()
-        .map(|up| Hypothesis {
-            up: *up,
-            score: images.score(*up),
-        })
-        .collect();
+    if images.views.is_empty() {
+        let message = "nothing says which way is up: neither the calibration nor the deployment does, no people with heads and ankles are \
+                       among the keypoints, and there are no pictures";
+        let hint = "give `up` in the deployment, the direction against gravity in the world of the calibration, such as [0, 0, 1]";
+        return Err(Failure::new(ExitKind::Config, message).with_hint(hint));
+    }
+    tracing::warn!(
+        "the calibration does not say which way is up: looking for people in the first pictures of {} cameras, which takes up to half a \
+         minute; `up` in the deployment spares it",
+        images.views.len()
+    );
+    let mut tried: Vec<Hypothesis> = Vec::new();
+    for (nth, up) in directions.iter().enumerate() {
+        let score = images.score(*up);
+        tried.push(Hypothesis { up: *up, score });
+        let found = score.map_or_else(
+            || "nobody".to_owned(),
+            |score| format!("people with a score of {score:.2}"),
+        );
+        tracing::warn!(
+            "up = {}, {} of {}: {found}",
+            text(up),
+            nth + 1,
+            directions.len()
+        );
+    }
     let best = choose(&tried).unwrap_or(Hypothesis {
         up: level,
         score: None,
     });
-    Ok(Some(Vertical {
+    let found = Vertical {
         up: best.up.into_inner().into(),
         why: reason(&best, &tried, &cameras),
-    }))
+    };
+    if best.score.is_some() {
+        kept::write(&deployment.rig, &cameras, &found);
+    }
+    Ok(Some(found))
 }
 
-/// The hypothesis with the highest score; the first, that of level cameras, unless another is clearly better.
+/// The hypothesis with the highest score; of equal ones the first.
 fn choose(tried: &[Hypothesis]) -> Option<Hypothesis> {
-    let level = tried.first()?;
     let score = |it: &Hypothesis| it.score.unwrap_or(f64::NEG_INFINITY);
-    let best = tried.iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
-    let gain = MIN_GAIN + MIN_GAIN_SHARE * level.score.unwrap_or(0.0).abs();
-    let is_clear = score(best) > score(level) + gain;
-    Some(if is_clear { *best } else { *level })
+    let best = tried.iter().map(score).fold(f64::NEG_INFINITY, f64::max);
+    tried
+        .iter()
+        .find(|it| score(it) >= best - SAME_SCORE)
+        .copied()
+}
+
+fn text(up: &UnitVector3<f64>) -> String {
+    format!("[{:.3}, {:.3}, {:.3}]", up.x, up.y, up.z)
 }
 
 fn reason(best: &Hypothesis, tried: &[Hypothesis], cameras: &[Camera]) -> String {
-    let text = |up: &UnitVector3<f64>| format!("[{:.3}, {:.3}, {:.3}]", up.x, up.y, up.z);
     let off = cameras.iter().map(|it| roll_degrees(it, &best.up).abs());
     let off = off.fold(0.0, f64::max);
     let others = tried.iter().filter(|it| it.up != best.up);
@@ -125,21 +165,8 @@ fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
     let (right, down) = (all(Vector3::x()), all(Vector3::y()));
     let level = common_normal(&right, -down.iter().sum::<Vector3<f64>>());
     let upright = common_normal(&down, right.iter().sum());
-    let world = [
-        Vector3::z_axis(),
-        -Vector3::z_axis(),
-        Vector3::y_axis(),
-        -Vector3::y_axis(),
-        Vector3::x_axis(),
-        -Vector3::x_axis(),
-    ];
-    let near = |direction: UnitVector3<f64>| {
-        let near = world
-            .iter()
-            .find(|axis| axis.angle(&direction).to_degrees() < NEAR_AXIS);
-        near.copied().unwrap_or(direction)
-    };
-    let found = [level, upright].map(|it| it.map(near));
+    let world = world_axes();
+    let found = [level, upright].map(|it| it.map(snapped));
     let [level, upright] = found;
     let likely = level
         .into_iter()
@@ -156,6 +183,17 @@ fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
         }
     }
     directions
+}
+
+fn world_axes() -> [UnitVector3<f64>; 6] {
+    let [x, y, z] = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+    [z, -z, y, -y, x, -x]
+}
+
+/// The axis of the world that is near a direction, or the direction itself.
+fn snapped(direction: UnitVector3<f64>) -> UnitVector3<f64> {
+    let is_near = |axis: &UnitVector3<f64>| axis.angle(&direction).to_degrees() < NEAR_AXIS;
+    world_axes().into_iter().find(is_near).unwrap_or(direction)
 }
 
 /// The direction perpendicular to all given vectors, by least squares with less weight for outliers.
@@ -218,7 +256,11 @@ struct View<'a> {
 impl<'a> Images<'a> {
     fn new(deployment: &Deployment, cameras: &'a [Camera]) -> Result<Self, Failure> {
         let model = inputs::model_or_shipped(deployment.model.as_deref())?;
-        let views = deployment.cameras.iter().take(MAX_VIEWS);
+        // Nobody can be found in the grey pictures of cameras that have keypoints alone.
+        let views = deployment.cameras.iter();
+        let views = views
+            .filter(|it| !Blank::is_blank(&it.source))
+            .take(MAX_VIEWS);
         let views = views.filter_map(|entry| {
             let camera = cameras.iter().find(|it| it.name == entry.name)?;
             View::new(entry, camera, &deployment.capture)
@@ -315,7 +357,7 @@ mod tests {
     use super::*;
 
     /// Cameras of a ring, rolled about their axes by some degrees, in a world whose up is `up`.
-    fn ring(rolls: &[f64], up: UnitVector3<f64>) -> Vec<Camera> {
+    pub(super) fn ring(rolls: &[f64], up: UnitVector3<f64>) -> Vec<Camera> {
         let rig = scene::RigChoice::parse(&format!("ring:{}", rolls.len()));
         let rig = rig.unwrap().rig().unwrap();
         let turn = nalgebra::UnitQuaternion::rotation_between(&up, &rig.up_in_world().unwrap());
@@ -360,12 +402,14 @@ mod tests {
     }
 
     #[test]
-    fn another_direction_needs_a_clearly_better_score() {
+    fn the_better_score_wins_and_level_cameras_where_scores_are_equal() {
         let tried = |score: Option<f64>, up| Hypothesis { up, score };
         let [z, y] = [Vector3::z_axis(), Vector3::y_axis()];
         let up = |level, other| choose(&[tried(level, z), tried(other, y)]).unwrap().up;
-        assert_eq!(up(Some(0.5), Some(0.55)), z);
-        assert_eq!(up(Some(-0.5), Some(0.9)), y);
+        assert_eq!(up(Some(0.5), Some(0.51)), z);
+        assert_eq!(up(Some(0.5), Some(0.55)), y);
+        assert_eq!(up(Some(-0.95), Some(-0.9)), y);
+        assert_eq!(up(Some(0.9), Some(-0.5)), z);
         assert_eq!(up(None, None), z);
         assert_eq!(up(None, Some(0.1)), y);
     }

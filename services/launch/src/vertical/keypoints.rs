@@ -1,0 +1,198 @@
+//! The vertical by keypoints of files: people have their heads above their ankles.
+//!
+//! In a picture the head and the ankles of a person span a plane with the camera, and the vertical lies in it: whoever leans, leans one way
+//! in one picture and another way in the next. No person has to be known in two pictures.
+
+use ::keypoints::Keypoint;
+use deployment::Deployment;
+use geometry::Camera;
+use nalgebra::{Point2, UnitVector3, Vector3};
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use super::{Vertical, common_normal, snapped, text};
+use crate::keypoints as keypoint_files;
+
+/// Most frames of a camera that are read, evenly over its keypoints.
+const MOST_FRAMES: u64 = 60;
+/// Least score of a keypoint.
+const LEAST_SCORE: f64 = 0.2;
+/// Least people of all frames and cameras.
+const LEAST_PEOPLE: usize = 5;
+/// Least share of people whose heads are above their ankles.
+const LEAST_AGREEING: f64 = 0.7;
+/// How far half of the people may lean from the vertical, degrees.
+const MOST_LEAN: f64 = 25.0;
+
+/// How one person stands in one picture.
+struct Standing {
+    /// Perpendicular to the plane of the camera, the head and the ankles, in the world.
+    normal: Vector3<f64>,
+    /// From the ankles to the head, in that plane and perpendicular to the ray to the ankles.
+    upward: Vector3<f64>,
+}
+
+/// The vertical; none where too few people have heads and ankles, or where they do not agree.
+///
+/// * `cameras`: those of the deployment that are in its rig.
+pub(super) fn find(
+    deployment: &Deployment,
+    cameras: &[Camera],
+) -> Result<Option<Vertical>, Failure> {
+    let mut all = Vec::new();
+    for entry in &deployment.cameras {
+        let camera = cameras.iter().find(|it| it.name == entry.name);
+        let (Some(camera), Some(source)) = (camera, keypoint_files::of_camera(entry)?) else {
+            continue;
+        };
+        let ways = ::keypoints::joint_ways(source.names().names());
+        let offset = entry.source_offset_px.unwrap_or([0, 0]).map(f64::from);
+        let step = source.n_frames().div_ceil(MOST_FRAMES).max(1);
+        let mut people = Vec::new();
+        for frame in (0..source.n_frames()).step_by(step as usize) {
+            source
+                .of_frame(frame, &mut people)
+                .or_fail(ExitKind::Input)?;
+            let standing = people.iter().filter_map(|person| {
+                let joint = |nth: usize| {
+                    let found = |at: usize| person.keypoints.get(at).copied().flatten();
+                    ways[nth].iter().find_map(|way| weighted(&way.row, found))
+                };
+                let at = |pixel: [f64; 2]| {
+                    let pixel = Point2::new(pixel[0] + offset[0], pixel[1] + offset[1]);
+                    Some(camera.ray(&pixel)?.direction)
+                };
+                let ankles = [joint(0), joint(5)].into_iter().flatten();
+                let ankles: Vec<[f64; 2]> = ankles.collect();
+                let head = joint(13).or_else(|| joint(12))?;
+                Standing::of(at(head)?, at(middle(&ankles)?)?)
+            });
+            all.extend(standing);
+        }
+    }
+    Ok(vertical(&all))
+}
+
+impl Standing {
+    /// * Directions of rays in the world.
+    fn of(head: UnitVector3<f64>, ankles: UnitVector3<f64>) -> Option<Self> {
+        let normal = head.cross(&ankles).try_normalize(1e-3)?;
+        let upward = ankles.cross(&normal);
+        Some(Self { normal, upward })
+    }
+}
+
+fn vertical(all: &[Standing]) -> Option<Vertical> {
+    if all.len() < LEAST_PEOPLE {
+        return None;
+    }
+    let normals: Vec<Vector3<f64>> = all.iter().map(|it| it.normal).collect();
+    let up = common_normal(&normals, all.iter().map(|it| it.upward).sum())?;
+    let n_agreeing = all.iter().filter(|it| it.upward.dot(&up) > 0.0).count();
+    let share = n_agreeing as f64 / all.len() as f64;
+    let mut leans: Vec<f64> = normals
+        .iter()
+        .map(|it| it.dot(&up).abs().min(1.0).asin())
+        .collect();
+    leans.sort_by(f64::total_cmp);
+    let lean = leans[leans.len() / 2].to_degrees();
+    if share < LEAST_AGREEING || lean > MOST_LEAN {
+        return None;
+    }
+    let up = snapped(up);
+    let why = format!(
+        "the calibration does not say which way is up; taken is up = {}: there {:.0} % of {} people in the keypoints have their heads above \
+         their ankles, and half of them lean by less than {lean:.0} degrees; give `up` in the deployment if it is wrong",
+        text(&up),
+        100.0 * share,
+        all.len()
+    );
+    Some(Vertical {
+        up: up.into_inner().into(),
+        why,
+    })
+}
+
+/// A weighted sum of keypoints that were all found.
+fn weighted(row: &[(usize, f64)], found: impl Fn(usize) -> Option<Keypoint>) -> Option<[f64; 2]> {
+    let mut sum = [0.0; 2];
+    for &(nth, weight) in row {
+        let keypoint = found(nth).filter(|it| it.score >= LEAST_SCORE)?;
+        for (sum, at) in sum.iter_mut().zip(keypoint.at) {
+            *sum += weight * at;
+        }
+    }
+    Some(sum)
+}
+
+fn middle(points: &[[f64; 2]]) -> Option<[f64; 2]> {
+    let n = points.len();
+    let mean = |axis: usize| points.iter().map(|it| it[axis]).sum::<f64>() / n as f64;
+    (n > 0).then(|| [mean(0), mean(1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, Rotation3};
+
+    use super::super::tests::ring;
+    use super::*;
+
+    /// People of 1.7 m who stand at several places and lean by some degrees, as cameras see them.
+    fn seen(rolls: &[f64], up: UnitVector3<f64>, lean_degrees: f64) -> Vec<Standing> {
+        let world = Rotation3::rotation_between(&Vector3::z(), &up).unwrap();
+        let mut all = Vec::new();
+        for camera in ring(rolls, up) {
+            for nth in 0..8 {
+                let around = f64::from(nth) * core::f64::consts::FRAC_PI_4;
+                let place = Vector3::new(0.6 * around.cos(), 0.6 * around.sin(), 0.1);
+                let lean = lean_degrees.to_radians();
+                let body = Vector3::new(
+                    lean.sin() * around.sin(),
+                    lean.sin() * around.cos(),
+                    lean.cos(),
+                );
+                let ray = |at: Vector3<f64>| {
+                    let at = Point3::from(world * at);
+                    let pixel = camera.project(&at)?;
+                    Some(camera.ray(&pixel)?.direction)
+                };
+                if let (Some(head), Some(ankles)) = (ray(place + 1.5 * body), ray(place)) {
+                    all.extend(Standing::of(head, ankles));
+                }
+            }
+        }
+        all
+    }
+
+    fn off(all: &[Standing], up: UnitVector3<f64>) -> f64 {
+        let found = Vector3::from(vertical(all).unwrap().up);
+        found.angle(&up).to_degrees()
+    }
+
+    #[test]
+    fn heads_above_ankles_tell_the_vertical_however_cameras_are_rolled() {
+        let odd = UnitVector3::new_normalize(Vector3::new(0.5, -0.7, 0.4));
+        for up in [Vector3::z_axis(), -Vector3::y_axis(), odd] {
+            for rolls in [
+                [0.0; 4],
+                [25.0, -20.0, 30.0, 22.0],
+                [90.0, 90.0, -90.0, 180.0],
+            ] {
+                let off = [0.0, 10.0].map(|lean| off(&seen(&rolls, up, lean), up));
+                assert!(off[0] < 1.0 && off[1] < 5.0, "{rolls:?}: {off:?} degrees");
+            }
+        }
+    }
+
+    #[test]
+    fn without_people_or_without_agreement_there_is_none() {
+        assert!(vertical(&[]).is_none());
+        let mut lying = seen(&[0.0; 4], Vector3::z_axis(), 0.0);
+        for (nth, it) in lying.iter_mut().enumerate() {
+            let axis = UnitVector3::new_normalize(it.normal.cross(&it.upward));
+            it.normal = Rotation3::from_axis_angle(&axis, nth as f64) * it.normal;
+            it.upward = Rotation3::from_axis_angle(&axis, nth as f64) * it.upward;
+        }
+        assert!(vertical(&lying).is_none());
+    }
+}
