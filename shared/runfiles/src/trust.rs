@@ -62,6 +62,15 @@ impl Kind {
         }
     }
 
+    /// What cannot be, however few the results are.
+    fn impossible(self) -> f64 {
+        match self {
+            Self::Reprojection => 0.25,
+            Self::Bones => 6.0,
+            Self::Implausible | Self::Joints | Self::Sides => f64::INFINITY,
+        }
+    }
+
     fn value(self, trust: &Trust) -> Option<f64> {
         match self {
             Self::Reprojection => trust.reprojection,
@@ -77,14 +86,18 @@ impl Trust {
     /// Fewest results that are judged.
     pub const MIN_FRAMES: u64 = 30;
 
-    /// Why the results should not be trusted; empty where nothing speaks against them, or too few are there to judge.
+    /// Why the results should not be trusted; empty where nothing speaks against them. Where too few are there to judge, only what is
+    /// impossible is a reason.
     pub fn doubts(&self) -> Vec<Doubt> {
-        if self.frames < Self::MIN_FRAMES {
-            return Vec::new();
-        }
+        let is_few = self.frames < Self::MIN_FRAMES;
         let doubt = |kind: Kind| {
             let value = kind.value(self)?;
-            (value > kind.limit()).then_some(Doubt { kind, value })
+            let limit = if is_few {
+                kind.impossible()
+            } else {
+                kind.limit()
+            };
+            (value > limit).then_some(Doubt { kind, value })
         };
         Kind::ALL.into_iter().filter_map(doubt).collect()
     }
@@ -181,12 +194,26 @@ mod tests {
     }
 
     #[test]
-    fn few_results_are_not_judged() {
+    fn few_results_are_judged_by_what_is_impossible_alone() {
         let few = Trust {
-            frames: Trust::MIN_FRAMES - 1,
+            frames: 1,
             sides_unsure: 1.0,
+            reprojection: Some(0.2),
             ..good()
         };
         assert_eq!(few.doubts(), []);
+        let impossible = Trust {
+            reprojection: Some(0.458),
+            ..few
+        };
+        let doubts: Vec<String> = impossible
+            .doubts()
+            .iter()
+            .map(ToString::to_string)
+            .collect();
+        assert!(
+            doubts.len() == 1 && doubts[0].contains("46 %"),
+            "{doubts:?}"
+        );
     }
 }

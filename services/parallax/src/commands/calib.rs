@@ -1,14 +1,15 @@
 //! `parallax calib`: shows, checks and converts calibrations.
 
+mod own_views;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand, ValueEnum};
 use geometry::files::{Format, ReadOptions, Unit};
-use geometry::{Camera, Rig, upright_roll};
+use geometry::{Camera, LeftOut, Rig, upright_roll};
 use launch::{inputs, output};
-use nalgebra::{Point2, UnitVector3, Vector3};
-use runfiles::ViewLine;
+use nalgebra::{UnitVector3, Vector3};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
@@ -23,12 +24,13 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Check units, handedness and image sizes; with detections, every camera's epipolar error.
+    /// Check units, handedness and image sizes; with detections, whether what every view found by itself agrees with the rig.
     #[command(after_help = "Ends with 5 if something is probably wrong.")]
     Check {
         #[command(flatten)]
         input: Input,
-        /// Poses of one person in all cameras: `pose2d.jsonl` of a run on uncropped footage.
+        /// What each view found by itself of one person: `pose2d.jsonl` of a run on uncropped footage. Poses after fusion do not count:
+        /// they are projections of one solution, and agree with any rig.
         #[arg(long, value_name = "FILE")]
         detections: Option<PathBuf>,
         /// Print JSON.
@@ -60,26 +62,15 @@ pub(crate) struct Input {
     /// The calibration file, or one file per camera.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Unit of lengths, if the format does not define it.
-    #[arg(long, value_enum)]
-    unit: Option<UnitName>,
+    /// Unit of lengths, if the format does not define it: m, cm, mm, ft, in, or a length such as 30mm, of a calibration in squares.
+    #[arg(long)]
+    unit: Option<Unit>,
     /// Direction against gravity in the world, if the file does not give it.
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_hyphen_values = true)]
     up: Option<Vec<f64>>,
     /// Image size in pixels, if the file does not give it.
     #[arg(long, num_args = 2, value_names = ["WIDTH", "HEIGHT"])]
     size: Option<Vec<u32>>,
-}
-
-/// Units of lengths.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum UnitName {
-    /// Metres.
-    M,
-    /// Centimetres.
-    Cm,
-    /// Millimetres.
-    Mm,
 }
 
 /// Output formats.
@@ -114,7 +105,8 @@ impl To {
 }
 
 impl Input {
-    fn read(&self) -> Result<Rig, Failure> {
+    /// * `lenses_suffice`: whether cameras without a place are read, too.
+    fn read(&self, lenses_suffice: bool) -> Result<Rig, Failure> {
         let up = match self.up.as_deref() {
             Some(&[x, y, z]) => {
                 let up = UnitVector3::try_new(Vector3::new(x, y, z), 1e-9);
@@ -124,16 +116,13 @@ impl Input {
             _ => None,
         };
         let options = ReadOptions {
-            unit: self.unit.map(|it| match it {
-                UnitName::M => Unit::Metres,
-                UnitName::Cm => Unit::Centimetres,
-                UnitName::Mm => Unit::Millimetres,
-            }),
+            unit: self.unit,
             up,
             size: match self.size.as_deref() {
                 Some(&[width, height]) => Some([width, height]),
                 _ => None,
             },
+            lenses_suffice,
         };
         inputs::rig(&self.files, &options)
     }
@@ -142,13 +131,15 @@ impl Input {
 /// Runs the subcommand.
 pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     match command {
-        Command::Show { input, json } => show(&input.read()?, *json),
+        Command::Show { input, json } => show(&input.read(true)?, *json),
         Command::Check {
             input,
             detections,
             json,
-        } => check(&input.read()?, detections.as_deref(), *json),
-        Command::Convert { input, out, to } => convert(&input.read()?, out, *to),
+        } => check(&input.read(false)?, detections.as_deref(), *json),
+        Command::Convert { input, out, to } => {
+            convert(&input.read(matches!(to, To::Rig))?, out, *to)
+        }
     }
 }
 
@@ -183,8 +174,16 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
         let roll = upright_roll(camera, rig).map_or("unknown".to_owned(), |it| {
             format!("{:.1} degrees", it.to_degrees())
         });
+        let place = if has_place(rig, camera) {
+            format!(
+                "at ({:.3}, {:.3}, {:.3}) m, roll to upright {roll}",
+                centre.x, centre.y, centre.z
+            )
+        } else {
+            "place not known".to_owned()
+        };
         output::line(format_args!(
-            "  {:<10} {}x{} px, f ({:.1}, {:.1}), c ({:.1}, {:.1}), at ({:.3}, {:.3}, {:.3}) m, roll to upright {roll}",
+            "  {:<10} {}x{} px, f ({:.1}, {:.1}), c ({:.1}, {:.1}), {place}",
             camera.name,
             intrinsics.size[0],
             intrinsics.size[1],
@@ -192,16 +191,20 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
             intrinsics.fy,
             intrinsics.cx,
             intrinsics.cy,
-            centre.x,
-            centre.y,
-            centre.z,
         ))?;
         output::line(format_args!(
             "             lens {}",
             intrinsics.lens.model()
         ))?;
     }
+    for LeftOut { camera, why } in rig.left_out() {
+        output::line(format_args!("  {camera}: {why}"))?;
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+fn has_place(rig: &Rig, camera: &Camera) -> bool {
+    rig.left_out().iter().all(|it| it.camera != camera.name)
 }
 
 fn describe(camera: &Camera, rig: &Rig) -> Value {
@@ -212,8 +215,8 @@ fn describe(camera: &Camera, rig: &Rig) -> Value {
         "focal_px": [intrinsics.fx, intrinsics.fy],
         "principal_point_px": [intrinsics.cx, intrinsics.cy],
         "lens": intrinsics.lens.model().to_string(),
-        "centre_m": <[f64; 3]>::from(camera.centre_in_world().coords),
-        "axis": <[f64; 3]>::from(camera.axis_in_world().into_inner()),
+        "centre_m": has_place(rig, camera).then(|| <[f64; 3]>::from(camera.centre_in_world().coords)),
+        "axis": has_place(rig, camera).then(|| <[f64; 3]>::from(camera.axis_in_world().into_inner())),
         "roll_to_upright_degrees": upright_roll(camera, rig).map(f64::to_degrees),
     })
 }
@@ -223,11 +226,9 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
     let has_problems = findings
         .iter()
         .any(|it| it.severity() != geometry::files::Severity::Note);
-    let report = detections
-        .map(|it| -> Result<_, Failure> {
-            Ok(geometry::files::epipolar_check(rig, &points(rig, it)?))
-        })
-        .transpose()?;
+    let report = detections.map(|file| own_views::agreement(rig, file));
+    let report = report.transpose()?;
+    let disagreements = report.as_ref().map_or(&[][..], |it| &it.disagreements);
     let name = |index: usize| rig.cameras()[index].name.as_str();
     if as_json {
         let findings: Vec<Value> = findings
@@ -235,11 +236,13 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
             .map(|it| json!({ "severity": format!("{:?}", it.severity()).to_lowercase(), "text": it.to_string() }))
             .collect();
         let cameras = report.as_ref().map(|report| {
-            let each = report.cameras.iter();
+            let each = report.errors.cameras.iter();
             each.map(|it| json!({ "camera": name(it.camera), "median_px": it.median_px, "points": it.n_points }))
                 .collect::<Vec<_>>()
         });
-        output::json(&json!({ "schema_version": 1, "findings": findings, "epipolar": cameras }))?;
+        output::json(&json!({
+            "schema_version": 1, "findings": findings, "epipolar": cameras, "disagreements": disagreements,
+        }))?;
     } else {
         for finding in &findings {
             output::line(format_args!("{:?}: {finding}", finding.severity()))?;
@@ -247,7 +250,7 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
         if findings.is_empty() {
             output::line("nothing odd was found")?;
         }
-        for camera in report.iter().flat_map(|it| &it.cameras) {
+        for camera in report.iter().flat_map(|it| &it.errors.cameras) {
             output::line(format_args!(
                 "{}: median epipolar error {:.2} px over {} pairs of points",
                 name(camera.camera),
@@ -255,34 +258,15 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
                 camera.n_points
             ))?;
         }
+        for disagreement in disagreements {
+            output::line(format_args!("Warning: {disagreement}"))?;
+        }
     }
-    Ok(if has_problems {
+    Ok(if has_problems || !disagreements.is_empty() {
         ExitCode::from(ExitKind::Calibration.status())
     } else {
         ExitCode::SUCCESS
     })
-}
-
-/// The fused parts in a `pose2d.jsonl`, pixels: one entry per frame and part, with one point per camera of the rig.
-fn points(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Point2<f64>>>>, Failure> {
-    let n_cameras = rig.cameras().len();
-    let mut frames = std::collections::BTreeMap::<u64, Vec<Vec<Option<Point2<f64>>>>>::new();
-    for line in runfiles::lines::<ViewLine>(&runtime::read_text(file)?) {
-        let line = line.map_err(|error| runtime::in_file(file, &error))?;
-        let Some(camera) = rig.cameras().iter().position(|it| it.name == line.view) else {
-            continue;
-        };
-        let points = frames.entry(line.frame).or_default();
-        let parts = line.fused.iter().flat_map(|it| &it.parts);
-        for (index, part) in parts.enumerate() {
-            if points.len() <= index {
-                points.push(vec![None; n_cameras]);
-            }
-            let position = part.x.zip(part.y);
-            points[index][camera] = position.map(|(x, y)| Point2::new(x, y));
-        }
-    }
-    Ok(frames.into_values().flatten().collect())
 }
 
 fn convert(rig: &Rig, out: &Path, to: To) -> Result<ExitCode, Failure> {

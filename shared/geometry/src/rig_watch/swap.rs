@@ -22,6 +22,8 @@ const FACTOR: f64 = 2.5;
 const LEAD: f64 = 1.5;
 /// With a larger angular residual the cameras do not see one person where the rig says.
 const CONTRADICTION_DEGREES: f64 = 2.5;
+/// With a larger one this is so however few the frames are: no detection of a person is as far off.
+const IMPOSSIBLE_DEGREES: f64 = 5.0;
 
 /// Computes, frame by frame, the angular residual of the rays with the footage of two cameras exchanged.
 ///
@@ -114,7 +116,7 @@ impl SwapWatch {
 
     /// The two cameras that were exchanged.
     pub fn swap(&self) -> Option<Swap> {
-        let all = self.best();
+        let all = self.best(MIN_FRAMES);
         let best = *all.first()?;
         let is_worse = |other: &Swap| other.exchanged_degrees > LEAD * best.exchanged_degrees;
         let is_sure = all.get(1).is_none_or(is_worse);
@@ -127,13 +129,16 @@ impl SwapWatch {
     /// Observations that contradict the rig: exchanged footage, the rig of other footage, unsynchronised views, or
     /// wrong detections in every view.
     ///
-    /// It is also reported where an exchange is not clear enough for [`Self::swap`]: frames that were turned upright
+    /// What is impossible is reported from the first frame on. It is also reported where an exchange is not clear enough for [`Self::swap`]: frames that were turned upright
     /// for another camera show people tilted, and the detections in them fit no camera.
     pub fn contradiction(&self) -> Option<Contradiction> {
-        let n_frames = self.configured.len();
-        let degrees = median(self.configured.clone())
-            .filter(|degrees| n_frames >= MIN_FRAMES && *degrees > CONTRADICTION_DEGREES)?;
-        let best = self.best().into_iter().next();
+        let least = if self.configured.len() >= MIN_FRAMES {
+            CONTRADICTION_DEGREES
+        } else {
+            IMPOSSIBLE_DEGREES
+        };
+        let degrees = median(self.configured.clone()).filter(|degrees| *degrees > least)?;
+        let best = self.best(1).into_iter().next();
         let likely = best.filter(|swap| swap.exchanged_degrees < swap.degrees);
         Some(Contradiction {
             degrees,
@@ -142,12 +147,12 @@ impl SwapWatch {
         })
     }
 
-    /// All pairs with enough frames, those first that fit best if they are exchanged.
-    pub(super) fn best(&self) -> Vec<Swap> {
+    /// All pairs with so many frames, those first that fit best if they are exchanged.
+    pub(super) fn best(&self, n_frames: usize) -> Vec<Swap> {
         let usable = self
             .tried
             .iter()
-            .filter(|(_, frames)| frames.len() >= MIN_FRAMES);
+            .filter(|(_, frames)| frames.len() >= n_frames);
         let mut all: Vec<Swap> = usable
             .filter_map(|(views, frames)| {
                 let column = |index: usize| median(frames.iter().map(|row| row[index]).collect());

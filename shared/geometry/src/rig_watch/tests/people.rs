@@ -252,7 +252,7 @@ fn exchanged_footage_of_two_cameras_is_detected() {
             if !is_right && !is_unsure {
                 wrong.push(format!(
                     "rig {rig}, seed {seed}: {a} and {b}, found {:?}",
-                    watch.best()
+                    watch.best(12)
                 ));
             }
         }
@@ -284,7 +284,7 @@ fn cyclically_exchanged_footage_of_three_cameras_is_detected() {
         assert!(
             contradiction.is_some() || watch.swap().is_some(),
             "seed {seed}: {:?}",
-            watch.best()
+            watch.best(12)
         );
     }
 }
