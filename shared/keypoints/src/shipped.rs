@@ -1,7 +1,7 @@
 //! The cards of published networks that ship with Parallax; their weights do not.
 
 /// The cards of `configs/networks`: the name of the file without its ending, and the text.
-pub const SHIPPED: [(&str, &str); 8] = [
+pub const SHIPPED: [(&str, &str); 9] = [
     (
         "rtmpose-coco17",
         include_str!("../../../configs/networks/rtmpose-coco17.toml"),
@@ -33,6 +33,10 @@ pub const SHIPPED: [(&str, &str); 8] = [
     (
         "lightweight-openpose",
         include_str!("../../../configs/networks/lightweight-openpose.toml"),
+    ),
+    (
+        "cpm-lsp14",
+        include_str!("../../../configs/networks/cpm-lsp14.toml"),
     ),
 ];
 

@@ -13,7 +13,9 @@ pub use turn::Turn;
 
 use inference::{Input, Session};
 use kernels::Rgb8View;
-use keypoints::{Card, Codec, HeatMaps, Keypoint, Layout, List, OutputError, SimCc, Window};
+use keypoints::{
+    Card, Codec, HeatMaps, Keypoint, Layout, List, Numbers, OutputError, SimCc, Window,
+};
 
 use self::mirror::Mirror;
 use self::ports::outputs_of;
@@ -92,7 +94,7 @@ impl PoseNetwork {
         let description = session.description();
         let input = input_of(&card.input, &description.inputs)?;
         let outputs = outputs_of(&card, &description.outputs)?;
-        let network = Self {
+        let mut network = Self {
             names: card.names(),
             session,
             card,
@@ -104,10 +106,29 @@ impl PoseNetwork {
         workspace.values.resize(network.n_values(), 0.0);
         let [width, height] = network.size().map(|it| it as f64);
         if let Some(window) = Window::new(&network.card, [0.0, 0.0, width, height]) {
-            network.run(&mut workspace)?;
+            network.try_numbers(&mut workspace)?;
             network.sight(window, &workspace)?;
         }
         Ok(network)
+    }
+
+    /// Runs with the type of numbers of the card. One network is published with bytes and with whole numbers of 32 bits, by how it was
+    /// converted: where one type is refused and the other taken, that is it.
+    fn try_numbers(&mut self, workspace: &mut Workspace) -> Result<(), LookError> {
+        let refused = match self.run(workspace) {
+            Ok(()) => return Ok(()),
+            Err(refused) => refused,
+        };
+        let of_card = self.card.input.numbers;
+        self.card.input.numbers = match of_card {
+            Numbers::F32 => return Err(refused),
+            Numbers::U8 => Numbers::I32,
+            Numbers::I32 => Numbers::U8,
+        };
+        self.run(workspace).map_err(|_other| {
+            self.card.input.numbers = of_card;
+            refused
+        })
     }
 
     /// The same network, which looks at the mirror image of every window as well: what it sees is the mean of both. That is better by

@@ -79,10 +79,10 @@ fn of_input(card: &Input, description: &Description) -> Option<usize> {
     inputs.filter_map(|it| agreeing(it, &sides)).max()
 }
 
-/// How well a card agrees; `None` if neither an input nor an output does.
+/// How well a card agrees; `None` if no output is of its kind. The kind of output counts most, then the number of keypoints, then the order
+/// of axes, then sides and names.
 fn points(card: &Card, description: &Description) -> Option<usize> {
     let [width, height] = [card.input.width, card.input.height];
-    let input = of_input(&card.input, description);
     let outputs = || description.outputs.iter();
     let n = card.names().len();
     let named = |name: &str| usize::from(outputs().any(|it| it.name == name));
@@ -94,16 +94,8 @@ fn points(card: &Card, description: &Description) -> Option<usize> {
             layout,
             ..
         } => {
-            let channels = n + further;
-            let maps_are = |it: &Port| {
-                let channel = match layout {
-                    Layout::Planes => 1,
-                    Layout::Pixels => 3,
-                };
-                it.sides.len() == 4 && it.sides[channel].may_be(channels)
-            };
-            let output = outputs().any(maps_are).then_some(3);
-            (output, maps.as_deref().map_or(0, named))
+            let rated = outputs().filter_map(|it| of_maps(it, n, *further, *layout));
+            (rated.max(), maps.as_deref().map_or(0, named))
         }
         Codec::Simcc {
             x,
@@ -114,22 +106,57 @@ fn points(card: &Card, description: &Description) -> Option<usize> {
             let bins = |side: usize| (side as f64 * bins_per_pixel).round() as usize;
             let across = given(&[1, n, bins(width)]);
             let output = across.and_then(|it| Some(it.min(given(&[1, n, bins(height)])?)));
-            (output, named(x) + named(y))
+            (output.map(|it| 8 + it), named(x) + named(y))
         }
         Codec::Keypoints { list, fields, .. } => {
             let flat = given(&[1, n * fields.len()]);
             let rows = given(&[1, n, fields.len()]);
             let nested = given(&[1, 1, n, fields.len()]);
             let output = flat.max(rows).max(nested);
-            (output, list.as_deref().map_or(0, named))
+            (output.map(|it| 8 + it), list.as_deref().map_or(0, named))
         }
     };
     let named_input = card.input.name.as_ref().is_some_and(|name| {
         let mut inputs = description.inputs.iter();
         inputs.any(|it| it.name == *name)
     });
-    let points = input.unwrap_or(0) + 2 * output.unwrap_or(0);
-    (points > 0).then_some(points + names + usize::from(named_input))
+    let input = of_input(&card.input, description).unwrap_or(0);
+    Some(2 * output? + input + names + usize::from(named_input))
+}
+
+/// How well an output agrees with maps of keypoints; `None` if it is none.
+fn of_maps(output: &Port, n: usize, further: usize, layout: Layout) -> Option<usize> {
+    /// Fewest rows and columns of maps.
+    const LEAST_SIDE: usize = 8;
+    let [_, second, third, fourth] = &output.sides[..] else {
+        return None;
+    };
+    let is_maps = |channels: &Side, sides: [&Side; 2]| {
+        let is_side = |side: &Side| !matches!(side, Side::Fixed(n) if *n < LEAST_SIDE);
+        let is_fewer = match (channels, sides) {
+            (Side::Fixed(n), [Side::Fixed(a), Side::Fixed(b)]) => n <= a || n <= b,
+            _ => true,
+        };
+        is_fewer && sides.into_iter().all(is_side)
+    };
+    let found = [
+        (Layout::Planes, second, [third, fourth]),
+        (Layout::Pixels, fourth, [second, third]),
+    ];
+    let rated = found
+        .into_iter()
+        .filter(|(_, channels, sides)| is_maps(channels, *sides));
+    let rated = rated.map(|(order, channels, _)| {
+        let known = if channels.may_be(n + further) {
+            4
+        } else if channels.may_be(n) {
+            3
+        } else {
+            0
+        };
+        4 + known + usize::from(order == layout)
+    });
+    rated.max()
 }
 
 /// How many sides are these, if all of them can be.

@@ -127,6 +127,15 @@ fn the_nearest_card_has_the_networks_sides() {
         near(&[1, 256, 256, 3], &[("y", &[1, 195])]),
         ["blazepose-landmarks"]
     );
+    // Maps of LSP's 14 joints and of the background, in either order of axes; never a card of lists.
+    for (input, output) in [
+        ([1, 3, 368, 368], [1, 15, 46, 46]),
+        ([1, 368, 368, 3], [1, 46, 46, 15]),
+        ([1, 192, 192, 3], [1, 96, 96, 14]),
+        ([1, 3, 256, 256], [1, 14, 64, 64]),
+    ] {
+        assert_eq!(near(&input, &[("y", &output)]), ["cpm-lsp14"], "{output:?}");
+    }
     assert!(near(&[1, 7], &[("y", &[1, 7])]).is_empty());
 }
 

@@ -260,3 +260,36 @@ fn a_list_is_read_with_its_unit() {
     assert_eq!([found[0].at, found[1].at], [[3.0, 8.0], [12.0, 0.0]]);
     assert!((found[2].score - 0.2).abs() < 1e-6);
 }
+
+#[test]
+fn a_network_of_bytes_is_taken_by_the_card_of_one_of_whole_numbers() {
+    let mut net = network("Relu");
+    net.nodes.clear();
+    net.node(
+        "Cast",
+        &["picture"],
+        "maps",
+        vec![("to", Attribute::Int(1))],
+    );
+    // The type of the input: bytes in place of single precision.
+    let mut file = net.file();
+    let input = file.windows(7).rposition(|it| it == b"picture").unwrap();
+    let kind = file[input..].windows(3).position(|it| it == [8, 1, 18]);
+    file[input + kind.unwrap() + 1] = 2;
+    let fitted = |numbers: &str| {
+        let card = CARD.replace(
+            "height = 16",
+            &format!("height = 16\nnumbers = \"{numbers}\""),
+        );
+        PoseNetwork::new(
+            Session::parse(file.clone()).unwrap(),
+            Card::parse(&card).unwrap(),
+        )
+    };
+    for numbers in ["i32", "u8"] {
+        let network = fitted(numbers).unwrap();
+        assert_eq!(network.card().input.numbers, Numbers::U8);
+    }
+    // What was prepared for single precision would be something else.
+    assert!(fitted("f32").is_err());
+}
