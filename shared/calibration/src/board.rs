@@ -7,10 +7,12 @@
 //! | how pairs stand that saw the board together, and all along the strongest pairs | `graph` |
 //! | all of it, in this order | `rig` |
 //! | everything adjusted at once, wrong corners left out | `adjust`, `problem`, `outcome` |
+//! | how well places are known where cameras are out of step | `certainty` |
 //! | a board that lies still before a rig | `still` |
 //! | what is known how well, and what forbids to trust it | `verdict` |
 
 mod adjust;
+mod certainty;
 mod choose;
 mod graph;
 mod intrinsics;
@@ -204,7 +206,7 @@ pub struct Outcome {
     /// Standard deviation of a corner along each axis, pixels.
     pub sigma_px: f64,
     /// Where pictures of one frame were not taken at the same time: residuals of each camera by itself, and of all together with
-    /// free lenses, pixels. Lenses that a camera by itself tells well are then kept as it has them, and frames in which the board moves least are used.
+    /// free lenses, pixels. Lenses that a camera by itself tells are then kept as it has them, and frames in which the board stands still are used.
     pub out_of_step_px: Option<[f64; 2]>,
     /// What forbids to trust it.
     pub doubts: Vec<Doubt>,

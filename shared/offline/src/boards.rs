@@ -10,7 +10,7 @@ pub use corners::{corners_text, parse_corners, read_corners, write_corners};
 pub use frames::{FrameTable, read_frames};
 pub use look::{LookSettings, look};
 pub use overlays::{Overlay, worst};
-pub use run::{BoardSettings, Calibrated, calibrate};
+pub use run::{Back, BoardSettings, Calibrated, calibrate};
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -15,6 +15,8 @@ const SIZES: usize = 8;
 const TILTS: usize = 6;
 /// The fewest slow frames that are enough.
 const FEWEST_SLOW: usize = 12;
+/// A board whose corners move by less in a frame stands still, pixels.
+const STILL_PX: f64 = 0.7;
 
 /// The frames of `sights` that cover most, at most `most`, in their order.
 ///
@@ -75,7 +77,8 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
     taken.map(|(frame, _)| *frame).collect()
 }
 
-/// The half of the frames in which the board moves least, as all cameras see it; none where that cannot be told, or is too few.
+/// The frames in which the board stands still, as all cameras see it; where these are few, the quarter in which it moves least. None where
+/// that cannot be told, or is too few.
 pub(crate) fn slow(sights: &[Sight], n_cameras: usize) -> Vec<usize> {
     let mut speeds: BTreeMap<usize, f64> = BTreeMap::new();
     for camera in 0..n_cameras {
@@ -95,7 +98,13 @@ pub(crate) fn slow(sights: &[Sight], n_cameras: usize) -> Vec<usize> {
     let several = |frame: &usize| sights.iter().filter(|it| it.frame == *frame).count() > 1;
     let mut order: Vec<(usize, f64)> = speeds.into_iter().filter(|it| several(&it.0)).collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
-    order.truncate(order.len().div_ceil(2));
+    let n_still = order.iter().filter(|it| it.1 < STILL_PX).count();
+    let quarter = order.len().div_ceil(4).max(FEWEST_SLOW);
+    order.truncate(if n_still >= FEWEST_SLOW {
+        n_still
+    } else {
+        quarter
+    });
     if order.len() < FEWEST_SLOW {
         return Vec::new();
     }

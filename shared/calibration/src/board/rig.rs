@@ -9,8 +9,8 @@ use super::graph::{Meeting, Pair, pair, standing};
 use super::outcome::{Shown, middle};
 use super::pose::board_pose;
 use super::{
-    BoardError, LEAST_BOARDS, LEAST_CORNERS, LensKind, Outcome, Sight, Task, Together, choose,
-    intrinsics, verdict,
+    BoardError, LEAST_BOARDS, LEAST_CORNERS, LensKind, Outcome, Sight, Task, Together, certainty,
+    choose, intrinsics, verdict,
 };
 
 /// The most pictures that intrinsics of one camera are begun with.
@@ -74,25 +74,15 @@ pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
     Ok(outcome)
 }
 
-/// Pictures of one frame that were not taken at the same time put boards where they were not, and lenses are bent to fit:
-/// so lenses that each camera by itself tells well stay as it has them, and where the cameras stand is told by the frames in which
-/// the board moves least.
+/// Pictures of one frame that were not taken at the same time put boards where they were not, and lenses are bent to fit: so lenses that
+/// each camera by itself tells stay as it has them, unless the joint adjustment agrees, and where the cameras stand is told by the
+/// frames in which the board stands still.
 fn in_step(
     task: &Task,
     (cameras, alone): (Vec<Camera>, &Outcome),
     placed: &[Placed],
     sights: &[Sight],
 ) -> Result<Outcome, BoardError> {
-    // A lens that its camera alone does not tell well is not held at what it tells.
-    let is_sure = alone.cameras.iter().map(verdict::is_lens_sure);
-    let free: Vec<Free> = is_sure
-        .enumerate()
-        .map(|(nth, is_sure)| match (is_sure, nth) {
-            (true, 0) => Free::default(),
-            (true, _) => Free::POSE,
-            (false, _) => free_of(task, nth, nth != 0),
-        })
-        .collect();
     let slow = choose::slow(sights, task.names.len());
     let frames = if slow.is_empty() {
         choose::frames(sights, &task.sizes, task.most_frames)
@@ -100,9 +90,27 @@ fn in_step(
         slow
     };
     let boards = boards(task, &cameras, placed, &frames);
-    let mut outcome = adjusted(task, cameras, &free, &boards)?;
-    for (camera, alone) in outcome.cameras.iter_mut().zip(&alone.cameras) {
-        let is_held = camera.numbers.iter().all(|it| it.name != "focal length");
+    let with = |is_held: &[bool]| {
+        let free = is_held.iter().enumerate().map(|(nth, is_held)| {
+            let wants_pose = nth != 0;
+            match (is_held, wants_pose) {
+                (true, false) => Free::default(),
+                (true, true) => Free::POSE,
+                (false, _) => free_of(task, nth, wants_pose),
+            }
+        });
+        let free: Vec<Free> = free.collect();
+        adjusted(task, cameras.clone(), &free, &boards)
+    };
+    let mut is_held: Vec<bool> = alone.cameras.iter().map(verdict::is_lens_sure).collect();
+    let mut outcome = with(&is_held)?;
+    let mut both = outcome.cameras.iter().zip(&alone.cameras);
+    if both.any(|(joint, alone)| !verdict::is_lens_the_same(joint, alone)) {
+        is_held = alone.cameras.iter().map(verdict::is_lens_told).collect();
+        outcome = with(&is_held)?;
+    }
+    certainty::widen(&mut outcome, alone, &is_held);
+    for ((camera, alone), is_held) in outcome.cameras.iter_mut().zip(&alone.cameras).zip(is_held) {
         if is_held {
             camera.numbers.extend(alone.numbers.iter().cloned());
         }

@@ -58,36 +58,51 @@ struct Show<'a> {
     noise_px: f64,
 }
 
+/// What a camera sees of a board in a frame, from either side if the board has two.
+fn seen(
+    (nth, camera): (usize, &Camera),
+    (board, pose): (&[Point2<f64>], &Isometry3<f64>),
+    (frame, has_two_sides): (usize, bool),
+    noise: &mut dyn FnMut() -> f64,
+) -> Option<Sight> {
+    let facing = (camera.camera_from_world.rotation * pose.rotation * Vector3::z()).z;
+    let facing = if has_two_sides { facing.abs() } else { facing };
+    if facing < 0.35 {
+        return None;
+    }
+    let points = board.iter().enumerate().filter_map(|(id, point)| {
+        let image = camera.project(&(pose * Point3::new(point.x, point.y, 0.0)))?;
+        let inside = (0..2).all(|it| image[it] > 0.0 && image[it] < f64::from(SIZE[it]));
+        inside.then(|| (id, image + Vector2::new(noise(), noise())))
+    });
+    let sight = Sight::new(nth, frame, points, board);
+    (sight.points.len() >= LEAST_CORNERS).then_some(sight)
+}
+
+/// Somewhere before the cameras.
+fn somewhere(random: &mut fastrand::Rng) -> Isometry3<f64> {
+    let mut spread = |reach: f64| reach * (2.0 * random.f64() - 1.0);
+    let turn = Vector3::new(spread(0.6), spread(3.1), spread(0.6));
+    let place = Translation3::new(spread(0.45), spread(0.3), 1.5 + spread(0.45));
+    let rotation = UnitQuaternion::from_scaled_axis(Vector3::y() * turn.y)
+        * UnitQuaternion::from_scaled_axis(Vector3::new(turn.x, 0.0, turn.z));
+    Isometry3::from_parts(place, rotation)
+}
+
+fn noisy(random: &mut fastrand::Rng, noise_px: f64) -> f64 {
+    let sum: f64 = (0..12).map(|_| random.f64()).sum();
+    noise_px * (sum - 6.0)
+}
+
 impl Show<'_> {
     /// The board moved about, seen where at least `LEAST_CORNERS` of its front are in a picture.
     fn sights(&self, random: &mut fastrand::Rng) -> Vec<Sight> {
         let mut sights = Vec::new();
         for frame in 0..self.n_frames {
-            let mut spread = |reach: f64| reach * (2.0 * random.f64() - 1.0);
-            let turn = Vector3::new(spread(0.6), spread(3.1), spread(0.6));
-            let place = Translation3::new(spread(0.45), spread(0.3), 1.5 + spread(0.45));
-            let rotation = UnitQuaternion::from_scaled_axis(Vector3::y() * turn.y)
-                * UnitQuaternion::from_scaled_axis(Vector3::new(turn.x, 0.0, turn.z));
-            let pose = Isometry3::from_parts(place, rotation);
-            for (nth, camera) in self.cameras.iter().enumerate() {
-                let facing = (camera.camera_from_world.rotation * pose.rotation * Vector3::z()).z;
-                if facing < 0.35 {
-                    continue;
-                }
-                let mut noise = || {
-                    let sum: f64 = (0..12).map(|_| random.f64()).sum();
-                    self.noise_px * (sum - 6.0)
-                };
-                let seen = self.board.iter().enumerate().filter_map(|(id, point)| {
-                    let image = camera.project(&(pose * Point3::new(point.x, point.y, 0.0)))?;
-                    let inside =
-                        (0..2).all(|it| image[it] > 0.0 && image[it] < f64::from(SIZE[it]));
-                    inside.then(|| (id, image + Vector2::new(noise(), noise())))
-                });
-                let sight = Sight::new(nth, frame, seen, self.board);
-                if sight.points.len() >= LEAST_CORNERS {
-                    sights.push(sight);
-                }
+            let pose = somewhere(random);
+            for camera in self.cameras.iter().enumerate() {
+                let noise = &mut || noisy(random, self.noise_px);
+                sights.extend(seen(camera, (self.board, &pose), (frame, false), noise));
             }
         }
         sights
@@ -292,5 +307,88 @@ fn cameras_out_of_step_are_doubted() {
             outcome.doubts
         ),
         Err(error) => assert!(matches!(error, BoardError::Apart { .. }), "{error}"),
+    }
+}
+
+#[test]
+fn a_board_with_two_sides_tells_how_opposite_cameras_stand() {
+    let truth = [ring(4, BROWN)[0].clone(), ring(4, BROWN)[2].clone()];
+    let board = board(6, 4);
+    let random = &mut fastrand::Rng::with_seed(5);
+    let mut sights = Vec::new();
+    for frame in 0..60 {
+        let pose = somewhere(random);
+        for camera in truth.iter().enumerate() {
+            let noise = &mut || noisy(random, 0.2);
+            sights.extend(seen(camera, (&board, &pose), (frame, true), noise));
+        }
+    }
+    let outcome = calibrate(&task(&truth, &board, sights)).unwrap();
+    assert_eq!(outcome.doubts, []);
+    let [focal, degrees, share] = errors(&outcome, &truth);
+    assert!(
+        focal < 0.01 && degrees < 0.3 && share < 0.01,
+        "{focal} {degrees} {share}"
+    );
+    assert!(outcome.pairs[0].n > 20, "{:?}", outcome.pairs);
+}
+
+/// A board that is carried from place to place, before cameras whose pictures of a frame are taken parts of a frame apart.
+fn carried(truth: &[Camera], board: &[Point2<f64>], late: &[f64], n_held: usize) -> Vec<Sight> {
+    const N_CARRIED: usize = 12;
+    let random = &mut fastrand::Rng::with_seed(7);
+    let places: Vec<Isometry3<f64>> = (0..24).map(|_| somewhere(random)).collect();
+    let period = n_held + N_CARRIED;
+    let at = |time: f64| {
+        let nth = (time.max(0.0) as usize / period).min(places.len() - 2);
+        let since = time - (nth * period + n_held) as f64;
+        let share = (since / N_CARRIED as f64).clamp(0.0, 1.0);
+        places[nth].lerp_slerp(&places[nth + 1], share)
+    };
+    let mut sights = Vec::new();
+    for frame in 0..period * (places.len() - 1) {
+        for (nth, camera) in truth.iter().enumerate() {
+            let noise = &mut || noisy(random, 0.2);
+            let pose = at(frame as f64 + late[nth]);
+            sights.extend(seen((nth, camera), (board, &pose), (frame, false), noise));
+        }
+    }
+    sights
+}
+
+#[test]
+fn cameras_out_of_step_keep_the_lenses_that_they_alone_tell_and_say_what_is_not_known() {
+    let truth = ring(3, BROWN);
+    let board = board(6, 4);
+    for n_held in [8, 0] {
+        let sights = carried(&truth, &board, &[0.0, 0.8, -0.7], n_held);
+        let outcome = calibrate(&task(&truth, &board, sights)).unwrap();
+        assert!(outcome.out_of_step_px.is_some(), "{n_held}");
+        let [focal, degrees, share] = errors(&outcome, &truth);
+        assert!(focal < 0.02, "{n_held}: {focal}");
+        for (found, truth) in outcome.cameras.iter().zip(&truth) {
+            let known = found
+                .numbers
+                .iter()
+                .find(|it| it.name == "focal length")
+                .unwrap();
+            let off = (known.value - truth.intrinsics.fx).abs();
+            assert!(
+                off < 3.0 * known.sd.max(1e-3 * known.value),
+                "{n_held}: {off} {known:?}"
+            );
+        }
+        let is_doubted = outcome
+            .doubts
+            .iter()
+            .any(|it| matches!(it, Doubt::Place { .. }));
+        if n_held > 0 {
+            assert!(degrees < 0.5 && share < 0.02, "{degrees} {share}");
+        } else {
+            assert!(
+                is_doubted || (degrees < 0.5 && share < 0.02),
+                "{degrees} {share}"
+            );
+        }
     }
 }

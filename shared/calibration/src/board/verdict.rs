@@ -5,8 +5,15 @@ use super::{CameraOutcome, Outcome, Sight, Task};
 /// Limits: fewer boards, less of the picture, larger residuals or less certain focal lengths are doubts.
 const FEW_BOARDS: usize = 6;
 const LITTLE_COVERED: f64 = 0.2;
-const LARGE_PX: f64 = 1.5;
+const LARGE_PX: f64 = 3.0;
 const FOCAL_SHARE: f64 = 0.01;
+/// A lens that its camera alone tells to this share is not left to cameras that are out of step.
+const TOLD_SHARE: f64 = 0.1;
+/// Lenses are the same within so many standard deviations.
+const SAME_SIGMAS: f64 = 2.0;
+/// Cameras out of step: a place that is known less well, share of the distance from the first camera, or a turn, degrees, is a doubt.
+const PLACE_SHARE: f64 = 0.02;
+const TURN_DEGREES: f64 = 0.5;
 const WRONG_SHARE: f64 = 0.15;
 const AGREEING_SHARE: f64 = 0.6;
 /// Residuals are judged in a picture of this longer side; larger ones are allowed as much more.
@@ -44,6 +51,15 @@ pub enum Doubt {
         camera: usize,
         /// Its standard deviation as a share of it.
         share: f64,
+    },
+    /// Pictures of one frame were not taken at the same time, and too little tells where the camera stands.
+    Place {
+        /// The camera.
+        camera: usize,
+        /// Standard deviation of its turn, degrees, and of its place, metres.
+        degrees: f64,
+        /// See there.
+        metres: f64,
     },
     /// Many corners do not fit.
     ManyWrong {
@@ -87,6 +103,16 @@ impl Doubt {
                 "{}: its focal length is known to {:.1} % only: show the board tilted by 30 to 45 degrees, nearer and further away",
                 name(camera),
                 100.0 * share
+            ),
+            Self::Place {
+                camera,
+                degrees,
+                metres,
+            } => format!(
+                "{}: where it stands is known to {degrees:.1} degrees and {:.0} mm only, since pictures of one frame were not taken at the same \
+                 time: hold the board still for a second at every place, or synchronise the cameras",
+                name(camera),
+                1000.0 * metres
             ),
             Self::ManyWrong { camera, share } => format!(
                 "{}: {:.0} % of its corners do not fit and were left out: was the board moved too fast?",
@@ -132,14 +158,53 @@ pub(super) fn is_lens_sure(camera: &CameraOutcome) -> bool {
     camera.is_known || focal.is_some_and(|it| it.sd <= FOCAL_SHARE * it.value)
 }
 
+/// Standard deviation of a focal length, share of it; infinite where it is not told.
+fn focal_share(camera: &CameraOutcome) -> f64 {
+    let focal = camera.numbers.iter().find(|it| it.name == "focal length");
+    focal.map_or(f64::INFINITY, |it| it.sd / it.value)
+}
+
+/// Whether the focal length of a camera is given, or known at all.
+pub(super) fn is_lens_told(camera: &CameraOutcome) -> bool {
+    camera.is_known || focal_share(camera) <= TOLD_SHARE
+}
+
+/// Whether a joint adjustment left the lens of a camera as its own pictures tell it, or that is not told.
+pub(super) fn is_lens_the_same(joint: &CameraOutcome, alone: &CameraOutcome) -> bool {
+    let [own, joint] = [alone, joint].map(|it| it.camera.intrinsics.fx);
+    let limit = SAME_SIGMAS * focal_share(alone) * own;
+    !is_lens_told(alone) || alone.is_known || (joint - own).abs() <= limit
+}
+
+/// How well a turn, degrees, and a place, metres, are known: the largest deviations.
+fn place_of(camera: &CameraOutcome) -> [f64; 2] {
+    ["rotation", "place"].map(|name| {
+        let own = camera.numbers.iter().filter(|it| it.name.starts_with(name));
+        own.map(|it| it.sd).fold(0.0, f64::max)
+    })
+}
+
 /// Adds the doubts of an outcome to it.
 pub(super) fn doubt(task: &Task, outcome: &mut Outcome) {
     let mut doubts = Vec::new();
+    let centre = |it: &CameraOutcome| it.camera.centre_in_world();
     for (camera, it) in outcome.cameras.iter().enumerate() {
         let side = f64::from(task.sizes[camera][0].max(task.sizes[camera][1]));
         let limit_px = LARGE_PX * (side / USUAL_SIDE).max(0.5);
-        if it.rms_px.is_nan() || it.rms_px > limit_px {
-            let rms_px = it.rms_px;
+        // Out of step, residuals of all together tell of the times, and the deviations of what comes of it.
+        let rms_px = outcome.out_of_step_px.map_or(it.rms_px, |px| px[0]);
+        if outcome.out_of_step_px.is_some() {
+            let [degrees, metres] = place_of(it);
+            let apart = (centre(it) - centre(&outcome.cameras[0])).norm();
+            if camera != 0 && (degrees > TURN_DEGREES || metres > PLACE_SHARE * apart) {
+                doubts.push(Doubt::Place {
+                    camera,
+                    degrees,
+                    metres,
+                });
+            }
+        }
+        if rms_px.is_nan() || rms_px > limit_px {
             doubts.push(Doubt::LargeResiduals {
                 camera,
                 rms_px,

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use boards::{Board, Kind, dictionary_names};
-use calibration::board::{BoardError, LensKind, Outcome, Sight, Task, calibrate as adjust};
+use calibration::board::{
+    BoardError, LensKind, Outcome, Sight, Task, Together, calibrate as adjust,
+};
 use geometry::{Camera, Rig};
 use nalgebra::Point2;
 use report::boards::Page;
@@ -16,6 +18,9 @@ use crate::Console;
 const WORST: usize = 8;
 /// Pictures of a camera in which other boards are looked for, if none of the one that was named is found.
 const GUESSED_PICTURES: usize = 6;
+
+/// The fewest pictures of each side of a board by which one camera shows that it has two, or two cameras that they stand on both.
+const LEAST_OF_EACH: usize = 3;
 
 /// What is to be done.
 #[derive(Debug, Clone)]
@@ -38,6 +43,25 @@ pub struct BoardSettings {
     pub most_frames: usize,
     /// Mirrored pictures are meant to be.
     pub is_mirrored: bool,
+    /// What is on the back of the board, where that is known.
+    pub back: Option<Back>,
+}
+
+/// The back of a board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Back {
+    /// The mirror image of the front, corner on corner: from behind, every corner is where it is.
+    Mirrored,
+    /// Nothing: mirrored codes are those of mirrored pictures.
+    Blank,
+}
+
+/// What mirrored codes come from.
+enum Mirrored {
+    /// There are none, or it is said, or a camera saw both sides.
+    Known,
+    /// A board with two sides, or the pictures of these cameras: the adjustment tells.
+    Asked(Vec<usize>),
 }
 
 /// A calibration, with what it is of.
@@ -69,6 +93,7 @@ pub fn calibrate(
     refuse_twins(&names)?;
     let (looked, sights, points, sizes) = sighted(settings, &names, stop, console)?;
     let mut notes = Vec::new();
+    let mut asked = Mirrored::Known;
     let mut task = Task {
         known: known(settings.known.as_ref(), &names, &sizes)?,
         names,
@@ -82,7 +107,7 @@ pub fn calibrate(
     };
     if let Some(looked) = &looked {
         notes.extend(looked.note.clone());
-        mirrored(settings, looked, &mut task, &mut notes)?;
+        asked = mirrored(settings, looked, &mut task, &mut notes)?;
         for (name, seen) in task.names.iter().zip(&looked.cameras) {
             if 2 * seen.n_inverted > seen.sights.len() {
                 notes.push(format!(
@@ -94,6 +119,13 @@ pub fn calibrate(
     console.begin("", "adjusting");
     let outcome = adjust(&task);
     console.finish();
+    if let Mirrored::Asked(cameras) = &asked {
+        let agrees = |it: &Outcome| sides_agree(it, cameras);
+        if !outcome.as_ref().is_ok_and(agrees) {
+            return Err(left_is_right(&task.names, cameras));
+        }
+        notes.push(two_sided(&task.names, cameras));
+    }
     let outcome = outcome.map_err(|error| refused(&error, looked.as_ref(), &task))?;
     if let Some([alone, together]) = outcome.out_of_step_px {
         notes.push(format!(
@@ -152,35 +184,39 @@ fn sighted(
     Ok((Some(looked), sights, points, sizes))
 }
 
-/// Mirrored footage: an error, unless it is meant to be; then the board is one in a mirror.
+/// Mirrored codes. Of a board with the mirror image on its back they are right: a camera behind it sees every corner where it is. In mirrored
+/// footage they are an error, unless it is meant to be mirrored; then the board is one in a mirror.
 fn mirrored(
     settings: &BoardSettings,
     looked: &Looked,
     task: &mut Task,
     notes: &mut Vec<String>,
-) -> Result<(), Failure> {
-    let mirrored = looked.mirrored();
-    if mirrored.is_empty() {
-        return Ok(());
+) -> Result<Mirrored, Failure> {
+    let cameras = looked.mirrored();
+    let sees_both = |seen: &&super::Seen| {
+        let n_front = seen.sights.len() - seen.n_mirrored;
+        seen.n_mirrored.min(n_front) >= LEAST_OF_EACH
+    };
+    let is_all = cameras.len() == task.names.len();
+    if settings.back == Some(Back::Mirrored) {
+        return Ok(Mirrored::Known);
     }
-    let names: Vec<&str> = mirrored.iter().map(|it| task.names[*it].as_str()).collect();
-    let is_all = mirrored.len() == task.names.len();
+    if settings.back.is_none() && !settings.is_mirrored {
+        if looked.cameras.iter().any(|seen| sees_both(&seen)) {
+            notes.push(
+                "a camera saw codes both ways round: the back of the board has the mirror image of its front".to_owned(),
+            );
+            return Ok(Mirrored::Known);
+        }
+        if !cameras.is_empty() && !is_all && settings.wants_rig {
+            return Ok(Mirrored::Asked(cameras));
+        }
+    }
+    if cameras.is_empty() {
+        return Ok(Mirrored::Known);
+    }
     if !settings.is_mirrored || !is_all {
-        let which = if is_all {
-            "all cameras".to_owned()
-        } else {
-            names.join(", ")
-        };
-        let failure = Failure::new(
-            ExitKind::Input,
-            format!("the pictures of {which} are mirrored: left is right in them"),
-        );
-        let hint = "switch mirroring off in the camera, or turn the footage back: ffmpeg -i IN.mp4 -vf hflip OUT.mp4";
-        return Err(if is_all {
-            failure.with_hint(format!("{hint}; --mirrored calibrates it as it is, for footage that is mirrored in all recordings"))
-        } else {
-            failure.with_hint(hint)
-        });
+        return Err(left_is_right(&task.names, &cameras));
     }
     let turned = |points: &mut Vec<Point2<f64>>| points.iter_mut().for_each(|it| it.x = -it.x);
     turned(&mut task.board);
@@ -191,7 +227,50 @@ fn mirrored(
         "all footage is mirrored: left and right of what is found with this rig are exchanged"
             .to_owned(),
     );
-    Ok(())
+    Ok(Mirrored::Known)
+}
+
+/// Whether cameras that see the back of a board stand behind it, as those that see the front agree with. Where the pictures are mirrored and the
+/// board has one side, every picture puts the camera elsewhere.
+fn sides_agree(outcome: &Outcome, behind: &[usize]) -> bool {
+    let crosses = |it: &&Together| it.cameras.iter().filter(|it| behind.contains(it)).count() == 1;
+    let (mut n, mut n_agree) = (0, 0);
+    for it in outcome.pairs.iter().filter(crosses) {
+        n += it.n;
+        n_agree += it.n_agree;
+    }
+    n >= LEAST_OF_EACH && 5 * n_agree >= 3 * n
+}
+
+fn two_sided(names: &[String], behind: &[usize]) -> String {
+    let names: Vec<&str> = behind.iter().map(|it| names[*it].as_str()).collect();
+    format!(
+        "{} saw the back of the board: it has the mirror image of the front, and the cameras agree about that",
+        names.join(", ")
+    )
+}
+
+/// Mirrored codes that no board with two sides explains.
+fn left_is_right(names: &[String], cameras: &[usize]) -> Failure {
+    let is_all = cameras.len() == names.len();
+    let named: Vec<&str> = cameras.iter().map(|it| names[*it].as_str()).collect();
+    let which = if is_all {
+        "all cameras".to_owned()
+    } else {
+        named.join(", ")
+    };
+    let message = format!(
+        "{which} saw the codes of the board mirrored: its back has the mirror image of the front, or the pictures are mirrored"
+    );
+    let more = if is_all {
+        "; or --mirrored, which calibrates footage as it is that is mirrored in all recordings"
+    } else {
+        ""
+    };
+    Failure::new(ExitKind::Input, message).with_hint(format!(
+        "--back mirrored for a board with two sides; of mirrored pictures (a preview of a webcam) switch the mirroring off in the camera and record \
+         again{more}"
+    ))
 }
 
 /// The intrinsics that are kept.

@@ -13,7 +13,8 @@ use geometry::files::ReadOptions;
 use launch::{inputs, output};
 use offline::Console as _;
 use offline::boards::{
-    BoardSettings, Calibrated, CameraFootage, LookSettings, calibrate, read_frames, write_corners,
+    Back, BoardSettings, Calibrated, CameraFootage, LookSettings, calibrate, read_frames,
+    write_corners,
 };
 use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
 
@@ -90,6 +91,10 @@ pub(crate) struct Arguments {
     /// The footage is mirrored, in all recordings alike.
     #[arg(long)]
     mirrored: bool,
+    /// What is on the back of the board: `mirrored` is the mirror image of the front, corner on corner, for cameras on both sides; `blank`
+    /// is nothing. Found by itself where cameras tell.
+    #[arg(long, value_enum, conflicts_with = "mirrored")]
+    back: Option<BackName>,
     /// Write the calibration; with --print the board (.pdf or .svg; both if not given).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -119,6 +124,15 @@ pub(crate) enum Lens {
     Eight,
     /// Fisheye with k1 to k4.
     Fisheye,
+}
+
+/// The back of a board.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum BackName {
+    /// The mirror image of the front.
+    Mirrored,
+    /// Nothing.
+    Blank,
 }
 
 /// Runs the subcommand.
@@ -157,10 +171,14 @@ fn settings(arguments: &Arguments) -> Result<BoardSettings, Failure> {
         .as_deref()
         .map(read_frames)
         .transpose()?;
+    let options = ReadOptions {
+        lenses_suffice: true,
+        ..ReadOptions::default()
+    };
     let known = arguments
         .known
         .as_ref()
-        .map(|it| inputs::rig(&[it], &ReadOptions::default()))
+        .map(|it| inputs::rig(&[it], &options))
         .transpose()?;
     Ok(BoardSettings {
         board,
@@ -181,6 +199,10 @@ fn settings(arguments: &Arguments) -> Result<BoardSettings, Failure> {
         wants_rig: !arguments.intrinsics,
         most_frames: arguments.most_frames as usize,
         is_mirrored: arguments.mirrored,
+        back: arguments.back.map(|it| match it {
+            BackName::Mirrored => Back::Mirrored,
+            BackName::Blank => Back::Blank,
+        }),
     })
 }
 
