@@ -8,9 +8,9 @@ use runfiles::{Doubt, Summary, Trust};
 pub(super) fn text(summary: &Summary, doubts: &[Doubt]) -> String {
     let trust = &summary.trust;
     let verdict = match (trust.frames < Trust::MIN_FRAMES, doubts.is_empty()) {
-        (true, _) => "too few frames to judge",
+        (true, true) => "too few frames to judge",
         (false, true) => "nothing speaks against the results",
-        (false, false) => "the results may be wrong",
+        (_, false) => "the results may be wrong",
     };
     let mut text = summary.reprojection_px.map_or_else(String::new, |px| {
         format!("  reprojection  {px:.2} px (rms over all joints)\n")
