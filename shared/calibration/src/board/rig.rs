@@ -112,7 +112,7 @@ fn in_step(
     certainty::widen(&mut outcome, alone, &is_held);
     for ((camera, alone), is_held) in outcome.cameras.iter_mut().zip(&alone.cameras).zip(is_held) {
         if is_held {
-            camera.numbers.extend(alone.numbers.iter().cloned());
+            camera.numbers.extend(certainty::held(alone));
         }
         // The lens is told by all that the camera saw.
         camera.coverage = alone.coverage;
