@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use calibration::people::{Doubt, Outcome, Recording, Scale, Settings, Vertical, estimate};
 use clap::Args;
 use launch::films::Poses;
-use launch::output;
+use launch::{inputs, load, output};
 use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use serde_json::{Value, json};
 
@@ -96,6 +96,27 @@ fn distance(text: &str) -> Result<(String, String, f64), String> {
     Ok((a.to_owned(), b.to_owned(), metres.ok_or_else(expected)?))
 }
 
+/// Refuses to keep the scale of a rig that has lenses alone.
+fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
+    let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
+    let rig = inputs::rig_of(&deployment)?;
+    let lacking = deployment
+        .cameras
+        .iter()
+        .find(|it| rig.camera(&it.name).is_none());
+    let Some(camera) = lacking else {
+        return Ok(());
+    };
+    let message = format!(
+        "{} has {}",
+        deployment.rig.display(),
+        rig.lacks(&camera.name)
+    );
+    let failure = Failure::new(ExitKind::Calibration, message);
+    Err(failure
+        .with_hint("without places there is no scale to keep: give --height-m or --distance"))
+}
+
 pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     if arguments.height_m.is_none() && arguments.distance.is_none() && arguments.scale.is_none() {
         let message = "pictures tell no lengths: say how tall the person is (--height-m), how far apart two cameras are (--distance), \
@@ -103,6 +124,9 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return Err(Failure::new(ExitKind::Usage, message));
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    if arguments.scale.is_some() {
+        has_places(&arguments.walk)?;
+    }
     let walk = walk(&arguments.walk, Poses::Unknown, globals, &stop)?;
     let settings = settings(arguments, &walk)?;
     let (cameras, films) = (walk.found.cameras.clone(), walk.found.films.clone());
