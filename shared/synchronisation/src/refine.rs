@@ -21,9 +21,12 @@ const MOVED_S: f64 = 0.005;
 /// How often, at most.
 const MOST_PASSES: usize = 4;
 /// Joints of a pair of cameras have one bias over so many seconds: finders of joints put them aside by the direction that they see a person
-/// from. It is estimated as if so many residuals of no bias had been seen besides.
+/// from.
 const BIAS_S: f64 = 20.0;
-const UNBIASED: f64 = 8.0;
+/// Errors of a joint are independent after so many seconds.
+const INDEPENDENT_S: f64 = 0.25;
+/// The standard deviation of a normal distribution in medians of its absolute values.
+const NORMAL: f64 = 1.4826;
 
 /// The clock of a camera: `t + offset + drift (t - centre)` on the common clock.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -194,9 +197,10 @@ impl Problem<'_> {
                 }
             }
         }
+        let spreads = spreads(self.pairs.len(), &biased);
         let mut pieces = BTreeMap::<(usize, usize, i64), Piece>::new();
         for ((pair, joint, _), rows) in &biased {
-            let biases = biases(rows);
+            let biases = biases(rows, spreads[*pair]);
             for Timed { row, since, block } in rows {
                 let piece = pieces.entry((*pair, *joint, *block));
                 let piece =
@@ -305,16 +309,58 @@ fn mean_cost(
     (n >= LEAST_JOINTS).then(|| sum / weights)
 }
 
-/// By how much a joint of a pair is off throughout, over the delay of the second camera, expected errors.
-fn biases(rows: &[Timed]) -> Vec<f64> {
-    let n_delays = rows.first().map_or(0, |it| it.row.over_delay.len());
-    let share = rows.len() as f64 / (rows.len() as f64 + UNBIASED);
-    let bias = |delay: usize| {
-        let mut each: Vec<f64> = rows.iter().map(|it| it.row.over_delay[delay]).collect();
-        each.sort_by(f64::total_cmp);
-        share * each[each.len() / 2]
+/// Of every pair the variance of the biases of its joints: what their medians vary by more than those of joints without bias do.
+fn spreads(n_pairs: usize, biased: &BTreeMap<(usize, usize, i64), Vec<Timed>>) -> Vec<f64> {
+    let mut found: Vec<Vec<[f64; 2]>> = vec![Vec::new(); n_pairs];
+    for ((pair, ..), rows) in biased {
+        found[*pair].push([
+            median_at(rows, HALF as usize).abs(),
+            variance_of_median(rows),
+        ]);
+    }
+    let spread = |of_pair: &Vec<[f64; 2]>| {
+        let median = |axis: usize| median(of_pair.iter().map(|it| it[axis]).collect());
+        ((NORMAL * median(0)).powi(2) - median(1)).max(0.0)
     };
-    (0..n_delays).map(bias).collect()
+    found.iter().map(spread).collect()
+}
+
+/// The variance of the median of residuals that are alike for some time.
+fn variance_of_median(rows: &[Timed]) -> f64 {
+    let middle = median_at(rows, HALF as usize);
+    let off = rows.iter().map(|it| (it.row.residual - middle).abs());
+    let sigma = NORMAL * median(off.collect());
+    let mut blocks: Vec<i64> = rows.iter().map(|it| it.block).collect();
+    blocks.dedup();
+    let n = blocks.len() as f64 * BLOCK_S / INDEPENDENT_S;
+    sigma * sigma / n.max(1.0)
+}
+
+/// What is taken from the residuals of a joint of a pair for its bias, over the delay of the second camera, expected errors.
+///
+/// The mean of the residuals has the variance of their errors and that of biases; what is left of it counts as much as that says.
+///
+/// * `spread`: variance of the biases of the pair.
+fn biases(rows: &[Timed], spread: f64) -> Vec<f64> {
+    let of_errors = variance_of_median(rows).max(1e-9);
+    let share = 1.0 - (of_errors / (of_errors + spread)).sqrt();
+    let n_delays = rows.first().map_or(0, |it| it.row.over_delay.len());
+    (0..n_delays)
+        .map(|delay| share * median_at(rows, delay))
+        .collect()
+}
+
+fn median_at(rows: &[Timed], delay: usize) -> f64 {
+    median(
+        rows.iter()
+            .filter_map(|it| it.row.over_delay.get(delay).copied())
+            .collect(),
+    )
+}
+
+fn median(mut all: Vec<f64>) -> f64 {
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Residuals with those that are missing between the others; none where more than a third is, or an end.

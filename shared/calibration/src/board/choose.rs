@@ -77,9 +77,17 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
     taken.map(|(frame, _)| *frame).collect()
 }
 
+/// Frames in which the board moves least.
+pub(crate) struct Slow {
+    /// The frames, in their order.
+    pub(crate) frames: Vec<usize>,
+    /// Whether it stands still in all of them.
+    pub(crate) are_still: bool,
+}
+
 /// The frames in which the board stands still, as all cameras see it; where these are few, the quarter in which it moves least. None where
 /// that cannot be told, or is too few.
-pub(crate) fn slow(sights: &[Sight], n_cameras: usize) -> Vec<usize> {
+pub(crate) fn slow(sights: &[Sight], n_cameras: usize) -> Option<Slow> {
     let mut speeds: BTreeMap<usize, f64> = BTreeMap::new();
     for camera in 0..n_cameras {
         let mut own: Vec<&Sight> = sights.iter().filter(|it| it.camera == camera).collect();
@@ -100,17 +108,14 @@ pub(crate) fn slow(sights: &[Sight], n_cameras: usize) -> Vec<usize> {
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
     let n_still = order.iter().filter(|it| it.1 < STILL_PX).count();
     let quarter = order.len().div_ceil(4).max(FEWEST_SLOW);
-    order.truncate(if n_still >= FEWEST_SLOW {
-        n_still
-    } else {
-        quarter
-    });
+    let are_still = n_still >= FEWEST_SLOW;
+    order.truncate(if are_still { n_still } else { quarter });
     if order.len() < FEWEST_SLOW {
-        return Vec::new();
+        return None;
     }
     let mut frames: Vec<usize> = order.into_iter().map(|it| it.0).collect();
     frames.sort_unstable();
-    frames
+    Some(Slow { frames, are_still })
 }
 
 /// The median movement of corners between two pictures, pixels a frame.

@@ -84,11 +84,11 @@ fn in_step(
     sights: &[Sight],
 ) -> Result<Outcome, BoardError> {
     let slow = choose::slow(sights, task.names.len());
-    let frames = if slow.is_empty() {
-        choose::frames(sights, &task.sizes, task.most_frames)
-    } else {
-        slow
-    };
+    let are_still = slow.as_ref().is_some_and(|it| it.are_still);
+    let frames = slow.map_or_else(
+        || choose::frames(sights, &task.sizes, task.most_frames),
+        |it| it.frames,
+    );
     let boards = boards(task, &cameras, placed, &frames);
     let with = |is_held: &[bool]| {
         let free = is_held.iter().enumerate().map(|(nth, is_held)| {
@@ -102,11 +102,17 @@ fn in_step(
         let free: Vec<Free> = free.collect();
         adjusted(task, cameras.clone(), &free, &boards)
     };
-    let mut is_held: Vec<bool> = alone.cameras.iter().map(verdict::is_lens_sure).collect();
+    // Of a board that moved, the joint adjustment tells nothing of lenses, agree as it may.
+    let is_told: Vec<bool> = alone.cameras.iter().map(verdict::is_lens_told).collect();
+    let mut is_held = if are_still {
+        vec![false; is_told.len()]
+    } else {
+        is_told.clone()
+    };
     let mut outcome = with(&is_held)?;
     let mut both = outcome.cameras.iter().zip(&alone.cameras);
     if both.any(|(joint, alone)| !verdict::is_lens_the_same(joint, alone)) {
-        is_held = alone.cameras.iter().map(verdict::is_lens_told).collect();
+        is_held = is_told;
         outcome = with(&is_held)?;
     }
     certainty::widen(&mut outcome, alone, &is_held);

@@ -363,6 +363,19 @@ fn cameras_out_of_step_keep_the_lenses_that_they_alone_tell_and_say_what_is_not_
     for n_held in [8, 0] {
         let sights = carried(&truth, &board, &[0.0, 0.8, -0.7], n_held);
         let outcome = calibrate(&task(&truth, &board, sights)).unwrap();
+        for it in &outcome.cameras {
+            eprintln!(
+                "{n_held} {:?} {:?} {:?}",
+                it.camera.intrinsics, it.camera.camera_from_world, it.numbers
+            );
+        }
+        eprintln!(
+            "{:?} {:?} {:?} n {}",
+            outcome.out_of_step_px,
+            outcome.doubts,
+            errors(&outcome, &truth),
+            outcome.boards.len()
+        );
         assert!(outcome.out_of_step_px.is_some(), "{n_held}");
         let [focal, degrees, share] = errors(&outcome, &truth);
         assert!(focal < 0.02, "{n_held}: {focal}");

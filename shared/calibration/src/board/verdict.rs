@@ -152,12 +152,6 @@ pub(super) fn is_spread(sight: &Sight) -> bool {
     finite && eigenvalues.min() > 0.01 * eigenvalues.max()
 }
 
-/// Whether the focal length of a camera is given, or known well.
-pub(super) fn is_lens_sure(camera: &CameraOutcome) -> bool {
-    let focal = camera.numbers.iter().find(|it| it.name == "focal length");
-    camera.is_known || focal.is_some_and(|it| it.sd <= FOCAL_SHARE * it.value)
-}
-
 /// Standard deviation of a focal length, share of it; infinite where it is not told.
 fn focal_share(camera: &CameraOutcome) -> f64 {
     let focal = camera.numbers.iter().find(|it| it.name == "focal length");

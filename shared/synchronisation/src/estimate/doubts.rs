@@ -16,7 +16,7 @@ const LEAST_T: f64 = 4.0;
 /// The largest standard error of an offset, seconds, and intervals between pictures.
 const MOST_ERROR: [f64; 2] = [0.01, 0.3];
 /// By how much less the best offset costs than the mean, as a share.
-const LEAST_GAIN: f64 = 0.15;
+const LEAST_GAIN: f64 = 0.08;
 /// The largest median residual, expected errors.
 const MOST_RESIDUAL: f64 = 3.0;
 /// A pair that is sure by itself (its second best is worse than this share) agrees if the common offset has this share of its
