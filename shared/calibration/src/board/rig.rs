@@ -115,7 +115,7 @@ fn in_step(
         is_held = is_told;
         outcome = with(&is_held)?;
     }
-    certainty::widen(&mut outcome, alone, &is_held);
+    certainty::widen(&mut outcome, alone, &is_held, are_still);
     for ((camera, alone), is_held) in outcome.cameras.iter_mut().zip(&alone.cameras).zip(is_held) {
         if is_held {
             camera.numbers.extend(certainty::held(alone));
