@@ -256,13 +256,11 @@ impl Rig {
 
     /// What the rig lacks of a camera and what it has, for errors: `no camera "c"; it has a, b`.
     pub fn lacks(&self, name: &str) -> String {
-        match self.left_out.iter().find(|camera| camera.camera == name) {
-            Some(LeftOut { why, .. }) => format!("no place of camera {name:?}: {why}"),
-            None => {
-                let names: Vec<&str> = self.cameras.iter().map(|it| &*it.name).collect();
-                format!("no camera {name:?}; it has {}", names.join(", "))
-            }
+        if let Some(LeftOut { why, .. }) = self.left_out.iter().find(|it| it.camera == name) {
+            return format!("no place of camera {name:?}: {why}");
         }
+        let names: Vec<&str> = self.cameras.iter().map(|it| &*it.name).collect();
+        format!("no camera {name:?}; it has {}", names.join(", "))
     }
 
     /// The cameras, in the order of the file.
