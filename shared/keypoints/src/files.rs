@@ -15,6 +15,7 @@ pub mod openpose;
 mod json;
 mod mmpose;
 mod names;
+mod people;
 mod seen;
 
 pub use names::{NameSet, NamesError};

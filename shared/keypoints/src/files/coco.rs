@@ -8,6 +8,7 @@ use serde::Deserialize;
 use crate::files::json::{Numbers, from_json};
 use crate::files::mmpose;
 use crate::files::names::NameSet;
+pub use crate::files::people::Film;
 use crate::files::seen::{
     FileError, MAX_FRAMES, MAX_PEOPLE, SeenKeypoints, at_most, person, told_by,
 };
@@ -80,18 +81,6 @@ impl fmt::Display for ImageId {
             Self::Text(text) => write!(f, "{:?}", text.chars().take(64).collect::<String>()),
         }
     }
-}
-
-/// The people of all frames of a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Film {
-    /// What their keypoints are called.
-    pub names: NameSet,
-    /// Number of frames: images of a data set; one more than the highest number of results.
-    pub n_frames: u64,
-    /// The people of frames, by number from 0, in the order of the file. A data set has all its frames; of results those
-    /// are missing that have no person.
-    pub frames: BTreeMap<u64, Vec<SeenKeypoints>>,
 }
 
 /// Reads a file, of mmpose too.

@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use crate::files::coco::Film;
 use crate::files::json::{Numbers, from_json};
 use crate::files::names::NameSet;
-use crate::files::openpose::{Frame, people_of};
+use crate::files::people::{Film, Frame, people_of};
 use crate::files::seen::{FileError, MAX_FRAMES, MAX_PEOPLE, at_most};
 
 /// What is expected, for errors.

@@ -5,7 +5,9 @@ use serde::Deserialize;
 use crate::files::json::{Numbers, from_json};
 use crate::files::mmpose;
 use crate::files::names::NameSet;
-use crate::files::seen::{FileError, MAX_PEOPLE, SeenKeypoints, at_most, person, told_by};
+pub use crate::files::people::Frame;
+use crate::files::people::people_of;
+use crate::files::seen::{FileError, MAX_PEOPLE, at_most};
 
 /// What is expected, for errors.
 const LAYOUT: &str = "`{\"people\": [{\"pose_keypoints_2d\": [x, y, confidence, ...]}]}`";
@@ -32,15 +34,6 @@ impl Person {
     }
 }
 
-/// The people of a frame.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
-    /// What their keypoints are called; `None` where nobody has keypoints and no names were given.
-    pub names: Option<NameSet>,
-    /// In the order of the file. Without names their lists are empty.
-    pub people: Vec<SeenKeypoints>,
-}
-
 /// Reads the file of a frame, of mmpose too. A keypoint whose three numbers are 0, or of which one is no number, was not found.
 ///
 /// * `names`: what the keypoints are called; `None`: what their number tells ([`NameSet::of_number`]).
@@ -65,31 +58,6 @@ pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Frame, FileError> {
     let entry = |nth: usize| format!("people[{nth}].pose_keypoints_2d");
     let lists: Vec<&[Option<f64>]> = file.people.iter().map(Person::numbers).collect();
     people_of(&lists, names, entry)
-}
-
-/// The people of lists of numbers.
-///
-/// * `entry`: what the list of a person is called, for errors.
-pub(super) fn people_of(
-    lists: &[&[Option<f64>]],
-    names: Option<&NameSet>,
-    entry: impl Fn(usize) -> String,
-) -> Result<Frame, FileError> {
-    let told = lists.iter().enumerate().find(|list| !list.1.is_empty());
-    let names = match (names, told) {
-        (Some(names), _) => Some(names.clone()),
-        (None, Some((nth, values))) => Some(told_by(values.len(), || entry(nth))?),
-        (None, None) => None,
-    };
-    let read = |(nth, values): (usize, &&[Option<f64>])| match &names {
-        Some(names) => person(values, names, || entry(nth), |it| it != [0.0; 3]),
-        None => Ok(SeenKeypoints::default()),
-    };
-    let people: Result<_, _> = lists.iter().enumerate().map(read).collect();
-    Ok(Frame {
-        people: people?,
-        names,
-    })
 }
 
 /// Refuses a person whose keypoints stand under keys that are not read.
