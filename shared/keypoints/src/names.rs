@@ -267,7 +267,9 @@ pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
         FACES.into_iter().flat_map(move |(face, length, spread)| {
             let beyond = move |neck: Vec<(usize, f64)>| {
                 let mut row = mean(face)?;
-                row.iter_mut().for_each(|term| term.1 *= length);
+                for term in &mut row {
+                    term.1 *= length;
+                }
                 row.extend(neck.iter().map(|term| (term.0, (1.0 - length) * term.1)));
                 Some(Way { row, spread })
             };
