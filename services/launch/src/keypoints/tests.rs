@@ -1,5 +1,7 @@
 //! Tests of keypoints as the input of a deployment.
 
+use std::path::Path;
+
 use std::fs;
 
 use deployment::{AnyMachine, Loaded};

@@ -115,7 +115,7 @@ mod tests {
         assert_eq!(table.of("cam_2"), Some(&[35, 36, 38][..]));
         assert_eq!(table.of("3"), Some(&[35][..]));
         assert_eq!(table.of("cam_1"), None);
-        let floats = table("sync_index,cam_id\n35.0,2.0\n").unwrap();
+        let floats = super::table("sync_index,cam_id\n35.0,2.0\n").unwrap();
         assert_eq!(floats.cameras().collect::<Vec<_>>(), ["2"]);
         for wrong in ["", "a,b\n1,2\n", "sync_index,cam_id\nx,0\n"] {
             assert!(self::table(wrong).is_err(), "{wrong:?}");
