@@ -1,8 +1,7 @@
 //! Tests of keypoints as the input of a deployment.
 
-use std::path::Path;
-
 use std::fs;
+use std::path::Path;
 
 use deployment::{AnyMachine, Loaded};
 use tempfile::TempDir;
