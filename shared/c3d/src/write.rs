@@ -250,11 +250,10 @@ fn section(heading: &Heading<'_>, data_block: u16) -> Vec<u8> {
     all.real("SCALE", -heading.residual_step);
     all.real("RATE", heading.rate_hz);
     all.word("DATA_START", data_block);
+    // A whole number, which some readers insist on; longer files have their number in LONG_FRAMES and in TRIAL.
+    all.word("FRAMES", clamped(heading.n_frames));
     if heading.n_frames > u32::from(u16::MAX) {
-        all.real("FRAMES", f64::from(heading.n_frames));
         all.real("LONG_FRAMES", f64::from(heading.n_frames));
-    } else {
-        all.word("FRAMES", heading.n_frames as u16);
     }
     all.texts("LABELS", heading.labels);
     if !heading.descriptions.is_empty() {
