@@ -76,6 +76,7 @@ pub fn films(
     poses: Poses,
     (stop, console): (&Stop, &dyn Console),
 ) -> Result<Films, Failure> {
+    let deployment = &inputs::settled(deployment)?;
     let rig = inputs::rig_of(deployment)?;
     let cameras = cameras(deployment, &rig)?;
     let finders = (0..cameras.len()).map(|it| finder(deployment, it));

@@ -1,9 +1,10 @@
 //! The input files of a deployment, read before any process is started.
 
-mod advice;
+pub(crate) mod advice;
 mod joints;
 mod live;
 mod maps;
+mod pictures;
 
 use std::borrow::Cow;
 use std::fs;
@@ -13,7 +14,6 @@ use std::sync::Arc;
 use consistency::{Appearance, Learned, Shape};
 use deployment::{Deployment, Timeline};
 use fmp::Model;
-use footage::{SourceSpec, Turn};
 use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
 use multiview::{Compatibility, TypeTables};
@@ -33,6 +33,7 @@ pub(crate) use live::{footage, lead_nanos};
 pub use live::{is_live, live_camera};
 pub(crate) use maps::{check_maps, network_card};
 pub use maps::{detector, mirrored, open_network, pose_network, springs};
+pub use pictures::{rotation, settled, source};
 pub use runtime::{in_file, read_text as text};
 
 /// Reads the named model, or the shipped model if none is named.
@@ -130,33 +131,6 @@ pub struct Footage {
     /// recordings of earlier versions.
     #[serde(default)]
     pub timeline: Option<Timeline>,
-}
-
-/// The footage of a camera, with the range of frames to use.
-pub fn source(
-    camera: &deployment::capture::Camera,
-    config: &deployment::capture::Config,
-) -> SourceSpec {
-    SourceSpec {
-        start: config.start_frame,
-        step: config.frame_step,
-        count: config.n_frames,
-        frame_rate_hz: config.frame_rate_hz,
-        ..SourceSpec::new(camera.source.clone())
-    }
-}
-
-/// Warns if an image has an orientation tag: the pixels of a calibrated camera are used as they are stored.
-///
-/// * `source`: the camera or file, for the message.
-pub fn warn_of_orientation_tag(source: &str, turn: Turn) {
-    if !turn.is_none() {
-        output::message(format_args!(
-            "warning: {source}: the orientation tag of its first picture asks for {turn}, which is not done: a \
-             calibration speaks of pixels as they are stored; if this one was made of pictures as they are seen, \
-             store these so (`mogrify -auto-orient`)"
-        ));
-    }
 }
 
 /// Reads the part-type tables of a pair of views.

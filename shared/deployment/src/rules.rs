@@ -4,7 +4,8 @@ use crate::complaint::{Complaint, demand, not_negative, positive, whole};
 use crate::older::OLDER;
 use crate::topology::{process_name, services};
 use crate::{
-    Deployment, Machine, capture, fuse, hosts, is_shipped, limits, pose, quality, triangulate,
+    Deployment, Machine, capture, fuse, hosts, is_shipped, limits, pose, quality, slips,
+    triangulate,
 };
 
 /// Checks the values that the types alone do not.
@@ -99,6 +100,24 @@ fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
         &format!("left out of camera {:?}", camera.name),
         "its footage: every [[camera]] needs that, or `keypoints` that another program found in it",
     )?;
+    demand(
+        !camera.source.chars().any(char::is_control),
+        "camera.source",
+        &format!("{:?}", camera.source),
+        &format!("a path without special characters: {}", slips::ESCAPE),
+    )?;
+    if let Some(capture::Rotate::Degrees(degrees)) = camera.rotate {
+        demand(
+            degrees % 90 == 0 && degrees < 360,
+            "camera.rotate",
+            &degrees.to_string(),
+            "0, 90, 180 or 270 degrees to the right, or \"tag\"",
+        )?;
+    }
+    if let Some([_, step]) = camera.numbers {
+        let expected = "[first, step], the step at least 1";
+        demand(step > 0, "camera.numbers", &step.to_string(), expected)?;
+    }
     let Some(names) = &camera.keypoint_names else {
         return Ok(());
     };

@@ -50,9 +50,32 @@ mod tests {
     fn opensim_names_are_those_of_the_marker_set() {
         // Markers_Halpe26.xml of Pose2Sim 0.10; eyes and ears are not in it.
         let due = [
-            "Nose", "LEye", "REye", "LEar", "REar", "LShoulder", "RShoulder", "LElbow", "RElbow", "LWrist", "RWrist",
-            "LHip", "RHip", "LKnee", "RKnee", "LAnkle", "RAnkle", "Head", "Neck", "Hip", "LBigToe", "RBigToe",
-            "LSmallToe", "RSmallToe", "LHeel", "RHeel",
+            "Nose",
+            "LEye",
+            "REye",
+            "LEar",
+            "REar",
+            "LShoulder",
+            "RShoulder",
+            "LElbow",
+            "RElbow",
+            "LWrist",
+            "RWrist",
+            "LHip",
+            "RHip",
+            "LKnee",
+            "RKnee",
+            "LAnkle",
+            "RAnkle",
+            "Head",
+            "Neck",
+            "Hip",
+            "LBigToe",
+            "RBigToe",
+            "LSmallToe",
+            "RSmallToe",
+            "LHeel",
+            "RHeel",
         ];
         let own = HALPE_26.map(|it| if it == "head top" { "head" } else { it });
         assert_eq!(own.map(|it| Naming::OpenSim.apply(it)), due);

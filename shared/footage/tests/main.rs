@@ -8,4 +8,5 @@ mod conformance;
 mod kept;
 mod overlay;
 mod prompt;
+mod told;
 mod warp;

@@ -1,22 +1,41 @@
 //! The standard error of a decoder: error messages, and the time of every frame.
 
 use std::io::Read;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Bytes kept of a log; a damaged video can fill a disk with it.
 const MAX_BYTES: usize = 16 << 10;
-/// Capacity of the queue of times; a decoder is a few frames ahead at most.
-const MAX_TIMES: usize = 1024;
 /// How long to wait for the time of a frame that has been read.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What a decoder complained about.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Complaints {
+    /// Messages.
+    pub messages: u64,
+    /// Those that say that a picture could not be decoded.
+    pub undecoded: u64,
+    /// The last message.
+    pub last: String,
+}
+
+/// How `ffmpeg` begins or ends what it says of a picture that it leaves out, by version.
+const UNDECODED: [&str; 4] = [
+    "Error while decoding stream",
+    "Error submitting packet",
+    "Error processing packet",
+    "Decoding error",
+];
 
 /// Reads a log to its end in a thread of its own, so that a decoder with much output does not block.
 #[derive(Debug)]
 pub(crate) struct Log {
     reader: Option<JoinHandle<Vec<u8>>>,
     times: Receiver<FrameTime>,
+    complaints: Arc<Mutex<Complaints>>,
 }
 
 /// What is said of a frame.
@@ -30,14 +49,23 @@ pub(crate) struct FrameTime {
 
 impl Log {
     pub(crate) fn follow(stream: impl Read + Send + 'static) -> std::io::Result<Self> {
-        let (sender, times) = sync_channel(MAX_TIMES);
+        let (sender, times) = channel();
+        let lines = Lines::new(sender);
+        let complaints = Arc::clone(&lines.complaints);
         let reader = std::thread::Builder::new()
             .name("decoder log".to_owned())
-            .spawn(move || Lines::new(sender).read(stream))?;
+            .spawn(move || lines.read(stream))?;
         Ok(Self {
             reader: Some(reader),
             times,
+            complaints,
         })
+    }
+
+    /// What the decoder has complained about so far.
+    pub(crate) fn complaints(&self) -> Complaints {
+        let complaints = self.complaints.lock();
+        complaints.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// The time of the next frame; waits for it for a short time.
@@ -54,22 +82,24 @@ impl Log {
 
 /// Separates the lines of ffmpeg's `framecrc` output from error messages.
 struct Lines {
-    times: SyncSender<FrameTime>,
+    times: Sender<FrameTime>,
     /// The unit of time from its header, seconds.
     unit_s: f64,
     /// The error messages.
     kept: Vec<u8>,
     /// The beginning of an incomplete line.
     partial: Vec<u8>,
+    complaints: Arc<Mutex<Complaints>>,
 }
 
 impl Lines {
-    fn new(times: SyncSender<FrameTime>) -> Self {
+    fn new(times: Sender<FrameTime>) -> Self {
         Self {
             times,
             unit_s: f64::NAN,
             kept: Vec::new(),
             partial: Vec::new(),
+            complaints: Arc::default(),
         }
     }
 
@@ -94,14 +124,28 @@ impl Lines {
             self.unit_s = fraction(unit_s).unwrap_or(f64::NAN);
         } else if let Some((units, bytes)) = frame_units(&text) {
             let time_s = units * self.unit_s;
-            // Times are dropped if the receiver is gone or too slow.
-            self.times.try_send(FrameTime { time_s, bytes }).ok();
+            // Nobody waits for it if the receiver is gone.
+            self.times.send(FrameTime { time_s, bytes }).ok();
         } else if !text.starts_with('#') {
+            self.complain(without_address(text.trim()));
             self.kept.extend_from_slice(&line);
             if self.kept.len() > MAX_BYTES {
                 self.kept.drain(..self.kept.len() - MAX_BYTES / 2);
             }
         }
+    }
+}
+
+impl Lines {
+    fn complain(&self, message: &str) {
+        if message.is_empty() {
+            return;
+        }
+        let complaints = self.complaints.lock();
+        let mut complaints = complaints.unwrap_or_else(PoisonError::into_inner);
+        complaints.messages += 1;
+        complaints.undecoded += u64::from(UNDECODED.iter().any(|it| message.contains(it)));
+        message.clone_into(&mut complaints.last);
     }
 }
 
@@ -151,7 +195,7 @@ mod tests {
 
     /// The messages and the times in a text.
     fn read(text: &str) -> (Vec<u8>, Vec<f64>) {
-        let (sender, times) = sync_channel(MAX_TIMES);
+        let (sender, times) = channel();
         let kept = Lines::new(sender).read(text.as_bytes());
         (kept, times.try_iter().map(|it| it.time_s).collect())
     }
