@@ -24,7 +24,6 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use viewquality::{Network, NetworkError, Table, Tau};
 
-use crate::output;
 use crate::shipped::Shipped;
 use runtime::no_text;
 

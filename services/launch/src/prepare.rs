@@ -71,8 +71,8 @@ impl Prepared {
         let names = deployment.cameras.iter().map(|it| it.name.as_str());
         let framings = names
             .enumerate()
-            .map(|it| (it.1, framing(resolved, &rig, it.0)));
-        let framings = inputs::advice::of_all(framings)?;
+            .map(|(index, name)| (name, framing(resolved, &rig, index)));
+        let framings = inputs::advice::of_all(framings.collect())?;
         for (camera, framing) in deployment.cameras.iter().zip(framings) {
             sizes.extend(rig.camera(&camera.name).map(|it| it.intrinsics.size));
             let plan = pipeline::plan(&model, framing.camera()).or_fail(ExitKind::Input)?;

@@ -12,7 +12,11 @@ fn a_gap_in_the_numbers_is_a_missing_picture_of_that_camera() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     for pattern in ["", "/%04d.png", "/*.png"] {
         let case = Case::new("gap", &[6; 3], PLAIN);
-        case.edit("deployment.toml", "source = \"b\"", &format!("source = \"b{pattern}\""));
+        case.edit(
+            "deployment.toml",
+            "source = \"b\"",
+            &format!("source = \"b{pattern}\""),
+        );
         for frame in [2, 3] {
             fs::remove_file(case.path(&format!("b/{frame:04}.png"))).unwrap();
         }
@@ -22,7 +26,10 @@ fn a_gap_in_the_numbers_is_a_missing_picture_of_that_camera() {
         let (lines, due) = (case.lines("pose3d.jsonl"), whole.lines("pose3d.jsonl"));
         assert_eq!(lines.len(), 6);
         for frame in [0, 1, 4, 5] {
-            assert_eq!(lines[frame]["joints"], due[frame]["joints"], "frame {frame}");
+            assert_eq!(
+                lines[frame]["joints"], due[frame]["joints"],
+                "frame {frame}"
+            );
         }
         for frame in [2, 3] {
             let missing = &lines[frame]["views_missing"]["b"];
@@ -43,5 +50,9 @@ fn cameras_that_do_not_begin_with_the_same_number_are_told() {
         fs::rename(from, to).unwrap();
     }
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
-    assert!(ended.stderr.contains("numbers of their own"), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("numbers of their own"),
+        "{}",
+        ended.stderr
+    );
 }

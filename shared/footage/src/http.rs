@@ -27,8 +27,8 @@ impl Answer {
                     .to_owned()
             }
             Self::Other(kind) if kind == "text/html" => {
-                "a page came (text/html) in place of pictures: does the camera want somebody to sign in \
-                 (http://user:password@host/...), or is it the address of its menu?"
+                "a page came (text/html) in place of pictures: does the camera want somebody to sign in (name and \
+                 password stand in front of the host, with an @ behind), or is it the address of its menu?"
                     .to_owned()
             }
             Self::Other(kind) => format!("{kind} came in place of pictures"),

@@ -55,14 +55,16 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
 /// What all cameras gave, or the first failure with what the other cameras fail at.
 ///
 /// * `cameras`: names and outcomes.
-pub(crate) fn of_all<'a, T>(
-    cameras: impl IntoIterator<Item = (&'a str, Result<T, Failure>)>,
-) -> Result<Vec<T>, Failure> {
+pub(crate) fn of_all<T>(cameras: Vec<(&str, Result<T, Failure>)>) -> Result<Vec<T>, Failure> {
     let (mut all, mut first, mut others) = (Vec::new(), None, Vec::new());
     for (name, outcome) in cameras {
         match outcome {
             Ok(it) => all.push(it),
-            Err(failure) if first.is_some() => others.push(format!("{name}: {failure}")),
+            Err(failure) if first.is_some() => {
+                let message = failure.to_string();
+                let is_named = message.contains(&format!("{name:?}"));
+                others.push(if is_named { message } else { format!("{name}: {message}") });
+            }
             Err(failure) => first = Some(failure),
         }
     }

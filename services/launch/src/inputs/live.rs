@@ -74,7 +74,7 @@ pub(crate) fn footage(
         read.collect()
     });
     let names = deployment.cameras.iter().map(|it| it.name.as_str());
-    let all = advice::of_all(names.zip(all))?;
+    let all = advice::of_all(names.zip(all).collect())?;
     if deployment.has_clocks() {
         retimed(deployment, all)
     } else {
