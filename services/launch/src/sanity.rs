@@ -177,7 +177,9 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
         "{rates}: frames are paired by their numbers, so that in the end they are {drift:.1} frames apart"
     );
     if high / low <= MAX_RATE_RATIO || deployment.capture.frame_rate_hz.is_some() {
-        return Ok((drift >= 0.5).then_some(text));
+        return Ok((drift >= 0.5)
+            .then_some(text)
+            .or_else(|| without_rate(resolved)));
     }
     let failure = Failure::new(ExitKind::Input, text);
     Err(failure.with_hint(
@@ -185,6 +187,19 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
          `parallax sync estimate` finds it, `offset_ms = 0` where they began together; if a file is wrong about its rate, give the \
          true one as `capture.frame_rate_hz`",
     ))
+}
+
+/// Names the cameras of which nothing says how many frames a second they have, beside others; none if there are none.
+fn without_rate(resolved: &Resolved) -> Option<String> {
+    let views = resolved.deployment.cameras.iter().zip(&resolved.footage);
+    let unknown = views.filter(|it| it.1.frame_rate_hz.is_none());
+    let names: Vec<&str> = unknown.map(|it| it.0.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "nothing says how many frames per second {} has: taken are those of the other cameras; `capture.frame_rate_hz` says it",
+            names.join(", ")
+        )
+    })
 }
 
 /// The pictures of live cameras are paired by their times: another rate only means that some have none for an instant.

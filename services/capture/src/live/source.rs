@@ -195,7 +195,12 @@ impl Keeper {
             let Some(error) = failed else { return };
             let status = error.status();
             // Whether it sends a boundary in front of its first picture is found by trying.
-            is_bare ^= self.camera.is_http() && n_read == 0;
+            let is_tried = self.camera.is_http() && n_read == 0;
+            is_bare ^= is_tried;
+            if is_tried && is_bare && said.is_none() {
+                tracing::debug!(camera = %self.camera.address, %error, "read without a first boundary");
+                continue;
+            }
             if n_read > 0 || said != Some(status) {
                 let error = causes::in_one_line(&error);
                 tracing::error!(camera = %self.camera.address, error, "no picture from this camera");

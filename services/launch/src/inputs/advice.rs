@@ -63,7 +63,11 @@ pub(crate) fn of_all<T>(cameras: Vec<(&str, Result<T, Failure>)>) -> Result<Vec<
             Err(failure) if first.is_some() => {
                 let message = failure.to_string();
                 let is_named = message.contains(&format!("{name:?}"));
-                others.push(if is_named { message } else { format!("{name}: {message}") });
+                others.push(if is_named {
+                    message
+                } else {
+                    format!("{name}: {message}")
+                });
             }
             Err(failure) => first = Some(failure),
         }
