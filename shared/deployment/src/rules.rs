@@ -11,6 +11,9 @@ use crate::{
 /// Checks the values that the types alone do not.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     name(&it.name)?;
+    for (key, path) in [("rig", &it.rig), ("output", &it.output)] {
+        is_path(key, &path.to_string_lossy())?;
+    }
     cameras(it)?;
     capture(&it.capture)?;
     pose(&it.pose)?;
@@ -92,6 +95,16 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
     Ok(())
 }
 
+/// A path without what a backslash makes in double quotes.
+fn is_path(key: &str, path: &str) -> Result<(), Complaint> {
+    demand(
+        !path.chars().any(char::is_control),
+        key,
+        &format!("{path:?}"),
+        &format!("a path without special characters: {}", slips::ESCAPE),
+    )
+}
+
 /// What a camera sees: footage, keypoints, or both.
 fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
     demand(
@@ -100,12 +113,7 @@ fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
         &format!("left out of camera {:?}", camera.name),
         "its footage: every [[camera]] needs that, or `keypoints` that another program found in it",
     )?;
-    demand(
-        !camera.source.chars().any(char::is_control),
-        "camera.source",
-        &format!("{:?}", camera.source),
-        &format!("a path without special characters: {}", slips::ESCAPE),
-    )?;
+    is_path("camera.source", &camera.source)?;
     if let Some(capture::Rotate::Degrees(degrees)) = camera.rotate {
         demand(
             degrees % 90 == 0 && degrees < 360,

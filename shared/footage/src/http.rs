@@ -1,6 +1,6 @@
 //! What an HTTP camera answers, where a decoder finds no pictures in it.
 
-use std::io::{Read as _, Write as _};
+use std::io::{BufReader, Read as _, Write as _};
 use std::net::{TcpStream, ToSocketAddrs as _};
 use std::time::Duration;
 
@@ -19,9 +19,9 @@ pub(crate) enum Answer {
 }
 
 impl Answer {
-    /// What is said of it; none of what is not wrong in itself.
-    pub(crate) fn complaint(self) -> Option<String> {
-        Some(match self {
+    /// What is said of it.
+    pub(crate) fn complaint(self) -> String {
+        match self {
             Self::Picture => {
                 "it is the address of a single picture; that of the stream is another one (the manual of the camera has it)"
                     .to_owned()
@@ -32,7 +32,7 @@ impl Answer {
                     .to_owned()
             }
             Self::Other(kind) => format!("{kind} came in place of pictures"),
-        })
+        }
     }
 }
 
@@ -60,7 +60,7 @@ pub(crate) fn ask(address: &str) -> Option<Answer> {
     let request = format!("GET {slash}{path} HTTP/1.0\r\nHost: {host}\r\nAccept: */*\r\n\r\n");
     stream.write_all(request.as_bytes()).ok()?;
     let mut head = Vec::new();
-    for byte in stream.take(MAX_HEAD).bytes() {
+    for byte in BufReader::new(stream).take(MAX_HEAD).bytes() {
         head.push(byte.ok()?);
         if head.ends_with(b"\r\n\r\n") || head.ends_with(b"\n\n") {
             break;

@@ -142,7 +142,7 @@ impl StreamSpec {
     ///
     /// [`FootageError::Stream`] if nobody answers, or it is no video; [`FootageError::FfmpegMissing`].
     pub fn probe(&self) -> Result<(Size, Option<f64>), FootageError> {
-        let answer = || http::ask(&self.address).and_then(http::Answer::complaint);
+        let answer = || http::ask(&self.address).map(http::Answer::complaint);
         let asked = match self.ask() {
             // Some cameras send no boundary in front of the first picture.
             Err(error) if self.is_http() && !self.is_bare => {

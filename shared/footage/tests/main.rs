@@ -5,6 +5,7 @@ mod clip;
 
 mod bad_input;
 mod conformance;
+mod http;
 mod kept;
 mod overlay;
 mod prompt;

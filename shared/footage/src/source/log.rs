@@ -1,13 +1,15 @@
 //! The standard error of a decoder: error messages, and the time of every frame.
 
 use std::io::Read;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Bytes kept of a log; a damaged video can fill a disk with it.
 const MAX_BYTES: usize = 16 << 10;
+/// Capacity of the queue of times: of the frames between two that are read, and those that a decoder is ahead.
+const MAX_TIMES: usize = 1 << 14;
 /// How long to wait for the time of a frame that has been read.
 const PATIENCE: Duration = Duration::from_secs(1);
 
@@ -49,7 +51,7 @@ pub(crate) struct FrameTime {
 
 impl Log {
     pub(crate) fn follow(stream: impl Read + Send + 'static) -> std::io::Result<Self> {
-        let (sender, times) = channel();
+        let (sender, times) = sync_channel(MAX_TIMES);
         let lines = Lines::new(sender);
         let complaints = Arc::clone(&lines.complaints);
         let reader = std::thread::Builder::new()
@@ -82,7 +84,7 @@ impl Log {
 
 /// Separates the lines of ffmpeg's `framecrc` output from error messages.
 struct Lines {
-    times: Sender<FrameTime>,
+    times: SyncSender<FrameTime>,
     /// The unit of time from its header, seconds.
     unit_s: f64,
     /// The error messages.
@@ -93,7 +95,7 @@ struct Lines {
 }
 
 impl Lines {
-    fn new(times: Sender<FrameTime>) -> Self {
+    fn new(times: SyncSender<FrameTime>) -> Self {
         Self {
             times,
             unit_s: f64::NAN,
@@ -124,8 +126,8 @@ impl Lines {
             self.unit_s = fraction(unit_s).unwrap_or(f64::NAN);
         } else if let Some((units, bytes)) = frame_units(&text) {
             let time_s = units * self.unit_s;
-            // Nobody waits for it if the receiver is gone.
-            self.times.send(FrameTime { time_s, bytes }).ok();
+            // Times are dropped if the receiver is gone or too slow.
+            self.times.try_send(FrameTime { time_s, bytes }).ok();
         } else if !text.starts_with('#') {
             self.complain(without_address(text.trim()));
             self.kept.extend_from_slice(&line);
@@ -195,7 +197,7 @@ mod tests {
 
     /// The messages and the times in a text.
     fn read(text: &str) -> (Vec<u8>, Vec<f64>) {
-        let (sender, times) = channel();
+        let (sender, times) = sync_channel(MAX_TIMES);
         let kept = Lines::new(sender).read(text.as_bytes());
         (kept, times.try_iter().map(|it| it.time_s).collect())
     }

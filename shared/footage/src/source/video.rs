@@ -113,7 +113,8 @@ impl Video {
                 self.last_index = due;
                 return Ok(true);
             };
-            let next = self.last_told.map_or(0, |it| it + 1);
+            let first = if self.is_listed() { 0 } else { self.spec.start };
+            let next = self.last_told.map_or(first, |it| it + 1);
             let is_whole = self.is_whole(told.max(next), next)?;
             self.last_told = Some(told.max(next));
             if self.is_listed() || self.is_chosen(told) {
@@ -256,14 +257,12 @@ fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
             "framecrc",
             "pipe:2",
         ];
-        // Of all frames up to the last, so that one that is missing between those that are chosen is noticed.
+        // Of all frames from the first to the last, so that one that is missing between those that are chosen is noticed.
         let all = SourceSpec {
-            start: 0,
             step: 1,
-            count: spec.count.map(|count| {
-                let before = (count - 1).saturating_mul(spec.step);
-                spec.start.saturating_add(before).saturating_add(1)
-            }),
+            count: spec
+                .count
+                .map(|count| (count - 1).saturating_mul(spec.step).saturating_add(1)),
             ..spec.clone()
         };
         let small = "crop=2:2:0:0:exact=1".to_owned();
@@ -362,7 +361,7 @@ mod tests {
         let counts: Vec<&str> = counts.map(|it| it[1].as_str()).collect();
         assert_eq!(
             counts,
-            ["4", "36"],
+            ["4", "31"],
             "pixels of the chosen frames, times of all"
         );
         let counted = outputs(&probe(Some(vec![])), &spec);
