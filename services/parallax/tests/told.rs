@@ -1,5 +1,4 @@
 //! What the files of cameras say of themselves, in whole runs: numbers with gaps, tags of orientation.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::fs;
 

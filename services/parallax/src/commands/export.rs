@@ -95,9 +95,9 @@ enum Trajectories {
 /// What the joints are called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Names {
-    /// right_ankle, left_hip, head.
+    /// `right_ankle`, `left_hip`, `head`.
     Own,
-    /// RAnkle, LHip, Head; Hip for the pelvis.
+    /// `RAnkle`, `LHip`, `Head`; `Hip` for the pelvis.
     Opensim,
 }
 
