@@ -12,8 +12,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use consistency::{Appearance, Learned, Shape};
+use deployment::capture::{Camera, Config, Rotate, Tag};
 use deployment::{Deployment, Timeline};
 use fmp::Model;
+use footage::{PictureNumbers, Rotation, SourceSpec, Turn};
 use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
 use multiview::{Compatibility, TypeTables};
@@ -32,7 +34,7 @@ pub(crate) use live::{footage, lead_nanos};
 pub use live::{is_live, live_camera};
 pub(crate) use maps::{check_maps, network_card};
 pub use maps::{detector, mirrored, open_network, pose_network, springs};
-pub use pictures::{rotation, settled, source};
+pub use pictures::{rotation, settled};
 pub use runtime::{in_file, read_text as text};
 
 /// Reads the named model, or the shipped model if none is named.
@@ -130,6 +132,27 @@ pub struct Footage {
     /// recordings of earlier versions.
     #[serde(default)]
     pub timeline: Option<Timeline>,
+}
+
+/// The footage of a camera, with the range of frames to use.
+pub fn source(camera: &Camera, config: &Config) -> SourceSpec {
+    SourceSpec {
+        start: config.start_frame,
+        step: config.frame_step,
+        count: config.n_frames,
+        frame_rate_hz: config.frame_rate_hz,
+        rotation: match camera.rotate {
+            None => Rotation::Stored,
+            Some(Rotate::Tag(Tag::Tag)) => Rotation::Tag,
+            Some(Rotate::Degrees(degrees)) => {
+                Rotation::By(Turn::clockwise(degrees.into()).unwrap_or_default())
+            }
+        },
+        numbers: camera
+            .numbers
+            .map(|[first, step]| PictureNumbers { first, step }),
+        ..SourceSpec::new(camera.source.clone())
+    }
 }
 
 /// Reads the part-type tables of a pair of views.

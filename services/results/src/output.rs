@@ -369,7 +369,6 @@ mod tests {
         let mut output = Output::begin(scene, &Config::default(), 1, folder).unwrap();
         output.frame(&record(0));
         assert_eq!(output.finish(1).writes_failed, 0);
-        assert!(dir.path().join("pose3d.csv").exists());
         assert!(!dir.path().join("pose3d.trc").exists());
     }
 

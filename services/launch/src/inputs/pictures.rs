@@ -1,7 +1,7 @@
 //! What the files of cameras say of themselves: how their pictures are to be turned, and which frames their numbers are.
 
 use deployment::Deployment;
-use deployment::capture::{Camera, Config, Rotate, Tag};
+use deployment::capture::{Camera, Rotate, Tag};
 use footage::{Counting, PictureNumbers, Rotation, Size, SourceSpec, Turn};
 use geometry::{Rig, upright_roll};
 use nalgebra::{UnitVector3, Vector3};
@@ -9,27 +9,6 @@ use runtime::Failure;
 use scene::Address;
 
 use super::{is_live, rig_of};
-
-/// The footage of a camera, with the range of frames to use.
-pub fn source(camera: &Camera, config: &Config) -> SourceSpec {
-    SourceSpec {
-        start: config.start_frame,
-        step: config.frame_step,
-        count: config.n_frames,
-        frame_rate_hz: config.frame_rate_hz,
-        rotation: match camera.rotate {
-            None => Rotation::Stored,
-            Some(Rotate::Tag(Tag::Tag)) => Rotation::Tag,
-            Some(Rotate::Degrees(degrees)) => {
-                Rotation::By(Turn::clockwise(degrees.into()).unwrap_or_default())
-            }
-        },
-        numbers: camera
-            .numbers
-            .map(|[first, step]| PictureNumbers { first, step }),
-        ..SourceSpec::new(camera.source.clone())
-    }
-}
 
 /// The deployment with `rotate` and `numbers` of every camera that does not give them, from what its files say; logs what is done.
 ///
