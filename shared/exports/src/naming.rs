@@ -1,6 +1,33 @@
 //! What points are called in the files.
 
-use crate::landmarks;
+/// A landmark of the body, and the joints of the sets that are it: the first that a set has.
+pub(crate) const LANDMARKS: [(&str, &[&str]); 15] = [
+    ("pelvis", &["pelvis", "torsoDistal"]),
+    ("neck", &["neck", "thorax", "torsoProximal"]),
+    ("head", &["head", "headDistal"]),
+    ("left shoulder", &["left shoulder", "upperLArmProximal"]),
+    ("left elbow", &["left elbow", "upperLArmDistal"]),
+    ("left wrist", &["left wrist", "lowerLArmDistal"]),
+    ("right shoulder", &["right shoulder", "upperRArmProximal"]),
+    ("right elbow", &["right elbow", "upperRArmDistal"]),
+    ("right wrist", &["right wrist", "lowerRArmDistal"]),
+    ("left hip", &["left hip", "upperLLegProximal"]),
+    ("left knee", &["left knee", "upperLLegDistal"]),
+    ("left ankle", &["left ankle", "lowerLLegDistal"]),
+    ("right hip", &["right hip", "upperRLegProximal"]),
+    ("right knee", &["right knee", "upperRLegDistal"]),
+    ("right ankle", &["right ankle", "lowerRLegDistal"]),
+];
+
+/// The landmark of a joint of HumanEva-I's set; any other name as it is.
+fn plain_name(joint: &str) -> &str {
+    let is_humaneva = joint.contains(|it: char| it.is_ascii_uppercase());
+    let found = LANDMARKS
+        .iter()
+        .filter(|_| is_humaneva)
+        .find(|it| it.1.contains(&joint));
+    found.map_or(joint, |it| it.0)
+}
 
 /// Names of the points in the files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -17,7 +44,7 @@ impl Naming {
     pub(crate) fn apply(self, name: &str) -> String {
         match self {
             Self::Own => name.to_owned(),
-            Self::OpenSim => opensim(landmarks::plain_name(name)),
+            Self::OpenSim => opensim(plain_name(name)),
         }
     }
 }
