@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use footage::{FootageError, FrameView, Size, SourceSpec, Turn};
+use footage::{FootageError, FrameView, Size, SourceSpec};
 
 use crate::info::FeedInfo;
 
@@ -128,12 +128,9 @@ pub struct BlankFeed {
 impl BlankFeed {
     /// The properties of the frames that `spec` chooses.
     pub(crate) fn look(blank: &Blank, spec: &SourceSpec) -> Result<FeedInfo, FootageError> {
-        Ok(FeedInfo {
-            size: blank.size,
-            n_frames: spec.n_delivered(blank.n_frames)?,
-            frame_rate_hz: Some(blank.rate_hz / spec.step as f64),
-            turn: Turn::default(),
-        })
+        let n_frames = spec.n_delivered(blank.n_frames)?;
+        let rate_hz = blank.rate_hz / spec.step as f64;
+        Ok(FeedInfo::plain(blank.size, n_frames, rate_hz))
     }
 
     pub(crate) fn open(blank: &Blank, spec: &SourceSpec) -> Result<Self, FootageError> {

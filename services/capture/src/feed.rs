@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use footage::{FootageError, FrameView, Size, Source, SourceKind, SourceSpec, Turn};
+use footage::{Complaints, FootageError, FrameView, Size, Source, SourceKind, SourceSpec};
 use scene::{Address, AddressError, Scene, SceneError, View};
 
 use crate::blank::{Blank, BlankError, BlankFeed};
@@ -149,7 +149,9 @@ impl Feed {
                 size: source.info().size,
                 n_frames: source.info().n_frames,
                 frame_rate_hz: source.info().frame_rate_hz,
-                turn: source.info().turn,
+                tag: source.info().tag,
+                depth: source.info().depth,
+                is_interlaced: source.info().is_interlaced,
             },
             Self::Scene(stage) => stage.info,
             Self::Blank(feed) => feed.info,
@@ -195,6 +197,14 @@ impl Feed {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Video,
             Self::Scene(_) | Self::Blank(_) | Self::Recorded(_) => false,
+        }
+    }
+
+    /// What the decoder of a video has complained about so far.
+    pub fn complaints(&self) -> Complaints {
+        match self {
+            Self::Footage(source) => source.complaints(),
+            Self::Scene(_) | Self::Blank(_) | Self::Recorded(_) => Complaints::default(),
         }
     }
 
@@ -282,12 +292,8 @@ fn failed(spec: &SourceSpec, source: SceneError) -> FeedError {
 
 fn info(spec: &SourceSpec, address: &Address, size: Size) -> Result<FeedInfo, FeedError> {
     let n_frames = spec.n_delivered(address.n_frames)?;
-    Ok(FeedInfo {
-        size,
-        n_frames,
-        frame_rate_hz: Some(address.settings.rate_hz / spec.step as f64),
-        turn: Turn::default(),
-    })
+    let rate_hz = address.settings.rate_hz / spec.step as f64;
+    Ok(FeedInfo::plain(size, n_frames, rate_hz))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What is known of a camera's pictures before the first one.
 
-use footage::{Size, Turn};
+use footage::{Depth, Size, Turn};
 
 /// The properties of a camera's pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +11,24 @@ pub struct FeedInfo {
     pub n_frames: u64,
     /// Frames per second of the scene, where it is known.
     pub frame_rate_hz: Option<f64>,
-    /// The orientation tag of the first image. It is not applied: a calibration refers to the pixels as stored.
-    pub turn: Turn,
+    /// What the tag of the first image or of the video asks, whether it is done or not.
+    pub tag: Turn,
+    /// How many bits images with 16 use, where these are fewer.
+    pub depth: Option<Depth>,
+    /// Whether every picture is two, of different moments, line by line.
+    pub is_interlaced: bool,
+}
+
+impl FeedInfo {
+    /// Of pictures that are made as they are to be.
+    pub(crate) fn plain(size: Size, n_frames: u64, frame_rate_hz: f64) -> Self {
+        Self {
+            size,
+            n_frames,
+            frame_rate_hz: Some(frame_rate_hz),
+            tag: Turn::default(),
+            depth: None,
+            is_interlaced: false,
+        }
+    }
 }

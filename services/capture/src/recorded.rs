@@ -9,7 +9,7 @@ mod table;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use footage::{FootageError, FrameView, PixelFormat, RemadeStream, SourceSpec, Turn};
+use footage::{FootageError, FrameView, PixelFormat, RemadeStream, SourceSpec};
 use recording::{Kind, ReadError};
 
 use crate::info::FeedInfo;
@@ -132,12 +132,8 @@ impl RecordedFeed {
     pub(crate) fn open(recorded: &Recorded, spec: &SourceSpec) -> Result<Self, RecordedError> {
         let mut file = File::open(&recorded.file)?;
         let table = Table::read(&mut file, &recorded.camera, spec.frame_rate_hz)?;
-        let info = FeedInfo {
-            size: table.size,
-            n_frames: spec.n_delivered(table.n_frames())?,
-            frame_rate_hz: Some(table.rate_hz / spec.step as f64),
-            turn: Turn::default(),
-        };
+        let n_frames = spec.n_delivered(table.n_frames())?;
+        let info = FeedInfo::plain(table.size, n_frames, table.rate_hz / spec.step as f64);
         Ok(Self {
             info,
             rgb: vec![0; table.size.rgb_bytes()],

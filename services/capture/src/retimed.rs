@@ -1,7 +1,7 @@
 //! Footage brought to common instants: of every instant the frame that is nearest to it.
 
 use deployment::Timeline;
-use footage::{FootageError, FrameView, SourceSpec};
+use footage::{Complaints, FootageError, FrameView, SourceSpec};
 
 use crate::feed::{Feed, FeedError};
 use crate::info::FeedInfo;
@@ -109,6 +109,11 @@ impl Retimed {
     /// As [`Feed::is_video`].
     pub fn is_video(&self) -> bool {
         self.feed.is_video()
+    }
+
+    /// As [`Feed::complaints`].
+    pub fn complaints(&self) -> Complaints {
+        self.feed.complaints()
     }
 
     /// Skips frames or instants; returns how many there were.

@@ -134,6 +134,7 @@ impl Supply {
     /// * `now`: nanoseconds; decides when a camera is reopened.
     pub(crate) fn step(&mut self, now: u64) -> Step {
         if self.at >= self.info.n_frames {
+            self.complain();
             return Step::End;
         }
         let index = self.index();
@@ -146,10 +147,26 @@ impl Supply {
             }
         };
         if step == Step::End {
+            self.complain();
             return Step::End;
         }
         self.at += 1;
         step
+    }
+
+    /// Says once what the decoder has complained about.
+    fn complain(&mut self) {
+        let Some(feed) = self.feed.take() else { return };
+        let complaints = feed.complaints();
+        if complaints.messages > 0 {
+            tracing::warn!(
+                source = self.spec.path,
+                messages = complaints.messages,
+                undecoded = complaints.undecoded,
+                last = complaints.last,
+                "the decoder complained about this camera's film; pictures that were not whole are left out"
+            );
+        }
     }
 
     fn check(&mut self, index: u64, read: Read) -> Step {

@@ -9,6 +9,7 @@ mod pictures;
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use exports::Naming;
 use exports::{FILES, FileFormat, Notes, Trial, ViewCamera};
 use offline::Console;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};

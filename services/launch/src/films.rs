@@ -76,6 +76,7 @@ pub fn films(
     poses: Poses,
     (stop, console): (&Stop, &dyn Console),
 ) -> Result<Films, Failure> {
+    let deployment = &inputs::settled(deployment)?;
     let rig = match poses {
         Poses::OfRig => inputs::rig_of(deployment)?,
         Poses::Unknown => inputs::lenses_of(deployment)?,

@@ -1,9 +1,10 @@
 //! The input files of a deployment, read before any process is started.
 
-mod advice;
+pub(crate) mod advice;
 mod joints;
 mod live;
 mod maps;
+mod pictures;
 
 use std::borrow::Cow;
 use std::fs;
@@ -11,11 +12,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use consistency::{Appearance, Learned, Shape};
+use deployment::capture::{Camera, Config, Rotate, Tag};
 use deployment::{Deployment, Timeline};
 use fmp::Model;
-use footage::{SourceSpec, Turn};
+use footage::{PictureNumbers, Rotation, SourceSpec, Turn};
+use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
-use geometry::{Camera, Rig};
 use multiview::{Compatibility, TypeTables};
 use nalgebra::UnitVector3;
 use orientation::Detector;
@@ -24,7 +26,6 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use viewquality::{Network, NetworkError, Table, Tau};
 
-use crate::output;
 use crate::shipped::Shipped;
 use runtime::no_text;
 
@@ -33,6 +34,7 @@ pub(crate) use live::{footage, lead_nanos};
 pub use live::{is_live, live_camera};
 pub(crate) use maps::{check_maps, network_card};
 pub use maps::{detector, mirrored, open_network, pose_network, springs};
+pub use pictures::{rotation, settled};
 pub use runtime::{in_file, read_text as text};
 
 /// Reads the named model, or the shipped model if none is named.
@@ -145,7 +147,7 @@ pub(crate) fn camera_of<'a>(
     rig: &'a Rig,
     name: &str,
     deployment: &Deployment,
-) -> Result<&'a Camera, Failure> {
+) -> Result<&'a geometry::Camera, Failure> {
     rig.camera(name).ok_or_else(|| {
         let file = deployment.rig.display();
         let message = format!("{file} has {}", rig.lacks(name));
@@ -169,29 +171,23 @@ pub struct Footage {
 }
 
 /// The footage of a camera, with the range of frames to use.
-pub fn source(
-    camera: &deployment::capture::Camera,
-    config: &deployment::capture::Config,
-) -> SourceSpec {
+pub fn source(camera: &Camera, config: &Config) -> SourceSpec {
     SourceSpec {
         start: config.start_frame,
         step: config.frame_step,
         count: config.n_frames,
         frame_rate_hz: config.frame_rate_hz,
+        rotation: match camera.rotate {
+            None => Rotation::Stored,
+            Some(Rotate::Tag(Tag::Tag)) => Rotation::Tag,
+            Some(Rotate::Degrees(degrees)) => {
+                Rotation::By(Turn::clockwise(degrees.into()).unwrap_or_default())
+            }
+        },
+        numbers: camera
+            .numbers
+            .map(|[first, step]| PictureNumbers { first, step }),
         ..SourceSpec::new(camera.source.clone())
-    }
-}
-
-/// Warns if an image has an orientation tag: the pixels of a calibrated camera are used as they are stored.
-///
-/// * `source`: the camera or file, for the message.
-pub fn warn_of_orientation_tag(source: &str, turn: Turn) {
-    if !turn.is_none() {
-        output::message(format_args!(
-            "warning: {source}: the orientation tag of its first picture asks for {turn}, which is not done: a \
-             calibration speaks of pixels as they are stored; if this one was made of pictures as they are seen, \
-             store these so (`mogrify -auto-orient`)"
-        ));
     }
 }
 

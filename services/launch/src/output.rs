@@ -1,8 +1,9 @@
 //! Writes data to standard output and messages to standard error.
 
-use std::fmt::Display;
+use core::fmt::{self, Display};
 use std::io::{self, IsTerminal as _, Write as _};
 
+use indicatif::{HumanDuration, ProgressState, ProgressStyle};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde::Serialize;
 use tracing::Level;
@@ -48,6 +49,25 @@ pub fn message(text: impl Display) {
 pub fn failure(failure: &Failure) {
     // An error of standard error cannot be reported.
     drop(failure.report(&mut io::stderr().lock()));
+}
+
+/// The style of a progress bar; none if the template is none of `indicatif`.
+///
+/// * `template`: `{left}` is a comma and the time that is left, nothing while that is not known.
+pub fn bar_style(template: &str) -> Option<ProgressStyle> {
+    let style = ProgressStyle::with_template(template).ok()?;
+    Some(
+        style.with_key("left", |state: &ProgressState, out: &mut dyn fmt::Write| {
+            let left = state.eta();
+            let text = match left.as_secs() {
+                0 if state.pos() == 0 || state.per_sec() <= 0.0 => return,
+                0 => ", less than a second left".to_owned(),
+                _ => format!(", {:#} left", HumanDuration(left)),
+            };
+            // An error of the bar's own buffer cannot be reported.
+            out.write_str(&text).ok();
+        }),
+    )
 }
 
 /// Whether standard error is a terminal, so that a progress bar can be drawn.

@@ -50,6 +50,7 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
 pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolved, Failure> {
     let lengths = keypoints::lengths(deployment)?;
     let deployment = &keypoints::with_pictures(deployment.clone(), &lengths)?;
+    let deployment = &inputs::settled(deployment)?;
     let is_here = |camera: usize| {
         let name = &deployment.cameras[camera].name;
         host.is_none_or(|it| it.views.contains(name))

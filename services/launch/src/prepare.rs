@@ -68,8 +68,12 @@ impl Prepared {
         };
         let rig = inputs::rig_of(deployment)?;
         let (mut views, mut sizes) = (Vec::new(), Vec::new());
-        for (index, camera) in deployment.cameras.iter().enumerate() {
-            let framing = framing(resolved, &rig, index)?;
+        let names = deployment.cameras.iter().map(|it| it.name.as_str());
+        let framings = names
+            .enumerate()
+            .map(|(index, name)| (name, framing(resolved, &rig, index)));
+        let framings = inputs::advice::of_all(framings.collect())?;
+        for (camera, framing) in deployment.cameras.iter().zip(framings) {
             sizes.extend(rig.camera(&camera.name).map(|it| it.intrinsics.size));
             let plan = pipeline::plan(&model, framing.camera()).or_fail(ExitKind::Input)?;
             views.push(View {
@@ -192,6 +196,13 @@ pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Fr
             ExitKind::Calibration,
             format!("camera {:?}: {error}", entry.name),
         );
+        let [width, height] = camera.intrinsics.size;
+        if size == [height, width] {
+            return failure.with_hint(
+                "the size agrees once the pictures are turned: `rotate = 90` or `rotate = 270` (degrees to the right) in its [[camera]], \
+                 `rotate = \"tag\"` as the file asks",
+            );
+        }
         failure.with_hint(
             "calibrate at the size of the footage; if the footage lacks rows or columns of the \
              calibrated image, say where it begins: source_offset_px = [x, y] in its [[camera]]",

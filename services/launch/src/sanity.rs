@@ -18,6 +18,11 @@ use crate::resolved::Resolved;
 const MAX_RATE_RATIO: f64 = 1.02;
 /// The least range of brightness, of 255, over the cells of an image at which it is compared with others.
 const MIN_CONTRAST: f64 = 16.0;
+/// What is said of footage without a rate.
+const NO_RATE: &str = "nothing says how many frames per second the footage has: times, speeds and pose3d.trc are left out; \
+    `capture.frame_rate_hz` says it";
+/// A picture whose brightest value is less, of 255, uses a small part of its range.
+const LEAST_BRIGHTEST: u8 = 64;
 /// Images whose mean difference of brightness over the cells is less than this, of 255, look the same.
 const MIN_DIFFERENCE: f64 = 1.0;
 /// Cells of the grid of brightness, in each direction.
@@ -161,7 +166,7 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     let slowest = known.iter().min_by(|a, b| a.1.total_cmp(&b.1));
     let fastest = known.iter().max_by(|a, b| a.1.total_cmp(&b.1));
     let (Some((slow, low)), Some((fast, high))) = (slowest, fastest) else {
-        return Ok(None);
+        return Ok(Some(NO_RATE.to_owned()));
     };
     let rates = format!("{slow} has {low:.6} frames per second, {fast} {high:.6}");
     if resolved.has_live() {
@@ -172,13 +177,29 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
         "{rates}: frames are paired by their numbers, so that in the end they are {drift:.1} frames apart"
     );
     if high / low <= MAX_RATE_RATIO || deployment.capture.frame_rate_hz.is_some() {
-        return Ok((drift >= 0.5).then_some(text));
+        return Ok((drift >= 0.5)
+            .then_some(text)
+            .or_else(|| without_rate(resolved)));
     }
     let failure = Failure::new(ExitKind::Input, text);
     Err(failure.with_hint(
-        "convert one of them to the rate of the other (`ffmpeg -i in.mp4 -r RATE out.mp4`); if a file is wrong about \
-         its rate, give the true one as `capture.frame_rate_hz`",
+        "cameras with clocks of their own are brought to common instants by `offset_ms` of each [[camera]], whatever their rates: \
+         `parallax sync estimate` finds it, `offset_ms = 0` where they began together; if a file is wrong about its rate, give the \
+         true one as `capture.frame_rate_hz`",
     ))
+}
+
+/// Names the cameras of which nothing says how many frames a second they have, beside others; none if there are none.
+fn without_rate(resolved: &Resolved) -> Option<String> {
+    let views = resolved.deployment.cameras.iter().zip(&resolved.footage);
+    let unknown = views.filter(|it| it.1.frame_rate_hz.is_none());
+    let names: Vec<&str> = unknown.map(|it| it.0.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "nothing says how many frames per second {} has: taken are those of the other cameras; `capture.frame_rate_hz` says it",
+            names.join(", ")
+        )
+    })
 }
 
 /// The pictures of live cameras are paired by their times: another rate only means that some have none for an instant.
@@ -193,20 +214,44 @@ fn of_live_rates(resolved: &Resolved, rates: &str, ratio: f64) -> Result<Option<
     ))
 }
 
-/// Warns if the footage of one camera is much shorter than that of another.
+/// Warns of cameras whose footage is much shorter than that of another.
 fn check_lengths(resolved: &Resolved) -> Option<String> {
     if resolved.has_live() {
         return None;
     }
-    let names = resolved.deployment.cameras.iter().map(|it| &it.name);
-    let all: Vec<_> = names
-        .zip(resolved.footage.iter().map(|it| it.n_frames))
+    let names = resolved
+        .deployment
+        .cameras
+        .iter()
+        .map(|it| it.name.as_str());
+    let lengths = resolved.footage.iter().map(|it| it.n_frames);
+    shorter(&names.zip(lengths).collect::<Vec<_>>())
+}
+
+/// The cameras that are much shorter than the longest, and by how much; none if there are none.
+fn shorter(all: &[(&str, u64)]) -> Option<String> {
+    const LEAST_FRAMES: u64 = 5;
+    const LEAST_SHARE: f64 = 0.05;
+    let (long, many) = *all.iter().max_by_key(|it| it.1)?;
+    let is_short = |few: u64| {
+        let missing = many - few;
+        missing >= LEAST_FRAMES && missing as f64 > LEAST_SHARE * many as f64
+    };
+    let short = all.iter().filter(|it| is_short(it.1));
+    let short: Vec<String> = short
+        .map(|(name, few)| {
+            let share = 100.0 * (many - few) as f64 / many as f64;
+            format!(
+                "{name} has {few} frames, {} ({share:.0} %) fewer",
+                many - few
+            )
+        })
         .collect();
-    let (short, few) = all.iter().min_by_key(|it| it.1)?;
-    let (long, many) = all.iter().max_by_key(|it| it.1)?;
-    let is_much = *many >= few + 10 && *many as f64 > 1.1 * *few as f64;
-    is_much.then(|| {
-        format!("{short} has {few} frames, {long} {many}: frames are paired by their numbers; do they begin together, at one rate?")
+    (!short.is_empty()).then(|| {
+        format!(
+            "{} than {long} with {many}: frames are paired by their numbers; do they begin together, at one rate?",
+            short.join(", ")
+        )
     })
 }
 
@@ -218,12 +263,27 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
         .iter()
         .map(|it| FirstImages::of(it, &deployment.capture));
     let first: Vec<Option<FirstImages>> = first.collect();
-    let mut warnings = Vec::new();
+    let cameras = deployment.cameras.iter().zip(&first);
+    let mut warnings: Vec<String> = cameras
+        .filter_map(|(camera, first)| {
+            let brightest = first.as_ref()?.brightest();
+            (brightest < LEAST_BRIGHTEST).then(|| {
+                format!(
+                    "the first pictures of {} ({}) use a small part of their range: the brightest value is {brightest} of 255; are they of \
+                     10 or 12 bits, in 16?",
+                    camera.name, camera.source
+                )
+            })
+        })
+        .collect();
     for (nth, own) in first.iter().enumerate() {
         for (other, theirs) in first[..nth].iter().enumerate() {
             let (Some(own), Some(theirs)) = (own, theirs) else {
                 continue;
             };
+            if !(own.has_contrast && theirs.has_contrast) {
+                continue;
+            }
             let [a, b] = [other, nth].map(|it| &deployment.cameras[it].name);
             if own.rgb == theirs.rgb {
                 let message = format!(
@@ -249,12 +309,14 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
 /// The first images of a camera.
 struct FirstImages {
     rgb: Vec<Vec<u8>>,
+    /// Whether there is something to be seen in the first.
+    has_contrast: bool,
     /// Mean brightness of the cells of the first image, row by row.
     grid: Vec<f64>,
 }
 
 impl FirstImages {
-    /// None for a live or a synthetic camera, for one without pictures, for unreadable footage, and for a first image without contrast.
+    /// None for a live or a synthetic camera, for one without pictures, and for unreadable footage.
     fn of(
         camera: &deployment::capture::Camera,
         capture: &deployment::capture::Config,
@@ -264,10 +326,9 @@ impl FirstImages {
             return None;
         }
         let spec = SourceSpec {
-            start: capture.start_frame,
             step: 5,
             count: Some(2),
-            ..SourceSpec::new(camera.source.clone())
+            ..inputs::source(camera, capture)
         };
         // Unreadable footage is reported where it is read.
         let mut feed = Feed::open(&spec).ok()?;
@@ -279,7 +340,15 @@ impl FirstImages {
         let grid = grid(rgb.first()?, [size.width, size.height]);
         let most = grid.iter().copied().fold(f64::MIN, f64::max);
         let least = grid.iter().copied().fold(f64::MAX, f64::min);
-        (most - least >= MIN_CONTRAST).then_some(Self { rgb, grid })
+        Some(Self {
+            has_contrast: most - least >= MIN_CONTRAST,
+            rgb,
+            grid,
+        })
+    }
+
+    fn brightest(&self) -> u8 {
+        self.rgb.iter().flatten().copied().max().unwrap_or(0)
     }
 
     /// Mean absolute difference of brightness over the cells.
@@ -324,4 +393,19 @@ pub(crate) fn warn(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<(), F
 fn n_cores() -> Option<usize> {
     let known = std::thread::available_parallelism();
     known.ok().map(usize::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_camera_that_is_much_shorter_is_named_with_what_it_lacks() {
+        assert_eq!(shorter(&[("a", 100), ("b", 96)]), None);
+        assert_eq!(shorter(&[("a", 6), ("b", 3)]), None, "too few to say");
+        let text = shorter(&[("a", 30), ("b", 100), ("c", 90)]).unwrap();
+        let due =
+            "a has 30 frames, 70 (70 %) fewer, c has 90 frames, 10 (10 %) fewer than b with 100";
+        assert!(text.starts_with(due), "{text}");
+    }
 }

@@ -289,10 +289,9 @@ impl<'a> View<'a> {
         capture: &deployment::capture::Config,
     ) -> Option<Self> {
         let spec = SourceSpec {
-            start: capture.start_frame,
             step: STEP,
             count: Some(N_PICTURES),
-            ..SourceSpec::new(entry.source.clone())
+            ..inputs::source(entry, capture)
         };
         let mut feed = Feed::open(&spec).ok()?;
         let mut rgb = Vec::new();

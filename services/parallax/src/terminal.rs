@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use offline::Console;
 use runtime::Failure;
 use serde_json::Value;
@@ -26,14 +26,14 @@ impl Terminal {
 
     /// With a progress bar, if standard error is a terminal.
     ///
-    /// * `template`: a template of `indicatif`.
+    /// * `template`: as for [`output::bar_style`].
     pub(crate) fn with_bar(quiet: bool, json: bool, template: &str) -> Self {
         let bar = if quiet || !output::is_terminal() {
             ProgressBar::hidden()
         } else {
             ProgressBar::new(0)
         };
-        if let Ok(style) = ProgressStyle::with_template(template) {
+        if let Some(style) = output::bar_style(template) {
             bar.set_style(style);
         }
         Self { bar, quiet, json }

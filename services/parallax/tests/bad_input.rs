@@ -220,7 +220,7 @@ fn calibrations() {
                 "camera \"a\"",
                 "96x128",
                 "calibrated for 128x96",
-                "source_offset_px",
+                "the size agrees once the pictures are turned",
             ],
         },
         Row {

@@ -80,6 +80,10 @@ fn a_room_from_people_is_made_step_by_step() {
         "{steps:#?}"
     );
     assert!(!case.path("room").exists());
+    let odd = [&["new", "room 1 #a", "--dry-run"], &cameras[..], &rig].concat();
+    let ended = case.start(&odd).wait();
+    let next = "next: parallax run 'room 1 #a/deployment.toml'";
+    assert!(ended.stderr.contains(next), "{}", ended.stderr);
     let ended = new(&["--people", "18"]);
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(

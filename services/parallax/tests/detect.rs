@@ -108,10 +108,10 @@ fn a_picture_is_searched_with_its_orientation_tag_applied() {
         assert!(ended.stdout.contains(said), "{by:?}: {}", ended.stdout);
     }
 
-    // A calibration refers to the pixels as stored: a deployment does not apply the tag, and reports that.
+    // The calibration is of the upright picture: a deployment applies the tag, and reports that.
     fs::copy(case.path("turned.png"), case.path("a/0000.png")).unwrap();
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
-    for words in ["orientation tag", "camera \"a\"", "as they are stored"] {
+    for words in ["orientation tag", "camera \"a\"", "which is done"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
 }

@@ -22,6 +22,25 @@ def c3d():
             "joints": parameters["LABELS"]["value"]}
 
 
+def long():
+    """A C3D file with more frames than 16 bits count: how many there are, and the last one."""
+    import ezc3d
+
+    points = ezc3d.c3d(FOLDER + "long.c3d")["data"]["points"][:3]
+    return {"frames": points.shape[2], "last": or_none(points[:, 0, -1])}
+
+
+def trc():
+    """y up, as OpenSim has it, back to z up."""
+    import opensim
+
+    table = opensim.TimeSeriesTableVec3(FOLDER + "pose3d.trc")
+    rows = [table.getRowAtIndex(it) for it in range(table.getNumRows())]
+    points = [[[row[it][axis] for axis in (2, 0, 1)] for it in range(row.ncol())] for row in rows]
+    return {"points": [[or_none(it) for it in frame] for frame in points],
+            "joints": [it.replace("_", " ") for it in table.getColumnLabels()]}
+
+
 def hierarchy():
     import bvh
 
@@ -62,8 +81,8 @@ def parquet():
     return table(lambda: pandas.read_parquet(FOLDER + "pose3d.parquet"))
 
 
-READERS = {"c3d": (c3d, ["ezc3d"]), "bvh": (hierarchy, ["bvh"]), "glb": (scene, ["pygltflib"]), "csv": (csv, ["pandas"]),
-           "parquet": (parquet, ["pandas", "pyarrow"])}
+READERS = {"c3d": (c3d, ["ezc3d"]), "long": (long, ["ezc3d"]), "trc": (trc, ["opensim"]), "bvh": (hierarchy, ["bvh"]),
+           "glb": (scene, ["pygltflib"]), "csv": (csv, ["pandas"]), "parquet": (parquet, ["pandas", "pyarrow"])}
 said = {}
 for name in sys.argv[2:]:
     read, packages = READERS[name]

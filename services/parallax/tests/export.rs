@@ -123,32 +123,41 @@ fn check_positions(case: &Case) {
     }
 }
 
-/// The same by programs of others, where Python has them.
-fn check_with_python(case: &Case) {
+/// What programs of others read of a folder, by format; those that Python lacks are left out, and named.
+fn read_by_python<'a>(folder: &Path, formats: &[&'a str]) -> Vec<(&'a str, Value)> {
     const SCRIPT: &str = include_str!("export.py");
-    let mut formats = vec!["c3d", "bvh", "glb", "csv"];
-    if cfg!(feature = "parquet") {
-        formats.push("parquet");
-    }
     let read = Command::new("python3")
         .args(["-c", SCRIPT])
-        .arg(case.path("out/export"))
-        .args(&formats)
+        .arg(folder)
+        .args(formats)
+        .current_dir(folder)
         .output();
     let Ok(read) = read else {
         eprintln!("skipped: no python3");
-        return;
+        return Vec::new();
     };
     let complaint = String::from_utf8_lossy(&read.stderr);
     assert!(read.status.success(), "{complaint}");
-    let said: Value = serde_json::from_slice(&read.stdout).unwrap();
+    // Some of them print notices of their own before.
+    let text = String::from_utf8_lossy(&read.stdout);
+    let said: Value = serde_json::from_str(text.lines().last().unwrap_or_default()).unwrap();
+    let all = formats.iter().map(|&it| (it, said[it].clone()));
+    let (lacking, found): (Vec<_>, Vec<_>) = all.partition(|it| it.1.is_null());
+    for (format, _) in lacking {
+        eprintln!("skipped: Python has no package that reads {format} (see .ci/run)");
+    }
+    found
+}
+
+/// The same by programs of others, where Python has them.
+fn check_with_python(case: &Case) {
+    let mut formats = vec!["c3d", "trc", "bvh", "glb", "csv"];
+    if cfg!(feature = "parquet") {
+        formats.push("parquet");
+    }
     let found = found(case);
-    for format in formats {
-        let said = &said[format];
-        if said.is_null() {
-            eprintln!("skipped: Python has no package that reads {format} (see .ci/run)");
-            continue;
-        }
+    for (format, said) in read_by_python(&case.path("out/export"), &formats) {
+        let said = &said;
         match format {
             "glb" => {
                 let is_moved = said["keys"] == json!([N_FRAMES]);
@@ -162,6 +171,101 @@ fn check_with_python(case: &Case) {
             }
             _ => check_points(format, said, &found),
         }
+    }
+}
+
+/// Joints that are missing anywhere in a row, whole rows, and more frames than 16 bits count.
+#[test]
+fn programs_of_others_open_gaps_and_long_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let joints = ["right_ankle", "neck", "head"];
+    let frames: Vec<Vec<Option<[f64; 3]>>> = (0..8)
+        .map(|missing| {
+            let place =
+                |joint: usize| (missing >> joint & 1 == 0).then_some([joint as f64, 1.0, 2.0]);
+            (0..3).map(place).collect()
+        })
+        .collect();
+    let heading = trc::Heading {
+        file_name: "pose3d.trc",
+        rate_hz: 60.0,
+        units: "m",
+        markers: &joints,
+        n_rows: 8,
+    };
+    let rows = frames.iter().enumerate().map(|(nth, frame)| {
+        // y up.
+        let turned = frame.iter().map(|it| it.map(|[x, y, z]| [y, z, x]));
+        trc::row(nth as u64 + 1, nth as f64 / 60.0, turned)
+    });
+    let text = heading.to_string() + &rows.collect::<String>();
+    fs::write(folder.path().join("pose3d.trc"), text).unwrap();
+
+    let heading = c3d::Heading {
+        rate_hz: 60.0,
+        units: "mm",
+        up: "+Z",
+        labels: &["head".to_owned()],
+        descriptions: &[],
+        n_frames: 70_000,
+        first_frame: 1,
+        residual_step: 0.5,
+        software: ["test", "1"],
+    };
+    let marker = |nth: u32| c3d::Marker {
+        position: [f64::from(nth), 2.0, 3.0],
+        residual: 1.0,
+        cameras: 1,
+    };
+    let mut file = Vec::new();
+    c3d::write(
+        &mut file,
+        &heading,
+        (1..=70_000).map(|it| vec![Some(marker(it))]),
+    )
+    .unwrap();
+    fs::write(folder.path().join("long.c3d"), file).unwrap();
+
+    for (format, said) in read_by_python(folder.path(), &["trc", "long"]) {
+        if format == "long" {
+            assert_eq!(
+                said,
+                json!({ "frames": 70_000, "last": [70_000.0, 2.0, 3.0] })
+            );
+            continue;
+        }
+        let read: Vec<Vec<Option<[f64; 3]>>> =
+            serde_json::from_value(said["points"].clone()).unwrap();
+        assert_eq!(read, frames);
+    }
+}
+
+#[test]
+fn joints_have_the_names_of_opensim_models_where_asked_for() {
+    let case = Case::new("export-names", &[2; 2], PLAIN);
+    let ended = case.start(&["run", "deployment.toml"]).wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(
+        !case.path("out/pose3d.trc").exists(),
+        "nothing tells its rate"
+    );
+    let told = [
+        "--to",
+        "trc,c3d,csv,csv-long",
+        "--rate",
+        "20",
+        "--up",
+        "0,0,1",
+    ];
+    let said = done(&case, "out", &[&told[..], &["--names", "opensim"]].concat());
+    let trc = fs::read_to_string(case.path("out/export/pose3d.trc")).unwrap();
+    let trc = Trc::parse(&trc).unwrap().markers;
+    let c3d = C3d::parse(&fs::read(case.path("out/export/pose3d.c3d")).unwrap()).unwrap();
+    assert_eq!(trc[..3], ["RAnkle", "RKnee", "RHip"]);
+    assert_eq!((c3d.labels(), &said["points"]), (&trc[..], &json!(trc)));
+    for (file, due) in [("pose3d.csv", "LWrist_x_m,"), ("pose3d-long.csv", ",Head,")] {
+        let text = fs::read_to_string(case.path("out/export").join(file)).unwrap();
+        assert!(text.contains(due), "{file}");
     }
 }
 

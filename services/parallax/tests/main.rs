@@ -37,5 +37,6 @@ mod search_size;
 mod smooth;
 mod sync;
 mod synth;
+mod told;
 mod train;
 mod view;

@@ -35,6 +35,11 @@ fn text(folder: &Path, name: &str) -> String {
 fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     const N_FRAMES: usize = 6;
     let case = Case::new("again", &[N_FRAMES; 3], PLAIN);
+    case.edit(
+        "deployment.toml",
+        "upright = false",
+        "upright = false\nframe_rate_hz = 20",
+    );
     let report = recorded(&case, &[]);
     let recording = &report["recording"];
     assert_eq!(recording["complete"], json!(true), "{recording:#}");

@@ -79,7 +79,8 @@ impl Output {
         }
         let (pose3d_jsonl, pose2d_jsonl) = (lines(FrameLine::FILE)?, lines(ViewLine::FILE)?);
         let times_jsonl = lines(TimesLine::FILE)?;
-        let trc_rows = if config.trc { Some(lines(TRC)?) } else { None };
+        let has_trc = config.trc && scene.frame_rate_hz.is_some();
+        let trc_rows = if has_trc { Some(lines(TRC)?) } else { None };
         let overlays = if config.overlay_every > 0 {
             Some(folder.folder("overlays")?)
         } else {
@@ -248,7 +249,9 @@ impl Output {
         let (path, headed) = (self.folder.part(TRC), self.folder.part("pose3d.trc.head"));
         let rows = fs::read_to_string(&path)?;
         let n_rows = rows.lines().count() as u64;
-        let written = fs::write(&headed, trc::header(&self.scene, n_rows) + &rows);
+        // Without a rate there are no rows.
+        let rate_hz = self.scene.frame_rate_hz.unwrap_or_default();
+        let written = fs::write(&headed, trc::header(&self.scene, rate_hz, n_rows) + &rows);
         if let Err(error) = written {
             // The rows stay as they are.
             fs::remove_file(&headed)?;
@@ -353,6 +356,20 @@ mod tests {
         assert_eq!(text(&dir, "pose2d.jsonl").lines().count(), 4);
         let trc = ::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
         assert_eq!(trc.frames.len(), 2);
+    }
+
+    #[test]
+    fn a_file_that_must_say_the_rate_is_not_written_where_nothing_tells_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = Folder::open(dir.path(), false).unwrap();
+        let scene = Scene {
+            frame_rate_hz: None,
+            ..scene()
+        };
+        let mut output = Output::begin(scene, &Config::default(), 1, folder).unwrap();
+        output.frame(&record(0));
+        assert_eq!(output.finish(1).writes_failed, 0);
+        assert!(!dir.path().join("pose3d.trc").exists());
     }
 
     #[test]

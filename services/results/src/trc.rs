@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use crate::Scene;
 use crate::pose3d::{is_placed, joints, keypoints};
 
-/// One row, with its end; a missing joint leaves its three cells empty.
+/// One row, with its end; the three cells of a missing joint are `NaN`.
 ///
 /// * `row`: number of the row, from 1.
 pub(crate) fn row(scene: &Scene, row: u64, pose: &Pose3d) -> String {
@@ -20,15 +20,16 @@ pub(crate) fn row(scene: &Scene, row: u64, pose: &Pose3d) -> String {
 
 /// The five lines before the rows.
 ///
+/// * `rate_hz`: frames of the footage per second.
 /// * `n_rows`: rows that follow.
-pub(crate) fn header(scene: &Scene, n_rows: u64) -> String {
-    let rate = scene.frame_rate_hz.unwrap_or(1.0) / scene.frame_step.max(1) as f64;
+pub(crate) fn header(scene: &Scene, rate_hz: f64, n_rows: u64) -> String {
+    let rate_hz = rate_hz / scene.frame_step.max(1) as f64;
     let joints = scene.joints.joints.iter().map(|it| it.name);
     let names = joints.chain(scene.extra_keypoints.iter().map(String::as_str));
     let names: Vec<String> = names.map(|it| it.replace(' ', "_")).collect();
     let heading = ::trc::Heading {
         file_name: "pose3d.trc",
-        rate_hz: rate,
+        rate_hz,
         units: "m",
         markers: &names.iter().map(String::as_str).collect::<Vec<_>>(),
         n_rows,
@@ -46,7 +47,7 @@ mod tests {
 
     fn written(poses: Vec<Pose3d>) -> Trc {
         let scene = scene();
-        let mut text = header(&scene, poses.len() as u64);
+        let mut text = header(&scene, 60.0, poses.len() as u64);
         for (index, pose) in poses.into_iter().enumerate() {
             text.push_str(&row(&scene, index as u64 + 1, &pose));
         }
@@ -74,7 +75,7 @@ mod tests {
         let mut pose = pose3d(0);
         pose.n_keypoints = 1;
         pose.keypoints[0].in_world = [-0.25, 0.5, 1.75];
-        let text = header(&scene, 1) + &row(&scene, 1, &pose);
+        let text = header(&scene, 60.0, 1) + &row(&scene, 1, &pose);
         let got = Trc::parse(&text).unwrap();
         assert_eq!(got.markers[14], "left_heel");
         assert_eq!(got.frames[0][14], Some([0.5, 1.75, -0.25]));

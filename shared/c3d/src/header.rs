@@ -22,7 +22,8 @@ pub(crate) struct Header {
 impl Header {
     /// Reads the first block.
     ///
-    /// Frames are numbered with 16 bits; at the largest number, `POINT:FRAMES` may have more.
+    /// Frames are numbered with 16 bits; at the largest number, parameters may have more: `POINT:LONG_FRAMES`, `POINT:FRAMES` as
+    /// a real, or the two words of `TRIAL:ACTUAL_END_FIELD`.
     pub(crate) fn read(bytes: Bytes<'_>, parameters: &Parameters<'_>) -> Result<Self, C3dError> {
         const WHAT: &str = "the header";
         let word = |nth: usize| bytes.u16(2 * (nth - 1), WHAT);
@@ -36,12 +37,17 @@ impl Header {
             return Err(C3dError::Frames { first, last });
         }
         let mut n_frames = (last - first + 1) as usize;
-        if last == u32::from(u16::MAX)
-            && let Some(more) = parameters.number("POINT", "FRAMES")
-            && more > n_frames as f64
-            && more < 1e9
-        {
-            n_frames = more as usize;
+        if last == u32::from(u16::MAX) {
+            let end = parameters.double_word("TRIAL", "ACTUAL_END_FIELD");
+            let start = parameters.double_word("TRIAL", "ACTUAL_START_FIELD");
+            let told = [
+                parameters.number("POINT", "LONG_FRAMES"),
+                parameters.number("POINT", "FRAMES"),
+                end.map(|it| it - start.unwrap_or(1.0) + 1.0),
+            ];
+            let is_more = |it: &f64| *it > n_frames as f64 && *it < 1e9;
+            let more = told.into_iter().flatten().find(is_more);
+            n_frames = more.map_or(n_frames, |it| it as usize);
         }
         let rate = f64::from(bytes.f32(20, WHAT)?);
         let is_rate = |it: &f64| it.is_finite() && *it > 0.0;

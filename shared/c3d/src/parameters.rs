@@ -145,6 +145,16 @@ impl<'a> Parameters<'a> {
             _ => None,
         }
     }
+
+    /// A whole number of 32 bits, as two words, the lower first; none for a parameter of any other form.
+    pub(crate) fn double_word(&self, group: &str, name: &str) -> Option<f64> {
+        let parameter = self.get(group, name).filter(|it| it.kind == 2)?;
+        let &[a, b, c, d] = parameter.data else {
+            return None;
+        };
+        let [low, high] = [[a, b], [c, d]].map(|it| f64::from(self.bytes.u16_of(it)));
+        Some(high * 65536.0 + low)
+    }
 }
 
 /// Latin-1 text, without surrounding blanks.

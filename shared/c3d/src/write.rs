@@ -99,6 +99,10 @@ pub fn write(
         let due = heading.n_frames;
         return Err(refused(&format!("{n_frames} frames, {due} were announced")));
     }
+    if heading.n_frames > u32::from(u16::MAX) {
+        // Readers such as `ezc3d` count the frames of long files to the end: what fills the last block would be more of them.
+        return Ok(());
+    }
     out.write_all(&vec![0; n_bytes.next_multiple_of(BLOCK) - n_bytes])
 }
 
@@ -250,11 +254,10 @@ fn section(heading: &Heading<'_>, data_block: u16) -> Vec<u8> {
     all.real("SCALE", -heading.residual_step);
     all.real("RATE", heading.rate_hz);
     all.word("DATA_START", data_block);
+    // A whole number, which some readers insist on; longer files have their number in LONG_FRAMES and in TRIAL.
+    all.word("FRAMES", clamped(heading.n_frames));
     if heading.n_frames > u32::from(u16::MAX) {
-        all.real("FRAMES", f64::from(heading.n_frames));
         all.real("LONG_FRAMES", f64::from(heading.n_frames));
-    } else {
-        all.word("FRAMES", heading.n_frames as u16);
     }
     all.texts("LABELS", heading.labels);
     if !heading.descriptions.is_empty() {

@@ -34,6 +34,13 @@ pub struct Camera {
     /// Where the source's top-left pixel lies on the calibrated image, `[x, y]` pixels, for a source
     /// that lacks rows or columns of it. Without it the sizes must be equal.
     pub source_offset_px: Option<[u32; 2]>,
+    /// Footage: how its pictures are turned before they are used, degrees to the right, `0` (as they are stored), `90`, `180` or `270`; or
+    /// `"tag"`, as the file asks (EXIF, display matrix). Without it as the calibration is: by the size of its pictures, else by where up is
+    /// in them.
+    pub rotate: Option<Rotate>,
+    /// Numbered pictures: the number in the name of frame 0, and by how much numbers rise from frame to frame. Without it by the numbers
+    /// of all cameras: one that is missing is a frame without a picture of that camera.
+    pub numbers: Option<[u64; 2]>,
     /// Footage: what is added to its times to have those that all cameras have in common, milliseconds: a camera that was started
     /// 2 s after the reference has 2000. `parallax sync estimate` finds it. Frames are brought to common instants by it.
     pub offset_ms: Option<f64>,
@@ -63,6 +70,27 @@ pub struct Camera {
     #[serde(default, skip_serializing_if = "Faults::is_empty")]
     #[schemars(with = "String")]
     pub fault: Faults,
+}
+
+/// How the pictures of footage are turned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected 0, 90, 180 or 270 degrees to the right, or \"tag\""
+)]
+pub enum Rotate {
+    /// By so many degrees to the right.
+    Degrees(u16),
+    /// As the file asks.
+    Tag(Tag),
+}
+
+/// The word `tag`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Tag {
+    /// As the file asks.
+    Tag,
 }
 
 /// How the packets of an RTSP camera travel.

@@ -38,6 +38,7 @@ mod reference;
 mod rules;
 mod schema;
 mod shipped;
+mod slips;
 mod timeline;
 mod topology;
 

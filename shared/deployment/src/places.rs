@@ -5,8 +5,8 @@ use std::path::Path;
 
 use toml::de::{DeTable, DeValue};
 
-use crate::ConfigError;
 use crate::older::OLDER;
+use crate::{ConfigError, slips};
 
 /// `file:line` of a span; the file alone where there is none.
 pub(super) fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> String {
@@ -45,14 +45,15 @@ pub(super) fn span_of_any(text: &str, key: &str) -> Option<Range<usize>> {
 /// What is wrong with the text of a file, with its line and its key.
 pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> ConfigError {
     let place = place(file, text, error.span());
-    let is_rig = text
-        .lines()
-        .any(|it| it.starts_with("format = \"parallax-rig\""));
-    if is_rig {
-        let message = "this is a rig file: name the deployment file, whose `rig` it is".to_owned();
+    let at = error.span();
+    let line = at.as_ref().and_then(|it| {
+        let begin = text.get(..it.start)?.rfind('\n').map_or(0, |it| it + 1);
+        text[begin..].lines().next()
+    });
+    if let Some(message) = slips::other_file(text).or_else(|| slips::of_line(line?)) {
+        let message = message.to_owned();
         return ConfigError::Malformed { place, message };
     }
-    let at = error.span();
     let key = match &at {
         // The document cannot be read then: the slice is the key itself.
         Some(span) if error.message().starts_with("duplicate key") => {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Results")]
 pub struct Config {
-    /// Write `pose3d.trc` for `OpenSim`.
+    /// Write `pose3d.trc` for `OpenSim`, where the frame rate is known.
     pub trc: bool,
     /// Draw every n-th frame of every view; 0 draws none.
     pub overlay_every: u64,

@@ -4,7 +4,8 @@ use crate::complaint::{Complaint, demand, not_negative, positive, whole};
 use crate::older::OLDER;
 use crate::topology::{process_name, services};
 use crate::{
-    Deployment, Machine, capture, fuse, hosts, is_shipped, limits, pose, quality, triangulate,
+    Deployment, Machine, capture, fuse, hosts, is_shipped, limits, pose, quality, slips,
+    triangulate,
 };
 
 /// Checks the values that the types alone do not.
@@ -17,6 +18,9 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
             &format!("{unit:?}"),
             "\"m\", \"cm\", \"mm\", \"ft\", \"in\", or a length such as \"30mm\", the squares of the board",
         )?;
+    }
+    for (key, path) in [("rig", &it.rig), ("output", &it.output)] {
+        is_path(key, &path.to_string_lossy())?;
     }
     cameras(it)?;
     capture(&it.capture)?;
@@ -99,6 +103,16 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
     Ok(())
 }
 
+/// A path without what a backslash makes in double quotes.
+fn is_path(key: &str, path: &str) -> Result<(), Complaint> {
+    demand(
+        !path.chars().any(char::is_control),
+        key,
+        &format!("{path:?}"),
+        &format!("a path without special characters: {}", slips::ESCAPE),
+    )
+}
+
 /// What a camera sees: footage, keypoints, or both.
 fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
     demand(
@@ -107,6 +121,19 @@ fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
         &format!("left out of camera {:?}", camera.name),
         "its footage: every [[camera]] needs that, or `keypoints` that another program found in it",
     )?;
+    is_path("camera.source", &camera.source)?;
+    if let Some(capture::Rotate::Degrees(degrees)) = camera.rotate {
+        demand(
+            degrees % 90 == 0 && degrees < 360,
+            "camera.rotate",
+            &degrees.to_string(),
+            "0, 90, 180 or 270 degrees to the right, or \"tag\"",
+        )?;
+    }
+    if let Some([_, step]) = camera.numbers {
+        let expected = "[first, step], the step at least 1";
+        demand(step > 0, "camera.numbers", &step.to_string(), expected)?;
+    }
     let Some(names) = &camera.keypoint_names else {
         return Ok(());
     };

@@ -86,9 +86,8 @@ impl Timeline {
 impl Deployment {
     /// Whether the footage of a camera has an offset or a drift, so that frames are brought to common instants.
     pub fn has_clocks(&self) -> bool {
-        let is_other = |it: Option<f64>| it.is_some_and(|it| it != 0.0);
         let mut cameras = self.cameras.iter();
-        cameras.any(|it| is_other(it.offset_ms) || is_other(it.drift_ppm))
+        cameras.any(|it| it.offset_ms.is_some() || it.drift_ppm.is_some_and(|it| it != 0.0))
     }
 
     /// The clock of a camera's footage.

@@ -66,7 +66,7 @@ pub const FILES: &[FileFormat] = &[
         suffix: ".trc",
         unit: "m",
         axes: "y up",
-        gaps: "empty cells",
+        gaps: "NaN",
         uncertainty: "none",
         needs: ALL,
         write: points::trc,

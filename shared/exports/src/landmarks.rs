@@ -3,25 +3,7 @@
 use nalgebra::Point3;
 
 use crate::Trial;
-
-/// A landmark of the body, and the joints of the sets that are it: the first that a set has.
-const LANDMARKS: [(&str, &[&str]); 15] = [
-    ("pelvis", &["pelvis", "torsoDistal"]),
-    ("neck", &["neck", "thorax", "torsoProximal"]),
-    ("head", &["head", "headDistal"]),
-    ("left shoulder", &["left shoulder", "upperLArmProximal"]),
-    ("left elbow", &["left elbow", "upperLArmDistal"]),
-    ("left wrist", &["left wrist", "lowerLArmDistal"]),
-    ("right shoulder", &["right shoulder", "upperRArmProximal"]),
-    ("right elbow", &["right elbow", "upperRArmDistal"]),
-    ("right wrist", &["right wrist", "lowerRArmDistal"]),
-    ("left hip", &["left hip", "upperLLegProximal"]),
-    ("left knee", &["left knee", "upperLLegDistal"]),
-    ("left ankle", &["left ankle", "lowerLLegDistal"]),
-    ("right hip", &["right hip", "upperRLegProximal"]),
-    ("right knee", &["right knee", "upperRLegDistal"]),
-    ("right ankle", &["right ankle", "lowerRLegDistal"]),
-];
+use crate::naming::LANDMARKS;
 
 /// Which points of a trial are the landmarks.
 #[derive(Debug, Clone, PartialEq)]

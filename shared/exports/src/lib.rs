@@ -7,7 +7,7 @@
 //! | format | unit | axes | a gap is |
 //! |---|---|---|---|
 //! | [`c3d`](FILES) | mm | z up | residual -1 |
-//! | `trc` | m | y up | empty cells |
+//! | `trc` | m | y up | NaN |
 //! | `glb` | m | y up | a bone that is not there (scale 0) |
 //! | `bvh` | cm | y up | the last rotation, and said: the format knows no gaps |
 //! | `csv`, `csv-long` | m | the rig's | empty cells |
@@ -20,6 +20,7 @@
 mod trial;
 
 mod landmarks;
+mod naming;
 mod tree;
 
 mod format;
@@ -38,6 +39,7 @@ pub mod annotate;
 pub mod openpose;
 
 pub use format::{FILES, FileFormat, Needs};
+pub use naming::Naming;
 pub use sink::{Notes, Sink};
 pub use trial::{Gap, Gathering, Point, Slot, Trial, TrialError};
 pub use view::{Seen, ViewCamera};

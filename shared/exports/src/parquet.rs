@@ -51,7 +51,7 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
     let schema = Arc::new(parse_message_type(SCHEMA)?);
     let properties = Arc::new(WriterProperties::builder().build());
     let mut file = SerializedFileWriter::new(out, schema, properties)?;
-    let names: Vec<&str> = trial.names().collect();
+    let names = trial.written_names();
     for begin in (0..trial.slots.len()).step_by(GROUP) {
         let end = (begin + GROUP).min(trial.slots.len());
         let places = (begin..end).flat_map(|slot| (0..names.len()).map(move |nth| (slot, nth)));
@@ -63,7 +63,7 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
             .collect();
         column::<Int64Type, _>(&mut group, &frames, None)?;
         numbers(&mut group, places.iter().map(|it| trial.time_s(it.0)))?;
-        texts(&mut group, places.iter().map(|it| names[it.1].to_owned()))?;
+        texts(&mut group, places.iter().map(|it| names[it.1].clone()))?;
         let point = |it: &(usize, usize)| trial.point(it.0, it.1);
         for axis in 0..3 {
             numbers(

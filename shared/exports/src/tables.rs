@@ -62,12 +62,12 @@ pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
 pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut table = csv::Writer::from_writer(out);
     table.write_record(LONG)?;
-    let names: Vec<&str> = trial.names().collect();
+    let names = trial.written_names();
     for slot in 0..trial.slots.len() {
         let [frame, time_s] = [trial.frame(slot).to_string(), cell(trial.time_s(slot))];
         for (nth, name) in names.iter().enumerate() {
             let point = trial.point(slot, nth);
-            let mut row = vec![frame.clone(), time_s.clone(), (*name).to_owned()];
+            let mut row = vec![frame.clone(), time_s.clone(), name.clone()];
             row.extend(place(point));
             row.extend((0..6).map(|it| cell(point.map(|point| point.covariance[it]))));
             row.push(cell(point.and_then(|it| it.reprojection_px)));

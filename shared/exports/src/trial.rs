@@ -6,6 +6,8 @@ use nalgebra::{Matrix3, Point3, Rotation3, UnitVector3};
 use runfiles::{FrameLine, JointLine};
 use skeleton::JointSet;
 
+use crate::Naming;
+
 /// Most places on the grid: a day at 50 Hz, and a number of a frame that is not one.
 const MAX_SLOTS: u64 = 5_000_000;
 /// A coordinate beyond this counts as missing, metres.
@@ -63,6 +65,8 @@ pub struct Slot {
 pub struct Trial {
     /// What the files call the run.
     pub name: String,
+    /// What the files call the points.
+    pub naming: Naming,
     /// The joints.
     pub joints: &'static JointSet,
     /// Names of the points after the joints: what networks name beside them.
@@ -92,9 +96,15 @@ impl Trial {
         joints.chain(self.extras.iter().map(String::as_str))
     }
 
+    /// Names of all points in files of text.
+    pub fn written_names(&self) -> Vec<String> {
+        self.names().map(|it| self.naming.apply(it)).collect()
+    }
+
     /// The same with underscores for blanks, as formats of motion capture want.
     pub fn labels(&self) -> Vec<String> {
-        self.names().map(|it| it.replace(' ', "_")).collect()
+        let names = self.written_names().into_iter();
+        names.map(|it| it.replace(' ', "_")).collect()
     }
 
     /// How many points a place has.
@@ -339,6 +349,7 @@ impl Gathering {
         let n_points = joints.joints.len() + self.extras.len();
         let mut trial = Trial {
             name: name.to_owned(),
+            naming: Naming::default(),
             joints,
             extras: self.extras,
             views: self.views,

@@ -10,9 +10,12 @@ mod error;
 mod size;
 mod source;
 mod spec;
+mod turn;
 
+mod http;
 mod pieces;
 mod pixels;
+mod programs;
 mod remade;
 mod sender;
 mod stream;
@@ -36,9 +39,11 @@ pub use pixels::PixelFormat;
 pub use remade::RemadeStream;
 pub use size::Size;
 pub use source::{
-    FrameView, LiveAddress, RecordedSound, Source, SourceInfo, SourceKind, Turn, is_address,
-    is_image, is_live, read_image, read_sound, read_upright, without_passwords,
+    Complaints, Counting, Depth, FrameView, LiveAddress, RecordedSound, Source, SourceInfo,
+    SourceKind, is_address, is_image, is_live, picture_numbers, read_image, read_sound,
+    read_upright, stored, without_passwords,
 };
-pub use spec::SourceSpec;
+pub use spec::{PictureNumbers, SourceSpec};
 pub use stream::{LiveStream, StreamEnd, StreamFrame, StreamSpec, Transport};
+pub use turn::{Rotation, Turn};
 pub use warp::{Affine, Fill, Warp, WarpError, resize_map};

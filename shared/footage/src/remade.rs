@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use std::process::{ChildStdout, Command, Stdio};
 use std::sync::{Arc, Mutex};
 
+use crate::programs::version_of;
 use crate::source::log::Log;
 use crate::source::probe::missing;
-use crate::stream::{SHARE, outputs, version_of};
+use crate::stream::{SHARE, outputs};
 use crate::{FootageError, Size, StreamEnd};
 
 /// A running decoder of pieces. It is killed when this is dropped.

@@ -5,6 +5,7 @@ mod images;
 mod listing;
 mod live;
 pub(crate) mod log;
+mod numbers;
 pub(crate) mod password;
 pub(crate) mod probe;
 mod sound;
@@ -12,17 +13,19 @@ mod video;
 
 use std::path::Path;
 
-pub use decode::Turn;
+pub use decode::Depth;
 pub(crate) use decode::{jpeg_into, jpeg_is_whole};
 use images::{Images, Still};
 pub use images::{is_image, read_image, read_upright};
 use listing::Listing;
 pub use live::{LiveAddress, is_address, is_live};
+pub use log::Complaints;
+pub use numbers::{Counting, picture_numbers};
 pub use password::without_passwords;
 pub use sound::{RecordedSound, read_sound};
 use video::Video;
 
-use crate::{FootageError, Size, SourceSpec};
+use crate::{FootageError, Size, SourceSpec, Turn};
 
 /// Kind of footage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -38,7 +41,7 @@ pub enum SourceKind {
 /// What is known of footage before its first frame is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceInfo {
-    /// Size of every frame.
+    /// Size of every frame, as it is handed out.
     pub size: Size,
     /// Number of frames to be read. A damaged video may have fewer; that is an error while reading.
     pub n_frames: u64,
@@ -46,8 +49,12 @@ pub struct SourceInfo {
     pub frame_rate_hz: Option<f64>,
     /// Kind of footage.
     pub kind: SourceKind,
-    /// The orientation tag of the first image, which is not applied; see [`Source`]. Unknown for a video.
-    pub turn: Turn,
+    /// What the tag of the first image or of the video asks, whether it is done or not; see [`Rotation`](crate::Rotation).
+    pub tag: Turn,
+    /// How many bits images with 16 use, where these are fewer: they are scaled by that.
+    pub depth: Option<Depth>,
+    /// Whether every picture of a video is two, of different moments, line by line.
+    pub is_interlaced: bool,
 }
 
 /// One frame of footage.
@@ -67,9 +74,8 @@ pub struct FrameView<'a> {
 /// frames are equally spaced.
 ///
 /// All frames have one size, and are 8-bit RGB whatever the file holds: grey is replicated, an alpha
-/// channel dropped, 16 bits are rounded to 8. Orientation tags (EXIF, or the display matrix of a
-/// phone's video) are ignored, because a calibration refers to pixels as they are stored; [`read_upright`]
-/// applies them.
+/// channel dropped, 16 bits are rounded to 8, and scaled where the pictures use fewer. Orientation tags (EXIF, or the display
+/// matrix of a phone's video) are applied as [`SourceSpec::rotation`] says.
 ///
 /// ```no_run
 /// use footage::{Source, SourceSpec};
@@ -109,11 +115,11 @@ impl Source {
         spec.check()?;
         let (path, reader) = match listing::list(&spec.path)? {
             Listing::Images(paths) => {
-                let images = Images::open(paths, spec)?;
+                let images = Images::open(numbers::frames(paths, spec.numbers), spec)?;
                 (images.first().to_path_buf(), Reader::Images(images))
             }
             Listing::File(path) if is_image(&path)? => {
-                let still = Still::open(&path, spec.count.unwrap_or(1))?;
+                let still = Still::open(&path, spec.count.unwrap_or(1), spec.rotation)?;
                 (path, Reader::Still(still))
             }
             Listing::File(path) => {
@@ -182,9 +188,17 @@ impl Source {
         Ok(read.map(|(index, time_s)| FrameView { index, time_s, rgb }))
     }
 
+    /// What the decoder of a video has complained about so far; nothing for images.
+    pub fn complaints(&self) -> Complaints {
+        match &self.reader {
+            Reader::Video(video) => video.complaints(),
+            Reader::Images(_) | Reader::Still(_) => Complaints::default(),
+        }
+    }
+
     /// Skips the next `n` frames, and returns how many there were.
     ///
-    /// Images are not opened; the frames of a video have to be decoded.
+    /// Images are not opened, and a frame without one counts; the frames of a video have to be decoded.
     ///
     /// # Errors
     ///
@@ -193,7 +207,10 @@ impl Source {
         for n_skipped in 0..n {
             let is_there = match &mut self.reader {
                 Reader::Video(_) => self.next_frame()?.is_some(),
-                Reader::Images(images) if !self.is_over => self.clock.tick(images.skip_one()),
+                Reader::Images(images) if !self.is_over => {
+                    let is_there = images.skip_one(self.clock.index);
+                    self.clock.tick(is_there)
+                }
                 Reader::Still(still) if !self.is_over => self.clock.tick(still.skip_one()),
                 Reader::Images(_) | Reader::Still(_) => false,
             };
@@ -212,12 +229,8 @@ impl Source {
         // Also after an error there are no more frames.
         self.is_over = true;
         let is_there = match &mut self.reader {
-            Reader::Images(images) => images.read_into(rgb)?,
-            Reader::Video(video) => {
-                let index = video.read_into(rgb)?;
-                self.clock.index = index.unwrap_or(self.clock.index);
-                index.is_some()
-            }
+            Reader::Images(images) => self.clock.set(images.read_into(rgb)?),
+            Reader::Video(video) => self.clock.set(video.read_into(rgb)?),
             Reader::Still(still) => still.read_into(rgb),
         };
         self.is_over = !is_there;
@@ -231,20 +244,40 @@ impl Reader {
         let (kind, size, n_frames) = match self {
             Self::Still(still) => (SourceKind::Still, still.size, still.n_left),
             Self::Images(images) => (SourceKind::Images, images.size, images.n_frames),
-            Self::Video(video) => (SourceKind::Video, video.probe.size, video.n_frames),
+            Self::Video(video) => (SourceKind::Video, video.size, video.n_frames),
         };
         SourceInfo {
             size,
             n_frames,
             frame_rate_hz,
             kind,
-            turn: match self {
-                Self::Still(still) => still.turn,
-                Self::Images(images) => images.turn,
-                Self::Video(_) => Turn::default(),
+            tag: match self {
+                Self::Still(still) => still.tag,
+                Self::Images(images) => images.tag,
+                Self::Video(video) => video.probe.tag,
             },
+            depth: match self {
+                Self::Still(still) => still.depth,
+                Self::Images(images) => images.depth(),
+                Self::Video(_) => None,
+            },
+            is_interlaced: matches!(self, Self::Video(video) if video.probe.is_interlaced),
         }
     }
+}
+
+/// The size of the pictures of footage as they are stored, and what the tag of the first one asks; quicker than to open it.
+///
+/// # Errors
+///
+/// As [`Source::open`].
+pub fn stored(spec: &SourceSpec) -> Result<(Size, Turn), FootageError> {
+    let image = match listing::list(&spec.path)? {
+        Listing::Images(paths) => paths.into_iter().next().unwrap_or_default(),
+        Listing::File(path) if is_image(&path)? => path,
+        Listing::File(path) => return probe::stored(&path, spec),
+    };
+    images::stored(&image)
 }
 
 /// Index and time of the next frame.
@@ -279,6 +312,12 @@ impl Clock {
             .as_ref()
             .and_then(|times_s| times_s.get(self.index as usize));
         (self.index, listed.copied().or_else(by_rate))
+    }
+
+    /// Goes to the frame that was read, if there was one.
+    fn set(&mut self, index: Option<u64>) -> bool {
+        self.index = index.unwrap_or(self.index);
+        index.is_some()
     }
 
     /// Advances by one frame if there was one, and returns `was_there`.

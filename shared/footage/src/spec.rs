@@ -2,7 +2,16 @@
 
 use std::path::PathBuf;
 
-use crate::FootageError;
+use crate::{FootageError, Rotation};
+
+/// Which numbers in the names of pictures are frames: `first`, `first + step`, ...
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PictureNumbers {
+    /// The number of frame 0.
+    pub first: u64,
+    /// By how much it rises from frame to frame, at least 1.
+    pub step: u64,
+}
 
 /// Footage as named by the user, and which of its frames to read.
 ///
@@ -13,7 +22,7 @@ pub struct SourceSpec {
     /// One of: a folder of images; a glob (`frames/*.png`); a numbered pattern (`frames/%05d.png`);
     /// an image; a video. A path that exists is never taken as a pattern, whatever it contains.
     pub path: String,
-    /// First frame, from 0. For a numbered pattern this counts files, not the numbers in their names.
+    /// First frame, from 0.
     pub start: u64,
     /// Distance between frames, at least 1.
     pub step: u64,
@@ -21,6 +30,11 @@ pub struct SourceSpec {
     pub count: Option<u64>,
     /// Frames per second of footage without a rate of its own: of images, not of videos.
     pub frame_rate_hz: Option<f64>,
+    /// Pictures: the numbers in their names that are frames, so that a missing picture is a missing frame; without it frames are the
+    /// pictures one after the other, whatever they are called.
+    pub numbers: Option<PictureNumbers>,
+    /// How pictures are turned.
+    pub rotation: Rotation,
     /// Smallest width and height accepted, pixels.
     pub min_side: usize,
     /// The `ffmpeg` executable, a name on the search path or a path. Needed for videos only.
@@ -38,9 +52,19 @@ impl SourceSpec {
             step: 1,
             count: None,
             frame_rate_hz: None,
+            numbers: None,
+            rotation: Rotation::Stored,
             min_side: 1,
             ffmpeg: "ffmpeg".into(),
             ffprobe: "ffprobe".into(),
+        }
+    }
+
+    /// The same with pictures as every player shows them.
+    pub fn upright(path: impl Into<String>) -> Self {
+        Self {
+            rotation: Rotation::Tag,
+            ..Self::new(path)
         }
     }
 

@@ -2,16 +2,18 @@
 
 use core::fmt;
 use std::ffi::OsString;
-use std::io::{self, ErrorKind, Read, pipe};
+use std::io::{self, ErrorKind, Read as _, pipe};
 use std::os::fd::AsRawFd as _;
 use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
-use std::process::{Child, ChildStdout, Command, Output, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde_json::Value;
 
+use crate::http;
+use crate::programs::{output_within, version_of};
 use crate::sender::{SenderClock, inherited_pipe, times_of_sender};
 use crate::source::LiveAddress;
 use crate::source::log::{Log, summary};
@@ -67,6 +69,16 @@ pub struct StreamSpec {
     pub ffprobe: PathBuf,
     /// Whether the packets are wanted as they came, beside the pictures.
     pub keeps: bool,
+    /// HTTP: whether JPEG pictures come without a boundary in front of the first.
+    pub is_bare: bool,
+}
+
+/// What is known of a stream from its first packets.
+struct Asked {
+    size: Size,
+    rate_hz: Option<f64>,
+    /// Whether it can be a single picture.
+    may_be_picture: bool,
 }
 
 /// One frame of a stream.
@@ -120,6 +132,7 @@ impl StreamSpec {
             ffmpeg: "ffmpeg".into(),
             ffprobe: "ffprobe".into(),
             keeps: false,
+            is_bare: false,
         }
     }
 
@@ -129,7 +142,27 @@ impl StreamSpec {
     ///
     /// [`FootageError::Stream`] if nobody answers, or it is no video; [`FootageError::FfmpegMissing`].
     pub fn probe(&self) -> Result<(Size, Option<f64>), FootageError> {
-        let entries = "stream=width,height,avg_frame_rate,r_frame_rate";
+        let answer = || http::ask(&self.address).map(http::Answer::complaint);
+        let asked = match self.ask() {
+            // Some cameras send no boundary in front of the first picture.
+            Err(error) if self.is_http() && !self.is_bare => {
+                let bare = Self {
+                    is_bare: true,
+                    ..self.clone()
+                };
+                bare.ask().map_err(|_no_pictures| match answer() {
+                    Some(complaint) => self.failed(&complaint),
+                    None => error,
+                })
+            }
+            asked => asked,
+        }?;
+        let complaint = asked.may_be_picture.then(answer).flatten();
+        complaint.map_or(Ok((asked.size, asked.rate_hz)), |it| Err(self.failed(&it)))
+    }
+
+    fn ask(&self) -> Result<Asked, FootageError> {
+        let entries = "stream=width,height,avg_frame_rate,r_frame_rate:format=format_name";
         let mut command = Command::new(&self.ffprobe);
         command
             .args(["-v", "error", "-select_streams", "v:0", "-of", "json"])
@@ -154,7 +187,11 @@ impl StreamSpec {
         }
         let rates = ["r_frame_rate", "avg_frame_rate"].map(|it| fraction(&stream[it]));
         let is_usual = |it: &f64| (RATES_HZ[0]..=RATES_HZ[1]).contains(it);
-        Ok((size, rates.into_iter().flatten().find(is_usual)))
+        Ok(Asked {
+            size,
+            rate_hz: rates.into_iter().flatten().find(is_usual),
+            may_be_picture: self.is_http() && found["format"]["format_name"] == "jpeg_pipe",
+        })
     }
 
     /// Starts the decoder. Frames of another size than `size` end the stream.
@@ -233,9 +270,13 @@ impl StreamSpec {
         self.is("rtsp") || self.is("rtsps")
     }
 
+    fn is_http(&self) -> bool {
+        self.is("http") || self.is("https")
+    }
+
     /// Whether the frames have times of their own: those of JPEG pictures over HTTP are made up by the decoder.
     fn has_times(&self) -> bool {
-        !self.is("http") && !self.is("https")
+        !self.is_http()
     }
 
     fn input_options(&self) -> Vec<OsString> {
@@ -245,6 +286,9 @@ impl StreamSpec {
         if !self.has_times() {
             // A JPEG picture that is cut short is left out; otherwise its lower part would be grey.
             options.extend(["-err_detect", "explode"]);
+        }
+        if self.is_bare {
+            options.extend(["-f", "mjpeg"]);
         }
         let is_rtsp = self.is_rtsp();
         let listens = self.address.contains("listen");
@@ -298,61 +342,6 @@ pub(crate) fn outputs(version: &str) -> Vec<String> {
         &["-f", "framecrc", "pipe:2"],
     ];
     all.concat().into_iter().map(str::to_owned).collect()
-}
-
-/// Runs a program to its end, and returns what it wrote; none if it has to be killed because the time is over.
-fn output_within(mut command: Command, limit: Duration) -> io::Result<Option<Output>> {
-    const PAUSE: Duration = Duration::from_millis(10);
-    let mut child = command
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()?;
-    let pipes: [Option<Box<dyn Read + Send>>; 2] = [
-        child.stdout.take().map(|it| Box::new(it) as _),
-        child.stderr.take().map(|it| Box::new(it) as _),
-    ];
-    let read = |pipe: Option<Box<dyn Read + Send>>| {
-        std::thread::Builder::new().spawn(move || {
-            let mut bytes = Vec::new();
-            // What could be read up to an error counts.
-            pipe.map(|mut it| it.read_to_end(&mut bytes).ok());
-            bytes
-        })
-    };
-    let [stdout, stderr] = pipes.map(read);
-    let begin = Instant::now();
-    let status = loop {
-        match child.try_wait()? {
-            Some(status) => break Some(status),
-            None if begin.elapsed() > limit => break None,
-            None => std::thread::sleep(PAUSE),
-        }
-    };
-    if status.is_none() {
-        child.kill()?;
-        child.wait()?;
-    }
-    let [stdout, stderr] = [stdout?, stderr?].map(|it| it.join().unwrap_or_default());
-    Ok(status.map(|status| Output {
-        status,
-        stdout,
-        stderr,
-    }))
-}
-
-/// The version of `ffmpeg`; empty if it does not tell.
-pub(crate) fn version_of(ffmpeg: &PathBuf) -> String {
-    let said = Command::new(ffmpeg)
-        .arg("-version")
-        .stdin(Stdio::null())
-        .output();
-    let said = said.map(|it| it.stdout).unwrap_or_default();
-    let text = String::from_utf8_lossy(&said);
-    text.split_whitespace()
-        .nth(2)
-        .unwrap_or_default()
-        .to_owned()
 }
 
 /// What is said of a stream that ends without a word of its decoder.

@@ -5,7 +5,9 @@ mod clip;
 
 mod bad_input;
 mod conformance;
+mod http;
 mod kept;
 mod overlay;
 mod prompt;
+mod told;
 mod warp;

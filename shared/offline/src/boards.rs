@@ -56,7 +56,7 @@ impl CameraFootage {
             .first()
             .ok_or("no pictures")
             .or_fail(ExitKind::Input)?;
-        let source = Source::open(&SourceSpec::new(first)).map_err(footage_failure)?;
+        let source = Source::open(&SourceSpec::upright(first)).map_err(footage_failure)?;
         let size = source.info().size;
         Ok([size.width as u32, size.height as u32])
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use fmp::{Layout, Model, Pose, Search};
-use footage::{Fill, Size, Source, SourceSpec, Turn, Warp, resize_map};
+use footage::{Fill, Rotation, Size, Source, SourceSpec, Turn, Warp, resize_map};
 use kernels::Rgb8View;
 use posenetwork::outline_of_parts;
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -84,12 +84,12 @@ impl Pictures {
         match self {
             Self::Image(path) => path.take().map(image).transpose(),
             Self::Video(path, source) => {
-                let size = source.info().size;
+                let (size, turn) = (source.info().size, source.info().tag);
                 let frame = source.next_frame().or_fail(ExitKind::Input)?;
                 Ok(frame.map(|it| Picture {
                     path: path.clone(),
                     frame: Some(it.index),
-                    turn: Turn::default(),
+                    turn,
                     size,
                     rgb: it.rgb.to_vec(),
                 }))
@@ -113,6 +113,7 @@ fn spec(path: &Path, frames: Frames) -> SourceSpec {
     SourceSpec {
         step: frames.every,
         count: frames.most,
+        rotation: Rotation::Tag,
         ..SourceSpec::new(path.to_string_lossy())
     }
 }

@@ -49,7 +49,10 @@ impl fmt::Display for Heading<'_> {
     }
 }
 
-/// One row, with its end; a missing marker leaves its three cells empty.
+/// One row, with its end; the three cells of a missing marker are `NaN`.
+///
+/// `OpenSim` (4.6) drops what follows the last tab of a line if it is empty, and refuses a row whose last marker left its cells
+/// empty.
 ///
 /// * `number`: of the row, from 1.
 /// * `markers`: positions in the file's unit.
@@ -64,7 +67,7 @@ pub fn row(
             // Writing to a string cannot fail.
             let _infallible = write!(text, "\t{x:.6}\t{y:.6}\t{z:.6}");
         } else {
-            text.push_str("\t\t\t");
+            text.push_str("\tNaN\tNaN\tNaN");
         }
     }
     text.push('\n');
@@ -77,6 +80,17 @@ mod tests {
 
     use super::*;
     use crate::Trc;
+
+    #[test]
+    fn every_row_has_all_cells_whatever_is_missing() {
+        for points in [[None; 3], [Some([1.0; 3]), Some([2.0; 3]), None]] {
+            let text = row(7, 0.1, points);
+            let cells: Vec<&str> = text.trim_end_matches('\n').split('\t').collect();
+            assert_eq!(cells.len(), 2 + 3 * 3);
+            assert!(cells.iter().all(|it| !it.is_empty()), "{text:?}");
+            assert_eq!(cells[8..], ["NaN"; 3]);
+        }
+    }
 
     proptest! {
         #[test]

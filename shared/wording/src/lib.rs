@@ -1,5 +1,23 @@
-//! Rewrites the error texts of TOML and JSON parsers, and of the transport, for users.
+//! Rewrites the error texts of TOML and JSON parsers, and of the transport, for users; and quotes what stands in commands.
 #![forbid(unsafe_code)]
+
+use core::fmt::Display;
+
+/// A word of a command that is printed, quoted where a shell would take it for something else.
+///
+/// ```
+/// assert_eq!(wording::shell("runs/one.toml"), "runs/one.toml");
+/// assert_eq!(wording::shell("room 1 #a/it's.toml"), r"'room 1 #a/it'\''s.toml'");
+/// ```
+#[must_use]
+pub fn shell(word: impl Display) -> String {
+    let word = word.to_string();
+    let is_plain = |it: char| it.is_alphanumeric() || "-_./:,=@%+".contains(it);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word;
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
 
 /// Replaces serde's terms in an error text by terms that users know.
 ///

@@ -165,6 +165,17 @@ impl LiveCamera {
         Ok((mode, pixels.ok_or_else(unknown)?))
     }
 
+    /// Whether it is read over HTTP.
+    pub(super) fn is_http(&self) -> bool {
+        let LiveAddress::Stream(address) = &self.address else {
+            return false;
+        };
+        let scheme = address.split(':').next().unwrap_or_default();
+        ["http", "https"]
+            .iter()
+            .any(|it| scheme.eq_ignore_ascii_case(it))
+    }
+
     pub(super) fn stream(&self, address: &str) -> StreamSpec {
         StreamSpec {
             transport: self.transport,

@@ -51,11 +51,13 @@ pub(super) enum Input {
 impl Input {
     /// * `before`: the device that was open before, which may have another number now.
     /// * `originals`: takes what is to be kept as it comes, if anything is.
+    /// * `is_bare`: see [`StreamSpec::is_bare`].
     pub(super) fn open(
         camera: &LiveCamera,
         size: Size,
         before: Option<&VideoAbout>,
         originals: Option<&Arc<Originals>>,
+        is_bare: bool,
     ) -> Result<Self, LiveError> {
         match &camera.address {
             LiveAddress::Device(path) => {
@@ -65,6 +67,7 @@ impl Input {
             LiveAddress::Stream(address) => Ok(Self::Stream(Box::new(Stream {
                 decoder: StreamSpec {
                     keeps: originals.is_some(),
+                    is_bare,
                     ..camera.stream(address)
                 }
                 .open(size)?,
@@ -323,7 +326,23 @@ fn missing_by_time(gap: i64, period: f64) -> u64 {
 /// [`LiveError`]; also if nothing comes.
 pub fn take_picture(camera: &LiveCamera, n_skipped: usize) -> Result<(Size, Vec<u8>), LiveError> {
     let (size, _) = camera.look()?;
-    let mut input = Input::open(camera, size, None, None)?;
+    let rgb = settled_picture(camera, size, n_skipped, false);
+    let rgb = match rgb {
+        Err(error) if camera.is_http() => {
+            settled_picture(camera, size, n_skipped, true).map_err(|_no_picture| error)?
+        }
+        rgb => rgb?,
+    };
+    Ok((size, rgb))
+}
+
+fn settled_picture(
+    camera: &LiveCamera,
+    size: Size,
+    n_skipped: usize,
+    is_bare: bool,
+) -> Result<Vec<u8>, LiveError> {
+    let mut input = Input::open(camera, size, None, None, is_bare)?;
     let _watched = input.end().map(Watched::new);
     let mut rgb = vec![0; size.rgb_bytes()];
     let mut n_whole = 0;
@@ -331,7 +350,7 @@ pub fn take_picture(camera: &LiveCamera, n_skipped: usize) -> Result<(Size, Vec<
         let taken = input.next(&mut rgb)?;
         n_whole += usize::from(taken.is_some_and(|it| it.is_whole));
         if n_whole > n_skipped {
-            return Ok((size, rgb));
+            return Ok(rgb);
         }
     }
 }

@@ -179,11 +179,13 @@ struct Keeper {
 impl Keeper {
     fn keep_open(self) {
         let (mut pause, mut before) = (FIRST_PAUSE, None);
+        let mut is_bare = false;
         let mut said: Option<Status> = None;
         while !self.shared.state().is_over {
             let mut n_read = 0;
             let originals = self.originals.as_ref();
-            let failed = match Input::open(&self.camera, self.size, before.as_ref(), originals) {
+            let (camera, size) = (&self.camera, self.size);
+            let failed = match Input::open(camera, size, before.as_ref(), originals, is_bare) {
                 Ok(mut input) => {
                     before = input.about().or(before);
                     self.read_all(&mut input, &mut n_read)
@@ -192,6 +194,13 @@ impl Keeper {
             };
             let Some(error) = failed else { return };
             let status = error.status();
+            // Whether it sends a boundary in front of its first picture is found by trying.
+            let is_tried = self.camera.is_http() && n_read == 0;
+            is_bare ^= is_tried;
+            if is_tried && is_bare && said.is_none() {
+                tracing::debug!(camera = %self.camera.address, %error, "read without a first boundary");
+                continue;
+            }
             if n_read > 0 || said != Some(status) {
                 let error = causes::in_one_line(&error);
                 tracing::error!(camera = %self.camera.address, error, "no picture from this camera");

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
-use exports::{Gathering, Trial, TrialError, ViewCamera};
+use exports::{Gathering, Naming, Trial, TrialError, ViewCamera};
 use geometry::{Framing, OutSize, Rig};
 use messages::{Joint3d, Pose3d, Status, topic};
 use nalgebra::UnitVector3;
@@ -49,6 +49,8 @@ struct States {
 pub struct Given {
     /// What the files call it.
     pub name: String,
+    /// What they call the points.
+    pub naming: Naming,
     /// Which trajectories.
     pub lines: Lines,
     /// Frames of the footage per second, where the run does not know.
@@ -116,6 +118,7 @@ impl Origin {
                     format!("{}: {error}; nothing is written", source.display()),
                 )
             })?;
+        trial.naming = given.naming;
         check_rate(&trial, given)?;
         flaws.extend(of_times(&trial, n_lines));
         let setup = resolved.and_then(|it| {

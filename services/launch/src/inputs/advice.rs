@@ -35,11 +35,12 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
         ) => format!(
             "`capture.start_frame`, `frame_step`, `n_frames` and `frame_rate_hz` say which frames are used; this is of {camera}"
         ),
+        FeedError::Footage(FootageError::FfmpegMissing { .. }) => format!(
+            "this is for the `source` of {camera}; ffmpeg and ffprobe come in one package, and both are needed; folders of pictures \
+             need neither"
+        ),
         FeedError::Footage(
-            FootageError::FfmpegMissing { .. }
-            | FootageError::Video { .. }
-            | FootageError::Image { .. }
-            | FootageError::Empty { .. },
+            FootageError::Video { .. } | FootageError::Image { .. } | FootageError::Empty { .. },
         ) => format!(
             "this is the `source` of {camera}; a player, or `ffprobe FILE`, shows whether the file is whole"
         ),
@@ -49,6 +50,33 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
              relative paths are relative to the deployment file"
         ),
     }
+}
+
+/// What all cameras gave, or the first failure with what the other cameras fail at.
+///
+/// * `cameras`: names and outcomes.
+pub(crate) fn of_all<T>(cameras: Vec<(&str, Result<T, Failure>)>) -> Result<Vec<T>, Failure> {
+    let (mut all, mut first, mut others) = (Vec::new(), None, Vec::new());
+    for (name, outcome) in cameras {
+        match outcome {
+            Ok(it) => all.push(it),
+            Err(failure) if first.is_some() => {
+                let message = failure.to_string();
+                let is_named = message.contains(&format!("{name:?}"));
+                others.push(if is_named {
+                    message
+                } else {
+                    format!("{name}: {message}")
+                });
+            }
+            Err(failure) => first = Some(failure),
+        }
+    }
+    let Some(failure) = first else { return Ok(all) };
+    if others.is_empty() {
+        return Err(failure);
+    }
+    Err(failure.with_another_hint(format!("other cameras fail, too: {}", others.join("; "))))
 }
 
 /// The hint for a calibration that cannot be used; none if the error message suffices.

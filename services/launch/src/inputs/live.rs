@@ -10,7 +10,7 @@ use footage::LiveAddress;
 use runtime::{ExitKind, Failure, Fault as _};
 use scene::Address;
 
-use super::{Footage, advice, source, warn_of_orientation_tag};
+use super::{Footage, advice, source};
 
 /// Frames of a live camera that runs until it is stopped: the most of any footage.
 pub(crate) const ENDLESS: u64 = 1_000_000_000_000;
@@ -73,7 +73,8 @@ pub(crate) fn footage(
         });
         read.collect()
     });
-    let all: Vec<Footage> = all.into_iter().collect::<Result<_, Failure>>()?;
+    let names = deployment.cameras.iter().map(|it| it.name.as_str());
+    let all = advice::of_all(names.zip(all).collect())?;
     if deployment.has_clocks() {
         retimed(deployment, all)
     } else {
@@ -133,7 +134,24 @@ fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
         let hint = advice::on_footage(&error, &camera.name);
         Failure::new(ExitKind::Input, error).with_hint(hint)
     })?;
-    warn_of_orientation_tag(&format!("camera {:?}", camera.name), info.turn);
+    if let Some(depth) = info.depth {
+        tracing::warn!(
+            "camera {:?}: the pictures of {} have 16 bits and use {}: the brightest value is {}; they are scaled by that",
+            camera.name,
+            camera.source,
+            depth.bits,
+            depth.brightest
+        );
+    }
+    if info.is_interlaced {
+        let file = wording::shell(&camera.source);
+        tracing::warn!(
+            "camera {:?}: {} is interlaced: every picture is two halves of different moments, so that whoever moves has combs for \
+             edges; `ffmpeg -i {file} -vf bwdif=mode=send_frame -c:v libx264 -crf 15 progressive.mp4` makes whole pictures of them",
+            camera.name,
+            camera.source
+        );
+    }
     Ok(Footage {
         size: [info.size.width as u32, info.size.height as u32],
         n_frames: info.n_frames,
@@ -173,7 +191,7 @@ fn refused(error: LiveError, camera: &Camera) -> Failure {
         "this is the live camera {:?}; `parallax cameras` lists the video devices of this machine with what they offer, and \
          `parallax cameras view {}` takes a picture",
         camera.name,
-        footage::without_passwords(&camera.source)
+        wording::shell(footage::without_passwords(&camera.source))
     );
     Failure::new(error.kind(), error).with_hint(hint)
 }

@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use supervise::Event;
 
 use crate::output;
@@ -36,12 +36,10 @@ impl Watcher {
             n_frames.map_or_else(ProgressBar::new_spinner, ProgressBar::new)
         };
         let style = match n_frames {
-            Some(_) => {
-                "{elapsed_precise} {wide_bar} {pos}/{len} frames, {per_sec}, {eta} left{msg}"
-            }
+            Some(_) => "{elapsed_precise} {wide_bar} {pos}/{len} frames, {per_sec}{left}{msg}",
             None => "{elapsed_precise} {spinner} {pos} frames, {per_sec}; Ctrl-C ends the run{msg}",
         };
-        if let Ok(style) = ProgressStyle::with_template(style) {
+        if let Some(style) = output::bar_style(style) {
             bar.set_style(style);
         }
         Self {

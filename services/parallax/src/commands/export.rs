@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use launch::export::{Format, Given, Job, Lines, Origin, Written, as_json, export};
+use launch::export::{Format, Given, Job, Lines, Naming, Origin, Written, as_json, export};
 use launch::output;
 use nalgebra::{UnitVector3, Vector3};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
@@ -12,6 +12,8 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use crate::globals::Globals;
 use crate::terminal::Terminal;
 
+/// What is said where the format is not in the build.
+const NO_PARQUET: &str = "this build writes none: cargo build --release --features parquet";
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
 
@@ -20,7 +22,7 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
 #[command(after_help = "\
 Formats, what they are for, and what they hold:
     c3d        motion capture        points, mm, z up; residual: standard deviation, mm; a gap: residual -1
-    trc        OpenSim               points, m, y up; a gap: empty cells
+    trc        OpenSim               points, m, y up; a gap: NaN
     glb        viewers, Blender      skinned skeleton and animation, m, y up; a gap: a bone that is not there
     bvh        animation             bones of fixed length (medians), cm, y up; in a gap the last rotation stays
     csv        tables                a row for each frame, m, axes of the rig; standard deviations
@@ -43,7 +45,8 @@ or the folder cannot be written; 5 the calibration does not fit; 7 no frame has 
 damaged, not ended; 130 stopped by Ctrl-C.
 
 Examples:
-    parallax export out/my --to c3d,trc
+    parallax export out/my --to c3d,glb
+    parallax export out/my --to trc --names opensim
     parallax export out/my --to all --out results/walk --name walk
     parallax export run.mcap --to glb,mp4
     parallax export out/photos --to bvh --rate 25 --up 0,0,1")]
@@ -62,6 +65,10 @@ pub(crate) struct Arguments {
     /// What the files are called.
     #[arg(long, default_value = "pose3d", value_parser = name)]
     name: String,
+    /// What the joints are called in the files: `right_ankle` as in the run, or `RAnkle` as OpenSim models with markers for keypoints
+    /// have it (those of Pose2Sim).
+    #[arg(long, value_enum, default_value_t = Names::Own)]
+    names: Names,
     /// Frames of the footage per second, for a run that does not know.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
@@ -85,6 +92,15 @@ enum Trajectories {
     Smooth,
 }
 
+/// What the joints are called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Names {
+    /// `right_ankle`, `left_hip`, `head`.
+    Own,
+    /// `RAnkle`, `LHip`, `Head`; `Hip` for the pelvis.
+    Opensim,
+}
+
 /// A list, as clap takes it from one argument.
 type Formats = Vec<Format>;
 
@@ -96,8 +112,7 @@ fn formats(text: &str) -> Result<Formats, String> {
         let of_name = |it: &Format| wanted == "all" || it.name() == wanted;
         let chosen: Formats = all.iter().copied().filter(of_name).collect();
         if chosen.is_empty() && wanted == "parquet" {
-            let how = "this build writes no Parquet: cargo build --release --features parquet";
-            return Err(how.to_owned());
+            return Err(NO_PARQUET.to_owned());
         }
         if chosen.is_empty() {
             return Err(format!("{wanted:?} is none of {}, all", names.join(", ")));
@@ -143,6 +158,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         &arguments.source,
         &Given {
             name: arguments.name.clone(),
+            naming: match arguments.names {
+                Names::Own => Naming::Own,
+                Names::Opensim => Naming::OpenSim,
+            },
             lines: match arguments.from {
                 Trajectories::Raw => Lines::Raw,
                 Trajectories::Smooth => Lines::Smooth,
@@ -160,6 +179,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         name: arguments.name.clone(),
         force: arguments.force,
     };
+    let has_parquet = Format::all().iter().any(|it| it.name() == "parquet");
+    if !has_parquet && job.formats.len() == Format::all().len() && !globals.quiet {
+        output::message(format_args!("without parquet: {NO_PARQUET}"));
+    }
     let terminal = Terminal::with_bar(globals.quiet, false, BAR);
     let written = export(&origin, &job, &stop, &terminal)?;
     if arguments.json {

@@ -211,9 +211,12 @@ fn view(arguments: &Arguments, rig: &Rig, camera: usize, file: &str) -> Result<V
     if arguments.no_lens {
         camera.intrinsics.lens = geometry::Lens::default();
     }
-    let mut source = Source::open(&SourceSpec::new(file)).or_fail(ExitKind::Input)?;
+    let spec = SourceSpec {
+        rotation: inputs::rotation(file, &camera.name, rig),
+        ..SourceSpec::new(file)
+    };
+    let mut source = Source::open(&spec).or_fail(ExitKind::Input)?;
     let size = source.info().size;
-    inputs::warn_of_orientation_tag(file, source.info().turn);
     let roll = if arguments.no_upright {
         0.0
     } else {

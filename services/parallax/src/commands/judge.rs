@@ -22,7 +22,7 @@ use crate::terminal::Terminal;
 
 /// The progress bar.
 pub(super) const BAR: &str =
-    "{elapsed_precise} {bar:20} {pos}/{len} people, {per_sec}, {eta} left {prefix}";
+    "{elapsed_precise} {bar:20} {pos}/{len} people, {per_sec}{left} {prefix}";
 
 /// Options of `parallax model judge`.
 #[derive(Debug, Args)]

@@ -110,7 +110,8 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         }
     }
     if !arguments.run {
-        output::message(format_args!("next: parallax run {}", deployment.display()));
+        let deployment = wording::shell(deployment.display());
+        output::message(format_args!("next: parallax run {deployment}"));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -123,14 +124,7 @@ impl Step {
 
     /// The exit code that ends everything, if it does.
     fn run(&self, arguments: &Arguments, globals: Globals) -> Result<Option<ExitCode>, Failure> {
-        let quoted = |word: &String| {
-            if word.contains([' ', '*', '?', '\'', '"']) {
-                format!("'{word}'")
-            } else {
-                word.clone()
-            }
-        };
-        let line: Vec<String> = self.words.iter().map(quoted).collect();
+        let line: Vec<String> = self.words.iter().map(wording::shell).collect();
         if let Some(file) = self.done.as_ref().filter(|it| it.exists()) {
             output::message(format_args!("kept {}", file.display()));
             return Ok(None);

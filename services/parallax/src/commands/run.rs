@@ -18,7 +18,7 @@ A second Ctrl-C, half a second or more after the first, ends the run at once. Th
 pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and
 overlays/, all for their user alone; files of an earlier run are replaced when the new ones are whole, until then they
 are called *.part. Every frame has one line of pose3d.jsonl, in order: its result, or with status \"no result\" the
-reason why it has none; in pose3d.trc its row is then blank. The folder belongs to one run at a time. A run without
+reason why it has none; in pose3d.trc its row is NaN then, and that file is only written where the frame rate is known. The folder belongs to one run at a time. A run without
 any result is degraded, and says why.
 
 Examples:

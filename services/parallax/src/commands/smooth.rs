@@ -16,7 +16,7 @@ use crate::globals::Globals;
 use crate::terminal::Terminal;
 
 /// The progress bar.
-const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} motions, {eta} left {prefix} {msg}";
+const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} motions{left} {prefix} {msg}";
 
 /// Options of `parallax smooth`.
 #[derive(Debug, Args)]

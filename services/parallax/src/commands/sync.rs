@@ -19,8 +19,7 @@ use crate::globals::Globals;
 use crate::terminal::Terminal;
 
 /// The progress bar.
-const BAR: &str =
-    "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left {prefix} {msg}";
+const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]

@@ -186,7 +186,7 @@ impl FlawArguments {
 }
 
 /// The template of the progress bar.
-const BAR: &str = "{elapsed_precise} {msg} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left";
+const BAR: &str = "{elapsed_precise} {msg} {bar:20} {pos}/{len} pictures, {per_sec}{left}";
 
 /// Default number of frames per camera.
 const N_FRAMES: u64 = 60;

@@ -40,6 +40,26 @@ fn more_frames_than_16_bits_count_are_read_back() {
     let read = C3d::parse(&file).unwrap();
     assert_eq!(read.n_frames(), 70_000);
     assert_eq!(read.frame(69_999)[0], Some([69_999.0, 0.0, 0.0]));
+    // Files of others have only one of the two.
+    for name in [&b"LONG_FRAMES"[..], b"ACTUAL_END_FIELD"] {
+        let mut one = file.clone();
+        let at = one.windows(name.len()).position(|it| it == name);
+        one[at.unwrap()] = b'X';
+        assert_eq!(C3d::parse(&one).unwrap().n_frames(), 70_000);
+    }
+}
+
+/// `ezc3d` refuses a real.
+#[test]
+fn the_number_of_frames_is_a_whole_number() {
+    for n_frames in [1, 70_000] {
+        let bytes = section(&heading(&names(1), n_frames), 3);
+        let at = bytes.windows(8).position(|it| it == b"\x06\x01FRAMES");
+        let at = at.unwrap() + 10;
+        let word = n_frames.min(65_535) as u16;
+        assert_eq!(bytes[at..at + 2], [2, 0], "kind and number of sizes");
+        assert_eq!(bytes[at + 2..at + 4], word.to_le_bytes());
+    }
 }
 
 #[test]

@@ -37,6 +37,20 @@ fn refused(text: &str, set: &[&str]) -> String {
 }
 
 #[test]
+fn a_slip_of_the_pen_is_told_with_its_line() {
+    let with = |from: &str, to: &str| refused(&SHORT.replace(from, to), &[]);
+    let path = with("videos/a.mp4", r"C:\Users\a.mp4");
+    assert!(path.starts_with("deployment.toml:9: a backslash"), "{path}");
+    let path = with("videos/a.mp4", r"videos\new.mp4");
+    assert!(path.contains("a backslash"), "{path}");
+    let up = with("output = \"out\"", "output = \"out\"\nup = [0 0 1]");
+    assert!(
+        up.starts_with("deployment.toml:6: the numbers of a list need commas"),
+        "{up}"
+    );
+}
+
+#[test]
 fn a_short_file_is_enough() {
     let got = read(SHORT, &[]).unwrap().deployment;
     assert_eq!(got.fuse.workers, 2);

@@ -1,71 +1,54 @@
 //! Decodes one image file to 8-bit RGB.
 
-use std::fmt;
 use std::io::Cursor;
 use std::path::Path;
 
 use image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
 use image::metadata::Orientation;
-use image::{
-    ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage,
-};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
+use crate::turn::{Rotation, Turn};
 use crate::{FootageError, Size};
-
-/// The orientation tag (EXIF) of a picture: how its stored pixels must be turned to show it upright.
-///
-/// ```
-/// use footage::{Size, Turn};
-///
-/// let as_stored = Turn::default();
-/// assert!(as_stored.is_none());
-/// assert_eq!(as_stored.apply(Size::new(1, 1), vec![1, 2, 3]), (Size::new(1, 1), vec![1, 2, 3]));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Turn(Orientation);
-
-impl Default for Turn {
-    fn default() -> Self {
-        Self(Orientation::NoTransforms)
-    }
-}
-
-impl Turn {
-    /// Whether the pixels are stored upright.
-    pub fn is_none(self) -> bool {
-        self.0 == Orientation::NoTransforms
-    }
-
-    /// The upright picture of stored pixels; unchanged if the number of bytes does not fit the size.
-    pub fn apply(self, size: Size, rgb: Vec<u8>) -> (Size, Vec<u8>) {
-        if self.is_none() || rgb.len() != size.rgb_bytes() {
-            return (size, rgb);
-        }
-        let stored = RgbImage::from_raw(size.width as u32, size.height as u32, rgb);
-        let mut image = DynamicImage::from(stored.unwrap_or_default());
-        image.apply_orientation(self.0);
-        let size = Size::new(image.width() as usize, image.height() as usize);
-        (size, image.into_rgb8().into_raw())
-    }
-}
-
-impl fmt::Display for Turn {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self.0 {
-            Orientation::NoTransforms => "as stored",
-            Orientation::Rotate90 => "turned by 90 degrees to the right",
-            Orientation::Rotate180 => "turned by 180 degrees",
-            Orientation::Rotate270 => "turned by 90 degrees to the left",
-            Orientation::FlipHorizontal => "mirrored",
-            Orientation::FlipVertical => "turned by 180 degrees and mirrored",
-            Orientation::Rotate90FlipH => "turned by 90 degrees to the right and mirrored",
-            Orientation::Rotate270FlipH => "turned by 90 degrees to the left and mirrored",
-        })
-    }
-}
 
 /// The largest image decoded, bytes: a header of 30 bytes may claim any size.
 const MAX_BYTES: u64 = 1 << 29;
+
+/// How images are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Reading {
+    pub(super) rotation: Rotation,
+    /// Of images with 16 bits that use fewer.
+    pub(super) depth: Option<Depth>,
+}
+
+/// How many bits images with 16 bits a colour use, and the largest value that was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Depth {
+    /// The largest value.
+    pub brightest: u16,
+    /// Bits that hold it, as cameras have them: 8, 10, 12 or 14.
+    pub bits: u32,
+}
+
+impl Depth {
+    /// The depth of images whose largest value is this; none where all 16 bits are used, or nothing is in the images.
+    pub(super) fn of(brightest: u16) -> Option<Self> {
+        let bits = [8, 10, 12, 14].into_iter().find(|it| brightest < 1 << it)?;
+        (brightest > 0).then_some(Self { brightest, bits })
+    }
+
+    fn in_8_bits(self, value: u16) -> u8 {
+        let most = (1 << self.bits) - 1;
+        ((u32::from(value) * 255 + most / 2) / most).min(255) as u8
+    }
+}
+
+fn has_16_bits(color: ColorType) -> bool {
+    matches!(
+        color,
+        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16
+    )
+}
 
 /// An image file in memory. Its format is detected from its content, never from its name.
 pub(super) struct Encoded<'a> {
@@ -94,7 +77,7 @@ impl<'a> Encoded<'a> {
     }
 
     /// The orientation tag (EXIF); a tag that cannot be read counts as none.
-    pub(super) fn turn(&self) -> Turn {
+    pub(super) fn tag(&self) -> Turn {
         let decoder = self.decoder();
         let tag = decoder.and_then(|mut decoder| {
             let tag = decoder.orientation();
@@ -103,11 +86,30 @@ impl<'a> Encoded<'a> {
         Turn(tag.unwrap_or(Orientation::NoTransforms))
     }
 
-    /// The pixels, row major: grey is replicated, alpha dropped, 16 bits rounded to 8, orientation tags
-    /// ignored.
-    ///
-    /// `rgb` must have the size of the image.
-    pub(super) fn decode_into(&self, rgb: &mut [u8]) -> Result<(), FootageError> {
+    /// The pixels, turned, row major: grey is replicated, alpha dropped, 16 bits rounded to 8. Returns the size.
+    pub(super) fn decode(&self, reading: Reading) -> Result<(Size, Vec<u8>), FootageError> {
+        let stored = self.size()?;
+        let mut rgb = vec![0; stored.rgb_bytes()];
+        self.decode_into(&mut rgb, reading.depth)?;
+        Ok(reading.rotation.turn(self.tag()).apply(stored, rgb))
+    }
+
+    /// The size of the turned picture, from the header.
+    pub(super) fn turned_size(&self, rotation: Rotation) -> Result<Size, FootageError> {
+        Ok(rotation.turn(self.tag()).size(self.size()?))
+    }
+
+    /// The largest value of an image with 16 bits a colour; none for other images.
+    pub(super) fn brightest(&self) -> Result<Option<u16>, FootageError> {
+        let decoder = self.decoder()?;
+        if !has_16_bits(decoder.color_type()) {
+            return Ok(None);
+        }
+        let image = DynamicImage::from_decoder(decoder).map_err(|source| self.error(source))?;
+        Ok(image.into_rgb16().iter().copied().max())
+    }
+
+    fn decode_into(&self, rgb: &mut [u8], depth: Option<Depth>) -> Result<(), FootageError> {
         let decoder = self.decoder()?;
         let wrong = |source| self.error(source);
         if self.is_jpeg() && jpeg_into(&self.bytes, rgb) {
@@ -116,8 +118,15 @@ impl<'a> Encoded<'a> {
         if decoder.color_type() == ColorType::Rgb8 {
             return decoder.read_image(rgb).map_err(wrong);
         }
+        let depth = depth.filter(|_| has_16_bits(decoder.color_type()));
         let image = DynamicImage::from_decoder(decoder).map_err(wrong)?;
-        rgb.copy_from_slice(image.into_rgb8().as_raw());
+        if let Some(depth) = depth {
+            for (to, from) in rgb.iter_mut().zip(image.into_rgb16().iter()) {
+                *to = depth.in_8_bits(*from);
+            }
+        } else {
+            rgb.copy_from_slice(image.into_rgb8().as_raw());
+        }
         Ok(())
     }
 
@@ -196,4 +205,111 @@ pub(crate) fn jpeg_is_whole(bytes: &[u8]) -> bool {
         };
     }
     false
+}
+
+/// Whether JPEG pictures of one size stand one behind the other, as cameras write Motion JPEG without a container.
+///
+/// Photographs may have pictures behind them as well (smaller ones, depth, what makes them brighter): these are smaller, or are
+/// named in a segment of the first (`MPF`, CIPA DC-007).
+pub(super) fn is_jpeg_stream(bytes: &[u8]) -> bool {
+    let Some(first) = JpegHead::read(bytes) else {
+        return false;
+    };
+    // Within the data no byte of this value is followed by another than 0 or a mark of restart.
+    let data = bytes.get(first.data..).unwrap_or_default();
+    let next = data.windows(3).position(|it| it == [0xff, 0xd8, 0xff]);
+    let second = next.and_then(|at| JpegHead::read(&data[at..]));
+    !first.has_others && second.is_some_and(|it| it.sides == first.sides)
+}
+
+/// What the segments of a JPEG picture say before its data.
+struct JpegHead {
+    sides: [u8; 4],
+    /// Whether a segment names more pictures.
+    has_others: bool,
+    /// Where the data begins.
+    data: usize,
+}
+
+impl JpegHead {
+    fn read(bytes: &[u8]) -> Option<Self> {
+        let (mut sides, mut has_others, mut at) = (None, false, 2);
+        while let Some(&[0xff, marker, high, low]) = bytes.get(at..at + 4) {
+            let length = 2 + usize::from(u16::from_be_bytes([high, low]));
+            match marker {
+                // Markers may be padded with any number of fill bytes.
+                0xff => {
+                    at += 1;
+                    continue;
+                }
+                0xda => {
+                    return Some(Self {
+                        sides: sides?,
+                        has_others,
+                        data: at + length,
+                    });
+                }
+                // Every frame header but those of Huffman tables, of extensions and of arithmetic coding.
+                0xc0..=0xcf if ![0xc4, 0xc8, 0xcc].contains(&marker) => {
+                    sides = bytes.get(at + 5..at + 9)?.first_chunk().copied();
+                }
+                0xe2 => has_others |= bytes.get(at + 4..at + 7) == Some(b"MPF"),
+                _ => {}
+            }
+            at += length;
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn jpeg(width: u32, height: u32) -> Vec<u8> {
+        let mut file = Cursor::new(Vec::new());
+        let image = DynamicImage::new_rgb8(width, height);
+        image.write_to(&mut file, ImageFormat::Jpeg).unwrap();
+        file.into_inner()
+    }
+
+    #[test]
+    fn pictures_of_one_size_behind_one_another_are_a_stream() {
+        let (one, small) = (jpeg(32, 16), jpeg(16, 8));
+        let cut = one[..one.len() - 8].to_vec();
+        for stream in [
+            [&one[..], &one].concat(),
+            [&one[..], &[0; 7], &one, &one].concat(),
+            [&cut[..], &one].concat(),
+        ] {
+            assert!(is_jpeg_stream(&stream));
+        }
+        let mut photograph = [&one[..2], &[0xff, 0xe2, 0, 6], b"MPF\0"].concat();
+        photograph.extend([&one[2..], &one].concat());
+        for still in [
+            one.clone(),
+            cut,
+            [&one[..], &small].concat(),
+            photograph,
+            vec![0xff, 0xd8],
+            Vec::new(),
+        ] {
+            assert!(!is_jpeg_stream(&still));
+        }
+    }
+
+    #[test]
+    fn bits_that_are_not_used_are_told_by_the_largest_value() {
+        let bits = |brightest| Depth::of(brightest).map(|it| it.bits);
+        assert_eq!(
+            [200, 1023, 4000, 16_000].map(bits),
+            [8, 10, 12, 14].map(Some)
+        );
+        assert_eq!([0, 16_384, 65_535].map(bits), [None; 3]);
+        let depth = Depth::of(4000).unwrap();
+        assert_eq!(
+            [0, 2048, 4095, 9000].map(|it| depth.in_8_bits(it)),
+            [0, 128, 255, 255]
+        );
+    }
 }

@@ -2,39 +2,59 @@
 
 use std::path::{Path, PathBuf};
 
-use super::decode::{Encoded, Turn};
+use super::decode::{Depth, Encoded, Reading, is_jpeg_stream};
+use super::numbers::Numbered;
+use crate::turn::{Rotation, Turn};
 use crate::{FootageError, Size, SourceSpec};
+
+/// Bytes of a file that are searched for a second picture.
+const MAX_PICTURE: u64 = 64 << 20;
+/// Most images of a sequence that are looked at for the bits that they use.
+const N_BRIGHTEST: usize = 8;
 
 /// The images to be read, in order.
 #[derive(Debug)]
 pub(super) struct Images {
-    paths: std::vec::IntoIter<PathBuf>,
+    /// Those that are left.
+    files: std::vec::IntoIter<Numbered>,
     first: PathBuf,
+    reading: Reading,
+    /// Size of all, turned.
     pub(super) size: Size,
     /// Orientation tag of the first image.
-    pub(super) turn: Turn,
+    pub(super) tag: Turn,
+    /// Frames, with those that have no image.
     pub(super) n_frames: u64,
+    /// Frame behind the last one.
+    end: u64,
 }
 
 impl Images {
-    pub(super) fn open(paths: Vec<PathBuf>, spec: &SourceSpec) -> Result<Self, FootageError> {
-        let n_frames = spec.n_delivered(paths.len() as u64)?;
-        let step = usize::try_from(spec.step).unwrap_or(usize::MAX);
-        let paths: Vec<PathBuf> = paths
-            .into_iter()
-            .skip(spec.start as usize)
-            .step_by(step)
-            .take(n_frames as usize)
-            .collect();
-        let first = paths.first().cloned().unwrap_or_default();
+    /// * `files`: all images, with the numbers of their frames.
+    pub(super) fn open(files: Vec<Numbered>, spec: &SourceSpec) -> Result<Self, FootageError> {
+        let n_all = files.last().map_or(0, |it| it.frame + 1);
+        let n_frames = spec.n_delivered(n_all)?;
+        let end = spec
+            .start
+            .saturating_add(n_frames.saturating_mul(spec.step));
+        let depth = depth(&files)?;
+        let is_used = |frame: u64| {
+            let is_within = (spec.start..end).contains(&frame);
+            is_within && (frame - spec.start).is_multiple_of(spec.step)
+        };
+        let any = files.first().map(|it| it.path.clone()).unwrap_or_default();
+        let files: Vec<Numbered> = files.into_iter().filter(|it| is_used(it.frame)).collect();
+        let first = files.first().map_or(any, |it| it.path.clone());
         let encoded = Encoded::read(&first)?;
-        let (size, turn) = (encoded.size()?, encoded.turn());
+        let rotation = spec.rotation;
         Ok(Self {
-            paths: paths.into_iter(),
-            size,
-            turn,
+            files: files.into_iter(),
+            size: encoded.turned_size(rotation)?,
+            tag: encoded.tag(),
             first,
+            reading: Reading { rotation, depth },
             n_frames,
+            end,
         })
     }
 
@@ -42,12 +62,17 @@ impl Images {
         &self.first
     }
 
-    pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> Result<bool, FootageError> {
-        let Some(path) = self.paths.next() else {
-            return Ok(false);
+    pub(super) fn depth(&self) -> Option<Depth> {
+        self.reading.depth
+    }
+
+    /// Reads the next image, and returns the number of its frame; none at the end.
+    pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> Result<Option<u64>, FootageError> {
+        let Some(Numbered { path, frame }) = self.files.next() else {
+            return Ok(None);
         };
         let encoded = Encoded::read(&path)?;
-        let found = encoded.size()?;
+        let found = encoded.turned_size(self.reading.rotation)?;
         if found != self.size {
             return Err(FootageError::SizeDiffers {
                 path,
@@ -56,14 +81,46 @@ impl Images {
                 expected: self.size,
             });
         }
-        encoded.decode_into(rgb)?;
-        Ok(true)
+        rgb.copy_from_slice(&encoded.decode(self.reading)?.1);
+        Ok(Some(frame))
     }
 
-    /// Skips the next image without opening it.
-    pub(super) fn skip_one(&mut self) -> bool {
-        self.paths.next().is_some()
+    /// Skips a frame without opening its image; whether there was such a frame.
+    pub(super) fn skip_one(&mut self, frame: u64) -> bool {
+        if self
+            .files
+            .as_slice()
+            .first()
+            .is_some_and(|it| it.frame <= frame)
+        {
+            self.files.next();
+        }
+        frame < self.end
     }
+}
+
+/// How many bits the images use, by some of them all over the sequence; none where they have 8, or use all of 16.
+fn depth(files: &[Numbered]) -> Result<Option<Depth>, FootageError> {
+    let mut brightest = None;
+    for it in files
+        .iter()
+        .step_by(files.len().div_ceil(N_BRIGHTEST).max(1))
+    {
+        let Some(value) = Encoded::read(&it.path)?.brightest()? else {
+            return Ok(None);
+        };
+        brightest = brightest.max(Some(value));
+        if Depth::of(value).is_none() && value > 0 {
+            return Ok(None);
+        }
+    }
+    Ok(brightest.and_then(Depth::of))
+}
+
+/// The size of an image as it is stored, and what its tag asks.
+pub(super) fn stored(path: &Path) -> Result<(Size, Turn), FootageError> {
+    let encoded = Encoded::read(path)?;
+    Ok((encoded.size()?, encoded.tag()))
 }
 
 /// One image, decoded once and repeated.
@@ -71,21 +128,26 @@ impl Images {
 pub(super) struct Still {
     rgb: Vec<u8>,
     pub(super) size: Size,
-    pub(super) turn: Turn,
+    pub(super) tag: Turn,
     pub(super) n_left: u64,
+    pub(super) depth: Option<Depth>,
 }
 
 impl Still {
-    pub(super) fn open(path: &Path, n_frames: u64) -> Result<Self, FootageError> {
+    pub(super) fn open(
+        path: &Path,
+        n_frames: u64,
+        rotation: Rotation,
+    ) -> Result<Self, FootageError> {
         let encoded = Encoded::read(path)?;
-        let size = encoded.size()?;
-        let mut rgb = vec![0; size.rgb_bytes()];
-        encoded.decode_into(&mut rgb)?;
+        let depth = encoded.brightest()?.and_then(Depth::of);
+        let (size, rgb) = encoded.decode(Reading { rotation, depth })?;
         Ok(Self {
             rgb,
             size,
-            turn: encoded.turn(),
+            tag: encoded.tag(),
             n_left: n_frames,
+            depth,
         })
     }
 
@@ -112,7 +174,7 @@ impl Still {
 ///
 /// [`FootageError`]: absent, empty, damaged or too large; each names the file.
 pub fn read_image(path: &Path) -> Result<(Size, Vec<u8>), FootageError> {
-    Still::open(path, 1).map(|still| (still.size, still.rgb))
+    Still::open(path, 1, Rotation::Stored).map(|still| (still.size, still.rgb))
 }
 
 /// Decodes one image file upright: [`read_image`] with its orientation tag (EXIF) applied. Returns the tag too.
@@ -124,33 +186,41 @@ pub fn read_image(path: &Path) -> Result<(Size, Vec<u8>), FootageError> {
 ///
 /// As [`read_image`].
 pub fn read_upright(path: &Path) -> Result<(Size, Vec<u8>, Turn), FootageError> {
-    let Still {
-        rgb, size, turn, ..
-    } = Still::open(path, 1)?;
-    let (size, rgb) = turn.apply(size, rgb);
-    Ok((size, rgb, turn))
+    let still = Still::open(path, 1, Rotation::Tag)?;
+    Ok((still.size, still.rgb, still.tag))
 }
 
-/// Whether the content of a file is that of an image (an empty file of an image's name counts as one).
+/// Whether the content of a file is that of one image (an empty file of an image's name counts as one): JPEG pictures one behind
+/// the other are a video.
 ///
 /// # Errors
 ///
 /// [`FootageError`]: absent, unreadable or empty.
 pub fn is_image(path: &Path) -> Result<bool, FootageError> {
     use std::io::Read as _;
+    let failed = |source| FootageError::Io {
+        path: path.to_path_buf(),
+        source,
+    };
+    let mut file = std::fs::File::open(path).map_err(failed)?;
     let mut head = Vec::with_capacity(32);
-    std::fs::File::open(path)
-        .and_then(|file| file.take(32).read_to_end(&mut head))
-        .map_err(|source| FootageError::Io {
-            path: path.to_path_buf(),
-            source,
-        })?;
+    (&mut file)
+        .take(32)
+        .read_to_end(&mut head)
+        .map_err(failed)?;
     if head.is_empty() {
         return Err(FootageError::Empty {
             path: path.to_path_buf(),
         });
     }
-    let by_content = image::guess_format(&head).is_ok_and(|format| format.reading_enabled());
+    let format = image::guess_format(&head).ok();
+    if format == Some(image::ImageFormat::Jpeg) {
+        file.take(MAX_PICTURE)
+            .read_to_end(&mut head)
+            .map_err(failed)?;
+        return Ok(!is_jpeg_stream(&head));
+    }
+    let by_content = format.is_some_and(|format| format.reading_enabled());
     let by_name = image::ImageFormat::from_path(path).is_ok_and(|format| format.reading_enabled());
     Ok(by_content || by_name)
 }

@@ -196,6 +196,17 @@ fn natural_order(a: &str, b: &str) -> Ordering {
     }
 }
 
+/// The runs of digits and of anything else.
+pub(super) fn runs(mut text: &str) -> Vec<&str> {
+    let mut all = Vec::new();
+    while !text.is_empty() {
+        let (run, rest) = split_run(text);
+        all.push(run);
+        text = rest;
+    }
+    all
+}
+
 /// The leading run of digits, or the leading run of anything else, and the rest.
 fn split_run(text: &str) -> (&str, &str) {
     let is_number = text.starts_with(|it: char| it.is_ascii_digit());

@@ -2,21 +2,42 @@
 
 use std::io::Read;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Bytes kept of a log; a damaged video can fill a disk with it.
 const MAX_BYTES: usize = 16 << 10;
-/// Capacity of the queue of times; a decoder is a few frames ahead at most.
-const MAX_TIMES: usize = 1024;
+/// Capacity of the queue of times: of the frames between two that are read, and those that a decoder is ahead.
+const MAX_TIMES: usize = 1 << 14;
 /// How long to wait for the time of a frame that has been read.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What a decoder complained about.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Complaints {
+    /// Messages.
+    pub messages: u64,
+    /// Those that say that a picture could not be decoded.
+    pub undecoded: u64,
+    /// The last message.
+    pub last: String,
+}
+
+/// How `ffmpeg` begins or ends what it says of a picture that it leaves out, by version.
+const UNDECODED: [&str; 4] = [
+    "Error while decoding stream",
+    "Error submitting packet",
+    "Error processing packet",
+    "Decoding error",
+];
 
 /// Reads a log to its end in a thread of its own, so that a decoder with much output does not block.
 #[derive(Debug)]
 pub(crate) struct Log {
     reader: Option<JoinHandle<Vec<u8>>>,
     times: Receiver<FrameTime>,
+    complaints: Arc<Mutex<Complaints>>,
 }
 
 /// What is said of a frame.
@@ -31,13 +52,22 @@ pub(crate) struct FrameTime {
 impl Log {
     pub(crate) fn follow(stream: impl Read + Send + 'static) -> std::io::Result<Self> {
         let (sender, times) = sync_channel(MAX_TIMES);
+        let lines = Lines::new(sender);
+        let complaints = Arc::clone(&lines.complaints);
         let reader = std::thread::Builder::new()
             .name("decoder log".to_owned())
-            .spawn(move || Lines::new(sender).read(stream))?;
+            .spawn(move || lines.read(stream))?;
         Ok(Self {
             reader: Some(reader),
             times,
+            complaints,
         })
+    }
+
+    /// What the decoder has complained about so far.
+    pub(crate) fn complaints(&self) -> Complaints {
+        let complaints = self.complaints.lock();
+        complaints.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// The time of the next frame; waits for it for a short time.
@@ -61,6 +91,7 @@ struct Lines {
     kept: Vec<u8>,
     /// The beginning of an incomplete line.
     partial: Vec<u8>,
+    complaints: Arc<Mutex<Complaints>>,
 }
 
 impl Lines {
@@ -70,6 +101,7 @@ impl Lines {
             unit_s: f64::NAN,
             kept: Vec::new(),
             partial: Vec::new(),
+            complaints: Arc::default(),
         }
     }
 
@@ -97,11 +129,25 @@ impl Lines {
             // Times are dropped if the receiver is gone or too slow.
             self.times.try_send(FrameTime { time_s, bytes }).ok();
         } else if !text.starts_with('#') {
+            self.complain(without_address(text.trim()));
             self.kept.extend_from_slice(&line);
             if self.kept.len() > MAX_BYTES {
                 self.kept.drain(..self.kept.len() - MAX_BYTES / 2);
             }
         }
+    }
+}
+
+impl Lines {
+    fn complain(&self, message: &str) {
+        if message.is_empty() {
+            return;
+        }
+        let complaints = self.complaints.lock();
+        let mut complaints = complaints.unwrap_or_else(PoisonError::into_inner);
+        complaints.messages += 1;
+        complaints.undecoded += u64::from(UNDECODED.iter().any(|it| message.contains(it)));
+        message.clone_into(&mut complaints.last);
     }
 }
 

@@ -6,70 +6,180 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-use crate::{FootageError, Size, SourceSpec};
+use crate::{FootageError, Size, SourceSpec, Turn};
 
 /// What is known of a video before it is decoded.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Probe {
-    /// Size as stored: a rotation tag is not applied.
-    pub(super) size: Size,
+    /// Number of the stream in the file.
+    pub(super) stream: u64,
+    /// Size as stored.
+    pub(super) stored: Size,
+    /// What the display matrix asks.
+    pub(super) tag: Turn,
+    /// Frames per second, where the file tells.
     pub(super) rate_hz: Option<f64>,
+    /// Frames per second of the times that the decoder gives, also where these are made up.
+    pub(super) clock_hz: Option<f64>,
     /// Frames in the stream, from the container or by counting packets.
     pub(super) n_frames: u64,
     /// Frames according to the duration in the header.
     pub(super) n_promised: u64,
     /// Presentation times, seconds after the first frame, where frames are not equally spaced.
     pub(super) times_s: Option<Vec<f64>>,
+    /// Time of the first frame as the decoder has it, seconds; none where only the first one that is decoded tells.
+    pub(super) origin_s: Option<f64>,
+    /// Whether pictures are made of others.
+    pub(super) is_inter: bool,
+    /// Whether every picture is two, of different moments, line by line.
+    pub(super) is_interlaced: bool,
     /// Whether the option that keeps every frame is called `-fps_mode` (since 5.1) or `-vsync`.
     pub(super) has_fps_mode: bool,
 }
 
-/// The first video stream of a file.
-const PICTURES: &str = "v:0";
 const ENTRIES: &str = "program_version=version:\
-    stream=width,height,nb_frames,avg_frame_rate,r_frame_rate:format=duration";
+    stream=index,codec_name,width,height,nb_frames,avg_frame_rate,r_frame_rate,duration,start_time,has_b_frames,field_order:\
+    stream_disposition=attached_pic,timed_thumbnails,still_image:stream_side_data:format=format_name,duration,start_time";
+/// A rate that nobody has, to see whether a stream without a container repeats what it is told.
+const ODD_RATE: &str = "225/32";
+/// Codecs of pictures that stand alone; the first four are also those of cover pictures.
+const INTRA: [&str; 9] = [
+    "mjpeg", "png", "bmp", "gif", "rawvideo", "ffv1", "huffyuv", "prores", "dnxhd",
+];
 
-/// Probes the first video stream of `path`. Reads the whole file (without decoding) only if the
-/// container does not have the number of frames, or may not have equally spaced ones.
+/// Probes the film of `path`. Reads the whole file (without decoding) only if the container does not have the number of frames
+/// that are shown, or may not have equally spaced ones.
 pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageError> {
     let wanted = ["-show_program_version", "-show_entries", ENTRIES];
-    let output = run_ffprobe(path, spec, PICTURES, &wanted)?;
-    let stream = &output["streams"][0];
+    let output = run_ffprobe(path, spec, "v", &wanted)?;
+    let stream = film(&output);
+    let has_clock = |it: &Value| number(&it["start_time"]).is_some();
+    let is_bare = number(&output["format"]["duration"]).is_none() && !has_clock(stream);
+    let mut is_made_up = false;
+    if is_bare {
+        // A stream without a container: some tell their rate, for others 25 Hz are made up.
+        let again = ["-framerate", ODD_RATE, "-show_entries", ENTRIES];
+        let told = run_ffprobe(path, spec, "v", &again)?;
+        is_made_up =
+            film(&told)["avg_frame_rate"] == ODD_RATE || film(&told)["r_frame_rate"] == ODD_RATE;
+    }
     let side = |key: &str| stream[key].as_u64().unwrap_or(0) as usize;
-    let size = Size::new(side("width"), side("height"));
-    if size.rgb_bytes() == 0 {
+    let stored = Size::new(side("width"), side("height"));
+    if stored.rgb_bytes() == 0 {
         return Err(FootageError::Video {
             path: path.to_path_buf(),
             message: "it has no video stream".to_owned(),
         });
     }
-    let rate_hz = fraction(&stream["avg_frame_rate"]);
+    let clock_hz = fraction(&stream["avg_frame_rate"]);
+    let codec = stream["codec_name"].as_str().unwrap_or_default();
     let mut probe = Probe {
-        size,
-        rate_hz,
+        stream: stream["index"].as_u64().unwrap_or(0),
+        stored,
+        tag: tag(stream),
+        rate_hz: clock_hz.filter(|_| !is_made_up),
+        clock_hz,
         n_frames: number(&stream["nb_frames"]).map_or(0, |it| it as u64),
         n_promised: 0,
         times_s: None,
+        origin_s: origin(stream, &output["format"], codec),
+        is_inter: !INTRA.contains(&codec),
+        is_interlaced: ["tt", "bb", "tb", "bt"]
+            .iter()
+            .any(|it| stream["field_order"] == *it),
         has_fps_mode: is_5_1(output["program_version"]["version"].as_str().unwrap_or("")),
     };
-    if probe.n_frames == 0 || rate_hz != fraction(&stream["r_frame_rate"]) {
-        let packets = run_ffprobe(
-            path,
-            spec,
-            PICTURES,
-            &["-show_entries", "packet=pts_time,flags"],
-        )?;
+    let is_regular = probe.n_frames > 0 && clock_hz == fraction(&stream["r_frame_rate"]);
+    let is_trimmed = probe.is_trimmed(stream, &output["format"]);
+    if !is_regular || is_trimmed {
+        let index = probe.stream.to_string();
+        let wanted = ["-show_entries", "packet=pts_time,flags"];
+        let packets = run_ffprobe(path, spec, &index, &wanted)?;
         let packets = packets["packets"].as_array().map_or(&[][..], Vec::as_slice);
         probe.count(packets, number(&output["format"]["duration"]));
+        if is_trimmed {
+            probe.n_promised = probe.n_frames;
+        }
     }
     probe.n_promised = probe.n_promised.max(probe.n_frames);
     Ok(probe)
 }
 
+/// The size of the pictures of a video as they are stored, and what its display matrix asks.
+pub(super) fn stored(path: &Path, spec: &SourceSpec) -> Result<(Size, Turn), FootageError> {
+    let output = run_ffprobe(path, spec, "v", &["-show_entries", ENTRIES])?;
+    let stream = film(&output);
+    let side = |key: &str| stream[key].as_u64().unwrap_or(0) as usize;
+    Ok((Size::new(side("width"), side("height")), tag(stream)))
+}
+
+/// The stream of a file that is the film: no cover picture, no thumbnails, no single picture; of several the largest.
+fn film(output: &Value) -> &Value {
+    let streams = output["streams"].as_array().map_or(&[][..], Vec::as_slice);
+    let rank = |stream: &Value| {
+        let marks = ["attached_pic", "timed_thumbnails", "still_image"];
+        let is_marked = marks.iter().any(|it| stream["disposition"][it] == 1);
+        let is_single = stream["nb_frames"] == "1";
+        let codec = stream["codec_name"].as_str().unwrap_or_default();
+        let is_of_covers = INTRA[..4].contains(&codec);
+        let sides = ["width", "height"].map(|it| stream[it].as_u64().unwrap_or(0));
+        (!is_marked, !is_single, !is_of_covers, sides[0] * sides[1])
+    };
+    // The first of equal ones.
+    let best = streams.iter().rev().max_by_key(|it| rank(it));
+    best.unwrap_or(&Value::Null)
+}
+
+/// What the display matrix of a stream asks.
+fn tag(stream: &Value) -> Turn {
+    let data = stream["side_data_list"]
+        .as_array()
+        .map_or(&[][..], Vec::as_slice);
+    let text = data.iter().find_map(|it| it["displaymatrix"].as_str());
+    // "00000000:  0  65536  0", a row a line.
+    let rows = text.unwrap_or_default().lines().filter_map(|it| {
+        let mut numbers = it
+            .split_once(':')?
+            .1
+            .split_whitespace()
+            .map(str::parse::<f64>);
+        Some([numbers.next()?.ok()?, numbers.next()?.ok()?])
+    });
+    match rows.collect::<Vec<_>>()[..] {
+        [[a, b], [c, d], ..] => Turn::of_matrix([a, b, c, d]),
+        _ => Turn::default(),
+    }
+}
+
+/// When the decoder shows the first frame, seconds.
+///
+/// Where frames are not decoded in their order, some containers have the times of decoding alone, which the decoder shifts.
+fn origin(stream: &Value, format: &Value, codec: &str) -> Option<f64> {
+    let has_order = INTRA.contains(&codec) || stream["has_b_frames"] == 0;
+    let starts = [stream, format].map(|it| number(&it["start_time"]));
+    match starts {
+        [Some(own), Some(all)] if has_order => Some(own - all),
+        [None, None] if codec == "mjpeg" => Some(0.0),
+        _ => None,
+    }
+}
+
 impl Probe {
+    /// Whether fewer frames are shown than are stored, by the duration of what is shown: MP4 and its relatives have edit lists.
+    fn is_trimmed(&self, stream: &Value, format: &Value) -> bool {
+        let names = format["format_name"].as_str().unwrap_or_default();
+        let has_edits = names.split(',').any(|it| it == "mov" || it == "mp4");
+        let seconds = number(&stream["duration"]).filter(|_| has_edits);
+        let shown = self
+            .clock_hz
+            .zip(seconds)
+            .map(|(rate_hz, seconds)| rate_hz * seconds);
+        shown.is_some_and(|it| it < self.n_frames as f64 - 0.6)
+    }
+
     /// Determines the number and the times of the frames from the packets of the stream.
     fn count(&mut self, packets: &[Value], duration_s: Option<f64>) {
-        // Packets in front of the first frame that is shown are marked `D`, to be discarded.
+        // Packets in front of the first frame that is shown, and behind the last one, are marked `D`, to be discarded.
         let is_discarded = |packet: &Value| {
             packet["flags"]
                 .as_str()
@@ -102,19 +212,67 @@ impl Probe {
         self.times_s = (!self.is_regular(&times_s)).then_some(times_s);
     }
 
-    /// The rate, where frames are equally spaced.
+    /// The rate by which the times of the decoder tell frames, where these are equally spaced.
     pub(super) fn regular_hz(&self) -> Option<f64> {
-        self.rate_hz.filter(|_| self.times_s.is_none())
+        self.clock_hz.filter(|_| self.times_s.is_none())
+    }
+
+    /// The times of all frames, where these are not equally spaced.
+    pub(super) fn listed_s(&self) -> Option<&[f64]> {
+        let times = self.times_s.as_deref()?;
+        (times.len() as u64 == self.n_frames).then_some(times)
+    }
+
+    /// The frame of a time of the decoder; none where times tell nothing.
+    pub(super) fn frame_at(&self, time_s: f64) -> Option<u64> {
+        if let Some(rate_hz) = self.regular_hz() {
+            return Some((time_s * rate_hz).round() as u64);
+        }
+        let times = self.listed_s()?;
+        let above = times.partition_point(|it| *it < time_s);
+        let nearest = [above.saturating_sub(1), above.min(times.len() - 1)];
+        let distance = |it: &usize| (times[*it] - time_s).abs();
+        let nearest = nearest
+            .into_iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.map(|it| it as u64)
     }
 
     /// Whether all frames are equally spaced, to a quarter of a frame, because some containers round times to
     /// milliseconds.
     fn is_regular(&self, times_s: &[f64]) -> bool {
-        self.rate_hz.is_some_and(|rate_hz| {
+        self.clock_hz.is_some_and(|rate_hz| {
             let late = |(k, time_s): (usize, &f64)| (time_s * rate_hz - k as f64).abs();
             times_s.iter().enumerate().map(late).all(|it| it < 0.25)
         })
     }
+}
+
+/// Frames that can be decoded without any other, by the packets of a stream.
+///
+/// # Errors
+///
+/// The file cannot be read.
+pub(super) fn key_frames(
+    path: &Path,
+    spec: &SourceSpec,
+    probe: &Probe,
+) -> Result<Vec<u64>, FootageError> {
+    let wanted = ["-show_entries", "packet=pts_time,flags"];
+    let packets = run_ffprobe(path, spec, &probe.stream.to_string(), &wanted)?;
+    let packets = packets["packets"].as_array().map_or(&[][..], Vec::as_slice);
+    let flags = |it: &Value| it["flags"].as_str().unwrap_or_default().to_owned();
+    let mut shown: Vec<(f64, String)> = packets
+        .iter()
+        .map(|it| (number(&it["pts_time"]).unwrap_or(0.0), flags(it)))
+        .filter(|it| !it.1.contains('D'))
+        .collect();
+    shown.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let numbered = (0..).zip(shown);
+    Ok(numbered
+        .filter(|it| it.1.1.contains('K'))
+        .map(|it| it.0)
+        .collect())
 }
 
 /// Asks `ffprobe` about a stream of a file.
@@ -131,6 +289,7 @@ pub(super) fn run_ffprobe(
     } = Command::new(&spec.ffprobe)
         .args(["-v", "error", "-select_streams", stream, "-of", "json"])
         .args(wanted)
+        .args(input_options(path))
         .arg(input_name(path))
         .stdin(Stdio::null())
         .output()
@@ -144,6 +303,17 @@ pub(super) fn run_ffprobe(
     }
     serde_json::from_slice(&stdout)
         .map_err(|error| unreadable(format!("the output of ffprobe is not JSON: {error}")))
+}
+
+/// What ffmpeg must know to read a file: pictures one behind the other are no picture, whatever the file is called.
+pub(super) fn input_options(path: &Path) -> &'static [&'static str] {
+    use std::io::Read as _;
+    let mut head = [0; 3];
+    let read = std::fs::File::open(path).and_then(|mut it| it.read_exact(&mut head));
+    if read.is_ok() && head == [0xff, 0xd8, 0xff] {
+        return &["-f", "mjpeg"];
+    }
+    &[]
 }
 
 /// The name of a file for ffmpeg, protected against names such as `concat:x` and `-x`.

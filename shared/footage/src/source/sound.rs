@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::listing::{self, Listing};
 use super::log::summary;
-use super::probe::{input_name, missing, number, run_ffprobe};
+use super::probe::{input_name, missing, number, probe, run_ffprobe};
 use crate::{FootageError, SourceSpec, is_image};
 
 /// The sound of a video, all channels mixed.
@@ -36,7 +36,8 @@ pub fn read_sound(spec: &SourceSpec, rate_hz: u32) -> Result<Option<RecordedSoun
     if of_sound["streams"].as_array().is_none_or(Vec::is_empty) {
         return Ok(None);
     }
-    let of_pictures = run_ffprobe(&path, spec, "v:0", &wanted)?;
+    let film = probe(&path, spec)?.stream.to_string();
+    let of_pictures = run_ffprobe(&path, spec, &film, &wanted)?;
     let start_s = |it: &Value| number(&it["start_time"]).unwrap_or(0.0);
     let first_frame_s = start_s(&of_pictures["streams"][0]);
     Ok(Some(RecordedSound {

@@ -4,9 +4,9 @@ use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
-use super::log::Log;
-use super::probe::{Probe, input_name, missing, probe};
-use crate::{FootageError, SourceSpec};
+use super::log::{Complaints, Log};
+use super::probe::{Probe, input_name, input_options, key_frames, missing, probe};
+use crate::{FootageError, Size, SourceSpec};
 
 /// A running decoder. It is killed when this is dropped. If this process dies without dropping it,
 /// the decoder ends at its next write to the closed pipe.
@@ -14,16 +14,24 @@ use crate::{FootageError, SourceSpec};
 pub(super) struct Video {
     path: PathBuf,
     pub(super) probe: Probe,
+    /// Size of the turned pictures.
+    pub(super) size: Size,
+    spec: SourceSpec,
     /// Expected frames, from the index of the container.
     pub(super) n_frames: u64,
     /// Expected frames, from the duration in the header.
     n_promised: u64,
     n_read: u64,
+    /// Those of them that were handed out.
+    n_given: u64,
     /// Index in the footage of the frame that was read last.
     last_index: u64,
-    /// Distance between the frames that are read, and the first of them.
-    step: u64,
-    start: u64,
+    /// The last frame whose time was told.
+    last_told: Option<u64>,
+    /// Pictures that the decoder had left out at the last gap.
+    n_undecoded: u64,
+    /// Frames that stand alone, while those that are read are made of one that could not be decoded.
+    is_broken: Option<Vec<u64>>,
     child: Child,
     stdout: ChildStdout,
     log: Log,
@@ -36,7 +44,11 @@ impl Video {
         let n_promised = spec.n_delivered(probe.n_promised)?;
         let not_started = |source| missing(&spec.ffmpeg, path, source);
         let mut child = Command::new(&spec.ffmpeg)
-            .args(["-nostdin", "-v", "error", "-noautorotate", "-i"])
+            // A picture that is not whole is left out; otherwise its rest would be made up.
+            .args(["-nostdin", "-v", "error", "-noautorotate"])
+            .args(["-err_detect:v", "explode"])
+            .args(input_options(path))
+            .arg("-i")
             .arg(input_name(path))
             .args(outputs(&probe, spec))
             .stdin(Stdio::null())
@@ -49,13 +61,17 @@ impl Video {
         let stderr = child.stderr.take().ok_or_else(no_pipe)?;
         Ok(Self {
             path: path.to_path_buf(),
+            size: spec.rotation.turn(probe.tag).size(probe.stored),
             probe,
+            spec: spec.clone(),
             n_frames,
             n_promised,
             n_read: 0,
+            n_given: 0,
             last_index: spec.start,
-            step: spec.step,
-            start: spec.start,
+            last_told: None,
+            n_undecoded: 0,
+            is_broken: None,
             child,
             stdout,
             log: Log::follow(stderr).map_err(not_started)?,
@@ -66,6 +82,64 @@ impl Video {
     ///
     /// The index of a frame that could not be decoded is left out.
     pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> Result<Option<u64>, FootageError> {
+        while self.spec.count.is_none_or(|most| self.n_given < most) {
+            if !self.fill(rgb)? {
+                return Ok(None);
+            }
+            let is_whole = self.identify()?;
+            self.n_read += 1;
+            if is_whole && self.is_chosen(self.last_index) {
+                self.n_given += 1;
+                return Ok(Some(self.last_index));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Finds the index of the frame whose pixels have just been read; whether it is whole.
+    fn identify(&mut self) -> Result<bool, FootageError> {
+        let due = match self.n_read {
+            0 => self.spec.start,
+            _ => self.last_index.saturating_add(self.spec.step),
+        };
+        if !has_times(&self.probe) {
+            self.last_index = due;
+            return Ok(true);
+        }
+        loop {
+            // Times are told of all frames, pixels of those that are chosen.
+            let time_s = self.log.next_time().map(|it| it.time_s);
+            let Some(told) = time_s.and_then(|it| self.probe.frame_at(it)) else {
+                self.last_index = due;
+                return Ok(true);
+            };
+            let first = if self.is_listed() { 0 } else { self.spec.start };
+            let next = self.last_told.map_or(first, |it| it + 1);
+            let is_whole = self.is_whole(told.max(next), next)?;
+            self.last_told = Some(told.max(next));
+            if self.is_listed() || self.is_chosen(told) {
+                self.last_index = told.max(if self.is_listed() { next } else { due });
+                return Ok(is_whole);
+            }
+        }
+    }
+
+    fn is_chosen(&self, index: u64) -> bool {
+        let SourceSpec { start, step, .. } = self.spec;
+        index >= start && (index - start).is_multiple_of(step)
+    }
+
+    fn is_listed(&self) -> bool {
+        self.probe.listed_s().is_some()
+    }
+
+    /// What the decoder has complained about so far.
+    pub(super) fn complaints(&self) -> Complaints {
+        self.log.complaints()
+    }
+
+    /// Reads the pixels of the next frame that the decoder gives; whether there was one.
+    fn fill(&mut self, rgb: &mut [u8]) -> Result<bool, FootageError> {
         let mut filled = 0;
         while filled < rgb.len() {
             match self.stdout.read(&mut rgb[filled..]) {
@@ -80,27 +154,33 @@ impl Video {
                 }
             }
         }
-        if filled == rgb.len() {
-            self.last_index = self.index();
-            self.n_read += 1;
-            return Ok(Some(self.last_index));
+        if filled < rgb.len() {
+            self.check_end(filled > 0)?;
         }
-        self.check_end(filled > 0)?;
-        Ok(None)
+        Ok(filled == rgb.len())
     }
 
-    /// The index of the frame that has just been read: by its time where frames are equally spaced, else
-    /// by counting.
-    fn index(&self) -> u64 {
-        let counted = match self.n_read {
-            0 => self.start,
-            _ => self.last_index.saturating_add(self.step),
+    /// Whether a frame is not made of one that could not be decoded: after such a one, from the next that stands alone on.
+    ///
+    /// * `next`: the frame that follows the one before it.
+    fn is_whole(&mut self, index: u64, next: u64) -> Result<bool, FootageError> {
+        if !self.probe.is_inter {
+            return Ok(true);
+        }
+        if index > next && self.is_broken.is_none() {
+            let n_undecoded = self.log.complaints().undecoded;
+            if core::mem::replace(&mut self.n_undecoded, n_undecoded) < n_undecoded {
+                self.is_broken = Some(key_frames(&self.path, &self.spec, &self.probe)?);
+            }
+        }
+        let Some(keys) = &self.is_broken else {
+            return Ok(true);
         };
-        let Some(rate_hz) = self.probe.regular_hz() else {
-            return counted;
-        };
-        let by_time = self.log.next_time().map(|it| (it.time_s * rate_hz).round());
-        by_time.map_or(counted, |index| counted.max(index as u64))
+        let is_whole = keys.contains(&index);
+        if is_whole {
+            self.is_broken = None;
+        }
+        Ok(is_whole)
     }
 
     /// Distinguishes the end of a complete video from one that is cut off.
@@ -128,7 +208,8 @@ impl Video {
         }
         let n_expected = self.n_promised;
         // Frames that could not be decoded do not mean that the end is missing.
-        let n_reached = (self.last_index - self.start) / self.step + 1;
+        let start = self.spec.start;
+        let n_reached = (self.last_index.max(start) - start) / self.spec.step + 1;
         let has_errors = !message.is_empty() && n_reached < n_expected;
         let is_short = n_reached < self.n_frames - self.n_frames / 10;
         if has_errors || is_partial || is_short || !status.success() {
@@ -155,26 +236,49 @@ impl Drop for Video {
     }
 }
 
-/// The outputs of the decoder: the pixels of the chosen frames and, where frames are equally spaced, the time of
-/// each on standard error. A frame that cannot be decoded is missing in both.
+/// Whether the decoder is asked for the times of frames.
+fn has_times(probe: &Probe) -> bool {
+    probe.regular_hz().is_some() || probe.listed_s().is_some()
+}
+
+/// The outputs of the decoder: the pixels of the chosen frames and, where times tell frames, the times of
+/// all on standard error. A frame that cannot be decoded is missing in both.
 fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
     let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
-    let mut arguments = output(probe, spec, None, &pixels);
-    if probe.regular_hz().is_some() {
-        let times = ["-flush_packets", "1", "-f", "framecrc", "pipe:2"];
-        arguments.extend(output(probe, spec, Some("crop=2:2:0:0:exact=1"), &times));
+    let turn = spec.rotation.turn(probe.tag).filters();
+    let mut arguments = output(probe, spec, turn, &pixels);
+    if has_times(probe) {
+        let times = [
+            "-enc_time_base",
+            "1:1000000",
+            "-flush_packets",
+            "1",
+            "-f",
+            "framecrc",
+            "pipe:2",
+        ];
+        // Of all frames from the first to the last, so that one that is missing between those that are chosen is noticed.
+        let all = SourceSpec {
+            step: 1,
+            count: spec
+                .count
+                .map(|count| (count - 1).saturating_mul(spec.step).saturating_add(1)),
+            ..spec.clone()
+        };
+        let small = "crop=2:2:0:0:exact=1".to_owned();
+        arguments.extend(output(probe, &all, Some(small), &times));
     }
     arguments
 }
 
-fn output(probe: &Probe, spec: &SourceSpec, more: Option<&str>, format: &[&str]) -> Vec<String> {
+fn output(probe: &Probe, spec: &SourceSpec, more: Option<String>, format: &[&str]) -> Vec<String> {
     let mut filters = frame_choice(probe, spec);
-    filters.extend(more.map(str::to_owned));
-    let mut arguments = vec!["-map".to_owned(), "0:v:0".to_owned()];
+    filters.extend(more);
+    let mut arguments = vec!["-map".to_owned(), format!("0:{}", probe.stream)];
     if !filters.is_empty() {
         arguments.extend(["-vf".to_owned(), filters.join(",")]);
     }
-    if let Some(count) = spec.count {
+    if let Some(count) = spec.count.filter(|_| probe.listed_s().is_none()) {
         arguments.extend(["-frames:v".to_owned(), count.to_string()]);
     }
     let mode = if probe.has_fps_mode {
@@ -191,11 +295,16 @@ fn output(probe: &Probe, spec: &SourceSpec, more: Option<&str>, format: &[&str])
 ///
 /// Every earlier frame is decoded nevertheless: a seek finds the wrong frame in many files. Where
 /// frames are equally spaced they are chosen by their time, so that one which cannot be decoded does not
-/// shift the others.
+/// shift the others; where their times are listed, by who reads them.
 fn frame_choice(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
     let (start, step) = (spec.start, spec.step);
     let is_part = start > 0 || step > 1;
+    let from_first = probe.origin_s.map_or_else(
+        || "setpts=PTS-STARTPTS".to_owned(),
+        |origin_s| format!("setpts=PTS-({origin_s:?}/TB)"),
+    );
     match probe.regular_hz() {
+        None if probe.listed_s().is_some() => vec![from_first],
         None if is_part => vec![format!(
             "select=gte(n\\,{start})*not(mod(n-{start}\\,{step}))"
         )],
@@ -203,7 +312,7 @@ fn frame_choice(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
         Some(rate_hz) => {
             let nth = format!("round(t*{rate_hz:?})");
             let chosen = format!("select=gte({nth}\\,{start})*not(mod({nth}-{start}\\,{step}))");
-            let all = ["setpts=PTS-STARTPTS".to_owned(), chosen].into_iter();
+            let all = [from_first, chosen].into_iter();
             all.take(if is_part { 2 } else { 1 }).collect()
         }
     }
@@ -212,14 +321,21 @@ fn frame_choice(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Turn;
 
     fn probe(times_s: Option<Vec<f64>>) -> Probe {
         Probe {
-            size: crate::Size::new(4, 4),
+            stream: 1,
+            stored: Size::new(4, 4),
+            tag: Turn::default(),
             rate_hz: Some(12.5),
+            clock_hz: Some(12.5),
             n_frames: 100,
             n_promised: 100,
             times_s,
+            origin_s: None,
+            is_inter: false,
+            is_interlaced: false,
             has_fps_mode: true,
         }
     }
@@ -241,8 +357,13 @@ mod tests {
         );
         assert!(frame_choice(&probe(Some(vec![])), &SourceSpec::new("x")).is_empty());
         let arguments = outputs(&probe(None), &spec);
-        let counts = arguments.windows(2).filter(|it| *it == ["-frames:v", "4"]);
-        assert_eq!(counts.count(), 2, "pixels and times of the same frames");
+        let counts = arguments.windows(2).filter(|it| it[0] == "-frames:v");
+        let counts: Vec<&str> = counts.map(|it| it[1].as_str()).collect();
+        assert_eq!(
+            counts,
+            ["4", "31"],
+            "pixels of the chosen frames, times of all"
+        );
         let counted = outputs(&probe(Some(vec![])), &spec);
         assert!(!counted.contains(&"framecrc".to_owned()), "{counted:?}");
     }

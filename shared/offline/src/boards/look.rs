@@ -63,7 +63,7 @@ pub fn look(
         .iter()
         .map(|camera| {
             let each = camera.paths.iter().map(|path| {
-                let source = Source::open(&SourceSpec::new(path)).map_err(footage_failure)?;
+                let source = Source::open(&SourceSpec::upright(path)).map_err(footage_failure)?;
                 Ok(source.info().clone())
             });
             each.collect()
@@ -168,7 +168,7 @@ impl CameraTask<'_> {
         };
         let mut before = 0;
         for (nth_path, path) in self.camera.paths.iter().enumerate() {
-            let mut source = Source::open(&SourceSpec::new(path)).map_err(footage_failure)?;
+            let mut source = Source::open(&SourceSpec::upright(path)).map_err(footage_failure)?;
             let size = [
                 source.info().size.width as u32,
                 source.info().size.height as u32,

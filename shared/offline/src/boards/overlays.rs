@@ -90,7 +90,7 @@ fn drawn(
     let Some(path) = camera.paths.get(path) else {
         return Ok(None);
     };
-    let mut source = Source::open(&SourceSpec::new(path)).map_err(footage_failure)?;
+    let mut source = Source::open(&SourceSpec::upright(path)).map_err(footage_failure)?;
     let size = source.info().size;
     while let Some(picture) = source.next_frame().map_err(footage_failure)? {
         if picture.index as usize == nth {

@@ -23,8 +23,7 @@ use crate::globals::Globals;
 use crate::terminal::Terminal;
 
 /// The progress bar.
-const BAR: &str =
-    "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left {prefix} {msg}";
+const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";
 
 /// Options of `parallax calibrate board`.
 #[derive(Debug, Args)]

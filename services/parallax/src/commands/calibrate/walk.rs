@@ -8,7 +8,7 @@ use deployment::Deployment;
 use geometry::files::Format;
 use geometry::{Camera, Rig};
 use launch::films::{Films, Part, Poses, films};
-use launch::load;
+use launch::{inputs, load};
 use nalgebra::UnitVector3;
 use offline::unless_stopped;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
@@ -17,8 +17,7 @@ use crate::globals::Globals;
 use crate::terminal::Terminal;
 
 /// The progress bar.
-const BAR: &str =
-    "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left {prefix} {msg}";
+const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";
 
 /// Options of both.
 #[derive(Debug, Args)]
@@ -83,6 +82,7 @@ pub(super) fn walk(
     stop: &Stop,
 ) -> Result<Walk, Failure> {
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
+    let deployment = inputs::settled(&deployment)?;
     if deployment.cameras.len() < 2 {
         let message = "the deployment has one camera: where it stands is told by others only";
         return Err(Failure::new(ExitKind::Config, message));

@@ -1,0 +1,72 @@
+//! What people write that TOML reads otherwise, and files of other programs in the place of a deployment.
+
+/// What is to be said of a whole text that is none of a deployment; none where it may be one.
+pub(super) fn other_file(text: &str) -> Option<&'static str> {
+    let begins = |head: &str| {
+        text.lines()
+            .any(|it| it.trim_end() == head || it.starts_with(head))
+    };
+    if begins("format = \"parallax-rig\"") {
+        return Some("this is a rig file: name the deployment file, whose `rig` it is");
+    }
+    // Sections of Pose2Sim's Config.toml.
+    let sections = [
+        "[project]",
+        "[pose]",
+        "[synchronization]",
+        "[personAssociation]",
+        "[triangulation]",
+        "[filtering]",
+        "[kinematics]",
+    ];
+    let n = sections.iter().filter(|it| begins(it)).count();
+    (n >= 3 && !begins("[[camera]]")).then_some(
+        "this is a configuration of Pose2Sim: a deployment names the cameras, their videos and the calibration. `parallax new FOLDER \
+         --camera cam01=videos/cam01.mp4 --camera cam02=videos/cam02.mp4 --rig calibration/Calib.toml` writes one of the same files",
+    )
+}
+
+/// What is to be said of a line that the reader refuses; none where it is nothing usual.
+pub(super) fn of_line(line: &str) -> Option<&'static str> {
+    let value = line.split_once('=').map_or(line, |it| it.1).trim();
+    if value.starts_with('"') && value.contains('\\') {
+        return Some(ESCAPE);
+    }
+    let inside = value.strip_prefix('[')?.split(']').next()?;
+    let mut words = inside.split_whitespace();
+    let is_number = |it: &str| it.parse::<f64>().is_ok();
+    let has_no_commas = inside.split_whitespace().count() > 1 && words.all(is_number);
+    has_no_commas.then_some("the numbers of a list need commas between them: [0, 0, 1]")
+}
+
+/// What is to be said of a path with characters that a backslash has made.
+pub(super) const ESCAPE: &str = "a backslash in \"...\" begins a special character: write / in its place, as in \"C:/videos/a.mp4\", or put the \
+    path in single quotes, 'C:\\videos\\a.mp4'";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usual_slips_are_told() {
+        assert_eq!(of_line(r#"source = "C:\Users\me\a.mp4""#), Some(ESCAPE));
+        assert!(of_line("up = [0 0 1]").is_some());
+        for fine in [
+            "up = [0, 0, 1]",
+            "source = 'C:\\a.mp4'",
+            "up = [1]",
+            "x",
+            "",
+        ] {
+            assert_eq!(of_line(fine), None, "{fine}");
+        }
+    }
+
+    #[test]
+    fn files_of_others_are_told() {
+        let pose2sim =
+            "[project]\nmulti_person = false\n[pose]\n[synchronization]\n[triangulation]\n";
+        assert!(other_file(pose2sim).is_some_and(|it| it.contains("Pose2Sim")));
+        assert_eq!(other_file("[pose]\nthreads = 2\n[[camera]]\n"), None);
+    }
+}

@@ -1,0 +1,130 @@
+//! What an HTTP camera answers, where a decoder finds no pictures in it.
+
+use std::io::{BufReader, Read as _, Write as _};
+use std::net::{TcpStream, ToSocketAddrs as _};
+use std::time::Duration;
+
+/// Longest wait for an answer.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// Longest head of an answer, bytes.
+const MAX_HEAD: u64 = 16 << 10;
+
+/// What came.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Answer {
+    /// One picture, and no stream.
+    Picture,
+    /// Something that is no picture: its media type.
+    Other(String),
+}
+
+impl Answer {
+    /// What is said of it.
+    pub(crate) fn complaint(self) -> String {
+        match self {
+            Self::Picture => {
+                "it is the address of a single picture; that of the stream is another one (the manual of the camera has it)"
+                    .to_owned()
+            }
+            Self::Other(kind) if kind == "text/html" => {
+                "a page came (text/html) in place of pictures: does the camera want somebody to sign in (name and \
+                 password stand in front of the host, with an @ behind), or is it the address of its menu?"
+                    .to_owned()
+            }
+            Self::Other(kind) => format!("{kind} came in place of pictures"),
+        }
+    }
+}
+
+/// Asks an address of `http://` what is there; none where nobody answers, or where it can be a stream.
+pub(crate) fn ask(address: &str) -> Option<Answer> {
+    let (scheme, rest) = address.split_once("://")?;
+    let (host, path) = rest.split_at(rest.find(['/', '?']).unwrap_or(rest.len()));
+    // Without its password a camera refuses, and with TLS nothing can be read.
+    if !scheme.eq_ignore_ascii_case("http") || host.contains('@') {
+        return None;
+    }
+    let has_port = host
+        .rsplit_once(':')
+        .is_some_and(|it| it.1.parse::<u16>().is_ok());
+    let with_port = if has_port {
+        host.to_owned()
+    } else {
+        format!("{host}:80")
+    };
+    let to = with_port.to_socket_addrs().ok()?.next()?;
+    let mut stream = TcpStream::connect_timeout(&to, PATIENCE).ok()?;
+    stream.set_read_timeout(Some(PATIENCE)).ok()?;
+    stream.set_write_timeout(Some(PATIENCE)).ok()?;
+    let slash = if path.starts_with('/') { "" } else { "/" };
+    let request = format!("GET {slash}{path} HTTP/1.0\r\nHost: {host}\r\nAccept: */*\r\n\r\n");
+    stream.write_all(request.as_bytes()).ok()?;
+    let mut head = Vec::new();
+    for byte in BufReader::new(stream).take(MAX_HEAD).bytes() {
+        head.push(byte.ok()?);
+        if head.ends_with(b"\r\n\r\n") || head.ends_with(b"\n\n") {
+            break;
+        }
+    }
+    of_head(&String::from_utf8_lossy(&head))
+}
+
+fn of_head(head: &str) -> Option<Answer> {
+    let mut lines = head.lines();
+    if lines.next()?.split_whitespace().nth(1)? != "200" {
+        return None;
+    }
+    let field = |name: &str| {
+        let mut fields = head.lines().filter_map(|it| it.split_once(':'));
+        let found = fields.find(|it| it.0.trim().eq_ignore_ascii_case(name))?;
+        Some(found.1.trim().to_ascii_lowercase())
+    };
+    let kind = field("content-type")?;
+    let kind = kind.split(';').next().unwrap_or_default().trim().to_owned();
+    if kind.starts_with("image/") {
+        return field("content-length").map(|_| Answer::Picture);
+    }
+    let is_stream = ["multipart/", "video/", "audio/", "application/"];
+    (!is_stream.iter().any(|it| kind.starts_with(it))).then_some(Answer::Other(kind))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_is_told_by_its_head() {
+        let of = |kind: &str, more: &str| {
+            of_head(&format!(
+                "HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\n{more}\r\n"
+            ))
+        };
+        assert_eq!(
+            of("image/jpeg", "Content-Length: 99\r\n"),
+            Some(Answer::Picture)
+        );
+        assert_eq!(
+            of("text/html; charset=utf-8", ""),
+            Some(Answer::Other("text/html".to_owned()))
+        );
+        for stream in [
+            "multipart/x-mixed-replace; boundary=a",
+            "image/jpeg",
+            "video/mp4",
+            "application/octet-stream",
+        ] {
+            assert_eq!(of(stream, ""), None, "{stream}");
+        }
+        assert_eq!(
+            of_head("HTTP/1.1 302 Found\r\nContent-Type: text/html\r\n\r\n"),
+            None
+        );
+        assert_eq!(of_head(""), None);
+    }
+
+    #[test]
+    fn nobody_is_no_answer() {
+        assert_eq!(ask("http://127.0.0.1:1/x"), None);
+        assert_eq!(ask("rtsp://127.0.0.1/x"), None);
+    }
+}

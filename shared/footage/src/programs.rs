@@ -1,0 +1,61 @@
+//! Programs of others: run with a time limit, and asked for their version.
+
+use std::io::{self, Read};
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Runs a program to its end, and returns what it wrote; none if it has to be killed because the time is over.
+pub(crate) fn output_within(mut command: Command, limit: Duration) -> io::Result<Option<Output>> {
+    const PAUSE: Duration = Duration::from_millis(10);
+    let mut child = command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()?;
+    let pipes: [Option<Box<dyn Read + Send>>; 2] = [
+        child.stdout.take().map(|it| Box::new(it) as _),
+        child.stderr.take().map(|it| Box::new(it) as _),
+    ];
+    let read = |pipe: Option<Box<dyn Read + Send>>| {
+        std::thread::Builder::new().spawn(move || {
+            let mut bytes = Vec::new();
+            // What could be read up to an error counts.
+            pipe.map(|mut it| it.read_to_end(&mut bytes).ok());
+            bytes
+        })
+    };
+    let [stdout, stderr] = pipes.map(read);
+    let begin = Instant::now();
+    let status = loop {
+        match child.try_wait()? {
+            Some(status) => break Some(status),
+            None if begin.elapsed() > limit => break None,
+            None => std::thread::sleep(PAUSE),
+        }
+    };
+    if status.is_none() {
+        child.kill()?;
+        child.wait()?;
+    }
+    let [stdout, stderr] = [stdout?, stderr?].map(|it| it.join().unwrap_or_default());
+    Ok(status.map(|status| Output {
+        status,
+        stdout,
+        stderr,
+    }))
+}
+
+/// The version of `ffmpeg`; empty if it does not tell.
+pub(crate) fn version_of(ffmpeg: &PathBuf) -> String {
+    let said = Command::new(ffmpeg)
+        .arg("-version")
+        .stdin(Stdio::null())
+        .output();
+    let said = said.map(|it| it.stdout).unwrap_or_default();
+    let text = String::from_utf8_lossy(&said);
+    text.split_whitespace()
+        .nth(2)
+        .unwrap_or_default()
+        .to_owned()
+}

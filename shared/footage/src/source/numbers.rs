@@ -1,0 +1,205 @@
+//! The numbers in the names of pictures, and the frames that follow from those of all cameras.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use super::listing::{self, Listing, runs};
+use crate::{FootageError, PictureNumbers};
+
+/// A picture of a sequence, and its frame.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Numbered {
+    pub(super) path: PathBuf,
+    /// From 0.
+    pub(super) frame: u64,
+}
+
+/// The frames of pictures: by their numbers where they are told, else one after the other.
+///
+/// Pictures in front of the first frame, and between two frames, are left out.
+pub(super) fn frames(paths: Vec<PathBuf>, numbers: Option<PictureNumbers>) -> Vec<Numbered> {
+    let told = numbers.and_then(|it| Some((it, numbers_of(&paths)?)));
+    let Some((PictureNumbers { first, step }, numbers)) = told else {
+        let all = paths.into_iter().zip(0..);
+        return all.map(|(path, frame)| Numbered { path, frame }).collect();
+    };
+    let frame = |number: u64| {
+        let above = number.checked_sub(first)?;
+        above
+            .is_multiple_of(step.max(1))
+            .then(|| above / step.max(1))
+    };
+    let all = paths.into_iter().zip(numbers);
+    all.filter_map(|(path, number)| {
+        Some(Numbered {
+            path,
+            frame: frame(number)?,
+        })
+    })
+    .collect()
+}
+
+/// The numbers of pictures, rising, each once; none where they are not numbered.
+///
+/// * `paths`: in natural order.
+fn numbers_of(paths: &[PathBuf]) -> Option<Vec<u64>> {
+    let texts: Vec<String> = paths
+        .iter()
+        .map(|it| it.with_extension("").to_string_lossy().into_owned())
+        .collect();
+    let all: Vec<Vec<&str>> = texts.iter().map(|it| runs(it)).collect();
+    let first = all.first()?;
+    let is_number = |it: &str| it.starts_with(|it: char| it.is_ascii_digit());
+    let is_alike = |it: &Vec<&str>| {
+        let mut pairs = it.iter().zip(first);
+        it.len() == first.len() && pairs.all(|(a, b)| a == b || (is_number(a) && is_number(b)))
+    };
+    if !all.iter().all(is_alike) {
+        return None;
+    }
+    let column = |nth: usize| -> Option<Vec<u64>> {
+        let numbers = all.iter().map(|it| it[nth].parse().ok());
+        let numbers: Vec<u64> = numbers.collect::<Option<_>>()?;
+        numbers.is_sorted_by(|a, b| a < b).then_some(numbers)
+    };
+    // Of several that rise (a number and a time), the one with the least gaps; the last of equal ones.
+    let rising = (0..first.len()).rev().filter_map(column);
+    rising.min_by_key(|it| it[it.len() - 1] - it[0])
+}
+
+/// The numbers of the pictures of a folder, a pattern or a glob, rising; none for other footage, and where they are not numbered.
+///
+/// # Errors
+///
+/// There is no such footage, or it cannot be read.
+pub fn picture_numbers(path: &str) -> Result<Option<Vec<u64>>, FootageError> {
+    Ok(match listing::list(path)? {
+        Listing::Images(paths) => numbers_of(&paths),
+        Listing::File(_) => None,
+    })
+}
+
+/// How the pictures of several cameras are counted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Counting {
+    /// One after the other, as their numbers are none of frames: too far apart.
+    InOrder,
+    /// By their numbers, which the cameras have in common.
+    Common(PictureNumbers),
+    /// By their numbers, each camera from its own first one: their ranges have little in common.
+    Own(Vec<PictureNumbers>),
+}
+
+impl Counting {
+    /// * `cameras`: the numbers of every camera, rising; none empty.
+    pub fn of(cameras: &[Vec<u64>]) -> Self {
+        let firsts: Vec<u64> = cameras
+            .iter()
+            .filter_map(|it| it.first().copied())
+            .collect();
+        let lasts = cameras.iter().filter_map(|it| it.last().copied());
+        let lengths = cameras
+            .iter()
+            .filter_map(|it| Some(it.last()? - it.first()?));
+        let from = firsts.iter().copied().max().unwrap_or(0);
+        let both = (lasts.min().unwrap_or(0) + 1).saturating_sub(from);
+        let is_common = 2 * both > lengths.min().unwrap_or(0);
+        if is_common {
+            let first = firsts.iter().copied().min().unwrap_or(0);
+            let step = step_of(&vec![first; cameras.len()], cameras);
+            return step.map_or(Self::InOrder, |step| {
+                Self::Common(PictureNumbers { first, step })
+            });
+        }
+        let step = step_of(&firsts, cameras);
+        step.map_or(Self::InOrder, |step| {
+            let all = firsts.into_iter();
+            Self::Own(all.map(|first| PictureNumbers { first, step }).collect())
+        })
+    }
+}
+
+/// By how much numbers rise from frame to frame; none where most frames would have no picture of any camera.
+///
+/// * `firsts`: the number of frame 0 of every camera.
+fn step_of(firsts: &[u64], cameras: &[Vec<u64>]) -> Option<u64> {
+    const MOST_FRAMES: u64 = 3;
+    let all = firsts.iter().zip(cameras);
+    let all = all.flat_map(|(first, it)| it.iter().map(move |it| it - first));
+    let all: BTreeSet<u64> = all.collect();
+    let step = all.iter().fold(0, |gcd, it| common(gcd, *it)).max(1);
+    let n_frames = all.last()? / step + 1;
+    (n_frames <= MOST_FRAMES * all.len() as u64).then_some(step)
+}
+
+/// The greatest common divisor.
+fn common(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { common(b, a % b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(names: &[&str]) -> Option<Vec<u64>> {
+        let paths: Vec<PathBuf> = names
+            .iter()
+            .map(|it| PathBuf::from("c1").join(it))
+            .collect();
+        numbers_of(&paths)
+    }
+
+    #[test]
+    fn the_number_that_rises_is_that_of_the_frame() {
+        assert_eq!(numbers(&["000000.jpg", "000007.jpg"]), Some(vec![0, 7]));
+        assert_eq!(numbers(&["im9.png", "im10.png"]), Some(vec![9, 10]));
+        assert_eq!(
+            numbers(&["a3_1_left.png", "a3_2_left.png"]),
+            Some(vec![1, 2])
+        );
+        let with_time = ["f1_1697381001233.png", "f2_1697381001266.png"];
+        assert_eq!(numbers(&with_time), Some(vec![1, 2]));
+        assert_eq!(numbers(&["a_5.jpg"]), Some(vec![5]));
+        for names in [
+            &["a.png", "b.png"][..],
+            &["im01.png", "im1.png"],
+            &["IMG_1.png", "PXL_2.png"],
+        ] {
+            assert_eq!(numbers(names), None, "{names:?}");
+        }
+    }
+
+    #[test]
+    fn a_gap_is_a_frame_without_a_picture() {
+        let paths = ["2.png", "3.png", "6.png"].map(PathBuf::from).to_vec();
+        let at = |first, step| -> Vec<u64> {
+            let numbers = Some(PictureNumbers { first, step });
+            frames(paths.clone(), numbers)
+                .iter()
+                .map(|it| it.frame)
+                .collect()
+        };
+        assert_eq!(at(0, 1), [2, 3, 6]);
+        assert_eq!(at(3, 1), [0, 3]);
+        assert_eq!(at(2, 2), [0, 2]);
+        let in_order: Vec<u64> = frames(paths, None).iter().map(|it| it.frame).collect();
+        assert_eq!(in_order, [0, 1, 2]);
+    }
+
+    #[test]
+    fn cameras_count_by_common_numbers_or_by_their_own() {
+        let range = |range: core::ops::Range<u64>| range.collect::<Vec<u64>>();
+        let common = |first, step| Counting::Common(PictureNumbers { first, step });
+        let gap: Vec<u64> = (0..14).filter(|it| !(3..6).contains(it)).collect();
+        assert_eq!(Counting::of(&[range(0..14), gap]), common(0, 1));
+        assert_eq!(Counting::of(&[range(0..14), range(3..14)]), common(0, 1));
+        let fifth = |range: core::ops::Range<u64>| range.map(|it| 5 * it).collect::<Vec<u64>>();
+        assert_eq!(Counting::of(&[fifth(2..20), fifth(2..19)]), common(10, 5));
+        assert_eq!(Counting::of(&[range(7..8), range(7..8)]), common(7, 1));
+        let own = |first| PictureNumbers { first, step: 1 };
+        let counted = Counting::of(&[range(0..100), range(1000..1099)]);
+        assert_eq!(counted, Counting::Own(vec![own(0), own(1000)]));
+        let chosen = vec![12, 31, 250, 301];
+        assert_eq!(Counting::of(&[chosen.clone(), chosen]), Counting::InOrder);
+    }
+}

@@ -1,0 +1,340 @@
+//! What files say of themselves: turns, trims, rates, covers, numbers, depths, and what a decoder says of them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use footage::{PictureNumbers, Rotation, Size, Source, SourceInfo, SourceKind, SourceSpec, Turn};
+use image::codecs::jpeg::JpegEncoder;
+use image::{ExtendedColorType, ImageBuffer, ImageEncoder as _, Luma};
+
+use crate::clip::{SIZE, encode, frame, has_ffmpeg, write_images};
+
+/// A lossless film of pictures that stand alone, in a container with display matrix and edit list.
+const PNG: &[&str] = &["-c:v", "png"];
+
+fn spec(path: &Path) -> SourceSpec {
+    SourceSpec::new(path.to_str().unwrap())
+}
+
+/// All frames with their numbers.
+fn frames(spec: &SourceSpec) -> (SourceInfo, Vec<(u64, Vec<u8>)>) {
+    let mut source = Source::open(spec).unwrap();
+    let mut all = Vec::new();
+    while let Some(it) = source.next_frame().unwrap() {
+        all.push((it.index, it.rgb.to_vec()));
+    }
+    (source.info().clone(), all)
+}
+
+fn indices(spec: &SourceSpec) -> Vec<u64> {
+    frames(spec).1.into_iter().map(|it| it.0).collect()
+}
+
+/// Replaces bytes behind the name of a box.
+fn patch(from: &Path, to: &str, (name, skipped): (&[u8; 4], usize), bytes: &[u8]) -> PathBuf {
+    let mut file = fs::read(from).unwrap();
+    let at = file.windows(4).position(|it| it == name).unwrap() + 4 + skipped;
+    file[at..at + bytes.len()].copy_from_slice(bytes);
+    let to = from.with_file_name(to);
+    fs::write(&to, file).unwrap();
+    to
+}
+
+/// With a display matrix.
+fn turned(from: &Path, to: &str, [a, b, c, d]: [i32; 4]) -> PathBuf {
+    let rows = [a, b, 0, c, d, 0].map(|it| (it << 16).to_be_bytes());
+    patch(from, to, (b"tkhd", 40), rows.as_flattened())
+}
+
+#[test]
+fn films_are_turned_as_their_display_matrix_asks_where_that_is_wanted() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_images(folder.path(), 2);
+    let lying = encode(folder.path(), "lying.mov", PNG);
+    let quarter = |degrees| Turn::clockwise(degrees).unwrap();
+    for (matrix, due) in [
+        ([1, 0, 0, 1], Some(quarter(0))),
+        ([0, 1, -1, 0], Some(quarter(90))),
+        ([-1, 0, 0, -1], Some(quarter(180))),
+        ([0, -1, 1, 0], Some(quarter(270))),
+        ([-1, 0, 0, 1], None),
+        ([1, 0, 0, -1], None),
+        ([0, 1, 1, 0], None),
+        ([0, -1, -1, 0], None),
+    ] {
+        let film = turned(&lying, "turned.mov", matrix);
+        let (info, stored) = frames(&spec(&film));
+        assert_eq!(info.size, SIZE, "pixels are left as they are stored");
+        assert!(
+            due.is_none_or(|it| it == info.tag),
+            "{matrix:?}: {}",
+            info.tag
+        );
+        assert_eq!(footage::stored(&spec(&film)).unwrap(), (SIZE, info.tag));
+        let (upright, shown) = frames(&SourceSpec::upright(film.to_str().unwrap()));
+        assert_eq!(upright.size, info.tag.size(SIZE), "{matrix:?}");
+        for ((_, stored), (_, shown)) in stored.into_iter().zip(shown) {
+            assert!(info.tag.apply(SIZE, stored).1 == shown, "{matrix:?}");
+        }
+        let by_hand = SourceSpec {
+            rotation: Rotation::By(quarter(270)),
+            ..spec(&film)
+        };
+        assert_eq!(frames(&by_hand).0.size, Size::new(SIZE.height, SIZE.width));
+    }
+}
+
+#[test]
+fn every_photograph_of_a_folder_is_turned_as_its_own_tag_asks() {
+    let folder = tempfile::tempdir().unwrap();
+    // TIFF header, one entry: orientation (0x0112), one short.
+    for (nth, value) in [(0, 6_u8), (1, 8), (2, 6)] {
+        let mut file = Vec::new();
+        let mut encoder = JpegEncoder::new(&mut file);
+        let exif = [
+            &b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0"[..],
+            &[value],
+            &[0; 7],
+        ]
+        .concat();
+        encoder.set_exif_metadata(exif).unwrap();
+        let picture = frame(nth);
+        let [width, height] = [SIZE.width, SIZE.height].map(|it| it as u32);
+        let written = encoder.write_image(&picture, width, height, ExtendedColorType::Rgb8);
+        written.unwrap();
+        fs::write(folder.path().join(format!("{nth}.jpg")), file).unwrap();
+    }
+    let (info, upright) = frames(&SourceSpec::upright(folder.path().to_str().unwrap()));
+    assert_eq!(info.size, Size::new(SIZE.height, SIZE.width));
+    for (nth, (_, rgb)) in upright.into_iter().enumerate() {
+        let alone = footage::read_upright(&folder.path().join(format!("{nth}.jpg")));
+        assert!(alone.unwrap().1 == rgb, "picture {nth}");
+    }
+    assert_eq!(frames(&spec(folder.path())).0.size, SIZE);
+}
+
+#[test]
+fn frames_that_an_edit_list_cuts_off_are_none() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_images(folder.path(), 9);
+    let whole = encode(
+        folder.path(),
+        "whole.mov",
+        &[PNG, &["-video_track_timescale", "100"]].concat(),
+    );
+    let (_, all) = frames(&spec(&whole));
+    // From the third frame on, four frames of 40 ms: units of the film are milliseconds, those of the track 10 ms.
+    let edit = [160_u32.to_be_bytes(), 8_u32.to_be_bytes()];
+    let trimmed = patch(&whole, "trimmed.mov", (b"elst", 8), edit.as_flattened());
+    let (info, shown) = frames(&spec(&trimmed));
+    assert_eq!((info.n_frames, shown.len()), (4, 4));
+    for (nth, (index, rgb)) in shown.into_iter().enumerate() {
+        assert_eq!(index, nth as u64);
+        assert!(rgb == all[nth + 2].1, "frame {nth}");
+    }
+}
+
+#[test]
+fn a_stream_without_a_container_has_all_its_pictures_and_no_rate_that_nobody_told() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_images(folder.path(), 6);
+    for name in ["film.mjpeg", "film.jpg", "film.m2v"] {
+        let format = if name == "film.m2v" {
+            "mpeg2video"
+        } else {
+            "mjpeg"
+        };
+        let film = encode(folder.path(), name, &["-f", format, "-bf", "0"]);
+        let (info, all) = frames(&spec(&film));
+        assert_eq!(
+            (info.kind, info.n_frames, all.len()),
+            (SourceKind::Video, 6, 6),
+            "{name}"
+        );
+        let tells = name == "film.m2v";
+        assert_eq!(info.frame_rate_hz, tells.then_some(25.0), "{name}");
+        assert!(all.windows(2).all(|it| it[0].1 != it[1].1), "{name}");
+        let told = SourceSpec {
+            frame_rate_hz: Some(60.0),
+            start: 2,
+            step: 2,
+            ..spec(&film)
+        };
+        assert_eq!(indices(&told), [2, 4], "{name}");
+        let due = if tells { 12.5 } else { 30.0 };
+        assert_eq!(Source::open(&told).unwrap().info().frame_rate_hz, Some(due));
+    }
+}
+
+#[test]
+fn the_film_is_read_and_not_the_cover_in_front_of_it() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_images(folder.path(), 5);
+    let film = encode(folder.path(), "film.mov", PNG);
+    let cover = folder.path().join("cover.png");
+    image::RgbImage::new(200, 200).save(&cover).unwrap();
+    for (name, more) in [
+        ("marked.mp4", &["-disposition:v:0", "attached_pic"][..]),
+        ("single.mov", &[]),
+        ("single.mkv", &[]),
+    ] {
+        let with_cover = folder.path().join(name);
+        let made = std::process::Command::new("ffmpeg")
+            .args(["-nostdin", "-v", "error", "-i"])
+            .arg(&cover)
+            .arg("-i")
+            .arg(&film)
+            .args([
+                "-map", "0", "-map", "1", "-c:v:0", "mjpeg", "-c:v:1", "libx264", "-pix_fmt",
+                "yuv444p",
+            ])
+            .args(more)
+            .arg(&with_cover)
+            .status();
+        assert!(made.unwrap().success());
+        let (info, all) = frames(&spec(&with_cover));
+        assert_eq!((info.size, all.len()), (SIZE, 5), "{name}");
+    }
+}
+
+/// JPEG pictures one behind the other, some of them cut, in a container.
+fn cut(folder: &Path, name: &str, is_cut: impl Fn(usize) -> bool) -> PathBuf {
+    let mut stream = Vec::new();
+    for nth in 0..8 {
+        let mut file = Vec::new();
+        frame(nth)
+            .write_with_encoder(JpegEncoder::new(&mut file))
+            .unwrap();
+        let n = if is_cut(nth) {
+            file.len() * 7 / 10
+        } else {
+            file.len()
+        };
+        stream.extend_from_slice(&file[..n]);
+    }
+    let raw = folder.join("raw.mjpeg");
+    fs::write(&raw, stream).unwrap();
+    let film = folder.join(name);
+    let made = std::process::Command::new("ffmpeg")
+        .args([
+            "-nostdin",
+            "-v",
+            "error",
+            "-y",
+            "-f",
+            "image2pipe",
+            "-c:v",
+            "mjpeg",
+            "-framerate",
+            "25",
+            "-i",
+        ])
+        .arg(raw)
+        .args(["-c", "copy"])
+        .arg(&film)
+        .status();
+    assert!(made.unwrap().success());
+    film
+}
+
+#[test]
+fn pictures_that_are_cut_are_left_out_and_counted() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["cut.avi", "cut.mkv", "cut.mov"] {
+        let film = cut(folder.path(), name, |nth| [0, 3, 4].contains(&nth));
+        let mut source = Source::open(&spec(&film)).unwrap();
+        let mut found = Vec::new();
+        while let Some(it) = source.next_frame().unwrap() {
+            found.push(it.index);
+        }
+        assert_eq!(found, [1, 2, 5, 6, 7], "{name}");
+        let complaints = source.complaints();
+        assert_eq!(complaints.undecoded, 3, "{name}: {complaints:?}");
+    }
+    let whole = cut(folder.path(), "whole.avi", |_| false);
+    let mut source = Source::open(&spec(&whole)).unwrap();
+    assert_eq!(source.skip(99).unwrap(), 8);
+    assert_eq!(source.complaints().messages, 0);
+}
+
+#[test]
+fn numbered_pictures_are_frames_by_their_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    write_images(folder.path(), 12);
+    for nth in [4, 5, 9] {
+        fs::remove_file(folder.path().join(format!("im{nth}.png"))).unwrap();
+    }
+    for name in ["", "im%d.png", "im*.png"] {
+        let path = folder.path().join(name);
+        let all: Vec<u64> = [1, 2, 3, 6, 7, 8, 10, 11, 12].into();
+        assert_eq!(
+            footage::picture_numbers(path.to_str().unwrap()).unwrap(),
+            Some(all)
+        );
+        let numbered = SourceSpec {
+            numbers: Some(PictureNumbers { first: 0, step: 1 }),
+            ..spec(&path)
+        };
+        assert_eq!(indices(&numbered), [1, 2, 3, 6, 7, 8, 10, 11, 12]);
+        let part = SourceSpec {
+            start: 2,
+            step: 2,
+            count: Some(4),
+            ..numbered
+        };
+        assert_eq!(indices(&part), [2, 6, 8]);
+        let mut source = Source::open(&part).unwrap();
+        assert_eq!(source.info().n_frames, 4);
+        assert_eq!(
+            source.skip(2).unwrap(),
+            2,
+            "a frame without a picture counts"
+        );
+        assert_eq!(source.next_frame().unwrap().unwrap().index, 6);
+        assert_eq!(indices(&spec(&path)).len(), 9, "in their order");
+    }
+}
+
+#[test]
+fn pictures_with_12_bits_of_16_are_scaled() {
+    let folder = tempfile::tempdir().unwrap();
+    for (nth, brightest) in [(0, 900), (1, 4000)] {
+        let ramp =
+            ImageBuffer::<Luma<u16>, _>::from_fn(64, 2, |x, _| Luma([(x * brightest / 63) as u16]));
+        ramp.save(folder.path().join(format!("{nth}.png"))).unwrap();
+    }
+    let (info, all) = frames(&spec(folder.path()));
+    let depth = info.depth.unwrap();
+    assert_eq!((depth.bits, depth.brightest), (12, 4000));
+    let most = |nth: usize| all[nth].1.iter().copied().max().unwrap();
+    assert_eq!([most(0), most(1)], [56, 249]);
+}
+
+#[test]
+fn interlaced_films_say_so() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_images(folder.path(), 3);
+    let options = ["-c:v", "mpeg2video", "-flags", "+ilme+ildct", "-top", "1"];
+    let film = encode(folder.path(), "film.ts", &options);
+    assert!(frames(&spec(&film)).0.is_interlaced);
+    let film = encode(folder.path(), "film.mov", PNG);
+    assert!(!frames(&spec(&film)).0.is_interlaced);
+}
