@@ -224,6 +224,40 @@ fn no_test_is_ignored_and_no_work_is_left_marked() {
 }
 
 #[test]
+fn files_of_users_are_written_through_one_room() {
+    // These write into folders of their own, or a new file exclusively; the record of benchmarks is appended to.
+    let may = [
+        "shared/files/",
+        "shared/runtime/",
+        "services/record/src/writer.rs",
+        "services/bridge/src/keys.rs",
+        "services/trials/src/bench/report.rs",
+    ];
+    let writes = [
+        "fs::write(",
+        "File::create(",
+        "OpenOptions::new()",
+        "File::options()",
+    ];
+    for (_, dir) in crates() {
+        for file in rust_files(&dir.join("src")) {
+            let name = file.strip_prefix(root()).unwrap().display().to_string();
+            if may.iter().any(|it| name.starts_with(it)) || name.contains("/test") {
+                continue;
+            }
+            let text = fs::read_to_string(&file).unwrap();
+            let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
+            for way in writes {
+                assert!(
+                    !code.contains(way),
+                    "{name} writes by {way}...): `files` does not follow links"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn every_crate_is_on_its_map() {
     for group in ["services", "shared"] {
         let map = fs::read_to_string(root().join(group).join("README.md")).unwrap();

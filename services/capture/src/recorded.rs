@@ -130,7 +130,7 @@ impl RecordedFeed {
     }
 
     pub(crate) fn open(recorded: &Recorded, spec: &SourceSpec) -> Result<Self, RecordedError> {
-        let mut file = File::open(&recorded.file)?;
+        let mut file = files::open(&recorded.file)?;
         let table = Table::read(&mut file, &recorded.camera, spec.frame_rate_hz)?;
         let n_frames = spec.n_delivered(table.n_frames())?;
         let info = FeedInfo::plain(table.size, n_frames, table.rate_hz / spec.step as f64);

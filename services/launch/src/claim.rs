@@ -1,6 +1,6 @@
 //! Exclusive access to an output folder.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, TryLockError};
 use std::io::{Read as _, Seek as _, Write as _};
 use std::path::Path;
 
@@ -28,13 +28,16 @@ impl Claim {
     ///
     /// The folder cannot be created or written to, or another process has claimed it; the message names that process.
     pub fn of(folder: &Path, owner: &str) -> Result<Self, Failure> {
-        let in_folder = |error: &std::io::Error| in_file(folder, error);
-        std::fs::create_dir_all(folder).map_err(|error| in_folder(&error))?;
+        let opened = files::Folder::create(folder).map_err(|error| in_file(folder, &error))?;
+        if let Some(risk) = opened.risk().map_err(|error| in_file(folder, &error))? {
+            tracing::warn!(
+                folder = %folder.display(),
+                "the output folder {risk}: others can change or remove the results there"
+            );
+        }
         let path = folder.join(FILE);
-        let mut options = OpenOptions::new();
-        let options = options.create(true).truncate(false).read(true).write(true);
-        let mut file = options
-            .open(&path)
+        let mut file = opened
+            .reopen(FILE)
             .map_err(|error| in_file(&path, &error))?;
         match file.try_lock() {
             Ok(()) => {}
@@ -47,6 +50,21 @@ impl Claim {
             .and_then(|()| writeln!(file, "process {}, {owner}", std::process::id()));
         written.map_err(|error| in_file(&path, &error))?;
         Ok(Self { _file: Some(file) })
+    }
+}
+
+/// Fails if another process has claimed a folder.
+///
+/// # Errors
+///
+/// The message names that process.
+pub(crate) fn check(folder: &Path) -> Result<(), Failure> {
+    let Ok(mut file) = files::open(&folder.join(FILE)) else {
+        return Ok(());
+    };
+    match file.try_lock_shared() {
+        Err(TryLockError::WouldBlock) => Err(taken(folder, &mut file)),
+        _ => Ok(()),
     }
 }
 

@@ -169,7 +169,7 @@ fn results_settings(pose: &deployment::pose::Config) -> deployment::pose::Config
 }
 
 fn read(file: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(file).map_err(|error| runtime::in_file(file, &error))
+    files::read(file, files::SETTINGS).map_err(|error| runtime::in_file(file, &error))
 }
 
 /// The part of a deployment that a host runs: one with cameras has a name and a folder of its own, so that it can run beside the others

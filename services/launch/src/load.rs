@@ -1,6 +1,5 @@
 //! Loads deployment files and checks them against this machine.
 
-use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -49,7 +48,7 @@ impl Fault for LoadError {
 ///
 /// The file cannot be read, or a value is invalid.
 pub fn read(file: &Path, set: &[String]) -> Result<Loaded, LoadError> {
-    let text = fs::read_to_string(file).map_err(|source| LoadError::Read {
+    let text = files::read_text(file, files::SETTINGS).map_err(|source| LoadError::Read {
         file: file.to_owned(),
         why: why_not(file, &source),
         source,
@@ -142,7 +141,8 @@ mod tests {
 
     fn parse(set: &str) -> Result<Loaded, ConfigError> {
         let file = Path::new("deployment.toml");
-        Loaded::parse(SHORT, file, &[set.to_owned()], &ThisMachine)
+        let set = ["pose.network=none".to_owned(), set.to_owned()];
+        Loaded::parse(SHORT, file, &set, &ThisMachine)
     }
 
     #[test]

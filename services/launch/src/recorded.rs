@@ -2,7 +2,6 @@
 
 use core::fmt::Write as _;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -73,7 +72,8 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
         .into_iter()
         .flatten()
     {
-        let bytes = std::fs::read(file).map_err(|error| runtime::in_file(file, &error))?;
+        let bytes =
+            files::read(file, files::MODEL).map_err(|error| runtime::in_file(file, &error))?;
         files.insert(file.clone(), checksum::fnv1a(&bytes));
     }
     let orientation = &deployment.pose.orientation;
@@ -106,7 +106,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
 ///
 /// The file cannot be read or is not a recording.
 pub fn open(file: &Path) -> Result<Recording, Failure> {
-    let mut input = File::open(file).map_err(|error| runtime::in_file(file, &error))?;
+    let mut input = files::open(file).map_err(|error| runtime::in_file(file, &error))?;
     recording::scan(&mut input).map_err(|error| runtime::in_file(file, &error))
 }
 
@@ -164,7 +164,7 @@ pub fn damaged(
         // Pictures of cameras are checked as they are read.
         Some(Kind::Pose3d | Kind::Health | Kind::Picture) | None => false,
     };
-    let mut input = File::open(file).map_err(|error| runtime::in_file(file, &error))?;
+    let mut input = files::open(file).map_err(|error| runtime::in_file(file, &error))?;
     recording::check(&mut input, recording, is_replayed)
         .map_err(|error| runtime::in_file(file, &error))
 }

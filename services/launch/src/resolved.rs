@@ -102,8 +102,11 @@ impl Resolved {
 
     /// Writes it to a file, for the user, without passwords of cameras.
     pub(crate) fn write(&self, file: &Path) -> Result<(), Failure> {
-        std::fs::write(file, footage::without_passwords(&self.to_text()?))
-            .map_err(|error| runtime::in_file(file, &error))
+        files::replace(
+            file,
+            footage::without_passwords(&self.to_text()?).as_bytes(),
+        )
+        .map_err(|error| runtime::in_file(file, &error))
     }
 
     /// The text that every process gets as standard input.

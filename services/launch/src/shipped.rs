@@ -1,7 +1,6 @@
 //! The files that ship with Parallax, built into the executable.
 
 use std::borrow::Cow;
-use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -82,7 +81,7 @@ impl Shipped {
         if is_shipped(file) {
             return Ok(Cow::Borrowed(self.bytes()));
         }
-        let bytes = fs::read(file).map_err(|error| {
+        let bytes = files::read(file, files::MODEL).map_err(|error| {
             let failure = in_file(file, &error);
             let is_absent = error.kind() == ErrorKind::NotFound;
             if is_absent {

@@ -101,7 +101,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
 }
 
 fn is_complete(file: &std::path::Path) -> bool {
-    let Ok(mut file) = std::fs::File::open(file) else {
+    let Ok(mut file) = files::open(file) else {
         return false;
     };
     recording::scan(&mut file).is_ok_and(|recording| recording.extent.is_complete)

@@ -80,7 +80,7 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
     let scenarios: Vec<Value> = verdicts.iter().map(Verdict::json).collect();
     let json = json!({ "schema_version": 1, "held": is_held, "scenarios": scenarios });
     let file = testbed.folder.join("chaos.json");
-    std::fs::write(&file, format!("{json:#}\n"))
+    files::replace(&file, format!("{json:#}\n").as_bytes())
         .map_err(|error| runtime::in_file(&file, &error))?;
     Ok(Some(Outcome {
         is_held,

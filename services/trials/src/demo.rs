@@ -193,7 +193,7 @@ fn remove_reports(synthetic: &SyntheticDeployment) -> Result<(), Failure> {
 fn write_reports(synthetic: &SyntheticDeployment, texts: [String; 2]) -> Result<(), Failure> {
     for (name, text) in REPORTS.into_iter().zip(texts) {
         let file = synthetic.folder.join(name);
-        std::fs::write(&file, text).map_err(|error| runtime::in_file(&file, &error))?;
+        files::replace(&file, text.as_bytes()).map_err(|error| runtime::in_file(&file, &error))?;
     }
     Ok(())
 }

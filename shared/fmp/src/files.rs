@@ -10,7 +10,6 @@ pub(crate) mod planted;
 mod released;
 mod summary;
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -101,7 +100,7 @@ pub enum ModelFileError {
 ///
 /// [`ModelFileError`]; every one names the file.
 pub fn read(path: &Path) -> Result<Model, ModelFileError> {
-    let bytes = fs::read(path).map_err(|source| match source.kind() {
+    let bytes = ::files::read(path, ::files::MODEL).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => ModelFileError::Absent {
             path: path.to_owned(),
         },
@@ -172,6 +171,8 @@ fn beginning(bytes: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn outcome(name: &str, bytes: &[u8]) -> String {

@@ -239,7 +239,8 @@ pub fn write(path: &Path, format: Format, rig: &Rig) -> Result<(), RigFileError>
         }),
     };
     for (path, text) in files.map_err(unwritable)? {
-        std::fs::write(&path, text).map_err(|source| RigFileError::Write { path, source })?;
+        ::files::replace(&path, text.as_bytes())
+            .map_err(|source| RigFileError::Write { path, source })?;
     }
     Ok(())
 }
@@ -293,7 +294,7 @@ fn read_text(path: &Path) -> Result<String, RigFileError> {
             limit: LARGEST_FILE,
         });
     }
-    std::fs::read_to_string(path).map_err(failed)
+    ::files::read_text(path, LARGEST_FILE).map_err(failed)
 }
 
 fn combine(

@@ -1,7 +1,6 @@
 //! The people of every frame.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -176,7 +175,7 @@ fn read(path: &Path, most: u64) -> Result<Vec<u8>, KeypointFileError> {
         path: path.to_owned(),
         source,
     };
-    let file = File::open(path).map_err(failed)?;
+    let file = files::open(path).map_err(failed)?;
     let bytes = file.metadata().map_err(failed)?.len();
     let mut text = Vec::new();
     if bytes <= most {

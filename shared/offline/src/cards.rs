@@ -52,7 +52,7 @@ impl OnnxFile {
         card: Option<&Path>,
         library: &Library,
     ) -> Result<Self, Failure> {
-        let bytes = std::fs::read(path).map_err(|error| in_file(path, &error))?;
+        let bytes = files::read(path, files::MODEL).map_err(|error| in_file(path, &error))?;
         let session = library.session(path, bytes)?;
         let card = match CardText::beside(path, card)? {
             Some(card) => Some(card),

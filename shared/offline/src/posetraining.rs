@@ -9,9 +9,8 @@ mod rendered;
 #[cfg(feature = "burn")]
 mod train;
 
-use std::fs::File;
-use std::io::{BufReader, BufWriter, Read as _, Write as _};
-use std::path::{Path, PathBuf};
+use std::io::{BufReader, Read as _, Write as _};
+use std::path::Path;
 
 use networktraining::{Person, SIDE};
 use posenetwork::PoseNetwork;
@@ -113,18 +112,14 @@ const END: &[u8; 8] = b"EVERYONE";
 ///
 /// The file cannot be written.
 pub fn write(path: &Path, people: &Prepared) -> Result<(), Failure> {
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
-    let partial = PathBuf::from(partial);
-    let fail = |error: std::io::Error| runtime::in_file(path, &error);
-    let mut file = BufWriter::with_capacity(1 << 20, File::create(&partial).map_err(fail)?);
-    file.write_all(KIND).map_err(fail)?;
-    let config = bincode::config::standard();
-    bincode::serde::encode_into_std_write(people, &mut file, config)
-        .map_err(|error| runtime::in_file(path, &error))?;
-    file.write_all(END).map_err(fail)?;
-    file.flush().map_err(fail)?;
-    std::fs::rename(&partial, path).map_err(fail)
+    let written = files::replace_by(path, |file| {
+        file.write_all(KIND)?;
+        let config = bincode::config::standard();
+        bincode::serde::encode_into_std_write(people, file, config)
+            .map_err(std::io::Error::other)?;
+        file.write_all(END)
+    });
+    written.map_err(|error| runtime::in_file(path, &error))
 }
 
 /// Reads what [`write()`] wrote.
@@ -141,7 +136,7 @@ pub fn read(path: &Path) -> Result<Prepared, Failure> {
         );
         Failure::new(ExitKind::Input, message)
     };
-    let mut file = BufReader::with_capacity(1 << 20, File::open(path).map_err(fail)?);
+    let mut file = BufReader::with_capacity(1 << 20, files::open(path).map_err(fail)?);
     let mut mark = [0; 8];
     let n = file.read(&mut mark).map_err(fail)?;
     if n < mark.len() || &mark != KIND {

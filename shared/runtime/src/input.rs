@@ -1,6 +1,5 @@
 //! Input files as text; an error names the file, then what is wrong with it.
 
-use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -12,7 +11,7 @@ use crate::{ExitKind, Failure};
 ///
 /// It cannot be read, or is not UTF-8.
 pub fn read_text(file: &Path) -> Result<String, Failure> {
-    fs::read_to_string(file).map_err(|error| match error.kind() {
+    files::read_text(file, files::RESULTS).map_err(|error| match error.kind() {
         ErrorKind::InvalidData => no_text(file),
         _ => in_file(file, &error),
     })

@@ -15,6 +15,9 @@ const DESCRIPTORS: u64 = 40;
 /// Open files per topic in the process that keeps it alive: 6.6 were measured.
 const DESCRIPTORS_A_TOPIC: u64 = 7;
 
+/// Smallest stack of the main thread, bytes.
+const STACK: u64 = 1 << 20;
+
 /// There is not enough shared memory for a deployment.
 #[derive(Debug, thiserror::Error)]
 pub enum PreflightError {
@@ -37,6 +40,12 @@ pub enum PreflightError {
         /// Open files of the process that needs most.
         needed: u64,
         /// The limit.
+        limit: u64,
+    },
+    /// The stack of a process is too small.
+    #[error("a process may have a stack of {} KB, and needs {} KB", .limit / 1024, STACK / 1024)]
+    Stack {
+        /// The limit, bytes.
         limit: u64,
     },
     /// The file system of shared memory cannot be queried.
@@ -62,6 +71,7 @@ impl Fault for PreflightError {
             Self::Descriptors { needed, .. } => Some(format!(
                 "allow more: `ulimit -n {needed}`, in a systemd unit LimitNOFILE={needed}"
             )),
+            Self::Stack { .. } => Some("allow more: `ulimit -s 8192`".to_owned()),
             Self::Unknown(_) => None,
         }
     }
@@ -91,6 +101,9 @@ pub fn process_topics(process: &str) -> [TopicPlan; 2] {
 pub fn preflight(topics: &[TopicPlan]) -> Result<(), PreflightError> {
     if let Some(limit) = getrlimit(Resource::Nofile).current {
         check_descriptors(topics.len() as u64, limit)?;
+    }
+    if let Some(limit) = getrlimit(Resource::Stack).current.filter(|it| *it < STACK) {
+        return Err(PreflightError::Stack { limit });
     }
     check_room(
         topics,

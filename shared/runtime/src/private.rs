@@ -271,7 +271,7 @@ pub(crate) fn open_base(path: &Path) -> Result<Option<OwnedFd>, PrivacyError> {
     } else if is_open {
         return Err(PrivacyError::Open {
             path: path.to_owned(),
-            owner: user(found.st_uid),
+            owner: files::user(found.st_uid),
             mode: found.st_mode & 0o7777,
         });
     }
@@ -302,7 +302,7 @@ fn unopened(path: &Path, error: Errno) -> PrivacyError {
         (Ok(owner), Errno::NOTDIR | Errno::LOOP) => match fs::read_link(path) {
             Ok(target) => PrivacyError::Link {
                 path: path.to_owned(),
-                owner: user(owner),
+                owner: files::user(owner),
                 target,
             },
             Err(_) => PrivacyError::NoDirectory {
@@ -389,32 +389,7 @@ fn failed(path: &Path) -> impl FnOnce(Errno) -> PrivacyError {
 fn foreign(path: &Path, owner: u32) -> PrivacyError {
     PrivacyError::Foreign {
         path: path.to_owned(),
-        owner: user(owner),
-        user: user(getuid().as_raw()),
-    }
-}
-
-/// `user nobody (65534)`, or the number alone where it has no name here.
-fn user(uid: u32) -> String {
-    let users = fs::read_to_string("/etc/passwd").unwrap_or_default();
-    let name = users.lines().find_map(|line| {
-        let mut cells = line.split(':');
-        let name = cells.next()?;
-        (cells.nth(1)?.parse() == Ok(uid)).then_some(name)
-    });
-    name.map_or_else(
-        || format!("user {uid}"),
-        |name| format!("user {name} ({uid})"),
-    )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn users_have_names_where_the_system_knows_them() {
-        assert_eq!(user(0), "user root (0)");
-        assert_eq!(user(4_000_000_000), "user 4000000000");
+        owner: files::user(owner),
+        user: files::user(getuid().as_raw()),
     }
 }

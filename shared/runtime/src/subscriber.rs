@@ -37,13 +37,21 @@ pub enum ReceiveError {
         #[source]
         source: IoxReceiveError,
     },
+    /// The end of the stream was refused, so that it would never come.
+    #[error("the end of a stream of {name} is not accepted: {why}")]
+    End {
+        /// Name of the message type.
+        name: &'static str,
+        /// Why.
+        why: String,
+    },
 }
 
 impl Fault for ReceiveError {
     fn hint(&self) -> Option<String> {
         match self {
             Self::Transport { .. } => short_of_room(),
-            Self::TooManyHeld { .. } => None,
+            Self::TooManyHeld { .. } | Self::End { .. } => None,
         }
     }
 }

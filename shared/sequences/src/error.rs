@@ -128,7 +128,7 @@ pub enum SyncError {
 
 /// Reads a text file; the error names it.
 pub(crate) fn text(path: &Path) -> Result<String, SequenceError> {
-    std::fs::read_to_string(path).map_err(|source| io(path, source))
+    files::read_text(path, files::RESULTS).map_err(|source| io(path, source))
 }
 
 pub(crate) fn io(path: &Path, source: std::io::Error) -> SequenceError {
@@ -146,7 +146,7 @@ pub(crate) fn invalid(path: &Path, line: usize, what: impl Into<String>) -> Sequ
 
 /// Reads a motion capture file; also returns metres per unit.
 pub(crate) fn motion(path: &Path) -> Result<(c3d::C3d, f64), SequenceError> {
-    let bytes = std::fs::read(path).map_err(|source| io(path, source))?;
+    let bytes = files::read(path, files::RESULTS).map_err(|source| io(path, source))?;
     let path = path.to_owned();
     let trial = match c3d::C3d::parse(&bytes) {
         Ok(trial) => trial,

@@ -1,6 +1,5 @@
 //! A recorded stream from a picture on, as it was.
 
-use std::fs::File;
 use std::io;
 use std::path::Path;
 
@@ -17,7 +16,7 @@ pub(super) fn from(
     table: &Table,
     first: &Picture,
 ) -> io::Result<impl Iterator<Item = Vec<u8>> + Send + 'static> {
-    let mut input = File::open(file)?;
+    let mut input = files::open(file)?;
     let parts = &table.parts;
     let is_of = |it: &Part| it.connection == first.connection;
     let own: Vec<Part> = parts.iter().copied().filter(is_of).collect();

@@ -1,7 +1,6 @@
 //! What is exported: the folder of a run, or its recording.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
@@ -220,7 +219,7 @@ fn views(resolved: Option<&Resolved>) -> Vec<String> {
 
 fn of_folder(folder: &Path) -> Result<Resolved, String> {
     let file = folder.join("deployment.json");
-    let text = std::fs::read_to_string(&file);
+    let text = files::read_text(&file, files::SETTINGS);
     let text = text.map_err(|error| format!("{}: {error}", file.display()))?;
     serde_json::from_str(&text).map_err(|error| format!("{}: {error}", file.display()))
 }
@@ -236,7 +235,7 @@ fn lines(
     let [whole, part] = [name.to_owned(), format!("{name}.part")].map(|it| folder.join(it));
     let is_whole = whole.exists() || !part.exists();
     let path = if is_whole { whole } else { part };
-    let file = File::open(&path).map_err(|error| {
+    let file = files::open(&path).map_err(|error| {
         in_file(&path, &error).with_hint(match which {
             Lines::Raw => "name the folder that a run has written, or an MCAP file",
             Lines::Smooth => "`parallax smooth` writes it",
@@ -299,7 +298,7 @@ fn messages(
         let message = format!("{}: no joint set is called {name:?}", file.display());
         Failure::new(ExitKind::Input, message)
     })?;
-    let mut input = File::open(file).map_err(|error| in_file(file, &error))?;
+    let mut input = files::open(file).map_err(|error| in_file(file, &error))?;
     let mut gathering = Gathering::new(views(Some(resolved)));
     let track = recording.tracks.get(&topic::pose3d());
     let (mut buffer, mut n_damaged) = (Vec::new(), 0);

@@ -1,7 +1,7 @@
 //! Formats with a file for every view: keypoints, and videos.
 
 use std::fs;
-use std::io;
+use std::io::{self, Write as _};
 use std::path::Path;
 
 use exports::{Trial, ViewCamera, annotate, openpose};
@@ -68,19 +68,24 @@ fn write_all(
         // Of a process that was killed.
         at(folder, fs::remove_dir_all(folder))?;
     }
-    at(folder, fs::create_dir_all(folder))?;
-    let mark = folder.join(MARK);
-    at(&mark, fs::write(&mark, "keypoints exported by parallax\n"))?;
+    let room = files::Folder::create(folder).map_err(|error| cannot_write(folder, &error))?;
+    let put = |room: &files::Folder, name: &str, text: &str| {
+        let written = room
+            .begin(name)
+            .and_then(|mut file| file.write_all(text.as_bytes()));
+        at(&room.path().join(name), written)
+    };
+    put(&room, MARK, "keypoints exported by parallax\n")?;
     console.set(0, cameras.len() * trial.slots.len());
     for view in cameras {
-        let folder = folder.join(&view.name);
-        at(&folder, fs::create_dir_all(&folder))?;
+        let room = room.inner(&view.name);
+        let room = room.map_err(|error| cannot_write(&folder.join(&view.name), &error))?;
         for slot in 0..trial.slots.len() {
             if stop.is_requested() {
                 return Err(interrupted());
             }
-            let file = folder.join(openpose::file_name(&view.name, trial.frame(slot)));
-            at(&file, fs::write(&file, openpose::frame(trial, slot, view)))?;
+            let name = openpose::file_name(&view.name, trial.frame(slot));
+            put(&room, &name, &openpose::frame(trial, slot, view))?;
             console.advance(1);
         }
     }

@@ -159,7 +159,7 @@ fn recorded(origin: &Origin, recording: &Recording, nth: usize) -> Option<From> 
     let frames = track.entries.iter().filter_map(|it| Some((it.frame?, *it)));
     has_pixels.then_some(From::Recording {
         path: origin.source.clone(),
-        file: File::open(&origin.source).ok()?,
+        file: files::open(&origin.source).ok()?,
         frames: frames.collect(),
         buffer: Vec::new(),
     })

@@ -1,6 +1,5 @@
 //! Hints for input files that cannot be used.
 
-use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
@@ -100,7 +99,7 @@ pub(super) fn on_rig(error: &RigFileError) -> Option<String> {
         RigFileError::Parse { path, .. } | RigFileError::UnknownFormat { path } => path,
         _ => return None,
     };
-    let text = fs::read_to_string(path).unwrap_or_default();
+    let text = files::read_text(path, files::SETTINGS).unwrap_or_default();
     if text.trim().is_empty() {
         return Some(format!("{} is empty", path.display()));
     }

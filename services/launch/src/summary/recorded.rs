@@ -1,6 +1,5 @@
 //! Reads `summary.json` of a run.
 
-use std::fs;
 use std::io;
 use std::path::Path;
 
@@ -27,7 +26,7 @@ impl Recorded {
     /// * `cameras`: the cameras of the deployment; the summary must have counts for each of them.
     pub(super) fn read(folder: &Path, session: u64, cameras: &[&str]) -> Self {
         let file = folder.join(RunSummary::FILE);
-        let read = match fs::read_to_string(&file) {
+        let read = match files::read_text(&file, files::SETTINGS) {
             Ok(text) => parse(&text, session, cameras),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Self::Nothing),
             Err(error) => Err(error.to_string()),
@@ -96,6 +95,8 @@ fn parse(text: &str, session: u64, cameras: &[&str]) -> Result<Recorded, String>
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use runfiles::VERSION;
 
     use super::*;

@@ -212,7 +212,7 @@ fn write(testbed: &Testbed, host: &str, port: u16) -> Result<PathBuf, Failure> {
         names(far)
     );
     let file = testbed.file.with_file_name(format!("hosts-{host}.toml"));
-    std::fs::write(&file, text).map_err(|error| runtime::in_file(&file, &error))?;
+    files::replace(&file, text.as_bytes()).map_err(|error| runtime::in_file(&file, &error))?;
     Ok(file)
 }
 

@@ -48,6 +48,7 @@ pub(super) fn page(
                 .count(),
             run.cameras.len(),
         ),
+        verdict: None,
         limits: report.limits.clone(),
         space: space(run, synthetic),
         marks: marks(report.cost.as_ref(), &clock),

@@ -111,7 +111,7 @@ impl SyntheticDeployment {
         geometry::files::write(&rig, RigFormat::Own, &self.rig).or_fail(ExitKind::Input)?;
         let file = self.folder.join("deployment.toml");
         let text = self.deployment(setup);
-        std::fs::write(&file, text).map_err(|error| runtime::in_file(&file, &error))?;
+        files::replace(&file, text.as_bytes()).map_err(|error| runtime::in_file(&file, &error))?;
         Ok(file)
     }
 

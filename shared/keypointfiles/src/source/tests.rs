@@ -1,6 +1,6 @@
 //! Tests of folders and files of keypoints.
 
-use std::fs;
+use std::fs::{self, File};
 
 use tempfile::TempDir;
 

@@ -99,7 +99,7 @@ pub(crate) fn beside(path: &str) -> Result<Option<FrameTable>, Failure> {
     if !table.is_file() {
         return Ok(None);
     }
-    let text = std::fs::read_to_string(&table).or_fail(ExitKind::Input)?;
+    let text = files::read_text(&table, files::SETTINGS).or_fail(ExitKind::Input)?;
     // One of another kind is not for us.
     Ok(self::table(&text).ok())
 }

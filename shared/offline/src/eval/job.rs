@@ -1,6 +1,6 @@
 //! All sequences, frame by frame, and what is kept of them.
 
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{Seek as _, SeekFrom, Write as _};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -247,8 +247,9 @@ impl Job<'_> {
                 failure.with_hint("remove it, or choose another --out")
             })?;
         }
-        let mut options = OpenOptions::new();
-        let opened = options.create(true).write(true).truncate(false).open(&file);
+        let folder = files::Folder::open(file.parent().unwrap_or(std::path::Path::new(".")));
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let opened = folder.and_then(|folder| folder.reopen(&name));
         let mut kept = opened.map_err(wrong)?;
         kept.set_len(n_bytes as u64).map_err(wrong)?;
         kept.seek(SeekFrom::End(0)).map_err(wrong)?;

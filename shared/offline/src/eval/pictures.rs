@@ -1,7 +1,6 @@
 //! Single pictures of annotated people: PARSE, LSP, and JSON lines of one's own.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 use datasets::People;
@@ -129,7 +128,7 @@ fn about(model: &str, sets: &[Pictures]) -> Vec<(String, String)> {
 }
 
 fn put(file: &Path, text: &str) -> Result<(), Failure> {
-    fs::write(file, text).map_err(|error| in_file(file, &error))
+    files::replace(file, text.as_bytes()).map_err(|error| in_file(file, &error))
 }
 
 #[cfg(test)]

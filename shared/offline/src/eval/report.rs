@@ -1,6 +1,5 @@
 //! What is left behind: the report for people, for programs and for papers.
 
-use std::fs;
 use std::path::Path;
 
 use evaluation::Bootstrap;
@@ -54,7 +53,7 @@ pub fn write_report(
         ("report.tex", latex(summary, versions)),
     ] {
         let file = out.join(name);
-        fs::write(&file, text).map_err(|error| in_file(&file, &error))?;
+        files::replace(&file, text.as_bytes()).map_err(|error| in_file(&file, &error))?;
     }
     Ok(())
 }

@@ -95,7 +95,7 @@ impl Store {
     /// It is damaged, or was made with other image files.
     pub(super) fn load(&self, stamp: u64) -> Result<Option<Checkpoint>, Failure> {
         let path = self.checkpoint();
-        let bytes = match fs::read(&path) {
+        let bytes = match files::read(&path, files::RESULTS) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             other => other,
         };
@@ -238,10 +238,12 @@ fn claim_of(out: &Path) -> PathBuf {
 /// Makes sure that no other training writes the same model.
 fn claim(out: &Path) -> Result<File, Failure> {
     let path = claim_of(out);
-    let file = File::create(&path).map_err(|error| {
-        let message = format!("cannot write {}: {error}", path.display());
-        Failure::new(ExitKind::Usage, message)
-    })?;
+    let file = files::Folder::open(folder_of(out))
+        .and_then(|folder| folder.reopen(&path.file_name().unwrap_or_default().to_string_lossy()))
+        .map_err(|error| {
+            let message = format!("cannot write {}: {error}", path.display());
+            Failure::new(ExitKind::Usage, message)
+        })?;
     match file.try_lock() {
         // A file system that cannot lock is no reason not to train.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(file),

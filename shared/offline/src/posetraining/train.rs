@@ -101,7 +101,7 @@ pub fn train(
     let write = |path: &Path, bytes: &[u8]| {
         files::replace(path, bytes).map_err(|error| runtime::in_file(path, &error))
     };
-    let kept = match std::fs::read(&file) {
+    let kept = match files::read(&file, files::RESULTS) {
         Ok(bytes) if job.resume => Some(bytes),
         Ok(_) => {
             let message = format!("{} is of an interrupted training", file.display());

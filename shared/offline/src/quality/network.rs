@@ -124,12 +124,12 @@ pub fn train(
 
 /// Weights of torchvision's VGG-16.
 fn weights(file: &Path) -> Result<Vec<Parameter>, Failure> {
-    let bytes = fs::read(file).map_err(|error| in_file(file, &error))?;
+    let bytes = files::read(file, files::RESULTS).map_err(|error| in_file(file, &error))?;
     vgg::parse(&bytes).map_err(|error| in_file(file, &error))
 }
 
 fn read(file: &Path) -> Result<Samples, Failure> {
-    let bytes = fs::read(file).map_err(|error| in_file(file, &error))?;
+    let bytes = files::read(file, files::RESULTS).map_err(|error| in_file(file, &error))?;
     Samples::from_bytes(&bytes).map_err(|error| in_file(file, &error))
 }
 
@@ -149,7 +149,7 @@ fn read_all(files: &[PathBuf]) -> Result<Samples, Failure> {
 }
 
 fn checkpoint(path: &Path, resume: bool) -> Result<Option<Vec<u8>>, Failure> {
-    match fs::read(path) {
+    match files::read(path, files::RESULTS) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(in_file(path, &error)),
         Ok(bytes) if resume => Ok(Some(bytes)),

@@ -1,6 +1,5 @@
 //! What a run left, as a person over time.
 
-use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
@@ -39,7 +38,7 @@ pub fn read_lines(
     mut each: impl FnMut(usize, FrameLine) -> Result<(), Failure>,
 ) -> Result<Option<String>, Failure> {
     let path = folder.join(FrameLine::FILE);
-    let file = File::open(&path).map_err(|error| unopened(folder, &path, &error))?;
+    let file = files::open(&path).map_err(|error| unopened(folder, &path, &error))?;
     let mut reader = BufReader::new(file);
     let mut text = String::new();
     let mut nth = 0;
@@ -160,7 +159,7 @@ fn add<'a>(
 
 /// What the deployment of a run says of itself, if it can be read.
 fn deployment_of(folder: &Path) -> Option<Value> {
-    let text = std::fs::read_to_string(folder.join("deployment.json")).ok()?;
+    let text = files::read_text(&folder.join("deployment.json"), files::SETTINGS).ok()?;
     let value: Value = serde_json::from_str(&text).ok()?;
     value.get("deployment").cloned()
 }

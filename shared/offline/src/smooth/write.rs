@@ -1,8 +1,7 @@
 //! The files of a smoothed run.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write as _};
-use std::path::{Path, PathBuf};
+use std::io::{self, Write as _};
+use std::path::Path;
 
 use motion::angles::{self, Unknown};
 use motion::{Estimate, Motion, Role, lines};
@@ -17,41 +16,6 @@ const CSV_HEADER: &str = "frame,time_s,angle,degrees,sd_degrees,state";
 /// Its name.
 const ANGLES: &str = "angles.csv";
 
-/// A file that has another name until it is whole.
-struct Growing {
-    path: PathBuf,
-    file: BufWriter<File>,
-}
-
-impl Growing {
-    fn new(path: PathBuf) -> Result<Self, Failure> {
-        let part = part(&path);
-        let file = File::create(&part).map_err(|error| in_file(&part, &error))?;
-        let file = BufWriter::new(file);
-        Ok(Self { path, file })
-    }
-
-    fn add(&mut self, text: &str) -> Result<(), Failure> {
-        let written = self.file.write_all(text.as_bytes());
-        written.map_err(|error| in_file(&part(&self.path), &error))
-    }
-
-    fn finish(self) -> Result<(), Failure> {
-        let part = part(&self.path);
-        let done = || -> io::Result<()> {
-            self.file.into_inner()?.sync_all()?;
-            std::fs::rename(&part, &self.path)
-        };
-        done().map_err(|error| in_file(&part, &error))
-    }
-}
-
-fn part(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".part");
-    name.into()
-}
-
 /// Writes all files.
 pub(super) fn all(
     folder: &Path,
@@ -60,14 +24,24 @@ pub(super) fn all(
     report: &SmoothReport,
     up: Option<UnitVector3<f64>>,
 ) -> Result<(), Failure> {
-    write_angles(&folder.join(ANGLES), run, motion, up)?;
-    let mut file = Growing::new(folder.join(SmoothLine::FILE))?;
-    folder::read_lines(folder, |at, line| {
-        let line = smoothed_line(line, at, run, motion);
-        let text = runfiles::to_line(&line).or_fail(ExitKind::Run)?;
-        file.add(&text)
-    })?;
-    file.finish()?;
+    let path = folder.join(ANGLES);
+    files::replace_by(&path, |out| write_angles(out, run, motion, up))
+        .map_err(|error| in_file(&path, &error))?;
+    let path = folder.join(SmoothLine::FILE);
+    let mut unread = None;
+    let written = files::replace_by(&path, |out| {
+        let done = folder::read_lines(folder, |at, line| {
+            let line = smoothed_line(line, at, run, motion);
+            let text = runfiles::to_line(&line).or_fail(ExitKind::Run)?;
+            let added = out.write_all(text.as_bytes());
+            added.map_err(|error| in_file(&path, &error))
+        });
+        done.map(drop).map_err(|failure| {
+            unread = Some(failure);
+            io::Error::other("not written")
+        })
+    });
+    written.map_err(|error| unread.unwrap_or_else(|| in_file(&path, &error)))?;
     let path = folder.join(SmoothReport::FILE);
     let text = report.to_text().or_fail(ExitKind::Run)?;
     files::replace(&path, text.as_bytes()).map_err(|error| in_file(&path, &error))
@@ -84,15 +58,14 @@ fn smoothed_line(line: FrameLine, at: usize, run: &Run, motion: &Motion) -> Smoo
 
 /// Writes a row for every angle of every frame; angles between joints that the run does not have are left out.
 fn write_angles(
-    path: &Path,
+    file: &mut impl io::Write,
     run: &Run,
     motion: &Motion,
     up: Option<UnitVector3<f64>>,
-) -> Result<(), Failure> {
+) -> io::Result<()> {
     let roles: Vec<Option<Role>> = run.recorded.joints.iter().map(|it| it.role).collect();
     let known: Vec<Role> = roles.iter().flatten().copied().collect();
-    let mut file = Growing::new(path.to_owned())?;
-    file.add(&format!("{CSV_HEADER}\n"))?;
+    writeln!(file, "{CSV_HEADER}")?;
     for (at, (&frame, time_s)) in run.frames.iter().zip(&run.recorded.times).enumerate() {
         let joints: Vec<(Role, Estimate)> = roles
             .iter()
@@ -110,10 +83,10 @@ fn write_angles(
                 }
                 Err(why) => format!(",,{}", unknown(why, angle, up)),
             };
-            file.add(&format!("{frame},{time_s:.6},{angle},{numbers}\n"))?;
+            writeln!(file, "{frame},{time_s:.6},{angle},{numbers}")?;
         }
     }
-    file.finish()
+    Ok(())
 }
 
 /// The word for an angle without a value.

@@ -155,5 +155,5 @@ pub(super) fn text(file: &Path, text: &str) -> Result<(), Failure> {
 }
 
 fn put(file: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::write(file, bytes).map_err(|error| in_file(file, &error))
+    files::replace_unsynced(file, bytes).map_err(|error| in_file(file, &error))
 }

@@ -1,0 +1,362 @@
+//! A folder that is written to. Everything in it is opened beneath its descriptor, and no link in it is followed: whoever else may
+//! write there cannot lead a file astray.
+
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, File};
+use std::io::{self, BufWriter, ErrorKind, Write as _};
+use std::os::fd::OwnedFd;
+use std::os::unix::fs::MetadataExt as _;
+use std::path::{Path, PathBuf};
+use std::process;
+
+use rustix::fs::{AtFlags, CWD, Mode, OFlags, mkdirat, openat, renameat, statat, unlinkat};
+use rustix::io::Errno;
+use rustix::process::geteuid;
+
+use crate::user;
+
+/// Every user may write.
+const OTHERS: u32 = 0o002;
+/// Only the owner of a file removes it.
+const STICKY: u32 = 0o1000;
+
+/// An open folder.
+#[derive(Debug)]
+pub struct Folder {
+    descriptor: OwnedFd,
+    path: PathBuf,
+}
+
+impl Folder {
+    /// Opens a folder. Links in `path` are followed: the user has named it.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operating system.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::CLOEXEC;
+        let descriptor = openat(CWD, path, flags, Mode::empty())?;
+        let path = path.to_owned();
+        Ok(Self { descriptor, path })
+    }
+
+    /// Opens a folder, and makes it if it does not exist.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operating system.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        fs::create_dir_all(path)?;
+        Self::open(path)
+    }
+
+    /// Opens a folder in this one, and makes it if it does not exist.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operating system; something other than a folder lies there, a link too.
+    pub fn inner(&self, name: &str) -> io::Result<Self> {
+        let mode = Mode::RWXU | Mode::RWXG | Mode::RWXO;
+        match mkdirat(&self.descriptor, name, mode) {
+            Ok(()) | Err(Errno::EXIST) => {}
+            Err(error) => return Err(error.into()),
+        }
+        let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
+        match openat(&self.descriptor, name, flags, Mode::empty()) {
+            Ok(descriptor) => Ok(Self {
+                descriptor,
+                path: self.path.join(name),
+            }),
+            Err(Errno::LOOP | Errno::NOTDIR) => Err(self.in_the_way(OsStr::new(name))),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// The path by which it was opened.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Why what is written here may be changed by somebody else: `belongs to user mallory (4001)`, or
+    /// `may be written to by every user`.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operating system.
+    pub fn risk(&self) -> io::Result<Option<String>> {
+        let found = rustix::fs::fstat(&self.descriptor)?;
+        let own = geteuid().as_raw();
+        if found.st_uid != own && found.st_uid != 0 {
+            return Ok(Some(format!("belongs to {}", user(found.st_uid))));
+        }
+        let is_open = found.st_mode & OTHERS != 0 && found.st_mode & STICKY == 0;
+        Ok(is_open.then(|| "may be written to by every user".to_owned()))
+    }
+
+    /// Makes a file anew; what a killed process left under that name is removed.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operating system; something other than a file lies there, a link too.
+    pub fn begin(&self, name: &str) -> io::Result<File> {
+        self.begin_named(OsStr::new(name))
+    }
+
+    /// Opens an own file for appending and reading; makes it if it does not exist.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operating system; something other than a file of this user lies there, a link too.
+    pub fn resume(&self, name: &str) -> io::Result<File> {
+        self.own(name, OFlags::CREATE | OFlags::APPEND)
+    }
+
+    /// Opens an own file for writing and reading, from its start; makes it if it does not exist.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`resume`](Self::resume).
+    pub fn reopen(&self, name: &str) -> io::Result<File> {
+        self.own(name, OFlags::CREATE)
+    }
+
+    /// Renames a file or a folder in this folder; what has the new name is replaced.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operating system.
+    pub fn rename(&self, from: &str, to: &str) -> io::Result<()> {
+        Ok(renameat(&self.descriptor, from, &self.descriptor, to)?)
+    }
+
+    /// Removes a file, or the link of that name.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operating system.
+    pub fn remove(&self, name: &str) -> io::Result<()> {
+        self.remove_named(OsStr::new(name))
+    }
+
+    /// Writes a file beside its place, and renames it into it.
+    pub(crate) fn replace<T>(
+        &self,
+        name: &OsStr,
+        sync: impl FnOnce(&File) -> io::Result<()>,
+        write: impl FnOnce(&mut BufWriter<File>) -> io::Result<T>,
+    ) -> io::Result<T> {
+        let beside = beside(name);
+        let file = self.begin_named(&beside)?;
+        let written = || {
+            let mut out = BufWriter::new(file);
+            let made = write(&mut out)?;
+            out.flush()?;
+            sync(out.get_ref())?;
+            renameat(&self.descriptor, &beside, &self.descriptor, name)?;
+            Ok(made)
+        };
+        let placed = written();
+        if placed.is_err() {
+            // The error that is reported came first; one of the removal could add nothing to it.
+            drop(self.remove_named(&beside));
+        }
+        placed
+    }
+
+    fn remove_named(&self, name: &OsStr) -> io::Result<()> {
+        Ok(unlinkat(&self.descriptor, name, AtFlags::empty())?)
+    }
+
+    fn begin_named(&self, name: &OsStr) -> io::Result<File> {
+        let flags =
+            OFlags::RDWR | OFlags::CREATE | OFlags::EXCL | OFlags::NOFOLLOW | OFlags::CLOEXEC;
+        let make = || openat(&self.descriptor, name, flags, Mode::from_raw_mode(0o666));
+        let made = match make() {
+            Err(Errno::EXIST) if self.kind(name)?.is_file() => {
+                self.remove_named(name)?;
+                make()
+            }
+            made => made,
+        };
+        match made {
+            Err(Errno::EXIST) => Err(self.in_the_way(name)),
+            made => Ok(made?.into()),
+        }
+    }
+
+    fn own(&self, name: &str, flags: OFlags) -> io::Result<File> {
+        let name = OsStr::new(name);
+        let flags = flags | OFlags::RDWR | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
+        let opened = openat(&self.descriptor, name, flags, Mode::from_raw_mode(0o666));
+        let file = match opened {
+            Err(Errno::LOOP | Errno::NXIO | Errno::ISDIR) => return Err(self.in_the_way(name)),
+            opened => File::from(opened?),
+        };
+        let found = file.metadata()?;
+        // A second name may be that of a file elsewhere.
+        if !found.is_file() || found.uid() != geteuid().as_raw() || found.nlink() > 1 {
+            return Err(self.in_the_way(name));
+        }
+        Ok(file)
+    }
+
+    fn kind(&self, name: &OsStr) -> io::Result<Kind> {
+        let found = statat(&self.descriptor, name, AtFlags::SYMLINK_NOFOLLOW)?;
+        Ok(Kind {
+            mode: found.st_mode,
+            owner: found.st_uid,
+            has_second_name: found.st_nlink > 1,
+        })
+    }
+
+    /// The error for a name under which something lies that is not written to.
+    fn in_the_way(&self, name: &OsStr) -> io::Error {
+        let text = match self.kind(name) {
+            Ok(kind) => format!(
+                "{} of {} lies there, and is not written to: remove it, or name another folder",
+                kind.name(),
+                user(kind.owner)
+            ),
+            Err(error) => return error,
+        };
+        io::Error::new(ErrorKind::AlreadyExists, text)
+    }
+}
+
+/// What lies under a name.
+struct Kind {
+    mode: u32,
+    owner: u32,
+    has_second_name: bool,
+}
+
+impl Kind {
+    fn is_file(&self) -> bool {
+        rustix::fs::FileType::from_raw_mode(self.mode) == rustix::fs::FileType::RegularFile
+    }
+
+    fn name(&self) -> &'static str {
+        use rustix::fs::FileType;
+        match FileType::from_raw_mode(self.mode) {
+            FileType::RegularFile if self.has_second_name => {
+                "a file with a second name (hard link)"
+            }
+            FileType::RegularFile => "a file",
+            FileType::Directory => "a folder",
+            FileType::Symlink => "a symbolic link",
+            FileType::Fifo => "a named pipe",
+            FileType::Socket => "a socket",
+            _ => "a device",
+        }
+    }
+}
+
+/// Name under which a file grows that is renamed to `name`.
+pub(crate) fn beside(name: &OsStr) -> OsString {
+    let mut hidden = OsString::from(".");
+    hidden.push(name);
+    hidden.push(format!(".{}.part", process::id()));
+    hidden
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::Permissions;
+    use std::os::unix::fs::{PermissionsExt as _, symlink};
+
+    use super::*;
+
+    /// A folder with a secret beside it.
+    fn room() -> (tempfile::TempDir, Folder, PathBuf) {
+        let base = tempfile::tempdir().unwrap();
+        let secret = base.path().join("secret");
+        fs::write(&secret, "kept").unwrap();
+        let folder = Folder::create(&base.path().join("out/run")).unwrap();
+        (base, folder, secret)
+    }
+
+    fn text(path: &Path) -> String {
+        fs::read_to_string(path).unwrap()
+    }
+
+    #[test]
+    fn a_link_is_refused_with_its_owner_and_what_it_leads_to_stays() {
+        let (_base, folder, secret) = room();
+        symlink(&secret, folder.path().join("pose3d.jsonl.part")).unwrap();
+        let own = user(geteuid().as_raw());
+        for opened in [
+            folder.begin("pose3d.jsonl.part"),
+            folder.resume("pose3d.jsonl.part"),
+            folder.reopen("pose3d.jsonl.part"),
+        ] {
+            let error = opened.unwrap_err().to_string();
+            assert!(
+                error.starts_with(&format!("a symbolic link of {own} lies there")),
+                "{error}"
+            );
+        }
+        let error = folder.inner("pose3d.jsonl.part").unwrap_err().to_string();
+        assert!(error.starts_with("a symbolic link"), "{error}");
+        assert_eq!(text(&secret), "kept");
+    }
+
+    #[test]
+    fn a_second_name_of_another_file_is_replaced_and_never_written_through() {
+        let (_base, folder, secret) = room();
+        fs::hard_link(&secret, folder.path().join("a.part")).unwrap();
+        let error = folder.resume("a.part").unwrap_err().to_string();
+        assert!(error.starts_with("a file with a second name"), "{error}");
+        folder.begin("a.part").unwrap().write_all(b"new").unwrap();
+        assert_eq!(text(&secret), "kept");
+        assert_eq!(text(&folder.path().join("a.part")), "new");
+    }
+
+    #[test]
+    fn a_pipe_is_refused_without_waiting() {
+        use rustix::fs::{FileType, mknodat};
+        let (_base, folder, _) = room();
+        let pipe = folder.path().join("pipe");
+        mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        for opened in [folder.begin("pipe"), folder.resume("pipe")] {
+            let error = opened.unwrap_err().to_string();
+            assert!(error.starts_with("a named pipe"), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_a_killed_process_left_is_begun_anew_or_gone_on_with() {
+        let (_base, folder, _) = room();
+        let path = folder.path().join("a.part");
+        folder.begin("a.part").unwrap().write_all(b"one").unwrap();
+        folder.resume("a.part").unwrap().write_all(b"two").unwrap();
+        assert_eq!(text(&path), "onetwo");
+        folder.begin("a.part").unwrap().write_all(b"new").unwrap();
+        assert_eq!(text(&path), "new");
+        folder.rename("a.part", "a").unwrap();
+        folder.remove("a").unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn what_is_put_in_the_place_of_an_open_folder_is_not_written_to() {
+        let (base, folder, _) = room();
+        let moved = base.path().join("moved");
+        fs::rename(folder.path(), &moved).unwrap();
+        symlink(base.path(), folder.path()).unwrap();
+        folder.begin("secret").unwrap().write_all(b"new").unwrap();
+        assert_eq!(text(&moved.join("secret")), "new");
+        assert_eq!(text(&base.path().join("secret")), "kept");
+    }
+
+    #[test]
+    fn a_folder_that_everybody_may_write_to_is_a_risk_unless_it_is_sticky() {
+        let (_base, folder, _) = room();
+        let risk = |mode| {
+            fs::set_permissions(folder.path(), Permissions::from_mode(mode)).unwrap();
+            folder.risk().unwrap()
+        };
+        assert_eq!(risk(0o755), None);
+        assert_eq!(risk(0o1777), None);
+        assert_eq!(risk(0o777).unwrap(), "may be written to by every user");
+    }
+}
