@@ -235,8 +235,16 @@ fn other_sites_strange_requests_and_nonsense_are_refused_and_the_page_goes_on() 
     }
     view.open().text("hello", |it| it["mode"] == "waiting");
     // Without a token nothing but the loopback.
+    let short = case.path("short");
+    fs::write(&short, "short").unwrap();
     let ended = case
-        .start(&["view", "--listen", "0.0.0.0", "--token=short"])
+        .start(&[
+            "view",
+            "--listen",
+            "0.0.0.0",
+            "--token-file",
+            short.to_str().unwrap(),
+        ])
         .wait_among_others();
     assert_eq!(ended.status.code(), Some(2));
     view.end();

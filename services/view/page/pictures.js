@@ -56,6 +56,7 @@ export class Pictures {
     const [width, height] = it.size;
     canvas.width = 480;
     canvas.height = Math.round((480 * height) / Math.max(width, 1)) || 360;
+    canvas.classList.toggle("tall", canvas.height > canvas.width);
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `picture of ${it.name}`);
     canvas.onclick = (event) => this.click(nth, event);

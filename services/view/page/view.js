@@ -74,8 +74,9 @@ function begin(value) {
   for (const name of ["state", "happened"]) element(name).hidden = isFinished;
   element("time").hidden = !isFinished;
   if (!isSame) show(value);
-  if (isFinished) beginFinished(value, isSame);
+  // Pictures come with the frames that are asked for after them.
   askForPictures();
+  if (isFinished) beginFinished(value, isSame);
   redraw();
 }
 

@@ -44,7 +44,8 @@ pub(crate) struct Board {
     tick: watch::Sender<u64>,
     /// Pages that show the pictures of a view.
     wanted: [AtomicUsize; MAX_VIEWS],
-    n_pages: AtomicUsize,
+    n_pages: Arc<AtomicUsize>,
+    n_opened: AtomicUsize,
 }
 
 #[derive(Debug, Default)]
@@ -56,8 +57,10 @@ struct Inner {
     pictures: [Slot; MAX_VIEWS],
     events: VecDeque<(u64, Message)>,
     scene: Option<Arc<Scene>>,
-    /// Whether the user wants what runs to be recorded; taken by the thread that looks on.
+    /// Whether what runs is to be recorded; taken by the thread that looks on.
     record: Option<bool>,
+    /// The page that has asked for it last.
+    recorder: Option<usize>,
 }
 
 /// A message to all pages, and the number of the change that brought it.
@@ -74,7 +77,8 @@ impl Board {
             inner: Mutex::default(),
             tick: watch::Sender::new(0),
             wanted: Default::default(),
-            n_pages: AtomicUsize::new(0),
+            n_pages: Arc::default(),
+            n_opened: AtomicUsize::new(0),
         }
     }
 
@@ -158,9 +162,31 @@ impl Board {
         self.lock().scene.clone()
     }
 
-    /// Asks that what runs be recorded, or no more.
-    pub(crate) fn ask_to_record(&self, on: bool) {
-        self.lock().record = Some(on);
+    /// Asks for what runs to be recorded, or no more, on behalf of a page.
+    pub(crate) fn ask_to_record(&self, on: bool, page: usize) {
+        let mut inner = self.lock();
+        inner.record = Some(on);
+        inner.recorder = on.then_some(page);
+    }
+
+    /// Asks again for what could not be begun yet.
+    pub(crate) fn ask_again(&self) {
+        let mut inner = self.lock();
+        inner.record = inner.recorder.map(|_| true);
+    }
+
+    /// Number of a page that opens.
+    pub(crate) fn open_page(&self) -> usize {
+        self.n_opened.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// Ends the recording that a page has asked for, as it goes.
+    pub(crate) fn leave_page(&self, page: usize) {
+        let mut inner = self.lock();
+        if inner.recorder == Some(page) {
+            inner.record = Some(false);
+            inner.recorder = None;
+        }
     }
 
     /// What was asked about recording since the last call.
@@ -169,7 +195,7 @@ impl Board {
     }
 
     /// Counts pages.
-    pub(crate) fn pages(&self) -> &AtomicUsize {
+    pub(crate) fn pages(&self) -> &Arc<AtomicUsize> {
         &self.n_pages
     }
 

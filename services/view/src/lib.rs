@@ -19,6 +19,7 @@
 
 mod board;
 mod date;
+mod door;
 mod moment;
 mod picture;
 mod scene;

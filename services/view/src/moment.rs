@@ -108,7 +108,7 @@ fn seen(scene: &Scene, message: &Pose3d, view: usize) -> Seen {
     Seen {
         joints: joints.map(|it| it.into_iter().map(in_view).collect()),
         why: None,
-        behind: fused.exchanged == 1,
+        behind: scene.tells_facing && fused.exchanged == 1,
     }
 }
 

@@ -10,6 +10,7 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use tokio::runtime::Builder;
 
 use crate::board::Board;
+use crate::door::{Door, Peer};
 use crate::finished::Finished;
 use crate::live;
 use crate::options::{Listen, Options, Subject};
@@ -112,7 +113,8 @@ fn serve(listener: TcpListener, site: Site, stop: &Stop) -> Result<(), Failure> 
                 tokio::time::sleep(CHECK).await;
             }
         };
-        let serve = axum::serve(listener, router(site));
+        let pages = router(site).into_make_service_with_connect_info::<Peer>();
+        let serve = axum::serve(Door::new(listener), pages);
         tokio::select! {
             served = async { serve.await } => served.or_fail(ExitKind::Run),
             () = stopped => Ok(()),

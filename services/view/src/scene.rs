@@ -24,6 +24,8 @@ pub(crate) struct Scene {
     pub up: [f64; 3],
     /// Frames per second of the footage, where known.
     pub frame_rate_hz: Option<f64>,
+    /// Whether results tell which views see the person from behind: those of the filters do.
+    pub tells_facing: bool,
     /// Why the cameras are not known, if they are not.
     pub problem: Option<String>,
 }
@@ -62,6 +64,7 @@ impl Scene {
             joints: prepared.settings.skeleton.joints,
             up: up.unwrap_or([0.0, 0.0, 1.0]),
             frame_rate_hz: resolved.frame_rate_hz(),
+            tells_facing: !resolved.deployment.has_maps(),
             problem: None,
         })
     }
@@ -82,6 +85,7 @@ impl Scene {
                     .unwrap_or(&PARSE14),
                 up: resolved.deployment.up.unwrap_or([0.0, 0.0, 1.0]),
                 frame_rate_hz: resolved.frame_rate_hz(),
+                tells_facing: !resolved.deployment.has_maps(),
                 problem: Some(format!("without cameras: {why}")),
             }
         })

@@ -5,15 +5,18 @@
 //! of another site has that site in `Origin`. With a token, which is needed on any other address, pages have to know it
 //! instead. The files of the page hold no data: what does, goes over the one web socket.
 
+use core::net::IpAddr;
+
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{ConnectInfo, RawQuery, Request, State};
 use axum::http::header::{HOST, ORIGIN};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::get;
 
+use crate::door::{Peer, Seat};
 use crate::site::Site;
 use crate::socket;
 
@@ -64,6 +67,7 @@ fn file(kind: &'static str, text: &'static str) -> Response {
 
 async fn upgrade(
     State(site): State<Site>,
+    ConnectInfo(peer): ConnectInfo<Peer>,
     RawQuery(asked): RawQuery,
     socket: WebSocketUpgrade,
 ) -> Response {
@@ -72,19 +76,17 @@ async fn upgrade(
     {
         return (StatusCode::FORBIDDEN, "the token is missing or wrong").into_response();
     }
-    if site
-        .board
-        .pages()
-        .load(core::sync::atomic::Ordering::Relaxed)
-        >= MOST_PAGES
-    {
+    let Some(seat) = Seat::take(site.board.pages(), MOST_PAGES) else {
         let what = format!("{MOST_PAGES} pages are open already");
         return (StatusCode::SERVICE_UNAVAILABLE, what).into_response();
-    }
-    socket
-        .max_message_size(LARGEST_QUESTION)
-        .max_frame_size(LARGEST_QUESTION)
-        .on_upgrade(|socket| socket::talk(socket, site))
+    };
+    let may_record = site.token.is_some() || peer.is_same_user();
+    let socket = socket.max_message_size(LARGEST_QUESTION);
+    let socket = socket.max_frame_size(LARGEST_QUESTION);
+    socket.on_upgrade(move |socket| {
+        peer.become_page();
+        socket::talk(socket, site, seat, may_record)
+    })
 }
 
 /// The token in what stands behind `?`; tokens have no characters that are written in another way there.
@@ -138,7 +140,9 @@ fn is_loopback(host: &str) -> bool {
         Some((name, port)) if port.bytes().all(|it| it.is_ascii_digit()) => name,
         _ => host,
     };
-    ["localhost", "127.0.0.1", "[::1]"].contains(&name.to_ascii_lowercase().as_str())
+    let is_address = |name: &str| name.parse().is_ok_and(|it: IpAddr| it.is_loopback());
+    let inner = name.strip_prefix('[').and_then(|it| it.strip_suffix(']'));
+    name.eq_ignore_ascii_case("localhost") || is_address(inner.unwrap_or(name))
 }
 
 async fn with_headers(request: Request, next: Next) -> Response {
@@ -173,7 +177,13 @@ mod tests {
 
     #[test]
     fn pages_of_other_sites_are_refused() {
-        for host in ["127.0.0.1:7878", "localhost:9", "LOCALHOST", "[::1]:80"] {
+        for host in [
+            "127.0.0.1:7878",
+            "127.0.0.2:7878",
+            "localhost:9",
+            "LOCALHOST",
+            "[::1]:80",
+        ] {
             assert!(checked(host, None, false), "{host}");
         }
         for host in [

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use tokio::time::timeout;
 
 use crate::board::Board;
+use crate::door::Seat;
 use crate::finished::Finished;
 use crate::site::Site;
 
@@ -35,9 +36,12 @@ struct Question {
     epipolar: Option<Vec<(usize, [f64; 2])>>,
 }
 
-/// A page, counted while it is open.
+/// A page while it is open.
 struct Page {
     site: Site,
+    number: usize,
+    /// Whether it may begin and end recordings: the others are of another user, and have no token.
+    may_record: bool,
     shown: [bool; MAX_VIEWS],
     seen: u64,
     n_refused: u32,
@@ -46,15 +50,19 @@ struct Page {
 impl Drop for Page {
     fn drop(&mut self) {
         self.show(&[]);
-        self.board().pages().fetch_sub(1, Ordering::Relaxed);
+        self.board().leave_page(self.number);
     }
 }
 
 /// Talks with a page until it goes, takes too long, or makes no sense.
-pub(crate) async fn talk(mut socket: WebSocket, site: Site) {
-    site.board.pages().fetch_add(1, Ordering::Relaxed);
+///
+/// * `_seat`: counts the page while it is open.
+/// * `may_record`: whether it may begin and end recordings.
+pub(crate) async fn talk(mut socket: WebSocket, site: Site, _seat: Seat, may_record: bool) {
     let mut changes = site.board.changes();
     let mut page = Page {
+        number: site.board.open_page(),
+        may_record,
         site,
         shown: [false; MAX_VIEWS],
         seen: 0,
@@ -115,10 +123,15 @@ impl Page {
         if let Some(views) = &question.pictures {
             self.show(views);
         }
-        if let Some(on) = question.record.filter(|_| self.site.finished.is_none()) {
-            self.board().ask_to_record(on);
-        }
         let mut answers = Vec::new();
+        match question.record.filter(|_| self.site.finished.is_none()) {
+            Some(on) if self.may_record => self.board().ask_to_record(on, self.number),
+            Some(_) => answers.push(text(&json!({
+                "type": "refused",
+                "why": "recording is for the user whose run this is, or for pages with a token (`--token`)",
+            }))),
+            None => {}
+        }
         if let Some(points) = &question.epipolar {
             answers.push(self.lines(points));
         }
@@ -217,11 +230,14 @@ mod tests {
             joints: &PARSE14,
             up: [0.0, 0.0, 1.0],
             frame_rate_hz: None,
+            tells_facing: true,
             problem: None,
         };
         let board = Board::new();
         board.begin(&json!({ "type": "hello" }), Some(Arc::new(scene)));
         Page {
+            number: board.open_page(),
+            may_record: true,
             site: Site {
                 board: Arc::new(board),
                 finished: None,
@@ -274,6 +290,30 @@ mod tests {
     }
 
     #[test]
+    fn a_recording_ends_with_its_page_and_a_page_of_another_user_begins_none() {
+        let mut first = page();
+        let board = Arc::clone(&first.site.board);
+        ask(&mut first, r#"{"record":true}"#);
+        assert_eq!(board.take_record(), Some(true));
+        let mut stranger = Page {
+            number: board.open_page(),
+            may_record: false,
+            site: first.site.clone(),
+            shown: [false; MAX_VIEWS],
+            seen: 0,
+            n_refused: 0,
+        };
+        for asked in [r#"{"record":true}"#, r#"{"record":false}"#] {
+            let refused = ask(&mut stranger, asked);
+            assert_eq!(refused[0]["type"], "refused");
+        }
+        drop(stranger);
+        assert_eq!(board.take_record(), None);
+        drop(first);
+        assert_eq!(board.take_record(), Some(false));
+    }
+
+    #[test]
     fn a_page_stands_whatever_it_is_asked_and_its_counts_end_at_nothing() {
         let mut random = fastrand::Rng::with_seed(1);
         let mut page = page();
@@ -299,7 +339,6 @@ mod tests {
         }
         let site = page.site.clone();
         assert!((0..MAX_VIEWS).any(|it| site.board.wants(it)));
-        site.board.pages().fetch_add(1, Ordering::Relaxed);
         drop(page);
         assert!((0..MAX_VIEWS).all(|it| !site.board.wants(it)));
     }

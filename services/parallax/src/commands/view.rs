@@ -16,8 +16,6 @@ use crate::globals::Globals;
 
 /// Shortest token that is accepted, characters.
 const SHORTEST_TOKEN: usize = 16;
-/// What stands for a token that is made.
-const RANDOM: &str = "random";
 
 /// Options of `parallax view`.
 #[derive(Debug, Args)]
@@ -29,7 +27,8 @@ out. It may be opened and closed at any time, several times at once; it waits fo
 for the next run when one ends. Of a finished run it shows a time line.
 
 The page is for this machine: it is served on the loopback alone, and pages of other sites cannot read it. Users of this \
-machine can, unless --token is given. With --listen 0.0.0.0 other machines can, and need a token, which is made if none \
+machine can, unless a token is asked for; only your own pages, or those with the token, begin a recording, and it ends with \
+the page that began it. With --listen 0.0.0.0 other machines can, and need a token, which is made if none \
 is given. Nothing is encrypted: over a network that others use, prefer a tunnel (`ssh -L 7878:localhost:7878 HOST`).
 
 Keys in the page: ? lists them. Ctrl-C ends the view, and nothing else.
@@ -54,9 +53,12 @@ pub(crate) struct Arguments {
     /// Address to listen on; any but the loopback needs a token.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     listen: IpAddr,
-    /// What a page must know, at least 16 letters, digits, '-' or '_'; random if it is not given here.
-    #[arg(long, value_name = "TOKEN", num_args = 0..=1, default_missing_value = RANDOM, require_equals = true, value_parser = token)]
-    token: Option<String>,
+    /// Ask pages for a token, which is made at random and is part of the address.
+    #[arg(long, conflicts_with = "token_file")]
+    token: bool,
+    /// File with the token that pages must know: at least 16 letters, digits, '-' or '_'.
+    #[arg(long, value_name = "FILE")]
+    token_file: Option<PathBuf>,
     /// Most pictures of a camera in a second.
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=60))]
     pictures: u32,
@@ -74,10 +76,9 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         Some(name) => Subject::Deployment(Some(name.clone())),
         None => subject(arguments.subject.as_deref())?,
     };
-    let token = match arguments.token.as_deref() {
-        Some(RANDOM) => Some(random_token()?),
-        Some(token) => Some(token.to_owned()),
-        None if arguments.listen.is_loopback() => None,
+    let token = match &arguments.token_file {
+        Some(file) => Some(token_in(file)?),
+        None if arguments.listen.is_loopback() && !arguments.token => None,
         None => Some(random_token()?),
     };
     let options = Options {
@@ -143,6 +144,11 @@ fn subject(named: Option<&str>) -> Result<Subject, Failure> {
         return Err(Failure::new(ExitKind::Usage, text));
     }
     Namespace::new(named).or_fail(ExitKind::Usage)?;
+    if !path.exists() && !runs(named)? {
+        output::message(format_args!(
+            "no folder, no file and no running deployment is called {named}: waiting for a deployment of that name"
+        ));
+    }
     Ok(Subject::Deployment(Some(named.to_owned())))
 }
 
@@ -153,17 +159,19 @@ fn runs(name: &str) -> Result<bool, Failure> {
     Ok(running.any(|it| it.namespace.name() == name))
 }
 
-fn token(text: &str) -> Result<String, String> {
-    let is_plain = |it: u8| it.is_ascii_alphanumeric() || b"-_".contains(&it);
-    if text == RANDOM {
-        return Ok(text.to_owned());
+/// The token in a file, without space around it.
+fn token_in(file: &Path) -> Result<String, Failure> {
+    let text = runtime::read_text(file)?;
+    let token = text.trim();
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_".contains(&byte);
+    if token.len() < SHORTEST_TOKEN || !token.bytes().all(is_plain) {
+        let text = format!(
+            "{}: a token has at least {SHORTEST_TOKEN} letters, digits, '-' or '_', and nothing else",
+            file.display()
+        );
+        return Err(Failure::new(ExitKind::Usage, text));
     }
-    if text.len() < SHORTEST_TOKEN || !text.bytes().all(is_plain) {
-        return Err(format!(
-            "not at least {SHORTEST_TOKEN} letters, digits, '-' or '_'"
-        ));
-    }
-    Ok(text.to_owned())
+    Ok(token.to_owned())
 }
 
 /// 128 random bits, as hexadecimal digits.
@@ -196,7 +204,13 @@ mod tests {
 
     #[test]
     fn tokens_are_long_and_plain() {
-        token("0123456789abcdef").unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("token");
+        let token = |text: &str| {
+            std::fs::write(&file, text).unwrap();
+            token_in(&file)
+        };
+        assert_eq!(token("0123456789abcdef\n").unwrap(), "0123456789abcdef");
         for wrong in ["", "short", "0123456789abcde&", "0123456789 abcdef"] {
             assert!(token(wrong).is_err(), "{wrong}");
         }

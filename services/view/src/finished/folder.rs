@@ -159,7 +159,7 @@ fn open_lines(folder: &Path, name: &str, notes: &mut Vec<String>) -> Result<Opti
     let part = format!("{name}.part");
     for name in [name, &part] {
         let path = folder.join(name);
-        match File::open(&path) {
+        match files::open(&path) {
             Ok(file) => {
                 if name == part {
                     notes.push(format!(
@@ -239,6 +239,7 @@ fn scene(folder: &Path, notes: &mut Vec<String>) -> Scene {
                 joints: &PARSE14,
                 up: [0.0, 0.0, 1.0],
                 frame_rate_hz: None,
+                tells_facing: false,
                 problem: None,
             }
         }

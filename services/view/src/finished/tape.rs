@@ -46,7 +46,7 @@ impl Tape {
         note(&recording, &mut notes);
         let track = recording.tracks.get(&topic::pose3d());
         let mut poses = track.map_or_else(Vec::new, |it| it.entries.clone());
-        let mut input = File::open(path).map_err(|why| runtime::in_file(path, &why))?;
+        let mut input = files::open(path).map_err(|why| runtime::in_file(path, &why))?;
         poses.retain(|it| read_pose(&mut input, it).is_ok_and(|it| it.status != Status::END));
         if poses.is_empty() {
             return Err(refused("it has no result".to_owned()));

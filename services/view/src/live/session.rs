@@ -224,7 +224,7 @@ impl Session {
             Some(true) if self.tape.is_none() => {
                 let Some(run) = self.run else {
                     // No process has reported yet, which they do every second.
-                    board.ask_to_record(true);
+                    board.ask_again();
                     return;
                 };
                 match Tape::start(&self.namespace, &self.resolved, run) {
