@@ -137,7 +137,7 @@ impl Worker<'_> {
     }
 
     fn refuse_evidence(&self, error: &WireError) {
-        Context::of(self.service).refuse("evidence", error);
+        Context::of(self.service).count_refused("evidence", error);
     }
 
     /// Solves this worker's pairs, one after the other.

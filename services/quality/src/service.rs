@@ -75,7 +75,7 @@ pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
                 match candidates(network, &pose.value) {
                     Ok(candidates) => predict(network, candidates, picture, frame_scale)?,
                     Err(error) => {
-                        Context::of(service).refuse("view-pose", &error);
+                        Context::of(service).count_refused("view-pose", &error);
                         no_prediction()?
                     }
                 }

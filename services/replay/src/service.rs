@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::fs::File;
 
-use messages::{Cause, Stamp, Status, Timing};
+use messages::{Cause, Status, Timing};
 use recording::{Entry, Envelope, ReadError, Recording, Track, in_order};
 use runtime::{ExitKind, Failure, OrFail as _, Place, SendError, Service, Woken, now_nanos};
 use stage::Stage;
@@ -20,7 +20,7 @@ use crate::job::{Job, Output};
 ///
 /// [`ExitKind::Input`] if the recording cannot be read, or lacks a topic; and what the transport reports.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
-    let mut file = File::open(&job.file).or_fail(ExitKind::Input)?;
+    let mut file = files::open(&job.file).or_fail(ExitKind::Input)?;
     let recording = recording::scan(&mut file).or_fail(ExitKind::Input)?;
     let recorded_session = recording.about.clone().or_fail(ExitKind::Input)?.session;
     let tracks = tracks(job, &recording)?;
@@ -65,7 +65,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
             tracing::debug!(%error, "cannot note the place in the recording");
         }
     }
-    let end = end.unwrap_or_else(|| end_after(&order, &tracks, &mut file, job.frame_step));
+    let end = end.unwrap_or_else(|| end_after(&order, &tracks, &mut file, job, recorded_session));
     playback.end(&end)
 }
 
@@ -85,28 +85,38 @@ fn tracks<'a>(job: &Job, recording: &'a Recording) -> Result<Vec<&'a Track>, Fai
     tracks.collect()
 }
 
-/// The end of stream for a recording that lacks it: one frame step after the last frame of the first output.
+/// The end of stream for a recording in which it is missing or damaged: one frame step after the last frame that can be read.
 fn end_after(
     order: &[(usize, Entry)],
     tracks: &[&Track],
     file: &mut File,
-    frame_step: u64,
+    job: &Job,
+    session: u64,
 ) -> Envelope {
-    let mut end = Envelope {
-        stamp: Stamp::default(),
+    let mut buffer = Vec::new();
+    let mut last_of = |output: usize| {
+        let entries = order.iter().rev().filter(|(other, _)| *other == output);
+        entries.into_iter().find_map(|(_, entry)| {
+            let kind = tracks[output].kind;
+            let message = recording::read(file, kind, entry, &mut buffer).ok()?;
+            let stamp = Envelope::of(kind, message.head)?.stamp;
+            (stamp.session == session).then_some(stamp)
+        })
+    };
+    let last = (0..tracks.len()).filter_map(&mut last_of);
+    let mut stamp = last.max_by_key(|stamp| stamp.frame).unwrap_or_default();
+    stamp.frame = stamp.frame.saturating_add(job.frame_step);
+    Envelope {
+        stamp,
         timing: Timing::default(),
         status: Status::END,
-    };
-    let last = order.iter().rev().find(|(output, _)| *output == 0);
-    if let (Some((_, entry)), Some(track)) = (last, tracks.first()) {
-        let mut buffer = Vec::new();
-        let read = recording::read(file, track.kind, entry, &mut buffer).ok();
-        if let Some(last) = read.and_then(|message| Envelope::of(track.kind, message.head)) {
-            end.stamp = last.stamp;
-            end.stamp.frame = last.stamp.frame.saturating_add(frame_step);
-        }
     }
-    end
+}
+
+/// Index of the view, or of the worker, at the end of the name of a topic; 0 for a topic of all views.
+fn view_in(topic: &str) -> u32 {
+    let last = topic.rsplit('/').next();
+    last.and_then(|text| text.parse().ok()).unwrap_or_default()
 }
 
 /// The outputs of the process, and the clock that they are replayed by.
@@ -207,13 +217,29 @@ impl<'a> Playback<'a> {
     /// Sends the end of the stream on all outputs, then waits for the stop request.
     fn end(&self, end: &Envelope) -> Result<(), Failure> {
         let send_end = || -> Result<(), Failure> {
-            let end = self.rebased(end);
-            for sender in &self.senders {
+            let mut end = self.rebased(end);
+            for (output, sender) in received(self.job).zip(&self.senders) {
+                end.stamp.view = view_in(&output.topic);
                 sender.end(&end)?;
             }
             Ok(())
         };
         let n_connected = || self.senders.first().map_or(0, Sender::n_connected);
         self.stage.end_with(n_connected, send_end)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use messages::topic;
+
+    use super::*;
+
+    #[test]
+    fn the_view_of_an_end_is_that_of_its_topic() {
+        assert_eq!(view_in(&topic::frame(0)), 0);
+        assert_eq!(view_in(&topic::view_pose(13)), 13);
+        assert_eq!(view_in(&topic::pair_pose(2)), 2);
+        assert_eq!(view_in(&topic::pose3d()), 0);
     }
 }

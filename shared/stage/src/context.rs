@@ -1,8 +1,10 @@
 //! What a stage needs from its process: the session, the clock and the counters.
 
-use messages::{Cause, Refusal};
-use runtime::{Health, Service, now_nanos};
+use messages::{Cause, Refusal, Stamp, Status};
+use runtime::{Health, ReceiveError, Service, now_nanos};
 use wire::{Expected, WireError};
+
+use crate::Stamped;
 
 /// The counters of a stage. A process reports them in its heartbeats.
 pub trait Account {
@@ -80,8 +82,37 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Counts and logs a refused message.
-    pub fn refuse(&self, topic: &str, error: &WireError) {
+    /// Counts and logs a refused message that ends no stream.
+    pub fn count_refused(&self, topic: &str, error: &WireError) {
         self.account.refused(error.refusal(), topic, error);
+    }
+
+    /// Counts and logs a refused message.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError::End`] if it is the end of a stream of this session: nobody would send another one.
+    pub fn refuse<M: Stamped>(&self, message: &M, error: &WireError) -> Result<(), ReceiveError> {
+        self.refuse_end(M::NAME, message.stamp(), message.status(), error)
+    }
+
+    /// As [`refuse`](Self::refuse), for the header of a bulk message.
+    ///
+    /// # Errors
+    ///
+    /// As for [`refuse`](Self::refuse).
+    pub fn refuse_end(
+        &self,
+        name: &'static str,
+        stamp: &Stamp,
+        status: Status,
+        error: &WireError,
+    ) -> Result<(), ReceiveError> {
+        self.account.refused(error.refusal(), name, error);
+        if status == Status::END && stamp.session == self.session {
+            let why = error.to_string();
+            return Err(ReceiveError::End { name, why });
+        }
+        Ok(())
     }
 }

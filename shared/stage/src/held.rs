@@ -82,7 +82,7 @@ impl<E: Element, H: BulkHeader> Inner<E, H> {
         while let Some(sample) = self.subscriber.receive()? {
             match (self.check)(&sample, &context.expected(self.view)) {
                 Ok(()) => return Ok(Some((sample.header().stamp().frame, sample))),
-                Err(error) => context.refuse(H::NAME, &error),
+                Err(error) => context.count_refused(H::NAME, &error),
             }
         }
         Ok(None)

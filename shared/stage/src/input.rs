@@ -41,7 +41,7 @@ where
                 continue;
             }
             match (self.decode)(&message) {
-                Err(error) => context.refuse(M::NAME, &error),
+                Err(error) => context.refuse(&message, &error)?,
                 Ok(value) => {
                     let timing = *message.timing();
                     let item = Item {

@@ -114,7 +114,7 @@ impl<R> Port<R> {
         while let Some(message) = self.receiver.receive()? {
             match self.sender.check(&message, context) {
                 Ok(()) => return Ok(Some(message)),
-                Err(error) => context.refuse(M::NAME, &error),
+                Err(error) => context.refuse(&message, &error)?,
             }
         }
         Ok(None)

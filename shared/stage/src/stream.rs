@@ -60,7 +60,7 @@ impl Stage<'_, ()> {
                 let header = *sample.header();
                 let expected = context.expected(view);
                 if let Err(error) = wire::check_frame(&header, sample.payload().len(), &expected) {
-                    context.refuse("frame", &error);
+                    context.refuse_end("frame", &header.stamp, header.status, &error)?;
                     continue;
                 }
                 let is_end = header.status == Status::END;
