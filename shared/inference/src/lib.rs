@@ -10,6 +10,7 @@ mod nesting;
 mod onnx_runtime;
 mod rten_engine;
 mod session;
+mod sizes;
 
 pub use engine::{Description, Input, LoadError, Output, Port, RunError, Side, Values, written};
 #[cfg(feature = "ort")]

@@ -4,7 +4,7 @@ use crate::engine::Engine;
 #[cfg(feature = "ort")]
 use crate::onnx_runtime::OnnxRuntime;
 use crate::rten_engine::Rten;
-use crate::{Description, Input, LoadError, Output, RunError, nesting};
+use crate::{Description, Input, LoadError, Output, RunError, nesting, sizes};
 
 /// A network that is loaded by a library.
 #[derive(Debug)]
@@ -80,5 +80,6 @@ impl Session {
 
 fn check(file: &[u8]) -> Result<u32, LoadError> {
     nesting::check(file).map_err(|error| LoadError::File(Box::new(error)))?;
+    sizes::check(file).map_err(|error| LoadError::File(Box::new(error)))?;
     Ok(checksum::fnv1a_32(file))
 }
