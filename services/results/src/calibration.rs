@@ -7,7 +7,7 @@ use geometry::{Camera, RigWatch, StepWatch, SwapWatch};
 use messages::Status;
 use runfiles::{CameraFit, Contradicted, Exchanged};
 
-use crate::{FrameRecord, Scene, ViewRecord};
+use crate::{FrameRecord, Scene, ViewRecord, own};
 
 /// Follows all cameras over a run.
 #[derive(Debug)]
@@ -191,23 +191,14 @@ fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2
     if fused.is_none() && !scene.has_maps {
         return None;
     }
-    let best = record
-        .own(scene, view)
-        .filter(|it| it.score >= scene.least_score)?;
-    let mirror = scene
-        .model
-        .spec()
-        .mirror
-        .as_deref()
-        .filter(|_| fused.is_some_and(|it| it.exchanged == 1));
-    let part = |nth: usize| mirror.map_or(nth, |it| it[nth]);
-    let layout = &scene.views[view].layout;
-    let parts = (0..best.parts.len()).map(part);
-    Some(
-        parts
-            .map(|it| best.centre(&scene.model, layout, it))
-            .collect(),
-    )
+    let readings = own::readings(scene, record, view)?;
+    let is_exchanged = match fused {
+        Some(fused) if !scene.has_maps => fused.exchanged == 1,
+        // Networks name sides as they see them; which are those of the body, the solution in space tells.
+        _ => own::is_exchanged(scene, record, view, &readings),
+    };
+    let [named, exchanged] = readings;
+    Some(if is_exchanged { exchanged } else { named })
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The output folder: files grow beside their final name, and take it when they are whole.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write as _};
+use std::fs::{self, File};
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use runfiles::{Line as _, RunSummary, SmoothLine, SmoothReport};
@@ -27,7 +27,7 @@ pub struct FolderError {
 /// until a new one is complete, and the name of an unfinished file shows that it is one.
 #[derive(Debug)]
 pub struct Folder {
-    dir: PathBuf,
+    dir: files::Folder,
     parts: Vec<String>,
     resume: bool,
 }
@@ -41,13 +41,13 @@ impl Folder {
     ///
     /// [`FolderError`].
     pub fn open(dir: &Path, resume: bool) -> Result<Self, FolderError> {
-        fs::create_dir_all(dir).map_err(|source| FolderError {
+        let dir = files::Folder::create(dir).map_err(|source| FolderError {
             doing: "make the folder",
             path: dir.to_owned(),
             source,
         })?;
         Ok(Self {
-            dir: dir.to_owned(),
+            dir,
             parts: Vec::new(),
             resume,
         })
@@ -55,7 +55,8 @@ impl Folder {
 
     /// Whether a run has left all its files there under their final names.
     pub fn is_finished(dir: &Path, session: u64) -> bool {
-        let text = fs::read_to_string(dir.join(RunSummary::FILE)).unwrap_or_default();
+        let text =
+            files::read_text(&dir.join(RunSummary::FILE), files::SETTINGS).unwrap_or_default();
         RunSummary::parse_session(&text) == Ok(session)
     }
 
@@ -65,26 +66,16 @@ impl Folder {
     ///
     /// [`FolderError`].
     pub fn file(&mut self, name: &str) -> Result<File, FolderError> {
-        let path = self.part(name);
-        if self.resume {
-            cut_half_line(&path).map_err(|source| FolderError {
-                doing: "mend",
-                path: path.clone(),
-                source,
-            })?;
-        }
-        let begin = || {
-            let file = OpenOptions::new().create(true).append(true).open(&path)?;
-            if !self.resume {
-                file.set_len(0)?;
-            }
-            Ok(file)
+        let part = part(name);
+        let file = if self.resume {
+            self.dir.resume(&part).and_then(|mut file| {
+                cut_half_line(&mut file)?;
+                Ok(file)
+            })
+        } else {
+            self.dir.begin(&part)
         };
-        let file = begin().map_err(|source| FolderError {
-            doing: "write",
-            path: path.clone(),
-            source,
-        })?;
+        let file = file.map_err(|source| self.failed("write", name, source))?;
         self.parts.push(name.to_owned());
         Ok(file)
     }
@@ -95,15 +86,16 @@ impl Folder {
     ///
     /// [`FolderError`].
     pub fn reserve(&mut self, name: &str, bytes: usize) -> Result<(), FolderError> {
-        let path = self.part(name);
-        let is_there = fs::metadata(&path).is_ok_and(|it| it.len() == bytes as u64);
-        if !(self.resume && is_there) {
-            fs::write(&path, vec![b' '; bytes]).map_err(|source| FolderError {
-                doing: "make room for",
-                path,
-                source,
-            })?;
-        }
+        let part = part(name);
+        let is_there = || Ok(self.dir.resume(&part)?.metadata()?.len() == bytes as u64);
+        let taken = if self.resume { is_there() } else { Ok(false) };
+        let taken = taken.and_then(|is_there| {
+            if is_there {
+                return Ok(());
+            }
+            self.dir.begin(&part)?.write_all(&vec![b' '; bytes])
+        });
+        taken.map_err(|source| self.failed("make room for", name, source))?;
         self.parts.push(name.to_owned());
         Ok(())
     }
@@ -115,18 +107,18 @@ impl Folder {
     /// The error of the operating system.
     pub fn fill(&self, name: &str, text: &str) -> io::Result<()> {
         // In place: what is emptied first may be taken by others.
-        let mut file = OpenOptions::new().write(true).open(self.part(name))?;
+        let mut file = self.dir.reopen(&part(name))?;
         file.write_all(text.as_bytes())?;
         file.set_len(text.len() as u64)
     }
 
     /// Removes what a smoother made of an earlier run: it is not of this one.
     pub(crate) fn remove_smoothed(&self) {
-        if !self.dir.join(SmoothReport::FILE).exists() {
+        if !self.dir.path().join(SmoothReport::FILE).exists() {
             return;
         }
         for name in [SmoothLine::FILE, SmoothReport::FILE, "angles.csv"] {
-            if let Err(error) = fs::remove_file(self.dir.join(name)) {
+            if let Err(error) = self.dir.remove(name) {
                 tracing::debug!(%error, name, "an earlier run's file stays");
             }
         }
@@ -147,21 +139,43 @@ impl Folder {
         if !self.resume {
             remove_pictures(&path)?;
         }
-        let made = fs::create_dir_all(&path);
-        let made =
-            made.and_then(|()| fs::write(path.join(MARK), "pictures of a run of parallax\n"));
-        made.map_err(|source| FolderError {
-            doing: "make the folder",
-            path: path.clone(),
-            source,
-        })?;
+        let made = self.dir.inner(&part(name));
+        let marked = made.and_then(|inner| {
+            let mut mark = inner.begin(MARK)?;
+            mark.write_all(b"pictures of a run of parallax\n")
+        });
+        marked.map_err(|source| self.failed("make the folder", name, source))?;
         self.parts.push(name.to_owned());
         Ok(path)
     }
 
     /// Where a file is while it grows.
     pub fn part(&self, name: &str) -> PathBuf {
-        self.dir.join(format!("{name}.part"))
+        self.dir.path().join(part(name))
+    }
+
+    /// Writes a part anew, as a whole.
+    ///
+    /// # Errors
+    ///
+    /// The error of the operating system; the old part stays.
+    pub(crate) fn rewrite(&self, name: &str, text: &str) -> io::Result<()> {
+        let beside = format!("{name}.head.part");
+        let written = self.dir.begin(&beside);
+        let written = written.and_then(|mut file| file.write_all(text.as_bytes()));
+        if let Err(error) = written {
+            self.dir.remove(&beside)?;
+            return Err(error);
+        }
+        self.dir.rename(&beside, &part(name))
+    }
+
+    fn failed(&self, doing: &'static str, name: &str, source: io::Error) -> FolderError {
+        FolderError {
+            doing,
+            path: self.part(name),
+            source,
+        }
     }
 
     /// Gives every file its final name, in the order of their names: `summary.json` after all that it
@@ -172,38 +186,38 @@ impl Folder {
         let mut names = self.parts.clone();
         names.sort();
         let outcomes = names.iter().map(|name| {
-            let (from, to) = (self.part(name), self.dir.join(name));
+            let (from, to) = (self.part(name), self.dir.path().join(name));
             // A folder does not take the place of another by renaming.
             if from.is_dir() {
                 remove_pictures(&to)?;
             }
-            fs::rename(&from, &to).map_err(|source| FolderError {
-                doing: "rename the finished",
-                path: from,
-                source,
-            })
+            let renamed = self.dir.rename(&part(name), name);
+            renamed.map_err(|source| self.failed("rename the finished", name, source))
         });
         outcomes.filter_map(Result::err).collect()
     }
 }
 
+/// Name of a file while it grows.
+fn part(name: &str) -> String {
+    format!("{name}.part")
+}
+
 /// Removes what a killed writer left after the last whole line.
-fn cut_half_line(path: &Path) -> io::Result<()> {
-    let text = match fs::read(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        text => text?,
-    };
-    let whole = text
-        .iter()
-        .rposition(|it| *it == b'\n')
-        .map_or(0, |it| it + 1);
-    if whole < text.len() {
-        OpenOptions::new()
-            .write(true)
-            .open(path)?
-            .set_len(whole as u64)?;
+fn cut_half_line(file: &mut File) -> io::Result<()> {
+    let mut end = file.metadata()?.len();
+    let mut block = [0; 4096];
+    while end > 0 {
+        let start = end.saturating_sub(block.len() as u64);
+        let block = &mut block[..(end - start) as usize];
+        file.seek(SeekFrom::Start(start))?;
+        file.read_exact(block)?;
+        if let Some(at) = block.iter().rposition(|byte| *byte == b'\n') {
+            return file.set_len(start + at as u64 + 1);
+        }
+        end = start;
     }
-    Ok(())
+    file.set_len(0)
 }
 
 /// Removes a folder of pictures if a run has made it: it says so, or numbered pictures are all that it and its

@@ -11,6 +11,7 @@ mod missing;
 
 mod latency;
 mod overlay;
+mod own;
 mod pose2d;
 mod pose3d;
 mod times;

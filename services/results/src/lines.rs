@@ -8,6 +8,7 @@ use std::io::{self, Write as _};
 pub(crate) struct Lines {
     file: File,
     len: u64,
+    lacks_some: bool,
 }
 
 impl Lines {
@@ -18,12 +19,21 @@ impl Lines {
     /// Its length cannot be found out.
     pub(crate) fn new(file: File) -> io::Result<Self> {
         let len = file.metadata()?.len();
-        Ok(Self { file, len })
+        Ok(Self {
+            file,
+            len,
+            lacks_some: false,
+        })
     }
 
     /// Whether nothing has been written yet.
     pub(crate) fn is_empty(&self) -> bool {
         self.len == 0
+    }
+
+    /// Whether lines could not be written.
+    pub(crate) fn lacks_some(&self) -> bool {
+        self.lacks_some
     }
 
     /// Appends lines; if that fails, what was written of them is taken back.
@@ -33,13 +43,13 @@ impl Lines {
     /// The first error of the operating system.
     pub(crate) fn append(&mut self, text: &str) -> io::Result<()> {
         let written = self.file.write_all(text.as_bytes());
-        match &written {
-            Ok(()) => self.len += text.len() as u64,
-            Err(_) => {
-                if let Err(error) = self.file.set_len(self.len) {
-                    tracing::debug!(%error, "cannot take back half a line");
-                }
-            }
+        if written.is_ok() {
+            self.len += text.len() as u64;
+            return written;
+        }
+        self.lacks_some = true;
+        if let Err(error) = self.file.set_len(self.len) {
+            tracing::debug!(%error, "cannot take back half a line");
         }
         written
     }

@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::PathBuf;
 
+use messages::Pose3d;
 use runfiles::{
     FrameLine, LatencyReport, Line, RunSummary, SmoothLine, SmoothReport, Summary, TimesLine,
     VERSION, ViewLine, ViewSummary,
@@ -137,48 +138,53 @@ impl Output {
         for frame in (begin..frame).step_by(self.scene.frame_step.max(1) as usize) {
             self.without(&Absent {
                 frame,
-                reason: "writing was too slow".to_owned(),
+                reason: "its result could not be written".to_owned(),
                 views: Vec::new(),
             });
         }
     }
 
-    fn without(&mut self, it: &Absent) {
-        self.tally.without(it.frame);
+    fn without(&mut self, absent: &Absent) {
         let scene = &self.scene;
-        let nothing = pose3d::nothing(scene, it.frame);
-        let line = pose3d::absent_line(scene, it);
-        let rows = pose3d::csv_rows(scene, &nothing);
-        let row = trc::row(scene, self.tally.n_lines(), &nothing);
-        let smoothed = self.smoothing.as_mut().map_or(Ok(()), |it| it.frame(&line));
-        let outcomes = [
-            smoothed,
-            append(&mut self.pose3d_jsonl, [line]),
-            self.pose3d_csv.append(&rows),
-            self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row)),
-        ];
-        for outcome in outcomes {
-            self.note(outcome);
+        let nothing = pose3d::nothing(scene, absent.frame);
+        let line = pose3d::absent_line(scene, absent);
+        if self.begin_frame(line) {
+            self.tally.without(absent.frame);
+            self.rows(&nothing);
         }
+    }
+
+    /// Writes the line of a frame; without it nothing else of the frame is written, and it does not count as written.
+    fn begin_frame(&mut self, line: FrameLine) -> bool {
+        let smoothed = self.smoothing.as_mut().map_or(Ok(()), |it| it.frame(&line));
+        let written = append(&mut self.pose3d_jsonl, [line]);
+        let is_written = written.is_ok();
+        self.note(smoothed);
+        self.note(written);
+        is_written
+    }
+
+    /// Writes the rows of a frame in the tables.
+    fn rows(&mut self, pose: &Pose3d) {
+        let row = trc::row(&self.scene, self.tally.n_lines(), pose);
+        let rows = self.pose3d_csv.append(&pose3d::csv_rows(&self.scene, pose));
+        let row = self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row));
+        self.note(rows);
+        self.note(row);
     }
 
     /// Writes one frame. What fails is counted, and never stops anything.
     pub fn frame(&mut self, record: &FrameRecord) {
         self.fill_up_to(record.frame());
-        self.tally.add(&self.scene, record);
         self.latency.add(record);
-        let (scene, pose) = (&self.scene, &record.pose3d);
-        let line = pose3d::line(scene, record);
-        let rows = pose3d::csv_rows(scene, pose);
-        let row = trc::row(scene, self.tally.n_lines(), pose);
-        let smoothed = self.smoothing.as_mut().map_or(Ok(()), |it| it.frame(&line));
+        if !self.begin_frame(pose3d::line(&self.scene, record)) {
+            return self.tally.missed(1);
+        }
+        self.tally.add(&self.scene, record);
+        self.rows(&record.pose3d);
         let outcomes = [
-            smoothed,
-            append(&mut self.pose3d_jsonl, [line]),
-            self.pose3d_csv.append(&rows),
-            append(&mut self.pose2d_jsonl, pose2d::lines(scene, record)),
-            append(&mut self.times_jsonl, [times::line(scene, record)]),
-            self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row)),
+            append(&mut self.pose2d_jsonl, pose2d::lines(&self.scene, record)),
+            append(&mut self.times_jsonl, [times::line(&self.scene, record)]),
         ];
         for outcome in outcomes {
             self.note(outcome);
@@ -223,6 +229,7 @@ impl Output {
     /// * `session`: the run.
     pub fn finish(mut self, session: u64) -> Summary {
         let report = self.latency.report();
+        self.leave_incomplete();
         if self.trc_rows.take().is_some() {
             let outcome = self.head_trc();
             if outcome.is_err() {
@@ -244,20 +251,30 @@ impl Output {
         self.tally.summary()
     }
 
+    /// Leaves files with lines missing the names of parts.
+    fn leave_incomplete(&mut self) {
+        let files = [
+            (FrameLine::FILE, Some(&self.pose3d_jsonl)),
+            ("pose3d.csv", Some(&self.pose3d_csv)),
+            (ViewLine::FILE, Some(&self.pose2d_jsonl)),
+            (TimesLine::FILE, Some(&self.times_jsonl)),
+            (TRC, self.trc_rows.as_ref()),
+        ];
+        for (name, lines) in files {
+            if lines.is_some_and(Lines::lacks_some) {
+                self.folder.leave(name);
+            }
+        }
+    }
+
     /// The head of `pose3d.trc` holds the number of rows, so it is written last.
     fn head_trc(&self) -> io::Result<()> {
-        let (path, headed) = (self.folder.part(TRC), self.folder.part("pose3d.trc.head"));
-        let rows = fs::read_to_string(&path)?;
+        let rows = files::read_text(&self.folder.part(TRC), files::RESULTS)?;
         let n_rows = rows.lines().count() as u64;
         // Without a rate there are no rows.
         let rate_hz = self.scene.frame_rate_hz.unwrap_or_default();
-        let written = fs::write(&headed, trc::header(&self.scene, rate_hz, n_rows) + &rows);
-        if let Err(error) = written {
-            // The rows stay as they are.
-            fs::remove_file(&headed)?;
-            return Err(error);
-        }
-        fs::rename(&headed, &path)
+        let text = trc::header(&self.scene, rate_hz, n_rows) + &rows;
+        self.folder.rewrite(TRC, &text)
     }
 
     fn fill(&mut self, name: &str, text: Result<String, serde_json::Error>) {
@@ -309,192 +326,4 @@ fn append<L: Line>(file: &mut Lines, lines: impl IntoIterator<Item = L>) -> io::
 }
 
 #[cfg(test)]
-mod tests {
-    use messages::{Searched, Status};
-    use serde_json::{Value, json};
-
-    use super::*;
-    use crate::Missing;
-    use crate::testing::{record, scene};
-
-    fn written(records: Vec<FrameRecord>) -> (tempfile::TempDir, Summary) {
-        let dir = tempfile::tempdir().unwrap();
-        let folder = Folder::open(dir.path(), false).unwrap();
-        let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
-        for record in records {
-            output.frame(&record);
-        }
-        let summary = output.finish(1);
-        (dir, summary)
-    }
-
-    fn text(dir: &tempfile::TempDir, name: &str) -> String {
-        fs::read_to_string(dir.path().join(name)).unwrap()
-    }
-
-    #[test]
-    fn all_files_are_there_at_the_end_and_no_part() {
-        let (dir, _) = written(vec![record(0), record(2)]);
-        let mut names: Vec<String> = fs::read_dir(dir.path())
-            .unwrap()
-            .map(|it| it.unwrap().file_name().into_string().unwrap())
-            .collect();
-        names.sort();
-        let expected = [
-            "latency.json",
-            "overlays",
-            "pose2d.jsonl",
-            "pose3d.csv",
-            "pose3d.jsonl",
-            "pose3d.trc",
-            "summary.json",
-            "times.jsonl",
-        ];
-        assert_eq!(names, expected);
-        assert_eq!(text(&dir, "pose3d.jsonl").lines().count(), 2);
-        assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 2 * 14);
-        assert_eq!(text(&dir, "pose2d.jsonl").lines().count(), 4);
-        let trc = ::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
-        assert_eq!(trc.frames.len(), 2);
-    }
-
-    #[test]
-    fn a_file_that_must_say_the_rate_is_not_written_where_nothing_tells_it() {
-        let dir = tempfile::tempdir().unwrap();
-        let folder = Folder::open(dir.path(), false).unwrap();
-        let scene = Scene {
-            frame_rate_hz: None,
-            ..scene()
-        };
-        let mut output = Output::begin(scene, &Config::default(), 1, folder).unwrap();
-        output.frame(&record(0));
-        assert_eq!(output.finish(1).writes_failed, 0);
-        assert!(!dir.path().join("pose3d.trc").exists());
-    }
-
-    #[test]
-    fn skipped_frames_and_missing_views_are_counted() {
-        let mut last = record(8);
-        last.pose3d.views_present = 0b01;
-        last.views[1].missing = Some(Missing::Late);
-        // Every second frame is used: 0, 2, (4, 6), 8.
-        let (_, summary) = written(vec![record(0), record(2), last]);
-        assert_eq!(summary.frames, 3);
-        assert_eq!(summary.frames_missed, 2);
-        assert_eq!(summary.frames_with_views_missing, 1);
-        assert_eq!(
-            summary.views_used,
-            [("left".to_owned(), 3), ("right".to_owned(), 3)]
-        );
-        assert!((summary.reprojection_px.unwrap() - 1.5).abs() < 1e-12);
-    }
-
-    #[test]
-    fn searches_and_the_bytes_of_their_evidence_are_counted_by_view() {
-        let searched = |frame, searched, evidence_bytes| {
-            let mut it = record(frame);
-            let pose = it.views[1].pose.as_mut().unwrap();
-            (pose.searched, pose.evidence_bytes) = (searched, evidence_bytes);
-            it
-        };
-        let mut without = record(6);
-        without.views[1].pose.as_mut().unwrap().status = Status::NO_FRAME;
-        let (dir, summary) = written(vec![
-            searched(0, Searched::FULL, 1000),
-            searched(2, Searched::TRACKED, 200),
-            searched(4, Searched::TRACKED, 300),
-            without,
-        ]);
-        let of_right = [("full".to_owned(), 1), ("tracked".to_owned(), 2)];
-        assert_eq!(summary.searches["right"], of_right.into());
-        assert_eq!(summary.searches["left"], [("full".to_owned(), 4)].into());
-        assert_eq!(summary.evidence_bytes_per_frame["right"], 500);
-        let text = text(&dir, "pose2d.jsonl");
-        let lines = text
-            .lines()
-            .map(|it| serde_json::from_str::<Value>(it).unwrap());
-        let said: Vec<Value> = lines.map(|it| it["search"].clone()).collect();
-        assert_eq!(said[3], "tracked");
-        assert_eq!(said[7], Value::Null, "there was no frame");
-    }
-
-    #[test]
-    fn a_restarted_recorder_counts_what_it_had_written() {
-        let dir = tempfile::tempdir().unwrap();
-        let begin = |resume| {
-            let folder = Folder::open(dir.path(), resume).unwrap();
-            Output::begin(scene(), &Config::default(), 1, folder).unwrap()
-        };
-        let mut killed = begin(false);
-        killed.frame(&record(0));
-        killed.frame(&record(2));
-        drop(killed);
-        let mut restarted = begin(true);
-        restarted.frame(&record(6));
-        let summary = restarted.finish(1);
-        assert_eq!((summary.frames, summary.frames_with_pose), (3, 3));
-        assert_eq!(summary.frames_missed, 1);
-        assert_eq!(summary.views_used[0].1, 3);
-        assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 4 * 14);
-    }
-
-    #[test]
-    fn every_frame_has_a_line_a_row_of_every_joint_and_one_for_opensim() {
-        let dir = tempfile::tempdir().unwrap();
-        let folder = Folder::open(dir.path(), false).unwrap();
-        let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
-        let absent = |frame| Absent {
-            frame,
-            reason: "dropped".to_owned(),
-            views: vec![Missing::Dropped; 2],
-        };
-        output.absent(&[absent(0)]);
-        output.frame(&record(2));
-        // 4 was handed on and not taken: the queue was full.
-        output.absent(&[absent(6)]);
-        output.frame(&record(8));
-        output.absent(&[absent(10)]);
-        let summary = output.finish(1);
-        assert_eq!((summary.frames, summary.frames_missed), (2, 4));
-        let lines = text(&dir, "pose3d.jsonl");
-        let lines = lines.lines().map(|it| serde_json::from_str(it).unwrap());
-        let lines: Vec<Value> = lines.collect();
-        let told = |it: &Value| {
-            (
-                it["frame"].as_u64(),
-                it["reason"].as_str().map(str::to_owned),
-            )
-        };
-        let dropped = Some("dropped".to_owned());
-        let expected = [
-            (Some(0), dropped.clone()),
-            (Some(2), None),
-            (Some(4), Some("writing was too slow".to_owned())),
-            (Some(6), dropped.clone()),
-            (Some(8), None),
-            (Some(10), dropped),
-        ];
-        assert_eq!(lines.iter().map(told).collect::<Vec<_>>(), expected);
-        assert_eq!(
-            lines[0]["views_missing"],
-            json!({ "left": "dropped", "right": "dropped" })
-        );
-        assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 6 * 14);
-        let trc = ::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
-        assert_eq!(trc.frames.len(), 6);
-    }
-
-    #[test]
-    fn a_full_disk_is_counted_and_stops_nothing() {
-        let dir = tempfile::tempdir().unwrap();
-        let folder = Folder::open(dir.path(), false).unwrap();
-        let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
-        output.pose3d_jsonl = Lines::new(fs::File::create("/dev/full").unwrap()).unwrap();
-        output.frame(&record(0));
-        output.frame(&record(2));
-        let summary = output.finish(1);
-        assert!(summary.writes_failed >= 2, "{summary:?}");
-        assert!(summary.first_failure.is_some());
-        assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 2 * 14);
-    }
-}
+mod tests;

@@ -39,7 +39,7 @@ pub(crate) fn draw(
         }
     }
     draw_keypoints(&mut canvas, scene, record, view);
-    let facing = match fused.map(|it| it.exchanged) {
+    let facing = match fused.filter(|_| !scene.has_maps).map(|it| it.exchanged) {
         Some(1) => ", from behind",
         _ => "",
     };
@@ -120,7 +120,7 @@ fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: us
 }
 
 /// The joints of a pose; none if the model has other parts than the joint set is made of.
-fn joints_of(scene: &Scene, parts: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+pub(crate) fn joints_of(scene: &Scene, parts: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
     let n_parts = scene.joints.joints.iter().flat_map(|it| it.parts).max()? + 1;
     (parts.len() >= n_parts).then(|| scene.joints.from_parts(parts))
 }

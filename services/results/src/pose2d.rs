@@ -30,7 +30,8 @@ fn line(scene: &Scene, record: &FrameRecord, view: usize) -> ViewLine {
     let scale = it.source_scale();
     let sigma = record.sigma_px(scene, view);
     ViewLine {
-        facing: fused.map(facing),
+        // Poses from maps are those of the body: the sides of each view are not told.
+        facing: fused.filter(|_| !scene.has_maps).map(facing),
         frame: pose.stamp.frame,
         fused: fused.map(|fused| fused_pose(it, fused)),
         search: search.map(|it| it.searched.name().to_owned()),

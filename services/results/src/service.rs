@@ -58,7 +58,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
             service.health().received(1);
             match wire::check_pose3d(&pose3d, n_views, n_joints) {
                 Ok(()) => take(service, &pose3d, &mut gather, &writer),
-                Err(error) => context.refuse("pose3d", &error),
+                Err(error) => context.count_refused("pose3d", &error),
             }
         }
     }
@@ -163,7 +163,7 @@ impl Ports {
             while let Some(sample) = frames.receive()? {
                 let (header, expected) = (*sample.header(), context.expected(view));
                 if let Err(error) = wire::check_frame(&header, sample.payload().len(), &expected) {
-                    context.refuse("frame", &error);
+                    context.count_refused("frame", &error);
                     continue;
                 }
                 let is_drawn = header.status == Status::OK && writer.draws(header.stamp.frame);

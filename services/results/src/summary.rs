@@ -1,7 +1,6 @@
 //! What was seen and what was missed, over the whole run.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use messages::Status;
@@ -12,7 +11,7 @@ use crate::height::Heights;
 use crate::people::Counted;
 use crate::pose3d::{is_placed, joints, missing};
 use crate::trust::Trusted;
-use crate::{FrameRecord, Scene};
+use crate::{FrameRecord, Scene, own};
 
 /// Counts frame by frame.
 #[derive(Debug)]
@@ -59,7 +58,7 @@ impl Tally {
     /// there, or a broken line, counts for nothing.
     pub(crate) fn resume(scene: &Scene, file: &Path) -> Self {
         let mut tally = Self::new(scene);
-        let text = fs::read_to_string(file).unwrap_or_default();
+        let text = files::read_text(file, files::RESULTS).unwrap_or_default();
         for line in runfiles::lines(&text).flatten() {
             tally.line(scene, &line);
         }
@@ -97,7 +96,11 @@ impl Tally {
         self.searches(scene, record);
         self.calibration.add(scene, record);
         self.heights.add(scene, pose);
-        self.trusted.add(pose);
+        let seen = (
+            scene.time_s(record.frame()),
+            &own::distances_m(scene, record)[..],
+        );
+        self.trusted.add(pose, scene.joints.limbs, seen);
         self.people.add(pose);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
             *count = it.frame.as_ref().map_or(*count, |it| it.n_dropped);

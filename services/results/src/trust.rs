@@ -3,9 +3,20 @@
 use std::collections::BTreeMap;
 
 use messages::{Joint3d, Pose3d, Sides, Status};
+use nalgebra::Vector3;
 use runfiles::{Doubt, Trust};
 
 use crate::height::height_px;
+use crate::pose3d::is_placed;
+
+/// Steps in which lengths of bones are counted, metres, and the longest.
+const LENGTH_STEP_M: f64 = 0.001;
+const LONGEST_M: f64 = 1.0;
+/// Farthest that the middle of a body moves between two results, metres, and metres a second.
+const FARTHEST_M: f64 = 0.5;
+const FASTEST_M_S: f64 = 6.0;
+/// Standard deviations in a median absolute deviation of normal errors.
+const SD_PER_MAD: f64 = 1.4826;
 
 /// Steps in which deviations of bodies are counted, standard deviations.
 const STEP: f64 = 0.05;
@@ -23,12 +34,28 @@ pub(crate) struct Trusted {
     deviations: BTreeMap<u32, u64>,
     /// Sum of the squared shares of the person's height, and their number.
     squared: (f64, u64),
+    /// Sum of the distances of what the views found, metres, and their number.
+    distances: (f64, u64),
+    /// By bone: how many results have it, by its length in [`LENGTH_STEP_M`]s.
+    lengths: BTreeMap<(usize, usize), Vec<u32>>,
+    /// When the last result was, seconds, and where its body.
+    last: Option<(f64, Vector3<f64>)>,
+    n_jumps: u64,
     warned: Vec<Doubt>,
 }
 
 impl Trusted {
     /// Adds a result.
-    pub(crate) fn add(&mut self, pose: &Pose3d) {
+    ///
+    /// * `limbs`: pairs of joints that a bone connects.
+    /// * `time_s`: of the frame, if it is known.
+    /// * `distances_m`: of what the views show from the joints, metres.
+    pub(crate) fn add(
+        &mut self,
+        pose: &Pose3d,
+        limbs: &[(usize, usize)],
+        (time_s, distances_m): (Option<f64>, &[f64]),
+    ) {
         let is_nobody = pose.status == Status::IMPLAUSIBLE;
         let is_body = pose.status == Status::OK && pose.stature_m > 0.0;
         // Skeletons of something else than people are not judged.
@@ -39,6 +66,10 @@ impl Trusted {
         self.n_implausible += u64::from(is_nobody);
         if !is_nobody {
             self.skeleton(pose);
+            self.bones(pose, limbs);
+            self.moved(pose, time_s);
+            self.distances.0 += distances_m.iter().sum::<f64>();
+            self.distances.1 += distances_m.len() as u64;
         }
         for doubt in self.trust().doubts() {
             if !self.warned.iter().any(|it| it.is_like(&doubt)) {
@@ -63,10 +94,49 @@ impl Trusted {
             if let Some(height_px) = height_px.filter(|_| joint.status == Status::OK)
                 && joint.reprojection_px.is_finite()
             {
-                self.squared.0 += (joint.reprojection_px / height_px).powi(2);
+                let share = joint.reprojection_px / height_px;
+                self.squared.0 += share.powi(2);
                 self.squared.1 += 1;
             }
         }
+    }
+
+    fn bones(&mut self, pose: &Pose3d, limbs: &[(usize, usize)]) {
+        for bone in limbs {
+            if let (Some(one), Some(other)) = (place(pose, bone.0), place(pose, bone.1)) {
+                let step = (one - other).norm().min(LONGEST_M) / LENGTH_STEP_M;
+                let n_steps = (LONGEST_M / LENGTH_STEP_M) as usize + 1;
+                let counts = self
+                    .lengths
+                    .entry(*bone)
+                    .or_insert_with(|| vec![0; n_steps]);
+                counts[(step as usize).min(n_steps - 1)] += 1;
+            }
+        }
+    }
+
+    fn moved(&mut self, pose: &Pose3d, time_s: Option<f64>) {
+        let places = (0..pose.n_joints as usize).filter_map(|joint| place(pose, joint));
+        let (sum, n) = places.fold((Vector3::zeros(), 0), |(sum, n), it| (sum + it, n + 1));
+        let Some(now_s) = time_s.filter(|_| n > 0) else {
+            return;
+        };
+        let middle = sum / f64::from(n);
+        if let Some((before_s, before)) = self.last {
+            let farthest = FARTHEST_M.max(FASTEST_M_S * (now_s - before_s));
+            self.n_jumps += u64::from((middle - before).norm() > farthest);
+        }
+        self.last = Some((now_s, middle));
+    }
+
+    /// The scatter of the lengths of the bones, metres.
+    fn bone_scatter_m(&self) -> Option<f64> {
+        let scatters: Vec<f64> = self
+            .lengths
+            .values()
+            .filter_map(|it| scatter_m(it))
+            .collect();
+        (!scatters.is_empty()).then(|| scatters.iter().sum::<f64>() / scatters.len() as f64)
     }
 
     /// What is known so far.
@@ -81,13 +151,45 @@ impl Trusted {
         });
         Trust {
             body_deviation: median.map(|it| f64::from(*it.0) * STEP),
+            bone_scatter_m: self.bone_scatter_m(),
+            disagreement_m: (self.distances.1 > 0)
+                .then(|| self.distances.0 / self.distances.1 as f64),
             frames: self.frames,
+            jumps: share(self.n_jumps, self.frames),
             implausible: share(self.n_implausible, self.frames),
             joints_implausible: share(self.n_joints_implausible, self.n_joints),
             reprojection: (n > 0).then(|| (sum / n as f64).sqrt()),
             sides_unsure: share(self.n_unsure, self.n_decided),
         }
     }
+}
+
+fn place(pose: &Pose3d, joint: usize) -> Option<Vector3<f64>> {
+    let joint = pose.joints.get(joint).filter(|it| is_placed(it))?;
+    Some(joint.in_world.into())
+}
+
+/// Median absolute deviation of counted lengths from their median, as a standard deviation, metres; none of fewer than two.
+fn scatter_m(counts: &[u32]) -> Option<f64> {
+    let n: u32 = counts.iter().sum();
+    if n < 2 {
+        return None;
+    }
+    let middle = |counts: &[u32]| {
+        let mut sum = 0;
+        counts.iter().position(|n_here| {
+            sum += n_here;
+            sum >= n.div_ceil(2)
+        })
+    };
+    let median = middle(counts)?;
+    let away = |by: usize| {
+        let below = median.checked_sub(by).filter(|_| by > 0);
+        let each = [below, Some(median + by)].into_iter().flatten();
+        each.filter_map(|at| counts.get(at)).sum::<u32>()
+    };
+    let deviation = middle(&(0..counts.len()).map(away).collect::<Vec<u32>>())?;
+    Some(SD_PER_MAD * deviation as f64 * LENGTH_STEP_M)
 }
 
 /// The mean height of the person in the views that were used, pixels of their frames.
@@ -125,18 +227,47 @@ mod tests {
     #[test]
     fn shares_are_of_what_was_found() {
         let mut trusted = Trusted::default();
-        trusted.add(&result(Sides::SURE));
-        trusted.add(&result(Sides::UNSURE));
+        let mut add = |pose: &Pose3d| trusted.add(pose, &[(0, 1)], (Some(0.0), &[]));
+        add(&result(Sides::SURE));
+        add(&result(Sides::UNSURE));
         let mut nobody = result(Sides::SURE);
         nobody.status = Status::IMPLAUSIBLE;
-        trusted.add(&nobody);
+        add(&nobody);
         let mut nothing = result(Sides::SURE);
         nothing.status = Status::TOO_FEW_VIEWS;
-        trusted.add(&nothing);
+        add(&nothing);
         let got = trusted.trust();
         assert_eq!((got.frames, got.sides_unsure), (3, 0.5));
         assert_eq!((got.implausible, got.joints_implausible), (1.0 / 3.0, 0.5));
         assert!((got.reprojection.unwrap() - 0.02).abs() < 1e-9);
         assert!((got.body_deviation.unwrap() - 0.8).abs() < 1e-9);
+    }
+    #[test]
+    fn bones_that_change_and_a_person_who_jumps_are_counted() {
+        let mut trusted = Trusted::default();
+        for nth in 0..20 {
+            let mut pose = result(Sides::SURE);
+            pose.joints[1].status = Status::OK;
+            // Every fourth bone is 20 cm too long; the person walks, and is elsewhere in two results.
+            let long = if nth % 4 == 0 {
+                0.2
+            } else {
+                0.01 * f64::from(nth % 3)
+            };
+            let away = if nth == 10 {
+                2.0
+            } else {
+                0.05 * f64::from(nth)
+            };
+            pose.joints[0].in_world = [away, 0.0, 0.0];
+            pose.joints[1].in_world = [away, 0.0, 0.4 + long];
+            let time_s = Some(0.1 * f64::from(nth));
+            trusted.add(&pose, &[(0, 1)], (time_s, &[0.02, 0.04]));
+        }
+        let got = trusted.trust();
+        assert_eq!(got.jumps, 0.1);
+        let scatter = got.bone_scatter_m.unwrap();
+        assert!((0.01..0.03).contains(&scatter), "{scatter}");
+        assert!((got.disagreement_m.unwrap() - 0.03).abs() < 1e-9);
     }
 }

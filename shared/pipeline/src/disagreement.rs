@@ -2,7 +2,7 @@
 
 use geometry::Triangulated;
 use multiview::Exchanges;
-use nalgebra::Point2;
+use nalgebra::{Matrix3, Point2};
 use skeleton::JointSet;
 
 use crate::bodies::NoJoint;
@@ -11,12 +11,22 @@ use crate::motion::Motion;
 use crate::space::Space;
 use crate::view_result::ViewResult;
 
+/// Farthest that the median joint of a view lies from the result where the view shows the same person, metres.
+const SAME_PERSON_M: f64 = 0.25;
+/// Largest disagreement that adds to the covariance of a joint, metres: that of views of which one or none sees it.
+const MOST_M: f64 = 0.3;
+/// Error of joints on which all views agree, metres: where a joint lies in the body is not defined better.
+const DEFINITION_M: f64 = 0.02;
+/// Share of the covariance from the noise of the pictures that is left where views disagree.
+const NOISE_SHARE: f64 = 0.5;
+
 /// Measures the joints of a result that was solved in space against the poses that the views found by themselves.
 ///
 /// The poses that come from such a solution are its own projections: they agree with it whatever the views show. What a view found is the
 /// candidate that lies nearest, with its sides as they are or exchanged; of a view that was left out as well, if it sees somebody there
-/// ([`SkeletonSettings::least_score`](crate::SkeletonSettings::least_score)). The residuals of every joint are replaced, and with them
-/// their root mean square.
+/// ([`SkeletonSettings::least_score`](crate::SkeletonSettings::least_score)). A view that shows somebody else does not count, where two
+/// others agree. The residuals of every joint are replaced, and with them their root mean square; and to its covariance the disagreement
+/// is added of the two views that agree best on it (docs/method/three-d.md).
 ///
 /// * `views`: the poses of the views that have a part in the result.
 /// * `motion`: of what the views show, as the solution has it.
@@ -26,54 +36,116 @@ pub(crate) fn measure(
     answers: &[Option<ViewResult>],
     (views, joints): (&[Option<FusedView>], &mut [Result<Triangulated, NoJoint>]),
 ) {
-    let set = space.settings.joints;
     for it in joints.iter_mut().flatten() {
         it.residuals_px.fill(f64::NAN);
     }
+    let mut disagreements_m: Vec<Vec<f64>> = vec![Vec::new(); joints.len()];
+    let mut found = Vec::new();
     for (view, answer) in answers.iter().enumerate() {
         let Some(answer) = answer else {
             continue;
         };
-        let camera = space.plans[view].camera();
-        let [width, height] = camera.intrinsics.size.map(f64::from);
-        let inside =
-            |at: &Point2<f64>| (0.0..width).contains(&at.x) && (0.0..height).contains(&at.y);
-        let mut projected: Vec<Option<Point2<f64>>> = joints
-            .iter()
-            .map(|it| camera.project(&it.as_ref().ok()?.in_world).filter(inside))
-            .collect();
-        // A picture that was taken at another time shows them elsewhere.
-        if let Some(by) = motion.since_instant(view, [answer.skew_s, 0.0], projected.clone()) {
-            for (at, by) in projected.iter_mut().zip(by) {
-                *at = at.map(|at| at + by);
-            }
-        }
         let least_score = match views.get(view) {
             Some(Some(_)) => f32::NEG_INFINITY,
             _ => space.settings.least_score,
         };
-        let nearest = readings(space, (view, least_score), answer, set)
-            .map(|points| {
-                let both = projected.iter().zip(&points);
-                let distance = |(at, point): (&Option<Point2<f64>>, &[f64; 2])| {
-                    at.map_or(f64::NAN, |at| (at - Point2::from(*point)).norm())
-                };
-                both.map(distance).collect::<Vec<f64>>()
-            })
-            .min_by(|a, b| sum(a).total_cmp(&sum(b)));
-        for (joint, residual) in joints.iter_mut().zip(nearest.unwrap_or_default()) {
+        let Some(distances_px) = nearest(space, motion, (view, least_score), (answer, joints))
+        else {
+            continue;
+        };
+        let metres = in_metres(space, view, joints, &distances_px);
+        for (all, metres) in disagreements_m.iter_mut().zip(&metres) {
+            all.extend(Some(*metres).filter(|it| it.is_finite()));
+        }
+        let is_same = median(&metres).is_some_and(|it| it < SAME_PERSON_M);
+        found.push((view, is_same, distances_px));
+    }
+    // A result on which no two views agree is judged by all of them.
+    let has_agreed = found.iter().filter(|it| it.1).count() >= 2;
+    for (view, _, distances_px) in found.iter().filter(|it| it.1 || !has_agreed) {
+        for (joint, px) in joints.iter_mut().zip(distances_px) {
             if let Ok(joint) = joint {
-                joint.residuals_px[view] = residual;
+                joint.residuals_px[*view] = *px;
             }
         }
     }
-    for it in joints.iter_mut().flatten() {
-        let known = it.residuals_px.iter().filter(|it| it.is_finite());
-        let squares: Vec<f64> = known.map(|it| it * it).collect();
-        if !squares.is_empty() {
-            it.reprojection_px = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    for (joint, disagreements_m) in joints.iter_mut().zip(&mut disagreements_m) {
+        if let Ok(joint) = joint {
+            joint.covariance = widened(&joint.covariance, disagreements_m);
+            let known = joint.residuals_px.iter().filter(|it| it.is_finite());
+            let squares: Vec<f64> = known.map(|it| it * it).collect();
+            if !squares.is_empty() {
+                let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+                joint.reprojection_px = mean.sqrt();
+            }
         }
     }
+}
+
+/// Distances of the joints from where a view found them, pixels, by the candidate that lies nearest; NaN where it does not see them.
+fn nearest(
+    space: &Space,
+    motion: &mut Motion,
+    (view, least_score): (usize, f32),
+    (answer, joints): (&ViewResult, &[Result<Triangulated, NoJoint>]),
+) -> Option<Vec<f64>> {
+    let camera = space.plans[view].camera();
+    let [width, height] = camera.intrinsics.size.map(f64::from);
+    let inside = |at: &Point2<f64>| (0.0..width).contains(&at.x) && (0.0..height).contains(&at.y);
+    let mut projected: Vec<Option<Point2<f64>>> = joints
+        .iter()
+        .map(|it| camera.project(&it.as_ref().ok()?.in_world).filter(inside))
+        .collect();
+    // A picture that was taken at another time shows them elsewhere.
+    if let Some(by) = motion.since_instant(view, [answer.skew_s, 0.0], projected.clone()) {
+        for (at, by) in projected.iter_mut().zip(by) {
+            *at = at.map(|at| at + by);
+        }
+    }
+    readings(space, (view, least_score), answer, space.settings.joints)
+        .map(|points| {
+            let both = projected.iter().zip(&points);
+            let distance = |(at, point): (&Option<Point2<f64>>, &[f64; 2])| {
+                at.map_or(f64::NAN, |at| (at - Point2::from(*point)).norm())
+            };
+            both.map(distance).collect::<Vec<f64>>()
+        })
+        .min_by(|a, b| sum(a).total_cmp(&sum(b)))
+}
+
+/// Distances in a picture as metres at the depth of the joints.
+fn in_metres(
+    space: &Space,
+    view: usize,
+    joints: &[Result<Triangulated, NoJoint>],
+    distances_px: &[f64],
+) -> Vec<f64> {
+    let camera = space.plans[view].camera();
+    let metres = |(joint, px): (&Result<Triangulated, NoJoint>, &f64)| {
+        let joint = joint.as_ref().ok()?;
+        let depth_m = (camera.camera_from_world * joint.in_world).z;
+        Some(px * depth_m / camera.intrinsics.fx)
+    };
+    let each = joints.iter().zip(distances_px);
+    each.map(|it| metres(it).unwrap_or(f64::NAN)).collect()
+}
+
+/// The covariance of a joint on which views disagree.
+///
+/// * `disagreements_m`: distance of what each view shows from the joint, metres.
+fn widened(covariance: &Matrix3<f64>, disagreements_m: &mut [f64]) -> Matrix3<f64> {
+    disagreements_m.sort_by(f64::total_cmp);
+    let second = disagreements_m.get(1).map_or(MOST_M, |it| it.min(MOST_M));
+    let added = second.powi(2) + DEFINITION_M.powi(2);
+    covariance * NOISE_SHARE + Matrix3::from_diagonal_element(added)
+}
+
+/// The median of those that are known.
+fn median(values: &[f64]) -> Option<f64> {
+    let known = values.iter().copied().filter(|it| it.is_finite());
+    let mut known: Vec<f64> = known.collect();
+    known.sort_by(f64::total_cmp);
+    known.get(known.len() / 2).copied()
 }
 
 /// The joints of all candidates of a view, with their sides as they are and exchanged.
@@ -100,4 +172,29 @@ fn readings<'a>(
 
 fn sum(distances: &[f64]) -> f64 {
     distances.iter().filter(|it| it.is_finite()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_covariance_grows_with_what_the_two_best_views_disagree_by() {
+        let noise = Matrix3::from_diagonal_element(1e-4);
+        let sd = |disagreements: &[f64]| {
+            let wide = widened(&noise, &mut disagreements.to_vec());
+            wide[(0, 0)].sqrt()
+        };
+        let close = |got: f64, expected: f64| assert!((got - expected).abs() < 1e-12, "{got}");
+        close(sd(&[0.5, 0.0, 0.1, 0.4]), (0.5e-4 + 0.01 + 4e-4_f64).sqrt());
+        let alone = (0.5e-4 + 0.09 + 4e-4_f64).sqrt();
+        close(sd(&[0.01]), alone);
+        close(sd(&[9.0, 8.0]), alone);
+    }
+
+    #[test]
+    fn the_median_is_of_what_is_known() {
+        assert_eq!(median(&[f64::NAN, 3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&[f64::NAN]), None);
+    }
 }

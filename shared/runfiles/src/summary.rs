@@ -64,7 +64,7 @@ pub struct Summary {
     pub frames_dropped_by_capture: u64,
     /// Frames without a result; each has a line with the reason.
     pub frames_missed: u64,
-    /// Results that came but were not written, because writing was too slow.
+    /// Results that came but were not written, because writing was too slow or the disk was full.
     pub frames_not_recorded: u64,
     /// Results with a skeleton.
     pub frames_with_pose: u64,

@@ -12,12 +12,21 @@ pub struct Trust {
     /// Median over the skeletons: root mean square deviation of the bones' lengths from those of people, standard deviations.
     #[serde(deserialize_with = "nullable")]
     pub body_deviation: Option<f64>,
+    /// Scatter of the bones' lengths over the run, metres: mean over the bones of the median absolute deviation, scaled to a standard
+    /// deviation.
+    #[serde(deserialize_with = "nullable")]
+    pub bone_scatter_m: Option<f64>,
+    /// Mean distance of what the views found from the joints in space, metres, each at most 0.3.
+    #[serde(deserialize_with = "nullable")]
+    pub disagreement_m: Option<f64>,
     /// Results in which somebody was found, whether as a body that people have or not.
     pub frames: u64,
     /// Share of these results whose body is none that people have.
     pub implausible: f64,
     /// Share of the joints of the skeletons that were left out, since no body has them there.
     pub joints_implausible: f64,
+    /// Share of the results in which the middle of the body is elsewhere than anybody could have moved to since the result before.
+    pub jumps: f64,
     /// Distance of the joints' reprojections from what the views found, as a share of the person's height in the frames: root
     /// mean square over all joints.
     #[serde(deserialize_with = "nullable")]
@@ -36,18 +45,22 @@ pub struct Doubt {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Reprojection,
+    Limbs,
     Implausible,
     Joints,
     Bones,
+    Jumps,
     Sides,
 }
 
 impl Kind {
-    const ALL: [Self; 5] = [
+    const ALL: [Self; 7] = [
         Self::Reprojection,
+        Self::Limbs,
         Self::Implausible,
         Self::Joints,
         Self::Bones,
+        Self::Jumps,
         Self::Sides,
     ];
 
@@ -56,6 +69,7 @@ impl Kind {
     fn limit(self) -> f64 {
         match self {
             Self::Reprojection => 0.1,
+            Self::Limbs | Self::Jumps => 0.02,
             Self::Implausible | Self::Joints => 0.15,
             Self::Bones => 2.0,
             Self::Sides => 0.3,
@@ -67,13 +81,15 @@ impl Kind {
         match self {
             Self::Reprojection => 0.25,
             Self::Bones => 6.0,
-            Self::Implausible | Self::Joints | Self::Sides => f64::INFINITY,
+            _ => f64::INFINITY,
         }
     }
 
     fn value(self, trust: &Trust) -> Option<f64> {
         match self {
             Self::Reprojection => trust.reprojection,
+            Self::Limbs => trust.expected_error_m(),
+            Self::Jumps => Some(trust.jumps),
             Self::Implausible => Some(trust.implausible),
             Self::Joints => Some(trust.joints_implausible),
             Self::Bones => trust.body_deviation,
@@ -84,7 +100,14 @@ impl Kind {
 
 impl Trust {
     /// Fewest results that are judged.
-    pub const MIN_FRAMES: u64 = 30;
+    pub const MIN_FRAMES: u64 = 12;
+
+    /// A number that orders runs by their error, metres: the geometric mean of [`disagreement_m`](Self::disagreement_m) and
+    /// [`bone_scatter_m`](Self::bone_scatter_m). It is no error itself; 0.02 tells runs with many wrong limbs from the others
+    /// (docs/guide/run.md).
+    pub fn expected_error_m(&self) -> Option<f64> {
+        Some((self.disagreement_m? * self.bone_scatter_m?).sqrt())
+    }
 
     /// Why the results should not be trusted; empty where nothing speaks against them. Where too few are there to judge, only what is
     /// impossible is a reason.
@@ -111,8 +134,11 @@ impl Trust {
         let bones = self.body_deviation.map_or_else(String::new, |it| {
             format!("bones {it:.1} sd from people's, ")
         });
+        let limbs = self.expected_error_m().map_or_else(String::new, |it| {
+            format!("limbs waver by {:.1} cm, ", 100.0 * it)
+        });
         format!(
-            "{reprojection}{bones}{} of bodies and {} of joints left out, sides unsure in {}",
+            "{reprojection}{limbs}{bones}{} of bodies and {} of joints left out, sides unsure in {}",
             percent(self.implausible),
             percent(self.joints_implausible),
             percent(self.sides_unsure)
@@ -135,6 +161,16 @@ impl fmt::Display for Doubt {
                 f,
                 "joints are {value:.0} % of the person's height from where the views see them (more than {limit:.0} %): see `parallax \
                  calib check`, and whether the footage is of one moment"
+            ),
+            Kind::Limbs => write!(
+                f,
+                "bones change their lengths and views disagree, by {value:.1} cm together (more than {limit:.0} cm): limbs are wrong in some frames, \
+                 or the cameras do not fit"
+            ),
+            Kind::Jumps => write!(
+                f,
+                "the person jumps in {value:.1} % of the results (more than {limit:.0} %): the one who is followed changes; `pose.follow` and \
+                 the space that is looked at say whom to follow"
             ),
             Kind::Implausible => write!(
                 f,
@@ -167,7 +203,10 @@ mod tests {
     fn good() -> Trust {
         Trust {
             body_deviation: Some(0.8),
+            bone_scatter_m: Some(0.004),
+            disagreement_m: Some(0.04),
             frames: 100,
+            jumps: 0.0,
             implausible: 0.01,
             joints_implausible: 0.02,
             reprojection: Some(0.02),
@@ -178,8 +217,10 @@ mod tests {
     #[test]
     fn good_results_raise_no_doubt_and_each_limit_raises_one() {
         assert_eq!(good().doubts(), []);
-        let cases: [(Spoil, &str); 5] = [
+        let cases: [(Spoil, &str); 7] = [
             (|it| it.reprojection = Some(0.2), "joints are 20 %"),
+            (|it| it.bone_scatter_m = Some(0.0163), "by 2.6 cm together"),
+            (|it| it.jumps = 0.087, "jumps in 8.7 %"),
             (|it| it.implausible = 0.4, "40 % of what was found"),
             (|it| it.joints_implausible = 0.3, "30 % of the joints"),
             (|it| it.body_deviation = Some(3.0), "bones are 3.0"),

@@ -1,0 +1,192 @@
+//! Tests of the files of a run.
+
+use messages::{Searched, Status};
+use serde_json::{Value, json};
+
+use super::*;
+use crate::Missing;
+use crate::testing::{record, scene};
+
+fn written(records: Vec<FrameRecord>) -> (tempfile::TempDir, Summary) {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = Folder::open(dir.path(), false).unwrap();
+    let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
+    for record in records {
+        output.frame(&record);
+    }
+    let summary = output.finish(1);
+    (dir, summary)
+}
+
+fn text(dir: &tempfile::TempDir, name: &str) -> String {
+    fs::read_to_string(dir.path().join(name)).unwrap()
+}
+
+#[test]
+fn all_files_are_there_at_the_end_and_no_part() {
+    let (dir, _) = written(vec![record(0), record(2)]);
+    let mut names: Vec<String> = fs::read_dir(dir.path())
+        .unwrap()
+        .map(|it| it.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    let expected = [
+        "latency.json",
+        "overlays",
+        "pose2d.jsonl",
+        "pose3d.csv",
+        "pose3d.jsonl",
+        "pose3d.trc",
+        "summary.json",
+        "times.jsonl",
+    ];
+    assert_eq!(names, expected);
+    assert_eq!(text(&dir, "pose3d.jsonl").lines().count(), 2);
+    assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 2 * 14);
+    assert_eq!(text(&dir, "pose2d.jsonl").lines().count(), 4);
+    let trc = ::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
+    assert_eq!(trc.frames.len(), 2);
+}
+
+#[test]
+fn a_file_that_must_say_the_rate_is_not_written_where_nothing_tells_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = Folder::open(dir.path(), false).unwrap();
+    let scene = Scene {
+        frame_rate_hz: None,
+        ..scene()
+    };
+    let mut output = Output::begin(scene, &Config::default(), 1, folder).unwrap();
+    output.frame(&record(0));
+    assert_eq!(output.finish(1).writes_failed, 0);
+    assert!(!dir.path().join("pose3d.trc").exists());
+}
+
+#[test]
+fn skipped_frames_and_missing_views_are_counted() {
+    let mut last = record(8);
+    last.pose3d.views_present = 0b01;
+    last.views[1].missing = Some(Missing::Late);
+    // Every second frame is used: 0, 2, (4, 6), 8.
+    let (_, summary) = written(vec![record(0), record(2), last]);
+    assert_eq!(summary.frames, 3);
+    assert_eq!(summary.frames_missed, 2);
+    assert_eq!(summary.frames_with_views_missing, 1);
+    assert_eq!(
+        summary.views_used,
+        [("left".to_owned(), 3), ("right".to_owned(), 3)]
+    );
+    assert!((summary.reprojection_px.unwrap() - 1.5).abs() < 1e-12);
+}
+
+#[test]
+fn searches_and_the_bytes_of_their_evidence_are_counted_by_view() {
+    let searched = |frame, searched, evidence_bytes| {
+        let mut it = record(frame);
+        let pose = it.views[1].pose.as_mut().unwrap();
+        (pose.searched, pose.evidence_bytes) = (searched, evidence_bytes);
+        it
+    };
+    let mut without = record(6);
+    without.views[1].pose.as_mut().unwrap().status = Status::NO_FRAME;
+    let (dir, summary) = written(vec![
+        searched(0, Searched::FULL, 1000),
+        searched(2, Searched::TRACKED, 200),
+        searched(4, Searched::TRACKED, 300),
+        without,
+    ]);
+    let of_right = [("full".to_owned(), 1), ("tracked".to_owned(), 2)];
+    assert_eq!(summary.searches["right"], of_right.into());
+    assert_eq!(summary.searches["left"], [("full".to_owned(), 4)].into());
+    assert_eq!(summary.evidence_bytes_per_frame["right"], 500);
+    let text = text(&dir, "pose2d.jsonl");
+    let lines = text
+        .lines()
+        .map(|it| serde_json::from_str::<Value>(it).unwrap());
+    let said: Vec<Value> = lines.map(|it| it["search"].clone()).collect();
+    assert_eq!(said[3], "tracked");
+    assert_eq!(said[7], Value::Null, "there was no frame");
+}
+
+#[test]
+fn a_restarted_recorder_counts_what_it_had_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let begin = |resume| {
+        let folder = Folder::open(dir.path(), resume).unwrap();
+        Output::begin(scene(), &Config::default(), 1, folder).unwrap()
+    };
+    let mut killed = begin(false);
+    killed.frame(&record(0));
+    killed.frame(&record(2));
+    drop(killed);
+    let mut restarted = begin(true);
+    restarted.frame(&record(6));
+    let summary = restarted.finish(1);
+    assert_eq!((summary.frames, summary.frames_with_pose), (3, 3));
+    assert_eq!(summary.frames_missed, 1);
+    assert_eq!(summary.views_used[0].1, 3);
+    assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 4 * 14);
+}
+
+#[test]
+fn every_frame_has_a_line_a_row_of_every_joint_and_one_for_opensim() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = Folder::open(dir.path(), false).unwrap();
+    let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
+    let absent = |frame| Absent {
+        frame,
+        reason: "dropped".to_owned(),
+        views: vec![Missing::Dropped; 2],
+    };
+    output.absent(&[absent(0)]);
+    output.frame(&record(2));
+    // 4 was handed on and not taken: the queue was full.
+    output.absent(&[absent(6)]);
+    output.frame(&record(8));
+    output.absent(&[absent(10)]);
+    let summary = output.finish(1);
+    assert_eq!((summary.frames, summary.frames_missed), (2, 4));
+    let lines = text(&dir, "pose3d.jsonl");
+    let lines = lines.lines().map(|it| serde_json::from_str(it).unwrap());
+    let lines: Vec<Value> = lines.collect();
+    let told = |it: &Value| {
+        (
+            it["frame"].as_u64(),
+            it["reason"].as_str().map(str::to_owned),
+        )
+    };
+    let dropped = Some("dropped".to_owned());
+    let expected = [
+        (Some(0), dropped.clone()),
+        (Some(2), None),
+        (Some(4), Some("its result could not be written".to_owned())),
+        (Some(6), dropped.clone()),
+        (Some(8), None),
+        (Some(10), dropped),
+    ];
+    assert_eq!(lines.iter().map(told).collect::<Vec<_>>(), expected);
+    assert_eq!(
+        lines[0]["views_missing"],
+        json!({ "left": "dropped", "right": "dropped" })
+    );
+    assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 6 * 14);
+    let trc = ::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
+    assert_eq!(trc.frames.len(), 6);
+}
+
+#[test]
+fn what_a_full_disk_does_not_take_is_not_counted_as_written_and_its_file_is_not_called_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = Folder::open(dir.path(), false).unwrap();
+    let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
+    output.pose3d_jsonl = Lines::new(fs::File::create("/dev/full").unwrap()).unwrap();
+    output.frame(&record(0));
+    output.frame(&record(2));
+    let summary = output.finish(1);
+    assert!(summary.writes_failed >= 2, "{summary:?}");
+    assert!(summary.first_failure.is_some());
+    assert_eq!((summary.frames, summary.frames_not_recorded), (0, 2));
+    assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1);
+    assert!(dir.path().join("pose3d.jsonl.part").exists());
+    assert!(!dir.path().join("pose3d.jsonl").exists());
+}

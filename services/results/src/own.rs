@@ -1,0 +1,106 @@
+//! What every view found by itself, beside the solution in space.
+
+use geometry::Camera;
+use messages::Joint3d;
+
+use crate::overlay::joints_of;
+use crate::pose3d::is_placed;
+use crate::{FrameRecord, Scene};
+
+/// Farthest that the median joint of a view lies from the result where the view shows the same person, metres.
+const SAME_PERSON_M: f64 = 0.25;
+/// Largest distance of a joint that counts, metres.
+const MOST_M: f64 = 0.3;
+
+/// The parts of a view's best candidate, pixels of the frame, with sides as the network or the filters name them, and exchanged; `None`
+/// where it has none, or is not sure enough of it.
+pub(crate) fn readings(
+    scene: &Scene,
+    record: &FrameRecord,
+    view: usize,
+) -> Option<[Vec<[f64; 2]>; 2]> {
+    let best = record
+        .own(scene, view)
+        .filter(|it| it.score >= scene.least_score)?;
+    let layout = &scene.views[view].layout;
+    let centre = |part: usize| best.centre(&scene.model, layout, part);
+    let named: Vec<[f64; 2]> = (0..best.parts.len()).map(centre).collect();
+    let mirror = scene.model.spec().mirror.as_deref();
+    let exchanged = mirror.map(|it| it.iter().map(|part| named[*part]).collect());
+    Some([named.clone(), exchanged.unwrap_or(named)])
+}
+
+/// Whether the solution fits the parts of a view better with the sides exchanged.
+pub(crate) fn is_exchanged(
+    scene: &Scene,
+    record: &FrameRecord,
+    view: usize,
+    readings: &[Vec<[f64; 2]>; 2],
+) -> bool {
+    let sum = |parts: &[[f64; 2]]| -> f64 {
+        let distances = distances(scene, record, view, parts);
+        distances.iter().map(|it| it[0]).sum()
+    };
+    sum(&readings[1]) < sum(&readings[0])
+}
+
+/// Distances of what the views show from the joints of the solution, metres at their depth, each at most 0.3; of the views that show the
+/// same person, or if fewer than two do, of all.
+pub(crate) fn distances_m(scene: &Scene, record: &FrameRecord) -> Vec<f64> {
+    let of_view = |view: usize| {
+        let readings = readings(scene, record, view)?;
+        let is_exchanged = is_exchanged(scene, record, view, &readings);
+        let distances = distances(scene, record, view, &readings[usize::from(is_exchanged)]);
+        let mut metres: Vec<f64> = distances.iter().map(|it| it[1]).collect();
+        metres.sort_by(f64::total_cmp);
+        Some(metres).filter(|it| !it.is_empty())
+    };
+    let views: Vec<Vec<f64>> = (0..scene.views.len()).filter_map(of_view).collect();
+    let is_same = |metres: &Vec<f64>| metres[metres.len() / 2] < SAME_PERSON_M;
+    let are_agreed = views.iter().filter(|it| is_same(it)).count() >= 2;
+    let counted = views.iter().filter(|it| is_same(it) || !are_agreed);
+    counted.flatten().map(|it| it.min(MOST_M)).collect()
+}
+
+/// Distances of a view's joints from those of the solution, pixels of the frame and metres, where both are known.
+fn distances(
+    scene: &Scene,
+    record: &FrameRecord,
+    view: usize,
+    parts: &[[f64; 2]],
+) -> Vec<[f64; 2]> {
+    let pose = &record.pose3d;
+    let camera = scene.views[view].framing.camera();
+    let joints = &pose.joints[..(pose.n_joints as usize).min(pose.joints.len())];
+    let seen = joints_of(scene, parts).unwrap_or_default();
+    let both = joints.iter().zip(&seen);
+    both.filter_map(|(joint, seen)| distance(camera, joint, *seen))
+        .collect()
+}
+
+fn distance(camera: &Camera, joint: &Joint3d, seen: [f64; 2]) -> Option<[f64; 2]> {
+    let joint = is_placed(joint).then_some(joint)?;
+    let in_world = joint.in_world.into();
+    let pixel = camera.project(&in_world)?;
+    let [width, height] = camera.intrinsics.size.map(f64::from);
+    let is_inside = (0.0..width).contains(&pixel.x) && (0.0..height).contains(&pixel.y);
+    let px = (pixel.x - seen[0]).hypot(pixel.y - seen[1]);
+    let metres = px * (camera.camera_from_world * in_world).z / camera.intrinsics.fx;
+    (is_inside && metres.is_finite()).then_some([px, metres])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{record, scene};
+
+    #[test]
+    fn a_view_without_a_candidate_has_no_reading() {
+        let scene = scene();
+        let mut record = record(0);
+        assert!(readings(&scene, &record, 0).is_some());
+        record.views[0].pose = None;
+        assert!(readings(&scene, &record, 0).is_none());
+        assert!(distances_m(&scene, &record).iter().all(|it| *it <= MOST_M));
+    }
+}
