@@ -19,6 +19,7 @@
 #![forbid(unsafe_code)]
 
 mod claim;
+mod earlier;
 mod find_every;
 mod padding;
 mod planned;
@@ -49,6 +50,7 @@ pub mod recorded;
 pub mod summary;
 
 pub use claim::Claim;
+pub use earlier::make_way;
 pub use find_every::FOLLOWED_S;
 pub use planned::Planned;
 pub use prepare::{Prepared, View, frame_scale};

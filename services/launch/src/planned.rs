@@ -130,12 +130,11 @@ impl Planned {
         });
         watcher.finish();
         let elapsed = begin.elapsed();
-        Ok(Report::new(
-            &self.resolved,
-            self.plan.session,
-            &outcome?,
-            elapsed,
-        ))
+        let report = Report::new(&self.resolved, self.plan.session, &outcome?, elapsed);
+        if let Err(failure) = report.write_page(&self.resolved) {
+            tracing::warn!(%failure, "the page of the run is not written");
+        }
+        Ok(report)
     }
 }
 

@@ -404,7 +404,7 @@ mod tests {
 
     #[test]
     fn every_process_of_a_deployment_has_a_name() {
-        let text = "name = 'a'\nrig = 'r'\noutput = 'o'\n[quality]\nnetwork = 'shipped'\n\
+        let text = "name = 'a'\nrig = 'r'\noutput = 'o'\nmodel = 'm'\n[quality]\nnetwork = 'shipped'\n\
             [[camera]]\nname = 'b'\nsource = 's'\n[[camera]]\nname = 'c'\nsource = 's'\n";
         let loaded = Loaded::parse(text, Path::new("d.toml"), &[], &AnyMachine).unwrap();
         let recording = RecordingPlan {

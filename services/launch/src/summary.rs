@@ -1,6 +1,7 @@
 //! The progress of a run, and the report at its end.
 
 mod cameras;
+mod page;
 mod people;
 mod recorded;
 mod slow;
@@ -10,15 +11,18 @@ mod watcher;
 use core::fmt::Write as _;
 use core::time::Duration;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use messages::Refusal;
 use metrics::Reading;
+use report::run::Verdict;
 use runfiles::{CameraFit, Doubt, LatencyReport, Summary};
-use runtime::ExitKind;
+use runtime::{ExitKind, Failure};
 use serde_json::{Value, json};
 use supervise::Outcome;
 
 use crate::budget::{self, Budget};
+use crate::inputs;
 use crate::live;
 use crate::no_results;
 use crate::resolved::Resolved;
@@ -27,6 +31,7 @@ use crate::views::{self, ViewReport};
 
 use people::Outside;
 
+pub use page::FILE as PAGE;
 pub use recorded::Recorded;
 pub use watcher::Watcher;
 
@@ -209,8 +214,10 @@ impl Report {
     /// Whether frames were lost or the cameras contradict each other.
     fn is_lossy(&self, summary: &Summary) -> bool {
         let is_incomplete = summary.frames_missed > 0 || summary.frames < self.n_frames;
+        let is_misplaced = |fit: &CameraFit| fit.suspected || fit.out_of_step;
         summary.exchanged.is_some()
             || summary.contradicted.is_some()
+            || summary.calibration.values().any(is_misplaced)
             || (self.is_lossless && is_incomplete)
             || summary.frames_not_recorded > 0
             || summary.writes_failed > 0
@@ -220,6 +227,42 @@ impl Report {
     fn no_results_reason(&self) -> Option<String> {
         let summary = self.recorded.summary().filter(|_| !self.interrupted)?;
         no_results::reason(summary, &self.views)
+    }
+
+    /// Writes `report.html` into the folder of the run, and returns its path; none where the results are elsewhere.
+    ///
+    /// # Errors
+    ///
+    /// The results cannot be read, or the page cannot be written.
+    pub fn write_page(&self, resolved: &Resolved) -> Result<Option<PathBuf>, Failure> {
+        let (Some(_), false) = (self.recorded.summary(), self.is_far) else {
+            return Ok(None);
+        };
+        let rig = inputs::rig_of(&resolved.deployment)?;
+        let cameras = resolved.deployment.cameras.iter();
+        let cameras: Vec<String> = cameras.map(|camera| camera.name.clone()).collect();
+        let content = page::Content {
+            name: &self.name,
+            verdict: self.verdict(),
+            text: &self.text(),
+            latency: self.recorded.latency(),
+            cameras: &cameras,
+            rig: &rig,
+            joints: &skeleton::PARSE14,
+        };
+        page::write(&resolved.deployment.output, &content).map(Some)
+    }
+
+    fn verdict(&self) -> Verdict {
+        let is_good = self.kind().is_none();
+        let doubts = self.doubts();
+        let text = match (doubts.first(), self.no_results_reason()) {
+            (_, Some(reason)) => reason,
+            (Some(doubt), None) => format!("The results may be wrong: {doubt}"),
+            (None, None) if is_good => "Nothing speaks against the results".to_owned(),
+            (None, None) => "The run lost frames: see below".to_owned(),
+        };
+        Verdict { text, is_good }
     }
 
     /// The report as JSON.

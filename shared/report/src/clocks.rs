@@ -238,6 +238,7 @@ mod tests {
             "{good}"
         );
         assert!(!good.contains("NaN") && !good.contains("inf<"), "{good}");
+        crate::testing::check_in_browser(&good);
         let bad = page(&outcome(vec![doubt]));
         assert!(
             bad.contains("not to be used") && bad.contains("followed for 0.0 s"),

@@ -11,6 +11,8 @@
 
 mod html;
 mod parts;
+#[cfg(test)]
+mod testing;
 
 pub mod boards;
 pub mod clocks;

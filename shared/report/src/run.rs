@@ -21,6 +21,8 @@ pub struct Page {
     pub title: String,
     /// Sentences under the title.
     pub lead: String,
+    /// What stands first; if not given, whether all limits held.
+    pub verdict: Option<Verdict>,
     /// What was asked of the run.
     pub limits: Vec<Limit>,
     /// The skeleton in space.
@@ -33,6 +35,15 @@ pub struct Page {
     pub legend: String,
     /// Pictures.
     pub strips: Vec<Strip>,
+}
+
+/// What is said of a run in one line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Verdict {
+    /// The line.
+    pub text: String,
+    /// Whether it is good.
+    pub is_good: bool,
 }
 
 /// Something that was asked of the run.
@@ -96,13 +107,15 @@ pub fn html(page: &Page) -> String {
         Html::constant(POLICY),
         Html::constant(STYLE)
     );
-    verdict(&mut out, &page.limits);
+    verdict(&mut out, page);
+    pictures(&mut out, page);
     space(&mut out, page);
-    limits(&mut out, &page.limits);
+    if !page.limits.is_empty() {
+        limits(&mut out, &page.limits);
+    }
     for table in &page.tables {
         tabulate(&mut out, table);
     }
-    pictures(&mut out, page);
     put!(
         out,
         "<script type=\"application/json\" id=\"data\">{}</script>\n<script type=\"module\">\n{}</script>\n</html>\n",
@@ -112,12 +125,18 @@ pub fn html(page: &Page) -> String {
     out.into_page()
 }
 
-fn verdict(out: &mut Html, limits: &[Limit]) {
-    let n_missed = limits.iter().filter(|it| !it.held).count();
-    let (class, verdict) = match n_missed {
-        0 => ("held", format!("All {} limits held", limits.len())),
-        n => ("missed", format!("{n} of {} limits missed", limits.len())),
+fn verdict(out: &mut Html, page: &Page) {
+    let n_limits = page.limits.len();
+    let n_missed = page.limits.iter().filter(|it| !it.held).count();
+    let of_limits = || Verdict {
+        text: match n_missed {
+            0 => format!("All {n_limits} limits held"),
+            n => format!("{n} of {n_limits} limits missed"),
+        },
+        is_good: n_missed == 0,
     };
+    let Verdict { text, is_good } = page.verdict.clone().unwrap_or_else(of_limits);
+    let (class, verdict) = (if is_good { "held" } else { "missed" }, text);
     put!(
         out,
         "<p class=\"verdict {class}\">{verdict}</p>\n",
@@ -149,15 +168,21 @@ fn limits(out: &mut Html, limits: &[Limit]) {
 }
 
 fn space(out: &mut Html, page: &Page) {
+    let has_truth = page.space.moments.iter().any(|it| !it.truth.is_empty());
+    let hidden = Html::constant(if has_truth { "" } else { " hidden" });
+    let grey = if has_truth { "; grey: where it is" } else { "" };
     put!(
         out,
-        "<canvas id=\"space\" width=\"900\" height=\"520\" role=\"img\" \
-         aria-label=\"the skeleton in space, beside the truth\"></canvas>\n<p class=\"bar\"><button id=\"play\">pause</button> <input id=\"at\" type=\"range\" min=\"0\" value=\"0\"> \
-         <label><input id=\"truth\" type=\"checkbox\" checked> truth</label> <span id=\"said\"></span></p>\n\
+        "<h2>The skeleton in space</h2>\n\
+         <canvas id=\"space\" width=\"900\" height=\"520\" role=\"img\" \
+         aria-label=\"the skeleton in space\"></canvas>\n<p class=\"bar\"><button id=\"play\">pause</button> <input id=\"at\" type=\"range\" min=\"0\" value=\"0\"> \
+         <label{}><input id=\"truth\" type=\"checkbox\" checked> truth</label> <span id=\"said\"></span></p>\n\
          <p class=\"note\">Drag to turn, wheel to come nearer. Colours: <b class=\"right\">right</b>, \
-         <b class=\"left\">left</b>, <b class=\"centre\">middle</b> of the body as it was found; grey: where it is. \
+         <b class=\"left\">left</b>, <b class=\"centre\">middle</b> of the body as it was found{}. \
          The squares of the floor are a metre wide; a red camera has no part in the frame.</p>\n\
-         <h2>Who was there</h2>\n<div class=\"scroll\">\n"
+         <h2>Cameras over time</h2>\n<div class=\"scroll\">\n",
+        hidden,
+        grey
     );
     put!(out, "{}", timeline::svg(&page.space, &page.marks));
     put!(

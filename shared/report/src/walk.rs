@@ -256,7 +256,7 @@ fn in_space(
         "<h2>The rig in space</h2>\n<canvas id=\"space\" width=\"900\" height=\"520\" role=\"img\" aria-label=\"the rig in space\"></canvas>\n\
          <p class=\"bar\"><button id=\"play\">pause</button> <input id=\"at\" type=\"range\" min=\"0\" value=\"0\"> <label hidden><input id=\"truth\" type=\"checkbox\"></label> <span id=\"said\"></span></p>\n\
          <p class=\"note\">Drag to turn, wheel to come nearer. The squares of the floor are a metre wide.</p>\n\
-         <script type=\"application/json\" id=\"data\">{}</script>\n<script>{}</script>\n",
+         <script type=\"application/json\" id=\"data\">{}</script>\n<script type=\"module\">{}</script>\n",
         Html::in_script(&data),
         Html::constant(SCRIPT)
     );
@@ -317,5 +317,13 @@ mod tests {
             page.contains("fit worst") && page.contains("alt=\"one &lt;at&gt; 1 s\""),
             "{page}"
         );
+        let head = Some(Point3::new(0.0, 0.0, 1.7));
+        let walked = people::Outcome {
+            skeletons: vec![vec![head; 14]; 3],
+            ..rough
+        };
+        let page = of_people(&walked, &["one"], &about, &[]);
+        assert!(page.contains("The rig in space"));
+        crate::testing::check_in_browser(&page);
     }
 }

@@ -50,7 +50,7 @@ pub(super) fn corners(camera: &CameraOutcome) -> Html {
         .residuals
         .iter()
         .step_by(step)
-        .filter(|it| !it.is_wrong)
+        .filter(|it| !it.is_wrong && is_known(it))
     {
         let at =
             [0, 1].map(|axis| middle[axis] + (PIXEL * it.off[axis]).clamp(-0.5 * PLOT, 0.5 * PLOT));
@@ -65,6 +65,10 @@ pub(super) fn corners(camera: &CameraOutcome) -> Html {
     out
 }
 
+fn is_known(corner: &Residual) -> bool {
+    corner.off.iter().all(|it| it.is_finite())
+}
+
 fn corner(out: &mut Html, it: &Residual, scale: f64) {
     let at = [scale * it.at.x, scale * it.at.y];
     let colour = Html::constant(if it.is_wrong { "#d9503f" } else { "#3a86c8" });
@@ -75,7 +79,7 @@ fn corner(out: &mut Html, it: &Residual, scale: f64) {
         at[0],
         at[1]
     );
-    if !it.is_wrong {
+    if !it.is_wrong && is_known(it) {
         let to = [0, 1].map(|axis| at[axis] + scale * LONGER * it.off[axis]);
         put!(
             out,

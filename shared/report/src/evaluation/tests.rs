@@ -38,6 +38,7 @@ fn the_page_is_self_contained_with_every_table_and_figure() {
     for outside in ["http:", "https:", "src=", "@import", "NaN", "inf"] {
         assert!(!page.contains(outside), "{outside}");
     }
+    crate::testing::check_in_browser(&page);
 }
 
 #[test]

@@ -69,6 +69,7 @@ fn every_filter_part_and_pair_of_types_is_drawn() {
     assert_eq!(count(&page, "section"), 3);
     assert_eq!(count(&page, "td"), 8);
     assert_eq!(page.matches(">never<").count(), 2);
+    crate::testing::check_in_browser(&page);
 }
 
 #[test]

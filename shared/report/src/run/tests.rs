@@ -28,6 +28,7 @@ fn page() -> Page {
     Page {
         title: "A <run>".to_owned(),
         lead: "Nobody & nothing".to_owned(),
+        verdict: None,
         limits: vec![limit("results", true), limit("pause", false)],
         space: Space {
             joints: vec!["head".to_owned(), "left hip".to_owned()],
@@ -74,6 +75,7 @@ fn the_page_asks_for_nothing_outside_itself() {
         .map(|it| &html[it.0 + 5..it.0 + 10]);
     assert_eq!(sources.collect::<Vec<_>>(), ["data:"]);
     assert!(html.contains("default-src 'none'"));
+    crate::testing::check_in_browser(&html);
 }
 
 #[test]

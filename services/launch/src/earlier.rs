@@ -1,0 +1,180 @@
+//! Results that lie in an output folder before a run begins.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use runfiles::{FrameLine, LatencyReport, Line as _, RunSummary, SmoothLine, TimesLine, ViewLine};
+use runtime::{ExitKind, Failure, in_file};
+use serde_json::Value;
+
+use crate::claim;
+
+/// Files and folders that a run writes.
+const RESULTS: [&str; 10] = [
+    FrameLine::FILE,
+    "pose3d.csv",
+    "pose3d.trc",
+    ViewLine::FILE,
+    TimesLine::FILE,
+    LatencyReport::FILE,
+    RunSummary::FILE,
+    SmoothLine::FILE,
+    "overlays",
+    crate::summary::PAGE,
+];
+/// Folder that `parallax export` writes by default.
+const EXPORT: &str = "export";
+/// End of the name of the file that lists what was exported.
+const MANIFEST: &str = ".export.json";
+
+/// Refuses a folder with results of an earlier run, or with files of the same names that no run has written.
+///
+/// * `force`: the results of an earlier run may be replaced. What was exported from them is removed; they themselves stay until
+///   the new ones are whole.
+///
+/// # Errors
+///
+/// As above; another run writes into the folder; the folder cannot be read.
+pub fn make_way(folder: &Path, force: bool) -> Result<(), Failure> {
+    claim::check(folder)?;
+    let lies_there = |name: &&str| fs::symlink_metadata(folder.join(name)).is_ok();
+    let unfinished = format!("{}.part", FrameLine::FILE);
+    let is_unfinished = fs::metadata(folder.join(&unfinished)).is_ok_and(|data| data.len() > 0);
+    let first = RESULTS.iter().copied().find(lies_there);
+    let Some(first) = first.or(is_unfinished.then_some(unfinished.as_str())) else {
+        return Ok(());
+    };
+    let Some(name) = deployment_of(folder) else {
+        let message = format!(
+            "{}: {first} lies there, and no run of parallax has written it",
+            folder.display()
+        );
+        let failure = Failure::new(ExitKind::Config, message);
+        return Err(failure.with_hint("move it away, or name another folder with --out"));
+    };
+    if !force {
+        let message = format!(
+            "{} has the results of an earlier run of {name} ({first})",
+            folder.display()
+        );
+        let failure = Failure::new(ExitKind::Config, message);
+        return Err(failure.with_hint("--force replaces them, --out names another folder"));
+    }
+    remove_exports(&folder.join(EXPORT)).map_err(|error| in_file(&folder.join(EXPORT), &error))
+}
+
+/// Name of the deployment whose results lie in a folder; none if no run has written there.
+fn deployment_of(folder: &Path) -> Option<String> {
+    let text = files::read_text(&folder.join("deployment.json"), files::SETTINGS).ok()?;
+    let value: Value = serde_json::from_str(&text).ok()?;
+    let name = value.get("deployment")?.get("name")?.as_str()?;
+    Some(name.to_owned())
+}
+
+/// Removes what `parallax export` has written, by its own list; other files stay.
+fn remove_exports(folder: &Path) -> io::Result<()> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        let manifest = entry?.path();
+        let name = manifest.file_name().unwrap_or_default().to_string_lossy();
+        if !name.ends_with(MANIFEST) {
+            continue;
+        }
+        let text = files::read_text(&manifest, files::SETTINGS)?;
+        let value: Value = serde_json::from_str(&text).map_err(io::Error::other)?;
+        let listed = value.get("files").and_then(Value::as_array);
+        for file in listed.into_iter().flatten() {
+            let path = file.get("path").and_then(Value::as_str).map(Path::new);
+            // Beneath the folder, wherever the list says that it was.
+            let Some(name) = path.and_then(Path::file_name) else {
+                continue;
+            };
+            results::remove_pictures(&folder.join(name)).map_err(|error| error.source)?;
+        }
+        fs::remove_file(&manifest)?;
+    }
+    match fs::remove_dir(folder) {
+        Err(error) if error.kind() != io::ErrorKind::DirectoryNotEmpty => Err(error),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(folder: &Path, force: bool) -> String {
+        make_way(folder, force).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn results_are_replaced_when_asked_for_and_foreign_files_never() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path();
+        make_way(&folder.join("not there"), false).unwrap();
+        make_way(folder, false).unwrap();
+        fs::write(folder.join("pose3d.csv"), "mine").unwrap();
+        for force in [false, true] {
+            let text = refused(folder, force);
+            assert!(text.contains("no run of parallax has written it"), "{text}");
+        }
+        let about = "{\"deployment\": {\"name\": \"room\"}}";
+        fs::write(folder.join("deployment.json"), about).unwrap();
+        let text = refused(folder, false);
+        assert!(
+            text.contains("an earlier run of room (pose3d.csv)"),
+            "{text}"
+        );
+        make_way(folder, true).unwrap();
+        assert!(
+            folder.join("pose3d.csv").exists(),
+            "until the new one is whole"
+        );
+    }
+
+    #[test]
+    fn an_unfinished_run_is_not_lost_without_a_word() {
+        let dir = tempfile::tempdir().unwrap();
+        let part = dir.path().join("pose3d.jsonl.part");
+        fs::write(&part, "").unwrap();
+        make_way(dir.path(), false).unwrap();
+        fs::write(&part, "{}\n").unwrap();
+        fs::write(
+            dir.path().join("deployment.json"),
+            "{\"deployment\": {\"name\": \"a\"}}",
+        )
+        .unwrap();
+        assert!(refused(dir.path(), false).contains("pose3d.jsonl.part"));
+    }
+
+    #[test]
+    fn what_was_exported_goes_with_its_results_and_other_files_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let export = dir.path().join("export");
+        fs::create_dir(&export).unwrap();
+        let about = "{\"deployment\": {\"name\": \"a\"}}";
+        for (name, text) in [
+            ("deployment.json", about),
+            ("pose3d.csv", ""),
+            ("export/pose3d.c3d", ""),
+            ("export/notes.txt", ""),
+            (
+                "export/pose3d.export.json",
+                "{\"files\": [{\"path\": \"/elsewhere/export/pose3d.c3d\"}]}",
+            ),
+        ] {
+            fs::write(dir.path().join(name), text).unwrap();
+        }
+        make_way(dir.path(), true).unwrap();
+        let left: Vec<_> = fs::read_dir(&export).unwrap().collect();
+        assert_eq!(left.len(), 1);
+        assert!(export.join("notes.txt").exists());
+        fs::remove_file(export.join("notes.txt")).unwrap();
+        make_way(dir.path(), true).unwrap();
+        assert!(!export.exists());
+    }
+}

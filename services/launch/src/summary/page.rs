@@ -1,0 +1,187 @@
+//! The page of a run: pictures with skeletons first, then the skeleton in space, what the run reports, and its latency.
+
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+
+use geometry::Rig;
+use image::codecs::jpeg::JpegEncoder;
+use report::run::{Eye, Moment, Page, Picture, Space, Strip, Table, Verdict};
+use runfiles::{FrameLine, LatencyReport, Line as _};
+use runtime::{ExitKind, Failure, in_file};
+use skeleton::JointSet;
+
+/// Name of the page in the folder of a run.
+pub const FILE: &str = "report.html";
+/// Most skeletons that are drawn in space.
+const MOST_MOMENTS: usize = 400;
+/// Instants of which pictures are shown.
+const N_STRIPS: usize = 3;
+const JPEG_QUALITY: u8 = 85;
+
+/// What the page is made of.
+pub(super) struct Content<'a> {
+    pub(super) name: &'a str,
+    pub(super) verdict: Verdict,
+    /// The report as text; a line becomes a row.
+    pub(super) text: &'a str,
+    pub(super) latency: Option<&'a LatencyReport>,
+    pub(super) cameras: &'a [String],
+    pub(super) rig: &'a Rig,
+    pub(super) joints: &'static JointSet,
+}
+
+/// Writes the page into the folder of the run.
+///
+/// # Errors
+///
+/// The results cannot be read, or the page cannot be written.
+pub(super) fn write(folder: &Path, content: &Content<'_>) -> Result<PathBuf, Failure> {
+    let file = folder.join(FILE);
+    let page = report::run::html(&page(folder, content)?);
+    files::replace(&file, page.as_bytes()).map_err(|error| in_file(&file, &error))?;
+    Ok(file)
+}
+
+fn page(folder: &Path, content: &Content<'_>) -> Result<Page, Failure> {
+    let mut tables = vec![reported(content.text)];
+    tables.extend(content.latency.map(latency));
+    Ok(Page {
+        title: format!("Parallax: {}", content.name),
+        lead: content.text.lines().next().unwrap_or_default().to_owned(),
+        verdict: Some(content.verdict.clone()),
+        limits: Vec::new(),
+        space: space(folder, content)?,
+        marks: Vec::new(),
+        tables,
+        legend: "Thick: the skeleton in space as the view sees it, right orange, left blue; thin and grey: what the view found by itself. \
+                 All pictures are in overlays/."
+            .to_owned(),
+        strips: strips(folder, content.cameras),
+    })
+}
+
+/// The lines of the report: a word, then what it says.
+fn reported(text: &str) -> Table {
+    let rows = text.lines().skip(1).map(|line| {
+        let (word, rest) = line.split_at_checked(16).unwrap_or((line, ""));
+        vec![word.trim().to_owned(), rest.trim().to_owned()]
+    });
+    Table {
+        heading: "The run".to_owned(),
+        note: String::new(),
+        columns: vec![String::new(); 2],
+        rows: rows.collect(),
+    }
+}
+
+fn latency(report: &LatencyReport) -> Table {
+    let all = [("capture to result", &report.end_to_end)].into_iter();
+    let all = all.chain(report.stages.iter().map(|(stage, it)| (stage.as_str(), it)));
+    let rows = all.map(|(what, it)| {
+        let numbers = [it.p50_ms, it.p99_ms, it.max_ms].map(|ms| format!("{ms:.1}"));
+        [vec![what.to_owned(), it.count.to_string()], numbers.into()].concat()
+    });
+    Table {
+        heading: "Latency".to_owned(),
+        note: "Milliseconds: from capture to result, then the computing time of every stage."
+            .to_owned(),
+        columns: ["", "measured", "median", "99 of 100", "longest"]
+            .map(str::to_owned)
+            .into(),
+        rows: rows.collect(),
+    }
+}
+
+fn space(folder: &Path, content: &Content<'_>) -> Result<Space, Failure> {
+    let joints = content.joints;
+    let eyes = content.rig.cameras().iter().map(|camera| Eye {
+        name: camera.name.clone(),
+        at: camera.centre_in_world().coords.into(),
+        axis: camera.axis_in_world().into_inner().into(),
+    });
+    let up = content.rig.up_in_world();
+    Ok(Space {
+        joints: joints
+            .joints
+            .iter()
+            .map(|joint| joint.name.to_owned())
+            .collect(),
+        limbs: joints.limbs.to_vec(),
+        eyes: eyes.collect(),
+        up: up.map_or([0.0, 0.0, 1.0], |up| up.into_inner().into()),
+        moments: moments(folder, content)?,
+    })
+}
+
+/// Results at equal distances in time, as many as can be drawn.
+fn moments(folder: &Path, content: &Content<'_>) -> Result<Vec<Moment>, Failure> {
+    let path = folder.join(FrameLine::FILE);
+    let lines = || -> Result<_, Failure> {
+        let file = files::open(&path).map_err(|error| in_file(&path, &error))?;
+        Ok(BufReader::new(file).lines())
+    };
+    let n_lines = lines()?.count();
+    let mut moments = Vec::new();
+    for text in lines()?.step_by(n_lines.div_ceil(MOST_MOMENTS).max(1)) {
+        let text = text.map_err(|error| in_file(&path, &error))?;
+        let Some(line) = runfiles::lines::<FrameLine>(&text).next() else {
+            continue;
+        };
+        let line = line.map_err(|error| Failure::new(ExitKind::Run, error))?;
+        let found = content.joints.joints.iter().map(|joint| {
+            let placed = line.joints.get(joint.name)?.placed()?;
+            Some(placed.position_m)
+        });
+        let missing = content.cameras.iter().map(|camera| {
+            let why = line.views_missing.get(camera)?;
+            Some(why.text().to_owned())
+        });
+        moments.push(Moment {
+            frame: line.frame,
+            seconds: line.time_s.unwrap_or(line.frame as f64),
+            found: found.collect(),
+            truth: Vec::new(),
+            views: missing.collect(),
+        });
+    }
+    Ok(moments)
+}
+
+/// Overlays of instants at the start, in the middle, and at the end, in all views.
+fn strips(folder: &Path, cameras: &[String]) -> Vec<Strip> {
+    let overlays = folder.join("overlays");
+    let mut names: Vec<String> = cameras
+        .iter()
+        .filter_map(|camera| std::fs::read_dir(overlays.join(camera)).ok())
+        .flatten()
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .collect();
+    names.sort();
+    names.dedup();
+    let n = names.len().min(N_STRIPS);
+    let shown = (0..n).map(|nth| &names[(2 * nth + 1) * names.len() / (2 * n)]);
+    let strip = |name: &String| Strip {
+        caption: format!(
+            "frame {}",
+            name.trim_end_matches(".png").trim_start_matches('0')
+        ),
+        pictures: cameras
+            .iter()
+            .map(|camera| Picture {
+                caption: camera.clone(),
+                jpeg: jpeg(&overlays.join(camera).join(name))
+                    .ok_or_else(|| "no picture".to_owned()),
+            })
+            .collect(),
+    };
+    shown.map(strip).collect()
+}
+
+fn jpeg(file: &Path) -> Option<Vec<u8>> {
+    let bytes = files::read(file, files::PICTURE).ok()?;
+    let picture = image::load_from_memory(&bytes).ok()?.into_rgb8();
+    let mut jpeg = Vec::new();
+    let encoder = JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY);
+    picture.write_with_encoder(encoder).ok()?;
+    Some(jpeg)
+}
