@@ -22,6 +22,8 @@ pub mod bundle;
 
 pub mod search_size;
 
+mod survey;
+
 mod triangulate;
 
 mod rig_watch;
@@ -46,6 +48,7 @@ pub use rig::{
 };
 pub use rig_watch::{Contradiction, RigWatch, Suspect, Swap, SwapWatch};
 pub use step_watch::{OUT_OF_STEP_MS, Step, StepWatch};
+pub use survey::{Place, Shared, Survey, survey};
 pub use triangulate::{
     MAX_VIEWS, Observation, Settings, TriangulateError, Triangulated, triangulate,
 };

@@ -444,13 +444,13 @@ fn check_image(camera: &Camera) -> Result<(), RigError> {
 mod tests;
 
 /// What [`is_plain_name`] requires, as text for error messages.
-pub const PLAIN_NAME: &str = "1 to 64 bytes that begin with neither a dot nor a space, without / \\ , \" and control \
+pub const PLAIN_NAME: &str = "1 to 64 bytes that begin with none of . - and space, without / \\ , \" and control \
                               characters: the name of a camera becomes that of a folder";
 
 /// Whether a name can be the name of a folder and a field of a table.
 pub fn is_plain_name(name: &str) -> bool {
     (1..=64).contains(&name.len())
-        && !name.starts_with(['.', ' '])
+        && !name.starts_with(['.', '-', ' '])
         && !name.contains(['/', '\\', ',', '"'])
         && !name.chars().any(char::is_control)
 }

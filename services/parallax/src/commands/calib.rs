@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand, ValueEnum};
 use geometry::files::{Format, ReadOptions, Unit};
-use geometry::{Camera, LeftOut, Rig, upright_roll};
+use geometry::{Camera, LeftOut, Rig, Shared, Survey, upright_roll};
 use launch::{inputs, output};
 use nalgebra::{UnitVector3, Vector3};
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -242,13 +242,15 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
         });
         output::json(&json!({
             "schema_version": 1, "findings": findings, "epipolar": cameras, "disagreements": disagreements,
+            "survey": survey_json(&geometry::survey(rig)),
         }))?;
     } else {
         for finding in &findings {
             output::line(format_args!("{:?}: {finding}", finding.severity()))?;
         }
+        output::line(survey_text(&geometry::survey(rig)))?;
         if findings.is_empty() {
-            output::line("nothing odd was found")?;
+            output::line("OK: nothing odd was found; compare these numbers with a tape measure")?;
         }
         for camera in report.iter().flat_map(|it| &it.errors.cameras) {
             output::line(format_args!(
@@ -266,6 +268,52 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
         ExitCode::from(ExitKind::Calibration.status())
     } else {
         ExitCode::SUCCESS
+    })
+}
+
+/// The numbers of a rig that can be compared with a tape measure.
+fn survey_text(survey: &Survey) -> String {
+    let mut lines = vec![format!("{} cameras", survey.cameras.len())];
+    for place in &survey.cameras {
+        let height = place
+            .height_m
+            .map(|it| format!("{it:.2} m above the origin"));
+        let distance = place
+            .distance_m
+            .map(|it| format!("{it:.2} m from the middle"));
+        let known: Vec<String> = height.into_iter().chain(distance).collect();
+        lines.push(format!("  {:<12} {}", place.name, known.join(", ")));
+    }
+    if let Some([least, most]) = survey.apart_m {
+        lines.push(format!(
+            "distance of two cameras: {least:.2} to {most:.2} m"
+        ));
+    }
+    lines.push(match survey.shared {
+        Some(Shared { sides_m: [x, y, z], volume_m3 }) => format!(
+            "space that all cameras see: {volume_m3:.1} m3 in a box of {x:.1} x {y:.1} x {z:.1} m around the middle"
+        ),
+        None => "space that all cameras see: none".to_owned(),
+    });
+    if let Some(mm) = survey.error_mm {
+        lines.push(format!(
+            "a point in the middle that is off by 1 px in every view is off by {mm:.1} mm in space"
+        ));
+    }
+    lines.join("\n")
+}
+
+fn survey_json(survey: &Survey) -> Value {
+    let cameras = survey.cameras.iter().map(|place| {
+        json!({ "camera": place.name, "height_m": place.height_m, "distance_to_middle_m": place.distance_m })
+    });
+    json!({
+        "cameras": cameras.collect::<Vec<_>>(),
+        "camera_distance_m": survey.apart_m,
+        "middle_m": survey.focus.map(|it| <[f64; 3]>::from(it.coords)),
+        "shared_box_m": survey.shared.map(|it| it.sides_m),
+        "shared_volume_m3": survey.shared.map(|it| it.volume_m3),
+        "error_mm_per_px": survey.error_mm,
     })
 }
 

@@ -1,0 +1,176 @@
+//! A rig in numbers that can be compared with a tape measure: heights, distances, shared space, and the accuracy to expect in it.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::{Camera, Rig};
+
+/// Spacing of the points that are tried for the shared space, metres.
+const STEP_M: f64 = 0.2;
+/// How far from the focus points are tried, metres.
+const REACH_M: f64 = 4.0;
+
+/// A rig in numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Survey {
+    /// In the order of the rig.
+    pub cameras: Vec<Place>,
+    /// Least and largest distance between two cameras, metres.
+    pub apart_m: Option<[f64; 2]>,
+    /// The point nearest to all optical axes, in the world.
+    pub focus: Option<Point3<f64>>,
+    /// The space that all cameras see.
+    pub shared: Option<Shared>,
+    /// Standard deviation of a point at the focus that is off by one pixel (standard deviation, in x and y) in every view that sees
+    /// it: root of the sum over the three axes, millimetres.
+    pub error_mm: Option<f64>,
+}
+
+/// Where a camera stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Place {
+    /// Its name.
+    pub name: String,
+    /// Height above the origin of the world, metres; unknown if the rig does not say which way is up.
+    pub height_m: Option<f64>,
+    /// Distance to the focus, metres.
+    pub distance_m: Option<f64>,
+}
+
+/// The space around the focus that all cameras see, as far as four metres from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shared {
+    /// Sides of the box around it, along the axes of the world, metres.
+    pub sides_m: [f64; 3],
+    /// Its volume, cubic metres.
+    pub volume_m3: f64,
+}
+
+/// Measures a rig.
+pub fn survey(rig: &Rig) -> Survey {
+    let focus = rig.focus();
+    let cameras = rig.cameras();
+    let places = cameras.iter().map(|camera| {
+        let centre = camera.centre_in_world();
+        Place {
+            name: camera.name.clone(),
+            height_m: rig.up_in_world().map(|up| up.dot(&centre.coords)),
+            distance_m: focus.map(|focus| (centre - focus).norm()),
+        }
+    });
+    let pairs = cameras.iter().enumerate().flat_map(|(nth, one)| {
+        let others = cameras[nth + 1..].iter();
+        others.map(|other| (one.centre_in_world() - other.centre_in_world()).norm())
+    });
+    Survey {
+        cameras: places.collect(),
+        apart_m: pairs
+            .map(|metres| [metres; 2])
+            .reduce(|[least, most], [metres, _]| [least.min(metres), most.max(metres)]),
+        focus,
+        shared: focus.and_then(|focus| shared(cameras, &focus)),
+        error_mm: focus.and_then(|focus| error_mm(cameras, &focus)),
+    }
+}
+
+fn sees(camera: &Camera, point: &Point3<f64>) -> bool {
+    let pixel = camera.project(point);
+    pixel.is_some_and(|pixel| {
+        let [width, height] = camera.intrinsics.size.map(f64::from);
+        (-0.5..width - 0.5).contains(&pixel.x) && (-0.5..height - 0.5).contains(&pixel.y)
+    })
+}
+
+fn shared(cameras: &[Camera], focus: &Point3<f64>) -> Option<Shared> {
+    let n = (REACH_M / STEP_M) as i32;
+    let along = move || -n..=n;
+    let steps =
+        along().flat_map(move |x| along().flat_map(move |y| along().map(move |z| [x, y, z])));
+    let offsets = steps.map(|step| Vector3::from(step.map(f64::from)) * STEP_M);
+    let (mut n_points, mut corners) = (0_u32, None);
+    for offset in offsets.filter(|it| cameras.iter().all(|camera| sees(camera, &(focus + it)))) {
+        n_points += 1;
+        let [low, high] = corners.unwrap_or([offset; 2]);
+        corners = Some([low.inf(&offset), high.sup(&offset)]);
+    }
+    let [low, high] = corners?;
+    Some(Shared {
+        sides_m: (high - low).add_scalar(STEP_M).into(),
+        volume_m3: f64::from(n_points) * STEP_M.powi(3),
+    })
+}
+
+fn error_mm(cameras: &[Camera], focus: &Point3<f64>) -> Option<f64> {
+    let seeing = cameras.iter().filter(|camera| sees(camera, focus));
+    let derivatives = seeing.filter_map(|camera| camera.project_with_jacobian(focus));
+    let information = derivatives.fold(Matrix3::zeros(), |sum, (_, by_point)| {
+        sum + by_point.transpose() * by_point
+    });
+    let covariance = information.try_inverse()?;
+    let variance = covariance.trace();
+    (variance.is_finite() && variance > 0.0).then(|| 1000.0 * variance.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, UnitVector3};
+
+    use super::*;
+    use crate::{Intrinsics, Lens};
+
+    /// Four cameras in a square of 4 m, 1.5 m high, that look at its centre at that height.
+    fn square() -> Rig {
+        let cameras = [[2.0, 2.0], [-2.0, 2.0], [-2.0, -2.0], [2.0, -2.0]];
+        let cameras = cameras.iter().enumerate().map(|(nth, [x, y])| {
+            let eye = Point3::new(*x, *y, 1.5);
+            let target = Point3::new(0.0, 0.0, 1.5);
+            // Looks along +z with y down.
+            let camera_from_world = Isometry3::look_at_lh(&eye, &target, &-Vector3::z());
+            Camera {
+                name: format!("c{nth}"),
+                intrinsics: Intrinsics {
+                    size: [640, 480],
+                    fx: 500.0,
+                    fy: 500.0,
+                    cx: 319.5,
+                    cy: 239.5,
+                    lens: Lens::default(),
+                },
+                camera_from_world,
+            }
+        });
+        let up = UnitVector3::new_normalize(Vector3::z());
+        Rig::new(cameras.collect(), Some(up), "test".to_owned()).unwrap()
+    }
+
+    #[test]
+    fn a_square_of_cameras_measures_as_it_was_built() {
+        let survey = survey(&square());
+        let close = |got: f64, expected: f64| assert!((got - expected).abs() < 1e-9, "{got}");
+        for place in &survey.cameras {
+            close(place.height_m.unwrap(), 1.5);
+            close(place.distance_m.unwrap(), 8.0_f64.sqrt());
+        }
+        let [least, most] = survey.apart_m.unwrap();
+        close(least, 4.0);
+        close(most, 32.0_f64.sqrt());
+        // Across each axis a pixel is 2.83 m / 500 px = 5.66 mm. Height is seen by four views, the others by two each.
+        let pixel_mm = 1000.0 * 8.0_f64.sqrt() / 500.0;
+        close(
+            survey.error_mm.unwrap(),
+            pixel_mm * (0.25 + 0.5 + 0.5_f64).sqrt(),
+        );
+    }
+
+    #[test]
+    fn the_shared_space_is_what_all_cameras_see() {
+        let shared = survey(&square()).shared.unwrap();
+        // At the centre a view is 3.6 m wide and 2.7 m high.
+        assert!((1.5..=3.0).contains(&shared.sides_m[2]), "{shared:?}");
+        let [x, y, _] = shared.sides_m;
+        assert!(
+            (x - y).abs() < 1e-9 && (2.0..4.5).contains(&x),
+            "{shared:?}"
+        );
+        assert!((4.0..30.0).contains(&shared.volume_m3), "{shared:?}");
+    }
+}
