@@ -22,9 +22,10 @@ pub struct Config {
     /// `parallax train orientation` made; `"shipped"`: the one that ships; `"none"`: nothing.
     pub orientation: PathBuf,
     /// An ONNX file of a network that finds keypoints, which takes the place of the filters; `"shipped"`: the one that ships;
-    /// `"none"`: the filters. Without it the one that ships, unless another setting is about the filters (`model`, `quality`,
-    /// `pose.search`, `pose.precision`, `pose.orientation`, `triangulate.joint_map`) or the paper's energy (`fuse.views`, `fuse.energy`,
-    /// `fuse.pairs`, `fuse.workers`, `fuse.consistency`, `fuse.compatibility`, `triangulate.combine`), or a camera has a network or keypoints.
+    /// `"none"`: the filters. Without it the one that ships, unless `model` names filters, or a camera has a network or keypoints. Settings
+    /// that only the filters or the paper's energy have (`quality`, `pose.search`, `pose.precision`, `pose.orientation`,
+    /// `triangulate.joint_map`, `triangulate.combine`, `fuse.views`, `fuse.energy`, `fuse.pairs`, `fuse.workers`, `fuse.consistency`,
+    /// `fuse.compatibility`) are refused where nothing says that the filters find people.
     pub network: Option<PathBuf>,
     /// The card that describes the network; without it the file beside it (`.toml` for `.onnx`), or what its metadata say.
     pub network_card: Option<PathBuf>,

@@ -68,7 +68,7 @@ fn what_cannot_be_is_refused_with_its_key() {
         ),
         (
             "keys = 'keys'",
-            "keys = 'keys'\ncarry = 'poses'\n[fuse]\nviews = 'all'",
+            "keys = 'keys'\ncarry = 'poses'\n[fuse]\nviews = 'all'\n[pose]\nnetwork = 'none'",
             "link.carry",
         ),
     ] {

@@ -110,8 +110,13 @@ mod tests {
     }
 
     fn solved(views: &str, more: &str) -> Deployment {
+        let model = if views == "space" {
+            ""
+        } else {
+            "model = 'm'\n"
+        };
         let text = format!(
-            "name = 'a'\nrig = 'r'\noutput = 'o'\n\
+            "name = 'a'\nrig = 'r'\noutput = 'o'\n{model}\
              [[camera]]\nname = 'c0'\nsource = 's'\n[[camera]]\nname = 'c1'\nsource = 's'\n\
              [[camera]]\nname = 'c2'\nsource = 's'\n\
              [capture]\nmode = 'realtime'\npace = 'realtime'\nframe_rate_hz = 5.0\n\

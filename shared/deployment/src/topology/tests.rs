@@ -12,6 +12,13 @@ use crate::{AnyMachine, Loaded};
 /// A deployment of so many cameras.
 fn deployment(n_views: usize, settings: &str) -> Deployment {
     let mut text = "name = 'a'\nrig = 'r'\noutput = 'o'\n".to_owned();
+    // What is of the filters has to be said.
+    if ["[fuse]", "[quality]", "[triangulate]"]
+        .iter()
+        .any(|it| settings.contains(it))
+    {
+        text.push_str("model = 'm'\n");
+    }
     for view in 0..n_views {
         write!(text, "[[camera]]\nname = 'c{view}'\nsource = 's'\n").unwrap();
     }
