@@ -3,9 +3,9 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    bench, calib, calibrate, cameras, chaos, config, demo, deployments, detect, eval, export,
-    fuse_frame, hosts, messages, model, new, publish, record, replay, run, service, simulate,
-    smooth, sync, synth, top, train, view,
+    bench, calib, calibrate, cameras, chaos, completions, config, demo, deployments, detect,
+    doctor, eval, export, fuse_frame, hosts, messages, model, new, publish, record, replay, run,
+    service, simulate, smooth, sync, synth, top, train, view,
 };
 use crate::exit::EXIT_CODES;
 use crate::globals::Globals;
@@ -20,8 +20,9 @@ consists of one process per stage and camera, all started and watched by `parall
 
 const EXAMPLES: &str = "\
 Examples:
+    parallax doctor                                     whether this machine has what is needed
     parallax demo                                       a whole deployment of synthetic cameras, and a report
-    parallax run configs/pose2sim-balancing.toml        four cameras to 3D
+    parallax run my.toml                                its cameras to 3D
     parallax run my.toml --set capture.n_frames=20      the same, with one value replaced
     parallax run my.toml --dry-run                      what would be started, and its memory
     parallax run my.toml --latency-budget-ms 150        fails if 1 frame in 100 takes longer
@@ -54,7 +55,7 @@ Examples:
 #[derive(Debug, Parser)]
 #[command(
     name = "parallax",
-    version,
+    version = env!("PARALLAX_VERSION"),
     about,
     long_about = LONG_ABOUT,
     after_help = EXIT_CODES,
@@ -139,6 +140,12 @@ pub(crate) enum Command {
     View(view::Arguments),
     /// Remove what dead deployments have left in shared memory.
     Clean(deployments::CleanArguments),
+    /// Check whether this machine has what Parallax needs, and say what to do where it has not.
+    Doctor(doctor::Arguments),
+    /// Print the completion script of a shell.
+    Completions(completions::Arguments),
+    /// Write manual pages, one a command.
+    Man(completions::ManArguments),
     /// Run one process of a deployment; started by `run`.
     #[command(hide = true)]
     Service(service::Arguments),
@@ -153,5 +160,32 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_has_a_page_and_every_shell_a_script() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut command = Cli::command();
+        command.build();
+        completions::write_pages(command, folder.path()).unwrap();
+        for (page, word) in [
+            ("parallax.1", "parallax\\-run(1)"),
+            ("parallax-run.1", "dry\\-run"),
+            ("parallax-calibrate-board.1", "charuco"),
+        ] {
+            let text = std::fs::read_to_string(folder.path().join(page)).unwrap();
+            assert!(text.contains(word), "{page} lacks {word}");
+        }
+        assert!(!folder.path().join("parallax-service.1").exists());
+        for shell in [
+            clap_complete::Shell::Bash,
+            clap_complete::Shell::Zsh,
+            clap_complete::Shell::Fish,
+        ] {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "parallax", &mut script);
+            let script = String::from_utf8(script).unwrap();
+            assert!(script.contains("dry-run"), "{shell}");
+        }
     }
 }

@@ -5,10 +5,12 @@ pub(crate) mod calib;
 pub(crate) mod calibrate;
 pub(crate) mod cameras;
 pub(crate) mod chaos;
+pub(crate) mod completions;
 pub(crate) mod config;
 pub(crate) mod demo;
 pub(crate) mod deployments;
 pub(crate) mod detect;
+pub(crate) mod doctor;
 pub(crate) mod eval;
 pub(crate) mod export;
 pub(crate) mod fuse_frame;
@@ -33,6 +35,7 @@ pub(crate) mod view;
 
 use std::process::ExitCode;
 
+use clap::CommandFactory as _;
 use runtime::{Failure, init_logging};
 
 use crate::cli::{Cli, Command};
@@ -75,6 +78,9 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Hosts(it) => hosts::run(&it),
         Command::Simulate(it) => simulate::run(&it),
         Command::Sync(it) => sync::run(&it, cli.globals),
+        Command::Doctor(it) => doctor::run(&it),
+        Command::Completions(it) => completions::run(&it, Cli::command()),
+        Command::Man(it) => completions::man(&it, Cli::command()),
         Command::Service(it) => service::run(&it),
     }
 }

@@ -3,10 +3,11 @@
 
 use crate::common;
 
+use std::fs;
 use std::process::Command;
 
 use common::started::{processes, signal};
-use common::{Case, PACED, PLAIN};
+use common::{Case, PACED, PLAIN, Started};
 use serde_json::{Value, json};
 
 /// The frame numbers of a run's results.
@@ -196,6 +197,20 @@ fn an_output_folder_belongs_to_one_run_at_a_time() {
 }
 
 #[test]
+fn results_of_an_earlier_run_are_replaced_only_when_asked_for() {
+    let case = Case::new("again", &[2; 2], PLAIN);
+    let run = || Started::new(case.folder(), &["run", "deployment.toml"]).wait();
+    assert_eq!(run().status.code(), Some(0));
+    let before = fs::metadata(case.path("out/pose3d.jsonl")).unwrap();
+    let ended = run();
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    let said = "--force replaces them";
+    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    let after = fs::metadata(case.path("out/pose3d.jsonl")).unwrap();
+    assert_eq!(before.modified().unwrap(), after.modified().unwrap());
+}
+
+#[test]
 fn a_camera_name_cannot_lead_outside_the_output_folder() {
     let case = Case::new("escape", &[2; 2], PLAIN);
     let name = "../../../../x_escape";
@@ -206,7 +221,7 @@ fn a_camera_name_cannot_lead_outside_the_output_folder() {
     );
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
-    let rig = std::fs::read_to_string(case.path("rig.toml")).unwrap();
+    let rig = fs::read_to_string(case.path("rig.toml")).unwrap();
     case.write("rig.toml", rig.replace("\"b\"", &format!("{name:?}")));
     let ended = case.start(&["calib", "check", "rig.toml"]).wait();
     assert_eq!(ended.status.code(), Some(5), "{}", ended.stderr);

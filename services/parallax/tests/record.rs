@@ -119,6 +119,10 @@ fn omitted_messages_and_existing_files_are_reported() {
 
     let again = ["record", "deployment.toml", "--out", "run.mcap"];
     let ended = case.start(&again).wait();
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    assert!(ended.stderr.contains("an earlier run"), "{}", ended.stderr);
+    let elsewhere = [&again[..], &["--set", "output=other"]].concat();
+    let ended = case.start(&elsewhere).wait();
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(
         ended.stderr.contains("is there already"),

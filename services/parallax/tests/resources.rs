@@ -32,7 +32,7 @@ fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal()
         n=0\n\
         for wait in 0 1 3 5 8 0 2 0 4 0 6 0 1 0 3 0 5 0 8 0; do\n\
           n=$((n + 1))\n\
-          timeout -k 20 100 \"$PARALLAX\" run deployment.toml --json >said-$n 2>&1 & run=$!\n\
+          timeout -k 20 100 \"$PARALLAX\" run deployment.toml --force --json >said-$n 2>&1 & run=$!\n\
           while set -- /dev/shm/px*/*/lock; [ ! -e \"$1\" ]; do kill -0 $run; done\n\
           [ $wait = 0 ] || sleep 0.0$wait\n\
           while kill -0 $run 2>/dev/null; do cat /dev/zero >>/dev/shm/filler 2>/dev/null || true; done\n\
@@ -41,7 +41,7 @@ fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal()
           if [ $code -ge 124 ]; then break; fi\n\
           if [ $n -ge 5 ] && grep -qx 1 code-*; then break; fi\n\
         done\n\
-        exec \"$PARALLAX\" run deployment.toml --json";
+        exec \"$PARALLAX\" run deployment.toml --force --json";
     let Some(started) = Started::in_mount_namespace(case.folder(), script) else {
         eprintln!("skipped: no private file system may be mounted here");
         return;
@@ -92,7 +92,7 @@ fn a_file_that_cannot_grow_is_counted_and_ends_no_process() {
 #[test]
 fn a_file_size_limit_is_an_error_with_the_limit() {
     let case = Case::new("small", &[2; 2], PLAIN);
-    let script = "ulimit -f 16; exec \"$PARALLAX\" run deployment.toml --json";
+    let script = "ulimit -f 16; exec \"$PARALLAX\" run deployment.toml --force --json";
     let ended = case.start_in_shell(script).wait();
     assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
     for words in ["error: ", "no file may have more than 8 KB", "ulimit -f"] {
@@ -177,7 +177,7 @@ fn truncated_shared_memory_is_reported_and_ends_no_process_by_a_signal() {
 fn too_few_descriptors_are_refused_with_the_numbers() {
     let case = Case::new("descriptors", &[2; 2], PLAIN);
     let ended = case
-        .start_in_shell("ulimit -n 64; exec \"$PARALLAX\" run deployment.toml --json")
+        .start_in_shell("ulimit -n 64; exec \"$PARALLAX\" run deployment.toml --force --json")
         .wait();
     case.assert_nothing_left();
     assert_no_bus_error(&ended);
@@ -276,7 +276,7 @@ mod long {
         let case = Case::new("filled", &[300; 3], &more);
         // The processes are children of the run; one of them is killed when there is no room to start another.
         let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
-            \"$PARALLAX\" run deployment.toml --json & run=$!\n\
+            \"$PARALLAX\" run deployment.toml --force --json & run=$!\n\
             while [ \"$(cat out/pose3d.jsonl.part 2>/dev/null | wc -l)\" -lt 10 ]; do\n\
               kill -0 $run; sleep 0.05\n\
             done\n\

@@ -46,7 +46,7 @@ pub(crate) struct Keys {
 pub(crate) struct Arguments {
     /// The deployment file.
     file: Option<PathBuf>,
-    /// Replace a value, for example `--set fuse.workers=2`.
+    /// Replace a value, for example `--set capture.scale=0.5`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Print JSON.

@@ -5,7 +5,6 @@ mod height;
 mod pictures;
 mod report;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex};
@@ -428,7 +427,8 @@ fn settings_text(
     joints: &inputs::Joints,
 ) -> Result<String, Failure> {
     let digest = |file: &PathBuf| {
-        let bytes = fs::read(file).map_err(|error| runtime::in_file(file, &error))?;
+        let bytes =
+            files::read(file, files::MODEL).map_err(|error| runtime::in_file(file, &error))?;
         Ok::<_, Failure>(checksum::fnv1a(&bytes))
     };
     let of = |kind: Shipped, file: &PathBuf| Ok::<_, Failure>(checksum::fnv1a(&kind.read(file)?));

@@ -141,7 +141,7 @@ fn rate(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("expected 0.001 to 100000 frames a second, got {text:?}"))
 }
 
-fn up(text: &str) -> Result<UnitVector3<f64>, String> {
+pub(crate) fn up(text: &str) -> Result<UnitVector3<f64>, String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|it| it.trim().parse().ok()).collect();
     let [x, y, z] = numbers
         .and_then(|it| it.try_into().ok())

@@ -104,7 +104,7 @@ fn draw(file: &Path, html: &Path, images: &[PathBuf]) -> Result<ExitCode, Failur
         }
     };
     let page = report::model::html(&model, examples.as_ref());
-    std::fs::write(html, page).map_err(|error| runtime::in_file(html, &error))?;
+    files::replace(html, page.as_bytes()).map_err(|error| runtime::in_file(html, &error))?;
     output::message(format_args!("wrote {}", html.display()));
     Ok(ExitCode::SUCCESS)
 }

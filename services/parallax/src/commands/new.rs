@@ -7,6 +7,7 @@ use std::process::{Command, ExitCode};
 use boards::Board;
 use clap::Args;
 use launch::output;
+use nalgebra::UnitVector3;
 use offline::boards::CameraFootage;
 use runtime::{ExitKind, Failure, OrFail as _, in_file};
 
@@ -59,6 +60,13 @@ pub(crate) struct Arguments {
     /// Find where the cameras stand from a person of this height, metres, who walks about in their footage.
     #[arg(long, value_name = "METRES", conflicts_with = "floor", value_parser = height)]
     people: Option<f64>,
+    /// Where the upper left pixel of the footage of a camera lies in the picture that was calibrated (`source_offset_px`), for footage
+    /// that was cut to a part; once for each.
+    #[arg(long, value_name = "NAME=X,Y", value_parser = offset)]
+    offset: Vec<Offset>,
+    /// Which way is up in the world of the rig, for example 0,0,1.
+    #[arg(long, value_name = "X,Y,Z", value_parser = super::export::up, allow_hyphen_values = true)]
+    up: Option<UnitVector3<f64>>,
     /// Find offset and drift of the cameras' clocks.
     #[arg(long)]
     sync: bool,
@@ -256,14 +264,47 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
         "# Made by `parallax new`. Everything that is not said here has a default: `parallax config show` prints it.\n\n\
          name = {name:?}\nrig = \"rig.toml\"\noutput = \"out\"\n"
     );
+    if let Some(up) = arguments.up {
+        text.extend([format!("up = [{:?}, {:?}, {:?}]\n", up.x, up.y, up.z)]);
+    }
+    let is_camera = |name: &str| {
+        let names = arguments.camera.iter().map(|it| CameraFootage::of(it).name);
+        names.into_iter().any(|it| it == name)
+    };
+    if let Some(stray) = arguments.offset.iter().find(|it| !is_camera(&it.camera)) {
+        let message = format!("--offset {}: no --camera has that name", stray.camera);
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
     for camera in &arguments.camera {
         let CameraFootage { name, paths } = CameraFootage::of(camera);
         let source = source(&paths[0]).or_fail(ExitKind::Input)?;
         let source = toml::Value::from(source);
-        let camera = format!("\n[[camera]]\nname = {name:?}\nsource = {source}\n");
-        text.push_str(&camera);
+        text.extend([format!(
+            "\n[[camera]]\nname = {name:?}\nsource = {source}\n"
+        )]);
+        if let Some(offset) = arguments.offset.iter().find(|it| it.camera == name) {
+            text.extend([format!("source_offset_px = {:?}\n", offset.px)]);
+        }
     }
     Ok(text)
+}
+
+/// Where the footage of a camera lies in the picture that was calibrated.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Offset {
+    camera: String,
+    px: [u32; 2],
+}
+
+fn offset(text: &str) -> Result<Offset, String> {
+    let parsed = || {
+        let (camera, numbers) = text.rsplit_once('=')?;
+        let (x, y) = numbers.split_once(',')?;
+        let px = [x.trim().parse().ok()?, y.trim().parse().ok()?];
+        let camera = camera.to_owned();
+        Some(Offset { camera, px })
+    };
+    parsed().ok_or_else(|| "not NAME=X,Y with whole pixels, for example left=0,240".to_owned())
 }
 
 /// A path as it is from the room; addresses and devices as they are.

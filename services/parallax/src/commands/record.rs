@@ -2,7 +2,7 @@
 
 mod disk_space;
 
-use std::fs::{File, TryLockError};
+use std::fs::TryLockError;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -31,7 +31,7 @@ process that was restarted continues in FILE.1.mcap. If anything was lost the ex
 
 Of a live camera the file also holds the pictures as they came, at the full rate of the camera: JPEG files, raw pixels,
 or the packets of a stream. `parallax replay FILE --from capture`, or `source = \"FILE#NAME\"` in a deployment, searches
-them later. No camera ever waits for the disk.
+them later. No camera ever waits for the disk. Results go to the file's `output`; `--set output=DIR` names another folder.
 
 Foxglove opens the file as it is, and shows skeletons with their uncertainty, cameras and pictures: beside its own topics it
 holds `foxglove.SceneUpdate`, `foxglove.FrameTransforms`, `foxglove.CameraCalibration` and `foxglove.CompressedImage`.
@@ -52,7 +52,7 @@ pub(crate) struct Arguments {
     /// The file to record to.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Replace FILE if it exists.
+    /// Replace FILE if it exists, and the results of an earlier run.
     #[arg(long)]
     force: bool,
     /// Leave out the largest messages; may be given twice.
@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
     /// Folder for the results, instead of the file's `output`.
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
-    /// Replace a value, for example `--set fuse.workers=2`; may be given several times.
+    /// Replace a value, for example `--set capture.scale=0.5`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// The host that this machine is, of a deployment with several `[[host]]`; without it the one with the name of the machine.
@@ -103,6 +103,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         pictures: Vec::new(),
         without_foxglove: arguments.without.contains(&Bulk::Foxglove),
     };
+    launch::make_way(&loaded.deployment.output, arguments.force)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let chosen = (arguments.host.as_deref(), false);
     let Some((resolved, session)) = hosts::resolve(&loaded.deployment, chosen, &stop)? else {
@@ -190,7 +191,7 @@ fn remove_existing(file: &Path, force: bool) -> Result<(), Failure> {
             let failure = Failure::new(ExitKind::Usage, message);
             return Err(failure.with_hint("take another name, or --force to replace it"));
         }
-        let is_busy = File::open(&file)
+        let is_busy = files::open(&file)
             .is_ok_and(|it| matches!(it.try_lock_shared(), Err(TryLockError::WouldBlock)));
         if is_busy {
             let message = format!("{} is being recorded to by another run", file.display());

@@ -45,6 +45,9 @@ pub(crate) struct Arguments {
     /// Folder for the results; if not given, the name of the recording with `-replay` appended.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Replace the results of an earlier run or replay in that folder.
+    #[arg(long)]
+    force: bool,
     /// Replace a value of the stages that run, or capture.mode; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -94,6 +97,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let out = arguments.out.clone();
     let out = out.unwrap_or_else(|| file.with_file_name(format!("{name}-replay")));
     loaded.deployment.output = std::path::absolute(out).or_fail(ExitKind::Usage)?;
+    launch::make_way(&loaded.deployment.output, arguments.force)?;
     warn_of_changed_files(&settings);
     let resolved = resolve(loaded.deployment, settings.resolved, &file, arguments)?;
     check(&file, &recording, &resolved, from)?;
@@ -183,7 +187,7 @@ fn warn_of_changed_files(settings: &Settings) {
     for (file, recorded) in &settings.files {
         let now = match Shipped::of_name(file) {
             Some(it) => Some(checksum::fnv1a(it.bytes())),
-            None => std::fs::read(file)
+            None => files::read(file, files::MODEL)
                 .ok()
                 .map(|bytes| checksum::fnv1a(&bytes)),
         };

@@ -16,14 +16,15 @@ use crate::globals::Globals;
 #[command(after_help = "\
 A second Ctrl-C, half a second or more after the first, ends the run at once. The output folder holds
 pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and
-overlays/, all for their user alone; files of an earlier run are replaced when the new ones are whole, until then they
-are called *.part. Every frame has one line of pose3d.jsonl, in order: its result, or with status \"no result\" the
-reason why it has none; in pose3d.trc its row is NaN then, and that file is only written where the frame rate is known. The folder belongs to one run at a time. A run without
+overlays/, all for their user alone, called *.part until they are whole. Results of an earlier run are replaced with --force
+only, when the new ones are whole; a file that no run has written is never replaced. Every frame has one line of pose3d.jsonl,
+in order: its result, or with status \"no result\" the reason why it has none; in pose3d.trc its row is NaN then, and that file
+is only written where the frame rate is known. The folder belongs to one run at a time. A run without
 any result is degraded, and says why.
 
 Examples:
-    parallax run configs/pose2sim-balancing.toml
-    parallax run my.toml --out /tmp/try --set capture.n_frames=20 --set fuse.workers=2
+    parallax run my.toml
+    parallax run my.toml --out /tmp/try --set capture.n_frames=20 --set capture.scale=0.5
     parallax run my.toml --latency-budget-ms 150
     parallax run my.toml --publish udp://127.0.0.1:9000
     parallax run my.toml --dry-run
@@ -42,7 +43,10 @@ pub(crate) struct Arguments {
     /// Folder for the results, instead of the file's `output`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Replace a value, for example `--set fuse.workers=2`; may be given several times.
+    /// Replace the results of an earlier run in the output folder.
+    #[arg(long, conflicts_with = "dry_run")]
+    force: bool,
+    /// Replace a value, for example `--set capture.scale=0.5`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// The host that this machine is, of a deployment with several `[[host]]`; without it the one with the name of the machine.
@@ -78,6 +82,9 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let mut loaded = load::read(&arguments.config, &set)?;
     if let Some(out) = &arguments.out {
         loaded.deployment.output = std::path::absolute(out).or_fail(ExitKind::Usage)?;
+    }
+    if !arguments.dry_run {
+        launch::make_way(&loaded.deployment.output, arguments.force)?;
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let chosen = (arguments.host.as_deref(), arguments.dry_run);

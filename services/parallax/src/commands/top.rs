@@ -40,14 +40,19 @@ pub(crate) struct Arguments {
 
 /// Shows a deployment until it ends or the user quits.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let mut live = Live::open(&live::namespace(arguments.deployment.as_deref())?)?;
+    let namespace = live::namespace(arguments.deployment.as_deref())?;
+    let mut live = Live::open(&namespace)?;
     let snapshot = live.first_snapshot()?;
     if arguments.once || !io::stdout().is_terminal() {
         output::line(live::table(&snapshot).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    if screen::show(&mut live, &stop, Duration::from_secs_f64(arguments.every))? {
+    drop(live);
+    let (asked, pause) = (stop.clone(), Duration::from_secs_f64(arguments.every));
+    // Reading keys does not end where the terminal is gone: it is left behind.
+    let shown = offline::unless_stopped(&stop, move || screen::show(&namespace, &asked, pause))?;
+    if shown.transpose()?.unwrap_or(false) {
         output::message("the deployment has ended");
     }
     Ok(ExitCode::SUCCESS)

@@ -68,7 +68,12 @@ fn shipped_files_are_found_from_any_program_location() {
         "workers = 2\nconsistency = \"shipped\"\ntau = \"learned\"",
     );
     section(&case, "[quality]\nnetwork = \"shipped\"");
-    let ended = case.start(&["config", "check", "deployment.toml"]).wait();
+    let check = ["config", "check", "deployment.toml"];
+    // Nothing says that the filters find people.
+    let ended = case.start(&check).wait();
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    section(&case, "[pose]\nnetwork = \"none\"");
+    let ended = case.start(&check).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     // A path is used as a path.
     for (from, to) in [

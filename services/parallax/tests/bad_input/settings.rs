@@ -346,7 +346,7 @@ const INPUTS: &[Mistake] = &[
         "folder for a model",
         |it| it.edit("deployment.toml", "model.plx", "a"),
         &["cannot read the model file", "/a"],
-        &["Is a directory"],
+        &["is a folder, not a regular file"],
     ),
     input(
         "absent network",

@@ -118,7 +118,11 @@ impl Case {
 
     /// Starts `parallax` with arguments, in the folder.
     pub(crate) fn start(&self, arguments: &[&str]) -> Started {
-        Started::new(self.folder(), arguments)
+        // Results of the run before may be replaced.
+        let may_force = matches!(arguments.first(), Some(&"run" | &"replay"));
+        let force = (may_force && !arguments.contains(&"--dry-run")).then_some("--force");
+        let arguments: Vec<&str> = arguments.iter().copied().chain(force).collect();
+        Started::new(self.folder(), &arguments)
     }
 
     /// Starts a shell script in the folder; `$PARALLAX` is the program.

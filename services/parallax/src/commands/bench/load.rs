@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     /// Let stages poll for messages: `--set runtime.spin=true`.
     #[arg(long)]
     spin: bool,
-    /// Replace a value of the deployment, for example `--set fuse.workers=2`; may be given several times.
+    /// Replace a value of the deployment, for example `--set capture.scale=0.5`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// The folder for pictures and results.

@@ -22,6 +22,10 @@ use crate::commands::network::keypoints_json;
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
 
+/// How much smaller the picture of the second search is, and its least longest side, pixels.
+const COARSER: usize = 3;
+const SMALLEST: usize = 320;
+
 /// The network that finds keypoints, and the detector of the boxes if there is one.
 pub(super) struct Eyes {
     /// As it is named on the command line.
@@ -99,6 +103,7 @@ impl Detector<'_> {
         let people: Result<Vec<Person>, Failure> = outlines.into_iter().map(&mut see).collect();
         let mut people = people?;
         if let From::Filters(_) = from {
+            people.retain(|it| it.score >= self.arguments.heat);
             people.sort_by(|a, b| b.score.total_cmp(&a.score));
             let mut apart: Vec<Person> = Vec::with_capacity(people.len());
             for person in people {
@@ -127,11 +132,26 @@ impl Detector<'_> {
             return Ok((outlines.collect(), From::Detector));
         }
         let searched = Searched::new(picture, self.longest(), &self.search)?;
+        let size = searched.layout().image_size;
+        let mut outlines = self.boxes(picture, &searched)?;
+        // Who fills the picture is found better in a small one.
+        let [width, height] = size;
+        let longest = width.max(height) / COARSER;
+        if longest >= SMALLEST {
+            let coarse = Searched::new(picture, Some(longest), &self.search)?;
+            outlines.extend(self.boxes(picture, &coarse)?);
+        }
+        Ok((
+            outlines.into_iter().map(plain).collect(),
+            From::Filters(size),
+        ))
+    }
+
+    /// Boxes of the filters, pixels of the picture.
+    fn boxes(&self, picture: &Picture, searched: &Searched) -> Result<Vec<[f64; 4]>, Failure> {
         let found = self.detect(searched.image(picture)?, searched.layout());
         let model = &self.search.model;
-        let outlines = found.iter().map(|it| plain(searched.outline(model, it)));
-        let size = searched.layout().image_size;
-        Ok((outlines.collect(), From::Filters(size)))
+        Ok(found.iter().map(|it| searched.outline(model, it)).collect())
     }
 
     fn report_people(

@@ -21,8 +21,8 @@ pub(super) fn costs(file: &Path) -> Result<Costs, Failure> {
     let text = runtime::read_text(file)?;
     let report: Value = serde_json::from_str(&text).map_err(|error| refused(&error.to_string()))?;
     let folder = report["output"].as_str();
-    let hosts =
-        folder.and_then(|it| std::fs::read_to_string(Path::new(it).join("hosts.json")).ok());
+    let hosts = folder
+        .and_then(|it| files::read_text(&Path::new(it).join("hosts.json"), files::SETTINGS).ok());
     let hosts: Option<Value> = hosts.and_then(|it| serde_json::from_str(&it).ok());
     of_run(&report, hosts.as_ref()).map_err(|what| refused(&what))
 }

@@ -10,7 +10,8 @@ use ratatui::style::{Style, Stylize as _};
 use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 use ratatui::{DefaultTerminal, Frame};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use runtime::{ExitKind, Failure, Namespace, OrFail as _, Stop};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 /// How often a stop request and the end of the deployment are checked.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
@@ -34,7 +35,8 @@ enum Key {
 /// # Errors
 ///
 /// The terminal cannot be used, or the metrics cannot be received.
-pub(super) fn show(live: &mut Live, stop: &Stop, pause: Duration) -> Result<bool, Failure> {
+pub(super) fn show(namespace: &Namespace, stop: &Stop, pause: Duration) -> Result<bool, Failure> {
+    let mut live = Live::open(namespace)?;
     let mut screen = Screen {
         terminal: ratatui::try_init().or_fail(ExitKind::Run)?,
     };
@@ -54,6 +56,10 @@ pub(super) fn show(live: &mut Live, stop: &Stop, pause: Duration) -> Result<bool
             [first, page_len] = draw(frame, &text, first);
         });
         drawn.or_fail(ExitKind::Run)?;
+        if is_gone() {
+            stop.request();
+            break;
+        }
         let left = pause.saturating_sub(updated_at.elapsed());
         match next_key(left.min(POLL_INTERVAL))? {
             Some(Key::Quit) => break,
@@ -117,6 +123,17 @@ fn styled(line: &str) -> Line<'_> {
         Style::new()
     };
     Line::styled(line, style)
+}
+
+/// Whether the terminal has been closed.
+fn is_gone() -> bool {
+    let out = std::io::stdout();
+    let mut watched = [PollFd::new(&out, PollFlags::empty())];
+    let now = Timespec::default();
+    poll(&mut watched, Some(&now)).is_ok()
+        && watched[0]
+            .revents()
+            .intersects(PollFlags::HUP | PollFlags::ERR)
 }
 
 fn next_key(wait: Duration) -> Result<Option<Key>, Failure> {

@@ -105,7 +105,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let save = |learned: &Learned| {
         let text = learned.write().or_fail(ExitKind::Run)?;
         let failure = |error: std::io::Error| runtime::in_file(&arguments.out, &error);
-        std::fs::write(&arguments.out, text).map_err(failure)
+        files::replace(&arguments.out, text.as_bytes()).map_err(failure)
     };
     let done = pool.install(|| learning.run(&sequences.train, &sequences.held_out, &save))?;
     print(arguments, globals, &done)?;

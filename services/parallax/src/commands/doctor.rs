@@ -1,0 +1,232 @@
+//! `parallax doctor`: whether this machine has what Parallax needs, and what to do where it has not.
+
+use std::process::{Command, ExitCode};
+
+use clap::Args;
+use kernels::Isa;
+use launch::output;
+use runtime::{
+    ExitKind, Failure, Namespace, VideoDevice, deployments, free_shared_memory, own_cores,
+};
+use rustix::process::{Resource, getrlimit};
+use serde_json::json;
+
+/// Shared memory of four cameras of 640x480 pixels with the network that ships, and as much again, bytes.
+const SHARED_MEMORY: u64 = 512 << 20;
+/// Open files of a deployment of eight cameras in the process that has most.
+const OPEN_FILES: u64 = 1024;
+/// Stack of the main thread, bytes.
+const STACK: u64 = 1 << 20;
+
+/// Options of `parallax doctor`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Exit code 0 if everything that is needed is there, 3 if something is missing; what is only good to know does not count.
+
+Examples:
+    parallax doctor
+    parallax doctor --json")]
+pub(crate) struct Arguments {
+    /// Print the findings as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How much a finding matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Good,
+    Note,
+    Missing,
+}
+
+impl State {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Good => "ok",
+            Self::Note => "note",
+            Self::Missing => "MISSING",
+        }
+    }
+}
+
+/// One thing that was looked at.
+#[derive(Debug)]
+struct Finding {
+    what: &'static str,
+    state: State,
+    found: String,
+    advice: Option<String>,
+}
+
+impl Finding {
+    fn good(what: &'static str, found: impl Into<String>) -> Self {
+        let found = found.into();
+        Self {
+            what,
+            state: State::Good,
+            found,
+            advice: None,
+        }
+    }
+
+    fn but(self, state: State, advice: impl Into<String>) -> Self {
+        let advice = Some(advice.into());
+        Self {
+            state,
+            advice,
+            ..self
+        }
+    }
+}
+
+/// Looks at the machine.
+pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let mut findings = vec![
+        Finding::good("version", env!("PARALLAX_VERSION")),
+        processor(),
+        program("ffmpeg", State::Missing),
+        program("ffprobe", State::Missing),
+        shared_memory(),
+        limit("open files", Resource::Nofile, OPEN_FILES, "ulimit -n 4096"),
+        limit("stack", Resource::Stack, STACK, "ulimit -s 8192"),
+    ];
+    findings.extend(cameras());
+    findings.push(remains());
+    if arguments.json {
+        let all = findings.iter().map(|it| {
+            json!({ "what": it.what, "state": it.state.name(), "found": it.found, "advice": it.advice })
+        });
+        output::json(&json!({ "schema_version": 1, "findings": all.collect::<Vec<_>>() }))?;
+    } else {
+        for finding in &findings {
+            let (state, what) = (finding.state.name(), finding.what);
+            output::line(format_args!("{state:<8} {what:<14} {}", finding.found))?;
+            if let Some(advice) = &finding.advice {
+                output::line(format_args!("{:<23} -> {advice}", ""))?;
+            }
+        }
+    }
+    let is_missing = findings.iter().any(|it| it.state == State::Missing);
+    Ok(ExitCode::from(if is_missing {
+        ExitKind::Config.status()
+    } else {
+        0
+    }))
+}
+
+fn processor() -> Finding {
+    let cores = own_cores().map_or(0, |cores| cores.len());
+    let isa = Isa::best().name();
+    let found = Finding::good("processor", format!("{cores} cores, {isa}"));
+    if isa == "portable" {
+        let advice = "without AVX2 everything is several times slower";
+        return found.but(State::Note, advice);
+    }
+    if cores < 2 {
+        return found.but(
+            State::Note,
+            "one core: a camera or two at a few frames a second",
+        );
+    }
+    found
+}
+
+/// * `without`: how much it matters that it is not there.
+fn program(name: &'static str, without: State) -> Finding {
+    let run = Command::new(name).arg("-version").output();
+    match run {
+        Ok(output) if output.status.success() => {
+            let text = String::from_utf8_lossy(&output.stdout);
+            let first = text.lines().next().unwrap_or_default();
+            let words = first.split(" Copyright").next();
+            Finding::good(name, words.unwrap_or_default())
+        }
+        Ok(output) => Finding::good(name, format!("ends with {}", output.status))
+            .but(without, "install it anew: Debian's package is `ffmpeg`"),
+        Err(error) => Finding::good(name, format!("cannot be run: {error}")).but(
+            without,
+            "videos and live cameras need it: `apt install ffmpeg`; folders of pictures do not",
+        ),
+    }
+}
+
+fn shared_memory() -> Finding {
+    let what = "/dev/shm";
+    match free_shared_memory() {
+        Ok(bytes) => {
+            let found = Finding::good(what, format!("{} MB free", bytes / 1_000_000));
+            if bytes >= SHARED_MEMORY {
+                return found;
+            }
+            let advice = "four cameras need 100 to 500 MB (`parallax run FILE --dry-run` says how much): \
+                          `mount -o remount,size=1g /dev/shm`, in Docker --shm-size=1g";
+            found.but(State::Note, advice)
+        }
+        Err(error) => Finding::good(what, error.to_string()).but(
+            State::Missing,
+            "processes exchange frames there: mount a tmpfs at /dev/shm",
+        ),
+    }
+}
+
+fn limit(what: &'static str, resource: Resource, needed: u64, advice: &str) -> Finding {
+    match getrlimit(resource).current {
+        None => Finding::good(what, "no limit"),
+        Some(limit) if limit >= needed => Finding::good(what, format!("limit {limit}")),
+        Some(limit) => Finding::good(what, format!("limit {limit}, {needed} are needed"))
+            .but(State::Missing, format!("allow more: `{advice}`")),
+    }
+}
+
+fn cameras() -> Vec<Finding> {
+    let what = "video devices";
+    let devices = match runtime::video_devices() {
+        Ok(devices) => devices,
+        Err(error) => return vec![Finding::good(what, error.to_string())],
+    };
+    if devices.is_empty() {
+        return vec![Finding::good(what, "none")];
+    }
+    let looked = devices.iter().map(|path| match VideoDevice::open(path) {
+        Ok(_) => Finding::good(what, path.display().to_string()),
+        Err(error) => Finding::good(what, format!("{}: {error}", path.display())).but(
+            State::Note,
+            "`parallax cameras` says more; members of the group `video` may open it",
+        ),
+    });
+    looked.collect()
+}
+
+fn remains() -> Finding {
+    let what = "deployments";
+    let all = match deployments(&Namespace::usual_base()) {
+        Ok(all) => all,
+        Err(error) => return Finding::good(what, error.to_string()),
+    };
+    let running = all.iter().filter(|it| it.supervisor.is_some()).count();
+    let dead = all.len() - running;
+    let found = Finding::good(
+        what,
+        format!("{running} running, {dead} left by dead processes"),
+    );
+    if dead > 0 {
+        return found.but(State::Note, "`parallax clean` removes what dead ones left");
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_that_is_not_there_and_a_limit_that_is_too_low_come_with_advice() {
+        let finding = program("parallax-no-such-program", State::Missing);
+        assert_eq!(finding.state, State::Missing);
+        assert!(finding.advice.is_some());
+        let finding = limit("open files", Resource::Nofile, u64::MAX, "ulimit -n 4096");
+        let is_limited = getrlimit(Resource::Nofile).current.is_some();
+        assert_eq!(finding.state == State::Missing, is_limited);
+    }
+}
