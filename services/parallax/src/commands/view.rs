@@ -96,6 +96,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     let mut failed = Ok(());
     view::run(&options, &stop, &mut |url| {
+        if arguments.port.is_none() && !url.contains(&format!(":{}/", Listen::PORT)) {
+            let usual = Listen::PORT;
+            output::message(format_args!("port {usual} is in use: another one is taken"));
+        }
         if arguments.with_parent {
             output::message(format_args!("the page: {url}"));
         } else if arguments.json {
