@@ -53,7 +53,7 @@ fn page(folder: &Path, content: &Content<'_>) -> Result<Page, Failure> {
         space: space(folder, content)?,
         marks: Vec::new(),
         tables,
-        legend: "Thick: the skeleton in space as the view sees it, right orange, left blue; thin and grey: what the view found by itself. \
+        legend: "Thick: the skeleton in space as the view sees it, right orange, left blue; thin and grey: what the view found by itself; pink: where the other views say that one part must lie. \
                  All pictures are in overlays/."
             .to_owned(),
         strips: strips(folder, content.cameras),
