@@ -36,7 +36,7 @@ impl Finder {
         match self {
             Self::Default => "",
             Self::TrackingFilters => {
-                "[pose]\nsearch = \"tracked\"       # near the last pose, and everywhere now and then\n\n"
+                "[pose]\nnetwork = \"none\"        # the filters find people\nsearch = \"tracked\"       # near the last pose, and everywhere now and then\n\n"
             }
         }
     }
