@@ -45,7 +45,7 @@ def write(folder, keys):
 
 
 def run(file, out, *more, ns=None, clock=0, log=None, errors=None, record=None):
-    what = ["record", file, "--results", out, "--out", record, "--force"] if record else ["run", file, "--out", out]
+    what = ["record", file, "--results", out, "--out", record, "--force"] if record else ["run", file, "--out", out, "--force"]
     command = [parallax, *what, "--set", "supervise.deadline_ms=1500",
                "--set", "supervise.hang_limit_s=120", "--set", "results.overlay_every=0"]
     for it in SET:
