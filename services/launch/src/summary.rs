@@ -214,10 +214,7 @@ impl Report {
     /// Whether frames were lost or the cameras contradict each other.
     fn is_lossy(&self, summary: &Summary) -> bool {
         let is_incomplete = summary.frames_missed > 0 || summary.frames < self.n_frames;
-        let is_misplaced = |fit: &CameraFit| fit.suspected || fit.out_of_step;
-        summary.exchanged.is_some()
-            || summary.contradicted.is_some()
-            || summary.calibration.values().any(is_misplaced)
+        trust::are_cameras_doubtful(summary)
             || (self.is_lossless && is_incomplete)
             || summary.frames_not_recorded > 0
             || summary.writes_failed > 0
@@ -235,7 +232,7 @@ impl Report {
     ///
     /// The results cannot be read, or the page cannot be written.
     pub fn write_page(&self, resolved: &Resolved) -> Result<Option<PathBuf>, Failure> {
-        let (Some(_), false) = (self.recorded.summary(), self.is_far) else {
+        let (Some(summary), false) = (self.recorded.summary(), self.is_far) else {
             return Ok(None);
         };
         let rig = inputs::rig_of(&resolved.deployment)?;
@@ -243,7 +240,7 @@ impl Report {
         let cameras: Vec<String> = cameras.map(|camera| camera.name.clone()).collect();
         let content = page::Content {
             name: &self.name,
-            verdict: self.verdict(),
+            verdict: self.verdict(summary),
             text: &self.text(),
             latency: self.recorded.latency(),
             cameras: &cameras,
@@ -253,15 +250,17 @@ impl Report {
         page::write(&resolved.deployment.output, &content).map(Some)
     }
 
-    fn verdict(&self) -> Verdict {
-        let is_good = self.kind().is_none();
+    fn verdict(&self, summary: &Summary) -> Verdict {
         let doubts = self.doubts();
-        let text = match (doubts.first(), self.no_results_reason()) {
-            (_, Some(reason)) => reason,
-            (Some(doubt), None) => format!("The results may be wrong: {doubt}"),
-            (None, None) if is_good => "Nothing speaks against the results".to_owned(),
-            (None, None) => "The run lost frames: see below".to_owned(),
+        let mut text = match self.no_results_reason() {
+            Some(reason) => reason,
+            None => trust::verdict(summary, &doubts).to_owned(),
         };
+        text.extend(doubts.first().map(|doubt| format!(": {doubt}")));
+        let is_good = self.kind().is_none();
+        if !is_good && doubts.is_empty() && !trust::are_cameras_doubtful(summary) {
+            text.push_str("; the run is not whole: see below");
+        }
         Verdict { text, is_good }
     }
 

@@ -7,6 +7,6 @@ mod replace;
 mod user;
 
 pub use folder::Folder;
-pub use read::{KEYPOINTS, MODEL, PICTURE, RESULTS, SETTINGS, open, read, read_text};
+pub use read::{MODEL, PICTURE, RESULTS, SETTINGS, open, read, read_text};
 pub use replace::{beside, replace, replace_by, replace_unsynced};
 pub use user::user;

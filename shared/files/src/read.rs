@@ -11,8 +11,6 @@ use rustix::fs::{Mode, OFlags};
 pub const SETTINGS: u64 = 64 << 20;
 /// Largest picture file, bytes.
 pub const PICTURE: u64 = 512 << 20;
-/// Largest file of keypoints, bytes.
-pub const KEYPOINTS: u64 = 1 << 30;
 /// Largest file of a model or a network, bytes: the format ONNX has no larger ones.
 pub const MODEL: u64 = 2 << 30;
 /// Largest file of results that is read at once, bytes.

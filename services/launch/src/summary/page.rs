@@ -161,10 +161,7 @@ fn strips(folder: &Path, cameras: &[String]) -> Vec<Strip> {
     let n = names.len().min(N_STRIPS);
     let shown = (0..n).map(|nth| &names[(2 * nth + 1) * names.len() / (2 * n)]);
     let strip = |name: &String| Strip {
-        caption: format!(
-            "frame {}",
-            name.trim_end_matches(".png").trim_start_matches('0')
-        ),
+        caption: caption(name),
         pictures: cameras
             .iter()
             .map(|camera| Picture {
@@ -177,6 +174,15 @@ fn strips(folder: &Path, cameras: &[String]) -> Vec<Strip> {
     shown.map(strip).collect()
 }
 
+/// What the pictures of a file name such as `000010.png` show.
+fn caption(name: &str) -> String {
+    let number = name.trim_end_matches(".png");
+    let number = number
+        .parse()
+        .map_or(number.to_owned(), |it: u64| it.to_string());
+    format!("frame {number}")
+}
+
 fn jpeg(file: &Path) -> Option<Vec<u8>> {
     let bytes = files::read(file, files::PICTURE).ok()?;
     let picture = image::load_from_memory(&bytes).ok()?.into_rgb8();
@@ -184,4 +190,22 @@ fn jpeg(file: &Path) -> Option<Vec<u8>> {
     let encoder = JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY);
     picture.write_with_encoder(encoder).ok()?;
     Some(jpeg)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_called_by_their_frame() {
+        assert_eq!(caption("000000.png"), "frame 0");
+        assert_eq!(caption("000120.png"), "frame 120");
+    }
+
+    #[test]
+    fn a_line_of_the_report_becomes_a_row() {
+        let table = reported("room: 2 frames\n  3D            2 of 2 frames\n    a reason\n");
+        assert_eq!(table.rows[0], ["3D", "2 of 2 frames"]);
+        assert_eq!(table.rows.len(), 2);
+    }
 }

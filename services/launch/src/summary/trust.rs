@@ -4,22 +4,29 @@ use core::fmt::Write as _;
 
 use runfiles::{Doubt, Summary, Trust};
 
+/// Whether cameras contradict each other or the calibration.
+pub(super) fn are_cameras_doubtful(summary: &Summary) -> bool {
+    let mut fits = summary.calibration.values();
+    summary.exchanged.is_some()
+        || summary.contradicted.is_some()
+        || fits.any(|fit| fit.suspected || fit.out_of_step)
+}
+
+/// The verdict on the results.
+pub(super) fn verdict(summary: &Summary, doubts: &[Doubt]) -> &'static str {
+    if !doubts.is_empty() || are_cameras_doubtful(summary) {
+        "the results may be wrong"
+    } else if summary.trust.frames < Trust::MIN_FRAMES {
+        "too few frames to judge"
+    } else {
+        "nothing speaks against the results"
+    }
+}
+
 /// The reprojection error, the verdict in one line, and a line for every reason to doubt.
 pub(super) fn text(summary: &Summary, doubts: &[Doubt]) -> String {
     let trust = &summary.trust;
-    let misplaced = summary.calibration.values();
-    let is_misplaced = misplaced
-        .into_iter()
-        .any(|fit| fit.suspected || fit.out_of_step);
-    let is_doubtful = !doubts.is_empty()
-        || is_misplaced
-        || summary.exchanged.is_some()
-        || summary.contradicted.is_some();
-    let verdict = match (trust.frames < Trust::MIN_FRAMES, is_doubtful) {
-        (_, true) => "the results may be wrong",
-        (true, false) => "too few frames to judge",
-        (false, false) => "nothing speaks against the results",
-    };
+    let verdict = verdict(summary, doubts);
     let mut text = summary.reprojection_px.map_or_else(String::new, |px| {
         format!("  reprojection  {px:.2} px (rms over all joints)\n")
     });
