@@ -1,11 +1,13 @@
 //! The maps of the skeleton's joints, as logarithms: the evidence that a network gives.
 
 mod sides;
+mod write;
 
 use fmp::{Layout, Placement, Scope};
 use keypoints::{Codec, Keypoint, Way, Window, joint_rows};
 use skeleton::PARSE14;
 
+use self::write::Write;
 use crate::between::{Tap, between, for_each_row};
 use crate::expected::expected_error;
 use crate::found::{likelihood, score_of, scored, weighted};
@@ -490,15 +492,6 @@ impl JointMaps {
             },
         );
     }
-}
-
-/// How values are written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Write {
-    /// In the place of others.
-    Over,
-    /// Where they are higher than others.
-    Highest,
 }
 
 #[cfg(test)]
