@@ -3,7 +3,7 @@
 use std::process::Command;
 
 /// Features that a user notices.
-const FEATURES: [&str; 5] = ["hosts", "libtorch", "ort", "parquet", "train-quality"];
+const FEATURES: [&str; 3] = ["hosts", "ort", "parquet"];
 
 fn main() {
     for file in ["HEAD", "logs/HEAD"] {

@@ -321,7 +321,7 @@ def busy(folder, processes):
 
 
 def model(data):
-    """The forecast of `parallax simulate hosts`, from the costs of the run on one host, beside what two and three hosts took."""
+    """The forecast of `parallax-lab simulate hosts`, from the costs of the run on one host, beside what two and three hosts took."""
     near = n_cameras // 2
     for n_hosts, file, far in ((2, "two", ["left"]), (3, "hosts", ["left", "right"])):
         folder = f"{out}/model-{n_hosts}"

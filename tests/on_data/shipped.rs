@@ -5,7 +5,7 @@ use std::sync::Arc;
 use datasets::{Person, Picture, ReadOptions, Selection};
 use evaluation::{PcpRule, evaluate};
 use fmp::{Extractor, Layout, Model, Responses, Solver};
-use offline::network::NetworkFile;
+use inputs::network::NetworkFile;
 use posenetwork::springs::TurnedSprings;
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, outline_of, overlap};
 use rayon::prelude::*;

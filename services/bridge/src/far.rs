@@ -5,10 +5,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use crossbeam::channel::{Receiver as ChannelReceiver, Sender, bounded};
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use hosts::{Answer, Content, Grid, Head, Hello, Outbox, Packet, Parcel, Signal, VERSION};
 use messages::{Cause, EvidenceHeader, FrameHeader, Stamp, Status, Timing, topic};
 use recording::{Envelope, Kind, Message};
-use runtime::{ExitKind, Failure, OrFail as _, Service, SliceSubscriber, Waiter, Woken, now_nanos};
+use runtime::{Service, SliceSubscriber, Waiter, Woken};
 use stage::any::Receiver;
 
 use crate::job::{Far, Job};

@@ -4,8 +4,8 @@ use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use failure::{Stop, now_nanos};
 use hosts::{Answer, Clock, Difference, Exchange, Fingerprint, Hello, Signal, VERSION, Welcome};
-use runtime::{Stop, now_nanos};
 
 use crate::address::{Address, LinkError};
 use crate::link::Link;

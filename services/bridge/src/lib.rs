@@ -34,7 +34,8 @@ pub use keys::{KeyError, KeyFiles, make_keys};
 pub use maps::ViewMaps;
 pub use one_thread::{ONE_THREAD, has_one_thread};
 
-use runtime::{Failure, Service};
+use failure::Failure;
+use runtime::Service;
 
 /// Whether this build has what carries messages between hosts.
 pub const HAS_LINK: bool = cfg!(feature = "zenoh");

@@ -11,9 +11,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use hosts::{Arrivals, Gap, Place, Signal};
 use messages::{Cause, Status};
-use runtime::{ExitKind, Failure, OrFail as _, Service, Woken, now_nanos};
+use runtime::{Service, Woken};
 use stage::Stage;
 
 use crate::job::{Job, Near};

@@ -3,10 +3,11 @@
 use core::time::Duration;
 use std::rc::Rc;
 
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use footage::{Fill, Pacer, Size, Warp};
 use messages::{CameraCounts, Cause, FrameHeader, Stamp, Status, Timing, topic};
 use metrics::Passage;
-use runtime::{ExitKind, Failure, OrFail as _, Place, Service, SlicePublisher, Woken, now_nanos};
+use runtime::{Place, Service, SlicePublisher, Woken};
 use stage::Stage;
 
 use crate::job::Job;

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use failure::{Failure, now_nanos};
 use messages::{MAX_NAME, PictureHeader, Stamp, Status, Timing, topic};
-use runtime::{Failure, SendError, Service, SlicePublisher, now_nanos};
+use runtime::{SendError, Service, SlicePublisher};
 
 use crate::job::Job;
 use crate::live::{Grid, LiveJob, Original, Originals};

@@ -2,8 +2,9 @@
 
 use core::time::Duration;
 
+use failure::{Failure, now_nanos};
 use messages::{CameraCounts, Status, TimedBy, UNMEASURED};
-use runtime::{Failure, Service, now_nanos};
+use runtime::Service;
 
 use crate::camera::{Camera, Shot};
 use crate::guard::Guard;

@@ -1,6 +1,7 @@
 //! Sends the frames of one camera.
 
-use runtime::{ExitKind, Failure, OrFail as _, Service, now_nanos};
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
+use runtime::Service;
 
 use crate::camera::{Camera, Shot};
 use crate::job::Job;

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use crate::input::{Candidates, Input, expected_errors};
 use crate::job::Job;
 use crate::worker::Worker;
+use failure::Failure;
 use messages::{ViewPose, topic};
 use pipeline::{Following, Motion};
-use runtime::{Failure, Service};
+use runtime::Service;
 use stage::Stage;
 
 /// Fuses every frame, until the footage of all views ends or a stop is requested.

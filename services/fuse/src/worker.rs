@@ -2,10 +2,11 @@
 
 use std::cell::Ref;
 
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use fmp::Responses;
 use messages::{EvidenceHeader, PairPose, Span, Status};
 use pipeline::{Following, Motion, Others, Support, ViewResult, Views};
-use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, now_nanos};
+use runtime::{Sample, Service};
 use stage::{Context, Frame, Held, Output, Turn};
 use wire::{EvidenceView, WireError};
 

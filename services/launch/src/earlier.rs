@@ -4,11 +4,9 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+use failure::{ExitKind, Failure, in_file};
 use runfiles::{FrameLine, LatencyReport, Line as _, RunSummary, SmoothLine, TimesLine, ViewLine};
-use runtime::{ExitKind, Failure, in_file};
 use serde_json::Value;
-
-use crate::claim;
 
 /// Files and folders that a run writes.
 const RESULTS: [&str; 10] = [
@@ -37,7 +35,7 @@ const MANIFEST: &str = ".export.json";
 ///
 /// As above; another run writes into the folder; the folder cannot be read.
 pub fn make_way(folder: &Path, force: bool) -> Result<(), Failure> {
-    claim::check(folder)?;
+    failure::check_claim(folder)?;
     let lies_there = |name: &&str| fs::symlink_metadata(folder.join(name)).is_ok();
     let unfinished = format!("{}.part", FrameLine::FILE);
     let is_unfinished = fs::metadata(folder.join(&unfinished)).is_ok_and(|data| data.len() > 0);

@@ -8,16 +8,15 @@ use core::ops::Range;
 
 use capture::Feed;
 use deployment::Deployment;
+use failure::Console;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use footage::{FrameView, SourceSpec};
 use geometry::{Camera, Rig, upright_roll};
 use keypointfiles::KeypointSource;
 use keypoints::{Keypoint, joint_rows, mirrored};
-use offline::Console;
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use skeleton::{PARSE14, SIDES};
 use synchronisation::{Film, Joint, Person, Shot};
 
-use crate::inputs;
 use crate::keypoints as keypoint_files;
 use eyes::Eyes;
 use upright::Upright;
@@ -76,7 +75,7 @@ pub fn films(
     poses: Poses,
     (stop, console): (&Stop, &dyn Console),
 ) -> Result<Films, Failure> {
-    let deployment = &inputs::settled(deployment)?;
+    let deployment = &crate::cameras::settled(deployment)?;
     let rig = match poses {
         Poses::OfRig => inputs::rig_of(deployment)?,
         Poses::Unknown => inputs::lenses_of(deployment)?,
@@ -125,7 +124,7 @@ pub fn films(
 /// A camera is live, or not in the rig.
 pub fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failure> {
     let of_entry = |it: &deployment::capture::Camera| {
-        if inputs::is_live(&it.source) {
+        if crate::cameras::is_live(&it.source) {
             let message = format!(
                 "camera {:?} is live: nothing of it can be compared with others",
                 it.name
@@ -234,7 +233,7 @@ fn whole(deployment: &Deployment, camera: usize, start: u64, step: u64) -> Sourc
         start,
         step,
         count: None,
-        ..inputs::source(&deployment.cameras[camera], &deployment.capture)
+        ..crate::cameras::source(&deployment.cameras[camera], &deployment.capture)
     }
 }
 

@@ -6,11 +6,10 @@ use std::sync::Arc;
 use bridge::{Address, KeyFiles, NearHost, ViewMaps};
 use deployment::Deployment;
 use deployment::hosts::{Carry, Host};
+use failure::{ExitKind, Failure, OrFail as _};
 use hosts::Fingerprint;
 use messages::topic;
-use runtime::{ExitKind, Failure, OrFail as _};
 
-use crate::inputs;
 use crate::prepare::{Prepared, View};
 use crate::resolved::Resolved;
 
@@ -169,7 +168,7 @@ fn results_settings(pose: &deployment::pose::Config) -> deployment::pose::Config
 }
 
 fn read(file: &Path) -> Result<Vec<u8>, Failure> {
-    files::read(file, files::SETTINGS).map_err(|error| runtime::in_file(file, &error))
+    files::read(file, files::SETTINGS).map_err(|error| failure::in_file(file, &error))
 }
 
 /// The part of a deployment that a host runs: one with cameras has a name and a folder of its own, so that it can run beside the others
@@ -243,7 +242,7 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
             Vec::new()
         },
         sizes: sizes.collect(),
-        lead_nanos: inputs::lead_nanos(deployment),
+        lead_nanos: crate::cameras::lead_nanos(deployment),
         period_nanos: 1e9 / rate_hz,
         start_frame: capture.start_frame,
         frame_step: step,

@@ -3,14 +3,13 @@
 use capture::Blank;
 use deployment::Deployment;
 use deployment::capture::{Camera, Config};
+use failure::{ExitKind, Failure, OrFail as _};
 use footage::Size;
 use keypointfiles::KeypointSource;
 use keypoints::Sides;
 use keypoints::files::NameSet;
 use messages::MAX_KEYPOINTS;
-use runtime::{ExitKind, Failure, OrFail as _};
 
-use crate::inputs;
 use crate::resolved::Resolved;
 
 /// Opens the keypoints of a camera; none for a camera that names none.

@@ -3,7 +3,7 @@
 //! | step | where |
 //! |---|---|
 //! | read the deployment file and check it against this machine | [`load`] |
-//! | read its input files and footage | [`inputs`], [`Shipped`] |
+//! | read its input files, and look at its footage | [`inputs`], [`cameras`] |
 //! | resolve it: the deployment with the metadata of its footage, the input of every process | [`plan::resolve`], [`Resolved`] |
 //! | prepare model, views and settings of the stages | [`Prepared`] |
 //! | plan processes and topics, and run them | [`Planned`] |
@@ -15,10 +15,9 @@
 //! | read the settings in a recording, and report its flaws | [`recorded`] |
 //! | write a finished run into the files of other tools | [`export`] |
 //!
-//! Data goes to standard output and messages to standard error, both through [`output`].
+//! Data goes to standard output and messages to standard error, both through [`terminal::output`].
 #![forbid(unsafe_code)]
 
-mod claim;
 mod earlier;
 mod find_every;
 mod padding;
@@ -30,26 +29,23 @@ mod sanity;
 mod scheduling;
 mod search_size;
 
-mod shipped;
 mod vertical;
 mod views;
 
 pub mod budget;
+pub mod cameras;
 pub mod export;
 pub mod films;
 pub mod hosts;
-pub mod inputs;
 pub mod keypoints;
 pub mod live;
 pub mod load;
 pub mod no_results;
-pub mod output;
 pub mod plan;
 pub mod process;
 pub mod recorded;
 pub mod summary;
 
-pub use claim::Claim;
 pub use earlier::make_way;
 pub use find_every::FOLLOWED_S;
 pub use planned::Planned;
@@ -57,6 +53,5 @@ pub use prepare::{Prepared, View, frame_scale};
 pub use resolved::{Resolved, SERVICES};
 pub use search_size::{CameraSize, SearchSize};
 
-pub use shipped::Shipped;
 pub use summary::{Recorded, Report, Watcher};
 pub use views::ViewReport;

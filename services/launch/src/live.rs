@@ -8,10 +8,8 @@ use core::time::Duration;
 use std::path::Path;
 use std::time::Instant;
 
-use runtime::{
-    ExitKind, Failure, Namespace, Observer, ObserverError, OrFail as _, deployments, now_nanos,
-    wait_for_description,
-};
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
+use runtime::{Namespace, Observer, ObserverError, deployments, wait_for_description};
 
 pub use describe::{describe, measured};
 pub use snapshot::{ProcessSnapshot, Snapshot, State};

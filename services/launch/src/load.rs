@@ -6,10 +6,8 @@ use std::path::{Path, PathBuf};
 use capture::Blank;
 use deployment::pose::Precision;
 use deployment::{ConfigError, Deployment, Loaded, Machine};
-use runtime::{ExitKind, Fault};
+use failure::{ExitKind, Fault};
 use scene::Address;
-
-use crate::inputs;
 
 /// Why a deployment could not be loaded.
 #[derive(Debug, thiserror::Error)]
@@ -112,7 +110,7 @@ impl Machine for ThisMachine {
     }
 
     fn is_live(&self, named: &str) -> bool {
-        inputs::is_live(named)
+        crate::cameras::is_live(named)
     }
 
     fn has(&self, precision: Precision) -> Result<(), String> {

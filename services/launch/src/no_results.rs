@@ -1,23 +1,8 @@
-//! Runs without results: the exit status and the reason.
-
-use std::process::ExitCode;
+//! The reason why a run has no results.
 
 use runfiles::Summary;
-use runtime::{ExitKind, Failure};
 
 use crate::views::ViewReport;
-
-/// The exit status of a command: success if it found something.
-///
-/// * `message`: the error message if it found nothing.
-///
-/// # Errors
-///
-/// Nothing was found: `ExitKind::Degraded` with the message.
-pub fn require(is_found: bool, message: &str) -> Result<ExitCode, Failure> {
-    let failure = || Failure::new(ExitKind::Degraded, message);
-    is_found.then_some(ExitCode::SUCCESS).ok_or_else(failure)
-}
 
 /// Why a run has no joints in space. None if it has some, or if its only view shows somebody.
 ///

@@ -6,18 +6,15 @@ use std::path::{Path, PathBuf};
 
 use deployment::hosts::Host;
 use deployment::{Content, Deployment, Process, Room, Stage, Topology, ViewSize};
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use messages::{
     EvidenceHeader, FrameHeader, PairPose, PictureHeader, Pose3d, ViewPose, ViewQuality,
 };
-use runtime::{
-    Delivery, ExitKind, Failure, HEARTBEAT, Limits, MOST_GUESTS, Namespace, OrFail as _, TopicPlan,
-    now_nanos, process_topics,
-};
+use runtime::{Delivery, HEARTBEAT, Limits, MOST_GUESTS, Namespace, TopicPlan, process_topics};
 use supervise::{Plan, Policy, ProcessSpec, Role};
 use tracing::Level;
 
 use crate::hosts;
-use crate::inputs;
 use crate::keypoints;
 use crate::prepare::{Prepared, framing};
 use crate::process::Name;
@@ -50,12 +47,12 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
 pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolved, Failure> {
     let lengths = keypoints::lengths(deployment)?;
     let deployment = &keypoints::with_pictures(deployment.clone(), &lengths)?;
-    let deployment = &inputs::settled(deployment)?;
+    let deployment = &crate::cameras::settled(deployment)?;
     let is_here = |camera: usize| {
         let name = &deployment.cameras[camera].name;
         host.is_none_or(|it| it.views.contains(name))
     };
-    let footage = inputs::footage(deployment, &is_here);
+    let footage = crate::cameras::footage(deployment, &is_here);
     let found = keypoints::found(deployment)?;
     let mut resolved = Resolved {
         footage: footage.map_err(|it| inputs::of_deployment(it, deployment))?,

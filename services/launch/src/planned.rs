@@ -4,18 +4,18 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use deployment::Deployment;
-use runtime::{Failure, Scheduling, Stop};
+use failure::{Failure, Stop};
+use runtime::Scheduling;
 use supervise::{Event, Plan};
 use tracing::Level;
 
-use crate::claim::Claim;
-use crate::inputs;
 use crate::plan;
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;
 use crate::scheduling;
 use crate::search_size::SearchSize;
 use crate::summary::{Report, Watcher};
+use failure::Claim;
 
 /// A deployment with the plan of its run.
 #[derive(Debug)]
@@ -72,7 +72,7 @@ impl Planned {
         &self.plan
     }
 
-    /// The session, which is the time of planning (`runtime::now_nanos`).
+    /// The session, which is the time of planning (`failure::now_nanos`).
     pub fn session(&self) -> u64 {
         self.plan.session
     }
@@ -118,7 +118,7 @@ impl Planned {
         let deployment = &self.resolved.deployment;
         let folder = &deployment.output;
         inputs::make_folder(folder)?;
-        let _claim = Claim::of(folder, &format!("deployment {}", deployment.name))?;
+        let _claim = Claim::take(folder, &format!("deployment {}", deployment.name))?;
         self.resolved.write(&resolved_file(deployment))?;
         let begin = Instant::now();
         let mut watcher = Watcher::new(&self.resolved, quiet);

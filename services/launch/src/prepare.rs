@@ -5,17 +5,16 @@ use std::sync::Arc;
 
 use consistency::Learned;
 use deployment::Deployment;
+use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::{Framing, OutSize, Rig, upright_roll};
 use multiview::ViewPlan;
 use nalgebra::UnitVector3;
 use pipeline::{BodySettings, EstimatorSettings, SkeletonSettings, ViewSettings};
 use posenetwork::MapSettings;
-use runtime::{ExitKind, Failure, OrFail as _};
 use skeleton::JointSet;
 use viewquality::Predictor;
 
-use crate::inputs;
 use crate::padding;
 use crate::resolved::Resolved;
 
@@ -115,7 +114,7 @@ impl Prepared {
         let table = inputs::quality_table(file, self.model.n_parts())?;
         let name = config.name_in_table(&resolved.deployment.cameras[view].name);
         let predictor = Predictor::from_table(&table, quality::selection(config), name);
-        let predictor = predictor.map_err(|error| runtime::in_file(file, &error))?;
+        let predictor = predictor.map_err(|error| failure::in_file(file, &error))?;
         Ok(Some(predictor))
     }
 

@@ -9,17 +9,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use deployment::Stage;
+use failure::{ExitKind, Failure, OrFail as _};
 use messages::topic;
 use multiview::SpaceSettings;
 use pipeline::{ExtrasStep, FuseStep, SkeletonStep, SpaceStep, Views};
 use posenetwork::MapSettings;
 use rayon::ThreadPoolBuilder;
-use runtime::{ExitKind, Failure, OrFail as _, Service};
+use runtime::Service;
 use viewquality::Forecaster;
 
 use crate::find_every::{self, FOLLOWED_S};
 use crate::hosts;
-use crate::inputs;
 use crate::prepare::{Prepared, frame_scale, framing, least_score};
 use crate::recorded;
 use crate::resolved::Resolved;
@@ -167,10 +167,10 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
     let rig = inputs::rig_of(deployment)?;
     let job = capture::Job {
         view,
-        source: inputs::source(&deployment.cameras[view], &deployment.capture),
+        source: crate::cameras::source(&deployment.cameras[view], &deployment.capture),
         timeline: resolved.footage[view].timeline,
         live: live::job(resolved, view),
-        lead_nanos: inputs::lead_nanos(deployment),
+        lead_nanos: crate::cameras::lead_nanos(deployment),
         faults: deployment.cameras[view].fault.clone(),
         frozen_after: deployment.capture.frozen_after,
         skew_nanos: live::skew_nanos(resolved, view),

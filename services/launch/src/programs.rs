@@ -1,7 +1,8 @@
 //! What a running deployment says about itself to other programs.
 
+use failure::{ExitKind, Failure, OrFail as _};
 use runfiles::{Running, RunningView};
-use runtime::{Delivery, ExitKind, Failure, OrFail as _};
+use runtime::Delivery;
 
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;

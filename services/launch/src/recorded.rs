@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use deployment::{Deployment, RecordingPlan, Stage};
+use failure::{ExitKind, Failure, OrFail as _};
 use messages::topic;
 use recording::{About, Checked, Damaged, Kind, Recording, Without};
-use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;
-use crate::shipped::Shipped;
+use inputs::Shipped;
 
 /// The maximal number of damaged messages, and of damaged places, that are listed as text.
 const MAX_LISTED: usize = 10;
@@ -73,7 +73,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
         .flatten()
     {
         let bytes =
-            files::read(file, files::MODEL).map_err(|error| runtime::in_file(file, &error))?;
+            files::read(file, files::MODEL).map_err(|error| failure::in_file(file, &error))?;
         files.insert(file.clone(), checksum::fnv1a(&bytes));
     }
     let orientation = &deployment.pose.orientation;
@@ -106,8 +106,8 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
 ///
 /// The file cannot be read or is not a recording.
 pub fn open(file: &Path) -> Result<Recording, Failure> {
-    let mut input = files::open(file).map_err(|error| runtime::in_file(file, &error))?;
-    recording::scan(&mut input).map_err(|error| runtime::in_file(file, &error))
+    let mut input = files::open(file).map_err(|error| failure::in_file(file, &error))?;
+    recording::scan(&mut input).map_err(|error| failure::in_file(file, &error))
 }
 
 /// Reads the settings of the recorded run.
@@ -117,9 +117,9 @@ pub fn open(file: &Path) -> Result<Recording, Failure> {
 /// The recording has none, or those of another version.
 pub fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure> {
     let about = recording.about.as_ref();
-    let about = about.map_err(|error| runtime::in_file(file, error))?;
+    let about = about.map_err(|error| failure::in_file(file, error))?;
     serde_json::from_str(&about.settings).map_err(|error| {
-        let failure = runtime::in_file(file, &error);
+        let failure = failure::in_file(file, &error);
         let (theirs, ours) = (&about.version, env!("CARGO_PKG_VERSION"));
         failure.with_hint(format!(
             "recorded by version {theirs}, this is version {ours}"
@@ -164,9 +164,9 @@ pub fn damaged(
         // Pictures of cameras are checked as they are read.
         Some(Kind::Pose3d | Kind::Health | Kind::Picture) | None => false,
     };
-    let mut input = files::open(file).map_err(|error| runtime::in_file(file, &error))?;
+    let mut input = files::open(file).map_err(|error| failure::in_file(file, &error))?;
     recording::check(&mut input, recording, is_replayed)
-        .map_err(|error| runtime::in_file(file, &error))
+        .map_err(|error| failure::in_file(file, &error))
 }
 
 /// Describes the damaged messages as text, and lists the first of them; none if there are none.

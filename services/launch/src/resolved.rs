@@ -6,10 +6,11 @@ use std::path::Path;
 
 use deployment::hosts::Host;
 use deployment::{Deployment, RecordingPlan, Replay, Topology};
-use runtime::{Delivery, ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _};
+use runtime::Delivery;
 use serde::{Deserialize, Serialize};
 
-use crate::inputs::{self, Footage};
+use crate::cameras::Footage;
 use crate::search_size::SearchSize;
 
 /// A deployment with the metadata of its footage, the input of every process.
@@ -66,13 +67,13 @@ impl Resolved {
     /// Whether it has a live camera.
     pub fn has_live(&self) -> bool {
         let mut cameras = self.deployment.cameras.iter();
-        cameras.any(|it| inputs::is_live(&it.source))
+        cameras.any(|it| crate::cameras::is_live(&it.source))
     }
 
     /// Views with a live camera.
     pub fn live_views(&self) -> Vec<usize> {
         let cameras = self.deployment.cameras.iter().enumerate();
-        let live = cameras.filter(|it| inputs::is_live(&it.1.source));
+        let live = cameras.filter(|it| crate::cameras::is_live(&it.1.source));
         live.map(|it| it.0).collect()
     }
 
@@ -106,7 +107,7 @@ impl Resolved {
             file,
             footage::without_passwords(&self.to_text()?).as_bytes(),
         )
-        .map_err(|error| runtime::in_file(file, &error))
+        .map_err(|error| failure::in_file(file, &error))
     }
 
     /// The text that every process gets as standard input.
@@ -124,14 +125,14 @@ impl Resolved {
     ///
     /// Neither standard input nor the file can be read, or the text is not a resolved deployment.
     pub fn read(file: &Path) -> Result<Self, Failure> {
-        let wrong = |error: &dyn core::error::Error| runtime::in_file(file, error);
+        let wrong = |error: &dyn core::error::Error| failure::in_file(file, error);
         let mut text = String::new();
         if !std::io::stdin().is_terminal() {
             let read = std::io::stdin().read_to_string(&mut text);
             read.map_err(|error| wrong(&error))?;
         }
         if text.is_empty() {
-            text = runtime::read_text(file)?;
+            text = failure::read_text(file)?;
         }
         serde_json::from_str(&text).map_err(|error| wrong(&error))
     }

@@ -4,13 +4,12 @@ use std::path::PathBuf;
 
 use capture::{Blank, Feed};
 use deployment::Deployment;
+use failure::{ExitKind, Failure};
 use footage::{LiveAddress, SourceSpec};
 use geometry::Rig;
 use geometry::files::{Finding, Severity, check as check_rig};
-use runtime::{ExitKind, Failure};
 use scene::Address;
 
-use crate::inputs;
 use crate::keypoints;
 use crate::resolved::Resolved;
 
@@ -322,13 +321,13 @@ impl FirstImages {
         capture: &deployment::capture::Config,
     ) -> Option<Self> {
         let is_made = Address::is_address(&camera.source) || Blank::is_blank(&camera.source);
-        if is_made || inputs::is_live(&camera.source) {
+        if is_made || crate::cameras::is_live(&camera.source) {
             return None;
         }
         let spec = SourceSpec {
             step: 5,
             count: Some(2),
-            ..inputs::source(camera, capture)
+            ..crate::cameras::source(camera, capture)
         };
         // Unreadable footage is reported where it is read.
         let mut feed = Feed::open(&spec).ok()?;

@@ -38,7 +38,7 @@ pub struct CameraSize {
 impl SearchSize {
     /// Chooses the size of every camera, unless the deployment says it.
     ///
-    /// * `rig`: as [`crate::inputs::rig_of`] reads it.
+    /// * `rig`: as [`inputs::rig_of`] reads it.
     ///
     /// Also `None` if the rig lacks a camera: that error is reported where the frames are planned.
     pub fn of(deployment: &Deployment, rig: &Rig) -> Option<Self> {

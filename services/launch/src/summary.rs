@@ -13,16 +13,15 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use failure::{ExitKind, Failure};
 use messages::Refusal;
 use metrics::Reading;
 use report::run::Verdict;
 use runfiles::{CameraFit, Doubt, LatencyReport, Summary};
-use runtime::{ExitKind, Failure};
 use serde_json::{Value, json};
 use supervise::Outcome;
 
 use crate::budget::{self, Budget};
-use crate::inputs;
 use crate::live;
 use crate::no_results;
 use crate::resolved::Resolved;

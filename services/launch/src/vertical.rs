@@ -6,14 +6,12 @@ mod keypoints;
 
 use capture::{Blank, Feed};
 use deployment::Deployment;
+use failure::{ExitKind, Failure};
 use fmp::{Layout, Search};
 use footage::{Fill, Size, SourceSpec, Warp};
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
 use nalgebra::{Matrix3, SymmetricEigen, UnitVector3, Vector3};
-use runtime::{ExitKind, Failure};
-
-use crate::inputs;
 
 /// Number of images per camera that are searched.
 const N_PICTURES: u64 = 2;
@@ -291,7 +289,7 @@ impl<'a> View<'a> {
         let spec = SourceSpec {
             step: STEP,
             count: Some(N_PICTURES),
-            ..inputs::source(entry, capture)
+            ..crate::cameras::source(entry, capture)
         };
         let mut feed = Feed::open(&spec).ok()?;
         let mut rgb = Vec::new();

@@ -3,12 +3,10 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    bench, calib, calibrate, cameras, chaos, completions, config, demo, deployments, detect,
-    doctor, eval, export, fuse_frame, hosts, messages, model, new, publish, record, replay, run,
-    service, simulate, smooth, sync, synth, top, train, view,
+    bench, calib, calibrate, cameras, chaos, config, demo, deployments, detect, doctor, export,
+    hosts, messages, new, publish, record, replay, run, service, smooth, sync, top, view,
 };
-use crate::exit::EXIT_CODES;
-use crate::globals::Globals;
+use terminal::{EXIT_CODES, Globals, completions};
 
 const LONG_ABOUT: &str = "\
 Calibrated, synchronised cameras in, 3D human skeletons out.
@@ -16,7 +14,9 @@ Calibrated, synchronised cameras in, 3D human skeletons out.
 A run is described by a deployment file (ten lines: the cameras, their calibration, a model) and
 consists of one process per stage and camera, all started and watched by `parallax run`:
 
-    capture -> pose -> (quality) -> fuse -> triangulate -> results";
+    capture -> pose -> (quality) -> fuse -> triangulate -> results
+
+Training, evaluation and synthetic sequences are in `parallax-lab`.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -38,12 +38,7 @@ Examples:
     parallax config show my.toml                        every value, and where it comes from
     parallax config schema > parallax.schema.json       completion and checks in an editor
     parallax detect photo.jpg --model parse.mat --json  people in single images
-    parallax model import parse.mat --out parse.plx     converts another format's model
-    parallax train fmp PARSE --only 1-100 --negatives neg/ --out person.fmp   a model of one's own
-    parallax model judge person.fmp PARSE --only 101-200    how good it is
-    parallax eval HumanEva_I --model he.txt --out out/he    the paper's evaluation
     parallax smooth out/run                             smoothed trajectories and joint angles of a run
-    parallax synth out/walk --actions walking           synthetic pictures, with the truth
     parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
     parallax sync estimate my.toml --write              how far the clocks of recorded cameras are apart
     parallax calibrate people my.toml --height-m 1.78 --out rig.toml   where the cameras stand, from someone who walks about
@@ -92,18 +87,8 @@ pub(crate) enum Command {
     Bench(bench::Command),
     /// Find people in single images.
     Detect(detect::Arguments),
-    /// Fuse one synchronised set of still images, in this process.
-    FuseFrame(fuse_frame::Arguments),
     /// Make a deployment from footage, step by step.
     New(Box<new::Arguments>),
-    /// Evaluate versions of the method on sequences whose joints are known.
-    Eval(Box<eval::Arguments>),
-    /// Train a model from annotated people.
-    #[command(subcommand)]
-    Train(train::Command),
-    /// Read, show, convert and try models.
-    #[command(subcommand)]
-    Model(model::Command),
     /// Read, show, check and convert calibrations.
     #[command(subcommand)]
     Calib(calib::Command),
@@ -127,11 +112,6 @@ pub(crate) enum Command {
     /// Deployments of several machines: their state, and their keys.
     #[command(subcommand)]
     Hosts(hosts::Command),
-    /// Work out what a deployment will take, before there is one.
-    #[command(subcommand)]
-    Simulate(simulate::Command),
-    /// Make synthetic sequences of people, with the truth.
-    Synth(Box<synth::Arguments>),
     /// List running deployments, and what dead ones have left in shared memory; or show the processes of one.
     Status(deployments::StatusArguments),
     /// Watch the processes of a running deployment: rates, times, losses, memory.

@@ -5,38 +5,30 @@ pub(crate) mod calib;
 pub(crate) mod calibrate;
 pub(crate) mod cameras;
 pub(crate) mod chaos;
-pub(crate) mod completions;
 pub(crate) mod config;
 pub(crate) mod demo;
 pub(crate) mod deployments;
 pub(crate) mod detect;
 pub(crate) mod doctor;
-pub(crate) mod eval;
 pub(crate) mod export;
-pub(crate) mod fuse_frame;
 pub(crate) mod hosts;
-pub(crate) mod judge;
 pub(crate) mod messages;
-pub(crate) mod model;
-pub(crate) mod network;
 pub(crate) mod new;
 pub(crate) mod publish;
 pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod run;
 pub(crate) mod service;
-pub(crate) mod simulate;
 pub(crate) mod smooth;
 pub(crate) mod sync;
-pub(crate) mod synth;
 pub(crate) mod top;
-pub(crate) mod train;
 pub(crate) mod view;
 
 use std::process::ExitCode;
 
 use clap::CommandFactory as _;
-use runtime::{Failure, init_logging};
+use failure::{Failure, init_logging};
+use terminal::completions;
 
 use crate::cli::{Cli, Command};
 
@@ -58,11 +50,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Replay(it) => replay::run(&it, cli.globals),
         Command::Export(it) => export::run(&it, cli.globals),
         Command::Detect(it) => detect::run(&it),
-        Command::FuseFrame(it) => fuse_frame::run(&it),
         Command::New(it) => new::run(&it, cli.globals),
-        Command::Eval(it) => eval::run(&it, cli.globals),
-        Command::Train(it) => train::run(it, cli.globals),
-        Command::Model(it) => model::run(&it, cli.globals),
         Command::Calib(it) => calib::run(&it),
         Command::Calibrate(it) => calibrate::run(&it, cli.globals),
         Command::Cameras(it) => cameras::run(&it),
@@ -73,10 +61,8 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Top(it) => top::run(&it),
         Command::View(it) => view::run(&it, cli.globals),
         Command::Clean(it) => deployments::clean(&it),
-        Command::Synth(it) => synth::run(&it, cli.globals),
         Command::Smooth(it) => smooth::run(&it, cli.globals),
         Command::Hosts(it) => hosts::run(&it),
-        Command::Simulate(it) => simulate::run(&it),
         Command::Sync(it) => sync::run(&it, cli.globals),
         Command::Doctor(it) => doctor::run(&it),
         Command::Completions(it) => completions::run(&it, Cli::command()),

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use fmp::{Layout, Model, Pose};
-use geometry::Framing;
 use serde_json::{Map, Value, json};
 use skeleton::{JointMap, JointSet};
 
@@ -22,7 +21,6 @@ pub(crate) struct Placed<'a> {
     pose: &'a Pose,
     model: &'a Model,
     layout: &'a Layout,
-    framing: Option<&'a Framing>,
     /// Reported pixels per pixel of the searched image, across and down.
     scaled: [f64; 2],
 }
@@ -34,16 +32,7 @@ impl<'a> Placed<'a> {
             pose,
             model,
             layout,
-            framing: None,
             scaled: [1.0; 2],
-        }
-    }
-
-    /// Reports pixels of the footage instead of those of the frame.
-    pub(crate) fn in_footage(self, framing: &'a Framing) -> Self {
-        Self {
-            framing: Some(framing),
-            ..self
         }
     }
 
@@ -85,10 +74,6 @@ impl<'a> Placed<'a> {
 
     fn part(&self, part: usize, [x, y]: [f64; 2]) -> Value {
         let mixture = self.pose.parts[part].mixture + 1;
-        if self.framing.is_some() {
-            // A box in a rotated frame is not axis-aligned in the footage.
-            return json!({ "x": x, "y": y, "type": mixture });
-        }
         let [x1, y1, x2, y2] = self.pose.part_box(self.model, self.layout, part);
         let ([x1, y1], [x2, y2]) = (self.at([x1, y1]), self.at([x2, y2]));
         let corners = [x1, y1, x2, y2];
@@ -97,15 +82,11 @@ impl<'a> Placed<'a> {
 
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [right, down] = self.scaled;
-        let scaled = if self.scaled == [1.0; 2] {
+        if self.scaled == [1.0; 2] {
             [x, y]
         } else {
             [(x + 0.5) * right - 0.5, (y + 0.5) * down - 0.5]
-        };
-        self.framing.map_or(scaled, |it| {
-            it.source_from_output()
-                .map(|row| row[0] * x + row[1] * y + row[2])
-        })
+        }
     }
 }
 

@@ -27,19 +27,16 @@
 mod cli;
 mod commands;
 mod describe;
-mod exit;
-mod globals;
 mod stage;
-mod terminal;
 
 use std::process::ExitCode;
 
 use clap::Parser as _;
 
 fn main() -> ExitCode {
-    if let Err(error) = runtime::guard_process() {
-        return runtime::Failure::new(runtime::ExitKind::Run, error).exit();
+    if let Err(error) = failure::guard_process() {
+        return failure::Failure::new(failure::ExitKind::Run, error).exit();
     }
     let cli = cli::Cli::parse();
-    runtime::run_command(|| commands::run(cli))
+    failure::run_command(|| commands::run(cli))
 }

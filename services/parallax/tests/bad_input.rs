@@ -162,7 +162,7 @@ fn models() {
             broken: |it| fs::remove_file(it.path("model.plx")).unwrap(),
             arguments: RUN,
             code: 4,
-            words: &["model.plx", "parallax model import"],
+            words: &["model.plx", "parallax-lab model import"],
         },
         Row {
             what: "truncated",

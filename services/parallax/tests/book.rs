@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use blocks::{Block, blocks};
-use command::{Line, lines};
+use command::{Line, Program, lines};
 
 /// Keys that a part of a deployment file leaves out.
 const BASE: &str = r#"
@@ -30,11 +30,11 @@ source = "right.mp4"
 fn every_command_line_is_one_that_the_executable_takes() {
     let mut n = 0;
     for (place, line) in command_lines() {
-        let Some(arguments) = line.parallax() else {
+        let Some(command) = line.ours() else {
             continue;
         };
         n += 1;
-        if let Err(problem) = command::check(arguments) {
+        if let Err(problem) = command::check(command) {
             panic!("{place}: `{line}`\n{problem}");
         }
     }
@@ -52,7 +52,8 @@ fn a_command_line_that_is_wrong_is_found() {
         ("parallax run", "an argument is missing"),
         ("parallax record my.toml", "a required option is missing"),
         ("parallax run one.toml two.toml", "one argument too many"),
-        ("parallax train", "a subcommand is missing"),
+        ("parallax-lab train", "a subcommand is missing"),
+        ("parallax eval out", "a command of the other executable"),
         (
             "cargo run --release --features nothing -- demo",
             "a feature",
@@ -62,8 +63,8 @@ fn a_command_line_that_is_wrong_is_found() {
         let line = lines(text).pop().unwrap();
         let refused = line.cargo_problem().is_some()
             || line
-                .parallax()
-                .is_some_and(|arguments| command::check(arguments).is_err());
+                .ours()
+                .is_some_and(|command| command::check(command).is_err());
         assert!(refused, "`{text}` is taken: {what}");
     }
     for text in [
@@ -71,7 +72,7 @@ fn a_command_line_that_is_wrong_is_found() {
         "parallax detect photo.jpg --threshold -0.5 > people.jsonl",
     ] {
         let line = lines(text).pop().unwrap();
-        assert_eq!(command::check(line.parallax().unwrap()), Ok(()), "{text}");
+        assert_eq!(command::check(line.ours().unwrap()), Ok(()), "{text}");
     }
 }
 
@@ -100,10 +101,10 @@ fn blocks_marked_to_run_succeed_in_an_empty_folder() {
         n += 1;
         let folder = tempfile::tempdir().unwrap();
         for line in lines(&block.text) {
-            let arguments = line
-                .parallax()
+            let (program, arguments) = line
+                .ours()
                 .unwrap_or_else(|| panic!("{place}: `{line}` is no command of parallax"));
-            let ended = parallax(folder.path(), arguments);
+            let ended = run(program, folder.path(), arguments);
             assert!(
                 ended.status.success(),
                 "{place}: `{line}` ended with {}\n{}",
@@ -138,7 +139,7 @@ fn results_are_described(folder: &Path) -> usize {
 
 #[test]
 fn the_reference_has_every_exit_code() {
-    let help = parallax(&root(), &["--help".to_owned()]).stdout;
+    let help = run(Program::Parallax, &root(), &["--help".to_owned()]).stdout;
     let help = String::from_utf8(help).unwrap();
     let (_, table) = help.split_once("Exit codes:").unwrap();
     let codes = table.lines().skip(1).map_while(|line| {
@@ -259,7 +260,7 @@ fn show(text: &str) -> Output {
     let base = if is_whole { "" } else { BASE };
     fs::write(folder.path().join("my.toml"), format!("{base}\n{text}")).unwrap();
     let arguments = ["config", "show", "my.toml"].map(str::to_owned);
-    parallax(folder.path(), &arguments)
+    run(Program::Parallax, folder.path(), &arguments)
 }
 
 /// Gives every deployment that a command has written a name that no other test has.
@@ -280,8 +281,8 @@ fn rename_deployments(folder: &Path) {
     }
 }
 
-fn parallax(folder: &Path, arguments: &[String]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_parallax"))
+fn run(program: Program, folder: &Path, arguments: &[String]) -> Output {
+    Command::new(program.file())
         .args(arguments)
         .current_dir(folder)
         .output()

@@ -260,7 +260,7 @@ fn what_does_not_fit_is_named_with_the_numbers() {
 #[test]
 fn numbers_are_of_the_type_that_the_card_says() {
     let case = case("detector-numbers");
-    let net = crate::eval_networks::detector_of([8.0, 8.0, 40.0, 40.0], 0.9);
+    let net = common::networks::detector_of([8.0, 8.0, 40.0, 40.0], 0.9);
     case.write("det.onnx", net.file());
     case.write("det.toml", CARD);
     let show = ["model", "show", "det.onnx"];

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
-use crate::eval_networks::{DETECTOR as DETECTOR_CARD, detector_of};
+use crate::common::networks::{DETECTOR as DETECTOR_CARD, detector_of};
 
 use core::fmt::Write as _;
 

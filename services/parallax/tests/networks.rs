@@ -302,7 +302,7 @@ fn a_network_is_judged_on_marked_people() {
     }
     let person = serde_json::json!({"image": "blocks.png", "joints": marks});
     case.write("people.jsonl", format!("{person}\n"));
-    let judge = ["model", "judge", "net.onnx", "people.jsonl"];
+    let judge = ["judge", "net.onnx", "people.jsonl"];
     let card = ["--card", "card.toml"];
     let report = json(&run(&case, &[&judge[..], &card, &["--json"]].concat()));
     assert_eq!(report["images"], 1, "{report}");
@@ -322,7 +322,7 @@ fn a_network_is_judged_on_marked_people() {
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     let ended = run(
         &case,
-        &[&["model", "judge", "model.plx", "people.jsonl"], &card[..]].concat(),
+        &[&["judge", "model.plx", "people.jsonl"], &card[..]].concat(),
     );
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     let ended = run(&case, &judge);
@@ -349,7 +349,7 @@ fn judging_ends_early_when_it_is_interrupted() {
     }
     case.write("people.jsonl", people);
     for model in [&["net.onnx", "--card", "card.toml"][..], &["model.plx"]] {
-        let judge = [&["model", "judge"], model, &["people.jsonl"]].concat();
+        let judge = [&["judge"], model, &["people.jsonl"]].concat();
         let mut started = case.start(&judge);
         started.until_said("left out");
         signal("INT", started.id());

@@ -10,7 +10,8 @@ use std::time::Instant;
 
 use client::{Client, ClientError, State, Wish};
 use common::started::signal;
-use common::{Case, PACED, PLAIN, WATCHDOG};
+use common::started::WATCHDOG;
+use common::{Case, PACED, PLAIN};
 use runtime::GuestError;
 use serde_json::Value;
 
@@ -278,7 +279,7 @@ mod long {
         let run = Command::new(python)
             .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
             .current_dir(folder)
-            .env("PARALLAX", env!("CARGO_BIN_EXE_parallax"))
+            .env("PARALLAX", crate::common::started::parallax())
             .env("PYTHONDONTWRITEBYTECODE", "1")
             .output();
         let run = run.unwrap();

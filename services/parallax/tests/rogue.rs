@@ -9,12 +9,14 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 use common::started::signal;
-use common::{Case, Ended, PACED, Started, WATCHDOG, last_taken, planted};
+use common::started::WATCHDOG;
+use common::{Case, Ended, PACED, Started, last_taken, planted};
+use failure::{Stop, now_nanos};
 use messages::{
     EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, MAX_JOINTS, MAX_KEYPOINTS, MAX_VIEWS,
     PairPose, Pose3d, Searched, Stamp, Status, Timing, ViewPose, topic,
 };
-use runtime::{Bus, Namespace, PortError, Publisher, SlicePublisher, Stop, Waiter, now_nanos};
+use runtime::{Bus, Namespace, PortError, Publisher, SlicePublisher, Waiter};
 use serde_json::Value;
 
 const N_FRAMES: usize = 200;

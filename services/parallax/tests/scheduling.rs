@@ -95,7 +95,8 @@ fn an_unknown_process_is_refused_by_name() {
 /// Runs the deployment without the privileges for real-time priority and locked memory; `None` if that is impossible.
 fn without_rights(case: &Case) -> Option<Output> {
     let limits = ["--rtprio=0", "--memlock=65536:65536"];
-    let parallax = [env!("CARGO_BIN_EXE_parallax"), "run", "deployment.toml"];
+    let program = common::started::parallax();
+    let parallax = [program.to_str().unwrap(), "run", "deployment.toml"];
     // Limits do not apply to root, unless these capabilities are dropped too.
     let drop = ["setpriv", "--bounding-set=-sys_nice,-ipc_lock"];
     let drop = [&drop[..], &["--inh-caps=-sys_nice,-ipc_lock"]].concat();

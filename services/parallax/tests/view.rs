@@ -9,7 +9,8 @@ use std::net::TcpStream;
 use std::time::Instant;
 
 use common::started::signal;
-use common::{Case, PACED, Started, WATCHDOG};
+use common::started::WATCHDOG;
+use common::{Case, PACED, Started};
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket, client};
 

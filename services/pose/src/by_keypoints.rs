@@ -1,8 +1,8 @@
 //! Takes what another program found in a frame.
 
+use failure::Failure;
 use keypoints::Keypoint;
 use messages::{Searched, Stamp, Status};
-use runtime::Failure;
 
 use crate::job::Keypoints;
 use crate::memory::KeypointState;
@@ -27,7 +27,7 @@ impl View<'_> {
         let frame = timeline.map_or(stamp.frame, |it| it.frame(stamp.frame));
         if let Err(error) = keypoints.source.of_frame(frame, people) {
             if !*has_failed {
-                let error = causes::in_one_line(&error);
+                let error = wording::in_one_line(&error);
                 tracing::warn!(
                     frame = stamp.frame,
                     error,

@@ -1,9 +1,9 @@
 //! Looks at a frame with a network that finds keypoints.
 
+use failure::{Failure, now_nanos};
 use kernels::Rgb8View;
 use messages::{Searched, Stamp, Status};
 use pipeline::{NetworkMemory, NetworkStep};
-use runtime::{Failure, now_nanos};
 
 use crate::memory::NetworkState;
 use crate::view::{Found, View};
@@ -24,7 +24,7 @@ impl View<'_> {
             Ok(scope) => scope,
             Err(error) => {
                 if !state.has_failed {
-                    let error = causes::in_one_line(&error);
+                    let error = wording::in_one_line(&error);
                     tracing::warn!(
                         frame = stamp.frame,
                         error,

@@ -1,7 +1,8 @@
 //! Opens the topics of a view, and searches its frames.
 
+use failure::Failure;
 use messages::topic;
-use runtime::{Failure, Service};
+use runtime::Service;
 use stage::{Range, Stage};
 
 use crate::job::{Job, Step};

@@ -2,12 +2,13 @@
 
 use std::rc::Rc;
 
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use fmp::{FrameTime, Scope, Tracker};
 use kernels::Rgb8View;
 use messages::{EvidenceHeader, FrameHeader, Searched, Status, Timing, ViewPose};
 use metrics::Passage;
 use pipeline::{ViewEstimate, ViewStep};
-use runtime::{ExitKind, Failure, Loan, OrFail as _, Sample, Service, SlicePublisher, now_nanos};
+use runtime::{Loan, Sample, Service, SlicePublisher};
 use stage::{Output, StreamFrame, Turn};
 
 use crate::job::{Job, Step};

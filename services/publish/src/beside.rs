@@ -5,7 +5,8 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::time::Instant;
 
-use runtime::{Child, ExitKind, Failure};
+use failure::{ExitKind, Failure};
+use runtime::Child;
 
 /// How long it may take to see that the deployment has ended.
 const LEAVING: Duration = Duration::from_secs(1);

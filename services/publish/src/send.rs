@@ -7,7 +7,7 @@ use std::net::UdpSocket;
 use std::time::Instant;
 
 use client::{Client, State, Wish};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 
 use crate::frame::Frame;
 use crate::json::{json_datagram, json_names};

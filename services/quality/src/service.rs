@@ -3,10 +3,11 @@
 use core::time::Duration;
 use std::sync::Arc;
 
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use fmp::{Layout, LocalScore, Model, Pose};
 use kernels::Rgb8View;
 use messages::{FrameHeader, ViewPose, ViewQuality, topic};
-use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, now_nanos};
+use runtime::{Sample, Service};
 use stage::{Context, Stage};
 use viewquality::{ForecastInput, Forecaster, Predictor};
 use wire::WireError;

@@ -3,7 +3,8 @@
 use core::time::Duration;
 use std::time::Instant;
 
-use runtime::{Bus, ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _};
+use runtime::Bus;
 
 use crate::foxglove::Foxglove;
 use crate::queue::queue;

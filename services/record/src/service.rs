@@ -7,9 +7,10 @@ use core::time::Duration;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use failure::{ExitKind, Failure, now_nanos};
 use messages::{Cause, Status};
 use recording::{About, Entry, Kind};
-use runtime::{Bus, Delivery, ExitKind, Failure, Service, Waiter, Woken, now_nanos};
+use runtime::{Bus, Delivery, Service, Waiter, Woken};
 use stage::WriterThread;
 use stage::any::{Received, Receiver};
 

@@ -3,9 +3,10 @@
 use core::time::Duration;
 use std::fs::File;
 
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use messages::{Cause, Status, Timing};
 use recording::{Entry, Envelope, ReadError, Recording, Track, in_order};
-use runtime::{ExitKind, Failure, OrFail as _, Place, SendError, Service, Woken, now_nanos};
+use runtime::{Place, SendError, Service, Woken};
 use stage::Stage;
 use stage::any::Sender;
 

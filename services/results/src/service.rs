@@ -6,8 +6,9 @@
 use core::time::Duration;
 use std::time::Instant;
 
+use failure::{Failure, now_nanos};
 use messages::{Cause, FrameHeader, PairPose, Pose3d, Span, Status, ViewPose, ViewQuality, topic};
-use runtime::{Failure, Service, SliceSubscriber, Subscriber, Waiter, Woken, now_nanos};
+use runtime::{Service, SliceSubscriber, Subscriber, Waiter, Woken};
 use stage::{Context, Port, Sender};
 
 use crate::gather::Gather;
@@ -23,7 +24,7 @@ const AWAIT_PAUSE: Duration = Duration::from_micros(500);
 ///
 /// # Errors
 ///
-/// [`runtime::ExitKind::Input`] if the output folder cannot be used, and what the transport reports.
+/// [`failure::ExitKind::Input`] if the output folder cannot be used, and what the transport reports.
 pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let ports = Ports::open(service, &job, &mut waiter)?;

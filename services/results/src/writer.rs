@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
-use runtime::{ExitKind, Failure, OrFail as _, Service};
+use failure::{ExitKind, Failure, OrFail as _};
+use runtime::Service;
 use stage::WriterThread;
 
 use crate::gather::Settled;

@@ -4,10 +4,11 @@ use core::time::Duration;
 use std::io;
 use std::time::Instant;
 
+use failure::{ExitKind, Fault, Stop};
 use messages::{Health, Metrics, topic};
 use runtime::{
-    Bus, BusError, Child, Cleaner, ExitKind, Fault, Launch, LockError, Losses, PortError,
-    PreflightError, Stop, preflight, wait_for_any,
+    Bus, BusError, Child, Cleaner, Launch, LockError, Losses, PortError, PreflightError, preflight,
+    wait_for_any,
 };
 
 use crate::stall::Stall;
@@ -89,7 +90,7 @@ impl Fault for SuperviseError {
     }
 }
 
-/// When the stop request is repeated: soon enough to count as the same request (`runtime::Stop`).
+/// When the stop request is repeated: soon enough to count as the same request (`failure::Stop`).
 const REPEAT_STOP: core::ops::Range<Duration> =
     Duration::from_millis(100)..Duration::from_millis(300);
 
@@ -116,7 +117,7 @@ pub fn run(
     on_event: &mut dyn FnMut(Event<'_>),
 ) -> Result<Outcome, SuperviseError> {
     runtime::raise_file_limit();
-    let stall = Stall::watch(LONGEST_STALL, || runtime::end_process(STALLED))
+    let stall = Stall::watch(LONGEST_STALL, || failure::end_process(STALLED))
         .map_err(SuperviseError::Watch)?;
     let on_event = &mut |event: Event<'_>| stall.outside(|| on_event(event));
     // Dropped in reverse: ports, topics, bus, and the lock last, which removes every file.

@@ -6,8 +6,9 @@ use std::os::unix::process::ExitStatusExt as _;
 use std::process::ExitStatus;
 use std::time::Instant;
 
+use failure::ExitKind;
 use messages::{Health, Metrics, Refusal};
-use runtime::{Child, ExitKind, Subscriber};
+use runtime::{Child, Subscriber};
 
 use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
 

@@ -11,7 +11,8 @@ use std::os::unix::process::ExitStatusExt as _;
 use std::process::{Command, Stdio};
 
 use common::{Case, Recorded, Run, is_alive, kill};
-use runtime::{Delivery, ExitKind, Fault as _};
+use failure::{ExitKind, Fault as _};
+use runtime::Delivery;
 use supervise::{Death, Role, State, SuperviseError};
 
 const KILLED: Death = Death::Signal { number: 9 };
@@ -21,7 +22,7 @@ fn kill_once<'a>(
     process: &'a str,
     signal: &'a str,
     when: impl Fn(&Recorded) -> bool + 'a,
-) -> impl FnMut(&Recorded, &runtime::Stop) + 'a {
+) -> impl FnMut(&Recorded, &failure::Stop) + 'a {
     let pid = Cell::new(None);
     let done = Cell::new(false);
     move |event, _| {

@@ -6,7 +6,8 @@ use core::time::Duration;
 use std::time::Instant;
 
 use common::{Case, Recorded, is_alive};
-use runtime::{Delivery, ExitKind, Fault as _};
+use failure::{ExitKind, Fault as _};
+use runtime::Delivery;
 use supervise::{Role, State, SuperviseError};
 
 #[test]

@@ -19,11 +19,12 @@ mod target;
 mod testbed;
 mod verdict;
 
+use failure::{ExitKind, Failure, now_nanos};
 use fastrand::Rng;
 use launch::Planned;
-use launch::output::{self, Verbosity};
-use runtime::{Delivery, ExitKind, Failure, now_nanos};
+use runtime::Delivery;
 use serde_json::{Value, json};
+use terminal::output::{self, Verbosity};
 
 use crate::trial::cost::Cost;
 use crate::trial::injection::Injector;
@@ -81,7 +82,7 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
     let json = json!({ "schema_version": 1, "held": is_held, "scenarios": scenarios });
     let file = testbed.folder.join("chaos.json");
     files::replace(&file, format!("{json:#}\n").as_bytes())
-        .map_err(|error| runtime::in_file(&file, &error))?;
+        .map_err(|error| failure::in_file(&file, &error))?;
     Ok(Some(Outcome {
         is_held,
         json,

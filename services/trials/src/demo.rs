@@ -10,10 +10,10 @@ mod score;
 
 use std::path::Path;
 
-use launch::output::{self, Verbosity};
+use failure::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use launch::{Planned, load};
-use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use serde_json::Value;
+use terminal::output::{self, Verbosity};
 
 use crate::trial::injection::{Injector, ProcessFault};
 use crate::trial::results;
@@ -184,7 +184,7 @@ fn remove_reports(synthetic: &SyntheticDeployment) -> Result<(), Failure> {
     for name in REPORTS {
         let file = synthetic.folder.join(name);
         if file.exists() {
-            std::fs::remove_file(&file).map_err(|error| runtime::in_file(&file, &error))?;
+            std::fs::remove_file(&file).map_err(|error| failure::in_file(&file, &error))?;
         }
     }
     Ok(())
@@ -193,7 +193,7 @@ fn remove_reports(synthetic: &SyntheticDeployment) -> Result<(), Failure> {
 fn write_reports(synthetic: &SyntheticDeployment, texts: [String; 2]) -> Result<(), Failure> {
     for (name, text) in REPORTS.into_iter().zip(texts) {
         let file = synthetic.folder.join(name);
-        files::replace(&file, text.as_bytes()).map_err(|error| runtime::in_file(&file, &error))?;
+        files::replace(&file, text.as_bytes()).map_err(|error| failure::in_file(&file, &error))?;
     }
     Ok(())
 }

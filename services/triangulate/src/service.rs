@@ -3,6 +3,7 @@
 use core::time::Duration;
 use std::sync::Arc;
 
+use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Pose;
 use messages::{PairPose, ViewPose, topic};
 use multiview::{FrontEvidence, ViewPlan};
@@ -10,7 +11,7 @@ use pipeline::{
     ExtraKeypoint, ExtrasStep, FoundExtras, Motion, PairResult, Skeleton, SkeletonStep, ViewResult,
     Views,
 };
-use runtime::{ExitKind, Failure, OrFail as _, Service};
+use runtime::Service;
 use stage::{Frame, Item, Stage};
 use wire::WireError;
 

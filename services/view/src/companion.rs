@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-use runtime::{ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _};
 
 use crate::options::Listen;
 

@@ -6,7 +6,7 @@ mod tape;
 use std::path::Path;
 use std::sync::Arc;
 
-use runtime::Failure;
+use failure::Failure;
 use serde_json::{Value, json};
 
 use crate::moment::Moment;

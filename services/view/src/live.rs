@@ -7,7 +7,7 @@ mod tape;
 use core::time::Duration;
 use std::time::Instant;
 
-use runtime::{Failure, Stop};
+use failure::{Failure, Stop};
 use serde_json::{Value, json};
 
 use crate::board::{Board, Weight};

@@ -6,7 +6,7 @@ use std::io;
 use std::net::TcpListener;
 use std::sync::Arc;
 
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use tokio::runtime::Builder;
 
 use crate::board::Board;

@@ -1,10 +1,10 @@
 //! What the numbers about a run mean: its cameras and joints.
 
+use failure::Failure;
 use geometry::Camera;
 use geometry::epipolar::epipolar_curve;
 use launch::{Prepared, Resolved};
 use nalgebra::Point2;
-use runtime::Failure;
 use serde_json::{Value, json};
 use skeleton::{JointSet, PARSE14};
 

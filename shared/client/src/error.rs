@@ -47,7 +47,7 @@ impl ClientError {
     /// What may be tried.
     pub fn hint(&self) -> Option<String> {
         match self {
-            Self::Guest(error) => runtime::Fault::hint(error),
+            Self::Guest(error) => failure::Fault::hint(error),
             Self::Description(_) => Some(
                 "build this program and the deployment of the same version of Parallax".to_owned(),
             ),

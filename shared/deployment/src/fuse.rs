@@ -18,7 +18,7 @@ pub struct Config {
     /// `pose.network` with bones in space. Without it: `space` with maps; else `all` of 3 to 8 cameras, unless another key is set
     /// that pairs alone have (`energy`, `pairs`, `workers`, `combine`).
     pub views: Option<Views>,
-    /// What `parallax train consistency` learned, or `"shipped"`: part-type tables, weights, thresholds, joints.
+    /// What `parallax-lab train consistency` learned, or `"shipped"`: part-type tables, weights, thresholds, joints.
     pub consistency: Option<PathBuf>,
     /// Rig of that file whose cameras these are; tables go by the angle between two cameras without it.
     pub consistency_rig: Option<String>,

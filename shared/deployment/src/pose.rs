@@ -19,7 +19,7 @@ pub struct Config {
     /// Least mean distance of two candidates' parts, in box sides.
     pub min_separation: f64,
     /// What tells from the picture in which direction a person faces, for left and right: a file that
-    /// `parallax train orientation` made; `"shipped"`: the one that ships; `"none"`: nothing.
+    /// `parallax-lab train orientation` made; `"shipped"`: the one that ships; `"none"`: nothing.
     pub orientation: PathBuf,
     /// An ONNX file of a network that finds keypoints, which takes the place of the filters; `"shipped"`: the one that ships;
     /// `"none"`: the filters. Without it the one that ships, unless `model` names filters, or a camera has a network or keypoints. Settings
@@ -33,7 +33,7 @@ pub struct Config {
     pub detector: Option<PathBuf>,
     /// The card that describes the detector; without it the file beside it (`.toml` for `.onnx`), or what its metadata say.
     pub detector_card: Option<PathBuf>,
-    /// `network`: what holds its maps together: a file that `parallax train springs` made; `"shipped"`: the one that ships.
+    /// `network`: what holds its maps together: a file that `parallax-lab train springs` made; `"shipped"`: the one that ships.
     pub springs: PathBuf,
     /// `network`: people are looked for in every n-th frame, and wherever nobody is seen; between, the network looks where they were.
     /// Without it twice a second with a `detector`, once by the filters, which take longer, and at most in every tenth; in every frame

@@ -14,7 +14,7 @@ use crate::shipped::SHIPPED;
 pub struct Config {
     /// The set of joints: `parse14`, `umpm15` or `humaneva20`.
     pub joints: String,
-    /// Where joints lie among the parts: what `parallax train joints` learned with this model; `"shipped"`: the one for the
+    /// Where joints lie among the parts: what `parallax-lab train joints` learned with this model; `"shipped"`: the one for the
     /// model that ships; `"none"`: a joint is the centre of its part, as for other models.
     pub joint_map: PathBuf,
     /// One pose per view out of its pairs': `mean`, as in the paper, or `consensus`.

@@ -22,7 +22,7 @@ use crate::{Model, ModelError, ModelSpec};
 pub enum ModelFileError {
     /// There is no such file.
     #[error(
-        "there is no model file {}: leave the model out to use the one that ships with Parallax; `parallax model \
+        "there is no model file {}: leave the model out to use the one that ships with Parallax; `parallax-lab model \
          import` makes one from Yang & Ramanan's released .mat models or from the paper authors' .txt models",
         path.display()
     )]
@@ -215,7 +215,7 @@ mod tests {
                 .to_string()
                 .starts_with("there is no model file no/such.plx: ")
         );
-        assert!(error.to_string().contains("parallax model import"));
+        assert!(error.to_string().contains("parallax-lab model import"));
         assert!(
             error
                 .to_string()

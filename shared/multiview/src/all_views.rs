@@ -57,7 +57,7 @@ pub struct AllViewsEstimate {
 /// energy (up to the tolerance of `epsilon_px`), or after `max_iterations / 2` solutions of every
 /// view.
 ///
-/// Benefit, as PCP3D of `parallax eval` on 134 instants (three views, 14 of them four; see the
+/// Benefit, as PCP3D of `parallax-lab eval` on 134 instants (three views, 14 of them four; see the
 /// documentation of the crate), for the mean of the terms (weight `1 / (n - 1)`) and two starts,
 /// compared with the mean of pairs: 73.3 against 71.0 by geometry, with 15 solutions of a single
 /// view against 20 (four views: 23 against 40); 75.9 against 75.1 with the network's expected

@@ -11,7 +11,7 @@
 //! The paper adds `beta p(t_A, t_B)`, the frequency with which two types occur together, and every
 //! pair of cameras needs its own table. The authors' program adds `beta p(t_target | t_support)`.
 //! Either form also rewards types that are frequent in any case, which the biases of the single
-//! view already do. A consistency file (`parallax train consistency`) therefore also contains the
+//! view already do. A consistency file (`parallax-lab train consistency`) therefore also contains the
 //! ratio to chance (`ln p(a, b) / (p(a) p(b))`, "lift"), which is 0 where nothing is known;
 //! cross-validation chooses between the two.
 //!
@@ -68,7 +68,7 @@
 //! # The same on more instants
 //!
 //! These instants were made after all choices above, with the third model and its file: 60 instants
-//! of ten people who jog and throw (`parallax synth --rig humaneva --subjects 501-510 --actions
+//! of ten people who jog and throw (`parallax-lab synth --rig humaneva --subjects 501-510 --actions
 //! jogging,throw-catch --frames 3 --rate 2 --seed 4711`, evaluated at 320 x 240), 60 of six people
 //! in five actions (`--subjects 601-606 --actions walking,boxing,gestures,chair,grab --frames 2
 //! --rate 2 --seed 991`, 640 x 480), and the 14 frames of C. PCP3D: pairs averaged, in consensus,

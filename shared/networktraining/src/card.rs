@@ -38,7 +38,7 @@ pub fn card(shape: &Shape, about: &About) -> String {
     let fill = FILL as u8;
     format!(
         "\
-# A network of `parallax train network`: {learnt} people, {samples} samples{before}. Of {judged} of {kept} people who were kept apart it finds
+# A network of `parallax-lab train network`: {learnt} people, {samples} samples{before}. Of {judged} of {kept} people who were kept apart it finds
 # {mean_of_ends:.1} % of the limbs by the mean of both ends and {both_ends:.1} % by both, and tells {front:.1} % of the directions from their
 # opposites; joints that are off by more than half a head are told from others with an area under the curve of {area:.3}.
 format = \"parallax-keypoint-network\"

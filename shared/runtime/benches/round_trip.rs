@@ -9,10 +9,11 @@ use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use failure::Stop;
 use messages::EvidenceHeader;
 use runtime::{
-    Bus, Child, Delivery, Limits, Namespace, Sample, SlicePublisher, SliceSubscriber, Stop,
-    TopicPlan, Waiter,
+    Bus, Child, Delivery, Limits, Namespace, Sample, SlicePublisher, SliceSubscriber, TopicPlan,
+    Waiter,
 };
 
 /// Values of f32.

@@ -14,7 +14,8 @@ use crate::log::adopt_transport_log;
 use crate::room::{OVERHEAD_BYTES, note_room};
 use crate::service::{self, PortError};
 use crate::topic::{Topic, TopicPlan};
-use crate::{Copies, Namespace, Progress, Stop, free_shared_memory, private};
+use crate::{Copies, Namespace, Progress, free_shared_memory, private};
+use failure::Stop;
 
 /// How long a sender waits for a receiver without room, unless set otherwise.
 const PATIENCE: Duration = Duration::from_mins(2);

@@ -8,7 +8,8 @@ use iceoryx2::service::builder::event::EventCreateError;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeCreateError;
 
 use crate::room::{ROOM, short_of_room};
-use crate::{Fault, NamespaceError, PrivacyError};
+use crate::{NamespaceError, PrivacyError};
+use failure::Fault;
 
 /// The deployment's shared memory cannot be reached, or a topic not be created.
 #[derive(Debug, thiserror::Error)]

@@ -24,7 +24,8 @@ use crate::observer::{running_supervisor, unless_over};
 use crate::payload::{Header, Message};
 use crate::service::patiently;
 use crate::subscriber::onlooker;
-use crate::{ExitKind, Fault, LockError, Namespace, NamespaceError, ReceiveError, deployments};
+use crate::{LockError, Namespace, NamespaceError, ReceiveError, deployments};
+use failure::{ExitKind, Fault};
 
 /// Guests of one deployment at the same time.
 pub const MOST_GUESTS: usize = 4;

@@ -9,7 +9,8 @@ use messages::{CameraCounts, Cause, Health as HealthMessage, Metrics, Refusal, S
 use metrics::{Meter, Passage, Rates};
 use rustix::time::{ClockId, clock_gettime};
 
-use crate::{Bus, Launch, PortError, Progress, Publisher, memory, now_nanos};
+use crate::{Bus, Launch, PortError, Progress, Publisher, memory};
+use failure::now_nanos;
 
 /// Period of the heartbeats.
 pub const HEARTBEAT: Duration = Duration::from_millis(150);
@@ -27,7 +28,7 @@ pub enum HealthError {
     Thread(#[source] std::io::Error),
 }
 
-impl crate::Fault for HealthError {}
+impl failure::Fault for HealthError {}
 
 /// The counters and times of a process, published several times a second until this is dropped.
 ///

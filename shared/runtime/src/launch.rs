@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use tracing::Level;
 
-use crate::{Delivery, ExitKind, Fault, Namespace, NamespaceError, Scheduling};
+use crate::{Delivery, Namespace, NamespaceError, Scheduling};
+use failure::{ExitKind, Fault};
 
 /// The arguments of a service are not those of a supervisor.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

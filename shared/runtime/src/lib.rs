@@ -26,12 +26,8 @@ mod subscriber;
 mod waiter;
 
 mod child;
-mod clock;
-mod failure;
-mod guard;
 mod guest;
 mod health;
-mod input;
 mod launch;
 mod log;
 mod observer;
@@ -40,24 +36,18 @@ mod process;
 mod progress;
 mod remains;
 mod scheduling;
-mod stop;
 mod video;
 
 pub use bus::Bus;
 pub use bus_error::BusError;
 pub use child::{Child, freeze, kill, thaw, wait_for_any};
 pub use clean::Cleaner;
-pub use clock::now_nanos;
 pub use copies::Copies;
 pub use delivery::{Delivery, Limits};
-pub use failure::{ExitKind, Failure, Fault, OrFail};
-pub use guard::{end_process, guard_process};
 pub use guest::{Guest, GuestError, GuestPort, MOST_GUESTS, Seen, running_deployments};
 pub use health::{HEARTBEAT, Health, HealthError};
-pub use input::{in_file, no_text, read_text};
 pub use launch::{Launch, LaunchError};
 pub use lock::{DeploymentLock, LockError};
-pub use log::init_logging;
 pub use losses::{Losses, Patience};
 pub use mapped::{Mapped, mapped_at};
 pub use memory::{MemoryError, free_shared_memory, free_space, peak_memory};
@@ -67,7 +57,7 @@ pub use payload::{Element, Header, Message};
 pub use place::Place;
 pub use preflight::{PreflightError, needed_bytes, preflight, process_topics};
 pub use private::PrivacyError;
-pub use process::{Service, raise_file_limit, run_command, run_service};
+pub use process::{Service, raise_file_limit, run_service};
 pub use progress::Progress;
 pub use publisher::{Loan, Publisher, SendError, SlicePublisher};
 pub use remains::{Remains, deployments};
@@ -75,7 +65,6 @@ pub use scheduling::{
     Denied, MAX_CORES, Policy, RealTime, Refusal, Scheduling, SchedulingError, give_way, own_cores,
 };
 pub use service::PortError;
-pub use stop::Stop;
 pub use subscriber::{ReceiveError, Sample, SliceSubscriber, Subscriber};
 pub use topic::{Topic, TopicPlan};
 pub use video::{

@@ -17,7 +17,8 @@ use rustix::io::Errno;
 use crate::bus::prepare;
 use crate::namespace::DESCRIPTION_FILE;
 use crate::private::{self, LOCK_FILE, Root};
-use crate::{BusError, ExitKind, Fault, Namespace, beneath};
+use crate::{BusError, Namespace, beneath};
+use failure::{ExitKind, Fault};
 
 /// Tells observers that the deployment is ending.
 pub(crate) const ENDING_FILE: &str = "ending";

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString as _};
 
-use crate::{ExitKind, Fault};
+use failure::{ExitKind, Fault};
 
 /// The longest file name that iceoryx2 puts below the root: `/`, 39 digits, `.event`.
 const SOCKET_NAME_LEN: usize = 1 + 39 + 6;

@@ -12,7 +12,8 @@ use messages::{Metrics, topic};
 use crate::lock::{ENDING_FILE, living};
 use crate::private::LOCK_FILE;
 use crate::remains::supervisor;
-use crate::{Bus, BusError, ExitKind, Fault, Namespace, PortError, ReceiveError, Stop, Subscriber};
+use crate::{Bus, BusError, Namespace, PortError, ReceiveError, Subscriber};
+use failure::{ExitKind, Fault, Stop};
 
 /// Pause between two looks at a deployment that is starting.
 const PAUSE: Duration = Duration::from_millis(20);

@@ -6,7 +6,8 @@ use messages::{Health, Metrics, topic};
 use rustix::process::{Resource, getrlimit};
 
 use crate::room::OVERHEAD_BYTES;
-use crate::{Delivery, ExitKind, Fault, Limits, TopicPlan, free_shared_memory};
+use crate::{Delivery, Limits, TopicPlan, free_shared_memory};
+use failure::{ExitKind, Fault};
 
 /// Onlookers at the same time.
 const ONLOOKERS: usize = 4;

@@ -1,7 +1,6 @@
 //! Runs a service process, from start-up to its exit status.
 
 use core::time::Duration;
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
@@ -9,9 +8,9 @@ use rustix::process::{
     Pid, Resource, Rlimit, Signal, getppid, getrlimit, set_parent_process_death_signal, setrlimit,
 };
 
-use crate::{
-    Bus, Delivery, ExitKind, Failure, Health, Launch, Patience, Progress, Stop, init_logging,
-};
+use failure::{DEFECT, ExitKind, Failure, Stop, init_logging, log_panics, panic_text};
+
+use crate::{Bus, Delivery, Health, Launch, Patience, Progress};
 
 /// What a service works with: the bus for its ports, its stop request and its counters.
 #[derive(Debug)]
@@ -83,9 +82,6 @@ impl Service {
 /// How long the processes of a deployment may take to find each other at start-up.
 const BEGINNING: Duration = Duration::from_secs(10);
 
-const DEFECT: &str = "this is a defect of the program, unless something else has changed its files in /dev/shm: \
-    please report it";
-
 /// Runs a service in this process and returns its exit status.
 ///
 /// The process ends when its supervisor ends. A panic is logged and ends the process. Call it from the main
@@ -111,20 +107,6 @@ pub fn run_service(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Fai
         Err(panic) => Failure::new(ExitKind::Run, panic_text(panic.as_ref()))
             .with_hint(DEFECT)
             .exit(),
-    }
-}
-
-/// Runs a command in this process and returns its exit status. A panic is reported like any other error.
-///
-/// * `body`: the command, which returns its exit status on success.
-pub fn run_command(body: impl FnOnce() -> Result<ExitCode, Failure>) -> ExitCode {
-    match catch_unwind(AssertUnwindSafe(body)) {
-        Ok(Ok(code)) => code,
-        Ok(Err(failure)) => failure.exit(),
-        Err(panic) => {
-            let text = format!("the program panicked: {}", panic_text(panic.as_ref()));
-            Failure::new(ExitKind::Run, text).with_hint(DEFECT).exit()
-        }
     }
 }
 
@@ -181,20 +163,4 @@ pub fn raise_file_limit() {
     if let Err(error) = setrlimit(Resource::Nofile, raised) {
         tracing::warn!(%error, "cannot raise the limit on open files");
     }
-}
-
-/// Logs panics of all threads in one line.
-fn log_panics() {
-    std::panic::set_hook(Box::new(|info| {
-        let at = info.location().map(ToString::to_string).unwrap_or_default();
-        tracing::error!(at, "panic: {}", panic_text(info.payload()));
-    }));
-}
-
-fn panic_text(panic: &(dyn Any + Send)) -> String {
-    let text = panic
-        .downcast_ref::<&str>()
-        .map(ToString::to_string)
-        .or_else(|| panic.downcast_ref::<String>().cloned());
-    text.unwrap_or_else(|| "panic without a message".to_owned())
 }

@@ -18,11 +18,11 @@ use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use crate::Fault;
 use crate::delivery::Delivery;
 use crate::memory::MemoryError;
 use crate::payload::{Header, Message};
 use crate::room::{ROOM, note_room, short_of_room};
+use failure::Fault;
 
 /// How long to wait for a service that another process is creating or removing.
 const IN_FLUX_LIMIT: Duration = Duration::from_secs(5);

@@ -17,7 +17,8 @@ use crate::delivery::Delivery;
 use crate::payload::{Element, Header, Message};
 use crate::room::{connections, note_room, short_of_room};
 use crate::service::{self, Messages, PortError};
-use crate::{Copies, Fault, Waiter};
+use crate::{Copies, Waiter};
+use failure::Fault;
 
 /// A message could not be received.
 #[derive(Debug, thiserror::Error)]

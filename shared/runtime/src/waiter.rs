@@ -14,10 +14,11 @@ use iceoryx2::prelude::{FileDescriptorBased as _, ipc};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
+use crate::Progress;
 use crate::bus::Bus;
 use crate::room::note_room;
 use crate::service::{self, PortError};
-use crate::{Fault, Progress, Stop};
+use failure::{Fault, Stop};
 
 /// Longest sleep. A sender may die between sending and notifying, so receivers have to check on their own;
 /// and a process that sleeps for long would seem to hang.

@@ -6,8 +6,9 @@ use crate::common;
 use std::time::{Duration, Instant};
 
 use common::{Deployment, shared_memory};
+use failure::Stop;
 use messages::FrameHeader;
-use runtime::{Bus, Delivery, Limits, SendError, SlicePublisher, SliceSubscriber, Stop, TopicPlan};
+use runtime::{Bus, Delivery, Limits, SendError, SlicePublisher, SliceSubscriber, TopicPlan};
 
 const SOON: Duration = Duration::from_secs(20);
 /// Elements of every array: enough bytes to distinguish chunks by their pages.

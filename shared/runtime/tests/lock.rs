@@ -5,8 +5,9 @@ use crate::common;
 use std::fs;
 
 use common::{Deployment, namespace, shared_memory};
+use failure::Stop;
 use messages::Health;
-use runtime::{Bus, LockError, Namespace, NamespaceError, Stop, process_topics};
+use runtime::{Bus, LockError, Namespace, NamespaceError, process_topics};
 
 #[test]
 fn a_running_deployment_is_not_started_again() {

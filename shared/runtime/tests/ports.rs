@@ -7,9 +7,10 @@ use std::os::unix::fs::MetadataExt as _;
 use std::time::{Duration, Instant};
 
 use common::{Deployment, shared_memory};
+use failure::Stop;
 use messages::{EvidenceHeader, FrameHeader, ViewQuality};
 use runtime::{
-    Bus, Delivery, Limits, Losses, Patience, PortError, SendError, Stop, TopicPlan, Waiter, Woken,
+    Bus, Delivery, Limits, Losses, Patience, PortError, SendError, TopicPlan, Waiter, Woken,
 };
 
 const SOON: Duration = Duration::from_secs(20);

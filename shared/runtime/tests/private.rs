@@ -10,11 +10,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use common::{Deployment, namespace};
+use failure::{Fault as _, Stop};
 use messages::{FrameHeader, ViewPose};
-use runtime::{
-    Bus, BusError, Delivery, Fault as _, Limits, LockError, Namespace, PrivacyError, Stop,
-    TopicPlan,
-};
+use runtime::{Bus, BusError, Delivery, Limits, LockError, Namespace, PrivacyError, TopicPlan};
 use rustix::fs::Mode;
 use rustix::process::{getuid, umask};
 

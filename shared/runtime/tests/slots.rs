@@ -15,8 +15,9 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use common::{Deployment, shared_memory};
+use failure::Stop;
 use messages::ViewQuality;
-use runtime::{Bus, Cleaner, Delivery, Limits, Namespace, Stop, TopicPlan};
+use runtime::{Bus, Cleaner, Delivery, Limits, Namespace, TopicPlan};
 use rustix::fs::{FlockOperation, fcntl_lock};
 
 const TOPIC: &str = "small";

@@ -12,7 +12,7 @@ use trc::TrcError;
 pub enum SequenceError {
     /// Neither a known data set, nor a description.
     #[error(
-        "{}: neither a folder of HumanEva-I, UMPM or `parallax synth`, nor a description (.toml)",
+        "{}: neither a folder of HumanEva-I, UMPM or `parallax-lab synth`, nor a description (.toml)",
         .path.display()
     )]
     Unknown {

@@ -10,7 +10,7 @@ use crate::{Options, Sequence, SequenceError, described, humaneva, synthetic, um
 /// | path | sequences |
 /// |---|---|
 /// | a `.toml` file | a description: rig, cameras, a TRC file (`configs/sequences/`) |
-/// | a folder with `truth.jsonl` | a sequence of `parallax synth` |
+/// | a folder with `truth.jsonl` | a sequence of `parallax-lab synth` |
 /// | a folder with `Image_Data` and `Mocap_Data` | a subject of `HumanEva-I`: the paper's test frames of every action |
 /// | a folder with `NAME.json` and `Groundtruth` | a sequence of UMPM |
 /// | a folder of such folders | all of them, in the order of their names |

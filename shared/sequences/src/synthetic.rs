@@ -1,4 +1,4 @@
-//! Sequences written by `parallax synth`: `truth.jsonl`, `rig.toml`, and a folder for each camera.
+//! Sequences written by `parallax-lab synth`: `truth.jsonl`, `rig.toml`, and a folder for each camera.
 
 use std::path::Path;
 

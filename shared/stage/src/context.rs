@@ -1,7 +1,8 @@
 //! What a stage needs from its process: the session, the clock and the counters.
 
+use failure::now_nanos;
 use messages::{Cause, Refusal, Stamp, Status};
-use runtime::{Health, ReceiveError, Service, now_nanos};
+use runtime::{Health, ReceiveError, Service};
 use wire::{Expected, WireError};
 
 use crate::Stamped;

@@ -3,12 +3,10 @@
 use core::fmt;
 use std::rc::Rc;
 
+use failure::{Failure, now_nanos};
 use messages::{Stamp, Timing};
 use metrics::Passage;
-use runtime::{
-    Element, Failure, Header, Message, Patience, Publisher, SendError, Service, SlicePublisher,
-    now_nanos,
-};
+use runtime::{Element, Header, Message, Patience, Publisher, SendError, Service, SlicePublisher};
 
 use crate::receivers::Receivers;
 use crate::{Stamped, Turn};

@@ -1,7 +1,8 @@
 //! A topic whose messages are checked as they are received.
 
+use failure::Failure;
 use messages::Status;
-use runtime::{Failure, Message, ReceiveError, Service, Subscriber, Waiter};
+use runtime::{Message, ReceiveError, Service, Subscriber, Waiter};
 use wire::WireError;
 
 use crate::{Context, Stamped};

@@ -5,11 +5,11 @@ use core::marker::PhantomData;
 use core::time::Duration;
 use std::rc::Rc;
 
+use failure::{Failure, now_nanos};
 use join::Joined;
 use messages::{EvidenceHeader, FrameHeader, PairPose, Stamp, topic};
 use runtime::{
-    Delivery, Element, Failure, Message, Service, SlicePublisher, Subscriber, WaitError, Waiter,
-    Woken, now_nanos,
+    Delivery, Element, Message, Service, SlicePublisher, Subscriber, WaitError, Waiter, Woken,
 };
 use wire::WireError;
 

@@ -1,7 +1,8 @@
 //! The loop of a stage with one stream of frames, each processed as it comes.
 
+use failure::{Failure, now_nanos};
 use messages::{Cause, FrameHeader, Stamp, Status, topic};
-use runtime::{Delivery, Failure, Place, Sample, SliceSubscriber, Woken, now_nanos};
+use runtime::{Delivery, Place, Sample, SliceSubscriber, Woken};
 
 use crate::intake::{Intake, Past};
 use crate::stage::Stage;

@@ -3,7 +3,8 @@
 use core::time::Duration;
 use std::thread::{Builder, JoinHandle};
 
-use runtime::{ExitKind, Failure, OrFail as _, Service};
+use failure::{ExitKind, Failure, OrFail as _};
+use runtime::Service;
 
 /// A thread that ends when its queue is closed.
 #[derive(Debug)]

@@ -1,5 +1,10 @@
-//! Rewrites the error texts of TOML and JSON parsers, and of the transport, for users; and quotes what stands in commands.
+//! Error texts for users: an error with its causes in one line, the texts of TOML and JSON parsers and of the transport in
+//! words that users know; and words of commands, quoted.
 #![forbid(unsafe_code)]
+
+mod causes;
+
+pub use causes::{chain, in_one_line};
 
 use core::fmt::Display;
 

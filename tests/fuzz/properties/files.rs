@@ -11,7 +11,7 @@ use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisy
 use keypoints::files::{NameSet, SeenKeypoints, coco, openpose};
 use motion::{Joint, Recorded, Role};
 use multiview::Compatibility;
-use offline::boards::{corners_text, parse_corners};
+use rigs::boards::{corners_text, parse_corners};
 use runfiles::{
     FrameLine, LatencyReport, Line, RunSummary, Running, SmoothLine, SmoothReport, TimesLine,
     ViewLine,

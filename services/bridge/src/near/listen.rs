@@ -4,12 +4,13 @@ use std::sync::{Arc, Mutex};
 
 use crossbeam::channel::{Receiver, Sender, bounded};
 use deployment::hosts::Carry;
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use hosts::{
     Answer, Content, Exchange, Expected, Fingerprint, Head, Hello, Packet, Signal, Welcome,
 };
 use messages::Status;
 use recording::{Kind, Message};
-use runtime::{ExitKind, Failure, OrFail as _, Service, now_nanos};
+use runtime::Service;
 
 use super::remote::Remote;
 use crate::job::{Job, Near};

@@ -1,10 +1,11 @@
 //! Writes what came from another host into the shared memory of this one.
 
 use deployment::hosts::Carry;
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use hosts::{Content, Estimate, Head};
 use messages::{EvidenceHeader, FrameHeader, Stamp, Status, Timing, topic};
 use recording::{Envelope, Kind, Message};
-use runtime::{ExitKind, Failure, OrFail as _, Patience, Service, SlicePublisher, now_nanos};
+use runtime::{Patience, Service, SlicePublisher};
 use stage::any::Sender;
 
 use super::listen::{Arrived, kind_of};

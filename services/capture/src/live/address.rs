@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use failure::{ExitKind, Fault};
 use footage::{FootageError, LiveAddress, PixelFormat, Size, StreamSpec, Transport};
 use messages::Status;
-use runtime::{ExitKind, Fault, FourCc, VideoDevice, VideoError, VideoMode, VideoWish};
+use runtime::{FourCc, VideoDevice, VideoError, VideoMode, VideoWish};
 
 /// A live camera, and what is wanted of it.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,9 +7,10 @@ use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use failure::now_nanos;
 use footage::{LiveAddress, LiveStream, PixelFormat, Size, StreamEnd, StreamSpec};
 use messages::TimedBy;
-use runtime::{VideoAbout, VideoDevice, VideoStream, now_nanos, video_devices};
+use runtime::{VideoAbout, VideoDevice, VideoStream, video_devices};
 
 use super::address::{LiveCamera, LiveError, size_of};
 use super::clock::{ClockMap, OwnClock, Verdict};

@@ -6,9 +6,9 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Instant;
 
+use failure::{ExitKind, Failure, OrFail as _};
 use footage::{Size, StreamEnd};
 use messages::{Status, TimedBy};
-use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::address::{LiveCamera, LiveError};
 use super::input::{Input, Taken};
@@ -202,7 +202,7 @@ impl Keeper {
                 continue;
             }
             if n_read > 0 || said != Some(status) {
-                let error = causes::in_one_line(&error);
+                let error = wording::in_one_line(&error);
                 tracing::error!(camera = %self.camera.address, error, "no picture from this camera");
             }
             said = Some(status);

@@ -5,16 +5,16 @@ use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
 use exports::{Gathering, Naming, Trial, TrialError, ViewCamera};
+use failure::{ExitKind, Failure, OrFail as _, in_file};
 use geometry::{Framing, OutSize, Rig};
 use messages::{Joint3d, Pose3d, Status, topic};
 use nalgebra::UnitVector3;
 use recording::{Kind, Recording};
 use runfiles::{FrameLine, JointLine, PlacedJoint};
-use runtime::{ExitKind, Failure, OrFail as _, in_file};
 use skeleton::JointSet;
 
+use crate::recorded;
 use crate::resolved::Resolved;
-use crate::{inputs, recorded};
 
 /// Which trajectories of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

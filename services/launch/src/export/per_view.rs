@@ -5,9 +5,9 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use exports::{Trial, ViewCamera, annotate, openpose};
+use failure::Console;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use footage::{Canvas, FootageError, Size, VideoWriter};
-use offline::Console;
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
 use super::pictures::Pictures;
 use super::{Written, cannot_write, interrupted};

@@ -6,15 +6,15 @@ use std::path::PathBuf;
 
 use capture::{Blank, Retimed};
 use exports::ViewCamera;
+use failure::{ExitKind, Failure, OrFail as _, in_file};
 use footage::SourceSpec;
 use messages::topic;
 use recording::{Entry, Kind, Recording};
-use runtime::{ExitKind, Failure, OrFail as _, in_file};
 
 use super::origin::camera as camera_of;
 use super::{Origin, of_footage};
+use crate::prepare;
 use crate::resolved::Resolved;
-use crate::{inputs, prepare};
 
 /// The pictures of a view. Frames are asked for in order.
 #[derive(Debug)]
@@ -125,7 +125,7 @@ fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, Str
     if camera.source.is_empty() || Blank::is_blank(&camera.source) {
         return Err("it consists of keypoints".to_owned());
     }
-    if inputs::is_live(&camera.source) {
+    if crate::cameras::is_live(&camera.source) {
         return Err("it was live".to_owned());
     }
     let trial = &origin.trial;
@@ -133,11 +133,11 @@ fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, Str
         start: trial.first_frame,
         step: trial.frame_step,
         count: Some(trial.slots.len() as u64),
-        ..inputs::source(camera, &resolved.deployment.capture)
+        ..crate::cameras::source(camera, &resolved.deployment.capture)
     };
     let footage = resolved.footage.get(nth);
     let feed = Retimed::open(&spec, footage.and_then(|it| it.timeline.as_ref()));
-    let feed = feed.map_err(|error| causes::in_one_line(&error))?;
+    let feed = feed.map_err(|error| wording::in_one_line(&error))?;
     let size = feed.info().size;
     let due = footage.map_or([0; 2], |it| it.size.map(|it| it as usize));
     if [size.width, size.height] != due {

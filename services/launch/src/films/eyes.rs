@@ -3,19 +3,18 @@
 use std::sync::Arc;
 
 use deployment::Deployment;
+use failure::{ExitKind, Failure, OrFail as _, in_file};
 use fmp::{CandidateSettings, Layout, Model, Search};
 use footage::{FrameView, Size, Turn};
+use inputs::pictures::{BOXES_PX, Picture, Searched};
 use kernels::Rgb8View;
 use keypoints::{Keypoint, Sides};
-use offline::pictures::{BOXES_PX, Picture, Searched};
 use pipeline::{Boxes, NetworkMemory, NetworkSettings, NetworkStep};
 use posenetwork::springs::TurnedSprings;
 use posenetwork::{Detector, JointMaps, LookError, PoseNetwork};
-use runtime::{ExitKind, Failure, OrFail as _, in_file};
 use skeleton::PARSE14;
 
 use crate::find_every::find_every;
-use crate::inputs;
 
 /// Detections of the filters: the lowest score, and how much of a better one's boxes a worse one may cover.
 const THRESHOLD: f32 = -0.5;

@@ -1,7 +1,7 @@
 //! Pictures that are turned until people stand upright in them, as a run turns its frames.
 
+use failure::{ExitKind, Failure, OrFail as _};
 use footage::{Affine, Fill, Size, Warp};
-use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::eyes::Found;
 

@@ -7,7 +7,7 @@ use deployment::{AnyMachine, Loaded};
 use tempfile::TempDir;
 
 use super::*;
-use crate::inputs::Footage;
+use crate::cameras::Footage;
 
 const RIG: &str = "\
 [a]\nname = 'a'\nsize = [ 640.0, 480.0,]\nmatrix = [ [ 500.0, 0.0, 320.0,], [ 0.0, 500.0, 240.0,], [ 0.0, 0.0, 1.0,],]\n\

@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
+use failure::{ExitKind, Failure, OrFail as _};
 use pipeline::{ViewSettings, ViewStep};
-use runtime::{ExitKind, Failure, OrFail as _};
 
-use crate::inputs;
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;
 

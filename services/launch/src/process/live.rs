@@ -3,13 +3,12 @@
 use footage::{LiveAddress, Size};
 use scene::{Address, skew_ms_of};
 
-use crate::inputs;
 use crate::resolved::Resolved;
 
 /// The live camera of a view, if it is one.
 pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> {
     let entry = &resolved.deployment.cameras[view];
-    let mut camera = inputs::live_camera(entry)?;
+    let mut camera = crate::cameras::live_camera(entry)?;
     let footage = &resolved.footage[view];
     if matches!(camera.address, LiveAddress::Stream(_)) {
         // What it told before: a stream is not asked again.
@@ -26,7 +25,7 @@ pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> 
             .is_some_and(|it| it.pictures.contains(&view)),
         name: entry.name.clone(),
         max_skew_nanos: max_skew_nanos(resolved),
-        lead_nanos: inputs::lead_nanos(&resolved.deployment),
+        lead_nanos: crate::cameras::lead_nanos(&resolved.deployment),
     })
 }
 

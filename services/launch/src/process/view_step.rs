@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 
+use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Layout;
 use pipeline::{Boxes, Eyes, NetworkSettings, NetworkStep, ViewStep};
 use posenetwork::springs::TurnedSprings;
-use runtime::{ExitKind, Failure, OrFail as _};
 
 use crate::find_every::find_every;
-use crate::inputs;
 use crate::keypoints;
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;

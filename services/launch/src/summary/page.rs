@@ -3,11 +3,11 @@
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
+use failure::{ExitKind, Failure, in_file};
 use geometry::Rig;
 use image::codecs::jpeg::JpegEncoder;
 use report::run::{Eye, Moment, Page, Picture, Space, Strip, Table, Verdict};
 use runfiles::{FrameLine, LatencyReport, Line as _};
-use runtime::{ExitKind, Failure, in_file};
 use skeleton::JointSet;
 
 /// Name of the page in the folder of a run.

@@ -6,8 +6,8 @@ use std::time::Instant;
 use indicatif::ProgressBar;
 use supervise::Event;
 
-use crate::output;
 use crate::resolved::Resolved;
+use terminal::output;
 
 /// Interval of progress messages if no bar can be drawn.
 const PERIOD: Duration = Duration::from_secs(5);

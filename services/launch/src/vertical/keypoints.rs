@@ -5,9 +5,9 @@
 
 use ::keypoints::Keypoint;
 use deployment::Deployment;
+use failure::{ExitKind, Failure, OrFail as _};
 use geometry::Camera;
 use nalgebra::{Point2, UnitVector3, Vector3};
-use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::{Vertical, common_normal, snapped, text};
 use crate::keypoints as keypoint_files;

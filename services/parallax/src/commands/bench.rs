@@ -8,11 +8,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use launch::output;
-use runtime::{ExitKind, Failure};
+use failure::{ExitKind, Failure};
+use terminal::output;
 use trials::bench::{self, Kind, Report};
 
-use crate::globals::Globals;
+use terminal::Globals;
 
 /// The benchmark to run.
 #[derive(Debug, Subcommand)]

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand, ValueEnum};
+use failure::{ExitKind, Failure, OrFail as _};
 use geometry::files::{Format, ReadOptions, Unit};
 use geometry::{Camera, LeftOut, Rig, Shared, Survey, upright_roll};
-use launch::{inputs, output};
 use nalgebra::{UnitVector3, Vector3};
-use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
+use terminal::output;
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]

@@ -10,10 +10,10 @@ mod walk;
 use std::process::ExitCode;
 
 use clap::Subcommand;
-use runtime::Failure;
+use failure::Failure;
 
-use crate::globals::Globals;
 pub(crate) use people::height;
+use terminal::Globals;
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]

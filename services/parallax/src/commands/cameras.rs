@@ -5,13 +5,14 @@ use std::process::ExitCode;
 
 use capture::{LiveCamera, take_picture};
 use clap::{Args, Subcommand};
+use failure::{ExitKind, Failure, OrFail as _, in_file};
 use footage::{Canvas, LiveAddress};
-use launch::{inputs, load, output};
+use launch::load;
 use runtime::{
-    ExitKind, Failure, OrFail as _, VideoAbout, VideoControl, VideoDevice, VideoError, VideoFormat,
-    VideoMode, in_file, video_devices,
+    VideoAbout, VideoControl, VideoDevice, VideoError, VideoFormat, VideoMode, video_devices,
 };
 use serde_json::{Value, json};
+use terminal::output;
 
 /// Options of `parallax cameras`.
 #[derive(Debug, Args)]
@@ -82,12 +83,12 @@ fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
     };
     let deployment = load::read(file, &[])?.deployment;
     let entry = deployment.cameras.iter().find(|it| it.name == *name);
-    let live = entry.and_then(inputs::live_camera);
+    let live = entry.and_then(launch::cameras::live_camera);
     live.ok_or_else(|| {
         let live = deployment
             .cameras
             .iter()
-            .filter(|it| inputs::is_live(&it.source));
+            .filter(|it| launch::cameras::is_live(&it.source));
         let names: Vec<&str> = live.map(|it| it.name.as_str()).collect();
         let message = format!("{} has no live camera {name:?}", file.display());
         let hint = if names.is_empty() {
@@ -115,7 +116,7 @@ fn list(as_json: bool) -> Result<ExitCode, Failure> {
     for path in &paths {
         match look(path) {
             Ok(it) => found.push(it),
-            Err(error) => others.push((path, causes::in_one_line(&error))),
+            Err(error) => others.push((path, wording::in_one_line(&error))),
         }
     }
     if as_json {

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::output;
-use runtime::{ExitKind, Failure};
+use failure::{ExitKind, Failure};
+use terminal::output;
 use trials::chaos::{self, Options, Scenario};
 
-use crate::globals::Globals;
+use terminal::Globals;
 
 const HELP: &str = "\
 Every scenario is a run of its own, with real processes and a real fault; --list names them. Without a DEPLOYMENT the \

@@ -5,9 +5,10 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 use deployment::Entry;
-use launch::{load, output, plan};
-use runtime::{ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _};
+use launch::{load, plan};
 use serde_json::json;
+use terminal::output;
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]

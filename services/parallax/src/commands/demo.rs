@@ -4,18 +4,18 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::output;
-use runtime::{ExitKind, Failure};
+use failure::{ExitKind, Failure};
 use scene::Action;
+use terminal::output;
 use trials::demo::{self, Options};
 
-use super::synth::rate;
 use super::view;
-use crate::globals::Globals;
+use terminal::Globals;
+use terminal::rate;
 
 const HELP: &str = "\
 Nothing is needed but this program: the capture processes render pictures of a synthetic person during the run (see \
-`parallax synth --help`), and the network that ships looks at them. Four cameras around the person, 320x240 pixels, capture in \
+`parallax-lab synth --help`), and the network that ships looks at them. Four cameras around the person, 320x240 pixels, capture in \
 real time. Their frame rate is chosen by a measurement: for about two seconds frames are rendered and looked at on all \
 cores, beside whatever else runs. Computing may take half of the time between two frames, up to 5 frames a second; a slow \
 or busy machine is reported with numbers. Below 2.5 frames a second the person is looked for in every frame, which takes \
@@ -63,7 +63,7 @@ pub(crate) struct Arguments {
     /// Frames per second; if not given, as many as this machine can process, at most 5.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
-    /// The action of the person; `parallax synth --help` lists them.
+    /// The action of the person; `parallax-lab synth --help` lists them.
     #[arg(long, value_name = "NAME", default_value = "walking", value_parser = action)]
     action: Action,
     /// Number of the person: shape, clothes, way of moving.

@@ -3,12 +3,11 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::{
-    live::{self, Live},
-    output,
-};
-use runtime::{ExitKind, Failure, Namespace, Remains, deployments};
+use failure::{ExitKind, Failure};
+use launch::live::{self, Live};
+use runtime::{Namespace, Remains, deployments};
 use serde_json::{Value, json};
+use terminal::output;
 
 /// The status of a directory that does not belong to a deployment.
 const UNMARKED: &str = "not a deployment: left alone";

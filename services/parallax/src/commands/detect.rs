@@ -6,22 +6,22 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use failure::{ExitKind, Failure, OrFail as _};
 use fmp::{CandidateSettings, Layout, Pose, Precision, Search};
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
+use inputs::Joints;
+use inputs::library::Library;
+use inputs::pictures::{self, Frames, Picture, Pictures, Searched};
+use inputs::sheet::{Sheet, Skeleton, limbs};
 use kernels::Rgb8View;
-use launch::inputs::{self, Joints};
-use launch::output;
-use offline::library::Library;
-use offline::pictures::{self, Frames, Picture, Pictures, Searched};
-use offline::sheet::{Sheet, Skeleton, limbs};
 use posenetwork::springs::TurnedSprings;
-use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 use skeleton::{JointSet, PARSE14};
+use terminal::output;
 
-use super::network::{Outline, outline};
 use crate::describe::{self, NamedJoints, Placed};
 use by_network::Eyes;
+use terminal::{Outline, outline};
 
 /// Default of `--size`: the longest side of a searched image, pixels.
 const SIZE: usize = 1280;
@@ -213,7 +213,7 @@ impl Arguments {
         }
         let card = self.detector_card.as_deref();
         let detector = self.detector.as_ref();
-        let detector = detector.map(|it| offline::detector::open(it, card));
+        let detector = detector.map(|it| inputs::detector::open(it, card));
         let springs = inputs::springs(Path::new(deployment::SHIPPED))?;
         Ok(Some(Eyes {
             file: file.to_path_buf(),
@@ -261,7 +261,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(folder) = &arguments.overlay {
         inputs::make_folder(folder)?;
     }
-    let files = offline::images::listed(&arguments.images)?;
+    let files = inputs::images::listed(&arguments.images)?;
     let mut sheet = arguments.sheet.as_ref().map(|it| {
         let n_pictures = files
             .iter()

@@ -3,13 +3,12 @@
 use std::process::{Command, ExitCode};
 
 use clap::Args;
+use failure::{ExitKind, Failure};
 use kernels::Isa;
-use launch::output;
-use runtime::{
-    ExitKind, Failure, Namespace, VideoDevice, deployments, free_shared_memory, own_cores,
-};
+use runtime::{Namespace, VideoDevice, deployments, free_shared_memory, own_cores};
 use rustix::process::{Resource, getrlimit};
 use serde_json::json;
+use terminal::output;
 
 /// Shared memory of four cameras of 640x480 pixels with the network that ships, and as much again, bytes.
 const SHARED_MEMORY: u64 = 512 << 20;

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::export::{Format, Given, Job, Lines, Naming, Origin, Written, as_json, export};
-use launch::output;
 use nalgebra::{UnitVector3, Vector3};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use terminal::output;
 
-use crate::globals::Globals;
-use crate::terminal::Terminal;
+use terminal::Globals;
+use terminal::Terminal;
 
 /// What is said where the format is not in the build.
 const NO_PARQUET: &str = "this build writes none: cargo build --release --features parquet";

@@ -8,9 +8,10 @@ use std::process::{Command as Program, ExitCode};
 
 use clap::{Args, Subcommand};
 use deployment::Deployment;
-use launch::{Resolved, hosts, load, output, plan};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use launch::{Resolved, hosts, load, plan};
 use serde_json::Value;
+use terminal::output;
 
 /// How long `status` waits for the host that fuses.
 const PATIENCE: Duration = Duration::from_secs(5);

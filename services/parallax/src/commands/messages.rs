@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::output;
-use runtime::Failure;
+use failure::Failure;
+use terminal::output;
 
 /// Options of `parallax messages`.
 #[derive(Debug, Args)]

@@ -6,13 +6,13 @@ use std::process::{Command, ExitCode};
 
 use boards::Board;
 use clap::Args;
-use launch::output;
+use failure::{ExitKind, Failure, OrFail as _, in_file};
 use nalgebra::UnitVector3;
-use offline::boards::CameraFootage;
-use runtime::{ExitKind, Failure, OrFail as _, in_file};
+use rigs::boards::CameraFootage;
+use terminal::output;
 
 use crate::commands::calibrate::height;
-use crate::globals::Globals;
+use terminal::Globals;
 
 /// Options of `parallax new`.
 #[derive(Debug, Args)]

@@ -3,11 +3,12 @@
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::{live, output};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use launch::live;
 use publish::{Companion, Target};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use terminal::output;
 
-use crate::globals::Globals;
+use terminal::Globals;
 
 /// Options of `parallax publish`.
 #[derive(Debug, Args)]

@@ -8,12 +8,13 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use deployment::RecordingPlan;
-use launch::{Planned, Resolved, load, output, recorded};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use launch::{Planned, Resolved, load, recorded};
+use terminal::output;
 
 use super::hosts;
-use crate::globals::Globals;
 use disk_space::{Forecast, Growth, PerFrame};
+use terminal::Globals;
 
 /// The maximal number of epochs of the recording process whose files are looked for.
 const MAX_EPOCHS: u32 = 64;
@@ -198,7 +199,7 @@ fn remove_existing(file: &Path, force: bool) -> Result<(), Failure> {
             let failure = Failure::new(ExitKind::Config, message);
             return Err(failure.with_hint("wait until it ends, or take another name"));
         }
-        std::fs::remove_file(&file).map_err(|error| runtime::in_file(&file, &error))?;
+        std::fs::remove_file(&file).map_err(|error| failure::in_file(&file, &error))?;
     }
     Ok(())
 }

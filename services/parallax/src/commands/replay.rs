@@ -5,18 +5,20 @@ use std::process::ExitCode;
 
 use clap::Args;
 use deployment::{Deployment, Replay, Stage};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use inputs::Shipped;
 use launch::{
-    Planned, Resolved, Shipped, load, output, plan,
+    Planned, Resolved, load, plan,
     recorded::{self, Settings},
 };
 use messages::topic;
 use recording::{Kind, Recording};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use terminal::output;
 
 mod live;
 
-use crate::globals::Globals;
 use crate::stage;
+use terminal::Globals;
 
 /// Options of `parallax replay`.
 #[derive(Debug, Args)]

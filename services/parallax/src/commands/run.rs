@@ -4,12 +4,14 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::{Planned, load, output};
-use runtime::{ExitKind, Failure, OrFail as _, Stop, free_shared_memory, needed_bytes, preflight};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use launch::{Planned, load};
+use runtime::{free_shared_memory, needed_bytes, preflight};
 use supervise::Plan;
+use terminal::output;
 
 use super::{hosts, publish, view};
-use crate::globals::Globals;
+use terminal::Globals;
 
 /// Options of `parallax run`.
 #[derive(Debug, Args)]

@@ -7,8 +7,9 @@ use std::process::ExitCode;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser};
 use deployment::Stage;
+use failure::{ExitKind, Failure, OrFail as _};
 use launch::process::{self, Name};
-use runtime::{ExitKind, Failure, Launch, OrFail as _, run_service};
+use runtime::{Launch, run_service};
 
 use crate::stage;
 

@@ -5,15 +5,15 @@ use std::process::ExitCode;
 
 use clap::Args;
 use deployment::smooth::{Config, Method};
-use launch::output;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use nalgebra::{UnitVector3, Vector3};
-use offline::smooth::trial::{self, Trial};
-use offline::smooth::{self, Comparison, Outcome, Request, Row};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use rigs::smooth::trial::{self, Trial};
+use rigs::smooth::{self, Comparison, Outcome, Request, Row};
 use serde_json::{Value, json};
+use terminal::output;
 
-use crate::globals::Globals;
-use crate::terminal::Terminal;
+use terminal::Globals;
+use terminal::Terminal;
 
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} motions{left} {prefix} {msg}";
@@ -29,9 +29,9 @@ FOLDER holds the results of a run; nothing in it is changed. Beside them are wri
 Everything has a default: how restless each joint is, and how far its covariances can be believed, is found from the measurements.
 Defaults of the options are those of the section [smooth] of the deployment that the run is of. docs/guide/smooth.md explains.
 
-With --truth all methods are compared with the true joints, at the instants that all of them have; what `parallax eval` takes is a
-TRUTH: a folder of `parallax synth`, or a file as configs/sequences/pose2sim-balancing.toml. With --trial the same is done on motions and
-errors that are made up: every action of `parallax synth` with each seed.
+With --truth all methods are compared with the true joints, at the instants that all of them have; what `parallax-lab eval` takes is a
+TRUTH: a folder of `parallax-lab synth`, or a file as configs/sequences/pose2sim-balancing.toml. With --trial the same is done on motions and
+errors that are made up: every action of `parallax-lab synth` with each seed.
 
 Exit codes: 0 done; 7 done, but something speaks against the result (`doubts`: the file is cut off, nothing was measured, many
 measurements contradict each other); 2 an option is wrong, or a cutoff too high for the rate; 4 the folder or the truth cannot be read, a

@@ -7,16 +7,17 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand, ValueEnum};
 use deployment::{ClockKeys, Deployment, with_clocks};
+use failure::Console as _;
+use failure::unless_stopped;
+use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use launch::films::{Films, Part, Poses, films};
-use launch::{load, output};
-use offline::Console as _;
-use offline::unless_stopped;
-use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
+use launch::load;
 use serde_json::{Value, json};
 use synchronisation::{Outcome, Settings, estimate};
+use terminal::output;
 
-use crate::globals::Globals;
-use crate::terminal::Terminal;
+use terminal::Globals;
+use terminal::Terminal;
 
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";
@@ -388,7 +389,7 @@ fn write(file: &Path, outcome: &Outcome, names: &[&str]) -> Result<(), Failure> 
             .filter(|it| *it != 0.0),
     };
     let keys: Vec<ClockKeys> = names.iter().zip(&outcome.cameras).map(keys).collect();
-    let text = runtime::read_text(file)?;
+    let text = failure::read_text(file)?;
     let changed = with_clocks(&text, &keys).map_err(|error| {
         let lines = keys.iter().map(|it| {
             let drift = it

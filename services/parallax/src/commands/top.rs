@@ -7,11 +7,9 @@ use std::io::{self, IsTerminal as _};
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::{
-    live::{self, Live},
-    output,
-};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use launch::live::{self, Live};
+use terminal::output;
 
 /// Options of `parallax top`.
 #[derive(Debug, Args)]
@@ -51,7 +49,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     drop(live);
     let (asked, pause) = (stop.clone(), Duration::from_secs_f64(arguments.every));
     // Reading keys does not end where the terminal is gone: it is left behind.
-    let shown = offline::unless_stopped(&stop, move || screen::show(&namespace, &asked, pause))?;
+    let shown = failure::unless_stopped(&stop, move || screen::show(&namespace, &asked, pause))?;
     if shown.transpose()?.unwrap_or(false) {
         output::message("the deployment has ended");
     }

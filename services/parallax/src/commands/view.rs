@@ -7,12 +7,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::{load, output};
-use runtime::{ExitKind, Failure, Namespace, OrFail as _, Stop, deployments};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use launch::load;
+use runtime::{Namespace, deployments};
 use serde_json::json;
+use terminal::output;
 use view::{Listen, Options, Subject};
 
-use crate::globals::Globals;
+use terminal::Globals;
 
 /// Shortest token that is accepted, characters.
 const SHORTEST_TOKEN: usize = 16;
@@ -165,7 +167,7 @@ fn runs(name: &str) -> Result<bool, Failure> {
 
 /// The token in a file, without space around it.
 fn token_in(file: &Path) -> Result<String, Failure> {
-    let text = runtime::read_text(file)?;
+    let text = failure::read_text(file)?;
     let token = text.trim();
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_".contains(&byte);
     if token.len() < SHORTEST_TOKEN || !token.bytes().all(is_plain) {
@@ -183,7 +185,7 @@ fn random_token() -> Result<String, Failure> {
     let mut bytes = [0; 16];
     let source = Path::new("/dev/urandom");
     let read = File::open(source).and_then(|mut it| it.read_exact(&mut bytes));
-    read.map_err(|error| runtime::in_file(source, &error))?;
+    read.map_err(|error| failure::in_file(source, &error))?;
     let digits = bytes.iter().flat_map(|it| [it >> 4, it & 15]);
     let digits = digits.filter_map(|it| char::from_digit(it.into(), 16));
     Ok(digits.collect())

@@ -334,7 +334,10 @@ const INPUTS: &[Mistake] = &[
         "absent model",
         |it| it.edit("deployment.toml", "model.plx", "person.mat"),
         &["there is no model file", "person.mat"],
-        &["the one that ships with Parallax", "parallax model import"],
+        &[
+            "the one that ships with Parallax",
+            "parallax-lab model import",
+        ],
     ),
     input(
         "empty model",
@@ -398,7 +401,7 @@ const INPUTS: &[Mistake] = &[
             joints(it, "person.joints");
         },
         &["person.joints", "learned with another model"],
-        &["`parallax train joints`"],
+        &["`parallax-lab train joints`"],
     ),
     input(
         "rig for joints",

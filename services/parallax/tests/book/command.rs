@@ -3,8 +3,11 @@
 use core::fmt;
 use std::collections::BTreeMap;
 use std::fs;
+use std::path::PathBuf;
 use std::process::Command;
 use std::sync::{Mutex, PoisonError};
+
+use crate::common::started::built;
 
 /// Folders of the repository that a command may name.
 const FOLDERS: [&str; 6] = [
@@ -15,6 +18,25 @@ const FOLDERS: [&str; 6] = [
     "shared/",
     "tests/",
 ];
+
+/// One of the executables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Program {
+    /// `parallax`.
+    Parallax,
+    /// `parallax-lab`.
+    Lab,
+}
+
+impl Program {
+    /// Where it is built.
+    pub(crate) fn file(self) -> PathBuf {
+        built(match self {
+            Self::Parallax => "parallax",
+            Self::Lab => "parallax-lab",
+        })
+    }
+}
 
 /// One command of a block.
 #[derive(Debug)]
@@ -27,13 +49,20 @@ impl fmt::Display for Line {
 }
 
 impl Line {
-    /// The arguments, if it is a command of the executable.
-    pub(crate) fn parallax(&self) -> Option<&[String]> {
+    /// The executable and its arguments, if it is a command of one of ours.
+    pub(crate) fn ours(&self) -> Option<(Program, &[String])> {
         match self.0.first()?.as_str() {
-            "parallax" | "target/release/parallax" => Some(&self.0[1..]),
+            "parallax" | "target/release/parallax" => Some((Program::Parallax, &self.0[1..])),
+            "parallax-lab" | "target/release/parallax-lab" => Some((Program::Lab, &self.0[1..])),
             "cargo" if self.0.get(1)? == "run" => {
                 let at = self.0.iter().position(|word| word == "--")?;
-                Some(&self.0[at + 1..])
+                let is_lab = self.0[..at].iter().any(|word| word == "parallax-lab");
+                let program = if is_lab {
+                    Program::Lab
+                } else {
+                    Program::Parallax
+                };
+                Some((program, &self.0[at + 1..]))
             }
             _ => None,
         }
@@ -53,6 +82,7 @@ impl Line {
         let folders = match value(["-p", "--package"]) {
             None => vec!["services/parallax".to_owned()],
             Some("system-tests") => vec!["tests".to_owned()],
+            Some("parallax-lab") => vec!["services/lab".to_owned()],
             Some(name) => vec![format!("shared/{name}"), format!("services/{name}")],
         };
         let manifests = folders
@@ -120,10 +150,10 @@ fn words(line: &str) -> Vec<String> {
 ///
 /// It parses them itself, `--help` behind them: what it does not know, and values of another kind, it refuses
 /// before it comes to that. What is missing it would not notice; that is compared with its usage line.
-pub(crate) fn check(arguments: &[String]) -> Result<(), String> {
+pub(crate) fn check((program, arguments): (Program, &[String])) -> Result<(), String> {
     let mut asked = arguments.to_vec();
     asked.push("--help".to_owned());
-    let (succeeded, said) = run(&asked);
+    let (succeeded, said) = run(program, &asked);
     // A line may ask for what only some processors have; there it is taken.
     if !succeeded && said.contains("this processor has no AMX") {
         return Ok(());
@@ -135,7 +165,7 @@ pub(crate) fn check(arguments: &[String]) -> Result<(), String> {
         return Ok(());
     }
     let mut path: Vec<String> = Vec::new();
-    let mut help = help_of(&path)?;
+    let mut help = help_of(program, &path)?;
     let mut rest = arguments;
     while help.lines().any(|line| line == "Commands:") {
         let Some((name, others)) = rest.split_first() else {
@@ -152,7 +182,7 @@ pub(crate) fn check(arguments: &[String]) -> Result<(), String> {
             return Ok(()); // `parallax --version` and the like
         }
         path.push(name.clone());
-        (help, rest) = (help_of(&path)?, others);
+        (help, rest) = (help_of(program, &path)?, others);
     }
     let usage = Usage::parse(&help, path.len())?;
     usage.compare(rest)
@@ -242,23 +272,23 @@ impl<'a> Usage<'a> {
 }
 
 /// The short help of a command; asked for once.
-fn help_of(path: &[String]) -> Result<String, String> {
-    static KNOWN: Mutex<BTreeMap<Vec<String>, String>> = Mutex::new(BTreeMap::new());
+fn help_of(program: Program, path: &[String]) -> Result<String, String> {
+    static KNOWN: Mutex<BTreeMap<(Program, Vec<String>), String>> = Mutex::new(BTreeMap::new());
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(help) = known.get(path) {
+    if let Some(help) = known.get(&(program, path.to_vec())) {
         return Ok(help.clone());
     }
-    let (succeeded, said) = run(&[path, &["-h".to_owned()]].concat());
+    let (succeeded, said) = run(program, &[path, &["-h".to_owned()]].concat());
     if !succeeded {
         return Err(said);
     }
-    known.insert(path.to_vec(), said.clone());
+    known.insert((program, path.to_vec()), said.clone());
     Ok(said)
 }
 
 /// Whether it succeeded, and what it printed: on success to standard output, else to standard error.
-fn run(arguments: &[String]) -> (bool, String) {
-    let ended = Command::new(env!("CARGO_BIN_EXE_parallax"))
+fn run(program: Program, arguments: &[String]) -> (bool, String) {
+    let ended = Command::new(program.file())
         .args(arguments)
         .output()
         .unwrap();

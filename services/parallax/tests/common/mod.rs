@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "every test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+pub(crate) mod networks;
 pub(crate) mod planted;
 pub(crate) mod same_bits;
 pub(crate) mod started;
@@ -17,7 +18,7 @@ use runtime::Namespace;
 use serde_json::Value;
 use tempfile::TempDir;
 
-pub(crate) use started::{Ended, Started, WATCHDOG};
+pub(crate) use started::{Ended, Started};
 
 /// No overlays and no rotation, so that frames equal the generated pictures.
 pub(crate) const PLAIN: &str =

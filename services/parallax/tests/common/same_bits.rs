@@ -40,7 +40,7 @@ impl OneProcess {
         let mut settings = self.settings.clone();
         let shipped = Path::new(deployment::SHIPPED);
         settings.skeleton.body = BodySettings::NONE;
-        settings.view.orientation = launch::inputs::orientation(shipped, &model).unwrap();
+        settings.view.orientation = inputs::orientation(shipped, &model).unwrap();
         let mut estimator = Estimator::new(&model, &cameras, up, &settings).unwrap();
         let (pose3d, pose2d) = (case.lines("pose3d.jsonl"), case.lines("pose2d.jsonl"));
         assert_eq!((pose3d.len(), pose2d.len()), (n_frames, n_frames * n_views));

@@ -18,6 +18,32 @@ pub(crate) struct Started {
     log: PathBuf,
 }
 
+/// The executable that ships.
+pub(crate) fn parallax() -> PathBuf {
+    built("parallax")
+}
+
+/// The executable whose command the arguments begin with.
+fn program(arguments: &[&str]) -> PathBuf {
+    const LAB: [&str; 6] = ["eval", "judge", "model", "simulate", "synth", "train"];
+    let is_lab = arguments
+        .first()
+        .is_some_and(|command| LAB.contains(command));
+    built(if is_lab { "parallax-lab" } else { "parallax" })
+}
+
+/// A program of the workspace, beside the folder of this test.
+pub(crate) fn built(name: &str) -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    let file = test.ancestors().nth(2).unwrap().join(name);
+    assert!(
+        file.is_file(),
+        "{} is not built: test with --workspace",
+        file.display()
+    );
+    file
+}
+
 /// Exit status and output of a finished `parallax`.
 #[derive(Debug)]
 pub(crate) struct Ended {
@@ -29,7 +55,7 @@ pub(crate) struct Ended {
 impl Started {
     /// Starts it in a folder, and in a process group of its own.
     pub(crate) fn new(folder: &Path, arguments: &[&str]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_parallax"));
+        let mut command = Command::new(program(arguments));
         command.args(arguments);
         Self::from_command(folder, command)
     }
@@ -46,16 +72,14 @@ impl Started {
         let mut command = Command::new("unshare");
         command
             .args(["-m", "sh", "-ec", script])
-            .env("PARALLAX", env!("CARGO_BIN_EXE_parallax"));
+            .env("PARALLAX", parallax());
         Some(Self::from_command(folder, command))
     }
 
     /// Starts a shell script; `$PARALLAX` is the program.
     pub(crate) fn in_shell(folder: &Path, script: &str) -> Self {
         let mut command = Command::new("sh");
-        command
-            .args(["-ec", script])
-            .env("PARALLAX", env!("CARGO_BIN_EXE_parallax"));
+        command.args(["-ec", script]).env("PARALLAX", parallax());
         Self::from_command(folder, command)
     }
 

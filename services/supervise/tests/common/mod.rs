@@ -7,8 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
+use failure::Stop;
 use messages::FrameHeader;
-use runtime::{Delivery, Limits, Namespace, Scheduling, Stop, TopicPlan, process_topics};
+use runtime::{Delivery, Limits, Namespace, Scheduling, TopicPlan, process_topics};
 use supervise::{Death, Event, Outcome, Plan, Policy, ProcessSpec, Role, SuperviseError};
 use tracing::Level;
 

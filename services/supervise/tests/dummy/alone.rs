@@ -4,11 +4,9 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
+use failure::{Failure, Stop};
 use messages::FrameHeader;
-use runtime::{
-    Bus, Delivery, Failure, Limits, Namespace, Scheduling, Stop, TopicPlan, preflight,
-    process_topics,
-};
+use runtime::{Bus, Delivery, Limits, Namespace, Scheduling, TopicPlan, preflight, process_topics};
 use supervise::{Event, Plan, Policy, ProcessSpec, Role};
 use tracing::Level;
 
@@ -70,7 +68,7 @@ pub(crate) fn fill(base: &Path) -> ExitCode {
     );
     let preflight = preflight(core::slice::from_ref(&plan));
     print_line(&preflight.map_or_else(
-        |error| causes::in_one_line(&error),
+        |error| wording::in_one_line(&error),
         |()| "it fits".to_owned(),
     ));
     match without_preflight(base, &plan) {
@@ -88,7 +86,7 @@ fn without_preflight(base: &Path, plan: &TopicPlan) -> Result<String, Failure> {
     let topics = bus.create_topics(core::slice::from_ref(plan))?;
     let text = match bus.slice_publisher::<u8, FrameHeader>(plan.topic()) {
         Ok(_) => "it fits".to_owned(),
-        Err(error) => causes::in_one_line(&error),
+        Err(error) => wording::in_one_line(&error),
     };
     drop(topics);
     Ok(text)

@@ -8,8 +8,9 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::Instant;
 
+use failure::{ExitKind, Failure, OrFail as _};
 use messages::{FrameHeader, Status, ViewQuality};
-use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, Woken, run_service};
+use runtime::{Launch, Service, Woken, run_service};
 
 /// The topic of all dummy processes.
 const TOPIC: &str = "data";

@@ -3,12 +3,13 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use launch::output;
+use failure::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use messages::{FrameHeader, Stamp, Status, Timing, topic};
 use runtime::{
-    Bus, Child, Delivery, ExitKind, Failure, Launch, Limits, Namespace, OrFail as _, Scheduling,
-    SlicePublisher, Stop, TopicPlan, now_nanos, preflight, process_topics,
+    Bus, Child, Delivery, Launch, Limits, Namespace, Scheduling, SlicePublisher, TopicPlan,
+    preflight, process_topics,
 };
+use terminal::output;
 use tracing::Level;
 
 use super::receiver::{N_PLACED, ReceiverReport, Spot, WARM_UP, write};

@@ -1,9 +1,9 @@
 //! Benchmarks of whole deployments under load.
 
-use launch::output::{self, Verbosity};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use report::run::Limit;
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::{Value, json};
+use terminal::output::{self, Verbosity};
 
 use super::options::Options;
 use super::provenance::Provenance;

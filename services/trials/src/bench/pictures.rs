@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use image::ExtendedColorType;
 use indicatif::ProgressBar;
-use launch::{inputs, output};
 use rayon::prelude::*;
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::{Scene, Settings, View};
+use terminal::output;
 
 /// Writes the first pictures of every camera into a subfolder with its name; false if it was interrupted.
 ///
@@ -65,7 +65,7 @@ fn draw_view(
         let file = folder.join(format!("{frame:06}.png"));
         let [width, height] = [size.width as u32, size.height as u32];
         image::save_buffer(&file, &rgb, width, height, ExtendedColorType::Rgb8)
-            .map_err(|error| runtime::in_file(&file, &error))?;
+            .map_err(|error| failure::in_file(&file, &error))?;
         if is_enough() {
             break;
         }

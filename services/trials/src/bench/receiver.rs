@@ -4,10 +4,11 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use launch::output;
+use failure::{Failure, now_nanos};
 use messages::{FrameHeader, Status, topic};
-use runtime::{Failure, Launch, Mapped, Sample, Service, Woken, mapped_at, now_nanos, run_service};
+use runtime::{Launch, Mapped, Sample, Service, Woken, mapped_at, run_service};
 use serde::{Deserialize, Serialize};
+use terminal::output;
 
 use crate::spread::Spread;
 

@@ -4,8 +4,8 @@ use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::Path;
 
+use failure::Failure;
 use report::run::Limit;
-use runtime::Failure;
 use serde_json::{Value, json};
 
 use super::provenance::Provenance;
@@ -44,7 +44,7 @@ impl Report {
     /// The file cannot be written to.
     pub fn append(&self, file: &Path) -> Result<(), Failure> {
         let written = self.write_record(file);
-        written.map_err(|error| runtime::in_file(file, &error))
+        written.map_err(|error| failure::in_file(file, &error))
     }
 
     fn write_record(&self, file: &Path) -> std::io::Result<()> {

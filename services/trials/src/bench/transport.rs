@@ -2,10 +2,11 @@
 
 use std::time::Duration;
 
-use launch::output::{self, Verbosity};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use report::run::Limit;
-use runtime::{ExitKind, Failure, OrFail as _, Policy, RealTime, Scheduling, Stop};
+use runtime::{Policy, RealTime, Scheduling};
 use serde_json::{Value, json};
+use terminal::output::{self, Verbosity};
 
 use super::hop::{self, Measured, Series};
 use super::provenance::Provenance;

@@ -5,12 +5,12 @@ use std::fs;
 use std::path::PathBuf;
 
 use deployment::Deployment;
-use launch::output::Verbosity;
-use launch::{Planned, Report, inputs, load};
+use failure::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
+use launch::{Planned, Report, load};
 use runfiles::Percentiles;
-use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use scene::Action;
 use serde_json::{Value, json};
+use terminal::output::Verbosity;
 
 use super::options::Options;
 use super::pictures;

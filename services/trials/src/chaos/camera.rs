@@ -1,8 +1,8 @@
 //! The `camera-...` scenarios: a camera fails for a while.
 
+use failure::Failure;
 use fastrand::Rng;
 use report::run::Limit;
-use runtime::Failure;
 use serde::Serialize;
 use serde_json::json;
 

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
-use launch::inputs;
-use runtime::{ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
 use super::host_fault::HostFault;
@@ -49,7 +48,7 @@ pub(super) fn attempt(
     inputs::make_folder(&output)?;
     let state = output.join("hosts.json");
     if state.exists() {
-        std::fs::remove_file(&state).map_err(|error| runtime::in_file(&state, &error))?;
+        std::fs::remove_file(&state).map_err(|error| failure::in_file(&state, &error))?;
     }
     let desk_port = free_port().or_fail(ExitKind::Run)?;
     let relay = Relay::to(desk_port).or_fail(ExitKind::Run)?;
@@ -194,7 +193,7 @@ fn free_port() -> std::io::Result<u16> {
 /// Writes the deployment with its hosts, for one of them; the first half of the cameras is connected to the one that fuses.
 fn write(testbed: &Testbed, host: &str, port: u16) -> Result<PathBuf, Failure> {
     let text = std::fs::read_to_string(&testbed.file)
-        .map_err(|error| runtime::in_file(&testbed.file, &error))?;
+        .map_err(|error| failure::in_file(&testbed.file, &error))?;
     let plan = testbed.plan(host, &[])?;
     let cameras = &plan.resolved().deployment.cameras;
     let names = |all: &[deployment::capture::Camera]| {
@@ -212,7 +211,7 @@ fn write(testbed: &Testbed, host: &str, port: u16) -> Result<PathBuf, Failure> {
         names(far)
     );
     let file = testbed.file.with_file_name(format!("hosts-{host}.toml"));
-    files::replace(&file, text.as_bytes()).map_err(|error| runtime::in_file(&file, &error))?;
+    files::replace(&file, text.as_bytes()).map_err(|error| failure::in_file(&file, &error))?;
     Ok(file)
 }
 

@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
+use failure::{ExitKind, Failure, OrFail as _};
 use fastrand::Rng;
 use geometry::files::Format;
 use geometry::{Camera, Rig};
-use launch::inputs;
 use nalgebra::{UnitQuaternion, Vector3};
-use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 
 use super::options::Options;

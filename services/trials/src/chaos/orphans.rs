@@ -7,8 +7,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
+use failure::{ExitKind, Failure, OrFail as _};
 use launch::Planned;
-use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::judge::SupervisorKillOutcome;
 use super::resources;
@@ -37,7 +37,7 @@ pub(super) fn kill(
     let output = testbed.output(scenario);
     let results = output.join("pose3d.jsonl.part");
     if results.exists() {
-        fs::remove_file(&results).map_err(|error| runtime::in_file(&results, &error))?;
+        fs::remove_file(&results).map_err(|error| failure::in_file(&results, &error))?;
     }
     let mut command = Command::new(std::env::current_exe().or_fail(ExitKind::Run)?);
     command

@@ -1,6 +1,6 @@
 //! The scenario `kill-random`: randomly chosen processes are killed, one after the other.
 
-use runtime::{Failure, now_nanos};
+use failure::{Failure, now_nanos};
 use serde_json::json;
 
 use super::judge::{self, RandomKillsOutcome};

@@ -41,7 +41,7 @@ impl Kill {
     /// The downtime, milliseconds: from the kill until the process sent its first message that contributed to a
     /// result, or, for processes that results do not name, until it reported that it has worked.
     ///
-    /// * `session`: the session, which is the time of planning (`runtime::now_nanos`).
+    /// * `session`: the session, which is the time of planning (`failure::now_nanos`).
     pub(super) fn downtime_ms(
         &self,
         source: EpochSource,
@@ -78,7 +78,7 @@ impl RandomKills {
 
     /// Handles an event of the supervisor, and kills a process if it is time. Returns a message about the kill.
     ///
-    /// * `now`: `runtime::now_nanos`.
+    /// * `now`: `failure::now_nanos`.
     /// * `kill`: kills the process with this id.
     pub(super) fn handle(
         &mut self,

@@ -49,7 +49,7 @@ pub(super) struct Measured {
 struct Watched {
     pid: u32,
     epoch: u32,
-    /// When it was started, `runtime::now_nanos`.
+    /// When it was started, `failure::now_nanos`.
     started_at: u64,
     /// Whether it has worked in this epoch.
     has_worked: bool,
@@ -58,7 +58,7 @@ struct Watched {
 /// What was in use at one time.
 #[derive(Debug)]
 struct Sample {
-    /// When, `runtime::now_nanos`.
+    /// When, `failure::now_nanos`.
     at: u64,
     used: ResourceUse,
     /// Class of age and memory of every process, bytes; in the order of their names.
@@ -77,7 +77,7 @@ pub(super) struct ResourceMonitor {
 impl ResourceMonitor {
     /// Handles an event of the supervisor, and takes a sample if it is time.
     ///
-    /// * `now`: `runtime::now_nanos`.
+    /// * `now`: `failure::now_nanos`.
     /// * `measure`: measures the processes with these ids.
     pub(super) fn handle(
         &mut self,
@@ -148,7 +148,7 @@ impl ResourceMonitor {
 
     /// The median of the samples in a span of time; none if there are none.
     ///
-    /// * `span`: `runtime::now_nanos`.
+    /// * `span`: `failure::now_nanos`.
     pub(super) fn within(&self, span: &Range<u64>) -> Option<ResourceUse> {
         let within = self.samples.iter().filter(|it| span.contains(&it.at));
         median(within.map(|it| it.used))

@@ -29,7 +29,7 @@ pub(super) struct Part {
 /// Divides a run into parts.
 ///
 /// * `length`: the length of a part, nanoseconds; the last one may be shorter.
-/// * `session`: the session, which is the time of planning (`runtime::now_nanos`).
+/// * `session`: the session, which is the time of planning (`failure::now_nanos`).
 pub(super) fn parts(
     length: u64,
     session: u64,

@@ -2,8 +2,8 @@
 
 use std::io;
 
+use failure::Failure;
 use report::run::Limit;
-use runtime::Failure;
 use serde::Serialize;
 use serde_json::json;
 use supervise::Event;
@@ -56,7 +56,7 @@ impl StallInjector {
 
     /// Handles an event of the supervisor, and stops or resumes the process if it is time. Returns a message about it.
     ///
-    /// * `now`: `runtime::now_nanos`.
+    /// * `now`: `failure::now_nanos`.
     /// * `signal`: stops (true) or resumes (false) the process with this id.
     pub(super) fn handle(
         &mut self,
@@ -156,7 +156,7 @@ pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, F
     let planned = testbed.plan(STALL, &NO_HANG_DETECTION)?;
     let mut stall = StallInjector::new(frame_at(&planned, INJECT_AFTER) as u64);
     let run = testbed.run(&planned, &mut |event| {
-        stall.handle(event, runtime::now_nanos(), |stops, pid| {
+        stall.handle(event, failure::now_nanos(), |stops, pid| {
             if stops {
                 runtime::freeze(pid)
             } else {

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use deployment::Deployment;
-use launch::output::Verbosity;
-use launch::{Planned, Report, inputs, load};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use launch::{Planned, Report, load};
 use scene::Action;
 use serde_json::Value;
 use supervise::Event;
+use terminal::output::Verbosity;
 
 use super::judge::RunOutcome;
 use super::options::Options;

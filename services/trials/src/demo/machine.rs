@@ -3,11 +3,11 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
 use launch::{FOLLOWED_S, Resolved, process};
 use pipeline::{NetworkMemory, NetworkStep};
 use rayon::prelude::*;
-use runtime::{ExitKind, Failure, OrFail as _};
 use scene::{Scene, View};
 use serde_json::{Value, json};
 

@@ -33,6 +33,6 @@ pub(super) struct Run<'a> {
     pub truth: &'a [Vec<Point>],
     /// The times of the kill, if a kill was planned.
     pub killed: Option<FaultTimes>,
-    /// The session, which is the time of planning (`runtime::now_nanos`).
+    /// The session, which is the time of planning (`failure::now_nanos`).
     pub session: u64,
 }

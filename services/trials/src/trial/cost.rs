@@ -68,7 +68,7 @@ impl Cost {
     ///
     /// * `source`: where results record the epoch of the process.
     /// * `times`: the times of the fault.
-    /// * `session`: the session, which is the time of planning (`runtime::now_nanos`).
+    /// * `session`: the session, which is the time of planning (`failure::now_nanos`).
     pub(crate) fn new(
         source: EpochSource,
         times: FaultTimes,

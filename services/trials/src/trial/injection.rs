@@ -53,7 +53,7 @@ pub(crate) struct Injector {
     times: FaultTimes,
 }
 
-/// The times of a fault, nanoseconds (`runtime::now_nanos`).
+/// The times of a fault, nanoseconds (`failure::now_nanos`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct FaultTimes {
     /// The fault was injected.
@@ -96,7 +96,7 @@ impl Injector {
     /// Handles an event of the supervisor, and injects the fault if it is time. Returns a message about the injection or
     /// the recovery.
     ///
-    /// * `now`: `runtime::now_nanos`.
+    /// * `now`: `failure::now_nanos`.
     /// * `inject`: injects the fault into the process with this id.
     pub(crate) fn handle(
         &mut self,

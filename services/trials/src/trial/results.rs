@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use failure::Failure;
 use runfiles::{CameraTimes, FrameLine, Line, PoseTimes, TimesLine};
-use runtime::Failure;
 use skeleton::PARSE14;
 
 use super::Point;
@@ -64,9 +64,9 @@ pub(crate) fn read(folder: &Path, cameras: &[String]) -> Result<Vec<FrameResult>
 /// Reads a JSON-lines file of the output folder.
 fn lines<L: Line>(folder: &Path) -> Result<Vec<L>, Failure> {
     let file = folder.join(L::FILE);
-    let text = runtime::read_text(&file)?;
+    let text = failure::read_text(&file)?;
     let lines = runfiles::lines(&text).collect::<Result<_, _>>();
-    lines.map_err(|error| runtime::in_file(&file, &error))
+    lines.map_err(|error| failure::in_file(&file, &error))
 }
 
 /// Joins the lines of both files by frame; a frame that is in one of them only has no result.

@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use failure::{ExitKind, Failure, OrFail as _};
 use geometry::files::Format as RigFormat;
 use geometry::{Camera, Intrinsics, Rig};
-use launch::inputs;
-use runtime::{ExitKind, Failure, OrFail as _};
 use scene::{Action, Address, RigChoice, Scene, Settings};
 
 use super::Point;
@@ -111,7 +110,7 @@ impl SyntheticDeployment {
         geometry::files::write(&rig, RigFormat::Own, &self.rig).or_fail(ExitKind::Input)?;
         let file = self.folder.join("deployment.toml");
         let text = self.deployment(setup);
-        files::replace(&file, text.as_bytes()).map_err(|error| runtime::in_file(&file, &error))?;
+        files::replace(&file, text.as_bytes()).map_err(|error| failure::in_file(&file, &error))?;
         Ok(file)
     }
 

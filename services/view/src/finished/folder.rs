@@ -6,9 +6,9 @@ use std::io::{BufRead as _, BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use failure::{ExitKind, Failure};
 use launch::Resolved;
 use runfiles::{FrameLine, Line as _, Missing, ViewLine};
-use runtime::{ExitKind, Failure};
 use serde::Deserialize;
 use skeleton::PARSE14;
 
@@ -169,7 +169,7 @@ fn open_lines(folder: &Path, name: &str, notes: &mut Vec<String>) -> Result<Opti
                 return Ok(Some(file));
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(error) => return Err(runtime::in_file(&path, &error)),
+            Err(error) => return Err(failure::in_file(&path, &error)),
         }
     }
     Ok(None)
@@ -211,10 +211,10 @@ fn line_at(file: &Mutex<File>, place: u64, n: usize) -> Result<String, Failure> 
 /// The cameras and joints of a run by its settings, as far as they can be read.
 fn scene(folder: &Path, notes: &mut Vec<String>) -> Scene {
     let file = folder.join("deployment.json");
-    let text = runtime::read_text(&file);
+    let text = failure::read_text(&file);
     let read = text.and_then(|text| {
         let read = serde_json::from_str::<Resolved>(&text);
-        read.map_err(|error| runtime::in_file(&file, &error))
+        read.map_err(|error| failure::in_file(&file, &error))
     });
     match read {
         Ok(resolved) => {
@@ -248,7 +248,7 @@ fn scene(folder: &Path, notes: &mut Vec<String>) -> Scene {
 
 /// The calibrated camera of the footage itself.
 fn of_footage(resolved: &Resolved, name: &str) -> Option<geometry::Camera> {
-    let rig = launch::inputs::rig_of(&resolved.deployment).ok()?;
+    let rig = inputs::rig_of(&resolved.deployment).ok()?;
     rig.camera(name).cloned()
 }
 

@@ -6,10 +6,10 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bytemuck::pod_read_unaligned;
+use failure::{ExitKind, Failure};
 use launch::recorded::{self, Settings};
 use messages::{FrameHeader, Pose3d, Status, topic};
 use recording::{Entry, Kind, Recording};
-use runtime::{ExitKind, Failure};
 
 use super::Frame;
 use crate::moment::Moment;
@@ -46,7 +46,7 @@ impl Tape {
         note(&recording, &mut notes);
         let track = recording.tracks.get(&topic::pose3d());
         let mut poses = track.map_or_else(Vec::new, |it| it.entries.clone());
-        let mut input = files::open(path).map_err(|why| runtime::in_file(path, &why))?;
+        let mut input = files::open(path).map_err(|why| failure::in_file(path, &why))?;
         poses.retain(|it| read_pose(&mut input, it).is_ok_and(|it| it.status != Status::END));
         if poses.is_empty() {
             return Err(refused("it has no result".to_owned()));

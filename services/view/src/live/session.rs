@@ -4,10 +4,11 @@ use core::time::Duration;
 use std::sync::Arc;
 use std::time::Instant;
 
+use failure::{Failure, Stop};
 use launch::Resolved;
 use launch::live::{self, Live};
 use messages::{FrameHeader, MAX_VIEWS, Pose3d, Status, topic};
-use runtime::{Bus, Failure, Namespace, SliceSubscriber, Stop, Subscriber};
+use runtime::{Bus, Namespace, SliceSubscriber, Subscriber};
 use serde_json::{Value, json};
 
 use super::events::Events;

@@ -7,9 +7,10 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use deployment::RecordingPlan;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::{Prepared, Resolved, recorded};
 use record::{Job, Kept, Topics};
-use runtime::{Bus, ExitKind, Failure, Namespace, OrFail as _, Stop};
+use runtime::{Bus, Namespace};
 use serde_json::{Value, json};
 
 use crate::board::{Board, Weight};

@@ -1,4 +1,4 @@
-//! A model in a few numbers, for `parallax model show`.
+//! A model in a few numbers, for `parallax-lab model show`.
 
 use crate::{Model, Spring, Springs};
 

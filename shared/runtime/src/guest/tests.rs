@@ -5,7 +5,8 @@ use core::time::Duration;
 use messages::Health;
 
 use super::*;
-use crate::{Bus, Delivery, DeploymentLock, Limits, Stop, Topic, TopicPlan, wait_for_description};
+use crate::{Bus, Delivery, DeploymentLock, Limits, Topic, TopicPlan, wait_for_description};
+use failure::Stop;
 
 #[test]
 fn a_topic_is_told_apart_from_its_version() {

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use crate::{ExitKind, Fault};
+use failure::{ExitKind, Fault};
 
 /// Why a video device cannot be used. Names the device, and what it offers instead.
 #[derive(Debug, thiserror::Error)]

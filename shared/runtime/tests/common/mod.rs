@@ -4,7 +4,8 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use runtime::{Bus, DeploymentLock, Namespace, Stop, Topic, TopicPlan};
+use failure::Stop;
+use runtime::{Bus, DeploymentLock, Namespace, Topic, TopicPlan};
 
 /// Dropped in this order: topics before the lock, which removes all files.
 pub(crate) struct Deployment {

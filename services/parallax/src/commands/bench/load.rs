@@ -7,7 +7,7 @@ use messages::MAX_VIEWS;
 use trials::bench::Options;
 
 use super::{EXITS, Output};
-use crate::commands::synth::rate;
+use terminal::rate;
 
 const HELP: &str = "\
 Every run is a deployment of real processes, as `parallax run` starts it. Without a deployment file its cameras are \

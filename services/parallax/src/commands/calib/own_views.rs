@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use failure::{ExitKind, Failure, OrFail as _};
 use geometry::files::{EpipolarReport, epipolar_check};
 use geometry::{Framing, OutSize, Rig, RigWatch, SwapWatch};
 use nalgebra::Point2;
 use runfiles::{Facing, ViewLine};
-use runtime::{ExitKind, Failure, OrFail as _};
 
 /// The points that one camera found in a frame, pixels.
 type Points = Vec<[f64; 2]>;
@@ -112,8 +112,8 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
 fn frames(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Points>>>, Failure> {
     let cameras = rig.cameras();
     let mut frames = BTreeMap::<u64, Vec<Option<Points>>>::new();
-    for line in runfiles::lines::<ViewLine>(&runtime::read_text(file)?) {
-        let line = line.map_err(|error| runtime::in_file(file, &error))?;
+    for line in runfiles::lines::<ViewLine>(&failure::read_text(file)?) {
+        let line = line.map_err(|error| failure::in_file(file, &error))?;
         let Some(camera) = cameras.iter().position(|it| it.name == line.view) else {
             continue;
         };

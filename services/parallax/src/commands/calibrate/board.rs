@@ -9,18 +9,18 @@ use std::process::ExitCode;
 use boards::{Board, Paper};
 use calibration::board::LensKind;
 use clap::{Args, ValueEnum};
+use failure::Console as _;
+use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use geometry::files::ReadOptions;
-use launch::{inputs, output};
-use offline::Console as _;
-use offline::boards::{
+use rigs::boards::{
     Back, BoardSettings, Calibrated, CameraFootage, LookSettings, calibrate, read_frames,
     write_corners,
 };
-use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
+use terminal::output;
 
 use crate::commands::calib::To;
-use crate::globals::Globals;
-use crate::terminal::Terminal;
+use terminal::Globals;
+use terminal::Terminal;
 
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";

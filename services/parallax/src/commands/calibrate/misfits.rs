@@ -2,10 +2,10 @@
 
 use calibration::people::Skeletons;
 use calibration::people::misfit::{Fitted, Misfit};
+use failure::{ExitKind, Failure, OrFail as _};
 use footage::{Canvas, LEFT, RIGHT, Size, Source, SourceSpec};
 use geometry::Camera;
-use launch::{inputs, output};
-use runtime::{ExitKind, Failure, OrFail as _};
+use terminal::output;
 
 use super::walk::Walk;
 
@@ -61,7 +61,7 @@ fn drawn(walk: &Walk, misfit: &Misfit) -> Result<Option<Vec<u8>>, Failure> {
         start: 0,
         step: 1,
         count: None,
-        ..inputs::source(camera, &walk.deployment.capture)
+        ..launch::cameras::source(camera, &walk.deployment.capture)
     };
     let rate_hz = Source::open(&whole)
         .or_fail(ExitKind::Input)?

@@ -9,15 +9,15 @@ use boards::Board;
 use calibration::origin::{Click, OriginError, from_board, from_floor, from_points, rebased};
 use calibration::people::Vertical;
 use clap::Args;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use geometry::Rig;
 use geometry::files::{Format, ReadOptions};
-use launch::{inputs, output};
 use nalgebra::Point2;
-use offline::boards::{CameraFootage, LookSettings, look};
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use rigs::boards::{CameraFootage, LookSettings, look};
+use terminal::output;
 
-use crate::globals::Globals;
-use crate::terminal::Terminal;
+use terminal::Globals;
+use terminal::Terminal;
 
 /// Options of `parallax calibrate origin`.
 #[derive(Debug, Args)]

@@ -4,14 +4,15 @@ use std::process::ExitCode;
 
 use calibration::people::{Doubt, Outcome, Recording, Scale, Settings, Vertical, estimate};
 use clap::Args;
+use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use launch::films::Poses;
-use launch::{inputs, load, output};
-use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
+use launch::load;
 use serde_json::{Value, json};
+use terminal::output;
 
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
-use crate::globals::Globals;
+use terminal::Globals;
 
 /// What to try where the answer is refused.
 const HINT: &str = "let one person walk through the whole volume, in view of at least two cameras at every moment, for half a minute, \

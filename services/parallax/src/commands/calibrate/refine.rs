@@ -5,14 +5,14 @@ use std::process::ExitCode;
 use calibration::people::Recording;
 use calibration::refine::{Outcome, Settings, refine};
 use clap::Args;
+use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use launch::films::Poses;
-use launch::{inputs, output};
-use runtime::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use serde_json::{Value, json};
+use terminal::output;
 
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
-use crate::globals::Globals;
+use terminal::Globals;
 
 /// What to try where the answer is refused.
 const HINT: &str = "let one person walk through the whole volume for half a minute; if a camera was moved far, \

@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 use calibration::people::Doubt;
 use clap::Args;
 use deployment::Deployment;
+use failure::unless_stopped;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use geometry::files::Format;
 use geometry::{Camera, Rig};
 use launch::films::{Films, Part, Poses, films};
-use launch::{inputs, load};
+use launch::load;
 use nalgebra::UnitVector3;
-use offline::unless_stopped;
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
-use crate::globals::Globals;
-use crate::terminal::Terminal;
+use terminal::Globals;
+use terminal::Terminal;
 
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";
@@ -82,7 +82,7 @@ pub(super) fn walk(
     stop: &Stop,
 ) -> Result<Walk, Failure> {
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
-    let deployment = inputs::settled(&deployment)?;
+    let deployment = launch::cameras::settled(&deployment)?;
     if deployment.cameras.len() < 2 {
         let message = "the deployment has one camera: where it stands is told by others only";
         return Err(Failure::new(ExitKind::Config, message));

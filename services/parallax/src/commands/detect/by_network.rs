@@ -2,22 +2,22 @@
 
 use std::path::PathBuf;
 
+use failure::{ExitKind, Failure, OrFail as _};
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
-use launch::output;
-use offline::pictures::{Picture, Searched};
-use offline::sheet::{Sheet, Skeleton};
-use offline::{detector, network};
+use inputs::pictures::{Picture, Searched};
+use inputs::sheet::{Sheet, Skeleton};
+use inputs::{detector, network};
 use posenetwork::springs::TurnedSprings;
 use posenetwork::{
     Detector as BoxDetector, JointMaps, LookMemory, MapSettings, OF_FILTERS, PoseNetwork, Turn,
     Workspace, overlap,
 };
-use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Map, Value, json};
 use skeleton::PARSE14;
+use terminal::output;
 
 use super::Detector;
-use crate::commands::network::keypoints_json;
+use inputs::network::keypoints_json;
 
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;

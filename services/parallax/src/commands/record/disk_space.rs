@@ -5,8 +5,9 @@ use core::time::Duration;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use failure::{ExitKind, Failure, OrFail as _};
 use recording::Kind;
-use runtime::{ExitKind, Failure, OrFail as _, TopicPlan, free_space};
+use runtime::{TopicPlan, free_space};
 
 /// A recording starts only if there is space for this many frames.
 const MIN_FRAMES: u64 = 10;

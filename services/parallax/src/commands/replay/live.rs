@@ -5,10 +5,10 @@ use std::path::Path;
 use capture::Recorded;
 use deployment::Stage;
 use deployment::capture::{Mode, Pace};
+use failure::{ExitKind, Failure};
 use launch::Resolved;
 use messages::topic;
 use recording::Recording;
-use runtime::{ExitKind, Failure};
 
 /// Puts the recording in the place of live cameras.
 ///

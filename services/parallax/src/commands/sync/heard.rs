@@ -1,12 +1,11 @@
 //! What the cameras of a deployment heard.
 
 use deployment::Deployment;
+use failure::unless_stopped;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use footage::{RecordedSound, SourceSpec, read_sound};
 use geometry::Camera;
 use launch::films::{Part, cameras};
-use launch::inputs;
-use offline::unless_stopped;
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use synchronisation::{Outcome, Sound, SoundSettings, estimate_by_sound};
 
 /// Samples a second: most of what is heard of a room lies below half of it.
@@ -30,7 +29,7 @@ pub(super) fn compared(
         if camera.source.is_empty() {
             return Err(silent(&name, "it has no footage"));
         }
-        let spec = inputs::source(camera, &deployment.capture);
+        let spec = launch::cameras::source(camera, &deployment.capture);
         let sound = unless_stopped(stop, move || sound(&name, &spec, part))?;
         sounds.push(sound.ok_or_else(interrupted)??);
     }

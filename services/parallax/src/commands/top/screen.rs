@@ -3,6 +3,7 @@
 use core::time::Duration;
 use std::time::Instant;
 
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::live::{self, Live};
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyModifiers};
 use ratatui::layout::{Constraint, Layout};
@@ -10,7 +11,7 @@ use ratatui::style::{Style, Stylize as _};
 use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 use ratatui::{DefaultTerminal, Frame};
-use runtime::{ExitKind, Failure, Namespace, OrFail as _, Stop};
+use runtime::Namespace;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 /// How often a stop request and the end of the deployment are checked.

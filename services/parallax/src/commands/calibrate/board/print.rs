@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use boards::{Board, Drawing, Paper, pdf, svg};
-use launch::output;
-use runtime::{ExitKind, Failure, OrFail as _, in_file};
+use failure::{ExitKind, Failure, OrFail as _, in_file};
+use terminal::output;
 
 /// Writes the board.
 pub(super) fn run(board: &Board, paper: Paper, out: Option<&Path>) -> Result<ExitCode, Failure> {

@@ -1,10 +1,10 @@
 //! What came out, as a table and as JSON.
 
 use calibration::board::CameraOutcome;
-use launch::output;
-use offline::boards::Calibrated;
-use runtime::Failure;
+use failure::Failure;
+use rigs::boards::Calibrated;
 use serde_json::{Map, Value, json};
+use terminal::output;
 
 use super::Arguments;
 

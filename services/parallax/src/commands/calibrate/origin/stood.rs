@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use calibration::people::{Floor, Skeletons, Vertical, floor};
+use failure::{ExitKind, Failure};
 use geometry::Rig;
-use launch::output;
 use nalgebra::{Point2, Point3};
-use offline::smooth::read_lines;
+use rigs::smooth::read_lines;
 use runfiles::{Line as _, ViewLine};
-use runtime::{ExitKind, Failure};
 use skeleton::PARSE14;
 use statistics::Sorted;
+use terminal::output;
 
 /// How far the skeletons of a run may be from what its cameras saw, as a share of the size of the person in the picture.
 const MOST_OFF: f64 = 0.15;
@@ -66,7 +66,7 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
 /// A failure where the skeletons are not where the cameras of the rig saw them: the run was made with another rig.
 fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result<(), Failure> {
     let file = run.join(ViewLine::FILE);
-    let text = runtime::read_text(&file)?;
+    let text = failure::read_text(&file)?;
     let mut off: Vec<f64> = Vec::new();
     for line in runfiles::lines::<ViewLine>(&text).filter_map(Result::ok) {
         let camera = rig.camera(&line.view).ok_or_else(|| {

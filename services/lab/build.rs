@@ -1,0 +1,35 @@
+//! Tells the command its version, the commit that it is built from, and the features that not every build has.
+
+use std::process::Command;
+
+/// Features that a user notices.
+const FEATURES: [&str; 2] = ["libtorch", "ort"];
+
+fn main() {
+    for file in ["HEAD", "logs/HEAD"] {
+        println!("cargo::rerun-if-changed=../../.git/{file}");
+    }
+    let commit = git(&["rev-parse", "--short=10", "HEAD"]);
+    let commit = commit.unwrap_or_else(|| "commit unknown".to_owned());
+    let has = |feature: &&str| {
+        let variable = feature.to_uppercase().replace('-', "_");
+        std::env::var_os(format!("CARGO_FEATURE_{variable}")).is_some()
+    };
+    let features: Vec<&str> = FEATURES.into_iter().filter(has).collect();
+    let features = if features.is_empty() {
+        "none".to_owned()
+    } else {
+        features.join(", ")
+    };
+    let version = env!("CARGO_PKG_VERSION");
+    println!(
+        "cargo::rustc-env=PARALLAX_VERSION={version} ({commit}), optional features: {features}"
+    );
+}
+
+fn git(arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git").args(arguments).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    let text = text.trim();
+    (output.status.success() && !text.is_empty()).then(|| text.to_owned())
+}

@@ -1,0 +1,485 @@
+//! `parallax-lab eval`: the paper's evaluation on sequences with ground truth.
+
+mod evidence;
+mod height;
+mod pictures;
+mod report;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::{Arc, Mutex};
+
+use clap::Args;
+use consistency::Learned;
+use datasets::Selection;
+use deployment::fuse::Config;
+use deployment::fuse_numbers;
+use experiment::{FilmSettings, Version};
+use failure::Claim;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use fmp::Model;
+use inputs::Shipped;
+use lab::eval::{Done, Fusion, Job};
+use sequences::{Alignment, Sequence};
+use skeleton::JointSet;
+use viewquality::{Forecaster, Network, Table};
+
+use super::judge::selection;
+use terminal::Globals;
+use terminal::Terminal;
+
+/// The template of the progress bar.
+const BAR: &str = "{elapsed_precise} {bar:30} {pos}/{len} frames, {msg}";
+
+const HELP: &str = "\
+SEQUENCE is a folder of HumanEva-I (the whole, or a subject), UMPM, `parallax-lab synth`, or a description \
+(configs/sequences/); or single pictures (below). Every frame is solved on its own: once in every view, then by each version.
+
+Versions: fmp (every view alone, then triangulation), geometry, appearance (part types too), adaptive \
+(parts of large expected error switched off). They combine pairs of views by their mean, as the paper does; \
+geometry+consensus by what all views can mean; geometry+all-views supports each view by all others at \
+once, geometry+all-views-mean by the mean of their terms. Without --versions: all for which there is what \
+they need (tables of part types, or --consistency, for appearance; --network, --sigma or --oracle for adaptive), pairs and all views.
+
+--network FILE predicts the errors of the same single views as the service does; the report then says how \
+well: area under the ROC and rank correlation, part by part. Its thresholds count where --fuse sets no tau; \
+without any, a tenth of the person's size.
+
+--fuse FILE is the [fuse] section of a deployment: energy, alpha, beta, compatibility, tau, facing ...
+
+Single pictures of people with 14 joints (the folders of PARSE and LSP, JSON lines) are judged as `model judge` \
+does, with the same numbers: PCP and PCK of the best detection of a picture, and of the best one on the person, with \
+intervals; --only and --without choose among them. They and sequences are not judged in one run.
+
+OUT holds report.html, report.json, report.tex, and poses/ with what was found in every frame. With \
+--resume frames that are there are not solved again; other settings are refused. --json prints the report's \
+numbers.
+
+--network-evidence FILE [--detector FILE] judges the keypoints of a network (docs/networks.md): by plain \
+triangulation, with cameras left out, and in space over its maps, without and with the bones of a body. \
+--stress makes what goes wrong in real rooms. OUT then holds evidence.txt and evidence.json.
+
+Exit codes: 0 done; 2 the command line, 3 a setting is wrong; 4 a sequence or a model; 5 a calibration; \
+7 done, but footage ended before the truth; 130 interrupted.
+
+Examples:
+    parallax-lab eval configs/sequences/pose2sim-balancing.toml --model parse.mat --size 272x480 --every 5 --out out/eval
+    parallax-lab eval PARSE --only 101-200 --model parse.mat --out out/parse
+    parallax-lab eval HumanEva_I --model he.txt --fuse he.toml --sigma errors.csv --out out/humaneva --resume";
+
+/// Options of `parallax-lab eval`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a switch of the command line"
+)]
+pub(crate) struct Arguments {
+    /// The sequences.
+    #[arg(required = true, value_name = "SEQUENCE")]
+    sequences: Vec<PathBuf>,
+    /// The model file; the person model that ships with Parallax if not given.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// The folder for the report.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The versions to compare, separated by commas; each is compared with the first.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    versions: Vec<Version>,
+    /// File with settings of fusion.
+    #[arg(long, value_name = "FILE")]
+    fuse: Option<PathBuf>,
+    /// Learned consistency (`train consistency`), instead of that of --fuse; "shipped": the one that ships.
+    #[arg(long, value_name = "FILE")]
+    consistency: Option<PathBuf>,
+    /// What tells in which direction a person faces, for left and right (`train orientation`); "shipped": the one that
+    /// ships; "none": nothing.
+    #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
+    orientation: PathBuf,
+    /// Table of expected errors, in the authors' format.
+    #[arg(long, value_name = "FILE", conflicts_with = "oracle")]
+    sigma: Option<PathBuf>,
+    /// Network that predicts the expected errors, an ONNX file; "shipped": the one that ships.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["sigma", "oracle"])]
+    network: Option<PathBuf>,
+    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
+    /// "none": a joint is the centre of its part, as for other models.
+    #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
+    joint_map: PathBuf,
+    /// Use the true errors: a part is switched off if its error exceeds a tenth of the person's size.
+    #[arg(long)]
+    oracle: bool,
+    /// Size of the frames.
+    #[arg(long, value_name = "WxH", value_parser = size, conflicts_with = "scale")]
+    size: Option<[u32; 2]>,
+    /// Size of the frames as a share of that of the footage.
+    #[arg(long, default_value_t = 1.0)]
+    scale: f64,
+    /// Do not turn the frames upright.
+    #[arg(long)]
+    no_upright: bool,
+    /// Maximal number of candidates per view.
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    candidates: usize,
+    /// Use the first and every n-th frame after it.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    every: usize,
+    /// Maximal number of frames per sequence.
+    #[arg(long, value_name = "N")]
+    frames: Option<usize>,
+    /// Single pictures: the people to evaluate, all if not given.
+    #[arg(long, value_name = "SELECTION", value_parser = selection)]
+    only: Option<Selection>,
+    /// Single pictures: the people to leave out.
+    #[arg(long, value_name = "SELECTION", value_parser = selection)]
+    without: Option<Selection>,
+    /// The part of each sequence to use: 0.8-1 is the last fifth.
+    #[arg(long, value_name = "FROM-TO", value_parser = share)]
+    share: Option<[f64; 2]>,
+    /// UMPM: compare every frame with the pose of the frame before, as the released tools do.
+    #[arg(long)]
+    umpm_late: bool,
+    /// Length of the blocks of frames that the bootstrap draws for confidence intervals.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    block: usize,
+    /// Threads; one per core if not given. The numbers do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Continue an interrupted run.
+    #[arg(long)]
+    resume: bool,
+    /// Print the numbers as JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    evidence: evidence::Options,
+}
+
+pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT")?;
+    let side = |it: &str| {
+        it.parse::<u32>()
+            .map_err(|error| format!("{it:?}: {error}"))
+    };
+    Ok([side(width)?, side(height)?])
+}
+
+fn share(text: &str) -> Result<[f64; 2], String> {
+    let (from, to) = text.split_once('-').ok_or("expected FROM-TO, as 0.8-1")?;
+    let end = |it: &str| match it.parse::<f64>() {
+        Ok(end) if (0.0..=1.0).contains(&end) => Ok(end),
+        _ => Err(format!("{it:?} is no share from 0 to 1")),
+    };
+    let [from, to] = [end(from)?, end(to)?];
+    if from < to {
+        Ok([from, to])
+    } else {
+        Err(format!("nothing lies between {from} and {to}"))
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    if are_pictures(arguments)? {
+        return pictures::run(arguments, globals, &stop);
+    }
+    let evidence = &arguments.evidence;
+    match &evidence.network_evidence {
+        Some(network) => evidence::run(arguments, network, globals, stop),
+        None => run_versions(arguments, globals, stop),
+    }
+}
+
+/// Judges the versions of the method on sequences.
+fn run_versions(arguments: &Arguments, globals: Globals, stop: Stop) -> Result<ExitCode, Failure> {
+    let sequences = sequences(arguments)?;
+    let model = inputs::model_or_shipped(arguments.model.as_deref())?;
+    let config = config(arguments)?;
+    let learned = inputs::learned(config.consistency.as_deref(), &model)?;
+    let (sigma, network) = expected(arguments, model.n_parts())?;
+    let _claim = Claim::take(&arguments.out, "eval")?;
+    let poses = arguments.out.join("poses");
+    inputs::make_folder(&poses)?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.map_or(0, usize::from))
+        .build()
+        .or_fail(ExitKind::Run)?;
+    let fusion = |sequence: &Sequence, scale: f32| {
+        fusion(
+            (&config, learned.as_ref(), &model),
+            arguments.candidates,
+            sequence,
+            scale,
+        )
+    };
+    let joints = inputs::Joints::of(&arguments.joint_map, arguments.model.as_deref())?;
+    let joint_map = |set: &JointSet| joints.map(learned.as_ref(), set);
+    let job = Job {
+        joint_map: &joint_map,
+        versions: versions(arguments, &config)?,
+        settings: settings_text(arguments, &config, &joints)?,
+        film: FilmSettings {
+            size: arguments.size,
+            scale: arguments.scale,
+            upright: !arguments.no_upright,
+        },
+        n_candidates: arguments.candidates,
+        orientation: inputs::orientation(&arguments.orientation, &model)?,
+        oracle: arguments.oracle,
+        resume: arguments.resume,
+        fusion: &fusion,
+        facing: config.facing,
+        learned: learned.as_ref(),
+        tau_px: match &config.tau {
+            deployment::fuse::Tau::File(it) => inputs::tau(&it.file, model.n_parts())?,
+            it => fuse::tau_px(it),
+        },
+        model: Arc::clone(&model),
+        sigma,
+        forecaster: network.map(|it| Mutex::new(Forecaster::new(it))),
+        poses,
+        stop,
+    };
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR);
+    let done = pool.install(|| job.run(&sequences, &terminal))?;
+    report::write(arguments, &config, &job, &done)?;
+    if job.stop.is_requested() {
+        let failure = Failure::new(ExitKind::Interrupted, "interrupted");
+        return Err(failure.with_hint("--resume goes on where it was"));
+    }
+    outcome(&done)
+}
+
+/// Reads the table of expected errors, and the network that predicts them, if they are given.
+fn expected(
+    arguments: &Arguments,
+    n_parts: usize,
+) -> Result<(Option<Table>, Option<Network>), Failure> {
+    let sigma = match &arguments.sigma {
+        Some(file) => Some(inputs::quality_table(file, n_parts)?),
+        None => None,
+    };
+    let network = match &arguments.network {
+        Some(file) => Some(inputs::network(file, n_parts)?),
+        None => None,
+    };
+    Ok((sigma, network))
+}
+
+/// The settings and part-type tables for a sequence.
+///
+/// * `scale`: pixels of the frame per pixel of the footage.
+fn fusion(
+    (config, learned, model): (&Config, Option<&Learned>, &Model),
+    n_candidates: usize,
+    sequence: &Sequence,
+    scale: f32,
+) -> Result<Fusion, Failure> {
+    let mut config = config.clone();
+    if let deployment::fuse::Tau::File(tau) = &config.tau {
+        config.tau = deployment::fuse::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
+    }
+    let settings = fuse::settings(&config, n_candidates, scale, learned);
+    let cameras: Vec<&str> = sequence.views.iter().map(|it| it.camera.as_str()).collect();
+    let tables = inputs::pair_tables(&config, learned, model, &cameras)?;
+    Ok((settings, tables))
+}
+
+/// The exit status: an error if frames were left out or no frame was evaluated.
+fn outcome(done: &Done) -> Result<ExitCode, Failure> {
+    match done.n_missing {
+        0 => {
+            let is_judged = done.sequences.iter().any(|it| !it.1.is_empty());
+            failure::require_results(
+                is_judged,
+                "no frame was judged: there is none, or --only and --every leave none",
+            )
+        }
+        n => {
+            let message = format!("{n} frames were left out: the footage ended before the truth");
+            Err(Failure::new(ExitKind::Degraded, message))
+        }
+    }
+}
+
+/// Whether single pictures are evaluated; refuses pictures together with sequences.
+fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
+    let n = arguments
+        .sequences
+        .iter()
+        .filter(|it| lab::eval::pictures::is_one(it));
+    let n = n.count();
+    let selects = arguments.only.is_some() || arguments.without.is_some();
+    let refuse = |message: &str| Err(Failure::new(ExitKind::Usage, message));
+    if n == 0 && selects {
+        return refuse("--only and --without choose single pictures, and there are none");
+    }
+    if n > 0 && arguments.evidence.network_evidence.is_some() {
+        return refuse("--network-evidence judges sequences, not single pictures");
+    }
+    if n > 0 && n < arguments.sequences.len() {
+        return refuse("single pictures and sequences are not judged in one run");
+    }
+    Ok(n > 0)
+}
+
+fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
+    let options = sequences::Options {
+        alignment: if arguments.umpm_late {
+            Alignment::OneLate
+        } else {
+            Alignment::Direct
+        },
+        share: arguments.share,
+    };
+    let mut all: Vec<Sequence> = Vec::new();
+    for path in &arguments.sequences {
+        let read = sequences::read(path, &options);
+        for mut sequence in read.map_err(lab::sequence_failure)? {
+            sequence.thin_out(arguments.every, arguments.frames);
+            if all
+                .iter()
+                .any(|other| other.name == sequence.name && other.dataset == sequence.dataset)
+            {
+                let message = format!("{} {} is given twice", sequence.dataset, sequence.name);
+                return Err(Failure::new(ExitKind::Usage, message));
+            }
+            all.push(sequence);
+        }
+    }
+    // A network with a detector of its own does without the filters.
+    if arguments.evidence.detector.is_none() {
+        for warning in height::warnings(&all, arguments.size, arguments.scale) {
+            tracing::warn!("{warning}");
+        }
+    }
+    Ok(all)
+}
+
+fn config(arguments: &Arguments) -> Result<Config, Failure> {
+    let mut config = fuse_section(arguments.fuse.as_deref())?;
+    if let Some(file) = &arguments.consistency {
+        config.consistency = Some(file.clone());
+    }
+    let needs_file = config.tau == deployment::fuse::Tau::Named(deployment::fuse::TauName::Learned);
+    if needs_file && config.consistency.is_none() {
+        let message = "`tau = \"learned\"` needs `consistency`, or --consistency";
+        return Err(Failure::new(ExitKind::Config, message));
+    }
+    Ok(config)
+}
+
+/// Reads the `[fuse]` settings from a file; the defaults if there is none.
+fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
+    let Some(file) = file else {
+        return Ok(Config::default());
+    };
+    let text = failure::read_text(file)?;
+    let mut config: Config = toml::from_str(&text).map_err(|error| {
+        let message = format!("{}: {error}", file.display());
+        Failure::new(ExitKind::Config, message)
+    })?;
+    fuse_numbers(&config)
+        .map_err(|it| it.at(file.display().to_string()))
+        .or_fail(ExitKind::Config)?;
+    let folder = file.parent().map_or_else(PathBuf::new, PathBuf::from);
+    if let Some(file) = &mut config.consistency {
+        *file = deployment::relative_to(file, &folder);
+    }
+    for table in &mut config.compatibility {
+        table.files = table.files.each_ref().map(|it| folder.join(it));
+    }
+    Ok(config)
+}
+
+/// The versions to compare: the requested ones, or all that are possible with the given inputs.
+fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Failure> {
+    let expects = arguments.sigma.is_some() || arguments.network.is_some() || arguments.oracle;
+    if let [_, ..] = arguments.versions[..] {
+        let adaptive = |it: &Version| it.terms == experiment::Terms::Adaptive;
+        if !expects && arguments.versions.iter().any(adaptive) {
+            let message = "adaptive selection needs expected errors: --network FILE, --sigma FILE or --oracle";
+            return Err(Failure::new(ExitKind::Usage, message));
+        }
+        return Ok(arguments.versions.clone());
+    }
+    let mut names = vec!["geometry"];
+    if !config.compatibility.is_empty() || config.consistency.is_some() {
+        names.push("appearance");
+    }
+    if expects {
+        names.push("adaptive");
+    }
+    let each = ["", "+all-views"].into_iter();
+    let each = each.flat_map(|it| names.iter().map(move |name| format!("{name}{it}")));
+    let mut versions = vec![Version::SINGLE];
+    for name in each {
+        versions.push(name.parse().or_fail(ExitKind::Run)?);
+    }
+    Ok(versions)
+}
+
+/// A text with all settings that the poses depend on, besides the sequence and its frames.
+fn settings_text(
+    arguments: &Arguments,
+    config: &Config,
+    joints: &inputs::Joints,
+) -> Result<String, Failure> {
+    let digest = |file: &PathBuf| {
+        let bytes =
+            files::read(file, files::MODEL).map_err(|error| failure::in_file(file, &error))?;
+        Ok::<_, Failure>(checksum::fnv1a(&bytes))
+    };
+    let of = |kind: Shipped, file: &PathBuf| Ok::<_, Failure>(checksum::fnv1a(&kind.read(file)?));
+    let model = checksum::fnv1a(&inputs::model_bytes(arguments.model.as_deref())?);
+    let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
+    let network = arguments
+        .network
+        .as_ref()
+        .map(|it| of(Shipped::Network, it))
+        .transpose()?;
+    let network = network.map_or_else(String::new, |it| format!("network {it:016x}, "));
+    let orientation = if deployment::is_none(&arguments.orientation) {
+        String::new()
+    } else {
+        let file = of(Shipped::Orientation, &arguments.orientation)?;
+        format!("orientation {file:016x}, ")
+    };
+    let joints = joints.fingerprint();
+    let mut tables = Vec::new();
+    let files = config.compatibility.iter().flat_map(|it| &it.files);
+    for file in files {
+        tables.push(digest(file)?);
+    }
+    if let Some(file) = &config.consistency {
+        tables.push(of(Shipped::Consistency, file)?);
+    }
+    let fuse = toml::to_string(config).or_fail(ExitKind::Run)?;
+    let (size, scale) = (arguments.size, arguments.scale);
+    let (upright, n, oracle) = (
+        !arguments.no_upright,
+        arguments.candidates,
+        arguments.oracle,
+    );
+    Ok(format!(
+        "{network}{orientation}joints {joints}, model {model:016x}, sigma {sigma:x?}, oracle {oracle}, tables {tables:x?}, size {size:?}, \
+         scale {scale}, upright {upright}, candidates {n}\n{fuse}"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_shares_are_checked() {
+        assert_eq!(size("272x480"), Ok([272, 480]));
+        assert!(size("272").is_err() && size("ax2").is_err());
+        assert_eq!(share("0.8-1"), Ok([0.8, 1.0]));
+        for text in ["0.8", "1-0.8", "0.5-0.5", "0-2", "nan-1"] {
+            assert!(share(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Evaluation of sequences on the keypoints of a network.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use evaluation::Bootstrap;
+use experiment::{FilmSettings, Stress};
+use failure::Claim;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use fmp::Search;
+use inputs::library::Library;
+use lab::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
+use posenetwork::springs::TurnedSprings;
+use terminal::output;
+
+use super::Arguments;
+use terminal::Globals;
+use terminal::Terminal;
+
+/// Options of the evaluation on a network.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// Judge the keypoints of this network (ONNX) in place of the filters; "shipped": the one that ships.
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["model", "versions", "fuse", "consistency", "sigma", "network", "oracle", "resume", "only", "without"]
+    )]
+    pub(super) network_evidence: Option<PathBuf>,
+    /// The card of the network; if not given, the one beside it, or in its metadata.
+    #[arg(long, value_name = "FILE", requires = "network_evidence")]
+    card: Option<PathBuf>,
+    /// The network (ONNX) that finds the boxes of people; without it the filters find them.
+    #[arg(long, value_name = "FILE", requires = "network_evidence")]
+    pub(super) detector: Option<PathBuf>,
+    /// The card of the detector; if not given, the one beside it, or in its metadata.
+    #[arg(long, value_name = "FILE", requires = "detector")]
+    detector_card: Option<PathBuf>,
+    /// What goes wrong, separated by commas: clean, covered:N (half of the person in N views), views:N (only so many),
+    /// turned:DEGREES (a camera), bystander, exchanged (sides in a view); all: the whole set. Only with
+    /// --network-evidence.
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "clean",
+        requires = "network_evidence"
+    )]
+    stress: Vec<String>,
+}
+
+impl Options {
+    fn stress(&self) -> Result<Vec<Stress>, Failure> {
+        if self.stress == ["all"] {
+            return Ok(Stress::ALL.to_vec());
+        }
+        let each = self.stress.iter().map(|it| it.parse::<Stress>());
+        let all: Result<Vec<Stress>, _> = each.collect();
+        all.map_err(|error| Failure::new(ExitKind::Usage, format!("--stress: {error}")))
+    }
+}
+
+/// Runs the evaluation.
+pub(super) fn run(
+    arguments: &Arguments,
+    file: &Path,
+    globals: Globals,
+    stop: Stop,
+) -> Result<ExitCode, Failure> {
+    let options = &arguments.evidence;
+    let stress = options.stress()?;
+    let sequences = super::sequences(arguments)?;
+    let network = (file, options.card.as_deref());
+    let network = inputs::open_network(network, &Library::BuiltIn)?.fitted()?;
+    let detector = options.detector.as_deref();
+    let detector = detector.map(|it| inputs::detector::open(it, options.detector_card.as_deref()));
+    let detector = detector.transpose()?;
+    let filters = Search::new(inputs::model_or_shipped(None)?);
+    let springs = TurnedSprings::new(&inputs::springs(Path::new(deployment::SHIPPED))?);
+    let _claim = Claim::take(&arguments.out, "eval")?;
+    let job = EvidenceJob {
+        network: &network,
+        boxes: detector
+            .as_ref()
+            .map_or(Boxes::Filters(&filters), Boxes::Detector),
+        springs: &springs,
+        stress: &stress,
+        film: FilmSettings {
+            size: arguments.size,
+            scale: arguments.scale,
+            upright: !arguments.no_upright,
+        },
+        bootstrap: Bootstrap {
+            block: arguments.block,
+            ..Bootstrap::default()
+        },
+        stop,
+    };
+    let terminal = Terminal::with_bar(globals.quiet, false, super::BAR);
+    let rows = job.run(&sequences, &terminal)?;
+    write(&arguments.out, &rows)?;
+    if arguments.json {
+        output::json(&rows)?;
+    } else {
+        output::line(evidence_text(&rows).trim_end())?;
+    }
+    failure::require_results(
+        rows.iter().any(|it| it.n_frames > 0),
+        "no frame was judged: there is none, or --every leaves none",
+    )
+}
+
+fn write(out: &Path, rows: &[EvidenceRow]) -> Result<(), Failure> {
+    let json = serde_json::to_vec_pretty(rows).or_fail(ExitKind::Run)?;
+    for (name, bytes) in [
+        ("evidence.json", json),
+        ("evidence.txt", evidence_text(rows).into_bytes()),
+    ] {
+        let path = out.join(name);
+        files::replace(&path, &bytes)
+            .map_err(|error| Failure::new(ExitKind::Run, format!("{}: {error}", path.display())))?;
+    }
+    Ok(())
+}

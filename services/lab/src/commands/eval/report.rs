@@ -1,0 +1,93 @@
+//! Writes the report of an evaluation.
+
+use deployment::fuse::Config;
+use evaluation::Bootstrap;
+use failure::Failure;
+use lab::eval::{self, Done, Job};
+use terminal::output;
+
+use super::Arguments;
+
+/// Writes the report, and prints a summary.
+pub(super) fn write(
+    arguments: &Arguments,
+    config: &Config,
+    job: &Job<'_>,
+    done: &Done,
+) -> Result<(), Failure> {
+    let bootstrap = Bootstrap {
+        block: arguments.block,
+        ..Bootstrap::default()
+    };
+    let summary = done.summary(&job.versions, &bootstrap);
+    let about = about(arguments, config, job, done);
+    eval::write_report(&arguments.out, &summary, &job.versions, &about)?;
+    if arguments.json {
+        return output::json(&summary);
+    }
+    output::line(eval::text(&summary, &job.versions))?;
+    output::line(format_args!(
+        "report: {}",
+        arguments.out.join("report.html").display()
+    ))
+}
+
+fn about(
+    arguments: &Arguments,
+    config: &Config,
+    job: &Job<'_>,
+    done: &Done,
+) -> Vec<(String, String)> {
+    let n_frames: usize = done.sequences.iter().map(|it| it.1.len()).sum();
+    let file = arguments.sigma.as_ref().or(arguments.network.as_ref());
+    let expected = match (file, arguments.oracle) {
+        (Some(file), _) => file.display().to_string(),
+        (None, true) => "the true errors, a tenth of the person's size allowed".to_owned(),
+        (None, false) => "none".to_owned(),
+    };
+    let size = arguments.size.map_or_else(
+        || format!("{} of the footage", arguments.scale),
+        |[width, height]| format!("{width}x{height}"),
+    );
+    let frames = format!("{n_frames} instants; sequences: {}", done.sequences.len());
+    let settings = fuse::settings(config, job.n_candidates, 1.0, job.learned);
+    let model = arguments.model.as_ref();
+    let model = model.map_or("the one that ships".to_owned(), |it| {
+        it.display().to_string()
+    });
+    let upright = if job.film.upright { ", upright" } else { "" };
+    [
+        ("model", model),
+        ("frames", format!("{frames}, {size}{upright}")),
+        ("expected errors", expected),
+        (
+            "energy",
+            format!(
+                "{}, alpha {}, beta {}, distances {}",
+                match config.energy {
+                    deployment::fuse::Energy::Paper => "the paper's",
+                    deployment::fuse::Energy::Released => "that of the released program",
+                },
+                settings.alpha,
+                settings.beta,
+                if settings.max_distance_cells.is_finite() {
+                    format!("up to {} cells", settings.max_distance_cells)
+                } else {
+                    "of any number of cells".to_owned()
+                }
+            ),
+        ),
+        (
+            "facing",
+            if config.facing {
+                "decided for every view"
+            } else {
+                "as the model names its parts"
+            }
+            .to_owned(),
+        ),
+        ("candidates of a view", job.n_candidates.to_string()),
+    ]
+    .map(|(key, value)| (key.to_owned(), value))
+    .to_vec()
+}

@@ -1,0 +1,178 @@
+//! `parallax-lab judge`: evaluates a model on annotated people.
+
+mod network;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use datasets::{People, ReadOptions, Selection, Sides, SkeletonTable};
+use evaluation::Bootstrap;
+use experiment::Judged;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use fmp::Search;
+use inputs::Joints;
+use lab::judged::{self, Reader};
+use serde_json::json;
+use skeleton::PARSE14;
+use terminal::output;
+
+use terminal::Globals;
+use terminal::Terminal;
+
+/// The progress bar.
+pub(super) const BAR: &str =
+    "{elapsed_precise} {bar:20} {pos}/{len} people, {per_sec}{left} {prefix}";
+
+/// Options of `parallax-lab judge`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+DATASET and SELECTION are those of `parallax-lab train fmp`. Two detections of an image are judged: the \
+best one of the image, which is how PCP is published, and the best one that covers 30 % of the box \
+around the person's joints, which is how PCK is (Yang & Ramanan). Bad labels are reported and left out.
+
+On a terminal a bar shows how many people are done. Ctrl-C ends the command after the person that it is at (exit code 130); nothing \
+is printed then.
+
+With --json one object:
+    {\"images\", \"left_out\", \"best\" | \"on_person\":
+     {\"missed\", \"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}}
+Percentages, of every stick or joint and in \"total\".
+
+\"joints\" says where they lie among the parts. With --offsets also \"offsets\": of every joint of the best detection on the
+person, found within 0.2 of the person's size, the mean along its bone (positive beyond the mark, seen from the trunk) and
+across it (positive outwards), percent of the height of the person, and their intervals.
+
+A network that finds keypoints (.onnx, docs/networks.md) is asked for every person in the box around the marked joints, widened
+by 5 % on each side: \"peaks\" are the joints at the maxima of its maps, \"springs\" those that the tree of springs chooses on
+the same maps. With --json these two stand in place of \"best\" and \"on_person\", each also with \"intervals\": of the totals, 95 %
+over the people, {\"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}. \"expected_errors\" says how well the \
+height of the maxima tells how far off the joints are: {\"joints\", \"off_by_half_a_head\", \"auc\" (of telling these), \
+\"auc_interval\", \"rank_correlation\"}.
+
+Examples:
+    parallax-lab judge person.fmp PARSE --only 101-200
+    parallax-lab judge pose.onnx PARSE --card configs/networks/rtmpose-coco17.toml --only 101-200")]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a switch of the command line"
+)]
+pub(crate) struct Arguments {
+    /// The model file, of 26 parts; or a network that finds keypoints (.onnx).
+    model: PathBuf,
+    /// The data set: people with 14 joints.
+    dataset: PathBuf,
+    /// The people to evaluate, all if not given.
+    #[arg(long, value_name = "SELECTION", value_parser = selection)]
+    only: Option<Selection>,
+    /// The people to leave out.
+    #[arg(long, value_name = "SELECTION", value_parser = selection)]
+    without: Option<Selection>,
+    /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
+    #[arg(long, value_name = "SIDES", default_value = "marked")]
+    sides: Sides,
+    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
+    /// "none": a joint is the centre of its part, as for other models.
+    #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
+    joint_map: PathBuf,
+    /// Also print the mean offset of every joint along and across its bone, with 95 % intervals.
+    #[arg(long)]
+    offsets: bool,
+    /// The card of a network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
+    #[arg(long, value_name = "CARD")]
+    card: Option<PathBuf>,
+    /// The tree of springs for the maps of a network; if not given, the one that ships.
+    #[arg(long, value_name = "FILE")]
+    springs: Option<PathBuf>,
+    /// A network is told nothing but the picture: it looks into the box of the best pose that the filters find.
+    #[arg(long)]
+    find_boxes: bool,
+    /// A network looks at the mirror image of every person as well: more exact, and takes its time twice.
+    #[arg(long)]
+    mirror: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Arguments {
+    /// The people to evaluate.
+    fn people(&self) -> Result<People, Failure> {
+        let options = options(self.only.as_ref(), self.without.as_ref());
+        let read = datasets::read(&self.dataset, &options);
+        let mut people = read.map_err(lab::dataset_failure)?;
+        let table = SkeletonTable::published();
+        let sided = people.people.into_iter();
+        let sided = sided.map(|it| self.sides.of(it, table.joint_mirror()));
+        people.people = sided.collect();
+        Ok(people)
+    }
+}
+
+pub(super) fn selection(text: &str) -> Result<Selection, String> {
+    Selection::from_argument(text).map_err(|it| it.to_string())
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR);
+    let is_network = arguments.model.extension();
+    if is_network.is_some_and(|it| it.eq_ignore_ascii_case("onnx")) {
+        return network::run(arguments, &stop, &terminal);
+    }
+    if arguments.card.is_some()
+        || arguments.springs.is_some()
+        || arguments.find_boxes
+        || arguments.mirror
+    {
+        let message = format!(
+            "{}: --card, --springs, --find-boxes and --mirror are for networks, files that end in .onnx",
+            arguments.model.display()
+        );
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    let model = inputs::model(&arguments.model)?;
+    judged::check(&model, &arguments.model.display().to_string())?;
+    let people = arguments.people()?;
+    let joints = Joints::of(&arguments.joint_map, Some(&arguments.model))?;
+    let reader = Reader {
+        search: Search::new(model),
+        joint_map: joints.map(None, &PARSE14),
+    };
+    let pictures = judged::judged(&reader, "", &people, &stop, &terminal)?;
+    let [best, on_person] = Judged::ALL.map(|it| pictures.report(it));
+    if arguments.json {
+        let mut report = json!({
+            "schema_version": 1,
+            "joints": joints.to_string(),
+            "images": best.n_images(),
+            "left_out": pictures.n_left_out,
+            "best": judged::numbers(&best),
+            "on_person": judged::numbers(&on_person),
+        });
+        if arguments.offsets {
+            report["offsets"] = judged::offset_numbers(&pictures.offsets(&Bootstrap::default()));
+        }
+        output::json(&report)?;
+    } else {
+        output::line(format_args!("joints: {joints}"))?;
+        output::line(format_args!("{}: {best}", Judged::Best.title()))?;
+        output::line(format_args!("\n{}: {on_person}", Judged::OnPerson.title()))?;
+        if arguments.offsets {
+            let offsets = pictures.offsets(&Bootstrap::default());
+            output::line(format_args!("\n{}", judged::offset_table(&offsets)))?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Options for reading the people to evaluate, with 14 joints.
+pub(super) fn options(only: Option<&Selection>, without: Option<&Selection>) -> ReadOptions {
+    ReadOptions {
+        only: only.cloned(),
+        without: without.cloned(),
+        n_joints: Some(PARSE14.joints.len()),
+        ..ReadOptions::default()
+    }
+}

@@ -1,0 +1,170 @@
+//! `parallax-lab judge` of a network that finds keypoints.
+
+use core::fmt;
+use std::path::Path;
+use std::process::ExitCode;
+
+use evaluation::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
+use experiment::{Intervals, Judged, Pictures};
+use failure::Console;
+use failure::{ExitKind, Failure, Stop};
+use fmp::Search;
+use inputs::library::Library;
+use lab::judged;
+use lab::judged_network::{self, JointError, NetworkReader, Seen};
+use posenetwork::springs::TurnedSprings;
+use serde_json::{Value, json};
+use terminal::output;
+
+use super::Arguments;
+
+/// What is judged, as [`Judged::ALL`]: keys and titles.
+const NAMES: [(&str, &str); 2] = [
+    ("peaks", "maxima of the maps, in the person's box"),
+    ("springs", "the same maps, held together by springs"),
+];
+
+/// Runs the command.
+pub(super) fn run(
+    arguments: &Arguments,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<ExitCode, Failure> {
+    refuse(arguments)?;
+    let named = (arguments.model.as_path(), arguments.card.as_deref());
+    let file = inputs::open_network(named, &Library::BuiltIn)?;
+    let shipped = Path::new(deployment::SHIPPED);
+    let springs = arguments.springs.as_deref().unwrap_or(shipped);
+    let finder = arguments.find_boxes.then(|| {
+        let model = inputs::model_or_shipped(None)?;
+        Ok::<_, Failure>(Search::new(model))
+    });
+    let mut network = file.fitted()?;
+    if arguments.mirror {
+        network = inputs::mirrored(network, "--mirror")?;
+    }
+    let reader = NetworkReader {
+        network,
+        springs: TurnedSprings::new(&inputs::springs(springs)?),
+        sides: arguments.sides,
+        finder: finder.transpose()?,
+    };
+    let people = arguments.people()?;
+    let Seen { pictures, errors } = judged_network::judged(&reader, &people, stop, console)?;
+    let expected = Expected::of(&errors);
+    if arguments.json {
+        let mut report = json!({
+            "schema_version": 1,
+            "network": arguments.model,
+            "images": pictures.truths.len(),
+            "left_out": pictures.n_left_out,
+        });
+        for ((key, _), which) in NAMES.into_iter().zip(Judged::ALL) {
+            report[key] = numbers(&pictures, which);
+        }
+        report["expected_errors"] = expected.json();
+        output::json(&report)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    for (nth, ((_, title), which)) in NAMES.into_iter().zip(Judged::ALL).enumerate() {
+        let gap = if nth == 0 { "" } else { "\n" };
+        output::line(format_args!("{gap}{title}: {}", pictures.report(which)))?;
+        let Intervals { pcp, pck } = pictures.intervals(which, &Bootstrap::default());
+        let [mean_of_ends, both_ends] = pcp.map(interval);
+        let [near, far] = pck.map(interval);
+        output::line(format_args!(
+            "95 % intervals of the totals: PCP mean of ends {mean_of_ends}, both ends {both_ends}; PCK {near}, {far}"
+        ))?;
+    }
+    output::line(format_args!("\n{expected}"))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// How well the heat of the maps tells how far off a joint is.
+struct Expected {
+    n_joints: usize,
+    n_far: usize,
+    /// With its interval.
+    auc: Option<(f64, [f64; 2])>,
+    rank_correlation: Option<f64>,
+}
+
+impl Expected {
+    /// * `people`: the joints of each.
+    fn of(people: &[Vec<JointError>]) -> Self {
+        let auc = |errors: &[JointError]| {
+            let each = errors.iter().map(|it| (it.expected, it.is_far()));
+            area_under_roc(&each.collect::<Vec<_>>())
+        };
+        let errors = people.concat();
+        let both: Vec<(f64, f64)> = errors.iter().map(|it| (it.expected, it.error)).collect();
+        Self {
+            n_joints: errors.len(),
+            n_far: errors.iter().filter(|it| it.is_far()).count(),
+            auc: auc(&errors).zip(Bootstrap::default().interval_of(people, auc)),
+            rank_correlation: rank_correlation(&both),
+        }
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "joints": self.n_joints,
+            "off_by_half_a_head": self.n_far,
+            "auc": self.auc.map(|it| it.0),
+            "auc_interval": self.auc.map(|it| it.1),
+            "rank_correlation": self.rank_correlation,
+        })
+    }
+}
+
+impl fmt::Display for Expected {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let auc = self.auc.map_or_else(
+            || "unknown".to_owned(),
+            |(auc, [low, high])| format!("{auc:.3} ({low:.3} to {high:.3})"),
+        );
+        let number =
+            |it: Option<f64>| it.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.3}"));
+        write!(
+            to,
+            "expected errors of the maxima: area under the ROC {} ({} of {} joints are off by more than half a head), rank correlation {}",
+            auc,
+            self.n_far,
+            self.n_joints,
+            number(self.rank_correlation)
+        )
+    }
+}
+
+/// Refuses what only models of parts have.
+fn refuse(arguments: &Arguments) -> Result<(), Failure> {
+    let unused = if arguments.offsets {
+        "--offsets"
+    } else if arguments.joint_map != Path::new(deployment::SHIPPED) {
+        "--joint-map"
+    } else {
+        return Ok(());
+    };
+    let message = format!(
+        "{}: {unused} is for models of parts, not for networks",
+        arguments.model.display()
+    );
+    Err(Failure::new(ExitKind::Usage, message))
+}
+
+fn numbers(pictures: &Pictures, which: Judged) -> Value {
+    let Intervals { pcp, pck } = pictures.intervals(which, &Bootstrap::default());
+    let mut value = judged::numbers(&pictures.report(which));
+    value["intervals"] = json!({
+        "pcp": {"mean_of_ends": pcp[0], "both_ends": pcp[1]},
+        "pck": {PCK_SHARES[0].to_string(): pck[0], PCK_SHARES[1].to_string(): pck[1]},
+    });
+    value
+}
+
+fn interval(of: Option<[f64; 2]>) -> String {
+    of.map_or_else(
+        || "unknown".to_owned(),
+        |[low, high]| format!("{low:.1} to {high:.1}"),
+    )
+}

@@ -1,0 +1,167 @@
+//! The costs of a run, from the report that it printed.
+
+use std::path::Path;
+
+use ::hosts::Costs;
+use failure::{ExitKind, Failure};
+use serde_json::Value;
+
+use super::DEFAULT;
+
+/// Reads the costs of a run: processor time of its stages, and of the link what `hosts.json` in its folder says, if there is one.
+///
+/// # Errors
+///
+/// The file is no report of a run, or no frame passed in it.
+pub(super) fn costs(file: &Path) -> Result<Costs, Failure> {
+    let refused = |what: &str| {
+        let failure = Failure::new(ExitKind::Input, format!("{}: {what}", file.display()));
+        failure.with_hint("write it with `parallax run my.toml --json > run.json`")
+    };
+    let text = failure::read_text(file)?;
+    let report: Value = serde_json::from_str(&text).map_err(|error| refused(&error.to_string()))?;
+    let folder = report["output"].as_str();
+    let hosts = folder
+        .and_then(|it| files::read_text(&Path::new(it).join("hosts.json"), files::SETTINGS).ok());
+    let hosts: Option<Value> = hosts.and_then(|it| serde_json::from_str(&it).ok());
+    of_run(&report, hosts.as_ref()).map_err(|what| refused(&what))
+}
+
+fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
+    let spent = report["processor_s"].as_object();
+    let spent = spent.ok_or("it has no `processor_s`: no report of a run")?;
+    let n_views = report["views"].as_array().map_or(0, Vec::len);
+    let n_frames = report["frames_in_footage"].as_f64().unwrap_or(0.0);
+    if n_views == 0 || n_frames < 1.0 {
+        return Err(format!(
+            "{n_frames} frames of {n_views} views: nothing can be told from it"
+        ));
+    }
+    // A process of a service, milliseconds for each frame.
+    let mean = |service: &str| {
+        let is_meant = |name: &str| {
+            let rest = name.strip_prefix(service);
+            rest.is_some_and(|it| it.is_empty() || it.starts_with('-'))
+        };
+        let own = spent.iter().filter(|(name, _)| is_meant(name));
+        let all: Vec<f64> = own.filter_map(|it| it.1.as_f64()).collect();
+        let sum: f64 = all.iter().sum();
+        (!all.is_empty()).then(|| 1e3 * sum / (all.len() as f64 * n_frames))
+    };
+    let needed = |service: &str| mean(service).ok_or_else(|| format!("no process {service} in it"));
+    let workers = spent.keys().filter(|it| it.starts_with("fuse-")).count() as f64;
+    let fused = mean("fuse").map_or(0.0, |it| it * workers)
+        + needed("triangulate")?
+        + mean("results").unwrap_or(0.0);
+    let costs = Costs {
+        capture_ms: needed("capture")?,
+        pose_ms: mean("pose").unwrap_or(DEFAULT.pose_ms) + mean("quality").unwrap_or(0.0),
+        fuse_ms_per_view: fused / n_views as f64,
+        fuse_ms: 0.0,
+        ..DEFAULT
+    };
+    let n_pose = spent.keys().filter(|it| it.starts_with("pose-")).count();
+    // Where poses cross, some are found elsewhere.
+    let carries_poses = n_pose > 0 && n_pose < n_views;
+    Ok(hosts.map_or(costs, |hosts| with_link(costs, hosts, carries_poses)))
+}
+
+/// The costs with what the link took.
+///
+/// * `hosts`: what `hosts.json` says; `carries_poses`: whether poses cross, and no frames.
+fn with_link(mut costs: Costs, hosts: &Value, carries_poses: bool) -> Costs {
+    let far = hosts["hosts"].as_array().into_iter().flatten();
+    let far = far.filter_map(|it| it["views"].as_array()).flatten();
+    let far: Vec<&Value> = far.filter(|it| it["used"].as_f64() > Some(0.0)).collect();
+    let over_views = |value: &dyn Fn(&Value) -> Option<f64>| {
+        let all: Vec<f64> = far.iter().filter_map(|it| value(it)).collect();
+        (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
+    };
+    if let Some(bytes) = over_views(&|it| Some(it["bytes"].as_f64()? / it["used"].as_f64()?)) {
+        if carries_poses {
+            costs.pose_bytes = bytes;
+        } else {
+            costs.frame_bytes = bytes;
+        }
+    }
+    let median = |key: &str| over_views(&|it: &Value| it[key]["p50_ms"].as_f64());
+    if !carries_poses {
+        costs.encode_ms = median("encode").unwrap_or(costs.encode_ms);
+        costs.decode_ms = median("decode").unwrap_or(costs.decode_ms);
+    }
+    costs.network_ms = median("network").unwrap_or(costs.network_ms);
+    costs
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn report() -> Value {
+        json!({
+            "frames_in_footage": 100, "views": [{}, {}, {}],
+            "processor_s": {
+                "capture-0": 1.0, "capture-1": 2.0, "pose-0": 3.0, "pose-1": 5.0, "pose-2": 4.0,
+                "fuse-0": 0.5, "triangulate": 0.4, "results": 0.3, "bridge": 9.0,
+            },
+        })
+    }
+
+    #[test]
+    fn costs_are_those_of_a_frame_of_a_view() {
+        let got = of_run(&report(), None).unwrap();
+        let off = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(
+            off(got.capture_ms, 15.0) && off(got.pose_ms, 40.0),
+            "{got:?}"
+        );
+        assert!(
+            off(got.fuse_ms_per_view, 4.0) && got.fuse_ms == 0.0,
+            "{got:?}"
+        );
+        assert_eq!(got.frame_bytes, DEFAULT.frame_bytes);
+    }
+
+    #[test]
+    fn the_link_is_that_of_the_views_that_came() {
+        let view = |used: u32| {
+            json!({ "used": used, "bytes": 2000, "encode": { "p50_ms": 1.5 },
+            "network": { "p50_ms": 0.25 }, "decode": { "p50_ms": 0.5 } })
+        };
+        let hosts = json!({ "hosts": [{ "views": [view(10), view(0)] }] });
+        let got = of_run(&report(), Some(&hosts)).unwrap();
+        assert_eq!(
+            [
+                got.frame_bytes,
+                got.encode_ms,
+                got.decode_ms,
+                got.network_ms
+            ],
+            [200.0, 1.5, 0.5, 0.25]
+        );
+        let mut poses = report();
+        poses["processor_s"]
+            .as_object_mut()
+            .unwrap()
+            .remove("pose-2");
+        let got = of_run(&poses, Some(&hosts)).unwrap();
+        assert_eq!(
+            [got.pose_bytes, got.frame_bytes],
+            [200.0, DEFAULT.frame_bytes]
+        );
+    }
+
+    #[test]
+    fn what_is_no_report_is_refused() {
+        let refused = |change: &dyn Fn(&mut Value)| {
+            let mut it = report();
+            change(&mut it);
+            of_run(&it, None).unwrap_err()
+        };
+        assert!(refused(&|it| it["processor_s"] = json!(null)).contains("no report"));
+        assert!(refused(&|it| it["frames_in_footage"] = json!(0)).contains("0 frames of 3 views"));
+        assert!(refused(&|it| it["processor_s"] = json!({})).contains("no process"));
+    }
+}

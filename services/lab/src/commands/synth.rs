@@ -1,0 +1,294 @@
+//! `parallax-lab synth`: makes synthetic sequences of people, with the truth.
+
+mod motion;
+mod parse;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use lab::synth::{self, Done, Job, Written};
+use scene::{Action, Flaws, RigChoice};
+use serde_json::json;
+use terminal::output;
+
+use motion::MotionArguments;
+use parse::{actions, rig, subjects};
+use terminal::Globals;
+use terminal::Terminal;
+
+const HELP: &str = "\
+OUT holds what a recording would, and more: deployment.toml (`parallax run OUT/deployment.toml`), rig.toml, the pictures \
+(cameras/NAME/000000.png), masks, and the truth: truth.jsonl (joints in 3D and in every picture, visibility, capture \
+times) and people.jsonl (the same as annotated people, for `train fmp` and `model judge`; people-as-seen.jsonl with left \
+and right as published models define them). The format is in shared/scene/TRUTH.md. Several subjects or actions have a \
+folder each, OUT/s1-walking, and a people.jsonl of all.
+
+The same options give the same files, bit for bit, on any number of threads. A subject is a person by number: shape, \
+clothes, way of moving. The seed determines the motion, the room and the lighting.
+
+RIG is humaneva (3 cameras, 640x480), umpm (4, 644x486), ring:N[:RADIUS[:HEIGHT]] (metres; 4.2 and 1.5 if not \
+given), or a rig file. Actions: walking, jogging, boxing, gestures, throw-catch, chair, grab, lean, table, lying.
+
+With --motion the subjects move as recorded in a C3D or TRC file: limbs have the recorded directions and the lengths of \
+the subject, and the path is moved to the middle of the room. Joints are not kept within limits. A table (--markers) maps \
+markers to joints. Gaps are interpolated up to --motion-gap seconds; longer ones are refused, with their frames, and so \
+are impossible motions: implausible lengths of the legs, a head below the feet, knees that bend forward.
+
+With --live no pictures are written: the cameras of the deployment are addresses, synth://RIG?camera=C1&action=..., \
+from which each capture process renders its pictures during the run, and the truth is that of the same pictures.
+
+With --json one object: {\"schema_version\", \"sequences\": [{\"folder\", \"subject\", \"action\", \"seed\", \
+\"pictures\", \"people\"}], \"seconds\", \"pictures_per_second\"}.
+
+Exit codes: 0 done; 2 the command line is wrong, or OUT is not empty; 4 a rig file, a backdrop or the output folder; \
+5 the rig does not say which way is up; 130 stopped by Ctrl-C.
+
+Examples:
+    parallax-lab synth out/walk && parallax run out/walk/deployment.toml
+    parallax-lab synth out/set --subjects 1-20 --actions all --rate 2 --frames 10 --rig ring:4:6.5 --format jpg
+    parallax-lab judge person.mat out/set/people-as-seen.jsonl
+    parallax-lab synth out/bad --noise 8 --blur 1 --desync 0.04 --drop 0.05 --calibration-degrees 1
+    parallax-lab synth out/punch --motion 02_05.c3d --motion-frames 1-600 --rig umpm
+    parallax-lab synth out/skewed --rig ring:4 --actions jogging --skew-ms 0,5,11,16
+    parallax-lab synth out/live --live --frames 900 --rig umpm --actions gestures";
+
+/// The file format of pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// Lossless.
+    Png,
+    /// Smaller, as most cameras store them (quality 95).
+    Jpg,
+}
+
+impl From<Format> for synth::Format {
+    fn from(format: Format) -> Self {
+        match format {
+            Format::Png => Self::Png,
+            Format::Jpg => Self::Jpg,
+        }
+    }
+}
+
+/// Options of `parallax-lab synth`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// The folder to write, which must be empty or absent.
+    out: PathBuf,
+    /// The cameras: humaneva, umpm, a ring (ring:N, ring:N:RADIUS, ring:N:RADIUS:HEIGHT), or a rig file.
+    #[arg(long, value_name = "RIG", default_value = "humaneva", value_parser = rig)]
+    rig: RigChoice,
+    /// Numbers of the subjects: 3, or 1-20,25.
+    #[arg(long, value_name = "LIST", default_value = "1", value_parser = subjects)]
+    subjects: Subjects,
+    /// Other people who stand around the subject, at most 4; the truth is of the subject alone.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
+    others: u64,
+    /// Their actions: names separated by commas, or all.
+    #[arg(long, value_name = "LIST", default_value = "walking", value_parser = actions)]
+    actions: Actions,
+    /// Seed of the motion, the room and the lighting.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Frames per camera; if not given, 60, or those of the recorded motion.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    frames: Option<u64>,
+    /// Frames per second; at a low rate successive pictures differ more.
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = terminal::rate)]
+    rate: f64,
+    /// The file format of pictures.
+    #[arg(long, value_enum, default_value_t = Format::Png)]
+    format: Format,
+    /// Write no masks.
+    #[arg(long)]
+    no_masks: bool,
+    /// Use photographs from this folder as the background, instead of a room.
+    #[arg(long, value_name = "DIR")]
+    backdrop: Option<PathBuf>,
+    /// The model for the deployment file; the person model that ships with Parallax if not given.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Write no pictures: the capture processes of the deployment render them during the run.
+    #[arg(long)]
+    live: bool,
+    /// How long after the instants of the frames each camera takes its pictures, milliseconds, in the order of the rig: 0,5,11,16;
+    /// negative for before. The deployment says so too, and a run moves the joints to the instants.
+    #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = parse::skews)]
+    skew_ms: Skews,
+    /// Recorded motion.
+    #[command(flatten)]
+    motion: MotionArguments,
+    /// Flaws of the cameras.
+    #[command(flatten)]
+    flaws: FlawArguments,
+    /// Threads; one per core if not given. The files do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Print a summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+type Subjects = Vec<u64>;
+type Actions = Vec<Action>;
+type Skews = Vec<f64>;
+
+/// Flaws of the cameras; none by default.
+#[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "Flaws of the cameras")]
+struct FlawArguments {
+    /// Standard deviation of the noise, grey levels.
+    #[arg(long, value_name = "LEVELS", default_value_t = 0.0)]
+    noise: f64,
+    /// Standard deviation of the blur, pixels.
+    #[arg(long, value_name = "PX", default_value_t = 0.0)]
+    blur: f64,
+    /// Change of the exposure, stops; negative is darker.
+    #[arg(
+        long,
+        value_name = "STOPS",
+        default_value_t = 0.0,
+        allow_hyphen_values = true
+    )]
+    exposure: f64,
+    /// Largest clock offset of all cameras except the first, seconds.
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    desync: f64,
+    /// Share of frames that a camera drops; each is replaced by the picture before.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    drop: f64,
+    /// Rotation error of every camera in rig.toml, degrees; the truth is exact.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0)]
+    calibration_degrees: f64,
+    /// Position error of every camera in rig.toml, millimetres; the truth is exact.
+    #[arg(long, value_name = "MM", default_value_t = 0.0)]
+    calibration_mm: f64,
+}
+
+impl FlawArguments {
+    fn flaws(self) -> Result<Flaws, Failure> {
+        let flaws = Flaws {
+            noise: self.noise,
+            blur_px: self.blur,
+            exposure_stops: self.exposure,
+            desync_s: self.desync,
+            drop: self.drop,
+            calibration_degrees: self.calibration_degrees,
+            calibration_mm: self.calibration_mm,
+        };
+        flaws.check().or_fail(ExitKind::Usage)?;
+        Ok(flaws)
+    }
+}
+
+/// The template of the progress bar.
+const BAR: &str = "{elapsed_precise} {msg} {bar:20} {pos}/{len} pictures, {per_sec}{left}";
+
+/// Default number of frames per camera.
+const N_FRAMES: u64 = 60;
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let n_cameras = arguments
+        .rig
+        .rig()
+        .map_err(synth::rig_failure)?
+        .cameras()
+        .len();
+    let skews_ms = skews_of(&arguments.skew_ms, n_cameras)?;
+    let recording = arguments.motion.recording()?;
+    let job = Job {
+        out: arguments.out.clone(),
+        rig: arguments.rig.clone(),
+        subjects: arguments.subjects.clone(),
+        others: arguments.others,
+        actions: arguments.actions.clone(),
+        seed: arguments.seed,
+        flaws: arguments.flaws.flaws()?,
+        n_frames: synth::n_frames(
+            arguments.frames,
+            arguments.rate,
+            recording.as_ref(),
+            N_FRAMES,
+        )?,
+        recording,
+        rate_hz: arguments.rate,
+        format: arguments.format.into(),
+        with_masks: !arguments.no_masks,
+        backdrop: arguments.backdrop.clone(),
+        model: arguments.model.clone(),
+        live: arguments.live,
+        skews_ms,
+    };
+    create_folder(&arguments.out)?;
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let threads = arguments.threads.map_or(0, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|it| format!("synth-{it}"))
+        .build()
+        .or_fail(ExitKind::Run)?;
+    let terminal = Terminal::with_bar(globals.quiet, arguments.json, BAR);
+    let done = pool.install(|| synth::write(&job, &stop, &terminal))?;
+    report(arguments, globals, &done)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The skews of the cameras; none if all are 0.
+fn skews_of(skews_ms: &[f64], n_cameras: usize) -> Result<Skews, Failure> {
+    if skews_ms.len() > n_cameras {
+        let message = format!(
+            "--skew-ms names {}, the rig has {n_cameras} cameras",
+            skews_ms.len()
+        );
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    let is_off = skews_ms.iter().any(|it| *it != 0.0);
+    Ok(if is_off {
+        skews_ms.to_vec()
+    } else {
+        Skews::new()
+    })
+}
+
+/// Creates the folder; refuses one that is not empty.
+fn create_folder(out: &Path) -> Result<(), Failure> {
+    inputs::make_folder(out)?;
+    let mut inside = std::fs::read_dir(out).map_err(|error| failure::in_file(out, &error))?;
+    if inside.next().is_some() {
+        let message = format!("{} is not empty", out.display());
+        return Err(
+            Failure::new(ExitKind::Usage, message).with_hint("name a folder that is not there yet")
+        );
+    }
+    Ok(())
+}
+
+fn report(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Failure> {
+    let Done { sequences, seconds } = done;
+    let pictures: u64 = sequences.iter().map(|it| it.n_pictures).sum();
+    let rate = pictures as f64 / seconds.max(1e-9);
+    if arguments.json {
+        return output::json(&json!({
+            "schema_version": 1,
+            "sequences": sequences.iter().map(Written::json).collect::<Vec<_>>(),
+            "seconds": seconds,
+            "pictures_per_second": rate,
+        }));
+    }
+    if !globals.quiet {
+        let (n, out) = (sequences.len(), arguments.out.display());
+        let what = if arguments.live {
+            "frames of cameras"
+        } else {
+            "pictures"
+        };
+        output::message(format_args!(
+            "{out}: {n} sequences, {pictures} {what} in {seconds:.1} s ({rate:.1} a second)"
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,64 @@
+//! Options for recorded motion, which replaces an action.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use failure::Failure;
+use lab::synth;
+use scene::Recording;
+use sequences::MotionOptions;
+
+/// Recorded motion; none by default.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Recorded motion")]
+pub(super) struct MotionArguments {
+    /// Let the subjects move as recorded in a C3D or TRC file, instead of an action.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["actions", "live"])]
+    motion: Option<PathBuf>,
+    /// Table that maps its markers to joints: cmu, pose2sim, parallax, optitrack36, or a file like those in
+    /// configs/markers; if not given, the first of these four whose markers are in the file.
+    #[arg(long, value_name = "TABLE", requires = "motion")]
+    markers: Option<PathBuf>,
+    /// First and last frame, by the numbers in the file; all if not given.
+    #[arg(long, value_name = "FIRST-LAST", requires = "motion", value_parser = frames)]
+    motion_frames: Option<[u32; 2]>,
+    /// Longest gap of a marker that is interpolated linearly, seconds.
+    #[arg(long, value_name = "S", default_value_t = MotionOptions::default().max_gap_s, requires = "motion")]
+    motion_gap: f64,
+}
+
+impl MotionArguments {
+    /// Reads the recorded motion, if a file is given.
+    pub(super) fn recording(&self) -> Result<Option<Recording>, Failure> {
+        let Some(file) = &self.motion else {
+            return Ok(None);
+        };
+        let table = self.markers.as_deref().map(synth::marker_table);
+        let table = table.transpose()?;
+        let options = MotionOptions {
+            frames: self.motion_frames,
+            max_gap_s: self.motion_gap,
+        };
+        synth::recording(file, table.as_ref(), &options).map(Some)
+    }
+}
+
+/// Parses `FIRST-LAST`.
+fn frames(text: &str) -> Result<[u32; 2], String> {
+    let range = text.split_once('-');
+    let range = range.and_then(|(from, to)| Some([from.parse().ok()?, to.parse().ok()?]));
+    range.ok_or_else(|| "expected the first and the last frame, for example 1-600".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_of_frames_is_two_numbers() {
+        assert_eq!(frames("1-600"), Ok([1, 600]));
+        for text in ["", "5", "5-", "-5", "a-b"] {
+            assert!(frames(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! `parallax-lab train`: trains models, networks and multi-view consistency.
+
+mod consistency;
+mod joints;
+mod marked;
+mod network;
+mod orientation;
+mod people;
+mod quality;
+mod springs;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::{Args, Subcommand};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use lab::person::{Job, Progress, Store};
+use training::Settings;
+
+use people::People;
+use terminal::Globals;
+use terminal::Terminal;
+use terminal::output;
+
+/// The template of the progress bar.
+const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} images{msg}";
+
+const HELP: &str = "\
+DATASET is a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a file of \
+JSON lines, one person each, image paths relative to the file:
+    {\"image\": \"7.jpg\", \"joints\": [[31.5, 80.0], ...], \"visible\": [true, ...], \"name\": \"ann\"}
+`visible` and `name` may be left out; the centre of the top-left pixel is (0, 0). Unless --skeleton \
+says otherwise the joints are the 14 of PARSE and LSP: right ankle, knee, hip, left hip, knee, \
+ankle, right wrist, elbow, shoulder, left shoulder, elbow, wrist, neck, top of the head.
+
+The model knows left and right by the side of the picture. PARSE is marked so; in LSP and \
+LSP-extended people who are seen from behind are marked by their own sides, which --sides LSP=seen \
+undoes.
+
+Rows of a data set count from 1. With several data sets, --only, --without, --rotate and --sides name \
+the one they mean, as it was written: --only PARSE=1-100. A selection is a list of rows (1-100,150), or \
+a file with a row, a range of rows or the file name of an image a line; what it names must be there.
+
+The training is a list of steps. After each one everything it knows is in OUT.checkpoint, so that \
+what is stopped by Ctrl-C, or killed, goes on with --resume from the last step that was done, and \
+ends with the same model, bit for bit, as if it had not been interrupted, on any number of threads.
+
+Kinds of bad labels, for --fatal: syntax, count, unknown, not-finite, zero-size, image, outside, \
+twice, same-name. People with others are reported with file and row, and left out.
+
+With --json, one object a line on standard output, nothing else:
+    {\"event\": \"left-out\" | \"unreadable\" | \"data\" | \"resumed\" | \"step\" | \"summary\", ...}
+
+Exit codes: 0 the model is written; 2 the command line is wrong, or an interrupted training is in \
+the way; 3 a setting is wrong; 4 a data set, a fatal label, a checkpoint; 130 stopped by Ctrl-C.
+
+Examples:
+    parallax-lab train fmp PARSE --only 1-100 --rotate -15,-7.5,7.5,15 \\
+        --negatives INRIA/neg --out person.fmp
+    parallax-lab train fmp PARSE lsp/joints.mat --only PARSE=1-100 --rotate PARSE=-15,15 \\
+        --sides lsp/joints.mat=seen --without lsp/joints.mat=held-out.txt \\
+        --negatives INRIA/neg --judge holiday-photos --out person.fmp
+    parallax-lab train fmp --print-settings > settings.toml
+    parallax-lab judge person.fmp PARSE --only 101-200";
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Train a flexible mixture of parts: the model that finds people in single views.
+    Fmp(Box<Arguments>),
+    /// Learn the consistency of several views of a person: part types, weights, thresholds, joints.
+    Consistency(Box<consistency::Arguments>),
+    /// Train the network that tells from the picture in which direction a person faces, for left and right.
+    Orientation(Box<orientation::Arguments>),
+    /// Learn where joints lie among the parts of a model, on photographs of marked people.
+    Joints(Box<joints::Arguments>),
+    /// Learn the springs that hold the maps of a network together, from the marks of people.
+    Springs(Box<springs::Arguments>),
+    /// Prepare people for training the network that finds joints.
+    NetworkPeople(Box<network::people::Arguments>),
+    /// Train the network that finds joints, the direction of the trunk, and how far off it may be.
+    Network(Box<network::learn::Arguments>),
+    /// Train a network that predicts the error of every part in a single view.
+    Quality(Box<quality::network::Arguments>),
+    /// Search pictures with known joints, and write the samples for training the quality network.
+    QualitySamples(Box<quality::samples::Arguments>),
+}
+
+/// Options of `train fmp`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// The data.
+    #[command(flatten)]
+    data: People,
+    /// The model file to write.
+    #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
+    out: Option<PathBuf>,
+    /// Settings of the training, as TOML; for missing keys and defaults see --print-settings.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Print the settings that would be used, as TOML, and exit.
+    #[arg(long)]
+    print_settings: bool,
+    /// Random seed, instead of that of the settings.
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// Threads; one per core if not given. The model does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Folder of images without people on which false alarms are counted at the end; the negatives if not given.
+    #[arg(long, value_name = "DIR")]
+    judge: Option<PathBuf>,
+    /// Continue from the checkpoint of an interrupted training; start anew if there is none.
+    #[arg(long)]
+    resume: bool,
+    /// Print events and the summary as JSON, one object per line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the subcommand until the model is written or a stop is requested.
+pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failure> {
+    let arguments = match command {
+        Command::Fmp(it) => it,
+        Command::Consistency(it) => return consistency::run(&it, globals),
+        Command::Orientation(arguments) => return orientation::run(&arguments, globals),
+        Command::Joints(it) => return joints::run(&it, globals),
+        Command::Springs(it) => return springs::run(&it, globals),
+        Command::NetworkPeople(it) => return network::people::run(&it, globals),
+        Command::Network(it) => return network::learn::run(&it, globals),
+        Command::Quality(arguments) => return quality::network::run(&arguments, globals),
+        Command::QualitySamples(arguments) => return quality::samples::run(&arguments, globals),
+    };
+    let settings = settings(&arguments)?;
+    if arguments.print_settings {
+        output::line(
+            toml::to_string(&settings)
+                .or_fail(ExitKind::Run)?
+                .trim_end(),
+        )?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let out = arguments.out.clone().unwrap_or_default();
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let shared = Arc::new(Shared {
+        store: Store::new(&out, arguments.resume)?,
+        progress: Progress::new(
+            stop.clone(),
+            Box::new(Terminal::with_bar(globals.quiet, arguments.json, BAR).ticking()),
+        ),
+        quiet: globals.quiet,
+    });
+    let threads = arguments.threads.map_or(0, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|it| format!("train-{it}"))
+        .build()
+        .or_fail(ExitKind::Run)?;
+    let worker = Arc::clone(&shared);
+    let done = failure::unless_stopped(&stop, move || {
+        pool.install(|| work(&arguments, &settings, &worker))
+    })?;
+    shared.progress.finish();
+    match done {
+        Some(Err(failure)) if failure.kind() != ExitKind::Interrupted => Err(failure),
+        Some(Ok(code)) => Ok(code),
+        _ => Err(shared.store.interrupted()),
+    }
+}
+
+/// State shared by the training thread and the thread that waits for it.
+struct Shared {
+    store: Store,
+    progress: Progress,
+    quiet: bool,
+}
+
+fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
+    let mut settings = match &arguments.settings {
+        None => Settings::default(),
+        Some(file) => toml::from_str(&failure::read_text(file)?).map_err(|error| {
+            Failure::new(ExitKind::Config, format!("{}: {error}", file.display()))
+        })?,
+    };
+    if let Some(seed) = arguments.seed {
+        settings.seed = u64::from(seed);
+    }
+    // Without mirrored images left and right parts need not be symmetric.
+    settings.symmetric &= arguments.data.with_mirror();
+    settings.check().or_fail(ExitKind::Config)?;
+    Ok(settings)
+}
+
+fn work(arguments: &Arguments, settings: &Settings, shared: &Shared) -> Result<ExitCode, Failure> {
+    let job = Job {
+        data: arguments.data.chosen(),
+        skeleton: arguments.data.table()?,
+        settings: settings.clone(),
+        judge: arguments.judge.clone(),
+        resume: arguments.resume,
+    };
+    let report = lab::person::train(&job, &shared.store, &shared.progress)?;
+    if arguments.json {
+        output::json(&report.json())?;
+    } else if !shared.quiet {
+        output::line(report.text())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Parses `FROM-TO`.
+fn subjects(text: &str) -> Result<[u64; 2], String> {
+    let ends = text.split_once('-').unwrap_or((text, text));
+    match (ends.0.trim().parse(), ends.1.trim().parse()) {
+        (Ok(from), Ok(to)) if from <= to => Ok([from, to]),
+        _ => Err("expected numbers of subjects, FROM-TO".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_of_subjects_is_parsed() {
+        assert_eq!(subjects("3-7"), Ok([3, 7]));
+        assert_eq!(subjects("5"), Ok([5, 5]));
+        for wrong in ["", "7-3", "a-b", "-1"] {
+            assert!(subjects(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! `parallax-lab train consistency`: learns the consistency of several views of a person from sequences with truth.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use ::consistency::Learned;
+use clap::Args;
+use experiment::FilmSettings;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use lab::consistency::{Done, Job, Learning, Sequences};
+
+use crate::commands::eval::size;
+use terminal::Globals;
+use terminal::Terminal;
+use terminal::output;
+
+const HELP: &str = "\
+SEQUENCE is what `parallax-lab eval` takes: a folder of HumanEva-I, of UMPM, of `parallax-lab synth`, or a description. \
+Every view is solved alone; of the parts that are near the truth it is learned which types come together in \
+two views, by the angle between the cameras as seen from the person, and with --rig NAME for the pairs of \
+that rig by the cameras' names too. The median error of every part is its threshold (tau); joints are a linear \
+map of the parts by least squares. Then alpha, the cap on distances and beta are chosen on subjects that \
+were held out: those of the largest area under the curve of PCP3D.
+
+The file belongs beside the model it was learned with: `consistency = \"person.consistency\"` in the [fuse] section \
+of a deployment, or --consistency of `fuse-frame` and `eval`. Its format: cargo doc -p consistency, `Learned`.
+
+With --json one object: the weights, every choice that was tried and how it did, tau, what the tables know of held-out \
+people by the number of bins, the error of joints with and without the map.
+
+Exit codes: 0 done; 2 the command line; 4 a sequence or a model, or nothing could be learned; 5 a calibration; 130 \
+interrupted; OUT then holds the tables with the default weights, if weights were being tried.
+
+Examples:
+    parallax-lab synth out/ring --rig ring:6 --subjects 1-8 --actions walking,boxing,gestures --frames 6 --rate 1
+    parallax-lab train consistency out/ring --scale 0.5 --out person.consistency
+    parallax-lab train consistency HumanEva_I --model he.txt --rig humaneva --hold-out S3 --out he.consistency";
+
+/// Options of `train consistency`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// The sequences.
+    #[arg(required = true, value_name = "SEQUENCE")]
+    sequences: Vec<PathBuf>,
+    /// The model file; the person model that ships with Parallax if not given.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// The file to write.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Subjects to choose the weights on, separated by commas; if not given, the last quarter of them.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    hold_out: Vec<String>,
+    /// Maximal number of instants of the held-out subjects that weights are tried on, evenly spaced.
+    #[arg(long, value_name = "N", default_value_t = 48)]
+    tries: usize,
+    /// Learn tables by camera names too, for a rig of this name; all sequences must be of one rig.
+    #[arg(long, value_name = "NAME")]
+    rig: Option<String>,
+    /// Do not learn the map from parts to joints.
+    #[arg(long)]
+    no_joints: bool,
+    /// Size of the frames.
+    #[arg(long, value_name = "WxH", value_parser = size, conflicts_with = "scale")]
+    size: Option<[u32; 2]>,
+    /// Size of the frames as a share of that of the footage.
+    #[arg(long, default_value_t = 1.0)]
+    scale: f64,
+    /// Do not turn the frames upright.
+    #[arg(long)]
+    no_upright: bool,
+    /// Use the first and every n-th frame after it.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    every: usize,
+    /// Maximal number of frames per sequence.
+    #[arg(long, value_name = "N")]
+    frames: Option<usize>,
+    /// Threads; one per core if not given. The file does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let sequences = Sequences::read(
+        &arguments.sequences,
+        &arguments.hold_out,
+        (arguments.every, arguments.frames),
+        arguments.rig.as_deref(),
+    )?;
+    let model = inputs::model_or_shipped(arguments.model.as_deref())?;
+    let bytes = inputs::model_bytes(arguments.model.as_deref())?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.map_or(0, usize::from))
+        .build()
+        .or_fail(ExitKind::Run)?;
+    let job = job(arguments, format!("{:016x}", checksum::fnv1a(&bytes)));
+    let terminal = Terminal::without_bar(globals.quiet, false);
+    let learning = Learning::new(&job, &terminal, model, stop);
+    let save = |learned: &Learned| {
+        let text = learned.write().or_fail(ExitKind::Run)?;
+        let failure = |error: std::io::Error| failure::in_file(&arguments.out, &error);
+        files::replace(&arguments.out, text.as_bytes()).map_err(failure)
+    };
+    let done = pool.install(|| learning.run(&sequences.train, &sequences.held_out, &save))?;
+    print(arguments, globals, &done)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The settings of the learning.
+fn job(arguments: &Arguments, fingerprint: String) -> Job {
+    Job {
+        tries: arguments.tries,
+        rig: arguments.rig.clone(),
+        with_joints: !arguments.no_joints,
+        film: FilmSettings {
+            size: arguments.size,
+            scale: arguments.scale,
+            upright: !arguments.no_upright,
+        },
+        fingerprint,
+    }
+}
+
+/// Prints the summary.
+fn print(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Failure> {
+    if arguments.json {
+        output::json(&done.json(&arguments.out))
+    } else if globals.quiet {
+        Ok(())
+    } else {
+        output::line(done.text(&arguments.out))
+    }
+}

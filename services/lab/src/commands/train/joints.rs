@@ -1,0 +1,113 @@
+//! `parallax-lab train joints`: learns where joints lie among the parts of a model.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::Args;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use lab::joints::Learned;
+use serde_json::json;
+
+use super::marked::Marked;
+use terminal::Globals;
+use terminal::Terminal;
+use terminal::output;
+
+const HELP: &str = "\
+A joint is the centre of one part, unless a file says better: this command searches the pictures of marked people with the \
+model, takes the best detection that covers 30 % of the box around a person's joints, and learns every joint as a weighted \
+sum of the parts around its own. Left and right are each other's mirror image. Joints found farther than a tenth of the \
+person's size from their mark count nothing: there the limb was not found. Every data set counts the same, however many \
+people it has. How many parts count and how freely is chosen by the error on people who are left out in turn.
+
+DATASETs are those of `train fmp`, of people with 14 joints: usually the same as for the model, with the same --only, --sides \
+and --without. The file is used with this model alone, where it is named: `triangulate.joint_map` of a deployment, --joint-map of \
+`detect`, `eval`, `fuse-frame` and `model judge`. The model that ships has one that ships.
+
+The file is the same on any number of threads.
+
+Exit codes: 0 the file is written; 2 the command line is wrong; 4 a model or a data set cannot be used; 130 stopped by Ctrl-C.
+
+Example:
+    parallax-lab train joints person.fmp PARSE LSP --only PARSE=1-100 --sides LSP=seen --without LSP=held-out.txt \\
+        --out person.joints
+    parallax-lab judge person.fmp PARSE --only 101-200 --joint-map person.joints --offsets";
+
+/// Options of `train joints`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// The model file, of 26 parts; "shipped": the one that ships.
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    #[command(flatten)]
+    people: Marked,
+    /// The file to write.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Threads; one per core if not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.map_or(0, usize::from))
+        .thread_name(|it| format!("train-{it}"))
+        .build()
+        .or_fail(ExitKind::Run)?;
+    let file = (!deployment::is_shipped(&arguments.model)).then_some(arguments.model.as_path());
+    let model = inputs::model_or_shipped(file)?;
+    lab::judged::check(&model, &arguments.model.display().to_string())?;
+    let fingerprint = checksum::fnv1a(&inputs::model_bytes(file)?);
+    let chosen = arguments.people.chosen();
+    let terminal = Terminal::without_bar(globals.quiet, arguments.json);
+    let of = (&Arc::clone(&model), fingerprint);
+    let train = || lab::joints::train(&chosen, &arguments.out, of, (&stop, &terminal));
+    let learned = pool.install(train)?;
+    if arguments.json {
+        output::json(&summary(&learned))?;
+    } else if !globals.quiet {
+        output::line(text(&learned))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn summary(learned: &Learned) -> serde_json::Value {
+    let tried = learned.tried.iter();
+    let tried =
+        tried.map(|(it, errors)| json!({ "reach": it.reach, "ridge": it.ridge, "errors": errors }));
+    json!({
+        "event": "summary",
+        "learned": learned.file.learned,
+        "tried": tried.collect::<Vec<_>>(),
+    })
+}
+
+fn text(learned: &Learned) -> String {
+    let it = &learned.file.learned;
+    let mut lines = vec!["reach  ridge   error of people left out, % of their size".to_owned()];
+    for (tried, errors) in &learned.tried {
+        let errors: Vec<String> = errors.iter().map(|it| format!("{it:.3}")).collect();
+        let is_taken = tried.reach == it.reach && tried.ridge == it.ridge;
+        let mark = if is_taken { "  <- taken" } else { "" };
+        let (reach, ridge) = (tried.reach, tried.ridge);
+        lines.push(format!(
+            "{reach:>5} {ridge:>6}   {}{mark}",
+            errors.join("  ")
+        ));
+    }
+    for set in &it.sets {
+        lines.push(format!(
+            "{}: {} of {} people found; error {:.3} before, {:.3} after, of people left out",
+            set.name, set.found, set.people, set.error_before, set.error_after
+        ));
+    }
+    lines.join("\n")
+}

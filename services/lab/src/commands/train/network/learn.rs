@@ -1,0 +1,154 @@
+//! `parallax-lab train network`: trains the network that finds joints.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use failure::{ExitKind, Failure, OrFail as _};
+#[cfg(feature = "train-quality")]
+use inputs::Shipped;
+use networktraining::Settings;
+use terminal::output;
+
+use terminal::Globals;
+
+const HELP: &str = "\
+PEOPLE is a file of `parallax-lab train network-people`. The network finds 14 joints as seen, the direction in which the trunk faces, and \
+the expected error of every joint; the ONNX file carries its card.
+
+After every hundred steps everything that the training knows is in OUT.checkpoint: what is stopped by Ctrl-C, or killed, goes on with \
+--resume and ends with the same network, bit for bit, on the same kind of machine.
+
+--from trains a network further; a lower `rate` in --settings is for this. --from shipped means the network that ships.
+
+A real training needs LibTorch: build with --features libtorch (docs/guide/train.md says how). The built-in backend is \
+many times slower, and for small trainings.
+
+Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a setting is wrong; \
+4 the people or the checkpoint cannot be used; 130 stopped by Ctrl-C.
+
+Example:
+    parallax-lab train network people.bin --backend libtorch --out person.onnx";
+
+/// Options of `train network`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// People, prepared by `train network-people`.
+    #[arg(value_name = "PEOPLE", required_unless_present = "print_settings")]
+    people: Option<PathBuf>,
+    /// The ONNX file to write.
+    #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
+    out: Option<PathBuf>,
+    /// Settings of the training, as TOML; for missing keys and defaults see --print-settings.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Print the settings that would be used, as TOML, and exit.
+    #[arg(long)]
+    print_settings: bool,
+    /// Steps, instead of those of the settings.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    steps: Option<u32>,
+    /// Random seed, instead of that of the settings.
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// What calculates: `flex`, built in; `libtorch`, if this executable was built with it.
+    #[arg(long, value_name = "NAME", default_value = "flex", value_parser = ["flex", "libtorch"])]
+    backend: String,
+    /// A network of this command to go on from, in place of random weights: more steps, or people of your own.
+    #[arg(long, value_name = "NETWORK")]
+    from: Option<PathBuf>,
+    /// Continue from the checkpoint of an interrupted training; start anew if there is none.
+    #[arg(long)]
+    resume: bool,
+    /// Print the steps as JSON, one object per line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command; an error if this executable was built without training.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let settings = settings(arguments)?;
+    if arguments.print_settings {
+        let text = toml::to_string(&settings).or_fail(ExitKind::Run)?;
+        output::line(text.trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    train(arguments, &settings, globals)
+}
+
+#[cfg(feature = "train-quality")]
+fn train(
+    arguments: &Arguments,
+    settings: &Settings,
+    globals: Globals,
+) -> Result<ExitCode, Failure> {
+    use lab::posetraining;
+    use terminal::Terminal;
+
+    let stop = failure::Stop::on_signals().or_fail(ExitKind::Run)?;
+    let terminal = Terminal::without_bar(globals.quiet || arguments.json, arguments.json);
+    let job = posetraining::Job {
+        out: arguments.out.clone().unwrap_or_default(),
+        from: arguments.from.as_deref().map(from).transpose()?,
+        resume: arguments.resume,
+        backend: backend(&arguments.backend)?,
+    };
+    let people = posetraining::read(arguments.people.as_deref().unwrap_or("".as_ref()))?;
+    let passes = posetraining::train((&job, settings), &people, (&stop, &terminal))?;
+    if arguments.json {
+        for pass in passes {
+            output::json(&pass)?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The network to go on from.
+#[cfg(feature = "train-quality")]
+fn from(file: &std::path::Path) -> Result<lab::posetraining::Earlier, Failure> {
+    Ok(lab::posetraining::Earlier {
+        bytes: Shipped::PoseNetwork.read(file)?.into_owned(),
+        file: file.to_path_buf(),
+    })
+}
+
+#[cfg(feature = "train-quality")]
+fn backend(name: &str) -> Result<networktraining::Backend, Failure> {
+    match name {
+        #[cfg(feature = "libtorch")]
+        "libtorch" => Ok(networktraining::Backend::LibTorch),
+        #[cfg(not(feature = "libtorch"))]
+        "libtorch" => {
+            let message = "this Parallax was built without LibTorch";
+            let hint = "build it with --features libtorch: docs/guide/train.md says how";
+            Err(Failure::new(ExitKind::Usage, message).with_hint(hint))
+        }
+        _ => Ok(networktraining::Backend::Flex),
+    }
+}
+
+#[cfg(not(feature = "train-quality"))]
+fn train(_: &Arguments, _: &Settings, _: Globals) -> Result<ExitCode, Failure> {
+    let message = "this Parallax was built without the trainer of networks";
+    Err(Failure::new(ExitKind::Usage, message).with_hint(
+        "build it with: cargo run --release -p parallax-lab --features train-quality -- train network ...",
+    ))
+}
+
+fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
+    let mut settings = match &arguments.settings {
+        None => Settings::default(),
+        Some(file) => toml::from_str(&failure::read_text(file)?).map_err(|error| {
+            Failure::new(ExitKind::Config, format!("{}: {error}", file.display()))
+        })?,
+    };
+    if let Some(steps) = arguments.steps {
+        settings.steps = steps as usize;
+    }
+    if let Some(seed) = arguments.seed {
+        settings.seed = u64::from(seed);
+    }
+    settings.check().or_fail(ExitKind::Config)?;
+    Ok(settings)
+}

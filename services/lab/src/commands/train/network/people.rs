@@ -1,0 +1,107 @@
+//! `parallax-lab train network-people`: prepares the people that the network learns from.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use inputs::network::NetworkFile;
+use lab::posetraining::{self, People};
+use lab::quality::Scenes;
+use serde_json::json;
+use terminal::output;
+
+use crate::commands::train::marked::Marked;
+use crate::commands::train::subjects;
+use terminal::Globals;
+use terminal::Terminal;
+
+/// The template of the progress bar.
+const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} {msg}";
+
+const HELP: &str = "\
+Two sources: DATASETs of annotated people as for `parallax-lab train fmp`, and scenes that do not exist (--scenes N), whose joints and \
+directions are exact. Of everybody a picture of 256 x 256 pixels is kept, and where the joints are: as seen, so that left and \
+right follow the picture. In which direction somebody faces follows from the marks, if left and right are those of the people \
+themselves (LSP; for PARSE say --sides PARSE=seen).
+
+A teacher, another network with a card, helps: its joints stand in for those without a mark, sides that it surely contradicts are \
+exchanged, and where it agrees with a mark the mean of both is learned.
+
+One in twelve is kept apart: the training is watched on them, and the expected error is learned on them. Who is judged on must be left \
+out with --without.
+
+Exit codes: 0 the file is written; 2 the command line is wrong; 4 a data set or the teacher cannot be used; 130 stopped by Ctrl-C.
+
+Example:
+    parallax-lab train network-people lspet lspet_more PARSE --only PARSE=1-100 --sides PARSE=seen --without lspet=held-out.txt \\
+        --teacher tinypose256.onnx --teacher-card configs/networks/pp-tinypose.toml --scenes 200 --out people.bin";
+
+/// Options of `train network-people`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    people: Marked,
+    /// A network that finds keypoints, to help with joints and sides.
+    #[arg(long, value_name = "FILE.onnx")]
+    teacher: Option<PathBuf>,
+    /// Its card, if that is not beside it.
+    #[arg(long, value_name = "FILE.toml", requires = "teacher")]
+    teacher_card: Option<PathBuf>,
+    /// Number of synthetic scenes; each gives some pictures of every camera.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    scenes: u32,
+    /// Numbers of the people in the scenes.
+    #[arg(long, value_name = "FROM-TO", default_value = "1-400", value_parser = subjects)]
+    subjects: [u64; 2],
+    /// Frames per camera of a scene, some seconds apart.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
+    frames: u16,
+    /// Photographs without people, used as the background of every third scene instead of a room.
+    #[arg(long, value_name = "DIR")]
+    backdrop: Option<PathBuf>,
+    /// Random seed of the scenes.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// The file to write.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let card = arguments.teacher_card.as_deref();
+    let open = |file: &Path| -> Result<Vec<_>, Failure> {
+        let each =
+            (0..rayon::current_num_threads()).map(|_| NetworkFile::open(file, card)?.fitted());
+        each.collect()
+    };
+    let teachers = arguments.teacher.as_deref().map(open).transpose()?;
+    let people = People {
+        photographs: arguments.people.chosen(),
+        teachers: teachers.unwrap_or_default(),
+        scenes: Scenes {
+            n: arguments.scenes,
+            subjects: arguments.subjects,
+            frames: arguments.frames,
+            backdrop: arguments.backdrop.clone(),
+            seed: arguments.seed,
+        },
+    };
+    let terminal = Terminal::with_bar(globals.quiet, arguments.json, BAR);
+    let prepared = posetraining::prepare(&people, (stop, &terminal))?;
+    posetraining::write(&arguments.out, &prepared)?;
+    if arguments.json {
+        output::json(&json!({
+            "event": "summary",
+            "learnt": prepared.learnt.len(),
+            "kept_apart": prepared.kept.len(),
+        }))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

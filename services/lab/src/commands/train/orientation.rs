@@ -1,0 +1,164 @@
+//! `parallax-lab train orientation`: trains the network that tells in which direction a person faces.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use lab::orientation::{Job, Report};
+use lab::quality::Scenes;
+use orientation::Settings;
+use serde_json::json;
+
+use super::subjects;
+use terminal::Globals;
+use terminal::Terminal;
+use terminal::output;
+
+const HELP: &str = "\
+Exchanging left and right in all views changes no energy: which side is which follows from whether the person is seen \
+from the front or from behind. The network learns that from two sources, together or alone: DATASETs of annotated \
+people as for `parallax-lab train fmp`, whose left and right are marked as their owner would call them (LSP; not PARSE), \
+and scenes that do not exist (--scenes N), searched as the pipeline does.
+
+Who is judged on is left out of the training: people by --judge, scenes by --judge-scenes, of other subjects.
+
+The network is the same, bit for bit, on any number of threads of one kind of machine.
+
+Exit codes: 0 the network is written; 2 the command line is wrong; 4 a data set cannot be used; 130 stopped by Ctrl-C.
+
+Example:
+    parallax-lab train orientation lsp --judge 1-100 --scenes 200 --judge-scenes 20 --out person.orientation";
+
+/// Options of `train orientation`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// Annotated people: folders or files, as for `train fmp`.
+    #[arg(value_name = "DATASET")]
+    datasets: Vec<PathBuf>,
+    /// People of a data set to use, all if not given.
+    #[arg(long, value_name = "[DATASET=]SELECTION")]
+    only: Vec<String>,
+    /// People of a data set to judge on, and not to learn from.
+    #[arg(long, value_name = "[DATASET=]SELECTION")]
+    judge: Vec<String>,
+    /// Number of synthetic scenes; each gives some pictures of every camera.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    scenes: u32,
+    /// Numbers of the people in the scenes.
+    #[arg(long, value_name = "FROM-TO", default_value = "1-100", value_parser = subjects)]
+    subjects: [u64; 2],
+    /// Number of synthetic scenes to judge on.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    judge_scenes: u32,
+    /// Numbers of the people in these.
+    #[arg(long, value_name = "FROM-TO", default_value = "901-920", value_parser = subjects)]
+    judge_subjects: [u64; 2],
+    /// Frames per camera of a scene, some seconds apart.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
+    frames: u16,
+    /// Photographs without people, used as the background of every third scene instead of a room.
+    #[arg(long, value_name = "DIR")]
+    backdrop: Option<PathBuf>,
+    /// Passes through all people.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    passes: Option<u16>,
+    /// Random seed.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// The single-view model; the person model that ships with Parallax if not given.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// The file to write.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Threads; one per core if not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.map_or(0, usize::from))
+        .thread_name(|it| format!("train-{it}"))
+        .build()
+        .or_fail(ExitKind::Run)?;
+    let model = inputs::model_or_shipped(arguments.model.as_deref())?;
+    let defaults = Settings::default();
+    let scenes = |n: u32, subjects: [u64; 2], seed: u64| Scenes {
+        n,
+        subjects,
+        frames: arguments.frames,
+        backdrop: arguments.backdrop.clone(),
+        seed,
+    };
+    let job = Job {
+        datasets: arguments.datasets.clone(),
+        only: arguments.only.clone(),
+        judge: arguments.judge.clone(),
+        scenes: scenes(arguments.scenes, arguments.subjects, arguments.seed),
+        judge_scenes: scenes(
+            arguments.judge_scenes,
+            arguments.judge_subjects,
+            arguments.seed + 1,
+        ),
+        settings: Settings {
+            passes: arguments.passes.map_or(defaults.passes, usize::from),
+            seed: arguments.seed,
+            ..defaults
+        },
+    };
+    let terminal = Terminal::without_bar(globals.quiet, arguments.json);
+    let out = &arguments.out;
+    let train = || lab::orientation::train(&job, out, &model, (stop, &terminal));
+    let report = pool.install(train)?;
+    if arguments.json {
+        output::json(&json(&report))?;
+    } else if !globals.quiet {
+        output::line(text(&report))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn json(report: &Report) -> serde_json::Value {
+    let judged = report.judged.iter().map(|it| {
+        json!({
+            "on": it.on,
+            "n": it.n,
+            "right": it.right,
+            "interval": it.interval,
+            "surprise_nats": it.surprise,
+        })
+    });
+    json!({
+        "event": "summary",
+        "photographs": report.n_photographs,
+        "behind": report.n_behind,
+        "rendered": report.n_rendered,
+        "judged": judged.collect::<Vec<_>>(),
+    })
+}
+
+fn text(report: &Report) -> String {
+    let mut lines = vec![format!(
+        "learned from {} photographs ({} from behind) and {} pictures of scenes",
+        report.n_photographs, report.n_behind, report.n_rendered
+    )];
+    lines.extend(report.judged.iter().map(|it| {
+        let [low, high] = it.interval.map(|it| 100.0 * it);
+        format!(
+            "{}: right for {:.1} % of {} people ({low:.1} to {high:.1}), surprise {:.3} nats (0.693: knows nothing)",
+            it.on,
+            100.0 * it.right,
+            it.n,
+            it.surprise
+        )
+    }));
+    lines.join("\n")
+}

@@ -1,0 +1,148 @@
+//! `parallax-lab train quality`: trains the network that predicts the error of every part in a single view.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use failure::{ExitKind, Failure, OrFail as _};
+use qualitytraining::network::Kind;
+use qualitytraining::settings::Settings;
+
+use terminal::Globals;
+use terminal::output;
+
+const HELP: &str = "\
+The samples are made by `parallax-lab train quality-samples`; a share of their groups (subjects, images) is validated on, \
+never a part of a group. After every pass the state is in OUT.checkpoint: --resume goes on, and on the CPU the \
+network is the same, bit for bit, whatever the interruptions. OUT.svg shows how the training went. The best pass is \
+written as ONNX, with what `[quality]` needs to know of it inside: preprocessing, unit, thresholds.
+
+This command needs a Parallax that was built with it:
+    cargo run --release -p parallax-lab --features train-quality -- train quality ...
+
+VGG-16 (--network vgg16) begins with torchvision's weights, --weights vgg16.safetensors (of a .pth make one \
+with safetensors.torch.save_file), and samples made with --tile vgg16.
+
+Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a \
+setting is wrong; 4 samples, weights or a checkpoint cannot be used; 130 stopped by Ctrl-C.
+
+Example:
+    parallax-lab train quality --samples train.samples --judge test.samples --out person.quality.onnx";
+
+/// The architecture of the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Network {
+    /// Features of the search only, without the picture: a baseline.
+    Evidence,
+    /// A few separable convolutions, sampled around every part, and the features of the search.
+    Small,
+    /// The network of the paper.
+    Vgg16,
+}
+
+impl From<Network> for Kind {
+    fn from(network: Network) -> Self {
+        match network {
+            Network::Evidence => Self::Evidence,
+            Network::Small => Self::Small,
+            Network::Vgg16 => Self::Vgg16,
+        }
+    }
+}
+
+/// Options of `train quality`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// Samples to learn from and to validate on.
+    #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
+    samples: Vec<PathBuf>,
+    /// Samples to test the network on, which are not trained on; every file separately.
+    #[arg(long, value_name = "FILE")]
+    judge: Vec<PathBuf>,
+    /// The ONNX file to write.
+    #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
+    out: Option<PathBuf>,
+    /// Settings of the training, as TOML; for missing keys and defaults see --print-settings.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Print the settings that would be used, as TOML, and exit.
+    #[arg(long)]
+    print_settings: bool,
+    /// The network, instead of that of the settings.
+    #[arg(long, value_enum)]
+    network: Option<Network>,
+    /// Random seed, instead of that of the settings.
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// Initial weights: torchvision's VGG-16, as .safetensors.
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// The identity stored in the file; its name if not given.
+    #[arg(long, value_name = "TEXT")]
+    identity: Option<String>,
+    /// Continue from the checkpoint of an interrupted training; start anew if there is none.
+    #[arg(long)]
+    resume: bool,
+    /// Print events and the summary as JSON, one object per line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command; an error if this executable was built without training.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let settings = settings(arguments)?;
+    if arguments.print_settings {
+        let text = toml::to_string(&settings).or_fail(ExitKind::Run)?;
+        output::line(text.trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    train(arguments, &settings, globals)
+}
+
+#[cfg(feature = "train-quality")]
+fn train(
+    arguments: &Arguments,
+    settings: &Settings,
+    globals: Globals,
+) -> Result<ExitCode, Failure> {
+    use terminal::Terminal;
+
+    let job = lab::quality::network::Job {
+        samples: arguments.samples.clone(),
+        judge: arguments.judge.clone(),
+        out: arguments.out.clone().unwrap_or_default(),
+        weights: arguments.weights.clone(),
+        identity: arguments.identity.clone(),
+        resume: arguments.resume,
+    };
+    let stop = failure::Stop::on_signals().or_fail(ExitKind::Run)?;
+    let terminal = Terminal::without_bar(globals.quiet || arguments.json, arguments.json);
+    lab::quality::network::train(&job, settings, &stop, &terminal)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(not(feature = "train-quality"))]
+fn train(_: &Arguments, _: &Settings, _: Globals) -> Result<ExitCode, Failure> {
+    let message = "this Parallax was built without the trainer of networks";
+    Err(Failure::new(ExitKind::Usage, message).with_hint(
+        "build it with: cargo run --release -p parallax-lab --features train-quality -- train quality ...",
+    ))
+}
+
+fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
+    let mut settings = match &arguments.settings {
+        None => Settings::default(),
+        Some(file) => toml::from_str(&failure::read_text(file)?).map_err(|error| {
+            Failure::new(ExitKind::Config, format!("{}: {error}", file.display()))
+        })?,
+    };
+    if let Some(network) = arguments.network {
+        settings.network = network.into();
+    }
+    if let Some(seed) = arguments.seed {
+        settings.seed = u64::from(seed);
+    }
+    settings.check().or_fail(ExitKind::Config)?;
+    Ok(settings)
+}

@@ -1,0 +1,128 @@
+//! `parallax-lab train quality-samples`: makes training samples from pictures with known joints.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use lab::quality::{Scenes, samples};
+use viewquality::TileShape;
+
+use crate::commands::train::subjects;
+use terminal::Globals;
+use terminal::Terminal;
+use terminal::output;
+
+const HELP: &str = "\
+Two sources, together or alone: scenes that do not exist (--scenes N, of the subjects of --subjects, every one of \
+another action, rig, room, noise, blur and exposure, by the seed), and DATASETs of annotated people as for \
+`parallax-lab train fmp`. Every picture is searched as the pipeline does; what is kept of it is the tile around \
+the best pose with a margin, what the search knows of the pose, and how far off every part is.
+
+Subjects and images that the network is to be judged on belong into a file of their own.
+
+Example:
+    parallax-lab train quality-samples --scenes 200 --subjects 1-100 --out train.samples
+    parallax-lab train quality-samples --scenes 40 --subjects 901-920 --seed 2 --out test.samples";
+
+/// The network that the tiles are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TileOf {
+    /// 160 x 64 pixels.
+    Small,
+    /// 160 x 48 pixels.
+    Vgg16,
+}
+
+impl TileOf {
+    fn shape(self) -> TileShape {
+        match self {
+            Self::Small => TileShape::SMALL,
+            Self::Vgg16 => TileShape::VGG16,
+        }
+    }
+}
+
+/// Options of `train quality-samples`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// Annotated people: folders or files, as for `train fmp`.
+    #[arg(value_name = "DATASET")]
+    datasets: Vec<PathBuf>,
+    /// People of a data set to use, all if not given.
+    #[arg(long, value_name = "[DATASET=]SELECTION")]
+    only: Vec<String>,
+    /// People of a data set to leave out, for example a test set.
+    #[arg(long, value_name = "[DATASET=]SELECTION")]
+    without: Vec<String>,
+    /// Number of synthetic scenes; each gives some pictures of every camera.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    scenes: u32,
+    /// Numbers of the people in the scenes.
+    #[arg(long, value_name = "FROM-TO", default_value = "1-100", value_parser = subjects)]
+    subjects: [u64; 2],
+    /// Frames per camera of a scene, some seconds apart.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
+    frames: u16,
+    /// Photographs without people, used as the background of every third scene instead of a room.
+    #[arg(long, value_name = "DIR")]
+    backdrop: Option<PathBuf>,
+    /// Random seed.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// The single-view model; the person model that ships with Parallax if not given.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// The network that the tiles are for.
+    #[arg(long, value_enum, default_value_t = TileOf::Small)]
+    tile: TileOf,
+    /// The file of samples to write.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Threads; one per core if not given. The samples do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    if arguments.scenes == 0 && arguments.datasets.is_empty() {
+        let failure = Failure::new(
+            ExitKind::Usage,
+            "no pictures: name a DATASET, or --scenes N",
+        );
+        return Err(failure);
+    }
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.map_or(0, usize::from))
+        .thread_name(|it| format!("samples-{it}"))
+        .build()
+        .or_fail(ExitKind::Run)?;
+    let model = inputs::model_or_shipped(arguments.model.as_deref())?;
+    let job = samples::Job {
+        datasets: arguments.datasets.clone(),
+        only: arguments.only.clone(),
+        without: arguments.without.clone(),
+        scenes: Scenes {
+            n: arguments.scenes,
+            subjects: arguments.subjects,
+            frames: arguments.frames,
+            backdrop: arguments.backdrop.clone(),
+            seed: arguments.seed,
+        },
+        tile: arguments.tile.shape(),
+    };
+    let terminal = Terminal::without_bar(globals.quiet, false);
+    let made = pool.install(|| samples::make(&job, &arguments.out, model, (stop, &terminal)))?;
+    if !globals.quiet {
+        output::message(format_args!(
+            "{}: {} samples, {} pictures on which nobody was found",
+            arguments.out.display(),
+            made.n,
+            made.n_lost
+        ));
+    }
+    Ok(ExitCode::SUCCESS)
+}

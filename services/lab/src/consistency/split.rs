@@ -1,0 +1,112 @@
+//! The sequences that are learned from, and those that are held out.
+
+use failure::{ExitKind, Failure};
+use sequences::Sequence;
+
+/// Those that are learned from, and those that the weights are chosen on.
+pub(super) fn split(
+    all: Vec<Sequence>,
+    hold_out: &[String],
+) -> Result<(Vec<Sequence>, Vec<Sequence>), Failure> {
+    let mut subjects: Vec<&str> = all.iter().map(|it| it.subject.as_str()).collect();
+    subjects.sort_by_key(|it| (it.len(), *it));
+    subjects.dedup();
+    if let Some(unknown) = hold_out.iter().find(|it| !subjects.contains(&it.as_str())) {
+        let known = subjects.join(", ");
+        let message = format!("--hold-out: there is no subject {unknown:?}, only {known}");
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    let held: Vec<String> = if hold_out.is_empty() {
+        let n = subjects.len().div_ceil(4);
+        let last = subjects.iter().rev().take(n);
+        last.map(|it| (*it).to_owned()).collect()
+    } else {
+        hold_out.to_vec()
+    };
+    let (held, train): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|it| held.contains(&it.subject));
+    if train.is_empty() {
+        let message = "all subjects are held out: nobody is left to learn from";
+        let failure = Failure::new(ExitKind::Usage, message);
+        return Err(failure.with_hint("sequences of at least two subjects are needed"));
+    }
+    Ok((train, held))
+}
+
+/// Sees that all sequences have the same cameras.
+pub(super) fn one_rig(all: &[&Sequence], rig: &str) -> Result<(), Failure> {
+    let cameras = |it: &Sequence| -> Vec<String> {
+        let views = it.views.iter();
+        views.map(|it| it.camera.clone()).collect()
+    };
+    for pair in all.windows(2) {
+        if cameras(pair[0]) != cameras(pair[1]) {
+            let other = pair[1];
+            let message = format!(
+                "--rig {rig}: {} {} has other cameras than the sequence before it",
+                other.dataset, other.name
+            );
+            return Err(Failure::new(ExitKind::Usage, message));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use geometry::Rig;
+    use skeleton::PARSE14;
+
+    use super::*;
+
+    /// One camera; what it sees does not matter here.
+    fn rig() -> Rig {
+        let camera = geometry::Camera {
+            name: "c1".to_owned(),
+            intrinsics: geometry::Intrinsics {
+                fx: 300.0,
+                fy: 300.0,
+                cx: 160.0,
+                cy: 120.0,
+                size: [320, 240],
+                lens: geometry::Lens::default(),
+            },
+            camera_from_world: nalgebra::Isometry3::identity(),
+        };
+        Rig::new(vec![camera], None, "made up").unwrap()
+    }
+
+    fn sequence(subject: &str) -> Sequence {
+        Sequence {
+            name: subject.to_owned(),
+            dataset: String::new(),
+            subject: subject.to_owned(),
+            action: String::new(),
+            rig: rig(),
+            views: Vec::new(),
+            joints: &PARSE14,
+            frames: Vec::new(),
+        }
+    }
+
+    fn held(subjects: &[&str], hold_out: &[&str]) -> Result<Vec<String>, String> {
+        let all = subjects.iter().map(|it| sequence(it)).collect();
+        let hold_out: Vec<String> = hold_out.iter().map(|it| (*it).to_owned()).collect();
+        let (_, held) = split(all, &hold_out).map_err(|it| it.to_string())?;
+        Ok(held.into_iter().map(|it| it.subject).collect())
+    }
+
+    #[test]
+    fn the_last_fourth_of_the_subjects_is_held_out() {
+        let subjects = ["s1", "s2", "s3", "s9", "s10", "s10", "s4", "s5"];
+        assert_eq!(held(&subjects, &[]).unwrap(), ["s9", "s10", "s10"]);
+        assert_eq!(held(&["s1", "s2"], &["s1"]).unwrap(), ["s1"]);
+    }
+
+    #[test]
+    fn somebody_must_be_left_to_learn_from() {
+        assert!(held(&["s1"], &[]).unwrap_err().contains("nobody is left"));
+        let said = held(&["s1", "s2"], &["s3"]).unwrap_err();
+        assert!(said.contains("no subject \"s3\", only s1, s2"), "{said}");
+    }
+}

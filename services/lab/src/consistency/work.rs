@@ -1,0 +1,322 @@
+//! From sequences to what was learned: look at all people, then try weights on those held out.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use ::consistency::{Grid, Learned, Learner, Point, Settings, Shape, Tally, Weights, best};
+use evaluation::Point as Joint;
+use experiment::{Bench, Combining, Film, FilmSettings, Setup, Terms, Trial, Version, score};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use fmp::Model;
+use kernels::Rgb8View;
+use pipeline::{PairTables, SkeletonSettings, ViewSettings};
+use sequences::{Frame, Sequence};
+
+use crate::failures::film_failure;
+use failure::Console;
+
+/// Numbers of bins that are compared.
+const BINS: [usize; 5] = [3, 6, 9, 12, 18];
+/// Ridges that are compared, in squared sizes of the person.
+const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
+
+/// What is learned, and how.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Most instants of the subjects held out that weights are tried on, evenly over all of them.
+    pub tries: usize,
+    /// Learn the pairs of the cameras of this rig by name too.
+    pub rig: Option<String>,
+    /// Whether joints are learned as a map of the parts.
+    pub with_joints: bool,
+    /// How the frames are made.
+    pub film: FilmSettings,
+    /// What identifies the model in the file.
+    pub fingerprint: String,
+}
+
+/// A run of learning.
+#[derive(Debug)]
+pub struct Learning<'a> {
+    job: &'a Job,
+    console: &'a dyn Console,
+    model: Arc<Model>,
+    stop: Stop,
+    begin: Instant,
+}
+
+/// What was found.
+#[derive(Debug)]
+pub struct Done {
+    /// What goes into the file.
+    pub learned: Learned,
+    /// Number of bins, and what so many know of the types of people held out.
+    pub bins: Vec<(usize, Option<f64>)>,
+    /// Ridge, and root mean square error of joints of people held out; without a map the first one.
+    pub joints: Vec<(Option<f64>, f64)>,
+    /// Every view alone.
+    pub single: Option<Point>,
+    /// All weights that were tried.
+    pub surface: Vec<Point>,
+    /// How long it took.
+    pub seconds: f64,
+}
+
+impl<'a> Learning<'a> {
+    /// Prepares the run; its time begins.
+    pub fn new(job: &'a Job, console: &'a dyn Console, model: Arc<Model>, stop: Stop) -> Self {
+        Self {
+            job,
+            console,
+            model,
+            stop,
+            begin: Instant::now(),
+        }
+    }
+
+    /// Learns, and chooses.
+    ///
+    /// * `keep`: is given what was learned before the weights are chosen, with those of the settings, and after.
+    ///
+    /// # Errors
+    ///
+    /// Frames cannot be read; nothing can be learned from them; a stop request ([`ExitKind::Interrupted`]); those of
+    /// `keep`.
+    pub fn run(
+        &self,
+        train: &[Sequence],
+        held: &[Sequence],
+        keep: &dyn Fn(&Learned) -> Result<(), Failure>,
+    ) -> Result<Done, Failure> {
+        let learners = self.look(train, "learning")?;
+        let others = self.look(held, "looking at people held out")?;
+        let known = learners.iter().zip(&others);
+        let bins: Vec<(usize, Option<f64>)> = BINS
+            .iter()
+            .zip(known)
+            .map(|(n, (learner, other))| (*n, learner.lift_on(other)))
+            .collect();
+        let chosen = largest(bins.iter().map(|it| it.1));
+        let (learner, other) = (&learners[chosen], &others[chosen]);
+        let joints = joint_errors(learner, other);
+        let ridge = smallest(&joints).filter(|_| self.job.with_joints);
+        let first = self.learned(learner, Weights::default(), ridge)?;
+        keep(&first)?;
+        let tried = self.thinned(held);
+        let (single, surface) = self.choose(&tried, &first)?;
+        let weights = best(&surface).map_or(first.weights, |it| it.weights);
+        let mut learned = self.learned(learner, weights, ridge)?;
+        learned.learned.held_out = tried.iter().map(|it| it.frames.len() as u64).sum();
+        keep(&learned)?;
+        Ok(Done {
+            learned,
+            bins,
+            joints,
+            single,
+            surface,
+            seconds: self.begin.elapsed().as_secs_f64(),
+        })
+    }
+
+    /// Some instants of people held out, evenly over all of them.
+    fn thinned(&self, held: &[Sequence]) -> Vec<Sequence> {
+        let n: usize = held.iter().map(|it| it.frames.len()).sum();
+        let most = self.job.tries.min(n);
+        let mut seen = 0;
+        let thin = |sequence: &Sequence| {
+            let mut sequence = sequence.clone();
+            sequence.frames.retain(|_| {
+                seen += 1;
+                // Whether the share that is wanted has grown by a whole instant.
+                seen * most / n > (seen - 1) * most / n
+            });
+            sequence
+        };
+        held.iter().map(thin).collect()
+    }
+
+    fn learned(
+        &self,
+        learner: &Learner,
+        weights: Weights,
+        ridge: Option<f64>,
+    ) -> Result<Learned, Failure> {
+        let rig = self.job.rig.as_deref();
+        let learned = learner.learned(self.job.fingerprint.clone(), weights, rig, ridge);
+        learned.or_fail(ExitKind::Input)
+    }
+
+    /// What single views show, by every number of bins.
+    fn look(&self, sequences: &[Sequence], what: &str) -> Result<Vec<Learner>, Failure> {
+        let shape = Shape::of(&self.model);
+        let learner = |n_bins: usize| {
+            let settings = Settings {
+                n_bins,
+                ..Settings::default()
+            };
+            Learner::new(shape.clone(), settings)
+        };
+        let mut learners = BINS.map(learner).to_vec();
+        let by_name = self.job.rig.is_some();
+        self.frames(sequences, what, &[], |bench, sequence, frame, images| {
+            let truth: (&Sequence, &[Option<Joint>]) = (sequence, &frame.joints);
+            bench.learn(&mut learners, truth, images, by_name);
+        })?;
+        Ok(learners)
+    }
+
+    /// Tries weights on people held out: geometry first, then appearance beside the best.
+    fn choose(
+        &self,
+        held: &[Sequence],
+        learned: &Learned,
+    ) -> Result<(Option<Point>, Vec<Point>), Failure> {
+        if held.iter().all(|it| it.frames.is_empty()) {
+            return Ok((None, Vec::new()));
+        }
+        let grid = Grid::default();
+        let alone = Weights {
+            alpha: 0.0,
+            beta: 0.0,
+            ..Weights::default()
+        };
+        let mut tried = vec![alone];
+        tried.extend(grid.geometry());
+        let mut points = self.try_out(held, learned, &tried, "choosing alpha")?;
+        let single = points.remove(0);
+        let Some(geometry) = best(&points) else {
+            return Ok((Some(single), points));
+        };
+        let tried = grid.appearance(&geometry.weights);
+        points.extend(self.try_out(held, learned, &tried, "choosing beta")?);
+        Ok((Some(single), points))
+    }
+
+    fn try_out(
+        &self,
+        held: &[Sequence],
+        learned: &Learned,
+        tried: &[Weights],
+        what: &str,
+    ) -> Result<Vec<Point>, Failure> {
+        let tables = |weights: &Weights| PairTables {
+            of_pairs: Vec::new(),
+            by_angle: Some(Arc::new(learned.by_angle(weights.appearance))),
+        };
+        let trial = |weights: &Weights| Trial {
+            version: version(weights),
+            fuse: fusion(weights),
+            tables: tables(weights),
+        };
+        let trials: Vec<Trial> = tried.iter().map(trial).collect();
+        let mut tallies = vec![Tally::default(); trials.len()];
+        self.frames(held, what, &trials, |bench, sequence, frame, images| {
+            let found = bench.solve(images, &|_| None);
+            for (tally, found) in tallies.iter_mut().zip(&found) {
+                let score = score(sequence, frame, found);
+                tally.add(&score.segments, &score.iterations);
+            }
+        })?;
+        let points = tallies.iter().zip(tried);
+        Ok(points
+            .map(|(tally, weights)| tally.point(*weights))
+            .collect())
+    }
+
+    /// Every frame of all sequences.
+    fn frames(
+        &self,
+        sequences: &[Sequence],
+        what: &str,
+        trials: &[Trial],
+        mut visit: impl FnMut(&mut Bench, &Sequence, &Frame, &[Option<Rgb8View<'_>>]),
+    ) -> Result<(), Failure> {
+        let n: usize = sequences.iter().map(|it| it.frames.len()).sum();
+        let (mut done, mut said) = (0, Instant::now());
+        for sequence in sequences {
+            let mut film = Film::open(sequence, &self.job.film).map_err(film_failure)?;
+            let mut bench = self.bench(sequence, &film, trials)?;
+            for frame in &sequence.frames {
+                if self.stop.is_requested() {
+                    let failure = Failure::new(ExitKind::Interrupted, "interrupted");
+                    return Err(failure.with_hint(
+                        "what was learned until then is in OUT, if it came to trying weights",
+                    ));
+                }
+                let images = film.at(frame.index).map_err(film_failure)?;
+                visit(&mut bench, sequence, frame, &images);
+                done += 1;
+                if said.elapsed() > Duration::from_secs(5) || done == n {
+                    said = Instant::now();
+                    let text = format!("{what}: {done} of {n} instants");
+                    self.console.message(&text);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn bench(&self, sequence: &Sequence, film: &Film, trials: &[Trial]) -> Result<Bench, Failure> {
+        let setup = Setup {
+            model: Arc::clone(&self.model),
+            view: ViewSettings::default(),
+            skeleton: SkeletonSettings {
+                joints: sequence.joints,
+                ..SkeletonSettings::default()
+            },
+            joint_map: None,
+            trials: trials.to_vec(),
+        };
+        let up = sequence.rig.up_in_world();
+        let maps = film.footage_from_frame();
+        Bench::new(setup, &film.cameras(), up, maps).or_fail(ExitKind::Input)
+    }
+}
+
+fn version(weights: &Weights) -> Version {
+    Version {
+        terms: match (weights.alpha > 0.0, weights.beta > 0.0) {
+            (false, _) => Terms::Single,
+            (true, false) => Terms::Geometry,
+            (true, true) => Terms::Appearance,
+        },
+        combining: Combining::Pairs,
+    }
+}
+
+fn fusion(weights: &Weights) -> multiview::Settings {
+    multiview::Settings {
+        alpha: weights.alpha,
+        beta: weights.beta,
+        max_distance_cells: weights.max_distance_cells.unwrap_or(f64::INFINITY),
+        ..multiview::Settings::default()
+    }
+}
+
+/// Root mean square error of joints of people held out, by ridge; without a map first.
+fn joint_errors(learner: &Learner, other: &Learner) -> Vec<(Option<f64>, f64)> {
+    let theirs = other.joints();
+    let none = ::consistency::JointFit::default();
+    let mut errors = vec![(None, theirs.error_of(&none, 1.0))];
+    let with = |ridge: f64| (Some(ridge), theirs.error_of(learner.joints(), ridge));
+    errors.extend(RIDGES.map(with));
+    let known = errors.into_iter();
+    known
+        .filter_map(|(ridge, it)| Some((ridge, it?.sqrt())))
+        .collect()
+}
+
+fn smallest(errors: &[(Option<f64>, f64)]) -> Option<f64> {
+    errors.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0
+}
+
+/// The place of the largest number; of the first among equals, or where none is known.
+fn largest(values: impl Iterator<Item = Option<f64>>) -> usize {
+    let mut best = (0, f64::NEG_INFINITY);
+    for (nth, value) in values.enumerate() {
+        if value.is_some_and(|it| it > best.1) {
+            best = (nth, value.unwrap_or(best.1));
+        }
+    }
+    best.0
+}

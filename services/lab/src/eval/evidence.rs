@@ -1,0 +1,384 @@
+//! Sequences judged on the keypoints of a network, undisturbed and under stress: in space, and by what everyone does.
+
+use evaluation::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
+use experiment::{
+    Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
+    projected,
+};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use fmp::{Layout, Pose, Search};
+use geometry::Camera;
+use kernels::Rgb8View;
+use keypoints::Sides;
+use multiview::{SeenPerson, same_person};
+use pipeline::ViewSettings;
+use posenetwork::springs::TurnedSprings;
+use posenetwork::{
+    Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
+};
+use sequences::{Frame, Sequence};
+use skeleton::PARSE14;
+
+use failure::Console;
+
+/// Least share of a segment's length at which it is not found (eq. 13 of the paper).
+const GAMMA: f64 = 0.5;
+/// Largest error of a joint that counts, metres: a joint that is not there counts as this.
+const MOST_M: f64 = 2.0;
+/// The limbs' joints are the first of `skeleton::PARSE14`.
+const N_LIMB_JOINTS: usize = 12;
+/// Reprojection error above which cameras are left out, as a share of the picture's height (15 px of 1080 are Pose2Sim's default).
+const LIMIT: f64 = 15.0 / 1080.0;
+
+/// What is judged.
+#[derive(Debug)]
+pub struct EvidenceJob<'a> {
+    /// The network that finds keypoints.
+    pub network: &'a PoseNetwork,
+    /// What finds the boxes.
+    pub boxes: Boxes<'a>,
+    /// Solve the tree of springs, which tells better boxes.
+    pub springs: &'a TurnedSprings,
+    /// What goes wrong.
+    pub stress: &'a [Stress],
+    /// How the frames are derived.
+    pub film: FilmSettings,
+    /// How intervals are found.
+    pub bootstrap: Bootstrap,
+    /// Ends the run.
+    pub stop: Stop,
+}
+
+/// What finds boxes around people.
+#[derive(Debug, Clone, Copy)]
+pub enum Boxes<'a> {
+    /// A detector.
+    Detector(&'a Detector),
+    /// The filters, over the whole frame.
+    Filters(&'a Search),
+}
+
+impl Boxes<'_> {
+    /// The boxes in a frame, the best first: left, top, right, bottom, pixels.
+    fn find(&self, image: Rgb8View<'_>, values: &mut Vec<f32>) -> Result<Vec<[f64; 4]>, Failure> {
+        match self {
+            Self::Detector(detector) => {
+                let found = detector.people(image, values).or_fail(ExitKind::Input)?;
+                Ok(found.into_iter().map(|it| it.outline).collect())
+            }
+            Self::Filters(search) => {
+                let layout = Layout::new(&search.model, image.width(), image.height());
+                let layout = layout.or_fail(ExitKind::Input)?;
+                let found = search.on(image, &layout, |it| {
+                    let separation = ViewSettings::default().min_separation;
+                    search.solver.distinct(it, MOST_PEOPLE, separation)
+                });
+                let outline = |it: &Pose| outline_of_parts(it.bounding_box(&search.model, &layout));
+                Ok(found.iter().map(outline).collect())
+            }
+        }
+    }
+}
+
+/// The scores of one method under one stress.
+#[derive(Debug, Clone, Default)]
+struct Tally {
+    /// Of every frame: segments found.
+    found: Vec<Share>,
+    /// Of every frame: errors of the limbs' joints, millimetres.
+    errors: Vec<Share>,
+}
+
+/// A row of the table.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct EvidenceRow {
+    /// What went wrong.
+    pub stress: String,
+    /// How the joints were found.
+    pub method: &'static str,
+    /// Number of frames.
+    pub n_frames: usize,
+    /// Segments found (PCP3D), per cent.
+    pub pcp3d: f64,
+    /// Its interval.
+    pub pcp3d_interval: [f64; 2],
+    /// Mean error of the limbs' twelve joints, millimetres.
+    pub limbs_mm: f64,
+    /// Its interval.
+    pub limbs_mm_interval: [f64; 2],
+    /// By how much the last method of the table finds more, per cent, and the interval over the same frames.
+    pub last_finds_more: [f64; 3],
+    /// By how many millimetres it errs less, and the interval.
+    pub last_errs_less_mm: [f64; 3],
+}
+
+/// A person whom the network sees in a view, and what it sees.
+type Seen = (SeenPerson, NetworkView);
+
+/// A frame before it is disturbed.
+struct Instant<'a> {
+    nth: usize,
+    images: Vec<Option<Rgb8View<'a>>>,
+    cameras: &'a [Camera],
+    /// Of `skeleton::PARSE14`.
+    truth: Vec<Option<Point>>,
+}
+
+impl EvidenceJob<'_> {
+    /// Judges all frames.
+    ///
+    /// # Errors
+    ///
+    /// Footage cannot be read, or the network cannot be run.
+    pub fn run(
+        &self,
+        sequences: &[Sequence],
+        console: &dyn Console,
+    ) -> Result<Vec<EvidenceRow>, Failure> {
+        let mut tallies = vec![vec![Tally::default(); Method::ALL.len()]; self.stress.len()];
+        let n_frames: usize = sequences.iter().map(|it| it.frames.len()).sum();
+        console.begin("frames", "");
+        let mut done = 0;
+        for sequence in sequences {
+            let mut film = Film::open(sequence, &self.film).or_fail(ExitKind::Input)?;
+            let cameras = film.cameras();
+            for (nth, frame) in sequence.frames.iter().enumerate() {
+                if self.stop.is_requested() {
+                    return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
+                }
+                let images = film.at(frame.index).or_fail(ExitKind::Input)?;
+                let instant = Instant {
+                    nth,
+                    images,
+                    cameras: &cameras,
+                    truth: truth(sequence, frame),
+                };
+                self.judge(&instant, &mut tallies)?;
+                done += 1;
+                console.details(&sequence.name);
+                console.set(done, n_frames);
+            }
+        }
+        console.finish();
+        Ok(self.rows(&tallies))
+    }
+
+    fn judge(&self, instant: &Instant<'_>, tallies: &mut [Vec<Tally>]) -> Result<(), Failure> {
+        let n_views = instant.cameras.len();
+        let mut memory = (LookMemory::default(), Vec::new());
+        let plain = (0..n_views)
+            .map(|view| self.people(instant, view, None, &mut memory))
+            .collect::<Result<Vec<_>, Failure>>()?;
+        for (stress, tallies) in self.stress.iter().zip(tallies) {
+            let mut seen = Vec::with_capacity(n_views);
+            for view in stress.views(instant.nth, n_views) {
+                let covers = matches!(stress, Stress::Covered(_));
+                let is_hit = stress.hits(instant.nth, view, n_views);
+                let people = if covers && is_hit {
+                    self.people(instant, view, Some(instant.nth + view), &mut memory)?
+                } else {
+                    plain[view].clone()
+                };
+                seen.push((view, people));
+            }
+            let as_seen = self.network.card().keypoints.sides == Sides::Seen;
+            let mut chosen = chosen(instant, seen, (*stress, as_seen));
+            if as_seen {
+                name_sides(&mut chosen);
+            }
+            let views: Vec<(&Camera, &NetworkView)> =
+                chosen.iter().map(|it| (&it.0, &it.1)).collect();
+            let height = instant.cameras.iter().map(|it| it.intrinsics.size[1]).max();
+            let limit_px = LIMIT * f64::from(height.unwrap_or(0));
+            for (method, tally) in Method::ALL.into_iter().zip(tallies) {
+                tally.add(&joints_by(method, &views, limit_px), &instant.truth);
+            }
+        }
+        Ok(())
+    }
+
+    /// The people whom the network sees in a view.
+    ///
+    /// * `covered`: which half of the person is covered.
+    fn people(
+        &self,
+        instant: &Instant<'_>,
+        view: usize,
+        covered: Option<usize>,
+        (memory, values): &mut (LookMemory, Vec<f32>),
+    ) -> Result<Vec<Seen>, Failure> {
+        let Some(image) = instant.images[view] else {
+            return Ok(Vec::new());
+        };
+        let size = [image.width(), image.height()];
+        let mut rgb = Vec::new();
+        let image = match (covered, outline(instant, view)) {
+            (Some(half), Some(outline)) => {
+                rgb.extend_from_slice(image.data());
+                cover_half(&mut rgb, size, outline, half);
+                Rgb8View::new(size[0], size[1], &rgb).or_fail(ExitKind::Input)?
+            }
+            _ => image,
+        };
+        let layout =
+            Layout::new(self.springs.model(), size[0], size[1]).or_fail(ExitKind::Input)?;
+        let looker = Looker {
+            network: self.network,
+            springs: self.springs,
+            layout: &layout,
+            settings: &MapSettings::default(),
+        };
+        let boxes = self.boxes.find(image, values)?;
+        let mut people = Vec::new();
+        for outline in boxes.into_iter().take(MOST_PEOPLE) {
+            let mut maps = JointMaps::default();
+            let seen = looker.look((image, outline), memory, &mut maps);
+            let Some(seen) = seen.or_fail(ExitKind::Input)? else {
+                continue;
+            };
+            let look = looker.look_closer((image, seen), memory, &mut maps);
+            let look = look.or_fail(ExitKind::Input)?;
+            let height = (look.outline[3] - look.outline[1]) / size[1] as f64;
+            let view = NetworkView::new(maps).with_front(look.front);
+            people.push((view.person(height), view));
+        }
+        Ok(people)
+    }
+
+    fn rows(&self, tallies: &[Vec<Tally>]) -> Vec<EvidenceRow> {
+        let mut rows = Vec::new();
+        for (stress, tallies) in self.stress.iter().zip(tallies) {
+            let Some(last) = tallies.last() else { continue };
+            for (method, tally) in Method::ALL.into_iter().zip(tallies) {
+                let mean = |of: &[Share]| Share::mean(of).unwrap_or(f64::NAN);
+                let interval = |of: &[Share]| self.bootstrap.interval(of).unwrap_or([f64::NAN; 2]);
+                let change = |a: &[Share], b: &[Share]| {
+                    let each = a.iter().zip(b);
+                    let each: Vec<Share> = each
+                        .map(|(a, b)| Share {
+                            sum: a.sum - b.sum,
+                            n: a.n,
+                        })
+                        .collect();
+                    let [from, to] = interval(&each);
+                    [mean(&each), from, to]
+                };
+                rows.push(EvidenceRow {
+                    stress: stress.to_string(),
+                    method: method.name(),
+                    n_frames: tally.found.len(),
+                    pcp3d: mean(&tally.found),
+                    pcp3d_interval: interval(&tally.found),
+                    limbs_mm: mean(&tally.errors),
+                    limbs_mm_interval: interval(&tally.errors),
+                    last_finds_more: change(&last.found, &tally.found),
+                    last_errs_less_mm: change(&tally.errors, &last.errors),
+                });
+            }
+        }
+        rows
+    }
+}
+
+/// Most people of a view that the network looks at.
+const MOST_PEOPLE: usize = 4;
+
+/// The person in every view that shows the same one, with the calibration that the stress leaves; disturbed.
+fn chosen(
+    instant: &Instant<'_>,
+    seen: Vec<(usize, Vec<Seen>)>,
+    (stress, as_seen): (Stress, bool),
+) -> Vec<(Camera, NetworkView)> {
+    let n_views = instant.cameras.len();
+    let people: Vec<Vec<SeenPerson>> = seen
+        .iter()
+        .map(|it| it.1.iter().map(|it| it.0.clone()).collect())
+        .collect();
+    let each: Vec<(&Camera, &[SeenPerson])> = seen
+        .iter()
+        .zip(&people)
+        .map(|((view, _), people)| (&instant.cameras[*view], &people[..]))
+        .collect();
+    let same = same_person(&each, as_seen);
+    let of_view = |((view, people), who): ((usize, Vec<Seen>), Option<usize>)| {
+        let (person, found) = people.into_iter().nth(who?)?;
+        let camera = &instant.cameras[view];
+        if !stress.hits(instant.nth, view, n_views) {
+            return Some((camera.clone(), found));
+        }
+        let mut maps = found.maps().clone();
+        match stress {
+            Stress::Exchanged => maps.exchange_sides(),
+            Stress::Bystander => {
+                let height = person.height * f64::from(camera.intrinsics.size[1]);
+                maps.shift([height / 2.0, 0.0]);
+            }
+            _ => {}
+        }
+        let view = NetworkView::new(maps).with_front(found.front());
+        Some((stress.calibrated(camera), view))
+    };
+    seen.into_iter().zip(same).filter_map(of_view).collect()
+}
+
+/// The true joints of `skeleton::PARSE14`.
+fn truth(sequence: &Sequence, frame: &Frame) -> Vec<Option<Point>> {
+    parse14(sequence.joints, &frame.joints)
+}
+
+/// The box around the true joints in a view, pixels of the frame.
+fn outline(instant: &Instant<'_>, view: usize) -> Option<[f64; 4]> {
+    let joints = projected(&instant.cameras[view], [0.0; 2], &instant.truth)?;
+    let far = [f64::INFINITY, f64::NEG_INFINITY];
+    let ends = [0, 1].map(|axis| {
+        let each = joints.iter().map(|it| it[axis]);
+        each.fold(far, |[from, to], it| [from.min(it), to.max(it)])
+    });
+    Some([ends[0][0], ends[1][0], ends[0][1], ends[1][1]])
+}
+
+impl Tally {
+    fn add(&mut self, found: &[Option<Point>], truth: &[Option<Point>]) {
+        let segments = segments(&PARSE14).map_or_else(Vec::new, Vec::from);
+        let errors = segment_errors(&segments, found, truth);
+        let hits = errors.iter().flatten();
+        self.found.push(Share::of(
+            hits.map(|it| if *it <= GAMMA { 100.0 } else { 0.0 }),
+        ));
+        let errors = joint_errors(found, truth);
+        let limbs = errors.iter().take(N_LIMB_JOINTS).flatten();
+        self.errors
+            .push(Share::of(limbs.map(|it| it.min(MOST_M) * 1000.0)));
+    }
+}
+
+/// The table as text.
+pub fn evidence_text(rows: &[EvidenceRow]) -> String {
+    use core::fmt::Write as _;
+    let mut text = format!(
+        "{:<12} {:<16} {:>7} {:<15} {:>7} {:<15} {:<24}\n",
+        "stress", "method", "PCP3D", "(95 %)", "mm", "(95 %)", "maps and bones err less by"
+    );
+    for it in rows {
+        let [gain, from, to] = it.last_errs_less_mm;
+        let less = if it.method == Method::Space.name() {
+            String::new()
+        } else {
+            format!("{gain:.1} ({from:.1} to {to:.1})")
+        };
+        let interval = |[from, to]: [f64; 2]| format!("({from:.1}-{to:.1})");
+        // Writing to a string cannot fail.
+        let _written = writeln!(
+            text,
+            "{:<12} {:<16} {:>7.1} {:<15} {:>7.1} {:<15} {}",
+            it.stress,
+            it.method,
+            it.pcp3d,
+            interval(it.pcp3d_interval),
+            it.limbs_mm,
+            interval(it.limbs_mm_interval),
+            less
+        );
+    }
+    text
+}

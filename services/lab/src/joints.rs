@@ -1,0 +1,142 @@
+//! Where joints lie among the parts of a model, learned on photographs of marked people.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use consistency::{JointFile, JointsLearned, LearnedSet, Marked, best_local, mean_error, try_all};
+use datasets::{Person, SkeletonTable};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use fmp::{Model, Search};
+use rayon::prelude::*;
+
+use crate::failures::dataset_failure;
+use crate::judged;
+use crate::person::{Chosen, deal, read_options, sides_of};
+use failure::Console;
+
+/// Fewest people of a data set who were found: fewer cannot be dealt into shares.
+const FEWEST: usize = 20;
+
+/// What is learned.
+#[derive(Debug)]
+pub struct Learned {
+    /// The file.
+    pub file: JointFile,
+    /// What was tried: reach, ridge, and the error of every data set on people that were left out.
+    pub tried: Vec<consistency::Tried>,
+}
+
+/// A data set, found.
+struct Found {
+    name: String,
+    n_people: usize,
+    people: Vec<Marked>,
+}
+
+/// Searches all people, learns their joints, and writes the file; on rayon's current pool.
+///
+/// * `fingerprint`: of the model file.
+///
+/// # Errors
+///
+/// A data set or a picture cannot be read, or too few people were found; the file cannot be written; a stop request
+/// ([`ExitKind::Interrupted`]).
+pub fn train(
+    chosen: &Chosen,
+    out: &Path,
+    (model, fingerprint): (&Arc<Model>, u64),
+    (stop, console): (&Stop, &dyn Console),
+) -> Result<Learned, Failure> {
+    let search = Search::new(Arc::clone(model));
+    let sets = found(chosen, &search, stop, console)?;
+    let people: Vec<Vec<Marked>> = sets.iter().map(|it| it.people.clone()).collect();
+    let tried = try_all(&people);
+    if stop.is_requested() {
+        return Err(Failure::new(ExitKind::Interrupted, "stopped"));
+    }
+    let Some((settings, errors)) = best_local(&tried) else {
+        return Err(Failure::new(ExitKind::Run, "there are no settings to try"));
+    };
+    let all: Vec<Vec<&Marked>> = people.iter().map(|it| it.iter().collect()).collect();
+    let rows = settings.learn(&all);
+    let of_set = |((set, people), after): ((&Found, &Vec<&Marked>), &f64)| LearnedSet {
+        name: set.name.clone(),
+        people: set.n_people as u64,
+        found: set.people.len() as u64,
+        error_before: rounded(mean_error(None, people).unwrap_or(0.0)),
+        error_after: rounded(*after),
+    };
+    let learned = JointsLearned {
+        reach: settings.reach,
+        ridge: settings.ridge,
+        sets: sets.iter().zip(&all).zip(errors).map(of_set).collect(),
+    };
+    let file = JointFile::new(format!("{fingerprint:016x}"), rows, learned);
+    let text = file.write().or_fail(ExitKind::Run)?;
+    files::replace(out, text.as_bytes()).map_err(|error| failure::in_file(out, &error))?;
+    Ok(Learned { file, tried })
+}
+
+/// Reads and searches all data sets.
+fn found(
+    chosen: &Chosen,
+    search: &Search,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<Vec<Found>, Failure> {
+    let table = SkeletonTable::published();
+    let options = read_options(chosen, &table)?;
+    let sides = deal(&chosen.datasets, "--sides", &chosen.sides, true)?;
+    let mut sets = Vec::new();
+    for ((path, options), sides) in chosen.datasets.iter().zip(&options).zip(sides) {
+        let sides = sides_of(&sides)?;
+        let read = datasets::read(path, options).map_err(dataset_failure)?;
+        for problem in &read.problems {
+            console.message(&format!("left out: {problem}: {}", problem.fault));
+        }
+        let people = read.people.into_iter();
+        let people: Vec<Person> = people
+            .map(|it| sides.of(it, table.joint_mirror()))
+            .collect();
+        let marked: Result<Vec<Option<Marked>>, Failure> = people
+            .par_iter()
+            .map(|person| {
+                if stop.is_requested() {
+                    return Err(Failure::new(ExitKind::Interrupted, "stopped"));
+                }
+                marked(search, person)
+            })
+            .collect();
+        let set = Found {
+            name: crate::eval::pictures::name(path),
+            n_people: people.len(),
+            people: marked?.into_iter().flatten().collect(),
+        };
+        let (name, n, n_found) = (&set.name, set.n_people, set.people.len());
+        console.message(&format!("{name}: {n} people, {n_found} of them found"));
+        if n_found < FEWEST {
+            let message = format!(
+                "{}: only {n_found} people were found, expected {FEWEST} or more",
+                path.display()
+            );
+            return Err(Failure::new(ExitKind::Input, message));
+        }
+        sets.push(set);
+    }
+    Ok(sets)
+}
+
+/// The best detection on a person, if there is one.
+fn marked(search: &Search, person: &Person) -> Result<Option<Marked>, Failure> {
+    let [_, on_person] = judged::find(search, person)?;
+    let centres = on_person.and_then(|it| it.try_into().ok());
+    Ok(centres.map(|centres| Marked {
+        centres,
+        joints: judged::truth(person),
+    }))
+}
+
+/// A percentage with four decimals.
+fn rounded(percent: f64) -> f64 {
+    (percent * 1e4).round() / 1e4
+}

@@ -1,0 +1,235 @@
+//! A model on pictures of people whose joints are known.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use datasets::{People, Person, Picture};
+use evaluation::{
+    Offset, PARSE_STICKS, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, best_covering,
+};
+use experiment::{Joints, Pictures};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use fmp::{Layout, Pose, Search};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use skeleton::{JointMap, N_PARTS, PARSE14};
+
+use failure::Console;
+
+/// Most detections that are looked through for the one that lies on the person.
+const MOST: usize = 10_000;
+
+/// Least share of a person's box that a detection on the person covers.
+const COVERED: f64 = 0.3;
+
+/// A model, and where joints lie among its parts.
+#[derive(Debug)]
+pub struct Reader {
+    /// Searches with the model.
+    pub search: Search,
+    /// From parts to the joints of `skeleton::PARSE14`; a choice of parts without it.
+    pub joint_map: Option<Arc<JointMap>>,
+}
+
+impl Reader {
+    fn joints(&self, centres: &[[f64; 2]]) -> Option<Joints> {
+        let joints = match &self.joint_map {
+            Some(map) => map.from_parts(centres),
+            None => PARSE14.from_parts(centres),
+        };
+        Joints::try_from(joints).ok()
+    }
+}
+
+/// Tries a model on people, on rayon's current pool.
+///
+/// * `name`: of the data set.
+/// * `stop`: whether to give up, asked before every person.
+/// * `console`: is given a message about everybody who was left out, and every person who is done.
+///
+/// # Errors
+///
+/// An image cannot be read; it was given up ([`ExitKind::Interrupted`]).
+pub fn judged(
+    reader: &Reader,
+    name: &str,
+    people: &People,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<Pictures, Failure> {
+    let find = |person: &Person| {
+        go_on(stop)?;
+        let found = find(&reader.search, person)?;
+        console.advance(1);
+        Ok(found.map(|it| it.and_then(|it| reader.joints(&it))))
+    };
+    pictures(name, people, console, |people| {
+        people.par_iter().map(find).collect()
+    })
+}
+
+/// Gives up if a stop was requested.
+pub(crate) fn go_on(stop: &Stop) -> Result<(), Failure> {
+    if stop.is_requested() {
+        return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
+    }
+    Ok(())
+}
+
+/// What was found on people, beside the truth.
+///
+/// * `find`: the detections of every person; it advances the bar of the console.
+pub(crate) fn pictures(
+    name: &str,
+    people: &People,
+    console: &dyn Console,
+    find: impl FnOnce(&[Person]) -> Result<Vec<[Option<Joints>; 2]>, Failure>,
+) -> Result<Pictures, Failure> {
+    for problem in &people.problems {
+        console.message(&format!("left out: {problem}: {}", problem.fault));
+    }
+    console.set(0, people.people.len());
+    console.begin(name, "");
+    let found = find(&people.people);
+    console.finish();
+    Ok(Pictures {
+        name: name.to_owned(),
+        n_left_out: people.problems.len(),
+        truths: people.people.iter().map(truth).collect(),
+        found: found?,
+    })
+}
+
+/// Refuses a model of other parts.
+///
+/// # Errors
+///
+/// The model has not 26 parts.
+pub fn check(model: &fmp::Model, name: &str) -> Result<(), Failure> {
+    let n = model.n_parts();
+    if n == N_PARTS {
+        return Ok(());
+    }
+    let message = format!("{name} has {n} parts, only models of {N_PARTS} can be judged");
+    Err(Failure::new(ExitKind::Input, message))
+}
+
+/// The joints of a person; there are 14, or the data set would have been refused.
+pub(crate) fn truth(person: &Person) -> Joints {
+    core::array::from_fn(|it| person.joints.get(it).copied().unwrap_or([f64::NAN; 2]))
+}
+
+/// The centres of the parts of a detection.
+pub(crate) type Centres = Vec<[f64; 2]>;
+
+/// The best detection, and the best one on the person.
+pub(crate) fn find(search: &Search, person: &Person) -> Result<[Option<Centres>; 2], Failure> {
+    let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
+    let size = picture.size();
+    let Search { model, solver, .. } = search;
+    let Ok(layout) = Layout::new(model, size.width, size.height) else {
+        return Ok([None, None]);
+    };
+    let threshold = model.detection_threshold() as f32;
+    let (found, best) = search.on(picture.view(), &layout, |evidence| {
+        let found = solver.above(evidence, threshold, MOST);
+        (found, solver.best(evidence, None))
+    });
+    let boxes: Vec<_> = found.iter().map(|it| around(model, it, &layout)).collect();
+    let [x, y] = [0, 1].map(|axis| {
+        let values = person.joints.iter().map(|it| it[axis]);
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
+            [low.min(it), high.max(it)]
+        })
+    });
+    let covering = best_covering(&boxes, [x[0], y[0], x[1], y[1]], COVERED);
+    let centres = |pose: &Pose| pose.centres(model, &layout);
+    let covering = covering.and_then(|it| found.get(it));
+    Ok([best.as_ref().map(centres), covering.map(centres)])
+}
+
+/// Score of a pose, and the box around all its parts.
+fn around(model: &fmp::Model, pose: &Pose, layout: &Layout) -> (f64, [f64; 4]) {
+    let boxes = (0..N_PARTS).map(|it| pose.part_box(model, layout, it));
+    let whole = boxes.reduce(|a, b| {
+        [
+            a[0].min(b[0]),
+            a[1].min(b[1]),
+            a[2].max(b[2]),
+            a[3].max(b[3]),
+        ]
+    });
+    (f64::from(pose.score), whole.unwrap_or([0.0; 4]))
+}
+
+/// A report for programs: percentages.
+pub fn numbers(report: &Report) -> Value {
+    let sticks = |rule: PcpRule| {
+        let each = PARSE_STICKS.iter().zip(report.sticks(rule));
+        let mut value: serde_json::Map<String, Value> = each
+            .map(|(stick, it)| (stick.0.to_owned(), it.percent().into()))
+            .collect();
+        value.insert("total".to_owned(), report.pcp(rule).percent().into());
+        value
+    };
+    let joints = |share: usize| {
+        let each = PCK_GROUPS.iter().zip(report.groups(share));
+        let mut value: serde_json::Map<String, Value> = each
+            .map(|((name, _), it): (_, Pcp)| ((*name).to_owned(), it.percent().into()))
+            .collect();
+        value.insert("total".to_owned(), report.pck(share).percent().into());
+        value
+    };
+    let pck: serde_json::Map<String, Value> = PCK_SHARES
+        .iter()
+        .enumerate()
+        .map(|(share, it)| (it.to_string(), joints(share).into()))
+        .collect();
+    json!({
+        "missed": report.n_missed(),
+        "pcp": {
+            "mean_of_ends": sticks(PcpRule::MeanOfEnds),
+            "both_ends": sticks(PcpRule::BothEnds),
+        },
+        "pck": pck,
+    })
+}
+
+/// The mean offsets of joints for programs.
+pub fn offset_numbers(offsets: &[Offset]) -> Value {
+    let each = offsets.iter().map(|it| {
+        json!({
+            "joint": it.joint,
+            "found": it.n_found,
+            "of": it.n,
+            "along": it.mean[0],
+            "along_interval": it.interval[0],
+            "across": it.mean[1],
+            "across_interval": it.interval[1],
+        })
+    });
+    each.collect()
+}
+
+/// The mean offsets of joints as a table.
+pub fn offset_table(offsets: &[Offset]) -> String {
+    let mut text =
+        "mean offset, % of the height     found    along the bone          across it".to_owned();
+    for it in offsets {
+        let number = |axis: usize| {
+            let [low, high] = it.interval[axis];
+            format!("{:6.2} ({low:5.2} to {high:5.2})", it.mean[axis])
+        };
+        // Writing to a string cannot fail.
+        let _infallible = write!(
+            text,
+            "\n{:<24} {:>5} of {:>5}  {}  {}",
+            it.joint,
+            it.n_found,
+            it.n,
+            number(0),
+            number(1)
+        );
+    }
+    text
+}

@@ -1,0 +1,205 @@
+//! A network on pictures of people whose joints are known: what it finds in their true boxes.
+
+use datasets::{People, Person, Picture, Sides};
+use experiment::{Joints, Pictures};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use fmp::{Layout, Pose, Search};
+use keypoints::Keypoint;
+use pipeline::ViewSettings;
+use posenetwork::springs::{TurnedSprings, joint_of};
+use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Turn, outline_of};
+use skeleton::PARSE14;
+
+use crate::judged::{go_on, pictures, truth};
+use failure::Console;
+use inputs::pictures::{BOXES_PX, Picture as Shown, Searched};
+
+/// Of the neck and the top of the head in `skeleton::PARSE14`.
+const NECK: usize = 12;
+const HEAD: usize = 13;
+/// A joint lies where its map is highest if the springs put it nearer than this, cells: between cells the maxima of the maps
+/// are more exact.
+const SAME: f64 = 1.5;
+
+/// A network, and the tree of springs that holds its maps together.
+#[derive(Debug)]
+pub struct NetworkReader {
+    /// The network.
+    pub network: PoseNetwork,
+    /// Solve the tree of springs.
+    pub springs: TurnedSprings,
+    /// What left and right mean in the marks.
+    pub sides: Sides,
+    /// Finds the boxes; the box around the marked joints is used without it.
+    pub finder: Option<Search>,
+}
+
+/// What a network found on people.
+#[derive(Debug)]
+pub struct Seen {
+    /// The joints at the maxima of the maps, and those that the springs choose, as [`Pictures::found`].
+    pub pictures: Pictures,
+    /// Of every person, the joints with a mark and a maximum.
+    pub errors: Vec<Vec<JointError>>,
+}
+
+/// How far a joint at the maximum of its map is off, and how far it was expected to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointError {
+    /// Share of the height of the network's window: [`JointMaps::expected_px`].
+    pub expected: f64,
+    /// Share of that height as well.
+    pub error: f64,
+    /// The same distance, lengths of the person's head: from the top of the head to the neck as they are marked.
+    pub in_heads: f64,
+}
+
+impl JointError {
+    /// Whether it is off by more than half a head.
+    pub fn is_far(&self) -> bool {
+        self.in_heads > 0.5
+    }
+}
+
+/// Tries a network on people, each in the box around the marked joints.
+///
+/// * `stop`: whether to give up, asked before every person.
+/// * `console`: is given a message about everybody who was left out, and every person who is done.
+///
+/// # Errors
+///
+/// An image cannot be read, or the network fails on it; it was given up ([`ExitKind::Interrupted`]).
+pub fn judged(
+    reader: &NetworkReader,
+    people: &People,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<Seen, Failure> {
+    let mut errors = Vec::new();
+    let mut memory = LookMemory::default();
+    let mut maps = JointMaps::default();
+    let find = |person: &Person| {
+        go_on(stop)?;
+        let found = reader.find(person, &mut memory, &mut maps)?;
+        if found[0].is_some() {
+            errors.push(errors_of(&maps, &truth(person)));
+        }
+        console.advance(1);
+        Ok(found)
+    };
+    let pictures = pictures("", people, console, |people| {
+        people.iter().map(find).collect()
+    })?;
+    Ok(Seen { pictures, errors })
+}
+
+/// The errors of the joints of a person; none where the head has no length.
+fn errors_of(maps: &JointMaps, truth: &Joints) -> Vec<JointError> {
+    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let head = distance(truth[NECK], truth[HEAD]);
+    let [_, top, _, bottom] = maps.extent();
+    let both = maps.peaks().iter().zip(truth).enumerate();
+    let each = both.filter_map(|(joint, (peak, truth))| {
+        let expected_px = maps.expected_px(joint)?;
+        let off = distance((*peak)?.at, *truth);
+        (off.is_finite() && head > 0.0).then(|| JointError {
+            expected: expected_px / (bottom - top),
+            error: off / (bottom - top),
+            in_heads: off / head,
+        })
+    });
+    each.collect()
+}
+
+impl NetworkReader {
+    fn find(
+        &self,
+        person: &Person,
+        memory: &mut LookMemory,
+        maps: &mut JointMaps,
+    ) -> Result<[Option<Joints>; 2], Failure> {
+        let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
+        let size = picture.size();
+        let Ok(layout) = Layout::new(self.springs.model(), size.width, size.height) else {
+            return Ok([None, None]);
+        };
+        let looker = Looker {
+            network: &self.network,
+            springs: &self.springs,
+            layout: &layout,
+            settings: &MapSettings::default(),
+        };
+        let image = picture.view();
+        let look = match (&self.finder, outline_of(truth(person))) {
+            (Some(finder), _) => {
+                let outlines = found_boxes(finder, person, &picture)?;
+                looker.best_of((image, &outlines), Turn::Up, memory, maps)
+            }
+            (None, Some(outline)) => looker.look((image, outline), memory, maps),
+            (None, None) => Ok(None),
+        };
+        let Some(look) = look.or_fail(ExitKind::Input)? else {
+            return Ok([None, None]);
+        };
+        if self.sides == Sides::Marked {
+            maps.name_sides(&self.network, look.front);
+        }
+        let peaks = at_peaks(maps.peaks());
+        let pose = maps.pose(self.springs.of(look.turn), &layout, &mut Vec::new());
+        let held = pose.map(|pose| self.joints(&layout, &pose, maps.peaks()));
+        Ok([Some(peaks), held])
+    }
+
+    /// The joints of a pose that the springs chose.
+    fn joints(&self, layout: &Layout, pose: &Pose, peaks: &[Option<Keypoint>]) -> Joints {
+        let model = self.springs.model();
+        let near = SAME * layout.levels[usize::from(pose.level)].scale;
+        let mut joints = [[f64::NAN; 2]; PARSE14.joints.len()];
+        for part in 0..pose.parts.len() {
+            let Some(joint) = joint_of(part) else {
+                continue;
+            };
+            let [x, y] = pose.centre(model, layout, part);
+            let peak = peaks.get(joint).copied().flatten().map(|it| it.at);
+            let is_near = |it: &[f64; 2]| (it[0] - x).hypot(it[1] - y) < near;
+            joints[joint] = peak.filter(is_near).unwrap_or([x, y]);
+        }
+        joints
+    }
+}
+
+/// The boxes of the distinct poses that the filters find in a picture, the best first.
+fn found_boxes(
+    finder: &Search,
+    person: &Person,
+    picture: &Picture,
+) -> Result<Vec<[f64; 4]>, Failure> {
+    let picture = Shown {
+        path: person.image.clone(),
+        frame: None,
+        turn: footage::Turn::default(),
+        size: picture.size(),
+        rgb: picture.rgb().to_vec(),
+    };
+    let searched = Searched::new(&picture, Some(BOXES_PX), finder)?;
+    let image = searched.image(&picture)?;
+    // As many, and as far apart, as a view of a deployment offers.
+    let ViewSettings {
+        n_candidates,
+        min_separation,
+        ..
+    } = ViewSettings::default();
+    let found = finder.on(image, searched.layout(), |it| {
+        finder.solver.distinct(it, n_candidates, min_separation)
+    });
+    let outlines = found.iter().map(|it| searched.outline(&finder.model, it));
+    Ok(outlines.collect())
+}
+
+/// The joints at the maxima of their maps; not finite where the keypoints do not tell a joint.
+fn at_peaks(peaks: &[Option<Keypoint>]) -> Joints {
+    core::array::from_fn(|joint| {
+        let peak = peaks.get(joint).copied().flatten();
+        peak.map_or([f64::NAN; 2], |it| it.at)
+    })
+}

@@ -1,0 +1,24 @@
+//! Work from files to files: trainings, evaluations, models tried on pictures, synthetic sequences.
+//!
+//! The algorithms are in crates of their own; here they are given files, threads, a [`Stop`](failure::Stop) and a
+//! [`Console`](failure::Console), and their errors become a [`Failure`](failure::Failure) with an exit status and a hint.
+#![forbid(unsafe_code)]
+
+mod failures;
+mod scenes;
+mod searches;
+
+pub mod consistency;
+pub mod eval;
+pub mod examples;
+pub mod joints;
+pub mod judged;
+pub mod judged_network;
+pub mod orientation;
+pub mod person;
+pub mod posetraining;
+pub mod quality;
+pub mod springs;
+pub mod synth;
+
+pub use failures::{dataset_failure, sequence_failure};

@@ -1,0 +1,177 @@
+//! The network that tells from the picture in which direction a person faces: its samples, and its training.
+//!
+//! Two sources of people whose direction is known: photographs with marked joints, if left and right are marked as
+//! their owner would call them, and scenes that do not exist, searched as the pipeline does.
+
+mod marked;
+mod rendered;
+
+pub(crate) use marked::front as facing;
+pub(crate) use rendered::front_in_view;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use failure::{ExitKind, Failure, Stop};
+use fmp::Model;
+use orientation::{Detector, Network, Score, Settings};
+
+use crate::scenes::Scenes;
+use failure::Console;
+
+/// What to learn from, and what to judge on.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Annotated people: folders or files.
+    pub datasets: Vec<PathBuf>,
+    /// Selections of those who are used, everybody if there is none; each may name its data set: `DATASET=SELECTION`.
+    pub only: Vec<String>,
+    /// Selections of those who are judged on, and not learned from.
+    pub judge: Vec<String>,
+    /// Scenes that do not exist.
+    pub scenes: Scenes,
+    /// Others, to judge on.
+    pub judge_scenes: Scenes,
+    /// Settings of the training.
+    pub settings: Settings,
+}
+
+/// How good the network is on people that it has not seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// The data set, or `scenes`.
+    pub on: String,
+    /// People.
+    pub n: usize,
+    /// Share of them of whom it tells the direction from its opposite, from 0 to 1.
+    pub right: f64,
+    /// 95 % interval of that share (Wilson).
+    pub interval: [f64; 2],
+    /// Mean surprise, nats; 0.693 for saying nothing.
+    pub surprise: f64,
+}
+
+/// What was learned, and from how much.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// Photographs learned from.
+    pub n_photographs: usize,
+    /// Those of them that show somebody from behind.
+    pub n_behind: usize,
+    /// Pictures of scenes learned from.
+    pub n_rendered: usize,
+    /// Every set that was judged on.
+    pub judged: Vec<Judged>,
+}
+
+/// What the threads share.
+struct Work {
+    stop: Stop,
+}
+
+impl Work {
+    /// Stops where that was asked for.
+    fn go_on(&self) -> Result<(), Failure> {
+        if self.stop.is_requested() {
+            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
+        }
+        Ok(())
+    }
+}
+
+/// Trains a network on rayon's current pool, judges it and writes it; it does not depend on the number of threads.
+///
+/// # Errors
+///
+/// A data set, a picture or a scene that cannot be used; nobody to learn from; the file cannot be written; a stop
+/// request ([`ExitKind::Interrupted`]).
+pub fn train(
+    job: &Job,
+    out: &Path,
+    model: &Arc<Model>,
+    (stop, console): (Stop, &dyn Console),
+) -> Result<Report, Failure> {
+    let work = Work { stop };
+    let (mut samples, mut judged) = marked::samples(job, &work)?;
+    let n_photographs = samples.len();
+    let n_behind = samples.iter().filter(|it| it.front[1] < 0.0).count();
+    console.message(&format!(
+        "{n_photographs} photographs of people, {n_behind} from behind"
+    ));
+    samples.extend(rendered::samples(&job.scenes, model, &work)?);
+    let n_rendered = samples.len() - n_photographs;
+    if job.judge_scenes.n > 0 {
+        let scenes = rendered::samples(&job.judge_scenes, model, &work)?;
+        judged.push(("scenes".to_owned(), scenes));
+    }
+    console.message(&format!("{n_rendered} pictures of scenes"));
+    let watch = |pass: orientation::Pass| {
+        console.message(&format!(
+            "pass {} of {}: loss {:.4}",
+            pass.nth, pass.of, pass.loss
+        ));
+        work.go_on().is_ok()
+    };
+    let network = orientation::train(&samples, &job.settings, watch);
+    work.go_on()?;
+    let network = network.ok_or_else(|| {
+        let message = "nobody to learn from: no person whose direction is known";
+        Failure::new(ExitKind::Input, message)
+    })?;
+    write(out, &network)?;
+    let detector = Detector::new(network);
+    let judged = judged.into_iter().map(|(on, samples)| {
+        let score = orientation::score(&detector, &samples);
+        judged_on(on, &score)
+    });
+    Ok(Report {
+        n_photographs,
+        n_behind,
+        n_rendered,
+        judged: judged.collect(),
+    })
+}
+
+fn judged_on(on: String, score: &Score) -> Judged {
+    Judged {
+        on,
+        n: score.n,
+        right: score.share(),
+        interval: wilson(score.n_right, score.n),
+        surprise: score.surprise,
+    }
+}
+
+/// The 95 % interval of a share (Wilson 1927).
+fn wilson(k: usize, n: usize) -> [f64; 2] {
+    const Z: f64 = 1.96;
+    if n == 0 {
+        return [0.0, 1.0];
+    }
+    let [k, n] = [k as f64, n as f64];
+    let share = k / n;
+    let centre = share + Z * Z / (2.0 * n);
+    let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
+    let scale = 1.0 + Z * Z / n;
+    [(centre - half) / scale, (centre + half) / scale]
+}
+
+fn write(out: &Path, network: &Network) -> Result<(), Failure> {
+    files::replace(out, &network.to_bytes()).map_err(|error| {
+        let message = format!("cannot write {}: {error}", out.display());
+        Failure::new(ExitKind::Run, message)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_interval_of_a_share_is_wilsons() {
+        let [low, high] = wilson(8, 10);
+        assert!((low - 0.490).abs() < 1e-3 && (high - 0.943).abs() < 1e-3);
+        assert_eq!(wilson(0, 0), [0.0, 1.0]);
+        assert!(wilson(10, 10)[1] <= 1.0 + 1e-12);
+    }
+}

@@ -1,0 +1,94 @@
+//! People who do not exist, as the search finds them.
+
+use std::sync::Arc;
+
+use datasets::SkeletonTable;
+use failure::Failure;
+use fmp::{Model, Scope};
+use nalgebra::{Point3, Vector3};
+use orientation::{Sample, Tile};
+use viewquality::Sampler;
+
+use super::Work;
+use crate::scenes::{Scenes, Shown, of_pictures};
+use crate::searches::Searches;
+
+/// Largest mean error of the parts of a pose that counts as the person, as a share of the box's height.
+const MAX_ERROR: f64 = 0.12;
+
+/// The samples of all scenes: the best pose of every picture, where it is the person.
+pub(super) fn samples(
+    scenes: &Scenes,
+    model: &Arc<Model>,
+    work: &Work,
+) -> Result<Vec<Sample>, Failure> {
+    let searches = Searches::new(Arc::clone(model));
+    let table = SkeletonTable::published();
+    of_pictures(
+        scenes,
+        |shown| {
+            work.go_on()?;
+            Ok(sample(shown, model, &searches, &table))
+        },
+        |_, _| (),
+    )
+}
+
+fn sample(
+    shown: &Shown<'_>,
+    model: &Model,
+    searches: &Searches,
+    table: &SkeletonTable,
+) -> Option<Sample> {
+    let size = [shown.picture.width(), shown.picture.height()];
+    let step = searches.of_size(size).ok()?;
+    let layout = step.layout();
+    let mut values = vec![0.0; layout.n_responses()];
+    let found = step.run(shown.picture, Scope::whole(layout), &mut values);
+    let pose = found.candidates.first()?;
+    let bounds = pose.bounding_box(model, layout);
+    let centres = pose.centres(model, layout);
+    let truth = table.parts_of(&shown.joints);
+    if mean_error(&centres, &truth)? > MAX_ERROR * (bounds[3] - bounds[1]) {
+        return None;
+    }
+    let head = orientation::head_of(&centres)?;
+    Some(Sample {
+        tile: Tile::around(shown.picture, bounds, head, &mut Sampler::default())?,
+        front: front_in_view(shown)?,
+        is_photograph: false,
+    })
+}
+
+/// The mean distance of parts that are known, under the better of both assignments of the sides.
+fn mean_error(centres: &[[f64; 2]], truth: &[[f64; 2]]) -> Option<f64> {
+    let mean = |of: &dyn Fn(usize) -> usize| {
+        let distances = centres.iter().enumerate().map(|(part, [x, y])| {
+            let there = truth[of(part)];
+            (x - there[0]).hypot(y - there[1])
+        });
+        let known: Vec<f64> = distances.filter(|it| it.is_finite()).collect();
+        (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+    };
+    let sides = [mean(&|part| part)?, mean(&|part| skeleton::MIRROR[part])?];
+    Some(sides[0].min(sides[1]))
+}
+
+/// Where the person faces, by the true joints in space.
+pub(crate) fn front_in_view(shown: &Shown<'_>) -> Option<[f32; 2]> {
+    let joints: Vec<Option<Point3<f64>>> = shown
+        .in_world
+        .iter()
+        .map(|it| {
+            it.iter()
+                .all(|it| it.is_finite())
+                .then(|| Point3::from(*it))
+        })
+        .collect();
+    let known: Vec<&Point3<f64>> = joints.iter().flatten().collect();
+    let sum: Vector3<f64> = known.iter().map(|it| it.coords).sum();
+    let place = Point3::from(sum / known.len().max(1) as f64);
+    let front = multiview::front(&joints)?;
+    let in_view = multiview::front_in_view(shown.camera, &place, &front);
+    Some(in_view.map(|it| it as f32))
+}

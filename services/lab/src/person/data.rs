@@ -1,0 +1,240 @@
+//! What a model is trained on: data sets joined, and images without people.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use datasets::{FaultKind, People, Person, Picture, ReadOptions, Selection, Sides, SkeletonTable};
+use failure::{ExitKind, Failure, OrFail as _};
+use rayon::prelude::*;
+
+use super::per_dataset::deal;
+use super::progress::Progress;
+use crate::failures::dataset_failure;
+use inputs::images;
+
+/// Which people, which images without people, and what is made of them.
+///
+/// Values of `only`, `without`, `sides` and `rotate` may name their data set as it is written in `datasets`:
+/// `DATASET=VALUE`.
+#[derive(Debug, Clone, Default)]
+pub struct Chosen {
+    /// Annotated people: folders or files.
+    pub datasets: Vec<PathBuf>,
+    /// Folders of images without people, all of which are used.
+    pub negatives: Vec<PathBuf>,
+    /// Selections of those who are trained on; everybody if there is none.
+    pub only: Vec<String>,
+    /// Selections of those who are left out.
+    pub without: Vec<String>,
+    /// Whose left and right the labels are: `marked` or `seen`.
+    pub sides: Vec<String>,
+    /// Angles of turned copies, degrees, anticlockwise, separated by commas.
+    pub rotate: Vec<String>,
+    /// Whether mirror images are trained on.
+    pub with_mirror: bool,
+    /// Faults of labels that end the training instead of leaving the person out.
+    pub fatal: Vec<FaultKind>,
+}
+
+/// Reads the parts of a model and where they lie between the joints.
+///
+/// * `file`: where `text` is from, for messages.
+///
+/// # Errors
+///
+/// The text is not a skeleton table.
+pub fn parse_skeleton(file: &Path, text: &str) -> Result<SkeletonTable, Failure> {
+    SkeletonTable::parse(text).map_err(|error| {
+        let message = format!("{}: {}", file.display(), wording::in_one_line(&error));
+        Failure::new(ExitKind::Input, message)
+    })
+}
+
+/// Everything that is trained on.
+#[derive(Debug)]
+pub(super) struct Data {
+    /// Everybody who can be used, in the order of the data sets, with the angles they are turned by,
+    /// 0 first.
+    pub(super) people: Vec<(Person, Vec<f64>)>,
+    /// How many people were left out, for every kind of fault.
+    pub(super) left_out: BTreeMap<&'static str, usize>,
+    /// Whether mirror images are trained on.
+    pub(super) with_mirror: bool,
+    /// Images without people, all of which can be decoded.
+    pub(super) negatives: Vec<PathBuf>,
+    /// Images without people that cannot.
+    pub(super) n_unreadable: usize,
+}
+
+impl Data {
+    /// Reads and judges all of it.
+    ///
+    /// # Errors
+    ///
+    /// A data set or a selection cannot be read, somebody has a fault that was called fatal, or nobody
+    /// or no image without people is left.
+    pub(super) fn read(
+        arguments: &Chosen,
+        table: &SkeletonTable,
+        progress: &Progress,
+    ) -> Result<Self, Failure> {
+        let mut data = Self {
+            people: Vec::new(),
+            left_out: BTreeMap::new(),
+            with_mirror: arguments.with_mirror,
+            negatives: Vec::new(),
+            n_unreadable: 0,
+        };
+        let options = read_options(arguments, table)?;
+        let all = &arguments.datasets;
+        let angles = deal(all, "--rotate", &arguments.rotate, true)?;
+        let sides = deal(all, "--sides", &arguments.sides, true)?;
+        for (((path, options), angles), sides) in all.iter().zip(&options).zip(angles).zip(sides) {
+            let angles = degrees(&angles)?;
+            let sides = sides_of(&sides)?;
+            let People { people, problems } =
+                datasets::read(path, options).map_err(dataset_failure)?;
+            let people = people.into_iter();
+            let people = people.map(|it| sides.of(it, table.joint_mirror()));
+            for problem in problems {
+                *data
+                    .left_out
+                    .entry(problem.fault.kind().name())
+                    .or_default() += 1;
+                progress.left_out(&problem)?;
+            }
+            data.people.extend(people.map(|it| (it, angles.clone())));
+        }
+        if data.people.is_empty() {
+            let n: usize = data.left_out.values().sum();
+            let message = format!("nobody is left to train on: all {n} people were left out");
+            return Err(Failure::new(ExitKind::Input, message));
+        }
+        data.negatives(&arguments.negatives, progress)?;
+        Ok(data)
+    }
+
+    /// Decodes every image once, to know that it can be.
+    fn negatives(&mut self, folders: &[PathBuf], progress: &Progress) -> Result<(), Failure> {
+        let images = in_folders(folders)?;
+        let read: Vec<_> = images
+            .par_iter()
+            .map(|it| Picture::read(it).err())
+            .collect();
+        for (image, error) in images.into_iter().zip(read) {
+            match error {
+                None => self.negatives.push(image),
+                Some(error) => {
+                    self.n_unreadable += 1;
+                    progress.unreadable(&image, &error)?;
+                }
+            }
+        }
+        if self.negatives.is_empty() {
+            let n = self.n_unreadable;
+            let message = format!("none of {n} images without people can be read");
+            return Err(Failure::new(ExitKind::Input, message));
+        }
+        Ok(())
+    }
+}
+
+/// All images of folders, by name.
+pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    if let Some(folder) = folders.iter().find(|it| !it.is_dir()) {
+        let message = format!("{}: no folder of images without people", folder.display());
+        return Err(Failure::new(ExitKind::Input, message));
+    }
+    images::listed(folders)
+}
+
+/// What of every data set is read.
+pub(crate) fn read_options(
+    arguments: &Chosen,
+    table: &SkeletonTable,
+) -> Result<Vec<ReadOptions>, Failure> {
+    let all = &arguments.datasets;
+    if let Some((_, twice)) = (1..)
+        .zip(all)
+        .find(|&(after, path)| all[after..].contains(path))
+    {
+        let message = format!("{}: the data set is named twice", twice.display());
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    let only = deal(all, "--only", &arguments.only, false)?;
+    let without = deal(all, "--without", &arguments.without, false)?;
+    only.iter()
+        .zip(&without)
+        .map(|(only, without)| {
+            Ok(ReadOptions {
+                only: selection("--only", only)?,
+                without: selection("--without", without)?,
+                n_joints: Some(table.n_joints()),
+                fatal: arguments.fatal.clone(),
+                ..ReadOptions::default()
+            })
+        })
+        .collect()
+}
+
+/// One selection at most.
+fn selection(option: &str, values: &[&str]) -> Result<Option<Selection>, Failure> {
+    match values {
+        [] => Ok(None),
+        [one] => Ok(Some(
+            Selection::from_argument(one).or_fail(ExitKind::Usage)?,
+        )),
+        _ => {
+            let message = format!("{option} is given more than once for one data set");
+            Err(Failure::new(ExitKind::Usage, message).with_hint("join them: 1-100,150"))
+        }
+    }
+}
+
+/// Angles of copies, 0 first, each once.
+fn degrees(values: &[&str]) -> Result<Vec<f64>, Failure> {
+    let mut angles = vec![0.0];
+    for text in values.iter().flat_map(|it| it.split(',')) {
+        let angle = text.trim().parse::<f64>().ok();
+        let angle = angle.filter(|it| it.abs() <= 180.0).ok_or_else(|| {
+            let message = format!("--rotate {text}: expected degrees between -180 and 180");
+            Failure::new(ExitKind::Usage, message)
+        })?;
+        if !angles.contains(&angle) {
+            angles.push(angle);
+        }
+    }
+    Ok(angles)
+}
+
+/// Whose left and right the joints of a data set are called by: the last word counts.
+pub(crate) fn sides_of(values: &[&str]) -> Result<Sides, Failure> {
+    let Some(name) = values.last() else {
+        return Ok(Sides::default());
+    };
+    name.parse().map_err(|error| {
+        let message = format!("--sides {name}: {error}");
+        Failure::new(ExitKind::Usage, message)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_are_as_marked_unless_said() {
+        assert_eq!(sides_of(&[]).unwrap(), Sides::Marked);
+        assert_eq!(sides_of(&["marked", "seen"]).unwrap(), Sides::Seen);
+        assert_eq!(sides_of(&["left"]).unwrap_err().kind(), ExitKind::Usage);
+    }
+
+    #[test]
+    fn angles_are_what_was_written_after_no_turn() {
+        let angles = degrees(&["-15,-7.5", "7.5, 0,-15"]).unwrap();
+        assert_eq!(angles, [0.0, -15.0, -7.5, 7.5]);
+        for wrong in ["", "a", "nan", "inf", "181"] {
+            assert_eq!(degrees(&[wrong]).unwrap_err().kind(), ExitKind::Usage);
+        }
+    }
+}

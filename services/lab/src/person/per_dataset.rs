@@ -1,0 +1,103 @@
+//! Options that mean one of several data sets: `--only PARSE=1-100`.
+
+use std::path::{Path, PathBuf};
+
+use failure::{ExitKind, Failure};
+
+/// Which data sets an option's value is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Whose<'a> {
+    /// It names none.
+    All(&'a str),
+    /// The data set, counted from 0, and what is said of it.
+    One(usize, &'a str),
+}
+
+/// Tells whom a value is for: `DATASET=VALUE` with the data set as it was written, else all of them.
+///
+/// Of two data sets one of which begins with the other and `=`, the longer one is meant.
+pub(super) fn whose<'a>(datasets: &[PathBuf], argument: &'a str) -> Whose<'a> {
+    let value_of = |path: &Path| {
+        let rest = argument.strip_prefix(path.to_str()?)?;
+        rest.strip_prefix('=')
+    };
+    let named = datasets.iter().enumerate();
+    let named = named.filter_map(|(it, path)| Some((it, value_of(path)?)));
+    match named.min_by_key(|it| it.1.len()) {
+        Some((it, value)) => Whose::One(it, value),
+        None => Whose::All(argument),
+    }
+}
+
+/// Gives every data set the values that are for it.
+///
+/// * `option`: its name, for messages.
+/// * `for_all`: whether a value may be for several data sets.
+///
+/// # Errors
+///
+/// A value that must name its data set does not.
+pub(crate) fn deal<'a>(
+    datasets: &[PathBuf],
+    option: &str,
+    arguments: &'a [String],
+    for_all: bool,
+) -> Result<Vec<Vec<&'a str>>, Failure> {
+    let mut dealt = vec![Vec::new(); datasets.len()];
+    for argument in arguments {
+        match whose(datasets, argument) {
+            Whose::One(it, value) => dealt[it].push(value),
+            Whose::All(value) if for_all || datasets.len() == 1 => {
+                for values in &mut dealt {
+                    values.push(value);
+                }
+            }
+            Whose::All(_) => {
+                let first = datasets.first().map(|it| it.display().to_string());
+                let first = first.unwrap_or_default();
+                let message =
+                    format!("{option} {argument}: of several data sets, which one is meant?");
+                return Err(Failure::new(ExitKind::Usage, message).with_hint(format!(
+                    "name it as you wrote it, for example {option} {first}={argument}"
+                )));
+            }
+        }
+    }
+    Ok(dealt)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn paths(all: &[&str]) -> Vec<PathBuf> {
+        all.iter().map(PathBuf::from).collect()
+    }
+
+    #[test]
+    fn a_value_is_for_the_data_set_that_it_names() {
+        let datasets = paths(&["a", "a=b", "c/joints.mat"]);
+        assert_eq!(whose(&datasets, "c/joints.mat=1-2"), Whose::One(2, "1-2"));
+        assert_eq!(whose(&datasets, "a=1"), Whose::One(0, "1"));
+        assert_eq!(whose(&datasets, "a=b=1"), Whose::One(1, "1"));
+        assert_eq!(whose(&datasets, "other=1"), Whose::All("other=1"));
+        assert_eq!(whose(&datasets, "ab=1"), Whose::All("ab=1"));
+    }
+
+    #[test]
+    fn one_data_set_need_not_be_named() {
+        let only = ["1-3".to_owned()];
+        let dealt = deal(&paths(&["a"]), "--only", &only, false);
+        assert_eq!(dealt.unwrap(), [["1-3"]]);
+    }
+
+    #[test]
+    fn of_two_data_sets_one_must_be_named_or_both_are_meant() {
+        let two = paths(&["a", "b"]);
+        let values = ["-15,15".to_owned(), "b=7".to_owned()];
+        let dealt = deal(&two, "--rotate", &values, true).unwrap();
+        assert_eq!(dealt, [vec!["-15,15"], vec!["-15,15", "7"]]);
+        let failure = deal(&two, "--only", &values, false).unwrap_err();
+        assert_eq!(failure.kind(), ExitKind::Usage);
+    }
+}

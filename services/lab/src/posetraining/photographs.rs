@@ -1,0 +1,308 @@
+//! People on photographs, by their marked joints and a teacher.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use datasets::{Person as Annotated, Picture, ReadOptions, Sides, SkeletonTable};
+use failure::{ExitKind, Failure, OrFail as _};
+use kernels::Rgb8View;
+use networktraining::{MIRROR, Marks, N_JOINTS, Person, SIDE, Source, Target, exchange_sides};
+use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace};
+
+use super::crop::Crop;
+use super::{People, Work};
+use crate::failures::dataset_failure;
+use crate::orientation::facing;
+use crate::person::{deal, read_options, sides_of};
+
+/// Pairs that tell who is seen from behind: hips and shoulders, the right one first.
+const PAIRS: [[usize; 2]; 2] = [[2, 3], [8, 9]];
+const NECK: usize = 12;
+/// Shortest trunk, pixels of the square picture.
+const MIN_TRUNK: f32 = 8.0;
+/// Most pixels of the network's window for one of the picture: smaller people show too little.
+const MOST_ENLARGED: f64 = 4.0;
+/// Share of the window up to which two findings of the teacher are one.
+const SAME: f32 = 0.05;
+/// Joints of clicked people that are marked as invisible lie anywhere.
+const ANYWHERE_PX: f64 = 1e5;
+
+type Point = [f32; 2];
+
+/// Everybody, with the place in the data set.
+pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Person)>, Failure> {
+    let chosen = &people.photographs;
+    let table = SkeletonTable::published();
+    let options = read_options(chosen, &table)?;
+    let sides = deal(&chosen.datasets, "--sides", &chosen.sides, true)?;
+    let mut all = Vec::new();
+    for ((path, options), sides) in chosen.datasets.iter().zip(options).zip(sides) {
+        let sides = sides_of(&sides)?;
+        let options = ReadOptions {
+            outside_px: ANYWHERE_PX,
+            ..options
+        };
+        let read = datasets::read(path, &options).map_err(dataset_failure)?;
+        for problem in &read.problems {
+            let cause = &problem.fault;
+            work.console
+                .message(&format!("left out: {problem}: {cause}"));
+        }
+        let n = read.people.len();
+        work.console
+            .begin(&crate::eval::pictures::name(path), "people");
+        work.console.set(0, n);
+        let found = of_all(&read.people, (sides, &people.teachers), work);
+        work.console.finish();
+        let before = all.len();
+        all.extend(found?);
+        let used = all.len() - before;
+        work.console.message(&format!(
+            "{}: {used} of {n} people can be used",
+            crate::eval::pictures::name(path)
+        ));
+    }
+    Ok(all)
+}
+
+/// The people who can be used, with their places.
+///
+/// Threads of our own: one of rayon that waited for a network, whose threads are rayon's as well, would begin with somebody else
+/// meanwhile, and so on, until its stack is full.
+fn of_all(
+    people: &[Annotated],
+    (sides, teachers): (Sides, &[PoseNetwork]),
+    work: &Work<'_>,
+) -> Result<Vec<(usize, Person)>, Failure> {
+    let n_threads = match teachers.len() {
+        0 => rayon::current_num_threads(),
+        n => n,
+    };
+    let next = AtomicUsize::new(0);
+    let of_thread = |teacher: Option<&PoseNetwork>| {
+        let mut found = Vec::new();
+        loop {
+            let nth = next.fetch_add(1, Ordering::Relaxed);
+            let Some(person) = people.get(nth) else {
+                return Ok::<_, Failure>(found);
+            };
+            work.go_on()?;
+            found.extend(of_person(person, sides, teacher)?.map(|it| (nth, it)));
+            work.console.advance(1);
+        }
+    };
+    let of_thread = &of_thread;
+    let found: Result<Vec<_>, Failure> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..n_threads)
+            .map(|it| scope.spawn(move || of_thread(teachers.get(it))))
+            .collect();
+        let died = || {
+            Err(Failure::new(
+                ExitKind::Run,
+                "a thread that prepared people died",
+            ))
+        };
+        let join = |it: std::thread::ScopedJoinHandle<'_, _>| it.join().unwrap_or_else(|_| died());
+        threads.into_iter().map(join).collect()
+    });
+    let mut found: Vec<(usize, Person)> = found?.into_iter().flatten().collect();
+    found.sort_by_key(|it| it.0);
+    Ok(found)
+}
+
+/// A person; nothing if the trunk is not known, or the person is too small.
+fn of_person(
+    person: &Annotated,
+    sides: Sides,
+    teacher: Option<&PoseNetwork>,
+) -> Result<Option<Person>, Failure> {
+    let joints = visible(person);
+    let lean = lean(&joints);
+    if !lean.is_finite() {
+        return Ok(None);
+    }
+    let (Some(upright), Some(crop)) = (Crop::around(&joints, -lean), Crop::around(&joints, 0.0))
+    else {
+        return Ok(None);
+    };
+    let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
+    let marked = joints.map(|at| upright.inside(at).map(|it| it as f32));
+    let trunk = length(trunk(&marked));
+    if !trunk.is_finite() || trunk < MIN_TRUNK || upright.enlarges() > MOST_ENLARGED {
+        return Ok(None);
+    }
+    let taught = match teacher {
+        Some(teacher) => taught(teacher, &upright.rgb(picture.view()), &marked)?,
+        None => [([f32::NAN; 2], 0.0); N_JOINTS],
+    };
+    let mut marks = Marks {
+        marked,
+        taught,
+        trunk,
+    };
+    marks.mend_sides();
+    let Some(across) = across(&marks) else {
+        return Ok(None);
+    };
+    let front = match sides {
+        Sides::Marked => front(&marks, across, lean as f32),
+        Sides::Seen => [0.0; 3],
+    };
+    if across < 0.0 {
+        marks.exchange();
+    }
+    let back = |at: Point| {
+        let at = crop.inside(upright.outside(at.map(f64::from)));
+        at.map(|it| it as f32)
+    };
+    let targets = marks.targets().map(|it| Target {
+        at: back(it.at),
+        or: it.or.map(back),
+        ..it
+    });
+    Ok(Some(Person {
+        source: Source::Photograph,
+        name: format!("{}, {}", person.image.display(), person.row),
+        rgb: crop.rgb(picture.view()),
+        targets,
+        front,
+    }))
+}
+
+/// The joints that are marked as visible; the others are not finite.
+fn visible(person: &Annotated) -> [[f64; 2]; N_JOINTS] {
+    core::array::from_fn(|joint| {
+        let is_visible = person.visible.get(joint).is_some_and(|it| *it);
+        let at = person.joints.get(joint).filter(|_| is_visible);
+        at.copied().unwrap_or([f64::NAN; 2])
+    })
+}
+
+/// The direction in which somebody faces, by marks in the upright picture; 0 where the hips and shoulders say something else than how
+/// wide they are.
+fn front(marks: &Marks, across: f32, lean: f32) -> [f32; 3] {
+    let [aside, towards] = facing(&marks.marked.map(|at| at.map(f64::from)));
+    if (towards > 0.0) == (across > 0.0) {
+        in_picture([aside, towards], lean)
+    } else {
+        [0.0; 3]
+    }
+}
+
+/// A direction by an upright trunk, in the picture where the trunk leans.
+fn in_picture([aside, towards]: [f32; 2], lean: f32) -> [f32; 3] {
+    let aside = if aside.is_finite() { aside } else { 0.0 };
+    let towards = if towards.is_finite() { towards } else { 0.0 };
+    [aside * lean.cos(), aside * lean.sin(), towards]
+}
+
+/// The angle between the trunk and upright, clockwise, radians.
+fn lean(joints: &[[f64; 2]; N_JOINTS]) -> f64 {
+    let [right, left] = PAIRS[0].map(|it| joints[it]);
+    let shoulders = PAIRS[1].map(|it| joints[it]);
+    let neck = if joints[NECK][0].is_finite() {
+        joints[NECK]
+    } else {
+        [0, 1].map(|axis| f64::midpoint(shoulders[0][axis], shoulders[1][axis]))
+    };
+    let [x, y] = [0, 1].map(|axis| neck[axis] - f64::midpoint(right[axis], left[axis]));
+    x.atan2(-y)
+}
+
+fn trunk(joints: &[Point; N_JOINTS]) -> Point {
+    let [right, left] = PAIRS[0].map(|it| joints[it]);
+    let shoulders = PAIRS[1].map(|it| joints[it]);
+    let neck = if joints[NECK][0].is_finite() {
+        joints[NECK]
+    } else {
+        [0, 1].map(|axis| f32::midpoint(shoulders[0][axis], shoulders[1][axis]))
+    };
+    [0, 1].map(|axis| neck[axis] - f32::midpoint(right[axis], left[axis]))
+}
+
+fn length([x, y]: Point) -> f32 {
+    x.hypot(y)
+}
+
+/// How far the left hip and shoulder lie to the right of the right ones, on average, in the upright picture: below 0 for who is
+/// seen from behind. The teacher's where there is no mark; nothing where neither is known.
+fn across(marks: &Marks) -> Option<f32> {
+    let widths = PAIRS.iter().filter_map(|[right, left]| {
+        let is_marked = [right, left]
+            .iter()
+            .all(|it| marks.marked[**it][0].is_finite());
+        let x = |joint: usize| {
+            if is_marked {
+                marks.marked[joint][0]
+            } else {
+                marks.taught[joint].0[0]
+            }
+        };
+        let width = x(*left) - x(*right);
+        width.is_finite().then_some(width)
+    });
+    let widths: Vec<f32> = widths.collect();
+    (!widths.is_empty()).then(|| widths.iter().sum::<f32>() / widths.len() as f32)
+}
+
+/// What the teacher finds in the upright picture and in its mirror image, put together.
+fn taught(
+    teacher: &PoseNetwork,
+    rgb: &[u8],
+    marked: &[Point; N_JOINTS],
+) -> Result<[(Point, f32); N_JOINTS], Failure> {
+    let last = (SIDE - 1) as f64;
+    let known = marked
+        .iter()
+        .filter(|it| it[0].is_finite())
+        .map(|at| at.map(f64::from));
+    let Some([left, top, right, bottom]) = posenetwork::outline_of(known) else {
+        return Ok([([f32::NAN; 2], 0.0); N_JOINTS]);
+    };
+    let plain = find(teacher, rgb, [left, top, right, bottom])?;
+    let rows = rgb.chunks_exact(3 * SIDE);
+    let mirrored: Vec<u8> = rows
+        .flat_map(|row| row.chunks_exact(3).rev().flatten().copied())
+        .collect();
+    let other = find(teacher, &mirrored, [last - right, top, last - left, bottom])?;
+    let other = exchange_sides(&other).map(|([x, y], score)| ([last as f32 - x, y], score));
+    let near = SAME * SIDE as f32;
+    Ok(core::array::from_fn(|joint| {
+        let [(a, of_a), (b, of_b)] = [plain[joint], other[joint]];
+        let off = length([a[0] - b[0], a[1] - b[1]]);
+        if off < near {
+            let at = [0, 1].map(|axis| f32::midpoint(a[axis], b[axis]));
+            (at, f32::midpoint(of_a, of_b))
+        } else if of_a >= of_b {
+            (a, 0.5 * of_a)
+        } else {
+            (b, 0.5 * of_b)
+        }
+    }))
+}
+
+fn find(
+    teacher: &PoseNetwork,
+    rgb: &[u8],
+    outline: [f64; 4],
+) -> Result<[(Point, f32); N_JOINTS], Failure> {
+    let unknown = ([f32::NAN; 2], 0.0);
+    let picture = Rgb8View::new(SIDE, SIDE, rgb).or_fail(ExitKind::Run)?;
+    let mut workspace = Workspace::default();
+    let sight = teacher.look(picture, outline, &mut workspace);
+    let Some(sight) = sight.or_fail(ExitKind::Input)? else {
+        return Ok([unknown; N_JOINTS]);
+    };
+    let mut maps = JointMaps::default();
+    maps.read(&sight, &MapSettings::default())
+        .or_fail(ExitKind::Input)?;
+    Ok(core::array::from_fn(|joint| {
+        let peak = maps.peaks().get(joint).copied().flatten();
+        peak.map_or(unknown, |it| (it.at.map(|it| it as f32), it.score as f32))
+    }))
+}
+
+/// Pairs are those of the mirror image.
+const _: () = {
+    assert!(MIRROR[PAIRS[0][0]] == PAIRS[0][1], "hips");
+    assert!(MIRROR[PAIRS[1][0]] == PAIRS[1][1], "shoulders");
+};

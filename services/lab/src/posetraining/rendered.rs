@@ -1,0 +1,68 @@
+//! People who do not exist.
+
+use failure::Failure;
+use networktraining::{N_JOINTS, Person, Source, Target, exchange_sides};
+
+use super::Work;
+use super::crop::Crop;
+use crate::orientation::front_in_view;
+use crate::scenes::{Scenes, Shown, of_pictures};
+
+/// Fewest joints that are seen.
+const FEWEST: usize = 10;
+
+/// The people of all scenes, with the numbers of the subjects.
+pub(super) fn people(scenes: &Scenes, work: &Work<'_>) -> Result<Vec<(u64, Person)>, Failure> {
+    let console = work.console;
+    if scenes.n == 0 {
+        return Ok(Vec::new());
+    }
+    console.begin("scenes", "pictures");
+    let found = of_pictures(
+        scenes,
+        |shown| {
+            work.go_on()?;
+            Ok(person(shown))
+        },
+        |n, _| console.advance(n),
+    );
+    console.finish();
+    let found = found?;
+    console.message(&format!("scenes: {} pictures of people", found.len()));
+    Ok(found)
+}
+
+fn person(shown: &Shown<'_>) -> Option<(u64, Person)> {
+    let subject = shown.group.rsplit(' ').next()?.parse().ok()?;
+    let joints: [[f64; 2]; N_JOINTS] = shown.joints.as_slice().try_into().ok()?;
+    let n_seen = joints.iter().filter(|it| it[0].is_finite()).count();
+    if n_seen < FEWEST {
+        return None;
+    }
+    let crop = Crop::around(&joints, 0.0)?;
+    let [right, towards] = front_in_view(shown)?;
+    let targets = joints.map(|at| {
+        if !at[0].is_finite() {
+            return Target::UNKNOWN;
+        }
+        Target {
+            at: crop.inside(at).map(|it| it as f32),
+            or: None,
+            weight: 1.0,
+            is_marked: true,
+        }
+    });
+    let is_from_behind = towards < 0.0;
+    let person = Person {
+        source: Source::Scene,
+        name: shown.source.clone(),
+        rgb: crop.rgb(shown.picture),
+        targets: if is_from_behind {
+            exchange_sides(&targets)
+        } else {
+            targets
+        },
+        front: [right, 0.0, towards],
+    };
+    Some((subject, person))
+}

@@ -1,0 +1,180 @@
+//! The training itself: from prepared people to an ONNX file with its card.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use networktraining::{About, Backend, Parameter, Pass, Score, Settings, Trainer};
+use report::curves::{self, Line, Panel};
+
+use super::Prepared;
+use failure::Console;
+use inputs::cards::METADATA_KEY;
+
+/// Steps between two checkpoints, and two lines of progress.
+const STEPS: usize = 100;
+/// Passes of so many steps between two looks at the people who are kept apart.
+const JUDGED: usize = 10;
+
+/// A network that was trained before.
+#[derive(Debug, Clone)]
+pub struct Earlier {
+    /// Its file, for errors.
+    pub file: PathBuf,
+    /// The bytes of the file.
+    pub bytes: Vec<u8>,
+}
+
+/// What is written, and how.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// The ONNX file.
+    pub out: PathBuf,
+    /// A network that was trained before, to go on from.
+    pub from: Option<Earlier>,
+    /// Whether to go on from the checkpoint of an interrupted training.
+    pub resume: bool,
+    /// What calculates.
+    pub backend: Backend,
+}
+
+/// The parameters of a network that was trained before.
+fn begun(from: &Earlier, settings: &Settings) -> Result<Vec<Parameter>, Failure> {
+    networktraining::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
+        let hint = "--from takes a network of `train network` that has the `shape` of the settings";
+        failure::in_file(&from.file, &error).with_hint(hint)
+    })
+}
+
+/// A file beside the one that is written.
+fn beside(out: &Path, ending: &str) -> PathBuf {
+    let mut name = out.as_os_str().to_owned();
+    name.push(ending);
+    PathBuf::from(name)
+}
+
+/// What was learned, and how good the network is on people who are kept apart.
+fn drawn(passes: &[Pass]) -> String {
+    let cost = |name, value: &dyn Fn(&Pass) -> f32| Line {
+        name,
+        values: passes.iter().map(|it| f64::from(value(it))).collect(),
+    };
+    let judged: Vec<Score> = passes.iter().filter_map(|it| it.score).collect();
+    let score = |name, value: &dyn Fn(&Score) -> f32| Line {
+        name,
+        values: judged.iter().map(|it| f64::from(value(it))).collect(),
+    };
+    let panel = |what, lines| Panel { what, lines };
+    let panels = [
+        panel("cost of the maps", vec![cost("learnt", &|it| it.cost.maps)]),
+        panel(
+            "cost of direction and error",
+            vec![
+                cost("direction", &|it| it.cost.front),
+                cost("error", &|it| it.cost.error),
+            ],
+        ),
+        panel(
+            "share, people kept apart",
+            vec![
+                score("limbs, both ends", &|it| it.both_ends),
+                score("direction", &|it| it.front),
+                score("area of errors", &|it| it.area),
+            ],
+        ),
+    ];
+    curves::svg(&panels, None)
+}
+
+/// Trains a network on prepared people, and writes it; a checkpoint, and curves (`.svg`), follow every hundred steps.
+///
+/// # Errors
+///
+/// Nobody to learn from, or nobody kept apart; the checkpoint is of another training; a file cannot be written; it was stopped
+/// ([`ExitKind::Interrupted`]).
+pub fn train(
+    (job, settings): (&Job, &Settings),
+    people: &Prepared,
+    (stop, console): (&Stop, &dyn Console),
+) -> Result<Vec<Pass>, Failure> {
+    let file = beside(&job.out, ".checkpoint");
+    let write = |path: &Path, bytes: &[u8]| {
+        files::replace(path, bytes).map_err(|error| failure::in_file(path, &error))
+    };
+    let kept = match files::read(&file, files::RESULTS) {
+        Ok(bytes) if job.resume => Some(bytes),
+        Ok(_) => {
+            let message = format!("{} is of an interrupted training", file.display());
+            let hint = "go on from it with --resume, or delete it";
+            return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
+        }
+        Err(_) => None,
+    };
+    let how = (settings, job.backend);
+    let learnt = [people.learnt.as_slice(), people.kept.as_slice()];
+    let from = job.from.as_ref().map(|it| begun(it, settings));
+    let mut trainer =
+        Trainer::new(how, learnt, from.transpose()?, kept.as_deref()).or_fail(ExitKind::Input)?;
+    let (began, from) = (Instant::now(), trainer.step());
+    while trainer.step() < trainer.n_steps() {
+        let to_end_of = |end: usize| end.saturating_sub(trainer.step());
+        let left = to_end_of(settings.steps);
+        let steps = if left > 0 {
+            left.min(STEPS)
+        } else {
+            to_end_of(trainer.n_steps()).min(STEPS)
+        };
+        let nth = trainer.passes().len() + 1;
+        let is_last = steps == left || trainer.step() + steps == trainer.n_steps();
+        if !trainer.pass(steps, nth % JUDGED == 0 || is_last, &mut |_| {
+            !stop.is_requested()
+        }) {
+            let message = format!("stopped after step {}", trainer.step());
+            let hint = "go on with --resume";
+            return Err(Failure::new(ExitKind::Interrupted, message).with_hint(hint));
+        }
+        write(&file, &trainer.checkpoint().or_fail(ExitKind::Run)?)?;
+        write(
+            &beside(&job.out, ".svg"),
+            drawn(trainer.passes()).as_bytes(),
+        )?;
+        if let Some(pass) = trainer.passes().last() {
+            let done = (trainer.step() - from) as f64;
+            let left = (trainer.n_steps() - trainer.step()) as f64;
+            let minutes = began.elapsed().as_secs_f64() / 60.0 * left / done;
+            console.message(&line(pass, trainer.n_steps(), minutes));
+        }
+    }
+    let passes = trainer.passes().to_vec();
+    let score = passes.iter().rev().find_map(|it| it.score);
+    let about = About {
+        people: learnt.map(<[_]>::len),
+        samples: settings.steps * settings.batch,
+        goes_on: job.from.is_some(),
+        score: score.unwrap_or_default(),
+    };
+    let card = networktraining::card(&settings.shape, &about);
+    write(&job.out, &trainer.onnx(&[(METADATA_KEY.to_owned(), card)]))?;
+    std::fs::remove_file(&file).map_err(|error| failure::in_file(&file, &error))?;
+    Ok(passes)
+}
+
+/// What a pass came to, for people.
+fn line(pass: &Pass, of: usize, minutes: f64) -> String {
+    let cost = pass.cost;
+    let learnt = format!(
+        "step {} of {of}: maps {:.4}, direction {:.3}, error {:.3}, {minutes:.0} minutes left",
+        pass.step, cost.maps, cost.front, cost.error
+    );
+    let Some(score) = pass.score else {
+        return learnt;
+    };
+    format!(
+        "{learnt}; {} people kept apart: limbs {:.1} / {:.1} %, direction {:.1} %, errors told by {:.3}",
+        score.people,
+        100.0 * score.mean_of_ends,
+        100.0 * score.both_ends,
+        100.0 * score.front,
+        score.area
+    )
+}

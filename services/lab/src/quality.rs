@@ -1,0 +1,11 @@
+//! The network that predicts the errors of single views: its samples, and its training.
+
+#[cfg(feature = "train-quality")]
+pub mod network;
+pub mod samples;
+
+mod observer;
+mod replace;
+mod work;
+
+pub use crate::scenes::Scenes;

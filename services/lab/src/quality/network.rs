@@ -1,0 +1,243 @@
+//! The training of a network, in a build that includes it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use qualitytraining::judge::Judgement;
+use qualitytraining::parameters::Parameter;
+use qualitytraining::passes::Pass;
+use qualitytraining::sample::Sample;
+use qualitytraining::settings::Settings;
+use qualitytraining::store::Samples;
+use qualitytraining::trainer::{TrainError, Trainer};
+use qualitytraining::vgg;
+use report::curves::{self, Line, Panel};
+use serde_json::json;
+
+use super::replace::replace;
+use failure::Console;
+use failure::in_file;
+
+/// What a network is trained on, and where to.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Files of samples to learn from and to validate on.
+    pub samples: Vec<PathBuf>,
+    /// Files of samples to judge the network on; every file by itself.
+    pub judge: Vec<PathBuf>,
+    /// The ONNX file to write; the checkpoint and the curves are beside it.
+    pub out: PathBuf,
+    /// Weights of torchvision's VGG-16 to begin with.
+    pub weights: Option<PathBuf>,
+    /// What the file says that it is; its name if not given.
+    pub identity: Option<String>,
+    /// Whether to go on from the checkpoint of an interrupted training, if there is one.
+    pub resume: bool,
+}
+
+/// The losses above, and the area under the ROC below.
+fn drawn(passes: &[Pass], best: Option<usize>) -> String {
+    let line = |name, value: &dyn Fn(&Pass) -> f64| Line {
+        name,
+        values: passes.iter().map(value).collect(),
+    };
+    let losses = Panel {
+        what: "loss",
+        lines: vec![
+            line("learnt", &|it| f64::from(it.learnt)),
+            line("validated", &|it| f64::from(it.validated)),
+        ],
+    };
+    let area = Panel {
+        what: "area",
+        lines: vec![line("area under the ROC, validated", &|it| it.area)],
+    };
+    curves::svg(&[losses, area], best)
+}
+
+/// Trains a network and writes it.
+///
+/// # Errors
+///
+/// Samples, weights or a checkpoint that cannot be used; a file that cannot be written; a stop request
+/// ([`ExitKind::Interrupted`]).
+pub fn train(
+    job: &Job,
+    settings: &Settings,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<(), Failure> {
+    let out = &job.out;
+    let beside = |ending: &str| {
+        let mut path = out.clone().into_os_string();
+        path.push(ending);
+        PathBuf::from(path)
+    };
+    let kept = beside(".checkpoint");
+    let samples = read_all(&job.samples)?;
+    let checkpoint = checkpoint(&kept, job.resume)?;
+    let weights = match &job.weights {
+        Some(file) => weights(file)?,
+        None => Vec::new(),
+    };
+    let trainer = Trainer::new(settings, &samples, &weights, checkpoint.as_deref());
+    let mut trainer = trainer.map_err(|error| refused(error, &kept))?;
+    let say = Say {
+        console,
+        epochs: settings.epochs as usize,
+        begin: Instant::now(),
+        before: trainer.passes().len(),
+    };
+    say.begin(&trainer)?;
+    while !trainer.is_done() {
+        if !trainer.pass(&mut |_, _| !stop.is_requested()) {
+            let failure = Failure::new(ExitKind::Interrupted, "stopped");
+            return Err(failure.with_hint(format!("--resume goes on from {}", kept.display())));
+        }
+        replace(&kept, &trainer.checkpoint().or_fail(ExitKind::Run)?)?;
+        let drawn = drawn(trainer.passes(), trainer.best());
+        replace(&beside(".svg"), drawn.as_bytes())?;
+        say.pass(&trainer)?;
+    }
+    let identity = job.identity.clone().unwrap_or_else(|| {
+        out.file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    });
+    replace(out, &trainer.onnx(&identity))?;
+    say.judged("validation", &trainer.judge(trainer.validated()))?;
+    for file in &job.judge {
+        let samples = read(file)?;
+        let all: Vec<&Sample> = samples.all.iter().collect();
+        if samples.tile != settings.network.tile().unwrap_or(samples.tile) {
+            let message = format!("{}: its tiles are of another network", file.display());
+            return Err(Failure::new(ExitKind::Input, message));
+        }
+        say.judged(&file.display().to_string(), &trainer.judge(&all))?;
+    }
+    fs::remove_file(&kept).map_err(|error| in_file(&kept, &error))
+}
+
+/// Weights of torchvision's VGG-16.
+fn weights(file: &Path) -> Result<Vec<Parameter>, Failure> {
+    let bytes = files::read(file, files::RESULTS).map_err(|error| in_file(file, &error))?;
+    vgg::parse(&bytes).map_err(|error| in_file(file, &error))
+}
+
+fn read(file: &Path) -> Result<Samples, Failure> {
+    let bytes = files::read(file, files::RESULTS).map_err(|error| in_file(file, &error))?;
+    Samples::from_bytes(&bytes).map_err(|error| in_file(file, &error))
+}
+
+/// Several files as one.
+fn read_all(files: &[PathBuf]) -> Result<Samples, Failure> {
+    let mut all = Samples::default();
+    for file in files {
+        let samples = read(file)?;
+        if !all.all.is_empty() && samples.tile != all.tile {
+            let message = format!("{}: its tiles are of another size", file.display());
+            return Err(Failure::new(ExitKind::Input, message));
+        }
+        all.tile = samples.tile;
+        all.all.extend(samples.all);
+    }
+    Ok(all)
+}
+
+fn checkpoint(path: &Path, resume: bool) -> Result<Option<Vec<u8>>, Failure> {
+    match files::read(path, files::RESULTS) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(in_file(path, &error)),
+        Ok(bytes) if resume => Ok(Some(bytes)),
+        Ok(_) => {
+            let message = format!("{} is there: a training was interrupted", path.display());
+            Err(Failure::new(ExitKind::Usage, message)
+                .with_hint("--resume goes on from it; to begin anew, delete it"))
+        }
+    }
+}
+
+fn refused(error: TrainError, checkpoint: &Path) -> Failure {
+    let is_old = matches!(error, TrainError::Checkpoint(_) | TrainError::Other);
+    let failure = Failure::new(ExitKind::Input, error);
+    if is_old {
+        let path = checkpoint.display();
+        return failure.with_hint(format!(
+            "--resume needs the samples and settings that it was made with; to begin anew, delete {path}"
+        ));
+    }
+    failure
+}
+
+/// Reports how far the training is.
+struct Say<'a> {
+    console: &'a dyn Console,
+    epochs: usize,
+    begin: Instant,
+    /// Passes that were done before.
+    before: usize,
+}
+
+impl Say<'_> {
+    fn begin(&self, trainer: &Trainer<'_>) -> Result<(), Failure> {
+        let [learnt, validated] = trainer.n_samples();
+        let console = self.console;
+        console.event(&json!({
+            "event": "data", "learnt": learnt, "validated": validated, "resumed": self.before,
+        }))?;
+        console.message(&format!(
+            "{learnt} samples to learn from, {validated} to validate on"
+        ));
+        if self.before > 0 {
+            console.message(&format!("going on after pass {}", self.before));
+        }
+        Ok(())
+    }
+
+    fn pass(&self, trainer: &Trainer<'_>) -> Result<(), Failure> {
+        let Some(pass) = trainer.passes().last() else {
+            return Ok(());
+        };
+        let n = trainer.passes().len();
+        let each = self.begin.elapsed().as_secs_f64() / (n - self.before).max(1) as f64;
+        let left = each * (self.epochs - n) as f64;
+        self.console.event(&json!({
+            "event": "pass", "pass": n, "passes": self.epochs, "learnt": pass.learnt,
+            "validated": pass.validated, "area": pass.area, "seconds_left": left,
+        }))?;
+        let best = if trainer.best() == Some(n - 1) {
+            ", the best"
+        } else {
+            ""
+        };
+        self.console.message(&format!(
+            "pass {n} of {}: loss {:.4}, validated {:.4}, area {:.3}{best}; {left:.0} s left at most",
+            self.epochs, pass.learnt, pass.validated, pass.area
+        ));
+        Ok(())
+    }
+
+    fn judged(&self, name: &str, judgement: &Judgement) -> Result<(), Failure> {
+        self.console.event(&json!({
+            "event": "judged", "samples": name, "judgement": judgement,
+            "mean_area": judgement.mean_area(),
+            "mean_rank_correlation": judgement.mean_rank_correlation(),
+        }))?;
+        let areas = judgement
+            .area
+            .iter()
+            .map(|it| it.map_or("-".to_owned(), |it| format!("{:.0}", 100.0 * it)));
+        let areas: Vec<String> = areas.collect();
+        self.console.result(&format!(
+            "{name}: {} samples, area under the ROC {:.3}, rank correlation {:.3}\n  area by part, %: {}",
+            judgement.n,
+            judgement.mean_area(),
+            judgement.mean_rank_correlation(),
+            areas.join(" ")
+        ))
+    }
+}

@@ -1,0 +1,137 @@
+//! The samples of a quality network: what the single-view model makes of pictures with known joints.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use datasets::{Picture, ReadOptions, Selection};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use fmp::Model;
+use qualitytraining::sample::Sample;
+use qualitytraining::store::Samples;
+use rayon::prelude::*;
+use viewquality::TileShape;
+
+use super::observer::Observer;
+use super::replace::replace;
+use super::work::Work;
+use crate::failures::dataset_failure;
+use crate::person::deal;
+use crate::scenes::{Scenes, of_pictures};
+use failure::Console;
+
+/// Which pictures.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Annotated people: folders or files.
+    pub datasets: Vec<PathBuf>,
+    /// Selections of those who are used, everybody if there is none; each may name its data set: `DATASET=SELECTION`.
+    pub only: Vec<String>,
+    /// Selections of those who are left out.
+    pub without: Vec<String>,
+    /// Scenes that do not exist.
+    pub scenes: Scenes,
+    /// The tiles of the network.
+    pub tile: TileShape,
+}
+
+/// What was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Made {
+    /// Samples.
+    pub n: usize,
+    /// Pictures of which there is no sample.
+    pub n_lost: usize,
+}
+
+/// Makes samples on rayon's current pool, and writes them; they do not depend on the number of threads.
+///
+/// # Errors
+///
+/// A data set, a picture or a scene that cannot be used; not one sample; the file cannot be written; a stop request
+/// ([`ExitKind::Interrupted`]).
+pub fn make(
+    job: &Job,
+    out: &Path,
+    model: Arc<Model>,
+    (stop, console): (Stop, &dyn Console),
+) -> Result<Made, Failure> {
+    let work = Work::new(Observer::new(model, job.tile), stop, console);
+    let mut all = scenes(job, &work)?;
+    all.extend(people(job, &work)?);
+    let n = all.len();
+    if n == 0 {
+        return Err(Failure::new(
+            ExitKind::Input,
+            "not one picture makes a sample",
+        ));
+    }
+    let samples = Samples {
+        tile: [job.tile.height, job.tile.width],
+        all,
+    };
+    let bytes = samples.to_bytes().or_fail(ExitKind::Run)?;
+    replace(out, &bytes)?;
+    let n_lost = work.n_lost();
+    Ok(Made { n, n_lost })
+}
+
+/// The samples of scenes.
+fn scenes(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
+    of_pictures(
+        &job.scenes,
+        |shown| {
+            work.go_on()?;
+            let named = (shown.group.to_owned(), shown.source.clone());
+            let found = work.observer.observe(shown.picture, &shown.joints, named);
+            Ok(found.ok())
+        },
+        |n, n_lost| work.done(n, n_lost),
+    )
+}
+
+/// The samples of data sets.
+fn people(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
+    let all = &job.datasets;
+    let only = deal(all, "--only", &job.only, false)?;
+    let without = deal(all, "--without", &job.without, false)?;
+    let mut samples = Vec::new();
+    for ((path, only), without) in all.iter().zip(only).zip(without) {
+        let options = ReadOptions {
+            only: selection(&only)?,
+            without: selection(&without)?,
+            n_joints: Some(skeleton::PARSE14.joints.len()),
+            ..ReadOptions::default()
+        };
+        let read = datasets::read(path, &options).map_err(dataset_failure)?;
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let found: Result<Vec<_>, Failure> = read
+            .people
+            .par_iter()
+            .map(|person| {
+                work.go_on()?;
+                let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
+                let file = person
+                    .image
+                    .file_name()
+                    .unwrap_or_default()
+                    .to_string_lossy();
+                let source = format!("{name} {file}");
+                let named = (source.clone(), source);
+                let found = work.observer.observe(picture.view(), &person.joints, named);
+                work.done(1, usize::from(found.is_err()));
+                Ok(found.ok())
+            })
+            .collect();
+        samples.extend(found?.into_iter().flatten());
+    }
+    Ok(samples)
+}
+
+fn selection(values: &[&str]) -> Result<Option<Selection>, Failure> {
+    let one = values.first().map(|it| Selection::from_argument(it));
+    one.transpose().or_fail(ExitKind::Usage)
+}

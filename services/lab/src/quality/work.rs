@@ -1,0 +1,52 @@
+//! What the threads share that search pictures.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use failure::{ExitKind, Failure, Stop};
+
+use super::observer::Observer;
+use failure::Console;
+
+/// What all threads share.
+pub(super) struct Work<'a> {
+    pub(super) observer: Observer,
+    stop: Stop,
+    console: &'a dyn Console,
+    n_done: AtomicUsize,
+    n_lost: AtomicUsize,
+}
+
+impl<'a> Work<'a> {
+    pub(super) fn new(observer: Observer, stop: Stop, console: &'a dyn Console) -> Self {
+        Self {
+            observer,
+            stop,
+            console,
+            n_done: AtomicUsize::new(0),
+            n_lost: AtomicUsize::new(0),
+        }
+    }
+
+    /// Pictures of which there is no sample.
+    pub(super) fn n_lost(&self) -> usize {
+        self.n_lost.load(Ordering::Relaxed)
+    }
+
+    /// Stops where that was asked for.
+    pub(super) fn go_on(&self) -> Result<(), Failure> {
+        if self.stop.is_requested() {
+            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
+        }
+        Ok(())
+    }
+
+    /// Takes note of pictures that were looked at.
+    pub(super) fn done(&self, n: usize, n_lost: usize) {
+        const EVERY: usize = 100;
+        self.n_lost.fetch_add(n_lost, Ordering::Relaxed);
+        let before = self.n_done.fetch_add(n, Ordering::Relaxed);
+        if before / EVERY != (before + n) / EVERY {
+            self.console.message(&format!("{} pictures", before + n));
+        }
+    }
+}

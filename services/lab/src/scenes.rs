@@ -1,0 +1,131 @@
+//! Pictures of people who do not exist.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use failure::{ExitKind, Failure, OrFail as _};
+use kernels::Rgb8View;
+use rayon::prelude::*;
+use scene::{Action, Flaws, RigChoice, Scene, Settings, View};
+
+/// Which scenes.
+#[derive(Debug, Clone)]
+pub struct Scenes {
+    /// How many; each gives some pictures of every camera.
+    pub n: u32,
+    /// Numbers of the first and the last of the people in them.
+    pub subjects: [u64; 2],
+    /// Frames of every camera of a scene, some seconds apart.
+    pub frames: u16,
+    /// Photographs without people that stand in the place of every third room.
+    pub backdrop: Option<PathBuf>,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+/// One picture of a scene.
+pub(crate) struct Shown<'a> {
+    /// The subject, as a name.
+    pub(crate) group: &'a str,
+    /// What it shows, as a name.
+    pub(crate) source: String,
+    /// The picture.
+    pub(crate) picture: Rgb8View<'a>,
+    /// The joints in it, `skeleton::PARSE14`, pixels; not finite where they are not seen.
+    pub(crate) joints: Vec<[f64; 2]>,
+    /// The joints in the world, metres.
+    pub(crate) in_world: Vec<[f64; 3]>,
+    /// The camera.
+    pub(crate) camera: &'a geometry::Camera,
+}
+
+/// Makes something of every picture of all scenes, in the order of the scenes, whatever the threads.
+///
+/// * `make`: of one picture; nothing if it is of no use.
+/// * `watch`: told of the pictures of a camera: how many there are, and how many were of no use.
+pub(crate) fn of_pictures<T: Send>(
+    scenes: &Scenes,
+    make: impl Fn(&Shown<'_>) -> Result<Option<T>, Failure> + Sync,
+    watch: impl Fn(usize, usize) + Sync,
+) -> Result<Vec<T>, Failure> {
+    let made: Result<Vec<_>, Failure> = (0..scenes.n)
+        .into_par_iter()
+        .map(|nth| of_scene(scenes, &settings(scenes, nth), &make, &watch))
+        .collect();
+    Ok(made?.into_iter().flatten().collect())
+}
+
+/// What a scene is, by its number: actions and subjects in turn, all else by chance.
+fn settings(scenes: &Scenes, nth: u32) -> Settings {
+    let mut rng = fastrand::Rng::with_seed(scenes.seed.wrapping_mul(1_000_003) + u64::from(nth));
+    let [from, to] = scenes.subjects;
+    let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
+    let rig = match nth % 4 {
+        0 => RigChoice::HumanEva,
+        1 => RigChoice::Umpm,
+        _ => RigChoice::Ring {
+            n: 3,
+            radius: between(3.4, 5.5),
+            height: between(0.8, 2.4),
+        },
+    };
+    // Half of the cameras are good ones.
+    let is_bad = between(0.0, 1.0) < 0.5;
+    let flaws = Flaws {
+        noise: between(1.0, 12.0),
+        blur_px: between(0.3, 1.5),
+        exposure_stops: between(-1.2, 0.8),
+        ..Flaws::default()
+    };
+    let is_photo = between(0.0, 1.0) < 1.0 / 3.0;
+    Settings {
+        rig,
+        subject: from + rng.u64(0..=to - from),
+        others: 0,
+        action: Action::ALL[rng.usize(0..Action::ALL.len())],
+        seed: rng.u64(1..1 << 32),
+        // One frame in three quarters of a second: no two show the same pose.
+        rate_hz: 4.0 / 3.0,
+        backdrop: scenes.backdrop.clone().filter(|_| is_photo),
+        flaws: if is_bad { flaws } else { Flaws::default() },
+        skews_ms: Vec::new(),
+    }
+}
+
+fn of_scene<T>(
+    scenes: &Scenes,
+    settings: &Settings,
+    make: &impl Fn(&Shown<'_>) -> Result<Option<T>, Failure>,
+    watch: &impl Fn(usize, usize),
+) -> Result<Vec<T>, Failure> {
+    let scene = Arc::new(Scene::new(settings).or_fail(ExitKind::Input)?);
+    let group = format!("subject {}", settings.subject);
+    let mut all = Vec::new();
+    for (nth, camera) in scene.rig().cameras().iter().enumerate() {
+        let mut view = View::new(&scene, nth).or_fail(ExitKind::Input)?;
+        let size = view.size();
+        let mut rgb = vec![0; size.rgb_bytes()];
+        let before = all.len();
+        for frame in 0..u64::from(scenes.frames) {
+            let truth = view.picture(frame, &mut rgb);
+            let joints = truth.pixels.map(|it| it.unwrap_or([f64::NAN; 2]));
+            let shown = Shown {
+                group: &group,
+                source: format!(
+                    "{group} {} seed {} camera {} frame {frame}",
+                    settings.action.name(),
+                    settings.seed,
+                    truth.camera
+                ),
+                picture: Rgb8View::new(size.width, size.height, &rgb).or_fail(ExitKind::Run)?,
+                joints: joints.to_vec(),
+                in_world: scene.joints(truth.seconds).to_vec(),
+                camera,
+            };
+            all.extend(make(&shown)?);
+        }
+        let n = usize::from(scenes.frames);
+        watch(n, n - (all.len() - before));
+    }
+    Ok(all)
+}

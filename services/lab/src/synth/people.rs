@@ -1,0 +1,60 @@
+//! The people on the pictures, as annotations.
+
+use std::path::Path;
+
+use datasets::Person;
+use failure::{ExitKind, Failure, OrFail as _};
+
+use super::files;
+
+/// Annotated people: the person, the name, and whether they are seen from behind.
+#[derive(Debug, Default)]
+pub(super) struct People(Vec<(Person, String, bool)>);
+
+/// The joint on the other side, in the order of `skeleton::PARSE14`.
+const MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
+
+impl People {
+    /// Adds somebody.
+    pub(super) fn add(&mut self, person: Person, name: String, is_from_behind: bool) {
+        self.0.push((person, name, is_from_behind));
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Adds those of a sequence in a folder of that name.
+    pub(super) fn append(&mut self, folder: &str, others: Self) {
+        self.0
+            .extend(others.0.into_iter().map(|(mut person, name, behind)| {
+                person.image = Path::new(folder).join(&person.image);
+                (person, name, behind)
+            }));
+    }
+
+    /// Writes both files of annotations; none if there is nobody.
+    pub(super) fn write(&self, folder: &Path) -> Result<(), Failure> {
+        if self.0.is_empty() {
+            return Ok(());
+        }
+        let (mut anatomical, mut as_seen) = (String::new(), String::new());
+        for (person, name, behind) in &self.0 {
+            let line = datasets::to_line(person, Some(name)).or_fail(ExitKind::Run)?;
+            anatomical += &(line.clone() + "\n");
+            let line = if *behind {
+                let mirrored = Person {
+                    joints: MIRROR.map(|it| person.joints[it]).to_vec(),
+                    visible: MIRROR.map(|it| person.visible[it]).to_vec(),
+                    ..person.clone()
+                };
+                datasets::to_line(&mirrored, Some(name)).or_fail(ExitKind::Run)?
+            } else {
+                line
+            };
+            as_seen += &(line + "\n");
+        }
+        files::text(&folder.join("people.jsonl"), &anatomical)?;
+        files::text(&folder.join("people-as-seen.jsonl"), &as_seen)
+    }
+}

@@ -1,0 +1,9 @@
+//! The laboratory, run as a user would. One test binary, because linking takes longer than most tests.
+
+#[path = "../../parallax/tests/common/mod.rs"]
+mod common;
+
+mod eval;
+mod eval_networks;
+mod synth;
+mod train;

@@ -1,0 +1,37 @@
+//! `parallax-lab train network-people` and `parallax-lab train network`.
+
+use serde_json::Value;
+
+use super::{Drawn, assert_ended};
+
+#[test]
+fn people_are_prepared_and_one_block_in_twelve_is_kept_apart() {
+    let drawn = Drawn::new(240);
+    let words = ["train", "network-people", "people.jsonl", "--sides", "seen"];
+    let ended = drawn
+        .start(&[&words[..], &["--json", "--out", "people.bin"]].concat())
+        .wait();
+    assert_ended(&ended, 0, &[]);
+    let report: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
+    assert_eq!([&report["learnt"], &report["kept_apart"]], [220, 20]);
+    let picture = 3 * 256 * 256;
+    assert!(drawn.model("people.bin").len() > 240 * picture);
+}
+
+#[test]
+fn a_build_without_the_trainer_says_how_to_get_it() {
+    let drawn = Drawn::new(1);
+    let words = ["train", "network", "people.bin", "--out", "n.onnx"];
+    let ended = drawn.start(&words).wait();
+    let (status, word) = if cfg!(feature = "train-quality") {
+        (4, "people.bin")
+    } else {
+        (2, "--features train-quality")
+    };
+    assert_ended(&ended, status, &[word]);
+    let ended = drawn
+        .start(&["train", "network", "--print-settings"])
+        .wait();
+    assert_ended(&ended, 0, &[]);
+    assert!(ended.stdout.contains("[shape]"), "{}", ended.stdout);
+}

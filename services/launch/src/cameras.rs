@@ -1,0 +1,50 @@
+//! The footage of the cameras of a deployment, looked at before any process is started.
+
+mod advice;
+mod live;
+mod pictures;
+
+use deployment::Timeline;
+use deployment::capture::{Camera, Config, Rotate, Tag};
+use footage::{PictureNumbers, Rotation, SourceSpec, Turn};
+use serde::{Deserialize, Serialize};
+
+pub(crate) use live::{footage, lead_nanos};
+pub use live::{is_live, live_camera};
+pub use pictures::{rotation, settled};
+
+/// Metadata of a camera's footage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Footage {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Number of frames to use.
+    pub n_frames: u64,
+    /// Used frames per second of the scene, if known.
+    pub frame_rate_hz: Option<f64>,
+    /// Which frame belongs to each common instant, where cameras have clocks of their own; frames are instants then. Not in the
+    /// recordings of earlier versions.
+    #[serde(default)]
+    pub timeline: Option<Timeline>,
+}
+
+/// The footage of a camera, with the range of frames to use.
+pub fn source(camera: &Camera, config: &Config) -> SourceSpec {
+    SourceSpec {
+        start: config.start_frame,
+        step: config.frame_step,
+        count: config.n_frames,
+        frame_rate_hz: config.frame_rate_hz,
+        rotation: match camera.rotate {
+            None => Rotation::Stored,
+            Some(Rotate::Tag(Tag::Tag)) => Rotation::Tag,
+            Some(Rotate::Degrees(degrees)) => {
+                Rotation::By(Turn::clockwise(degrees.into()).unwrap_or_default())
+            }
+        },
+        numbers: camera
+            .numbers
+            .map(|[first, step]| PictureNumbers { first, step }),
+        ..SourceSpec::new(camera.source.clone())
+    }
+}

@@ -1,0 +1,249 @@
+//! What the files of cameras say of themselves: how their pictures are to be turned, and which frames their numbers are.
+
+use deployment::Deployment;
+use deployment::capture::{Camera, Rotate, Tag};
+use failure::Failure;
+use footage::{Counting, PictureNumbers, Rotation, Size, SourceSpec, Turn};
+use geometry::{Rig, upright_roll};
+use nalgebra::{UnitVector3, Vector3};
+use scene::Address;
+
+use inputs::rig_of;
+
+use super::is_live;
+
+/// The deployment with `rotate` and `numbers` of every camera that does not give them, from what its files say; logs what is done.
+///
+/// Files that cannot be read are left to those who read them.
+///
+/// # Errors
+///
+/// The calibration cannot be read.
+pub fn settled(deployment: &Deployment) -> Result<Deployment, Failure> {
+    let mut settled = deployment.clone();
+    let is_of_files = |it: &Camera| {
+        let is_made = Address::is_address(&it.source) || capture::Blank::is_blank(&it.source);
+        let is_recorded = capture::Recorded::is_recorded(&it.source);
+        !it.source.is_empty() && !is_made && !is_recorded && !is_live(&it.source)
+    };
+    let files: Vec<usize> = (0..settled.cameras.len())
+        .filter(|&it| is_of_files(&settled.cameras[it]))
+        .collect();
+    turn(&mut settled, &files)?;
+    count(&mut settled, &files);
+    Ok(settled)
+}
+
+fn turn(deployment: &mut Deployment, files: &[usize]) -> Result<(), Failure> {
+    let mut rig = None;
+    for &index in files {
+        let camera = &deployment.cameras[index];
+        if camera.rotate.is_some() {
+            continue;
+        }
+        let Some(tagged) = Tagged::read(&camera.source) else {
+            continue;
+        };
+        let rig = match &mut rig {
+            Some(rig) => rig,
+            empty => empty.insert(with_up(rig_of(deployment)?)),
+        };
+        let does_turn = tagged.does_turn(&camera.name, rig);
+        let rotate = if does_turn {
+            Rotate::Tag(Tag::Tag)
+        } else {
+            Rotate::Degrees(0)
+        };
+        deployment.cameras[index].rotate = Some(rotate);
+    }
+    Ok(())
+}
+
+/// How the pictures of a file are turned for a camera of a rig; logs what is done.
+pub fn rotation(source: &str, camera: &str, rig: &Rig) -> Rotation {
+    let is_turned =
+        Tagged::read(source).is_some_and(|it| it.does_turn(camera, &with_up(rig.clone())));
+    if is_turned {
+        Rotation::Tag
+    } else {
+        Rotation::Stored
+    }
+}
+
+/// Footage whose pictures are to be turned.
+struct Tagged<'a> {
+    source: &'a str,
+    stored: Size,
+    tag: Turn,
+}
+
+impl<'a> Tagged<'a> {
+    /// None for footage without a tag, or that cannot be read.
+    fn read(source: &'a str) -> Option<Self> {
+        let (stored, tag) = footage::stored(&SourceSpec::new(source)).ok()?;
+        (!tag.is_none()).then_some(Self {
+            source,
+            stored,
+            tag,
+        })
+    }
+
+    /// Whether the calibration of a camera is of the turned picture; logs it.
+    fn does_turn(&self, camera: &str, rig: &Rig) -> bool {
+        let (does_turn, why) = by_calibration(camera, rig, self.stored, self.tag);
+        let done = if does_turn {
+            "which is done"
+        } else {
+            "which is not done"
+        };
+        tracing::warn!(
+            "camera {camera:?}: the orientation tag of {} asks for its pictures to be {}, {done}: {why}",
+            self.source,
+            self.tag
+        );
+        does_turn
+    }
+}
+
+/// The rig with a direction of up, if need be that of cameras that are held level.
+fn with_up(rig: Rig) -> Rig {
+    if rig.up_in_world().is_some() {
+        return rig;
+    }
+    let down = rig.cameras().iter();
+    let down: Vector3<f64> = down
+        .map(|it| it.camera_from_world.rotation.inverse() * Vector3::y())
+        .sum();
+    let up = UnitVector3::try_new(-down, 0.3 * rig.cameras().len() as f64);
+    let level = Rig::new(rig.cameras().to_vec(), up, rig.source());
+    level.unwrap_or(rig)
+}
+
+/// Whether a calibration is of the turned picture, and why it seems so.
+fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, String) {
+    const BY_HAND: &str = "`rotate = 0` (as they are stored) or `rotate = \"tag\"` of the [[camera]] says it for good";
+    let Some(camera) = rig.camera(name) else {
+        return (true, BY_HAND.to_owned());
+    };
+    let [width, height] = camera.intrinsics.size;
+    let turned = tag.size(stored);
+    let is_wide = |it: Size| it.width > it.height;
+    if tag.swaps_sides() && is_wide(turned) != is_wide(stored) && width != height {
+        let does_turn = is_wide(turned) == (width > height);
+        let pixels = if does_turn { turned } else { stored };
+        let how = if does_turn {
+            "turned"
+        } else {
+            "as they are stored"
+        };
+        let why = format!(
+            "the calibration is of {width}x{height} pixels, and the pictures have {pixels} {how}"
+        );
+        return (does_turn, why);
+    }
+    // What the calibrated picture must be turned by, for up to be up in it.
+    let Some(roll) = upright_roll(camera, rig).map(f64::to_degrees) else {
+        return (true, format!("players show it so; {BY_HAND}"));
+    };
+    let most = if tag.swaps_sides() { 45.0 } else { 90.0 };
+    let does_turn = roll.abs() < most;
+    let how = if does_turn {
+        "stand upright"
+    } else {
+        "do not stand upright"
+    };
+    (
+        does_turn,
+        format!("with the calibration people {how} then; {BY_HAND}"),
+    )
+}
+
+fn count(deployment: &mut Deployment, files: &[usize]) {
+    let is_open = |it: &&usize| deployment.cameras[**it].numbers.is_none();
+    let numbered = files.iter().filter(is_open).filter_map(|&it| {
+        let numbers = footage::picture_numbers(&deployment.cameras[it].source);
+        Some((it, numbers.ok()??))
+    });
+    let (cameras, numbers): (Vec<usize>, Vec<Vec<u64>>) = numbered.unzip();
+    let name = |nth: usize| &deployment.cameras[cameras[nth]].name;
+    let ends = || {
+        let all = numbers.iter().enumerate();
+        let all = all.map(|(nth, it)| format!("{} {} to {}", name(nth), it[0], it[it.len() - 1]));
+        all.collect::<Vec<_>>().join(", ")
+    };
+    if numbers.is_empty() {
+        return;
+    }
+    let of_cameras = match Counting::of(&numbers) {
+        Counting::InOrder => {
+            if numbers.iter().any(|it| *it != numbers[0]) {
+                tracing::warn!(
+                    "the numbers of the pictures ({}) lie too far apart to be those of frames: pictures are paired in their order; \
+                     `numbers = [first, step]` of a [[camera]] says which numbers are frames",
+                    ends()
+                );
+            }
+            return;
+        }
+        Counting::Common(common) => {
+            if numbers.iter().any(|it| it[0] != numbers[0][0]) {
+                tracing::warn!(
+                    "cameras do not begin with the same picture ({}): frames are paired by these numbers; where each camera counts for \
+                     itself, `numbers = [first, step]` of its [[camera]] says which is the number of frame 0",
+                    ends()
+                );
+            }
+            vec![common; numbers.len()]
+        }
+        Counting::Own(own) => {
+            tracing::warn!(
+                "the pictures of the cameras have numbers of their own ({}): the first of each is frame 0; do they begin together? \
+                 `numbers = [first, step]` of a [[camera]] says which is the number of frame 0",
+                ends()
+            );
+            own
+        }
+    };
+    for (nth, counted) in of_cameras.iter().enumerate() {
+        if let Some(gaps) = gaps(&numbers[nth], *counted) {
+            tracing::warn!("camera {:?} has no picture of {gaps}", name(nth));
+        }
+    }
+    for (camera, PictureNumbers { first, step }) in cameras.into_iter().zip(of_cameras) {
+        deployment.cameras[camera].numbers = Some([first, step]);
+    }
+}
+
+/// The frames between the first and the last picture that have none, in words; none where there are none.
+fn gaps(numbers: &[u64], counted: PictureNumbers) -> Option<String> {
+    const MOST_NAMED: usize = 5;
+    let PictureNumbers { first, step } = counted;
+    let frame = |number: u64| (number - first) / step;
+    let missing: Vec<[u64; 2]> = numbers
+        .windows(2)
+        .map(|it| [frame(it[0]) + 1, frame(it[1])])
+        .filter(|it| it[1] > it[0])
+        .collect();
+    let n: u64 = missing.iter().map(|it| it[1] - it[0]).sum();
+    let named = missing.iter().take(MOST_NAMED).map(|[from, end]| {
+        let last = end - 1;
+        if *from == last {
+            from.to_string()
+        } else {
+            format!("{from} to {last}")
+        }
+    });
+    let named = named.collect::<Vec<_>>().join(", ");
+    let more = if missing.len() > MOST_NAMED {
+        ", ..."
+    } else {
+        ""
+    };
+    let all = numbers.len() as u64 + n;
+    (n > 0).then(|| {
+        format!("{n} of {all} frames ({named}{more}): the numbers in the names are missing")
+    })
+}
+
+#[cfg(test)]
+mod tests;

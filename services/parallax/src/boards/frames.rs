@@ -1,0 +1,124 @@
+//! Which pictures of different cameras were taken at the same time.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::corners::without_fraction;
+use failure::{ExitKind, Failure, OrFail as _};
+
+/// The most rows of a table.
+const MOST_ROWS: usize = 10_000_000;
+
+/// For each camera of a table the frame that its n-th picture belongs to.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FrameTable {
+    frames: BTreeMap<String, Vec<usize>>,
+}
+
+impl FrameTable {
+    /// The frames of a camera: of its name, or of a number that its name ends with.
+    pub fn of(&self, camera: &str) -> Option<&[usize]> {
+        let digits = camera.len()
+            - camera
+                .trim_end_matches(|it: char| it.is_ascii_digit())
+                .len();
+        let number = &camera[camera.len() - digits..];
+        let found = self.frames.get(camera).or_else(|| self.frames.get(number));
+        found.map(Vec::as_slice)
+    }
+
+    /// The cameras that it knows.
+    pub fn cameras(&self) -> impl Iterator<Item = &str> {
+        self.frames.keys().map(String::as_str)
+    }
+}
+
+/// Reads a table with the columns `sync_index` and `cam_id`, as Caliscope writes it: the n-th row of a camera is the n-th
+/// picture of its video.
+///
+/// # Errors
+///
+/// A file that cannot be read, without these columns, or with a row that has no whole numbers.
+pub fn read_frames(path: &Path) -> Result<FrameTable, Failure> {
+    let text = failure::read_text(path)?;
+    table(&text)
+        .map_err(|error| Failure::new(ExitKind::Input, format!("{}: {error}", path.display())))
+}
+
+fn table(text: &str) -> Result<FrameTable, String> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let header = reader.headers().map_err(|error| error.to_string())?.clone();
+    let column = |names: &[&str]| {
+        let found = header.iter().position(|it| names.contains(&it.trim()));
+        found.ok_or_else(|| format!("no column {}: expected sync_index and cam_id", names[0]))
+    };
+    let (sync, camera) = (column(&["sync_index"])?, column(&["cam_id", "port"])?);
+    let mut frames: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (nth, row) in reader.records().take(MOST_ROWS).enumerate() {
+        let row = row.map_err(|error| error.to_string())?;
+        let cell = |column: usize| row.get(column).unwrap_or_default().trim();
+        let frame = without_fraction(cell(sync)).parse::<usize>();
+        let frame = frame
+            .map_err(|error| format!("row {}: sync_index {:?}: {error}", nth + 2, cell(sync)))?;
+        frames
+            .entry(without_fraction(cell(camera)).to_owned())
+            .or_default()
+            .push(frame);
+    }
+    // The pictures of a video are in the order of time, whatever the order of the rows.
+    for list in frames.values_mut() {
+        list.sort_unstable();
+    }
+    Ok(FrameTable { frames })
+}
+
+/// The frame of a picture where no table tells: its time in steps of the slowest camera's rate if rates differ, else its number.
+pub(crate) fn by_clock(index: u64, time_s: Option<f64>, slowest_hz: Option<f64>) -> usize {
+    match (time_s, slowest_hz) {
+        (Some(time_s), Some(rate_hz)) => (time_s * rate_hz).round().max(0.0) as usize,
+        _ => index as usize,
+    }
+}
+
+/// The rate by which frames are counted, if the cameras' rates are known and differ.
+pub(crate) fn slowest(rates_hz: &[Option<f64>]) -> Option<f64> {
+    let known: Option<Vec<f64>> = rates_hz.iter().copied().collect();
+    let known = known.filter(|it| it.len() > 1)?;
+    let least = known.iter().copied().fold(f64::MAX, f64::min);
+    let most = known.iter().copied().fold(0.0, f64::max);
+    (most > 1.001 * least).then_some(least)
+}
+
+/// The table beside the first camera's file, if it has one.
+///
+/// # Errors
+///
+/// As [`read_frames`].
+pub(crate) fn beside(path: &str) -> Result<Option<FrameTable>, Failure> {
+    let table = Path::new(path).with_file_name("timestamps.csv");
+    if !table.is_file() {
+        return Ok(None);
+    }
+    let text = files::read_text(&table, files::SETTINGS).or_fail(ExitKind::Input)?;
+    // One of another kind is not for us.
+    Ok(self::table(&text).ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nth_row_of_a_camera_is_its_nth_picture() {
+        let text = "sync_index,cam_id,frame_time\n35,2,25.0\n35,3,25.1\n36,2,25.2\n38,2,25.5\n";
+        let table = table(text).unwrap();
+        assert_eq!(table.of("cam_2"), Some(&[35, 36, 38][..]));
+        assert_eq!(table.of("3"), Some(&[35][..]));
+        assert_eq!(table.of("cam_1"), None);
+        let floats = super::table("sync_index,cam_id\n35.0,2.0\n").unwrap();
+        assert_eq!(floats.cameras().collect::<Vec<_>>(), ["2"]);
+        for wrong in ["", "a,b\n1,2\n", "sync_index,cam_id\nx,0\n"] {
+            assert!(self::table(wrong).is_err(), "{wrong:?}");
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! The board looked for in the pictures of every camera.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use boards::{Board, Finder, Found, Hints, Nothing, Picture};
+use calibration::board::Sight;
+use failure::{ExitKind, Failure, Stop};
+use footage::{Source, SourceInfo, SourceSpec};
+use rayon::prelude::*;
+
+use super::frames::{beside, by_clock, slowest};
+use super::{CameraFootage, FrameTable, Looked, Seen, footage_failure};
+use failure::Console;
+
+/// Pictures in which the board was read in one way before it is believed of the camera.
+const SURE: usize = 3;
+
+/// How footage is looked at.
+#[derive(Debug, Clone, Default)]
+pub struct LookSettings {
+    /// Every n-th frame; chosen by `most` if not set.
+    pub every: Option<usize>,
+    /// The most pictures of a camera that are looked at.
+    pub most: usize,
+    /// The number of pictures of each path that are looked at, from the first; all if not set.
+    pub first: Option<u64>,
+    /// Which pictures belong together; the table beside the first video if not set.
+    pub frames: Option<FrameTable>,
+}
+
+/// A picture with the board.
+struct Sighting {
+    frame: usize,
+    /// The path, and the picture of it.
+    picture: [usize; 2],
+    found: Found,
+}
+
+/// What one camera's footage gave.
+struct Raw {
+    size: [u32; 2],
+    n_pictures: usize,
+    found: Vec<Sighting>,
+    nothing: BTreeMap<Nothing, usize>,
+}
+
+/// Looks for a board in all footage.
+///
+/// # Errors
+///
+/// Footage that cannot be read, tables that do not fit it; [`ExitKind::Interrupted`].
+pub fn look(
+    board: &Board,
+    cameras: &[CameraFootage],
+    settings: &LookSettings,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<Looked, Failure> {
+    let finder = Finder::new(board);
+    let frames = frame_table(cameras, settings, console)?;
+    let infos: Vec<Vec<SourceInfo>> = cameras
+        .iter()
+        .map(|camera| {
+            let each = camera.paths.iter().map(|path| {
+                let source = Source::open(&SourceSpec::upright(path)).map_err(footage_failure)?;
+                Ok(source.info().clone())
+            });
+            each.collect()
+        })
+        .collect::<Result<_, Failure>>()?;
+    let rates: Vec<Option<f64>> = infos.iter().map(|it| it[0].frame_rate_hz).collect();
+    let slowest_hz = slowest(&rates);
+    let n_pictures = |infos: &Vec<SourceInfo>| infos.iter().map(|it| it.n_frames as usize).sum();
+    let longest: usize = infos.iter().map(n_pictures).max().unwrap_or(0);
+    let every = settings
+        .every
+        .unwrap_or_else(|| longest.div_ceil(settings.most.max(1)).max(1));
+    console.begin("", "looking for the board");
+    let total: usize = infos.iter().map(n_pictures).sum::<usize>();
+    console.set(0, total);
+    let is_over = AtomicBool::new(false);
+    let raw: Vec<Result<Raw, Failure>> = cameras
+        .par_iter()
+        .map(|camera| {
+            let table = match &frames {
+                None => None,
+                Some(table) => Some(
+                    table
+                        .of(&camera.name)
+                        .ok_or_else(|| unknown(table, &camera.name))?,
+                ),
+            };
+            let task = CameraTask {
+                finder: &finder,
+                camera,
+                table,
+                slowest_hz,
+                every,
+                first: settings.first,
+                console,
+                is_over: &|| is_over.load(Ordering::Relaxed) || stop.is_requested(),
+            };
+            let found = task.look();
+            if found.is_err() {
+                is_over.store(true, Ordering::Relaxed);
+            }
+            found
+        })
+        .collect();
+    console.finish();
+    let raw = raw.into_iter().collect::<Result<Vec<Raw>, Failure>>()?;
+    if stop.is_requested() {
+        return Err(Failure::new(ExitKind::Interrupted, "stopped"));
+    }
+    Ok(agreed(&finder, raw))
+}
+
+/// Which pictures belong together, if a table tells.
+fn frame_table(
+    cameras: &[CameraFootage],
+    settings: &LookSettings,
+    console: &dyn Console,
+) -> Result<Option<FrameTable>, Failure> {
+    Ok(match (&settings.frames, cameras.first()) {
+        (Some(table), _) => Some(table.clone()),
+        (None, Some(first)) if cameras.len() > 1 => {
+            let table = beside(&first.paths[0])?;
+            if table.is_some() {
+                console.message("frames by timestamps.csv beside the footage");
+            }
+            table
+        }
+        _ => None,
+    })
+}
+
+fn unknown(table: &FrameTable, camera: &str) -> Failure {
+    let known: Vec<&str> = table.cameras().collect();
+    Failure::new(
+        ExitKind::Input,
+        format!(
+            "the table of timestamps has the cameras {}, not {camera}",
+            known.join(", ")
+        ),
+    )
+    .with_hint("name the footage: NAME=PATH, with the name or number of the table")
+}
+
+struct CameraTask<'a> {
+    finder: &'a Finder,
+    camera: &'a CameraFootage,
+    table: Option<&'a [usize]>,
+    slowest_hz: Option<f64>,
+    every: usize,
+    first: Option<u64>,
+    console: &'a dyn Console,
+    is_over: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl CameraTask<'_> {
+    fn look(&self) -> Result<Raw, Failure> {
+        let mut raw = Raw {
+            size: [0; 2],
+            n_pictures: 0,
+            found: Vec::new(),
+            nothing: BTreeMap::new(),
+        };
+        let mut before = 0;
+        for (nth_path, path) in self.camera.paths.iter().enumerate() {
+            let mut source = Source::open(&SourceSpec::upright(path)).map_err(footage_failure)?;
+            let size = [
+                source.info().size.width as u32,
+                source.info().size.height as u32,
+            ];
+            if raw.size != [0; 2] && raw.size != size {
+                return Err(Failure::new(
+                    ExitKind::Input,
+                    format!(
+                        "{path}: {}x{}, other pictures of {} have {}x{}",
+                        size[0], size[1], self.camera.name, raw.size[0], raw.size[1]
+                    ),
+                ));
+            }
+            raw.size = size;
+            let mut count = 0;
+            while let Some(picture) = source.next_frame().map_err(footage_failure)? {
+                if (self.is_over)() {
+                    return Ok(raw);
+                }
+                if self.first.is_some_and(|it| picture.index >= it) {
+                    break;
+                }
+                count += 1;
+                self.console.advance(1);
+                let nth = before + picture.index as usize;
+                let frame = match self.table {
+                    Some(table) => table.get(nth).copied(),
+                    None if self.camera.paths.len() > 1 => Some(nth),
+                    None => Some(by_clock(picture.index, picture.time_s, self.slowest_hz)),
+                };
+                let Some(frame) = frame.filter(|it| it.is_multiple_of(self.every)) else {
+                    continue;
+                };
+                let grey = Picture::of_rgb(size[0] as usize, size[1] as usize, picture.rgb);
+                if let Some(grey) = grey {
+                    let picture = [nth_path, picture.index as usize];
+                    self.look_at(&mut raw, (frame, picture), &grey);
+                }
+            }
+            before += count;
+        }
+        Ok(raw)
+    }
+
+    fn look_at(&self, raw: &mut Raw, (frame, picture): (usize, [usize; 2]), grey: &Picture) {
+        raw.n_pictures += 1;
+        match self.finder.find(grey, hints(&raw.found)) {
+            Ok(found) => raw.found.push(Sighting {
+                frame,
+                picture,
+                found,
+            }),
+            Err(nothing) => *raw.nothing.entry(nothing).or_default() += 1,
+        }
+    }
+}
+
+/// What the pictures of a camera so far agree about.
+fn hints(found: &[Sighting]) -> Hints {
+    let all_same = |it: &dyn Fn(&Found) -> usize| {
+        let first = it(&found.first()?.found);
+        (found.len() >= SURE && found.iter().all(|one| it(&one.found) == first)).then_some(first)
+    };
+    Hints {
+        is_inverted: all_same(&|it| usize::from(it.is_inverted)).map(|it| it == 1),
+        variant: all_same(&|it| it.variant),
+    }
+}
+
+/// The board that most pictures have, and what each camera saw of it.
+fn agreed(finder: &Finder, raw: Vec<Raw>) -> Looked {
+    let mut votes = vec![0; finder.variants().len()];
+    for it in raw.iter().flat_map(|it| &it.found) {
+        votes[it.found.variant] += it.found.corners.len();
+    }
+    // The first of the best: the board as it was said to be.
+    let best = (0..votes.len())
+        .rev()
+        .max_by_key(|it| votes[*it])
+        .unwrap_or(0);
+    let variant = &finder.variants()[best];
+    let cameras = raw.into_iter().enumerate().map(|(camera, raw)| {
+        let own: Vec<&Sighting> = raw
+            .found
+            .iter()
+            .filter(|it| it.found.variant == best)
+            .collect();
+        let count = |is: &dyn Fn(&Found) -> bool| own.iter().filter(|it| is(&it.found)).count();
+        let mut nothing: Vec<(Nothing, usize)> = raw.nothing.into_iter().collect();
+        nothing.sort_by_key(|it| core::cmp::Reverse(it.1));
+        Seen {
+            size: raw.size,
+            n_pictures: raw.n_pictures,
+            n_inverted: count(&|it| it.is_inverted),
+            n_mirrored: count(&|it| it.is_mirrored),
+            sights: own
+                .iter()
+                .map(|it| {
+                    let corners = it.found.corners.iter().map(|it| (it.id, it.at));
+                    Sight::new(camera, it.frame, corners, &variant.layout.points)
+                })
+                .collect(),
+            nothing,
+            pictures: own.iter().map(|it| (it.frame, it.picture)).collect(),
+        }
+    });
+    Looked {
+        board: variant.board.clone(),
+        note: variant.note.clone(),
+        cameras: cameras.collect(),
+        layout: variant.layout.clone(),
+    }
+}

@@ -1,0 +1,479 @@
+//! From footage of a board to a rig: look, calibrate, judge.
+
+use std::path::PathBuf;
+
+use boards::{Board, Kind, dictionary_names};
+use calibration::board::{
+    BoardError, LensKind, Outcome, Sight, Task, Together, calibrate as adjust,
+};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use geometry::{Camera, Rig};
+use nalgebra::Point2;
+use report::boards::Page;
+
+use super::{CameraFootage, LookSettings, Looked, Overlay, look, read_corners, worst};
+use failure::Console;
+
+/// The pictures that fit worst and are shown.
+const WORST: usize = 8;
+/// Pictures of a camera in which other boards are looked for, if none of the one that was named is found.
+const GUESSED_PICTURES: usize = 6;
+
+/// The fewest pictures of each side of a board by which one camera shows that it has two, or two cameras that they stand on both.
+const LEAST_OF_EACH: usize = 3;
+
+/// What is to be done.
+#[derive(Debug, Clone)]
+pub struct BoardSettings {
+    /// The board.
+    pub board: Board,
+    /// The cameras.
+    pub cameras: Vec<CameraFootage>,
+    /// How footage is looked at.
+    pub look: LookSettings,
+    /// A table of corners that is read instead.
+    pub corners: Option<PathBuf>,
+    /// Cameras whose intrinsics are kept, by name.
+    pub known: Option<Rig>,
+    /// What is found of lenses.
+    pub lens: LensKind,
+    /// Whether the poses are wanted.
+    pub wants_rig: bool,
+    /// The most frames that are used.
+    pub most_frames: usize,
+    /// Mirrored pictures are meant to be.
+    pub is_mirrored: bool,
+    /// What is on the back of the board, where that is known.
+    pub back: Option<Back>,
+}
+
+/// The back of a board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Back {
+    /// The mirror image of the front, corner on corner: from behind, every corner is where it is.
+    Mirrored,
+    /// Nothing: mirrored codes are those of mirrored pictures.
+    Blank,
+}
+
+/// What mirrored codes come from.
+enum Mirrored {
+    /// There are none, or it is said, or a camera saw both sides.
+    Known,
+    /// A board with two sides, or the pictures of these cameras: the adjustment tells.
+    Asked(Vec<usize>),
+}
+
+/// A calibration, with what it is of.
+#[derive(Debug, Clone)]
+pub struct Calibrated {
+    /// What was adjusted.
+    pub task: Task,
+    /// What was looked for; `None` where corners were read.
+    pub looked: Option<Looked>,
+    /// What came out.
+    pub outcome: Outcome,
+    /// The board.
+    pub board: Board,
+    /// What the user should know: how the board differs from what was said, inverted pictures.
+    pub notes: Vec<String>,
+}
+
+/// Calibrates cameras from a board.
+///
+/// # Errors
+///
+/// Inputs that cannot be read or do not fit one another, and what [`adjust`] refuses; each with what to try.
+pub fn calibrate(
+    settings: &BoardSettings,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<Calibrated, Failure> {
+    let names: Vec<String> = settings.cameras.iter().map(|it| it.name.clone()).collect();
+    refuse_twins(&names)?;
+    let (looked, sights, points, sizes) = sighted(settings, &names, stop, console)?;
+    let mut notes = Vec::new();
+    let mut asked = Mirrored::Known;
+    let mut task = Task {
+        known: known(settings.known.as_ref(), &names, &sizes)?,
+        names,
+        sizes,
+        lens: settings.lens,
+        look_alikes: boards::Finder::new(&settings.board).look_alikes(),
+        board: points,
+        sights,
+        wants_rig: settings.wants_rig,
+        most_frames: settings.most_frames,
+    };
+    if let Some(looked) = &looked {
+        notes.extend(looked.note.clone());
+        asked = mirrored(settings, looked, &mut task, &mut notes)?;
+        for (name, seen) in task.names.iter().zip(&looked.cameras) {
+            if 2 * seen.n_inverted > seen.sights.len() {
+                notes.push(format!(
+                    "{name}: black and white are exchanged in its pictures"
+                ));
+            }
+        }
+    }
+    console.begin("", "adjusting");
+    let outcome = adjust(&task);
+    console.finish();
+    if let Mirrored::Asked(cameras) = &asked {
+        let agrees = |it: &Outcome| sides_agree(it, cameras);
+        if !outcome.as_ref().is_ok_and(agrees) {
+            return Err(left_is_right(&task.names, cameras));
+        }
+        notes.push(two_sided(&task.names, cameras));
+    }
+    let outcome = outcome.map_err(|error| refused(&error, looked.as_ref(), &task))?;
+    if let Some([alone, together]) = outcome.out_of_step_px {
+        notes.push(format!(
+            "boards fit each camera alone to {alone:.2} px, all together to {together:.2} px: the pictures of a frame were not taken at the \
+             same time. Lenses that a camera alone tells well are kept as it has them, and the frames in which the board moves least tell where cameras stand"
+        ));
+    }
+    Ok(Calibrated {
+        board: looked
+            .as_ref()
+            .map_or_else(|| settings.board.clone(), |it| it.board.clone()),
+        task,
+        looked,
+        outcome,
+        notes,
+    })
+}
+
+/// Cameras of one name are refused.
+fn refuse_twins(names: &[String]) -> Result<(), Failure> {
+    for (nth, name) in names.iter().enumerate() {
+        if names[..nth].contains(name) {
+            return Err(
+                Failure::new(ExitKind::Usage, format!("two cameras are named {name}"))
+                    .with_hint("name them: NAME=PATH"),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Footage that was looked at, sights, the points of the board, the sizes of the pictures.
+type Sighted = (Option<Looked>, Vec<Sight>, Vec<Point2<f64>>, Vec<[u32; 2]>);
+
+/// What was seen of the board: read from a table, or looked for.
+fn sighted(
+    settings: &BoardSettings,
+    names: &[String],
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<Sighted, Failure> {
+    if let Some(file) = &settings.corners {
+        let (sights, points) = read_corners(file, names)?;
+        let sizes = settings.cameras.iter().map(CameraFootage::size);
+        let sizes = sizes.collect::<Result<Vec<_>, Failure>>()?;
+        return Ok((None, sights, points, sizes));
+    }
+    let cameras = &settings.cameras;
+    let looked = look(&settings.board, cameras, &settings.look, stop, console)?;
+    let sights = looked.sights();
+    if sights.is_empty() {
+        return Err(nowhere(settings, &looked, stop));
+    }
+    let sizes = looked.cameras.iter().map(|it| it.size).collect();
+    let points = looked.layout.points.clone();
+    Ok((Some(looked), sights, points, sizes))
+}
+
+/// Mirrored codes. Of a board with the mirror image on its back they are right: a camera behind it sees every corner where it is. In mirrored
+/// footage they are an error, unless it is meant to be mirrored; then the board is one in a mirror.
+fn mirrored(
+    settings: &BoardSettings,
+    looked: &Looked,
+    task: &mut Task,
+    notes: &mut Vec<String>,
+) -> Result<Mirrored, Failure> {
+    let cameras = looked.mirrored();
+    let sees_both = |seen: &&super::Seen| {
+        let n_front = seen.sights.len() - seen.n_mirrored;
+        seen.n_mirrored.min(n_front) >= LEAST_OF_EACH
+    };
+    let is_all = cameras.len() == task.names.len();
+    if settings.back == Some(Back::Mirrored) {
+        return Ok(Mirrored::Known);
+    }
+    if settings.back.is_none() && !settings.is_mirrored {
+        if looked.cameras.iter().any(|seen| sees_both(&seen)) {
+            notes.push(
+                "a camera saw codes both ways round: the back of the board has the mirror image of its front".to_owned(),
+            );
+            return Ok(Mirrored::Known);
+        }
+        if !cameras.is_empty() && !is_all && settings.wants_rig {
+            return Ok(Mirrored::Asked(cameras));
+        }
+    }
+    if cameras.is_empty() {
+        return Ok(Mirrored::Known);
+    }
+    if !settings.is_mirrored || !is_all {
+        return Err(left_is_right(&task.names, &cameras));
+    }
+    let turned = |points: &mut Vec<Point2<f64>>| points.iter_mut().for_each(|it| it.x = -it.x);
+    turned(&mut task.board);
+    task.sights
+        .iter_mut()
+        .for_each(|it| turned(&mut it.on_board));
+    notes.push(
+        "all footage is mirrored: left and right of what is found with this rig are exchanged"
+            .to_owned(),
+    );
+    Ok(Mirrored::Known)
+}
+
+/// Whether cameras that see the back of a board stand behind it, as those that see the front agree with. Where the pictures are mirrored and the
+/// board has one side, every picture puts the camera elsewhere.
+fn sides_agree(outcome: &Outcome, behind: &[usize]) -> bool {
+    let crosses = |it: &&Together| it.cameras.iter().filter(|it| behind.contains(it)).count() == 1;
+    let (mut n, mut n_agree) = (0, 0);
+    for it in outcome.pairs.iter().filter(crosses) {
+        n += it.n;
+        n_agree += it.n_agree;
+    }
+    n >= LEAST_OF_EACH && 5 * n_agree >= 3 * n
+}
+
+fn two_sided(names: &[String], behind: &[usize]) -> String {
+    let names: Vec<&str> = behind.iter().map(|it| names[*it].as_str()).collect();
+    format!(
+        "{} saw the back of the board: it has the mirror image of the front, and the cameras agree about that",
+        names.join(", ")
+    )
+}
+
+/// Mirrored codes that no board with two sides explains.
+fn left_is_right(names: &[String], cameras: &[usize]) -> Failure {
+    let is_all = cameras.len() == names.len();
+    let named: Vec<&str> = cameras.iter().map(|it| names[*it].as_str()).collect();
+    let which = if is_all {
+        "all cameras".to_owned()
+    } else {
+        named.join(", ")
+    };
+    let message = format!(
+        "{which} saw the codes of the board mirrored: its back has the mirror image of the front, or the pictures are mirrored"
+    );
+    let more = if is_all {
+        "; or --mirrored, which calibrates footage as it is that is mirrored in all recordings"
+    } else {
+        ""
+    };
+    Failure::new(ExitKind::Input, message).with_hint(format!(
+        "--back mirrored for a board with two sides; of mirrored pictures (a preview of a webcam) switch the mirroring off in the camera and record \
+         again{more}"
+    ))
+}
+
+/// The intrinsics that are kept.
+fn known(
+    rig: Option<&Rig>,
+    names: &[String],
+    sizes: &[[u32; 2]],
+) -> Result<Vec<Option<geometry::Intrinsics>>, Failure> {
+    let each = names.iter().zip(sizes).map(|(name, size)| {
+        let camera = rig.and_then(|rig| rig.cameras().iter().find(|it| it.name == *name));
+        match camera {
+            Some(camera) if camera.intrinsics.size != *size => {
+                let known = camera.intrinsics.size;
+                Err(Failure::new(
+                    ExitKind::Calibration,
+                    format!(
+                        "camera {name}: its intrinsics are for {}x{} pixels, its footage has {}x{}",
+                        known[0], known[1], size[0], size[1]
+                    ),
+                ))
+            }
+            camera => Ok(camera.map(|it| it.intrinsics)),
+        }
+    });
+    let known: Vec<_> = each.collect::<Result<_, _>>()?;
+    match rig {
+        Some(rig) if known.iter().all(Option::is_none) => {
+            let there: Vec<&str> = rig.cameras().iter().map(|it| it.name.as_str()).collect();
+            Err(Failure::new(
+                ExitKind::Usage,
+                format!(
+                    "--known has the cameras {}, none of {}",
+                    there.join(", "),
+                    names.join(", ")
+                ),
+            )
+            .with_hint("name the footage as the calibration names its cameras: NAME=PATH"))
+        }
+        _ => Ok(known),
+    }
+}
+
+/// Nothing at all was found: what may be there instead.
+fn nowhere(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Failure {
+    let pictures: usize = looked.cameras.iter().map(|it| it.n_pictures).sum();
+    let failure = Failure::new(
+        ExitKind::Input,
+        format!("no board {} in {pictures} pictures", settings.board),
+    );
+    let guess = guessed(settings, looked, stop);
+    failure.with_hint(guess.unwrap_or_else(|| reasons(looked)))
+}
+
+/// Markers of another dictionary.
+fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<String> {
+    if settings.board.kind == Kind::Chessboard {
+        return None;
+    }
+    let quiet = failure::Silent;
+    let most = looked.cameras.iter().map(|it| it.n_pictures).max()?;
+    let settings_of = LookSettings {
+        every: Some(most.div_ceil(GUESSED_PICTURES).max(1)),
+        ..settings.look.clone()
+    };
+    // The largest of each family has the codes of the smaller ones.
+    let largest = dictionary_names().filter(|it| {
+        !["_50", "_100", "_250"]
+            .iter()
+            .any(|small| it.ends_with(small))
+    });
+    for name in largest {
+        let text = settings.board.to_string();
+        let mut parts: Vec<&str> = text.split(':').collect();
+        parts[3] = &name;
+        let Ok(board) = parts.join(":").parse::<Board>() else {
+            continue;
+        };
+        let found = look(&board, &settings.cameras[..1], &settings_of, stop, &quiet).ok()?;
+        if !found.sights().is_empty() {
+            return Some(format!(
+                "there are markers of {name}: --board {}",
+                found.board
+            ));
+        }
+    }
+    None
+}
+
+/// Why pictures had no board, as a hint.
+fn reasons(looked: &Looked) -> String {
+    use boards::Nothing;
+
+    let most = looked
+        .cameras
+        .iter()
+        .flat_map(|it| &it.nothing)
+        .max_by_key(|it| {
+            // What says more goes first.
+            let says = !matches!(it.0, Nothing::NoGrid | Nothing::NoMarkers);
+            (says, it.1)
+        });
+    match most.map(|it| it.0) {
+        Some(Nothing::OtherGrid { columns, rows }) => format!(
+            "a chessboard of {columns}x{rows} inner corners is there: inner corners are counted, not squares"
+        ),
+        Some(Nothing::Elsewhere { n_markers }) => format!(
+            "markers are there (up to {n_markers} in a picture), not where this board has them: are its counts and dictionary right?"
+        ),
+        Some(Nothing::NoCorners) => {
+            "the board is there, its corners are not sharp: move it slower, with more light".to_owned()
+        }
+        _ => "is it the right kind of board, and large enough in the pictures (squares of 15 px and more)?".to_owned(),
+    }
+}
+
+fn refused(error: &BoardError, looked: Option<&Looked>, task: &Task) -> Failure {
+    let hint = match error {
+        BoardError::TooFewBoards { camera, .. } => {
+            let nth = task.names.iter().position(|it| it == camera);
+            let seen = nth.and_then(|it| looked?.cameras.get(it));
+            seen.map_or_else(String::new, |seen| {
+                let n = seen.sights.len();
+                format!("{n} of its {} pictures show some of the board; {}", seen.n_pictures, looked.map_or_else(String::new, reasons))
+            })
+        }
+        BoardError::NoStart { .. } => "try --lens fisheye for a wide lens".to_owned(),
+        BoardError::Apart { .. } => {
+            "if boards were seen together, the frames do not belong together: --timestamps, or start the videos at the same time".to_owned()
+        }
+        BoardError::NotFinite => "try fewer coefficients (--lens five), or known intrinsics (--known)".to_owned(),
+    };
+    let failure = Failure::new(ExitKind::Calibration, error.clone());
+    if hint.is_empty() {
+        failure
+    } else {
+        failure.with_hint(hint)
+    }
+}
+
+impl Calibrated {
+    /// What forbids to trust it, as sentences.
+    pub fn doubts(&self) -> Vec<String> {
+        let each = self.outcome.doubts.iter();
+        each.map(|it| it.text(&self.task.names)).collect()
+    }
+
+    /// The cameras as a rig; all at the origin where poses were not wanted.
+    ///
+    /// # Errors
+    ///
+    /// Numbers that no camera has.
+    pub fn rig(&self) -> Result<Rig, Failure> {
+        let cameras: Vec<Camera> = self
+            .outcome
+            .cameras
+            .iter()
+            .map(|it| it.camera.clone())
+            .collect();
+        let mut source = format!("calibrate board {}", self.board);
+        if !self.task.wants_rig {
+            source += "; intrinsics alone: the poses are not known";
+        }
+        if !self.outcome.doubts.is_empty() {
+            source += "; not to be trusted: ";
+            source += &self.doubts().join("; ");
+        }
+        Rig::new(cameras, None, source).or_fail(ExitKind::Calibration)
+    }
+
+    /// The report.
+    ///
+    /// # Errors
+    ///
+    /// Footage that cannot be read again for the worst pictures.
+    pub fn page(
+        &self,
+        cameras: &[CameraFootage],
+        about: &[(String, String)],
+    ) -> Result<String, Failure> {
+        let overlays: Vec<Overlay> = match &self.looked {
+            Some(looked) => worst(&self.outcome, cameras, &looked.cameras, WORST)?,
+            None => Vec::new(),
+        };
+        let worst: Vec<(String, Vec<u8>)> = overlays
+            .into_iter()
+            .map(|it| {
+                let caption = format!(
+                    "{}, frame {}: {:.2} px",
+                    self.task.names[it.camera], it.frame, it.rms_px
+                );
+                (caption, it.jpeg)
+            })
+            .collect();
+        let [width, height] = self.board.size_metres();
+        let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
+        Ok(report::boards::html(&Page {
+            names: &self.task.names,
+            outcome: &self.outcome,
+            has_rig: self.task.wants_rig,
+            outline: corners.map(Point2::from),
+            about,
+            more_doubts: &[],
+            worst: &worst,
+        }))
+    }
+}

@@ -1,4 +1,0 @@
-//! `parallax train quality` and `quality-samples`: training of the network that predicts the errors of single views.
-
-pub(crate) mod network;
-pub(crate) mod samples;

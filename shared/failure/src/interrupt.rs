@@ -1,0 +1,90 @@
+//! Work that a signal ends in time, however long it takes between two looks at the flag.
+
+use core::time::Duration;
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::thread;
+use std::time::Instant;
+
+use crate::{ExitKind, Failure, OrFail as _, Stop};
+
+/// How long the work may take to notice the flag by itself.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Pause between two looks at the flag.
+const PERIOD: Duration = Duration::from_millis(50);
+
+/// Does `work` on a thread of its own and waits for it; a second after the flag is raised the work is
+/// left behind, to end with the process.
+///
+/// * Returns what the work returned; `None` if it was left behind.
+///
+/// # Errors
+///
+/// The operating system refuses a thread.
+///
+/// # Panics
+///
+/// If the work does.
+pub fn unless_stopped<T: Send + 'static>(
+    stop: &Stop,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<Option<T>, Failure> {
+    let (sender, receiver) = sync_channel(1);
+    let worker = thread::Builder::new().name("train".to_owned());
+    let worker = worker
+        .spawn(move || {
+            // Nobody waits any more: nothing is lost.
+            drop(sender.send(work()));
+        })
+        .or_fail(ExitKind::Run)?;
+    let mut raised: Option<Instant> = None;
+    loop {
+        match receiver.recv_timeout(PERIOD) {
+            Ok(done) => return Ok(Some(done)),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => {
+                if let Err(panic) = worker.join() {
+                    std::panic::resume_unwind(panic);
+                }
+                return Ok(None);
+            }
+        }
+        if stop.is_requested() && raised.get_or_insert_with(Instant::now).elapsed() >= PATIENCE {
+            return Ok(None);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_that_ends_is_waited_for() {
+        let stop = Stop::new().unwrap();
+        let done = unless_stopped(&stop, || {
+            thread::sleep(PERIOD * 2);
+            7
+        });
+        assert_eq!(done.unwrap(), Some(7));
+    }
+
+    #[test]
+    fn work_that_does_not_notice_is_left_behind() {
+        let stop = Stop::new().unwrap();
+        stop.request();
+        let (_held, never) = sync_channel::<()>(1);
+        assert!(
+            unless_stopped(&stop, move || never.recv())
+                .unwrap()
+                .is_none()
+        );
+    }
+
+    #[test]
+    #[should_panic(expected = "a bug")]
+    fn a_panic_is_passed_on() {
+        let stop = Stop::new().unwrap();
+        drop(unless_stopped(&stop, || panic!("a bug")));
+    }
+}

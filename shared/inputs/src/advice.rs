@@ -1,0 +1,86 @@
+//! Hints for input files that cannot be used.
+
+use std::io::{self, ErrorKind};
+use std::path::Path;
+
+use failure::{ExitKind, Failure};
+use geometry::files::RigFileError;
+
+/// What all cameras gave, or the first failure with what the other cameras fail at.
+///
+/// * `cameras`: names and outcomes.
+pub fn of_all<T>(cameras: Vec<(&str, Result<T, Failure>)>) -> Result<Vec<T>, Failure> {
+    let (mut all, mut first, mut others) = (Vec::new(), None, Vec::new());
+    for (name, outcome) in cameras {
+        match outcome {
+            Ok(it) => all.push(it),
+            Err(failure) if first.is_some() => {
+                let message = failure.to_string();
+                let is_named = message.contains(&format!("{name:?}"));
+                others.push(if is_named {
+                    message
+                } else {
+                    format!("{name}: {message}")
+                });
+            }
+            Err(failure) => first = Some(failure),
+        }
+    }
+    let Some(failure) = first else { return Ok(all) };
+    if others.is_empty() {
+        return Err(failure);
+    }
+    Err(failure.with_another_hint(format!("other cameras fail, too: {}", others.join("; "))))
+}
+
+/// The hint for a calibration that cannot be used; none if the error message suffices.
+pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
+    let path = match error {
+        RigFileError::Read { path, source } if source.kind() == ErrorKind::PermissionDenied => {
+            return Some(format!(
+                "whoever runs Parallax needs to read {}",
+                path.display()
+            ));
+        }
+        RigFileError::Read { path, .. } if path.is_dir() => {
+            return Some("a rig is one file: name it, not the folder that it lies in".to_owned());
+        }
+        RigFileError::Read { .. } | RigFileError::NoFiles => {
+            return Some(
+                "a rig file says where the cameras stand; `parallax calib convert` makes one of other programs' calibrations"
+                    .to_owned(),
+            );
+        }
+        RigFileError::Parse { path, .. } | RigFileError::UnknownFormat { path } => path,
+        _ => return None,
+    };
+    let text = files::read_text(path, files::SETTINGS).unwrap_or_default();
+    if text.trim().is_empty() {
+        return Some(format!("{} is empty", path.display()));
+    }
+    let begins = |key: &str| text.lines().any(|it| it.starts_with(key));
+    if begins("rig =") && begins("[[camera]]") {
+        return Some(
+            "this is a deployment file; the rig is the file that its `rig` names".to_owned(),
+        );
+    }
+    None
+}
+
+/// The failure to create a folder for results.
+pub(crate) fn on_folder(folder: &Path, error: &io::Error) -> Failure {
+    let in_the_way = folder
+        .ancestors()
+        .find(|it| it.exists())
+        .filter(|it| !it.is_dir());
+    let message = match in_the_way {
+        Some(file) => format!(
+            "cannot make the folder {}: {} is a file",
+            folder.display(),
+            file.display()
+        ),
+        None => format!("cannot make the folder {}: {error}", folder.display()),
+    };
+    Failure::new(ExitKind::Input, message)
+        .with_hint("results go to the folder `output` of the deployment file, or to --out: name one that can be written")
+}

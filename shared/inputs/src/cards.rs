@@ -1,0 +1,142 @@
+//! Where the card of an ONNX file lies.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use failure::{ExitKind, Failure, in_file, read_text};
+use inference::{Description, Session};
+use keypoints::{CardError, CardKind};
+
+use crate::library::Library;
+
+/// The entry of an ONNX file's `metadata_props` that holds the text of its card.
+pub const METADATA_KEY: &str = "parallax.card";
+
+/// Where a card was found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum CardPlace {
+    /// In a file.
+    File(PathBuf),
+    /// In the network's own file.
+    Metadata,
+}
+
+impl core::fmt::Display for CardPlace {
+    fn fmt(&self, to: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::File(file) => write!(to, "{}", file.display()),
+            Self::Metadata => write!(to, "`{METADATA_KEY}` in the file"),
+        }
+    }
+}
+
+/// An ONNX file, and the text of its card.
+#[derive(Debug)]
+pub(crate) struct OnnxFile {
+    pub(crate) path: PathBuf,
+    pub(crate) session: Session,
+    pub(crate) card: Option<CardText>,
+}
+
+/// The text of a card that is not read yet.
+#[derive(Debug)]
+pub(crate) struct CardText {
+    text: String,
+    place: CardPlace,
+}
+
+impl OnnxFile {
+    /// Loads a network, and finds its card.
+    pub(crate) fn open(
+        path: &Path,
+        card: Option<&Path>,
+        library: &Library,
+    ) -> Result<Self, Failure> {
+        let bytes = files::read(path, files::MODEL).map_err(|error| in_file(path, &error))?;
+        let session = library.session(path, bytes)?;
+        let card = match CardText::beside(path, card)? {
+            Some(card) => Some(card),
+            None => CardText::within(session.description()),
+        };
+        Ok(Self {
+            path: path.to_path_buf(),
+            session,
+            card,
+        })
+    }
+
+    /// A network that is built in, whose card is its own entry.
+    ///
+    /// * `name`: what it is called in errors.
+    pub(crate) fn built_in(name: &Path, bytes: &[u8], library: &Library) -> Result<Self, Failure> {
+        let session = library.session(name, bytes.to_vec())?;
+        Ok(Self {
+            path: name.to_path_buf(),
+            card: CardText::within(session.description()),
+            session,
+        })
+    }
+}
+
+impl CardText {
+    /// The card of a network in a file: the given one, or one beside it.
+    fn beside(network: &Path, given: Option<&Path>) -> Result<Option<Self>, Failure> {
+        let instead = network.with_extension("toml");
+        let mut after = network.as_os_str().to_owned();
+        after.push(".toml");
+        let beside = [instead, PathBuf::from(after)];
+        let beside = beside.iter().find(|it| it.is_file()).map(PathBuf::as_path);
+        let Some(file) = given.or(beside) else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            text: read_text(file)?,
+            place: CardPlace::File(file.to_path_buf()),
+        }))
+    }
+
+    /// The card of a network in its own entry.
+    fn within(description: &Description) -> Option<Self> {
+        let mut entries = description.metadata.iter().rev();
+        let entry = entries.find(|it| it.0 == METADATA_KEY);
+        entry.map(|(_, text)| Self {
+            text: text.clone(),
+            place: CardPlace::Metadata,
+        })
+    }
+
+    /// What it says that it is; `None` if it says neither.
+    pub(crate) fn kind(&self) -> Option<CardKind> {
+        CardKind::of(&self.text)
+    }
+
+    /// The card.
+    ///
+    /// * `network`: the file that it is of.
+    pub(crate) fn read<T>(
+        self,
+        network: &Path,
+        parse: impl FnOnce(&str) -> Result<T, CardError>,
+    ) -> Result<(T, CardPlace), Failure> {
+        let Self { text, place } = self;
+        let card = parse(&text).map_err(|error| match &place {
+            CardPlace::File(file) => in_file(file, &error),
+            CardPlace::Metadata => {
+                let message = format!("{}: `{METADATA_KEY}`: {error}", network.display());
+                Failure::new(ExitKind::Input, message)
+            }
+        })?;
+        Ok((card, place))
+    }
+}
+
+/// What is said of a network that does not fit its card.
+pub(crate) fn misfit(path: &Path, place: &CardPlace, error: &(dyn Error + 'static)) -> Failure {
+    let message = format!(
+        "{} does not fit its card ({place}): {}",
+        path.display(),
+        wording::in_one_line(error)
+    );
+    let hint = "docs/networks.md says what the keys of a card mean";
+    Failure::new(ExitKind::Input, message).with_hint(hint)
+}

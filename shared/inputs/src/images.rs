@@ -1,0 +1,48 @@
+//! Image files that a user names, alone or by their folder.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use failure::{ExitKind, Failure};
+
+use failure::in_file;
+
+/// The images that are named, those of folders in the order of their names.
+///
+/// # Errors
+///
+/// A folder cannot be read, or has no image in it.
+pub fn listed(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut images = Vec::new();
+    for path in named {
+        if !path.is_dir() {
+            images.push(path.clone());
+            continue;
+        }
+        let wrong = |error: io::Error| in_file(path, &error);
+        let mut inside = Vec::new();
+        for entry in fs::read_dir(path).map_err(wrong)? {
+            inside.push(entry.map_err(wrong)?.path());
+        }
+        inside.retain(|it| has_image_name(it));
+        inside.sort();
+        if inside.is_empty() {
+            let message = format!("{}: no image (png, jpg, jpeg, bmp) in it", path.display());
+            return Err(Failure::new(ExitKind::Input, message));
+        }
+        images.append(&mut inside);
+    }
+    Ok(images)
+}
+
+/// Whether a file has an image's name.
+pub fn has_image_name(path: &Path) -> bool {
+    let extension = path
+        .extension()
+        .and_then(|it| it.to_str())
+        .unwrap_or_default();
+    ["png", "jpg", "jpeg", "bmp"]
+        .iter()
+        .any(|it| extension.eq_ignore_ascii_case(it))
+}

@@ -1,0 +1,90 @@
+//! Where joints lie among the parts of a model: the file that is named, or the one that ships with the model.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use consistency::{JointFile, Learned};
+use deployment::{is_none, is_shipped};
+use failure::{ExitKind, Failure, in_file, no_text};
+use skeleton::{JointMap, JointSet};
+
+use super::model_bytes;
+use crate::shipped::Shipped;
+
+/// Where joints lie among the parts.
+#[derive(Debug, Clone)]
+pub struct Joints {
+    file: Option<JointFile>,
+    from: PathBuf,
+}
+
+impl Joints {
+    /// Chooses the joints of a model.
+    ///
+    /// * `file`: of joints; `shipped`: the one that ships, for a model that it was learned with; `none`: a joint is the
+    ///   centre of its part.
+    /// * `model`: the model file; the model that ships if not given.
+    ///
+    /// # Errors
+    ///
+    /// A file cannot be read, or the one that is named was learned with another model.
+    pub fn of(file: &Path, model: Option<&Path>) -> Result<Self, Failure> {
+        let chosen = |it| Self {
+            file: it,
+            from: file.to_owned(),
+        };
+        if is_none(file) {
+            return Ok(chosen(None));
+        }
+        let fingerprint = format!("{:016x}", checksum::fnv1a(&model_bytes(model)?));
+        let read = read(file)?;
+        if read.model == fingerprint {
+            return Ok(chosen(Some(read)));
+        }
+        if is_shipped(file) {
+            return Ok(chosen(None));
+        }
+        let message = format!(
+            "{}: learned with another model ({}, this one is {fingerprint})",
+            file.display(),
+            read.model
+        );
+        let failure = Failure::new(ExitKind::Input, message);
+        Err(failure.with_hint(
+            "`parallax-lab train joints` makes such a file; \"none\" takes the centres of parts",
+        ))
+    }
+
+    /// The map from parts to the joints of a set; a choice of parts without it.
+    ///
+    /// * `learned`: a consistency file; a map of its own counts before the file of joints that ships.
+    pub fn map(&self, learned: Option<&Learned>, set: &JointSet) -> Option<Arc<JointMap>> {
+        let learned = learned.filter(|_| is_shipped(&self.from));
+        let learned = learned.and_then(|it| it.joint_map(set));
+        learned.or_else(|| self.file.as_ref()?.map(set))
+    }
+
+    /// A text that differs for different joints.
+    pub fn fingerprint(&self) -> String {
+        let text = self.file.as_ref().and_then(|it| it.write().ok());
+        text.map_or_else(String::new, |it| {
+            format!("{:016x}", checksum::fnv1a(it.as_bytes()))
+        })
+    }
+}
+
+impl std::fmt::Display for Joints {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.file {
+            None => out.write_str("the centres of parts"),
+            Some(_) if is_shipped(&self.from) => out.write_str("as learned (the file that ships)"),
+            Some(_) => write!(out, "as learned ({})", self.from.display()),
+        }
+    }
+}
+
+fn read(file: &Path) -> Result<JointFile, Failure> {
+    let bytes = Shipped::Joints.read(file)?;
+    let text = core::str::from_utf8(&bytes).map_err(|_odd| no_text(file))?;
+    JointFile::parse(text).map_err(|error| in_file(file, &error))
+}

@@ -1,0 +1,384 @@
+//! The files that users name, read and checked before any process is started: rigs, models, networks with their cards, tables,
+//! and the files that ship; and pictures and videos to try them on. Every error says which file, and what to do.
+#![forbid(unsafe_code)]
+
+pub mod advice;
+mod joints;
+mod maps;
+mod memory;
+mod refused;
+mod shipped;
+
+pub mod cards;
+pub mod described;
+pub mod detector;
+pub mod images;
+pub mod library;
+pub mod network;
+pub mod pictures;
+pub mod sheet;
+
+use std::borrow::Cow;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use consistency::{Appearance, Learned, Shape};
+use deployment::Deployment;
+use failure::no_text;
+use failure::{ExitKind, Failure, OrFail as _};
+use fmp::Model;
+use geometry::Rig;
+use geometry::files::{ReadOptions, RigFileError};
+use multiview::{Compatibility, TypeTables};
+use nalgebra::UnitVector3;
+use orientation::Detector;
+use pipeline::PairTables;
+use viewquality::{Network, NetworkError, Table, Tau};
+
+pub use failure::{in_file, read_text as text};
+pub use joints::Joints;
+pub use maps::{check_maps, detector, mirrored, network_card, open_network, pose_network, springs};
+pub use shipped::Shipped;
+
+/// Reads the named model, or the shipped model if none is named.
+///
+/// # Errors
+///
+/// The file cannot be read or is not a model.
+pub fn model_or_shipped(path: Option<&Path>) -> Result<Arc<Model>, Failure> {
+    path.map_or_else(shipped_model, model)
+}
+
+/// The bytes of the named model file, or of the shipped model if none is named.
+///
+/// # Errors
+///
+/// The file cannot be read, or is empty.
+pub fn model_bytes(path: Option<&Path>) -> Result<Cow<'static, [u8]>, Failure> {
+    path.map_or_else(
+        || Ok(Cow::Borrowed(Shipped::Model.bytes())),
+        |path| Shipped::Model.read(path),
+    )
+}
+
+fn shipped_model() -> Result<Arc<Model>, Failure> {
+    let spec = fmp::files::own::decode(Shipped::Model.bytes()).or_fail(ExitKind::Input)?;
+    Model::new(spec).map(Arc::new).or_fail(ExitKind::Input)
+}
+
+/// Reads a model of any supported format.
+///
+/// # Errors
+///
+/// The file cannot be read or is not a model.
+pub fn model(path: &Path) -> Result<Arc<Model>, Failure> {
+    if deployment::is_shipped(path) {
+        return shipped_model();
+    }
+    fmp::files::read(path)
+        .map(Arc::new)
+        .or_fail(ExitKind::Input)
+}
+
+/// Reads a calibration of any supported format.
+///
+/// * `paths`: one file, or one file per camera.
+///
+/// # Errors
+///
+/// A file cannot be read or is not a calibration; the hint says what to try.
+pub fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<Rig, Failure> {
+    let paths: Vec<&Path> = paths.iter().map(AsRef::as_ref).collect();
+    geometry::files::read_many(&paths, options).map_err(|error| {
+        let kind = match error {
+            RigFileError::Read { .. } | RigFileError::NoFiles => ExitKind::Input,
+            _ => ExitKind::Calibration,
+        };
+        let hint = advice::on_rig(&error);
+        let failure = Failure::new(kind, error);
+        match hint {
+            Some(hint) => failure.with_hint(hint),
+            None => failure,
+        }
+    })
+}
+
+/// Reads the calibration of a deployment, and applies the deployment's `unit` and `up`.
+///
+/// # Errors
+///
+/// As for [`rig`].
+pub fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
+    rig_with(deployment, ReadOptions::default())
+}
+
+/// As [`rig_of`], for what needs the lenses alone: a camera without a place stands at the origin.
+///
+/// # Errors
+///
+/// As for [`rig`].
+pub fn lenses_of(deployment: &Deployment) -> Result<Rig, Failure> {
+    let options = ReadOptions {
+        lenses_suffice: true,
+        ..ReadOptions::default()
+    };
+    rig_with(deployment, options)
+}
+
+fn rig_with(deployment: &Deployment, options: ReadOptions) -> Result<Rig, Failure> {
+    let unit = deployment.unit.as_deref().map(str::parse).transpose();
+    let options = ReadOptions {
+        unit: unit.or_fail(ExitKind::Config)?,
+        ..options
+    };
+    let read = rig(&[&deployment.rig], &options)?;
+    let up = deployment
+        .up
+        .and_then(|up| UnitVector3::try_new(up.into(), 1e-9));
+    Ok(match up {
+        Some(up) => read.with_up(Some(up)),
+        None => read,
+    })
+}
+
+/// A camera of a deployment in its rig.
+///
+/// # Errors
+///
+/// The rig has no such camera, or not its place.
+pub fn camera_of<'a>(
+    rig: &'a Rig,
+    name: &str,
+    deployment: &Deployment,
+) -> Result<&'a geometry::Camera, Failure> {
+    rig.camera(name).ok_or_else(|| {
+        let file = deployment.rig.display();
+        let message = format!("{file} has {}", rig.lacks(name));
+        Failure::new(ExitKind::Calibration, message)
+    })
+}
+
+/// Reads the part-type tables of a pair of views.
+///
+/// * `files`: the tables `first wrt second` and `second wrt first`.
+///
+/// # Errors
+///
+/// A file cannot be read, its part types are not those of the model, or the two contradict each other.
+pub fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> {
+    let n_types: Vec<usize> = (0..model.n_parts())
+        .map(|part| model.n_types(part))
+        .collect();
+    let read = |file: &Path| -> Result<Compatibility, Failure> {
+        let text = text(file)?;
+        let table = Compatibility::parse(&text, &n_types);
+        table.map_err(|error| in_file(file, &error))
+    };
+    let [first, second] = [read(files[0])?, read(files[1])?];
+    let (joint, contradiction) = Compatibility::joint_from_conditionals(&first, &second)
+        .map_err(|error| in_file(files[1], &error))?;
+    tracing::debug!(contradiction, "part-type tables of both directions");
+    Ok(TypeTables {
+        conditional: [Arc::new(first), Arc::new(second)],
+        joint: Arc::new(joint),
+        exchanged: None,
+    })
+}
+
+/// Reads the learned multi-view consistency, if a file is named, and checks that it matches the model.
+///
+/// # Errors
+///
+/// The file cannot be read or was learned with another model.
+pub fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Failure> {
+    let Some(file) = file else {
+        return Ok(None);
+    };
+    let bytes = Shipped::Consistency.read(file)?;
+    let text = core::str::from_utf8(&bytes).map_err(|_odd| no_text(file))?;
+    let learned = Learned::parse(text).map_err(|error| in_file(file, &error))?;
+    let checked = learned.check_model(&Shape::of(model));
+    checked.map_err(|error| in_file(file, &error))?;
+    Ok(Some(learned))
+}
+
+/// Reads what tells in which direction a person faces; nothing for the word `none`, and for a model of other parts
+/// than those it was learned for.
+///
+/// # Errors
+///
+/// The file cannot be read, or is another one.
+pub fn orientation(file: &Path, model: &Model) -> Result<Option<Arc<Detector>>, Failure> {
+    let has_head = model.n_parts() == skeleton::N_PARTS;
+    if deployment::is_none(file) || (!has_head && deployment::is_shipped(file)) {
+        return Ok(None);
+    }
+    if !has_head {
+        let message = format!(
+            "{}: for models of {} parts, this one has {}",
+            file.display(),
+            skeleton::N_PARTS,
+            model.n_parts()
+        );
+        return Err(Failure::new(ExitKind::Input, message));
+    }
+    let bytes = Shipped::Orientation.read(file)?;
+    let network =
+        orientation::Network::from_bytes(&bytes).map_err(|error| in_file(file, &error))?;
+    Ok(Some(Arc::new(Detector::new(network))))
+}
+
+/// The part-type tables of all pairs of the given cameras: those named in the settings, else the learned ones.
+///
+/// # Errors
+///
+/// A table cannot be read, or there are no learned tables for the rig that `fuse.consistency_rig` names.
+pub fn pair_tables(
+    config: &deployment::fuse::Config,
+    learned: Option<&Learned>,
+    model: &Model,
+    cameras: &[&str],
+) -> Result<PairTables, Failure> {
+    let index = |name: &String| cameras.iter().position(|it| it == name);
+    let mut of_pairs = Vec::new();
+    for entry in &config.compatibility {
+        let [Some(first), Some(second)] = entry.views.each_ref().map(index) else {
+            continue;
+        };
+        let mut files = entry.files.each_ref().map(PathBuf::as_path);
+        if first > second {
+            files.reverse();
+        }
+        of_pairs.push((
+            first.min(second),
+            first.max(second),
+            type_tables(files, model)?,
+        ));
+    }
+    let Some(learned) = learned else {
+        let by_angle = None;
+        return Ok(PairTables { of_pairs, by_angle });
+    };
+    let appearance = match config.energy {
+        deployment::fuse::Energy::Paper => learned.weights.appearance,
+        deployment::fuse::Energy::Released => Appearance::Joint,
+    };
+    if let Some(rig) = &config.consistency_rig {
+        let Some(own) = learned.of_rig(rig, cameras, appearance) else {
+            let message = format!("`fuse.consistency_rig`: no rig {rig:?} was learned");
+            return Err(Failure::new(ExitKind::Config, message));
+        };
+        of_pairs.extend(own);
+    }
+    Ok(PairTables {
+        of_pairs,
+        by_angle: Some(Arc::new(learned.by_angle(appearance))),
+    })
+}
+
+/// Reads a table of expected errors of a model with `n_parts` parts.
+///
+/// # Errors
+///
+/// The file cannot be read or is not a table for this number of parts.
+pub fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failure> {
+    Table::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))
+}
+
+/// Reads a network that predicts the expected errors of a model with `n_parts` parts.
+///
+/// # Errors
+///
+/// The file cannot be read or is not a network for this number of parts.
+pub fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
+    let bytes = Shipped::Network.read(file)?.into_owned();
+    Network::parse(bytes, n_parts).map_err(|error| unusable(file, &error))
+}
+
+/// Reads the network of the `[quality]` section, if it names one.
+///
+/// # Errors
+///
+/// The file cannot be read or is not a network for this number of parts, or the requested ONNX Runtime cannot be
+/// loaded.
+pub fn quality_network(
+    config: &deployment::quality::Config,
+    n_parts: usize,
+) -> Result<Option<Network>, Failure> {
+    let Some(file) = &config.network else {
+        return Ok(None);
+    };
+    let network = match &config.onnx_runtime {
+        None => network(file, n_parts),
+        Some(library) => by_onnx_runtime(library, config.device, file, n_parts),
+    };
+    network.map(Some)
+}
+
+#[cfg(feature = "ort")]
+fn by_onnx_runtime(
+    library: &Path,
+    device: deployment::quality::Device,
+    file: &Path,
+    n_parts: usize,
+) -> Result<Network, Failure> {
+    let runtime = viewquality::OnnxRuntime::load(library);
+    let runtime = runtime.map_err(|error| unusable(library, &NetworkError::Load(error)))?;
+    let runtime = match device {
+        deployment::quality::Device::Cpu => runtime,
+        deployment::quality::Device::Cuda => runtime.on_cuda(),
+    };
+    let bytes = Shipped::Network.read(file)?;
+    Network::parse_with(&runtime, &bytes, n_parts).map_err(|error| unusable(file, &error))
+}
+
+#[cfg(not(feature = "ort"))]
+fn by_onnx_runtime(
+    library: &Path,
+    _device: deployment::quality::Device,
+    _file: &Path,
+    _n_parts: usize,
+) -> Result<Network, Failure> {
+    let message = format!(
+        "`quality.onnx_runtime` names {}, but this Parallax was built without it: build it with --features ort",
+        library.display()
+    );
+    Err(Failure::new(ExitKind::Config, message))
+}
+
+/// The failure for a network that cannot be used, with the cause that the library reports.
+fn unusable(file: &Path, error: &NetworkError) -> Failure {
+    let cause = std::error::Error::source(error).map(|it| format!(": {it}"));
+    let message = format!("{}: {error}{}", file.display(), cause.unwrap_or_default());
+    Failure::new(ExitKind::Input, message)
+}
+
+/// Reads the thresholds (tau) of a model with `n_parts` parts, pixels.
+///
+/// # Errors
+///
+/// The file cannot be read, or does not have one threshold per part.
+pub fn tau(file: &Path, n_parts: usize) -> Result<Vec<f32>, Failure> {
+    let tau = Tau::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))?;
+    Ok(tau.px().to_vec())
+}
+
+/// Creates a folder for results.
+///
+/// # Errors
+///
+/// The folder cannot be created; the hint says what to try.
+pub fn make_folder(folder: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(folder).map_err(|error| advice::on_folder(folder, &error))
+}
+
+/// Adds the origin of the data, if the deployment file gives one, to a failure to read an input.
+pub fn of_deployment(failure: Failure, deployment: &Deployment) -> Failure {
+    match &deployment.data {
+        Some(data) if failure.kind() == ExitKind::Input => {
+            failure.with_another_hint(format!("where its data come from: {data}"))
+        }
+        _ => failure,
+    }
+}

@@ -1,0 +1,68 @@
+//! What runs networks.
+
+use std::path::Path;
+
+use failure::Failure;
+use inference::Session;
+
+use crate::refused::refused;
+
+/// What runs networks.
+#[derive(Debug, Default)]
+pub enum Library {
+    /// The library that is built in.
+    #[default]
+    BuiltIn,
+    /// ONNX Runtime, which the user provides.
+    #[cfg(feature = "ort")]
+    OnnxRuntime(inference::OnnxRuntime),
+}
+
+impl Library {
+    /// Loads ONNX Runtime.
+    ///
+    /// * `file`: the library, for example `/usr/lib/libonnxruntime.so`.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be loaded.
+    #[cfg(feature = "ort")]
+    pub fn load(file: &Path) -> Result<Self, Failure> {
+        let loaded = inference::OnnxRuntime::load(file);
+        loaded
+            .map(Self::OnnxRuntime)
+            .map_err(|error| refused(file, &error))
+    }
+
+    /// Loads ONNX Runtime.
+    ///
+    /// * `file`: the library, for example `/usr/lib/libonnxruntime.so`.
+    ///
+    /// # Errors
+    ///
+    /// Always: this Parallax was built without it.
+    #[cfg(not(feature = "ort"))]
+    pub fn load(file: &Path) -> Result<Self, Failure> {
+        let message = format!(
+            "{}: ONNX Runtime, but this Parallax was built without it: build it with --features ort",
+            file.display()
+        );
+        Err(Failure::new(failure::ExitKind::Config, message))
+    }
+
+    /// Loads a network.
+    ///
+    /// * `path`: what it is called in errors.
+    ///
+    /// # Errors
+    ///
+    /// It is no network that can be run.
+    pub(crate) fn session(&self, path: &Path, bytes: Vec<u8>) -> Result<Session, Failure> {
+        let session = match self {
+            Self::BuiltIn => Session::parse(bytes),
+            #[cfg(feature = "ort")]
+            Self::OnnxRuntime(runtime) => Session::parse_with(runtime, &bytes),
+        };
+        session.map_err(|error| refused(path, &error))
+    }
+}

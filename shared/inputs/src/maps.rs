@@ -1,0 +1,137 @@
+//! Networks that find keypoints, and what goes with them: detectors of people, and the springs between joints.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::library::Library;
+use crate::network::NetworkFile;
+use deployment::pose::Config;
+use deployment::{Deployment, is_shipped};
+use failure::{ExitKind, Failure, OrFail as _, in_file};
+use fmp::Model;
+use keypoints::Card;
+use posenetwork::{Detector, PoseNetwork};
+
+use crate::shipped::Shipped;
+
+/// Reads the tree of springs that holds the maps of a network together; `shipped` stands for the one that ships.
+///
+/// # Errors
+///
+/// The file cannot be read, or is another model.
+pub fn springs(file: &Path) -> Result<Arc<Model>, Failure> {
+    let bytes = Shipped::Springs.read(file)?;
+    let spec = fmp::files::own::decode(&bytes).map_err(|error| in_file(file, &error))?;
+    let model = Model::new(spec).or_fail(ExitKind::Input)?;
+    if !posenetwork::springs::is_tree(&model) {
+        let message = format!("{}: a model, but no tree of springs", file.display());
+        let hint =
+            "`parallax-lab train springs` makes such a file; \"shipped\": the one that is built in";
+        return Err(Failure::new(ExitKind::Input, message).with_hint(hint));
+    }
+    Ok(Arc::new(model))
+}
+
+/// Loads the network of a camera, if it has one, and tries it once.
+///
+/// # Errors
+///
+/// A file cannot be read, is no network that can be run or no card, or the two do not fit.
+pub fn pose_network(
+    deployment: &Deployment,
+    camera: usize,
+) -> Result<Option<PoseNetwork>, Failure> {
+    let Some((file, card)) = deployment.pose_network(camera) else {
+        return Ok(None);
+    };
+    let library = library(&deployment.pose)?;
+    let network = open_network((file, card), &library)?.fitted()?;
+    if deployment.pose.mirror {
+        return mirrored(network, "pose.mirror").map(Some);
+    }
+    Ok(Some(network))
+}
+
+/// The same network, which looks at mirror images as well.
+///
+/// * `asked`: the setting or option that asks for it.
+///
+/// # Errors
+///
+/// [`ExitKind::Config`]: it cannot.
+pub fn mirrored(network: PoseNetwork, asked: &str) -> Result<PoseNetwork, Failure> {
+    let name = network.card().name.clone();
+    network.mirrored().map_err(|error| {
+        let message = format!("{asked}: {name}: {error}");
+        Failure::new(ExitKind::Config, message)
+    })
+}
+
+/// Reads a network that finds keypoints and its card; `shipped` stands for the one that ships.
+///
+/// * `card`: the file of the card, if that is not beside the network.
+///
+/// # Errors
+///
+/// A file cannot be read, is no network that can be run, or no card.
+pub fn open_network(
+    (file, card): (&Path, Option<&Path>),
+    library: &Library,
+) -> Result<NetworkFile, Failure> {
+    if is_shipped(file) {
+        let shipped = Shipped::PoseNetwork;
+        return NetworkFile::built_in(&shipped.name(), shipped.bytes(), library);
+    }
+    NetworkFile::open_with(file, card, library)
+}
+
+/// The card of a camera's network; none without a network or a card.
+///
+/// # Errors
+///
+/// The network or its card cannot be read.
+pub fn network_card(deployment: &Deployment, camera: usize) -> Result<Option<Card>, Failure> {
+    let Some((file, card)) = deployment.pose_network(camera) else {
+        return Ok(None);
+    };
+    let network = open_network((file, card), &library(&deployment.pose)?)?;
+    Ok(network.card().map(|it| it.0.clone()))
+}
+
+/// Loads the detector of a deployment, if it has one, and tries it once.
+///
+/// # Errors
+///
+/// As for [`pose_network`].
+pub fn detector(config: &Config) -> Result<Option<Detector>, Failure> {
+    let Some(file) = &config.detector else {
+        return Ok(None);
+    };
+    let library = library(config)?;
+    crate::detector::open_with(file, config.detector_card.as_deref(), &library).map(Some)
+}
+
+/// Loads every network of a deployment once, to see that each fits its card.
+///
+/// # Errors
+///
+/// As for [`pose_network`].
+pub fn check_maps(deployment: &Deployment) -> Result<(), Failure> {
+    let mut known = Vec::new();
+    for camera in 0..deployment.cameras.len() {
+        let named = deployment.pose_network(camera);
+        if named.is_some() && !known.contains(&named) {
+            pose_network(deployment, camera)?;
+            known.push(named);
+        }
+    }
+    if !known.is_empty() {
+        detector(&deployment.pose)?;
+    }
+    Ok(())
+}
+
+fn library(config: &Config) -> Result<Library, Failure> {
+    let file = config.onnx_runtime.as_deref();
+    file.map_or(Ok(Library::BuiltIn), Library::load)
+}

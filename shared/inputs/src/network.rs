@@ -1,0 +1,192 @@
+//! Networks that find keypoints, from files: an ONNX file and its card.
+
+mod drawn;
+mod nearest;
+
+use std::path::{Path, PathBuf};
+
+use failure::{ExitKind, Failure, OrFail as _, in_file};
+use fmp::Layout;
+use footage::Size;
+use inference::{Description, Session};
+use kernels::Rgb8View;
+use keypoints::Card;
+use posenetwork::springs::TurnedSprings;
+use posenetwork::{
+    JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Sight, Turn, Workspace,
+};
+use serde_json::{Value, json};
+
+use crate::cards::{CardPlace, OnnxFile, misfit};
+use crate::library::Library;
+use crate::pictures::Picture;
+use crate::refused::refused;
+
+pub use drawn::{limbs, sheet};
+pub use nearest::{nearest, nearest_detectors};
+
+/// An ONNX file that was read.
+#[derive(Debug)]
+pub struct NetworkFile {
+    path: PathBuf,
+    session: Session,
+    card: Option<(Card, CardPlace)>,
+}
+
+impl NetworkFile {
+    /// Reads a network, and its card if there is one.
+    ///
+    /// * `card`: the file of the card. If not given it is the first of: the file beside the network whose ending is `.toml`
+    ///   in place of `.onnx`, or after it; the entry [`METADATA_KEY`](crate::cards::METADATA_KEY) of the network.
+    ///
+    /// # Errors
+    ///
+    /// A file cannot be read, is no network that can be run, or no card.
+    pub fn open(path: &Path, card: Option<&Path>) -> Result<Self, Failure> {
+        Self::open_with(path, card, &Library::BuiltIn)
+    }
+
+    /// As [`Self::open`], run by a library of choice.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Self::open`].
+    pub fn open_with(path: &Path, card: Option<&Path>, library: &Library) -> Result<Self, Failure> {
+        Self::of(OnnxFile::open(path, card, library)?)
+    }
+
+    /// A network that is built in, run by a library of choice.
+    ///
+    /// * `name`: what it is called in errors.
+    ///
+    /// # Errors
+    ///
+    /// It is no network that can be run, or its card is none.
+    pub fn built_in(name: &Path, bytes: &[u8], library: &Library) -> Result<Self, Failure> {
+        Self::of(OnnxFile::built_in(name, bytes, library)?)
+    }
+
+    pub(crate) fn of(read: OnnxFile) -> Result<Self, Failure> {
+        let OnnxFile {
+            path,
+            session,
+            card,
+        } = read;
+        let card = card.map(|it| it.read(&path, Card::parse));
+        Ok(Self {
+            card: card.transpose()?,
+            path,
+            session,
+        })
+    }
+
+    /// What it takes and gives.
+    pub fn description(&self) -> &Description {
+        self.session.description()
+    }
+
+    /// Its card, and where that was found.
+    pub fn card(&self) -> Option<&(Card, CardPlace)> {
+        self.card.as_ref()
+    }
+
+    /// The network, which is tried once on an empty picture.
+    ///
+    /// # Errors
+    ///
+    /// It has no card, or does not fit it.
+    pub fn fitted(self) -> Result<PoseNetwork, Failure> {
+        let Self {
+            path,
+            session,
+            card,
+        } = self;
+        let Some((card, place)) = card else {
+            let message = format!("{}: the network has no card", path.display());
+            let hint = format!(
+                "`parallax-lab model show {}` says which of the cards in configs/networks comes nearest: give it with --card, or \
+                 put it beside the network as {}; docs/networks.md says how to write one",
+                wording::shell(path.display()),
+                path.with_extension("toml").display()
+            );
+            return Err(Failure::new(ExitKind::Input, message).with_hint(hint));
+        };
+        PoseNetwork::new(session, card).map_err(|error| misfit(&path, &place, &error))
+    }
+}
+
+/// What a network sees in a box of a picture: left, top, right, bottom, pixels.
+///
+/// * `turn`: how the picture is turned for the network.
+///
+/// # Errors
+///
+/// The network cannot be run, or gives values that are not finite; the box has no extent.
+pub fn look<'a>(
+    network: &'a PoseNetwork,
+    picture: &Picture,
+    (outline, turn): ([f64; 4], Turn),
+    workspace: &'a mut Workspace,
+) -> Result<Sight<'a>, Failure> {
+    let Size { width, height } = picture.size;
+    let image = Rgb8View::new(width, height, &picture.rgb);
+    let image = image.map_err(|error| in_file(&picture.path, &error))?;
+    let sight = network.look_turned(image, (outline, turn), workspace);
+    let sight = sight.map_err(|error| refused(&picture.path, &error))?;
+    sight.ok_or_else(|| {
+        let message = format!("{}: a box without an extent", picture.path.display());
+        Failure::new(ExitKind::Input, message)
+    })
+}
+
+/// The box that fits a person best who is seen in another one, as a deployment looks for it ([`Looker::look_closer`]), and how the
+/// picture is to be turned there.
+///
+/// * `outline`: the box in which the person is seen, pixels of the picture.
+/// * Returns that box itself in a picture that is too small for the tree of springs.
+///
+/// # Errors
+///
+/// As for [`look`].
+pub fn closest(
+    (network, springs): (&PoseNetwork, &TurnedSprings),
+    picture: &Picture,
+    outline: [f64; 4],
+    memory: &mut LookMemory,
+) -> Result<([f64; 4], Turn), Failure> {
+    let Size { width, height } = picture.size;
+    let image = Rgb8View::new(width, height, &picture.rgb);
+    let image = image.map_err(|error| in_file(&picture.path, &error))?;
+    let as_it_is = (outline, Turn::Up);
+    let Ok(layout) = Layout::new(springs.model(), width, height) else {
+        return Ok(as_it_is);
+    };
+    let looker = Looker {
+        network,
+        springs,
+        layout: &layout,
+        settings: &MapSettings::default(),
+    };
+    let mut maps = JointMaps::default();
+    let outlines = &[outline][..];
+    let seen = looker.best_of((image, outlines), Turn::Up, memory, &mut maps);
+    let seen = seen.map_err(|error| refused(&picture.path, &error))?;
+    Ok(seen.map_or(as_it_is, |it| (it.outline, it.turn)))
+}
+
+/// Returns the keypoints with their names, pixels of the picture, as JSON.
+///
+/// # Errors
+///
+/// The answer of the network cannot be decoded.
+pub fn keypoints_json(sight: &Sight<'_>) -> Result<Vec<Value>, Failure> {
+    let found = sight.keypoints().or_fail(ExitKind::Input)?;
+    let names = sight.network().names().iter();
+    let each = names.zip(found);
+    let each = each
+        .map(|(name, it)| json!({ "name": name, "x": it.at[0], "y": it.at[1], "score": it.score }));
+    Ok(each.collect())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,248 @@
+//! The pictures of a file, and the size at which one is searched.
+
+use std::path::{Path, PathBuf};
+
+use failure::{ExitKind, Failure, OrFail as _};
+use fmp::{Layout, Model, Pose, Search};
+use footage::{Fill, Rotation, Size, Source, SourceSpec, Turn, Warp, resize_map};
+use kernels::Rgb8View;
+use posenetwork::outline_of_parts;
+
+use crate::images::has_image_name;
+use crate::memory::check_memory;
+use failure::in_file;
+
+/// Which frames of a video are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frames {
+    /// The first and every so many-th frame after it.
+    pub every: u64,
+    /// At most so many; all if not given.
+    pub most: Option<u64>,
+}
+
+/// A picture as people see it.
+#[derive(Debug)]
+pub struct Picture {
+    /// The file.
+    pub path: PathBuf,
+    /// The frame of it, if it is a video.
+    pub frame: Option<u64>,
+    /// How it was turned.
+    pub turn: Turn,
+    /// Its size, pixels.
+    pub size: Size,
+    /// Its pixels, row by row.
+    pub rgb: Vec<u8>,
+}
+
+impl Picture {
+    /// For people: the name of the file, and the frame.
+    pub fn title(&self) -> String {
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        let frame = self.frame.map(|it| format!(" {it}"));
+        format!("{name}{}", frame.unwrap_or_default())
+    }
+
+    /// For the names of files: that of the file without its ending, and the frame.
+    pub fn stem(&self) -> String {
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let frame = self.frame.map(|it| format!("-{it:06}"));
+        format!("{stem}{}", frame.unwrap_or_default())
+    }
+}
+
+/// The pictures of a file, one after the other.
+#[derive(Debug)]
+pub enum Pictures {
+    /// An image; none once it was handed out.
+    Image(Option<PathBuf>),
+    /// A video.
+    Video(PathBuf, Box<Source>),
+}
+
+impl Pictures {
+    /// Opens a file.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be read, or is neither an image nor a video.
+    pub fn open(path: &Path, frames: Frames) -> Result<Self, Failure> {
+        if path.is_file() && footage::is_image(path).or_fail(ExitKind::Input)? {
+            return Ok(Self::Image(Some(path.to_path_buf())));
+        }
+        let source = Source::open(&spec(path, frames)).or_fail(ExitKind::Input)?;
+        Ok(Self::Video(path.to_path_buf(), Box::new(source)))
+    }
+
+    /// The next one; none at the end.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be decoded.
+    pub fn next_picture(&mut self) -> Result<Option<Picture>, Failure> {
+        match self {
+            Self::Image(path) => path.take().map(image).transpose(),
+            Self::Video(path, source) => {
+                let (size, turn) = (source.info().size, source.info().tag);
+                let frame = source.next_frame().or_fail(ExitKind::Input)?;
+                Ok(frame.map(|it| Picture {
+                    path: path.clone(),
+                    frame: Some(it.index),
+                    turn,
+                    size,
+                    rgb: it.rgb.to_vec(),
+                }))
+            }
+        }
+    }
+}
+
+fn image(path: PathBuf) -> Result<Picture, Failure> {
+    let (size, rgb, turn) = footage::read_upright(&path).or_fail(ExitKind::Input)?;
+    Ok(Picture {
+        path,
+        frame: None,
+        turn,
+        size,
+        rgb,
+    })
+}
+
+fn spec(path: &Path, frames: Frames) -> SourceSpec {
+    SourceSpec {
+        step: frames.every,
+        count: frames.most,
+        rotation: Rotation::Tag,
+        ..SourceSpec::new(path.to_string_lossy())
+    }
+}
+
+/// How many pictures a file promises; one if it does not say.
+pub fn count(path: &Path, frames: Frames) -> usize {
+    if has_image_name(path) {
+        return 1;
+    }
+    let source = Source::open(&spec(path, frames));
+    source.map_or(1, |it| it.info().n_frames as usize)
+}
+
+/// What is searched of a picture.
+#[derive(Debug)]
+pub struct Searched {
+    /// The pyramid of it.
+    layout: Layout,
+    /// Pixels of the picture per pixel of it.
+    per_pixel: [f64; 2],
+    /// Its pixels; none where they are the picture's own.
+    smaller: Option<Vec<u8>>,
+}
+
+impl Searched {
+    /// Prepares a picture for the search.
+    ///
+    /// * `longest`: longest side that is searched, pixels; none: all pixels.
+    ///
+    /// # Errors
+    ///
+    /// The picture is too small for the model, or there is no memory for the search.
+    pub fn new(
+        picture: &Picture,
+        longest: Option<usize>,
+        search: &Search,
+    ) -> Result<Self, Failure> {
+        let size = bounded(picture.size, longest);
+        let layout = Layout::new(&search.model, size.width, size.height);
+        let layout = layout.map_err(|error| in_file(&picture.path, &error))?;
+        check_memory(&layout).map_err(|needed| {
+            let message = format!("{}: {needed}", picture.path.display());
+            let hint = "leave --full out, or ask for a smaller --size";
+            Failure::new(ExitKind::Input, message).with_hint(hint)
+        })?;
+        let smaller = if size == picture.size {
+            None
+        } else {
+            let map = resize_map(picture.size, size);
+            let mut pixels = vec![0; size.rgb_bytes()];
+            let warp = Warp::new(picture.size, size, &map, Fill::Replicate);
+            warp.or_fail(ExitKind::Input)?
+                .apply(&picture.rgb, &mut pixels);
+            Some(pixels)
+        };
+        let share = |of: usize, to: usize| of as f64 / to as f64;
+        Ok(Self {
+            layout,
+            per_pixel: [
+                share(picture.size.width, size.width),
+                share(picture.size.height, size.height),
+            ],
+            smaller,
+        })
+    }
+
+    /// The pyramid of what is searched.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Pixels of the picture per pixel that is searched, `[x, y]`.
+    pub fn per_pixel(&self) -> [f64; 2] {
+        self.per_pixel
+    }
+
+    /// The pixels that are searched.
+    ///
+    /// # Errors
+    ///
+    /// Size and pixels of the picture disagree.
+    pub fn image<'a>(&'a self, picture: &'a Picture) -> Result<Rgb8View<'a>, Failure> {
+        let [width, height] = self.layout.image_size;
+        let rgb = self.smaller.as_deref().unwrap_or(&picture.rgb);
+        let image = Rgb8View::new(width, height, rgb);
+        image.map_err(|error| in_file(&picture.path, &error))
+    }
+
+    /// Where a point of it is in the picture.
+    pub fn in_picture(&self, point: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| (point[axis] + 0.5) * self.per_pixel[axis] - 0.5)
+    }
+
+    /// The box of a pose that was found, for a network: all boxes of its parts, widened; left, top, right, bottom, pixels of the
+    /// picture.
+    pub fn outline(&self, model: &Model, pose: &Pose) -> [f64; 4] {
+        let [left, top, right, bottom] = pose.bounding_box(model, &self.layout);
+        let (first, last) = (
+            self.in_picture([left, top]),
+            self.in_picture([right, bottom]),
+        );
+        outline_of_parts([first[0], first[1], last[0], last[1]])
+    }
+}
+
+/// Longest side of a picture in which the filters search for the boxes of a network, pixels.
+pub const BOXES_PX: usize = 640;
+
+/// The size with the longest side that is allowed, and the same shape.
+fn bounded(size: Size, longest: Option<usize>) -> Size {
+    let side = size.width.max(size.height);
+    let Some(longest) = longest.filter(|it| *it < side) else {
+        return size;
+    };
+    let scale = longest as f64 / side as f64;
+    let smaller = |it: usize| ((it as f64 * scale).round() as usize).max(1);
+    Size::new(smaller(size.width), smaller(size.height))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_searched_keeps_its_shape_and_is_never_enlarged() {
+        let bounded = |width, height, longest| bounded(Size::new(width, height), longest);
+        assert_eq!(bounded(4000, 3000, Some(1280)), Size::new(1280, 960));
+        assert_eq!(bounded(3000, 4000, Some(1280)), Size::new(960, 1280));
+        assert_eq!(bounded(640, 480, Some(1280)), Size::new(640, 480));
+        assert_eq!(bounded(4000, 3000, None), Size::new(4000, 3000));
+    }
+}

@@ -1,0 +1,219 @@
+//! Contact sheets: pages of thumbnails with what was found.
+
+use std::path::PathBuf;
+
+use failure::{ExitKind, Failure, OrFail as _};
+use fmp::Model;
+use footage::{Canvas, Fill, Limb, Side, Size, Tile, Warp, compose, draw_limbs, resize_map};
+
+/// Thumbnails of a row, and of a page.
+const N_COLUMNS: usize = 8;
+const N_TILES: usize = 40;
+
+/// Longer side of a thumbnail, pixels.
+const SIDE_PX: usize = 220;
+
+/// What is drawn on a thumbnail.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Skeleton {
+    /// Pixels of the image.
+    pub points: Vec<[f64; 2]>,
+    /// The lines.
+    pub limbs: Vec<Limb>,
+    /// For the caption.
+    pub score: f32,
+}
+
+/// A line from every part to its parent, in the colour of its side.
+pub fn limbs(model: &Model) -> Vec<Limb> {
+    let limb = |(to, part): (usize, &fmp::PartSpec)| {
+        let side = match &part.name {
+            name if name.starts_with("left") => Side::Left,
+            name if name.starts_with("right") => Side::Right,
+            _ => Side::Centre,
+        };
+        part.edge.as_ref().map(|edge| Limb {
+            from: edge.parent,
+            to,
+            side,
+        })
+    };
+    let parts = model.spec().parts.iter().enumerate();
+    parts.filter_map(limb).collect()
+}
+
+/// Thumbnails that wait for their page to be full.
+#[derive(Debug)]
+pub struct Sheet {
+    path: PathBuf,
+    n_pages: usize,
+    page: usize,
+    waiting: Vec<(Canvas, String)>,
+}
+
+impl Sheet {
+    /// Begins the first page.
+    ///
+    /// * `path`: the PNG file; several pages are numbered before the ending.
+    /// * `n_images`: how many will be added.
+    pub fn new(path: PathBuf, n_images: usize) -> Self {
+        Self {
+            path,
+            n_pages: n_images.div_ceil(N_TILES),
+            page: 1,
+            waiting: Vec::new(),
+        }
+    }
+
+    /// Adds an image; writes the page if it is the last of it.
+    ///
+    /// * `name`: for the caption.
+    /// * `rgb`: pixels of an image of `size`, row by row.
+    ///
+    /// # Errors
+    ///
+    /// The page cannot be written.
+    pub fn add(
+        &mut self,
+        name: &str,
+        size: Size,
+        rgb: &[u8],
+        found: Option<&Skeleton>,
+    ) -> Result<(), Failure> {
+        let (thumbnail, scale) = shrunk(size);
+        let map = resize_map(size, thumbnail);
+        let mut pixels = vec![0; thumbnail.rgb_bytes()];
+        let warp = Warp::new(size, thumbnail, &map, Fill::Replicate);
+        warp.or_fail(ExitKind::Input)?.apply(rgb, &mut pixels);
+        let mut canvas = Canvas::from_rgb(thumbnail, &pixels);
+        let caption = match found {
+            None => format!("{name} -"),
+            Some(skeleton) => {
+                let smaller = |it: &[f64; 2]| it.map(|it| (it + 0.5) * scale - 0.5);
+                let points: Vec<_> = skeleton.points.iter().map(smaller).collect();
+                draw_limbs(&mut canvas, &points, &skeleton.limbs);
+                format!("{name} {:.2}", skeleton.score)
+            }
+        };
+        self.waiting.push((canvas, caption));
+        if self.waiting.len() == N_TILES {
+            self.write()?;
+        }
+        Ok(())
+    }
+
+    /// Writes what is left.
+    ///
+    /// # Errors
+    ///
+    /// The page cannot be written.
+    pub fn finish(mut self) -> Result<(), Failure> {
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        self.write()
+    }
+
+    fn write(&mut self) -> Result<(), Failure> {
+        let waiting = std::mem::take(&mut self.waiting);
+        let tiles: Vec<Tile<'_>> = waiting
+            .iter()
+            .map(|(picture, caption)| Tile { picture, caption })
+            .collect();
+        let page = compose(&tiles, N_COLUMNS);
+        page.save_png(&self.path_of_page())
+            .or_fail(ExitKind::Input)?;
+        self.page += 1;
+        Ok(())
+    }
+
+    /// `sheet.png`, or `sheet-1.png` and on if there are several.
+    fn path_of_page(&self) -> PathBuf {
+        if self.n_pages <= 1 {
+            return self.path.clone();
+        }
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let ending = self.path.extension().map(|it| it.to_string_lossy());
+        let ending = ending.map_or(String::new(), |it| format!(".{it}"));
+        let name = format!("{stem}-{}{ending}", self.page);
+        self.path.with_file_name(name)
+    }
+}
+
+/// Size of the thumbnail of an image, and thumbnail pixels per pixel.
+fn shrunk(size: Size) -> (Size, f64) {
+    let scale = SIDE_PX as f64 / size.width.max(size.height).max(1) as f64;
+    let side = |it: usize| ((it as f64 * scale).round() as usize).max(1);
+    (Size::new(side(size.width), side(size.height)), scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longer_side_is_that_of_all_thumbnails() {
+        assert_eq!(shrunk(Size::new(440, 100)), (Size::new(220, 50), 0.5));
+        assert_eq!(shrunk(Size::new(11, 110)), (Size::new(22, 220), 2.0));
+        assert_eq!(shrunk(Size::new(9000, 1)).0, Size::new(220, 1));
+    }
+
+    #[test]
+    fn several_pages_are_numbered_and_every_image_is_on_one() {
+        let dir = tempfile::tempdir().unwrap();
+        let size = Size::new(20, 10);
+        for (n_images, expected) in [(40, vec!["s.png"]), (41, vec!["s-1.png", "s-2.png"])] {
+            let folder = dir.path().join(n_images.to_string());
+            std::fs::create_dir(&folder).unwrap();
+            let mut sheet = Sheet::new(folder.join("s.png"), n_images);
+            for _ in 0..n_images {
+                sheet.add("a.png", size, &[90; 600], None).unwrap();
+            }
+            sheet.finish().unwrap();
+            let entries = std::fs::read_dir(&folder).unwrap();
+            let mut names: Vec<_> = entries
+                .map(|it| it.unwrap().file_name().into_string().unwrap())
+                .collect();
+            names.sort();
+            assert_eq!(names, expected);
+        }
+    }
+
+    #[test]
+    fn the_skeleton_is_drawn_where_it_is_in_the_image() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("s.png");
+        let mut sheet = Sheet::new(path.clone(), 1);
+        let skeleton = Skeleton {
+            points: vec![[100.0, 40.0], [340.0, 40.0]],
+            limbs: vec![Limb {
+                from: 0,
+                to: 1,
+                side: Side::Left,
+            }],
+            score: 0.5,
+        };
+        let size = Size::new(440, 100);
+        sheet
+            .add("a.png", size, &vec![90; size.rgb_bytes()], Some(&skeleton))
+            .unwrap();
+        sheet.finish().unwrap();
+        let page = image::open(path).unwrap().into_rgb8();
+        let blue: Vec<[u32; 2]> = page
+            .enumerate_pixels()
+            .filter(|(_, _, it)| it.0 == footage::LEFT)
+            .map(|(x, y, _)| [x, y])
+            .collect();
+        let ends = |axis: usize| {
+            let values = || blue.iter().map(|it| it[axis]);
+            (values().min().unwrap(), values().max().unwrap())
+        };
+        let top = page.height() - 50 - 8;
+        let ((left, right), (above, below)) = (ends(0), ends(1));
+        assert!(
+            (56..=59).contains(&left) && (176..=180).contains(&right),
+            "{left} {right}"
+        );
+        assert!(above >= top + 17 && below <= top + 23, "{above} {below}");
+    }
+}

@@ -1,0 +1,142 @@
+//! The files that ship with Parallax, built into the executable.
+
+use std::borrow::Cow;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use deployment::{SHIPPED, is_shipped};
+use failure::{ExitKind, Failure};
+
+use failure::in_file;
+
+/// A shipped file; its model card is beside it in `configs/models`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shipped {
+    /// The person model.
+    Model,
+    /// The network that predicts the expected errors of its parts.
+    Network,
+    /// The learned multi-view consistency of the model.
+    Consistency,
+    /// The network that tells in which direction a person faces.
+    Orientation,
+    /// Where joints lie among the parts of the model.
+    Joints,
+    /// The springs that hold the maps of a network together.
+    Springs,
+    /// The network that finds joints.
+    PoseNetwork,
+}
+
+impl Shipped {
+    /// All of them.
+    const ALL: [Self; 7] = [
+        Self::Model,
+        Self::Network,
+        Self::Consistency,
+        Self::Orientation,
+        Self::Joints,
+        Self::Springs,
+        Self::PoseNetwork,
+    ];
+
+    /// The content of the file.
+    pub fn bytes(self) -> &'static [u8] {
+        match self {
+            Self::Model => include_bytes!("../../../configs/models/person.fmp"),
+            Self::Network => include_bytes!("../../../configs/models/person.quality.onnx"),
+            Self::Consistency => include_bytes!("../../../configs/models/person.consistency"),
+            Self::Orientation => include_bytes!("../../../configs/models/person.orientation"),
+            Self::Joints => include_bytes!("../../../configs/models/person.joints"),
+            Self::Springs => include_bytes!("../../../configs/models/person.springs"),
+            Self::PoseNetwork => include_bytes!("../../../configs/models/person.pose.onnx"),
+        }
+    }
+
+    /// A unique name, for example `shipped:model`; settings call every shipped file `shipped`.
+    pub fn name(self) -> PathBuf {
+        let kind = match self {
+            Self::Model => "model",
+            Self::Network => "network",
+            Self::Consistency => "consistency",
+            Self::Orientation => "orientation",
+            Self::Joints => "joints",
+            Self::Springs => "springs",
+            Self::PoseNetwork => "pose-network",
+        };
+        format!("{SHIPPED}:{kind}").into()
+    }
+
+    /// The file with the given unique name.
+    pub fn of_name(name: &Path) -> Option<Self> {
+        Self::ALL.into_iter().find(|it| it.name() == name)
+    }
+
+    /// Reads a file of this kind; `shipped` stands for the shipped one.
+    ///
+    /// # Errors
+    ///
+    /// The file does not exist, cannot be read, or is empty.
+    pub fn read(self, file: &Path) -> Result<Cow<'static, [u8]>, Failure> {
+        if is_shipped(file) {
+            return Ok(Cow::Borrowed(self.bytes()));
+        }
+        let bytes = files::read(file, files::MODEL).map_err(|error| {
+            let failure = in_file(file, &error);
+            let is_absent = error.kind() == ErrorKind::NotFound;
+            if is_absent {
+                failure.with_hint(self.hint())
+            } else {
+                failure
+            }
+        })?;
+        if bytes.is_empty() {
+            let message = format!("{} is empty (0 bytes)", file.display());
+            return Err(Failure::new(ExitKind::Input, message).with_hint(self.hint()));
+        }
+        Ok(Cow::Owned(bytes))
+    }
+
+    /// The hint for a missing file.
+    fn hint(self) -> String {
+        let [key, made_by] = match self {
+            Self::Model => ["model", "train fmp"],
+            Self::Network => ["quality.network", "train quality"],
+            Self::Consistency => ["fuse.consistency", "train consistency"],
+            Self::Orientation => ["pose.orientation", "train orientation"],
+            Self::Joints => ["triangulate.joint_map", "train joints"],
+            Self::Springs => ["pose.springs", "train springs"],
+            Self::PoseNetwork => ["pose.network", "train network"],
+        };
+        format!(
+            "`{key}` is a file that `parallax {made_by}` made, or \"{SHIPPED}\": the one that is built in"
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shipped_file_is_of_its_kind() {
+        let model = fmp::files::own::decode(Shipped::Model.bytes()).unwrap();
+        let n_parts = model.parts.len();
+        viewquality::Network::parse(Shipped::Network.bytes().to_vec(), n_parts).unwrap();
+        let text = core::str::from_utf8(Shipped::Consistency.bytes()).unwrap();
+        consistency::Learned::parse(text).unwrap();
+        orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
+        crate::springs(Path::new(SHIPPED)).unwrap();
+        let library = crate::library::Library::BuiltIn;
+        let network = crate::open_network((Path::new(SHIPPED), None), &library);
+        network.unwrap().fitted().unwrap();
+    }
+
+    #[test]
+    fn the_joints_that_ship_belong_to_the_model_that_ships() {
+        let text = core::str::from_utf8(Shipped::Joints.bytes()).unwrap();
+        let file = consistency::JointFile::parse(text).unwrap();
+        let model = checksum::fnv1a(Shipped::Model.bytes());
+        assert_eq!(file.model, format!("{model:016x}"));
+    }
+}
