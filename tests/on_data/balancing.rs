@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use ::footage::{Fill, Size, Source, SourceSpec, Warp};
+use formats::trc::Trc;
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
 use nalgebra::Point3;
@@ -13,7 +14,6 @@ use orientation::{Detector, Network};
 use pipeline::{Combine, Estimator, EstimatorSettings, Views};
 use skeleton::PARSE14;
 use statistics::Sorted;
-use trc::Trc;
 
 use crate::shared_dir;
 

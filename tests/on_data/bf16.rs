@@ -6,9 +6,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use evaluation::{PcpRule, evaluate};
 use fmp::{Extractor, Model, Precision, Solver};
 use rayon::prelude::*;
+use score::{PcpRule, evaluate};
 use skeleton::PARSE14;
 
 use crate::shared_dir;

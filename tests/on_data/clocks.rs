@@ -1,9 +1,9 @@
 //! Clocks of cameras that are known: the balancing keypoints, shifted and slowed down.
 
+use calibration::synchronisation::{Film, Joint, Person, Settings, Shot, estimate};
 use geometry::files::ReadOptions;
-use keypointfiles::KeypointSource;
 use keypoints::files::NameSet;
-use synchronisation::{Film, Joint, Person, Settings, Shot, estimate};
+use keypoints::keypointfiles::KeypointSource;
 
 use crate::shared_dir;
 

@@ -5,9 +5,9 @@
     reason = "the tests print the figures that they measure"
 )]
 
-use keypointfiles::KeypointSource;
 use keypoints::files::NameSet;
 use keypoints::joint_ways;
+use keypoints::keypointfiles::KeypointSource;
 use posenetwork::{JointMaps, MapSettings};
 use std::time::Instant;
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use c3d::{C3d, C3dError};
-use sequences::{MarkerTable, Motion, MotionError, MotionOptions, read_motion};
+use datasets::sequences::{MarkerTable, Motion, MotionError, MotionOptions, read_motion};
+use formats::c3d::{C3d, C3dError};
 
 use crate::shared_dir;
 

@@ -4,9 +4,9 @@
 
 use std::sync::Arc;
 
-use evaluation::{PcpRule, Report, evaluate};
 use fmp::{Extractor, Model, Solver};
 use rayon::prelude::*;
+use score::{PcpRule, Report, evaluate};
 use serde_json::Value;
 use skeleton::PARSE14;
 

@@ -1,11 +1,11 @@
 //! Where cameras stand, from a person that they see: the balancing keypoints.
 
 use calibration::people::{Recording, Scale, Settings, Vertical, estimate};
+use calibration::synchronisation::{Film, Joint, Person, Shot};
 use keypoints::files::NameSet;
 use keypoints::{is_joint, joint_rows, mirrored};
 use skeleton::{PARSE14, SIDES};
 use statistics::Sorted;
-use synchronisation::{Film, Joint, Person, Shot};
 
 use crate::clocks::recorded;
 use crate::{balancing, shared_dir};

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use datasets::{Person, Picture, ReadOptions, Selection};
-use evaluation::{PcpRule, evaluate};
 use fmp::{Extractor, Layout, Model, Responses, Solver};
 use inputs::network::NetworkFile;
 use posenetwork::springs::TurnedSprings;
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, outline_of, overlap};
 use rayon::prelude::*;
+use score::{PcpRule, evaluate};
 use skeleton::PARSE14;
 
 use crate::shared_dir;

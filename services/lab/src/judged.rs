@@ -4,13 +4,11 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use datasets::{People, Person, Picture};
-use evaluation::{
-    Offset, PARSE_STICKS, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, best_covering,
-};
-use experiment::{Joints, Pictures};
+use evaluation::{Joints, Pictures};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Layout, Pose, Search};
 use rayon::prelude::*;
+use score::{Offset, PARSE_STICKS, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, best_covering};
 use serde_json::{Value, json};
 use skeleton::{JointMap, N_PARTS, PARSE14};
 

@@ -1,7 +1,7 @@
 //! A network on pictures of people whose joints are known: what it finds in their true boxes.
 
 use datasets::{People, Person, Picture, Sides};
-use experiment::{Joints, Pictures};
+use evaluation::{Joints, Pictures};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Layout, Pose, Search};
 use keypoints::Keypoint;

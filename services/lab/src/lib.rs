@@ -14,6 +14,7 @@ pub mod examples;
 pub mod joints;
 pub mod judged;
 pub mod judged_network;
+pub mod model_page;
 pub mod orientation;
 pub mod person;
 pub mod posetraining;

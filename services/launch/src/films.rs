@@ -6,16 +6,16 @@ mod upright;
 
 use core::ops::Range;
 
+use calibration::synchronisation::{Film, Joint, Person, Shot};
 use capture::Feed;
 use deployment::Deployment;
 use failure::Console;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use footage::{FrameView, SourceSpec};
 use geometry::{Camera, Rig, upright_roll};
-use keypointfiles::KeypointSource;
+use keypoints::keypointfiles::KeypointSource;
 use keypoints::{Keypoint, joint_rows, mirrored};
 use skeleton::{PARSE14, SIDES};
-use synchronisation::{Film, Joint, Person, Shot};
 
 use crate::keypoints as keypoint_files;
 use eyes::Eyes;

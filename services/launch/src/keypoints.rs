@@ -5,9 +5,9 @@ use deployment::Deployment;
 use deployment::capture::{Camera, Config};
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::Size;
-use keypointfiles::KeypointSource;
 use keypoints::Sides;
 use keypoints::files::NameSet;
+use keypoints::keypointfiles::KeypointSource;
 use messages::MAX_KEYPOINTS;
 
 use crate::resolved::Resolved;

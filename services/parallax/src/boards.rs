@@ -15,8 +15,8 @@ pub use run::{Back, BoardSettings, Calibrated, calibrate};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use boards::{Board, Layout, Nothing};
 use calibration::board::Sight;
+use calibration::boards::{Board, Layout, Nothing};
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::{FootageError, Source, SourceSpec};
 

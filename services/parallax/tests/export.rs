@@ -6,9 +6,9 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use c3d::C3d;
+use formats::c3d::C3d;
+use formats::trc::Trc;
 use serde_json::{Value, json};
-use trc::Trc;
 
 use crate::common::{Case, Ended, PLAIN};
 
@@ -186,7 +186,7 @@ fn programs_of_others_open_gaps_and_long_files() {
             (0..3).map(place).collect()
         })
         .collect();
-    let heading = trc::Heading {
+    let heading = formats::trc::Heading {
         file_name: "pose3d.trc",
         rate_hz: 60.0,
         units: "m",
@@ -196,12 +196,12 @@ fn programs_of_others_open_gaps_and_long_files() {
     let rows = frames.iter().enumerate().map(|(nth, frame)| {
         // y up.
         let turned = frame.iter().map(|it| it.map(|[x, y, z]| [y, z, x]));
-        trc::row(nth as u64 + 1, nth as f64 / 60.0, turned)
+        formats::trc::row(nth as u64 + 1, nth as f64 / 60.0, turned)
     });
     let text = heading.to_string() + &rows.collect::<String>();
     fs::write(folder.path().join("pose3d.trc"), text).unwrap();
 
-    let heading = c3d::Heading {
+    let heading = formats::c3d::Heading {
         rate_hz: 60.0,
         units: "mm",
         up: "+Z",
@@ -212,13 +212,13 @@ fn programs_of_others_open_gaps_and_long_files() {
         residual_step: 0.5,
         software: ["test", "1"],
     };
-    let marker = |nth: u32| c3d::Marker {
+    let marker = |nth: u32| formats::c3d::Marker {
         position: [f64::from(nth), 2.0, 3.0],
         residual: 1.0,
         cameras: 1,
     };
     let mut file = Vec::new();
-    c3d::write(
+    formats::c3d::write(
         &mut file,
         &heading,
         (1..=70_000).map(|it| vec![Some(marker(it))]),

@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use client::{Client, ClientError, State, Wish};
-use common::started::signal;
 use common::started::WATCHDOG;
+use common::started::signal;
 use common::{Case, PACED, PLAIN};
 use runtime::GuestError;
 use serde_json::Value;

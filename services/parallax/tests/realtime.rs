@@ -67,7 +67,7 @@ fn fast_stages_lose_no_frames() {
 #[test]
 fn slow_stages_process_fewer_frames_and_every_dropped_one_is_counted() {
     // More frames per second than any machine can process. That slow views choose the same frames is tested with
-    // `join::Cadence`; how soon they do depends on the load of the machine.
+    // `stage::join::Cadence`; how soon they do depends on the load of the machine.
     let hurried = PACED.replace("= 20", "= 200");
     let more = format!("{LIVE}{hurried}size = [240, 320]\n");
     let case = Case::new("slow", &[300; 3], &more);

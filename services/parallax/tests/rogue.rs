@@ -8,8 +8,8 @@ use core::time::Duration;
 use std::collections::BTreeSet;
 use std::time::Instant;
 
-use common::started::signal;
 use common::started::WATCHDOG;
+use common::started::signal;
 use common::{Case, Ended, PACED, Started, last_taken, planted};
 use failure::{Stop, now_nanos};
 use messages::{

@@ -8,8 +8,8 @@ use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::Instant;
 
-use common::started::signal;
 use common::started::WATCHDOG;
+use common::started::signal;
 use common::{Case, PACED, Started};
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket, client};

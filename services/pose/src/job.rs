@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use deployment::Timeline;
 use fmp::Layout;
-use keypointfiles::KeypointSource;
+use keypoints::keypointfiles::KeypointSource;
 use pipeline::{NetworkStep, ViewStep};
 
 /// Keypoints that another program found in the footage of a view.

@@ -15,7 +15,7 @@ pub(crate) fn row(scene: &Scene, row: u64, pose: &Pose3d) -> String {
     let points = joints(scene, pose)
         .chain(keypoints(scene, pose))
         .map(|(_, joint)| is_placed(joint).then(|| (axes * Vector3::from(joint.in_world)).into()));
-    ::trc::row(row, time, points)
+    formats::trc::row(row, time, points)
 }
 
 /// The five lines before the rows.
@@ -27,7 +27,7 @@ pub(crate) fn header(scene: &Scene, rate_hz: f64, n_rows: u64) -> String {
     let joints = scene.joints.joints.iter().map(|it| it.name);
     let names = joints.chain(scene.extra_keypoints.iter().map(String::as_str));
     let names: Vec<String> = names.map(|it| it.replace(' ', "_")).collect();
-    let heading = ::trc::Heading {
+    let heading = formats::trc::Heading {
         file_name: "pose3d.trc",
         rate_hz,
         units: "m",
@@ -39,7 +39,7 @@ pub(crate) fn header(scene: &Scene, rate_hz: f64, n_rows: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use ::trc::Trc;
+    use formats::trc::Trc;
     use messages::Status;
 
     use super::*;

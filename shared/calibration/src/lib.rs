@@ -13,8 +13,10 @@
 
 mod align;
 pub mod board;
+pub mod boards;
 pub mod origin;
 pub mod people;
 pub mod refine;
+pub mod synchronisation;
 
 pub use align::{Difference, Similarity, aligned, differences};

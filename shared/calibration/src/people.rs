@@ -37,7 +37,7 @@ pub use floor::{Floor, floor};
 pub use frame::{Scale, Skeletons, Vertical};
 pub use outcome::{CameraReport, Outcome};
 
-use synchronisation::Film;
+use crate::synchronisation::Film;
 
 use geometry::Camera;
 

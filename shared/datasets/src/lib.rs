@@ -26,6 +26,7 @@
 #![forbid(unsafe_code)]
 
 mod person;
+pub mod sequences;
 
 mod check;
 mod lines;

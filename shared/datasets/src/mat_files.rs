@@ -1,6 +1,6 @@
 //! The MATLAB files of PARSE and LSP.
 
-use mat5::{ContainerError, Numbers, Value};
+use formats::mat5::{ContainerError, Numbers, Value};
 
 /// Joints of one person and whether they are visible.
 pub type Annotation = (Vec<[f64; 2]>, Vec<bool>);
@@ -100,8 +100,8 @@ fn with_numbers(
     variable: &'static str,
     read: impl Fn(&Numbers<'_>) -> Result<Vec<Annotation>, MatLayoutError>,
 ) -> Result<Vec<Annotation>, MatLayoutError> {
-    for bytes in &mat5::variables(file)? {
-        let (name, value) = mat5::variable(bytes)?;
+    for bytes in &formats::mat5::variables(file)? {
+        let (name, value) = formats::mat5::variable(bytes)?;
         if let (true, Value::Numbers(numbers)) = (name == variable, &value) {
             return read(numbers);
         }

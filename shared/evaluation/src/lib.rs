@@ -1,31 +1,50 @@
-//! Errors against a reference: PCP, PCK, and distances.
+//! The paper's evaluation: versions of the method side by side on one sequence, scored, and reported.
 //!
-//! In three dimensions: [`segment_errors`] (PCP3D, the paper's eq. 13), [`joint_errors`] and [`aligned`]
-//! (MPJPE and its Procrustes form, 3D PCK), [`Changes`] against a baseline, and [`Bootstrap`] intervals of
-//! any of them.
+//! [`Film`] gives the frames of a sequence, [`Bench`] solves each of them once in every view and then
+//! by every [`Version`], [`Record`] keeps what was found (so that a run can go on), [`score()`] compares
+//! it with the truth, and [`Summary`] adds up: as JSON and as LaTeX ([`latex()`]), the paper's own numbers
+//! beside ours ([`published()`]).
+//!
+//! [`Pictures`] are single pictures of annotated people. [`joints_by`] solves a frame on the keypoints of a network in the ways
+//! that are compared, and [`Stress`] is what goes wrong in it on purpose.
+//!
+//! Solving and scoring are separate: other thresholds or another ground truth need no second run.
 #![forbid(unsafe_code)]
 
-mod offsets;
-mod pck;
-mod pcp;
-mod report;
+pub mod page;
 
-mod joints3d;
-mod pcp3d;
+mod version;
 
-mod bootstrap;
-mod changes;
-mod ranks;
+mod bench;
+mod by_network;
+mod film;
+mod plain;
+mod stress;
+mod truth;
 
-pub use bootstrap::{Bootstrap, Share};
-pub use changes::Changes;
-pub use joints3d::{aligned, joint_errors};
-pub use offsets::{FOUND_WITHIN, Offset, height, offsets};
-pub use pck::{PCK_GROUPS, best_covering, joints_found};
-pub use pcp::{PARSE_STICKS, Pcp, PcpRule, pcp, sticks_found};
-pub use pcp3d::{SEGMENT_NAMES, Segment, segment_errors, segments};
-pub use ranks::{area_under_roc, rank_correlation};
-pub use report::{PCK_SHARES, Report, evaluate};
+mod predicted;
+mod record;
+mod score;
+mod summary;
 
-/// A point in space.
-pub type Point = [f64; 3];
+mod latex;
+mod pictures;
+mod published;
+
+#[cfg(test)]
+mod testing;
+
+pub use bench::{Bench, ErrorPredictor, Expectation, Setup, SingleView, Trial};
+pub use by_network::{Method, NetworkView, joints_by, name_sides};
+pub use film::{Film, FilmError, FilmSettings};
+pub use latex::{latex, number, overall, pictures_latex};
+pub use pictures::{Intervals, Judged, Pictures, Table};
+pub use plain::{Sighting, dropping, linear};
+pub use predicted::{Judgement, Predicted, judge};
+pub use published::published;
+pub use record::{FrameResult, Header, Record, RecordError, read_records};
+pub use score::{FrameScore, Joints, projected, score};
+pub use stress::{Stress, UnknownStress, cover_half};
+pub use summary::{ChangesOf, Group, Measured, Numbers, Summary, summarise};
+pub use truth::{parse14, part_errors, part_errors_and_facing, size, tenth_of};
+pub use version::{Combining, Terms, Version, VersionError};

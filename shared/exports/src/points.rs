@@ -2,7 +2,7 @@
 
 use std::io;
 
-use c3d::{Heading, Marker};
+use formats::c3d::{Heading, Marker};
 
 use crate::sink::{Notes, Sink};
 use crate::{Point, Trial};
@@ -53,7 +53,7 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
         let points = trial.points(slot).map(|it| it.map(marker));
         points.collect()
     });
-    c3d::write(&mut out, &heading, frames)?;
+    formats::c3d::write(&mut out, &heading, frames)?;
     let last = first_frame.saturating_add(trial.slots.len() as u64 - 1);
     let mut notes = Notes::new();
     if last > u64::from(u16::MAX) && first_frame > 1 {
@@ -74,7 +74,7 @@ pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
         .iter()
         .map(|it| it.replace(['\t', '\n', '\r'], "_"))
         .collect();
-    let heading = trc::Heading {
+    let heading = formats::trc::Heading {
         file_name: &format!("{}.trc", trial.name),
         rate_hz: rate(trial)?,
         units: "m",
@@ -88,7 +88,7 @@ pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
             .points(slot)
             .map(|it| it.map(|it| (turn * it.in_world).into()));
         let time_s = trial.time_s(slot).unwrap_or(0.0);
-        out.write_all(trc::row(slot as u64 + 1, time_s, points).as_bytes())?;
+        out.write_all(formats::trc::row(slot as u64 + 1, time_s, points).as_bytes())?;
     }
     Ok(Notes::new())
 }

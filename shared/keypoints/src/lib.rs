@@ -20,6 +20,7 @@ mod card;
 mod decode;
 mod detector;
 pub mod files;
+pub mod keypointfiles;
 mod names;
 mod shipped;
 mod window;

@@ -2,7 +2,7 @@
 
 use core::fmt::Write as _;
 
-use synchronisation::{Curve, Outcome, PairReport};
+use calibration::synchronisation::{Curve, Outcome, PairReport};
 
 use crate::html::{Html, put};
 use crate::parts::{about_table, begin, number, verdict};
@@ -189,7 +189,7 @@ fn path(curve: &Curve, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> String
 
 #[cfg(test)]
 mod tests {
-    use synchronisation::{CameraClock, Doubt};
+    use calibration::synchronisation::{CameraClock, Doubt};
 
     use super::*;
 
@@ -238,7 +238,7 @@ mod tests {
             "{good}"
         );
         assert!(!good.contains("NaN") && !good.contains("inf<"), "{good}");
-        crate::testing::check_in_browser(&good);
+        testkit::chromium::check_in_browser(&good);
         let bad = page(&outcome(vec![doubt]));
         assert!(
             bad.contains("not to be used") && bad.contains("followed for 0.0 s"),

@@ -17,32 +17,32 @@ pub const STAGE: &str = include_str!("stage.js");
 
 /// Markup: in it every text from outside is escaped.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(crate) struct Html(String);
+pub struct Html(String);
 
 impl Html {
     /// What the program has as a constant: a style sheet, a script.
-    pub(crate) fn constant(markup: &'static str) -> Self {
+    pub fn constant(markup: &'static str) -> Self {
         Self(markup.to_owned())
     }
 
     /// JSON that cannot end the `<script>` that it stands in.
-    pub(crate) fn in_script(value: &Json) -> Self {
+    pub fn in_script(value: &Json) -> Self {
         Self(value.to_string().replace('<', "\\u003c"))
     }
 
     /// For [`put!`] alone, which wraps every value.
-    pub(crate) fn put_wrapped(&mut self, markup: fmt::Arguments<'_>) {
+    pub fn put_wrapped(&mut self, markup: fmt::Arguments<'_>) {
         // Writing to a string cannot fail.
         let _infallible = fmt::Write::write_fmt(&mut self.0, markup);
     }
 
     /// Whether nothing has been written.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
     /// The finished page.
-    pub(crate) fn into_page(self) -> String {
+    pub fn into_page(self) -> String {
         self.0
     }
 }
@@ -50,6 +50,7 @@ impl Html {
 /// Adds to markup: a literal, in brackets the variables that stand in its braces by name, then the other values.
 ///
 /// `put!(out, "<text x=\"{x:.1}\">{}</text>", [x], name)`
+#[macro_export]
 macro_rules! put {
     ($out:expr, $markup:literal, [$($name:ident),+] $(, $value:expr)* $(,)?) => {
         // Behind `concat!` braces cannot take variables that are not listed, which would go in unwrapped.
@@ -65,10 +66,11 @@ macro_rules! put {
 }
 
 /// New markup; as [`put!`].
+#[macro_export]
 macro_rules! html {
     ($($all:tt)+) => {{
         let mut html = $crate::html::Html::default();
-        $crate::html::put!(html, $($all)+);
+        $crate::put!(html, $($all)+);
         html
     }};
 }
@@ -76,13 +78,16 @@ macro_rules! html {
 pub(crate) use {html, put};
 
 /// What may stand in the braces of [`put!`].
-pub(crate) trait Value {
+pub trait Value {
     /// Writes it as markup.
     fn write(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result;
 }
 
 /// A value in the braces of [`put!`].
-pub(crate) struct Put<'a, T: ?Sized>(pub(crate) &'a T);
+pub struct Put<'a, T: ?Sized>(
+    /// The value.
+    pub &'a T,
+);
 
 impl<T: Value + ?Sized> fmt::Display for Put<'_, T> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {

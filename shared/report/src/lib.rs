@@ -1,4 +1,4 @@
-//! Pages for people: of a run, of a model, of an evaluation, of a rig. One look, one way to escape.
+//! Pages for people: of a run and of a rig, and what all pages are made with. One look, one way to escape.
 //!
 //! Every page is one HTML file that needs nothing but itself: no font, no picture, no style from elsewhere, and no
 //! script but the one of [`run`] that draws the skeleton in space.
@@ -9,16 +9,12 @@
 //! Each page has a test with text that would break it.
 #![forbid(unsafe_code)]
 
-mod html;
-mod parts;
-#[cfg(test)]
-mod testing;
+pub mod html;
+pub mod parts;
 
 pub mod boards;
 pub mod clocks;
 pub mod curves;
-pub mod evaluation;
-pub mod model;
 pub mod run;
 pub mod walk;
 

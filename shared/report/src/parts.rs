@@ -6,7 +6,7 @@ use base64::engine::general_purpose::STANDARD;
 use crate::html::{Html, STYLE, html, put};
 
 /// The beginning of a page, up to its heading.
-pub(crate) fn begin(title: &str) -> Html {
+pub fn begin(title: &str) -> Html {
     let mut out = html!("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
     put!(
         out,
@@ -21,7 +21,7 @@ pub(crate) fn begin(title: &str) -> Html {
 /// Whether what the page is about can be used.
 ///
 /// * `good`, `bad`: what is said without and with doubts.
-pub(crate) fn verdict(out: &mut Html, (good, bad): (&str, &str), doubts: &[String]) {
+pub fn verdict(out: &mut Html, (good, bad): (&str, &str), doubts: &[String]) {
     if doubts.is_empty() {
         put!(out, "<p class=\"verdict held\">{}</p>\n", good);
         return;
@@ -34,7 +34,7 @@ pub(crate) fn verdict(out: &mut Html, (good, bad): (&str, &str), doubts: &[Strin
 }
 
 /// What was looked at, or run: key and value.
-pub(crate) fn about_table(out: &mut Html, about: &[(String, String)]) {
+pub fn about_table(out: &mut Html, about: &[(String, String)]) {
     put!(out, "<div class=\"scroll\"><table>\n");
     for (key, value) in about {
         put!(
@@ -50,7 +50,7 @@ pub(crate) fn about_table(out: &mut Html, about: &[(String, String)]) {
 /// The pictures that fit worst, as JPEG with a caption.
 ///
 /// * `drawn`: what is drawn into them.
-pub(crate) fn worst(out: &mut Html, drawn: &'static str, pictures: &[(String, Vec<u8>)]) {
+pub fn worst(out: &mut Html, drawn: &'static str, pictures: &[(String, Vec<u8>)]) {
     if pictures.is_empty() {
         return;
     }
@@ -71,7 +71,7 @@ pub(crate) fn worst(out: &mut Html, drawn: &'static str, pictures: &[(String, Ve
 }
 
 /// A number with some decimals; a dash for one that is not finite.
-pub(crate) fn number(value: f64, decimals: usize) -> String {
+pub fn number(value: f64, decimals: usize) -> String {
     if value.is_finite() {
         format!("{value:.decimals$}")
     } else {

@@ -324,6 +324,6 @@ mod tests {
         };
         let page = of_people(&walked, &["one"], &about, &[]);
         assert!(page.contains("The rig in space"));
-        crate::testing::check_in_browser(&page);
+        testkit::chromium::check_in_browser(&page);
     }
 }

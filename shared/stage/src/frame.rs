@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use join::Last;
+use crate::join::Last;
 use messages::{Stamp, Timing};
 
 /// A decoded message.

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use join::{Cadence, Joined, Joiner, Last};
+use crate::join::{Cadence, Joined, Joiner, Last};
 use messages::{Cause, Stamp};
 use runtime::{Delivery, ReceiveError};
 

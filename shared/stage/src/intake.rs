@@ -1,6 +1,6 @@
 //! Which frames of a stream are processed, and how many were lost.
 
-use join::Cadence;
+use crate::join::Cadence;
 use messages::{FrameHeader, Status};
 use runtime::Delivery;
 

@@ -1,6 +1,6 @@
 //! The joiner of a stage, and the last messages of each input.
 
-use join::{Joiner, Last, Push};
+use crate::join::{Joiner, Last, Push};
 use messages::{Cause, Stamp, Status};
 
 use crate::slots::Slots;

@@ -24,6 +24,7 @@ mod held;
 mod inbox;
 mod input;
 mod intake;
+pub mod join;
 mod joins;
 mod message;
 mod output;

@@ -5,8 +5,8 @@ use core::marker::PhantomData;
 use core::time::Duration;
 use std::rc::Rc;
 
+use crate::join::Joined;
 use failure::{Failure, now_nanos};
-use join::Joined;
 use messages::{EvidenceHeader, FrameHeader, PairPose, Stamp, topic};
 use runtime::{
     Delivery, Element, Message, Service, SlicePublisher, Subscriber, WaitError, Waiter, Woken,

@@ -3,6 +3,7 @@
 
 pub mod browser;
 pub mod c3d;
+pub mod chromium;
 pub mod mat;
 pub mod networks;
 pub mod npy;

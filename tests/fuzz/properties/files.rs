@@ -1,12 +1,12 @@
 //! What must hold of every reader of files, whatever is in them.
 
-use c3d::C3d;
 use consistency::{Appearance, JointFile, Learned};
 use datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use deployment::{AnyMachine, Loaded, Stage, Topology};
 use exports::{FILES, Gathering};
 use fmp::Model;
 use fmp::files::{describe, mat, own, text};
+use formats::c3d::C3d;
 use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisys, umpm};
 use keypoints::files::{NameSet, SeenKeypoints, coco, openpose};
 use motion::{Joint, Recorded, Role};

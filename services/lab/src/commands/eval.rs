@@ -12,15 +12,15 @@ use std::sync::{Arc, Mutex};
 use clap::Args;
 use consistency::Learned;
 use datasets::Selection;
+use datasets::sequences::{Alignment, Sequence};
 use deployment::fuse::Config;
 use deployment::fuse_numbers;
-use experiment::{FilmSettings, Version};
+use evaluation::{FilmSettings, Version};
 use failure::Claim;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use inputs::Shipped;
 use lab::eval::{Done, Fusion, Job};
-use sequences::{Alignment, Sequence};
 use skeleton::JointSet;
 use viewquality::{Forecaster, Network, Table};
 
@@ -326,7 +326,7 @@ fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
 }
 
 fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
-    let options = sequences::Options {
+    let options = datasets::sequences::Options {
         alignment: if arguments.umpm_late {
             Alignment::OneLate
         } else {
@@ -336,7 +336,7 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
     };
     let mut all: Vec<Sequence> = Vec::new();
     for path in &arguments.sequences {
-        let read = sequences::read(path, &options);
+        let read = datasets::sequences::read(path, &options);
         for mut sequence in read.map_err(lab::sequence_failure)? {
             sequence.thin_out(arguments.every, arguments.frames);
             if all
@@ -398,7 +398,7 @@ fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
 fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Failure> {
     let expects = arguments.sigma.is_some() || arguments.network.is_some() || arguments.oracle;
     if let [_, ..] = arguments.versions[..] {
-        let adaptive = |it: &Version| it.terms == experiment::Terms::Adaptive;
+        let adaptive = |it: &Version| it.terms == evaluation::Terms::Adaptive;
         if !expects && arguments.versions.iter().any(adaptive) {
             let message = "adaptive selection needs expected errors: --network FILE, --sigma FILE or --oracle";
             return Err(Failure::new(ExitKind::Usage, message));

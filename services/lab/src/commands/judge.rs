@@ -7,12 +7,12 @@ use std::process::ExitCode;
 
 use clap::Args;
 use datasets::{People, ReadOptions, Selection, Sides, SkeletonTable};
-use evaluation::Bootstrap;
-use experiment::Judged;
+use evaluation::Judged;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use inputs::Joints;
 use lab::judged::{self, Reader};
+use score::Bootstrap;
 use serde_json::json;
 use skeleton::PARSE14;
 use terminal::output;

@@ -99,7 +99,7 @@ fn draw(file: &Path, html: &Path, images: &[PathBuf]) -> Result<ExitCode, Failur
             Some(lab::examples::gather(&model, &listed)?)
         }
     };
-    let page = report::model::html(&model, examples.as_ref());
+    let page = lab::model_page::html(&model, examples.as_ref());
     files::replace(html, page.as_bytes()).map_err(|error| failure::in_file(html, &error))?;
     output::message(format_args!("wrote {}", html.display()));
     Ok(ExitCode::SUCCESS)

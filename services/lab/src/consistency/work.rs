@@ -4,13 +4,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ::consistency::{Grid, Learned, Learner, Point, Settings, Shape, Tally, Weights, best};
-use evaluation::Point as Joint;
-use experiment::{Bench, Combining, Film, FilmSettings, Setup, Terms, Trial, Version, score};
+use datasets::sequences::{Frame, Sequence};
+use evaluation::{Bench, Combining, Film, FilmSettings, Setup, Terms, Trial, Version, score};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use kernels::Rgb8View;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
-use sequences::{Frame, Sequence};
+use score::Point as Joint;
 
 use crate::failures::film_failure;
 use failure::Console;

@@ -1,7 +1,7 @@
 //! Sequences judged on the keypoints of a network, undisturbed and under stress: in space, and by what everyone does.
 
-use evaluation::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
-use experiment::{
+use datasets::sequences::{Frame, Sequence};
+use evaluation::{
     Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
     projected,
 };
@@ -16,7 +16,7 @@ use posenetwork::springs::TurnedSprings;
 use posenetwork::{
     Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
 };
-use sequences::{Frame, Sequence};
+use score::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
 use skeleton::PARSE14;
 
 use failure::Console;

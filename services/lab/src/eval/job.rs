@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use consistency::Learned;
-use experiment::{
+use datasets::sequences::{Frame, Sequence};
+use evaluation::{
     Bench, Expectation, Film, FilmSettings, Header, Predicted, Record, Setup, SingleView, Trial,
     Version, parse14, part_errors, projected, read_records, tenth_of,
 };
@@ -14,7 +15,6 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use orientation::Detector;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
-use sequences::{Frame, Sequence};
 use skeleton::{JointMap, JointSet, PARSE14};
 use viewquality::{ForecastInput, Forecaster, Table};
 

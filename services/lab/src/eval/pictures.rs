@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use datasets::People;
-use evaluation::Bootstrap;
-use experiment::{Intervals, Judged, Pictures, pictures_latex};
+use evaluation::page::pictures_html;
+use evaluation::{Intervals, Judged, Pictures, pictures_latex};
 use failure::{ExitKind, Failure, OrFail as _};
-use report::evaluation::pictures_html;
+use score::Bootstrap;
 use serde_json::{Value, json};
 
 use crate::judged;

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use evaluation::Bootstrap;
-use experiment::{FrameScore, Group, Measured, Summary, Version, judge, latex, score, summarise};
+use evaluation::page::{Page, html};
+use evaluation::{FrameScore, Group, Measured, Summary, Version, judge, latex, score, summarise};
 use failure::{ExitKind, Failure, OrFail as _};
-use report::evaluation::{Page, html};
+use score::Bootstrap;
 
 use super::Done;
 use failure::in_file;

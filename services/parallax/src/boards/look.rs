@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use boards::{Board, Finder, Found, Hints, Nothing, Picture};
 use calibration::board::Sight;
+use calibration::boards::{Board, Finder, Found, Hints, Nothing, Picture};
 use failure::{ExitKind, Failure, Stop};
 use footage::{Source, SourceInfo, SourceSpec};
 use rayon::prelude::*;

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use boards::{Board, Kind, dictionary_names};
 use calibration::board::{
     BoardError, LensKind, Outcome, Sight, Task, Together, calibrate as adjust,
 };
+use calibration::boards::{Board, Kind, dictionary_names};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use geometry::{Camera, Rig};
 use nalgebra::Point2;
@@ -99,7 +99,7 @@ pub fn calibrate(
         names,
         sizes,
         lens: settings.lens,
-        look_alikes: boards::Finder::new(&settings.board).look_alikes(),
+        look_alikes: calibration::boards::Finder::new(&settings.board).look_alikes(),
         board: points,
         sights,
         wants_rig: settings.wants_rig,
@@ -361,7 +361,7 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
 
 /// Why pictures had no board, as a hint.
 fn reasons(looked: &Looked) -> String {
-    use boards::Nothing;
+    use calibration::boards::Nothing;
 
     let most = looked
         .cameras

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf, absolute};
 use std::process::{Command, ExitCode};
 
-use boards::Board;
+use calibration::boards::Board;
 use clap::Args;
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use nalgebra::UnitVector3;

@@ -5,6 +5,7 @@ mod heard;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use calibration::synchronisation::{Outcome, Settings, estimate};
 use clap::{Args, Subcommand, ValueEnum};
 use deployment::{ClockKeys, Deployment, with_clocks};
 use failure::Console as _;
@@ -13,7 +14,6 @@ use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use launch::films::{Films, Part, Poses, films};
 use launch::load;
 use serde_json::{Value, json};
-use synchronisation::{Outcome, Settings, estimate};
 use terminal::output;
 
 use terminal::Globals;
@@ -380,7 +380,7 @@ fn refuse(outcome: &Outcome, names: &[&str], by: By) -> Result<(), Failure> {
 }
 
 fn write(file: &Path, outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
-    let keys = |(name, it): (&&str, &synchronisation::CameraClock)| ClockKeys {
+    let keys = |(name, it): (&&str, &calibration::synchronisation::CameraClock)| ClockKeys {
         name: (*name).to_owned(),
         offset_ms: 1e3 * it.offset_s,
         drift_ppm: it

@@ -3,11 +3,11 @@
 use core::fmt::Write as _;
 
 use deployment::smooth::Config;
-use evaluation::{Bootstrap, Share};
 use motion::judge::{self, Errors, Sum};
 use motion::live;
 use motion::{Motion, Recorded, Settings, butterworth};
 use nalgebra::Vector3;
+use score::{Bootstrap, Share};
 use serde_json::{Value, json};
 
 use super::one_euro;

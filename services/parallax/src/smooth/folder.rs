@@ -186,7 +186,7 @@ pub(super) fn truth(
     recorded: &Recorded,
     frames: &[u64],
 ) -> Result<Vec<Vec<Option<Vector3<f64>>>>, Failure> {
-    let sequences = sequences::read(path, &sequences::Options::default())
+    let sequences = datasets::sequences::read(path, &datasets::sequences::Options::default())
         .map_err(|error| in_file(path, &error))?;
     let [sequence] = &sequences[..] else {
         let what = format!(

@@ -3,10 +3,10 @@
 mod noise;
 
 use deployment::smooth::Config;
-use evaluation::Bootstrap;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use nalgebra::Vector3;
 use scene::{Action, Scene};
+use score::Bootstrap;
 use serde_json::{Value, json};
 
 use super::compare::{self, Row, Tried};

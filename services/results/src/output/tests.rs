@@ -44,7 +44,7 @@ fn all_files_are_there_at_the_end_and_no_part() {
     assert_eq!(text(&dir, "pose3d.jsonl").lines().count(), 2);
     assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 2 * 14);
     assert_eq!(text(&dir, "pose2d.jsonl").lines().count(), 4);
-    let trc = ::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
+    let trc = formats::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
     assert_eq!(trc.frames.len(), 2);
 }
 
@@ -170,7 +170,7 @@ fn every_frame_has_a_line_a_row_of_every_joint_and_one_for_opensim() {
         json!({ "left": "dropped", "right": "dropped" })
     );
     assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 6 * 14);
-    let trc = ::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
+    let trc = formats::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
     assert_eq!(trc.frames.len(), 6);
 }
 

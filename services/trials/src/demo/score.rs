@@ -1,6 +1,6 @@
 //! The accuracy of results: PCP3D and MPJPE.
 
-use evaluation::{joint_errors, segment_errors, segments};
+use score::{joint_errors, segment_errors, segments};
 use serde::Serialize;
 use skeleton::PARSE14;
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use boards::Homography;
+use crate::boards::Homography;
 use nalgebra::Point2;
 use statistics::Sorted;
 

@@ -1,6 +1,6 @@
 //! Where a flat board is before one camera.
 
-use boards::Homography;
+use crate::boards::Homography;
 use geometry::{Camera, Intrinsics};
 use nalgebra::{
     Isometry3, Matrix2x6, Matrix3, Point2, Point3, Rotation3, SMatrix, SVector, Translation3,

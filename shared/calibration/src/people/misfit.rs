@@ -1,9 +1,9 @@
 //! The pictures in which people fit a rig worst.
 
+use crate::synchronisation::{Film, Person, Shot};
 use geometry::Camera;
 use nalgebra::Point3;
 use statistics::Sorted;
-use synchronisation::{Film, Person, Shot};
 
 use super::frame::Skeletons;
 
@@ -124,7 +124,7 @@ impl Fitted<'_> {
 
 #[cfg(test)]
 mod tests {
-    use synchronisation::Joint;
+    use crate::synchronisation::Joint;
 
     use super::super::testing::{ring, sides, walker};
     use super::*;

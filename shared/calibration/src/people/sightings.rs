@@ -1,9 +1,9 @@
 //! From films to sightings: where the joints of one person are in every camera, at the same instants.
 
+use crate::synchronisation::{Film, Track, tracks};
 use geometry::{Camera, Lens};
 use nalgebra::{Point2, Vector2};
 use statistics::Sorted;
-use synchronisation::{Film, Track, tracks};
 
 /// Standard deviation of the kernel that smooths places over time: so many intervals between pictures, and seconds.
 const SMOOTHING: [f64; 2] = [0.75, 0.015];
@@ -213,8 +213,8 @@ impl Sightings {
 
 #[cfg(test)]
 mod tests {
+    use crate::synchronisation::{Joint, Person, Shot};
     use fastrand::Rng;
-    use synchronisation::{Joint, Person, Shot};
 
     use super::*;
     use crate::people::testing::{N_JOINTS, ring};

@@ -2,10 +2,10 @@
 
 use core::f64::consts::TAU;
 
+use crate::synchronisation::{Film, Joint, Person, Shot};
 use fastrand::Rng;
 use geometry::{Camera, Intrinsics, Lens, LensModel};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use synchronisation::{Film, Joint, Person, Shot};
 
 pub(crate) const N_JOINTS: usize = 14;
 pub(crate) const RADIUS: f64 = 5.0;

@@ -1,6 +1,6 @@
 //! Yang & Ramanan's released models: a MATLAB level 5 file with a struct called `model`.
 
-use mat5::{ContainerError, Numbers, Structs, Value};
+use formats::mat5::{ContainerError, Numbers, Structs, Value};
 
 use super::released::{Released, ReleasedPart, SpringIds, filter_from_planes};
 use crate::{Filter, Model, ModelError, ModelSpec, N_CHANNELS, Spring};
@@ -62,9 +62,9 @@ pub enum MatError {
 /// [`MatError`], naming the field by its MATLAB path. The numbers themselves are judged by
 /// [`Model::new`].
 pub fn parse(file: &[u8]) -> Result<ModelSpec, MatError> {
-    let variables = mat5::variables(file)?;
+    let variables = formats::mat5::variables(file)?;
     for bytes in &variables {
-        let (name, value) = mat5::variable(bytes)?;
+        let (name, value) = formats::mat5::variable(bytes)?;
         if name == "model" {
             return Ok(released(&value)?.into_spec()?);
         }

@@ -72,7 +72,7 @@ fn the_page_says_what_is_known_and_what_is_not_to_be_trusted() {
         "{good}"
     );
     assert!(!good.contains(">NaN") && !good.contains(">inf"), "{good}");
-    crate::testing::check_in_browser(&good);
+    testkit::chromium::check_in_browser(&good);
     let doubt = Doubt::FewBoards { camera: 0, n: 2 };
     let bad = page(&outcome(vec![doubt]), &["mirrored".to_owned()]);
     assert!(bad.contains("not to be trusted") && bad.contains("in 2 pictures only"));

@@ -75,7 +75,7 @@ fn the_page_asks_for_nothing_outside_itself() {
         .map(|it| &html[it.0 + 5..it.0 + 10]);
     assert_eq!(sources.collect::<Vec<_>>(), ["data:"]);
     assert!(html.contains("default-src 'none'"));
-    crate::testing::check_in_browser(&html);
+    testkit::chromium::check_in_browser(&html);
 }
 
 #[test]

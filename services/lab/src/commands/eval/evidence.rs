@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use evaluation::Bootstrap;
-use experiment::{FilmSettings, Stress};
+use evaluation::{FilmSettings, Stress};
 use failure::Claim;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use inputs::library::Library;
 use lab::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
 use posenetwork::springs::TurnedSprings;
+use score::Bootstrap;
 use terminal::output;
 
 use super::Arguments;

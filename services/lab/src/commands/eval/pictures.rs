@@ -3,12 +3,12 @@
 use std::process::ExitCode;
 
 use datasets::People;
-use evaluation::Bootstrap;
-use experiment::{Judged, Pictures};
+use evaluation::{Judged, Pictures};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use lab::eval::pictures;
 use lab::judged::{self, Reader};
+use score::Bootstrap;
 use skeleton::PARSE14;
 use terminal::output;
 

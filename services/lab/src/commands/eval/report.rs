@@ -1,9 +1,9 @@
 //! Writes the report of an evaluation.
 
 use deployment::fuse::Config;
-use evaluation::Bootstrap;
 use failure::Failure;
 use lab::eval::{self, Done, Job};
+use score::Bootstrap;
 use terminal::output;
 
 use super::Arguments;

@@ -4,8 +4,7 @@ use core::fmt;
 use std::path::Path;
 use std::process::ExitCode;
 
-use evaluation::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
-use experiment::{Intervals, Judged, Pictures};
+use evaluation::{Intervals, Judged, Pictures};
 use failure::Console;
 use failure::{ExitKind, Failure, Stop};
 use fmp::Search;
@@ -13,6 +12,7 @@ use inputs::library::Library;
 use lab::judged;
 use lab::judged_network::{self, JointError, NetworkReader, Seen};
 use posenetwork::springs::TurnedSprings;
+use score::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
 use serde_json::{Value, json};
 use terminal::output;
 

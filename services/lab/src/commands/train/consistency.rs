@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use ::consistency::Learned;
 use clap::Args;
-use experiment::FilmSettings;
+use evaluation::FilmSettings;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use lab::consistency::{Done, Job, Learning, Sequences};
 

@@ -6,8 +6,8 @@ mod words;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use boards::{Board, Paper};
 use calibration::board::LensKind;
+use calibration::boards::{Board, Paper};
 use clap::{Args, ValueEnum};
 use failure::Console as _;
 use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};

@@ -5,7 +5,7 @@ mod stood;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use boards::Board;
+use calibration::boards::Board;
 use calibration::origin::{Click, OriginError, from_board, from_floor, from_points, rebased};
 use calibration::people::Vertical;
 use clap::Args;

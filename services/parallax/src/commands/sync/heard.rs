@@ -1,12 +1,12 @@
 //! What the cameras of a deployment heard.
 
+use calibration::synchronisation::{Outcome, Sound, SoundSettings, estimate_by_sound};
 use deployment::Deployment;
 use failure::unless_stopped;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use footage::{RecordedSound, SourceSpec, read_sound};
 use geometry::Camera;
 use launch::films::{Part, cameras};
-use synchronisation::{Outcome, Sound, SoundSettings, estimate_by_sound};
 
 /// Samples a second: most of what is heard of a room lies below half of it.
 const RATE_HZ: u32 = 8000;

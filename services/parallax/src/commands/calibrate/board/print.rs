@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use boards::{Board, Drawing, Paper, pdf, svg};
+use calibration::boards::{Board, Drawing, Paper, pdf, svg};
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use terminal::output;
 

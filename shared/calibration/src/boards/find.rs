@@ -1,0 +1,289 @@
+//! A board in a picture.
+
+use crate::boards::board::Kind;
+use crate::boards::chess;
+use crate::boards::fit::agreeing;
+use crate::boards::grow::{Known, grow};
+use crate::boards::marker::{Codes, Sighting};
+use crate::boards::quads::quads;
+use crate::boards::{Board, Corner, Layout, Nothing, Picture};
+
+/// The smallest picture that is doubled for a second look has this side at most.
+const DOUBLED_UP_TO: usize = 2000;
+/// The largest picture that is not halved.
+const HALVED_FROM: usize = 900;
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// The corners, by number.
+    pub corners: Vec<Corner>,
+    /// Which of [`Finder::variants`] it is.
+    pub variant: usize,
+    /// White is black.
+    pub is_inverted: bool,
+    /// Left is right. Only markers tell.
+    pub is_mirrored: bool,
+    /// Markers that were read.
+    pub n_markers: usize,
+}
+
+/// What is known from other pictures of the same camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Hints {
+    /// Whether white is black.
+    pub is_inverted: Option<bool>,
+    /// The variant of the board.
+    pub variant: Option<usize>,
+}
+
+/// A way in which a board may differ from what was said.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variant {
+    /// The board.
+    pub board: Board,
+    /// Its layout.
+    pub layout: Layout,
+    /// How it differs, as a sentence; `None` for the board as it was said to be.
+    pub note: Option<String>,
+}
+
+/// Finds a board in pictures.
+#[derive(Debug, Clone)]
+pub struct Finder {
+    variants: Vec<Variant>,
+    codes: Option<Codes>,
+}
+
+impl Finder {
+    /// Of a board, and of those that it may have been confused with: rows and columns exchanged, the older pattern of
+    /// `OpenCV`, tags counted from below.
+    pub fn new(board: &Board) -> Self {
+        let codes = board.codes().map(|dictionary| {
+            Codes::new(
+                dictionary.marker_size(),
+                &dictionary.codes()[..board.n_markers().min(dictionary.codes().len())],
+            )
+        });
+        Self {
+            variants: variants(board),
+            codes,
+        }
+    }
+
+    /// The board as it was said to be, then what it may be instead.
+    pub fn variants(&self) -> &[Variant] {
+        &self.variants
+    }
+
+    /// The numbers that corners have after a turn by which the board looks the same, one list for each such turn.
+    pub fn look_alikes(&self) -> Vec<Vec<usize>> {
+        match &self.variants[0].board {
+            board if board.kind == Kind::Chessboard => chess::look_alikes(board),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Finds the board.
+    ///
+    /// # Errors
+    ///
+    /// [`Nothing`] that says what was seen instead.
+    pub fn find(&self, picture: &Picture, hints: Hints) -> Result<Found, Nothing> {
+        if let Some(codes) = &self.codes {
+            return self.by_markers(codes, picture, hints);
+        }
+        let Variant { board, layout, .. } = &self.variants[0];
+        chess::find(picture, board, layout).map(|corners| Found {
+            corners,
+            variant: 0,
+            is_inverted: false,
+            is_mirrored: false,
+            n_markers: 0,
+        })
+    }
+
+    fn by_markers(&self, codes: &Codes, picture: &Picture, hints: Hints) -> Result<Found, Nothing> {
+        let mut best: Option<(bool, usize, Vec<Sighting>)> = None;
+        let mut nothing = Nothing::NoMarkers;
+        for is_inverted in [false, true] {
+            if hints.is_inverted.is_some_and(|it| it != is_inverted) {
+                continue;
+            }
+            let seen = if is_inverted {
+                picture.inverted()
+            } else {
+                picture.clone()
+            };
+            let mut sightings = Vec::new();
+            for scale in scales(picture) {
+                sightings.extend(read(codes, &seen, scale, self.frames()));
+                let Some((variant, agreed)) = self.agreed(&sightings, hints) else {
+                    continue;
+                };
+                let n_best = best.as_ref().map_or(0, |it| it.2.len());
+                if agreed.len() > n_best {
+                    best = Some((is_inverted, variant, agreed));
+                }
+                if 2 * n_best.max(best.as_ref().map_or(0, |it| it.2.len())) >= self.n_markers() {
+                    break;
+                }
+            }
+            if sightings.len() >= 2 {
+                nothing = nothing.or(Nothing::Elsewhere {
+                    n_markers: sightings.len(),
+                });
+            }
+        }
+        let (is_inverted, variant, agreed) = best.ok_or(nothing)?;
+        let seen = if is_inverted {
+            picture.inverted()
+        } else {
+            picture.clone()
+        };
+        let Variant { board, layout, .. } = &self.variants[variant];
+        let known: Vec<Known> = agreed
+            .iter()
+            .filter_map(|it| Some((layout.marker(it.id)?, it)))
+            .flat_map(|(marker, it)| (0..4).map(|i| (marker.corners[i], it.corners[i], 1.0)))
+            .collect();
+        let corners = grow(&seen, board, layout, &known);
+        if corners.is_empty() {
+            return Err(Nothing::NoCorners);
+        }
+        Ok(Found {
+            corners,
+            variant,
+            is_inverted,
+            is_mirrored: agreed.iter().any(|it| it.is_mirrored),
+            n_markers: agreed.len(),
+        })
+    }
+
+    fn n_markers(&self) -> usize {
+        self.variants[0].layout.markers.len()
+    }
+
+    /// Widths of the frame of a marker that are tried: Kalibr's tags have two cells.
+    fn frames(&self) -> &'static [usize] {
+        match self.variants[0].board.kind {
+            Kind::Grid => &[1, 2],
+            Kind::Charuco | Kind::Chessboard => &[1],
+        }
+    }
+
+    /// The variant that most sightings agree with, and these.
+    fn agreed(&self, sightings: &[Sighting], hints: Hints) -> Option<(usize, Vec<Sighting>)> {
+        let mut best: Option<(usize, Vec<Sighting>)> = None;
+        for (index, variant) in self.variants.iter().enumerate() {
+            if hints.variant.is_some_and(|it| it != index) {
+                continue;
+            }
+            let agreed = agreeing(&variant.layout, sightings);
+            if agreed.len() > best.as_ref().map_or(1, |it| it.1.len()) {
+                best = Some((index, agreed));
+            }
+        }
+        best
+    }
+}
+
+/// Scales that are looked at: as it is, then smaller where it is large, then larger where it is not.
+fn scales(picture: &Picture) -> Vec<f64> {
+    let side = picture.width().max(picture.height());
+    let mut scales = vec![1.0];
+    if side <= DOUBLED_UP_TO {
+        scales.push(2.0);
+    }
+    if side >= HALVED_FROM {
+        scales.push(0.5);
+    }
+    scales
+}
+
+fn read(codes: &Codes, picture: &Picture, scale: f64, frames: &[usize]) -> Vec<Sighting> {
+    let scaled = match scale {
+        2.0 => picture.doubled(),
+        0.5 => match picture.halved() {
+            Some(half) => half,
+            None => return Vec::new(),
+        },
+        _ => picture.clone(),
+    };
+    let mut sightings = codes.read(&scaled, &quads(&scaled), frames);
+    for sighting in &mut sightings {
+        for corner in &mut sighting.corners {
+            *corner = corner.map(|it| (it + 0.5) / scale - 0.5);
+        }
+    }
+    sightings
+}
+
+fn variants(board: &Board) -> Vec<Variant> {
+    let mut list: Vec<Variant> = Vec::new();
+    let mut add = |board: Board, layout: Layout, note: Option<String>| {
+        if list.iter().all(|it| it.layout != layout) {
+            list.push(Variant {
+                board,
+                layout,
+                note,
+            });
+        }
+    };
+    let counts = |it: &Board| format!("{}x{}", it.columns, it.rows);
+    for told in [board.clone(), board.turned()] {
+        let turned = (told != *board)
+            .then(|| format!("the board has {}, not {}", counts(&told), counts(board)));
+        match board.kind {
+            Kind::Chessboard => {
+                if turned.is_none() {
+                    add(told.clone(), Layout::of(&told), None);
+                }
+            }
+            Kind::Charuco => {
+                for is_legacy in [board.is_legacy, !board.is_legacy] {
+                    let it = Board {
+                        is_legacy,
+                        ..told.clone()
+                    };
+                    let pattern = (is_legacy != board.is_legacy).then(|| {
+                        let which = if is_legacy { "before 4.6" } else { "since 4.6" };
+                        format!("the board is drawn as OpenCV {which} does: its upper left square is {}",
+                            if is_legacy { "white" } else { "black" })
+                    });
+                    let notes: Vec<String> = turned.iter().cloned().chain(pattern).collect();
+                    let note = (!notes.is_empty()).then(|| notes.join("; "));
+                    add(it.clone(), Layout::of(&it), note);
+                }
+            }
+            Kind::Grid => {
+                for is_from_below in [false, true] {
+                    for turn in 0..4 {
+                        let layout =
+                            regrouped(Layout::of(&told), told.columns, is_from_below, turn);
+                        // Where tags are counted from, and which way up they are, is not part of what was said.
+                        add(told.clone(), layout, turned.clone());
+                    }
+                }
+            }
+        }
+    }
+    list
+}
+
+/// A grid whose tags are counted from the lowest row, and are turned by quarters.
+fn regrouped(layout: Layout, columns: usize, is_from_below: bool, turn: usize) -> Layout {
+    let rows = layout.markers.len() / columns;
+    let mut markers = layout.markers.clone();
+    for marker in &mut markers {
+        let [column, row] = [marker.id % columns, marker.id / columns];
+        let row = if is_from_below { rows - 1 - row } else { row };
+        let place = &layout.markers[row * columns + column].corners;
+        marker.corners = [0, 1, 2, 3].map(|nth| place[(nth + turn) % 4]);
+    }
+    Layout {
+        points: markers.iter().flat_map(|it| it.corners).collect(),
+        markers,
+        ..layout
+    }
+}

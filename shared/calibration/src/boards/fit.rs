@@ -1,0 +1,99 @@
+//! The markers that agree with the layout of a board.
+
+use nalgebra::Point2;
+
+use crate::boards::marker::Sighting;
+use crate::boards::{Homography, Layout};
+
+/// How far a marker may be from where the others say, in sides of it: lenses bend boards.
+const OFF_SIDES: f64 = 0.45;
+/// The most pairs of markers that are tried.
+const MOST_PAIRS: usize = 300;
+
+/// The largest set of sightings that one projective map takes to the layout, each number at most once; at least two.
+pub(crate) fn agreeing(layout: &Layout, sightings: &[Sighting]) -> Vec<Sighting> {
+    let mut best: (f64, Vec<Sighting>) = (f64::MAX, Vec::new());
+    let pairs = (0..sightings.len()).flat_map(|a| (a + 1..sightings.len()).map(move |b| [a, b]));
+    let possible = pairs.filter(|[a, b]| {
+        let [a, b] = [sightings[*a], sightings[*b]];
+        a.id != b.id && a.is_mirrored == b.is_mirrored
+    });
+    let possible: Vec<[usize; 2]> = possible.collect();
+    let step = possible.len().div_ceil(MOST_PAIRS).max(1);
+    for [a, b] in possible.into_iter().step_by(step) {
+        let Some(map) = map_of(layout, &[sightings[a], sightings[b]]) else {
+            continue;
+        };
+        let seed = supporters(layout, &map, &[sightings[a], sightings[b]]);
+        if seed.1.len() < 2 {
+            continue;
+        }
+        let found = supporters(layout, &map, sightings);
+        if is_better(&found, &best) {
+            best = found;
+        }
+    }
+    // Once more with the map of all of them.
+    if let Some(map) = map_of(layout, &best.1) {
+        let found = supporters(layout, &map, sightings);
+        if found.1.len() >= best.1.len() {
+            best = found;
+        }
+    }
+    if best.1.len() < 2 { Vec::new() } else { best.1 }
+}
+
+fn is_better(a: &(f64, Vec<Sighting>), b: &(f64, Vec<Sighting>)) -> bool {
+    a.1.len() > b.1.len() || (a.1.len() == b.1.len() && a.0 < b.0)
+}
+
+fn map_of(layout: &Layout, sightings: &[Sighting]) -> Option<Homography> {
+    let pairs = sightings.iter().filter_map(|it| {
+        let marker = layout.marker(it.id)?;
+        Some((0..4).map(move |i| (marker.corners[i], it.corners[i], 1.0)))
+    });
+    Homography::fit(pairs.flatten())
+}
+
+/// The sightings near where a map has them, and the sum of their distances in sides.
+fn supporters(layout: &Layout, map: &Homography, sightings: &[Sighting]) -> (f64, Vec<Sighting>) {
+    let mut kept: Vec<(f64, Sighting)> = Vec::new();
+    for sighting in sightings {
+        let Some(off) = off_sides(layout, map, sighting).filter(|it| *it < OFF_SIDES) else {
+            continue;
+        };
+        match kept.iter_mut().find(|it| it.1.id == sighting.id) {
+            Some(known) if off < known.0 => *known = (off, *sighting),
+            Some(_) => {}
+            None => kept.push((off, *sighting)),
+        }
+    }
+    let sum = kept.iter().map(|it| it.0).sum();
+    (sum, kept.into_iter().map(|it| it.1).collect())
+}
+
+/// The largest distance of a corner of a marker from where a map has it, in its sides.
+fn off_sides(layout: &Layout, map: &Homography, sighting: &Sighting) -> Option<f64> {
+    let marker = layout.marker(sighting.id)?;
+    let mut worst: f64 = 0.0;
+    for (on_board, in_picture) in marker.corners.iter().zip(sighting.corners) {
+        let off: f64 = (map.apply(*on_board)? - in_picture).norm();
+        worst = worst.max(off / sighting.side_px());
+    }
+    Some(worst)
+}
+
+/// The map near a point of the board: of the known points, near ones count most.
+///
+/// * `known`: on the board (metres), in the picture (pixels), weight.
+/// * `reach`: the distance in metres beyond which points count little.
+pub(crate) fn map_near(
+    known: &[(Point2<f64>, Point2<f64>, f64)],
+    at: Point2<f64>,
+    reach: f64,
+) -> Option<Homography> {
+    Homography::fit(known.iter().map(|(on_board, in_picture, weight)| {
+        let away = (on_board - at).norm_squared() / (2.0 * reach * reach);
+        (*on_board, *in_picture, weight * ((-away).exp() + 1e-3))
+    }))
+}

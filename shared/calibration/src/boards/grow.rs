@@ -1,0 +1,167 @@
+//! From a few known places of a board to every corner that can be seen.
+
+use nalgebra::{Point2, Vector2};
+
+use crate::boards::corner::refine;
+use crate::boards::fit::map_near;
+use crate::boards::{Board, Corner, Kind, Layout, Picture};
+
+/// The largest window around a corner, pixels from its middle.
+const WIDEST_WINDOW: f64 = 9.0;
+const NARROWEST_WINDOW: f64 = 2.0;
+/// How far a corner may be from where its neighbours say, in squares, and at least in pixels.
+const OFF_SQUARES: f64 = 0.06;
+const OFF_PX: f64 = 1.2;
+/// The least difference between white and black at a crossing, grey values.
+const LEAST_CONTRAST: f64 = 8.0;
+
+/// A place of the board that is known in the picture: metres, pixels, weight.
+pub(crate) type Known = (Point2<f64>, Point2<f64>, f64);
+
+/// Every corner of the layout that is seen, found from known places.
+///
+/// `picture` has the polarity of the print: black is dark.
+pub(crate) fn grow(
+    picture: &Picture,
+    board: &Board,
+    layout: &Layout,
+    first: &[Known],
+) -> Vec<Corner> {
+    let side = board.square_metres;
+    let mut known = first.to_vec();
+    let mut found: Vec<Option<Corner>> = vec![None; layout.points.len()];
+    // Near known places first; what they give carries further.
+    for reach in [1.2, 1.8, 3.0, 100.0] {
+        for (id, point) in layout.points.iter().enumerate() {
+            let is_near = known.iter().any(|it| (it.0 - point).norm() < reach * side);
+            if found[id].is_some() || !is_near {
+                continue;
+            }
+            if let Some(at) = look(picture, board, layout, id, &known) {
+                found[id] = Some(Corner { id, at });
+                known.push((*point, at, 4.0));
+            }
+        }
+    }
+    let mut corners: Vec<Corner> = found.into_iter().flatten().collect();
+    while let Some(worst) = worst_off(layout, side, &corners) {
+        corners.remove(worst);
+    }
+    corners
+}
+
+/// One corner at sub-pixel, if it is there.
+fn look(
+    picture: &Picture,
+    board: &Board,
+    layout: &Layout,
+    id: usize,
+    known: &[Known],
+) -> Option<Point2<f64>> {
+    let point = layout.points[id];
+    let side = board.square_metres;
+    let map = map_near(known, point, 1.5 * side)?;
+    let start = map.apply(point)?;
+    let square_px = narrow_px(&map, point, side)?;
+    let window = window_px(&map, board, point)?;
+    if square_px < 5.0 || !picture.holds(start, window + 2.0) {
+        return None;
+    }
+    let at = refine(
+        picture,
+        start,
+        window.max(0.12 * square_px).min(WIDEST_WINDOW),
+    )
+    .and_then(|at| refine(picture, at, window))?;
+    let limit = (0.2 * square_px).max(2.0);
+    let is_there = (at - start).norm() <= limit
+        && match board.kind {
+            Kind::Grid => true,
+            Kind::Chessboard | Kind::Charuco => {
+                let moved = at - start;
+                is_crossing(layout.is_black_before[id], board, |offset| {
+                    Some(picture.between(map.apply(point + side * offset)? + moved))
+                })
+            }
+        };
+    is_there.then_some(at)
+}
+
+/// Whether black and white lie around a corner as they do on the board; `value` is the grey value by the offset in squares.
+fn is_crossing(
+    is_black_before: bool,
+    board: &Board,
+    value: impl Fn(Vector2<f64>) -> Option<f64>,
+) -> bool {
+    let white = match board.kind {
+        Kind::Charuco => 0.25 * (1.0 - board.ratio),
+        Kind::Chessboard | Kind::Grid => 0.2,
+    };
+    let turn = if is_black_before { 1.0 } else { -1.0 };
+    let pair = |away: f64, across: f64| {
+        let one = value(Vector2::new(away, away * across))?;
+        Some([one, value(Vector2::new(-away, -away * across))?])
+    };
+    let (Some(black), Some(white)) = (pair(0.2, turn), pair(white.max(0.03), -turn)) else {
+        return false;
+    };
+    let apart = white[0].min(white[1]) - black[0].max(black[1]);
+    let mean = 0.5 * (white[0] + white[1] - black[0] - black[1]);
+    apart > LEAST_CONTRAST && apart > 0.25 * mean
+}
+
+/// The shorter of a length's images along both axes of the board, pixels.
+fn narrow_px(map: &crate::boards::Homography, point: Point2<f64>, metres: f64) -> Option<f64> {
+    let at = map.apply(point)?;
+    let mut least = f64::MAX;
+    for axis in [[1.0, 0.0], [0.0, 1.0], [0.71, 0.71], [0.71, -0.71]] {
+        let end = map.apply(point + metres * Vector2::from(axis))?;
+        least = least.min((end - at).norm());
+    }
+    Some(least)
+}
+
+/// Half the window around a corner: no marker may be in it.
+fn window_px(map: &crate::boards::Homography, board: &Board, point: Point2<f64>) -> Option<f64> {
+    let free = match board.kind {
+        Kind::Chessboard => 0.35,
+        Kind::Charuco => 0.5 * (1.0 - board.ratio) * 1.15,
+        Kind::Grid => 0.45 * board.ratio,
+    };
+    let free_px = narrow_px(map, point, free * board.square_metres)?;
+    Some(free_px.clamp(NARROWEST_WINDOW, WIDEST_WINDOW))
+}
+
+/// The corner that is furthest from where the others say, if that is too far.
+fn worst_off(layout: &Layout, side: f64, corners: &[Corner]) -> Option<usize> {
+    if corners.len() < 6 {
+        return None;
+    }
+    let known: Vec<Known> = corners
+        .iter()
+        .map(|it| (layout.points[it.id], it.at, 1.0))
+        .collect();
+    let mut worst = (1.0, None);
+    for (nth, corner) in corners.iter().enumerate() {
+        let point = layout.points[corner.id];
+        let mut others = known.clone();
+        others.swap_remove(nth);
+        let Some(map) = map_near(&others, point, 1.5 * side) else {
+            continue;
+        };
+        let (Some(expected), Some(square_px)) = (map.apply(point), narrow_px(&map, point, side))
+        else {
+            continue;
+        };
+        // At the border of the board the others say less.
+        let around = others
+            .iter()
+            .filter(|it| (it.0 - point).norm() < 1.6 * side);
+        let slack = if around.count() >= 5 { 1.0 } else { 2.0 };
+        let off = (expected - corner.at).norm() / (slack * (OFF_SQUARES * square_px).max(OFF_PX));
+        if off > worst.0 {
+            worst = (off, Some(nth));
+        }
+    }
+    worst.1
+}

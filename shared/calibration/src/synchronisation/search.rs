@@ -1,0 +1,290 @@
+//! The offsets of all cameras that agree best, and what comes next.
+
+use crate::synchronisation::curve::{Curve, STEP_S};
+
+/// Samples that count as seen without a gain, so that few samples tell little.
+const PRIOR_SAMPLES: f64 = 20.0;
+/// Where the curve has fallen to this share of its best, the basin of the best offset ends.
+const BASIN: f64 = 0.6;
+/// An entry is a peak if none of so many to each side is higher.
+const NEAR: usize = 3;
+/// Length of the blocks of time whose gains are taken as independent, seconds.
+const BLOCK_S: f64 = 0.5;
+/// Most cameras of which every division into two groups is looked at.
+const MOST_DIVIDED: usize = 8;
+
+/// A division of the cameras into two groups, and how much better the found offset between these is than any other.
+#[derive(Debug, Clone)]
+pub(crate) struct Rival {
+    /// The cameras of the group without the reference.
+    pub(crate) group: Vec<usize>,
+    /// The second-best offset of the group, seconds against the best.
+    pub(crate) away_s: f64,
+    /// The second-best gain as a share of the best.
+    pub(crate) ratio: f64,
+    /// The difference of both gains in units of its standard error.
+    pub(crate) t: f64,
+}
+
+/// What the search found.
+#[derive(Debug, Clone)]
+pub(crate) struct Found {
+    /// Of each camera, seconds; 0 for the reference.
+    pub(crate) offsets_s: Vec<f64>,
+    /// One for every division, the most doubtful first.
+    pub(crate) rivals: Vec<Rival>,
+}
+
+/// Finds the offsets with the largest gain over all pairs.
+///
+/// * `active`: the cameras that take part; the first is the reference.
+/// * `curves`: of pairs of these.
+pub(crate) fn search(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Found {
+    let groups = groups(active);
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for mut offsets_s in starts(n_cameras, active, curves) {
+        for _ in 0..20 {
+            let mut has_moved = false;
+            for group in &groups {
+                let curve = Joint::new(curves, group, &offsets_s);
+                let (by, value) = curve.best();
+                if by != 0 && value > curve.value(0) + 1e-9 {
+                    for &camera in group {
+                        offsets_s[camera] += by as f64 * STEP_S;
+                    }
+                    has_moved = true;
+                }
+            }
+            if !has_moved {
+                break;
+            }
+        }
+        let value = total(curves, &offsets_s);
+        if best.as_ref().is_none_or(|it| value > it.0) {
+            best = Some((value, offsets_s));
+        }
+    }
+    let mut offsets_s = best.map_or_else(|| vec![0.0; n_cameras], |it| it.1);
+    let zero = active.first().map_or(0.0, |it| offsets_s[*it]);
+    for it in &mut offsets_s {
+        *it -= zero;
+    }
+    let mut rivals: Vec<Rival> = groups
+        .iter()
+        .map(|it| rival(curves, it, &offsets_s))
+        .collect();
+    rivals.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
+    Found { offsets_s, rivals }
+}
+
+/// The groups of cameras that may be moved against the others: all without the reference, or single ones if there are many.
+fn groups(active: &[usize]) -> Vec<Vec<usize>> {
+    let others = active.get(1..).unwrap_or(&[]);
+    if active.len() > MOST_DIVIDED {
+        let mut singles: Vec<Vec<usize>> = others.iter().map(|it| vec![*it]).collect();
+        singles.push(others.to_vec());
+        return singles;
+    }
+    let chosen = |bits: usize| {
+        let each = others.iter().enumerate();
+        each.filter(|(nth, _)| bits >> nth & 1 == 1)
+            .map(|it| *it.1)
+            .collect()
+    };
+    (1..1_usize << others.len()).map(chosen).collect()
+}
+
+/// Offsets from which the search begins: along the pairs with the clearest minima, and from every camera to all others.
+fn starts(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Vec<Vec<f64>> {
+    let mut peaks: Vec<(f64, [usize; 2], f64)> = curves
+        .iter()
+        .map(|it| {
+            let (nth, value) = peak(it);
+            (value, it.cameras, it.offset_s(nth))
+        })
+        .collect();
+    peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut starts = vec![spread(n_cameras, &peaks)];
+    for &hub in active {
+        let of_hub: Vec<_> = peaks
+            .iter()
+            .filter(|it| it.1.contains(&hub))
+            .copied()
+            .collect();
+        starts.push(spread(n_cameras, &of_hub));
+    }
+    starts
+}
+
+/// Offsets along pairs, the first of which count most.
+fn spread(n_cameras: usize, peaks: &[(f64, [usize; 2], f64)]) -> Vec<f64> {
+    let mut offsets_s = vec![0.0; n_cameras];
+    let mut tree: Vec<usize> = (0..n_cameras).collect();
+    for &(_, [a, b], offset_s) in peaks {
+        let (of_a, of_b) = (tree[a], tree[b]);
+        if of_a == of_b {
+            continue;
+        }
+        // The offset of a pair is that of the first camera less that of the second.
+        let by = offsets_s[a] - offset_s - offsets_s[b];
+        for camera in 0..n_cameras {
+            if tree[camera] == of_b {
+                offsets_s[camera] += by;
+                tree[camera] = of_a;
+            }
+        }
+    }
+    offsets_s
+}
+
+/// The clearest minimum of a pair: its entry, and how clear it is.
+pub(crate) fn peak(curve: &Curve) -> (usize, f64) {
+    let each = curve.gain.iter().zip(&curve.n).enumerate();
+    let each = each.map(|(nth, (gain, n))| (nth, clearness(*gain, *n)));
+    each.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
+}
+
+/// The second-best minimum of a pair: its entry, and its gain as a share of the best.
+pub(crate) fn second(curve: &Curve) -> Option<(usize, f64)> {
+    let (best, _) = peak(curve);
+    let each = curve.gain.iter().zip(&curve.n);
+    let values: Vec<f64> = each.map(|(gain, n)| clearness(*gain, *n)).collect();
+    let other = other_peak(&values, best)?;
+    Some((other, (values[other] / values[best]).max(0.0)))
+}
+
+/// The highest entry outside the basin of another that is higher than all near it; the ends count as such where the basin goes on
+/// up to them.
+fn other_peak(values: &[f64], best: usize) -> Option<usize> {
+    let last = values.len().checked_sub(1)?;
+    let is_below = |it: &usize| values[*it] < BASIN * values[best];
+    let after = (best..=last).find(is_below).unwrap_or(last);
+    let before = (0..=best).rev().find(is_below).unwrap_or(0);
+    let is_peak = |it: &usize| {
+        let near = it.saturating_sub(NEAR)..=(it + NEAR).min(last);
+        // A flank of the basin is no peak: what is beside it on the way to the best is higher.
+        near.clone().all(|other| values[other] <= values[*it])
+    };
+    let others = (0..=before).chain(after..=last);
+    let others = others.filter(|it| *it != best && is_peak(it));
+    others.max_by(|a, b| values[*a].total_cmp(&values[*b]))
+}
+
+fn clearness(gain: f64, n: f64) -> f64 {
+    gain / (n + PRIOR_SAMPLES).sqrt()
+}
+
+fn total(curves: &[Curve], offsets_s: &[f64]) -> f64 {
+    let (mut gain, mut n) = (0.0, 0.0);
+    for it in curves {
+        let [a, b] = it.cameras;
+        if let Some(nth) = it.index(offsets_s[a] - offsets_s[b]) {
+            gain += it.gain[nth];
+            n += it.n[nth];
+        }
+    }
+    clearness(gain, n)
+}
+
+/// The curves of all pairs between a group and the other cameras, over an offset of the whole group.
+struct Joint<'a> {
+    /// The curve, the entry without an offset, and in which direction the offset counts.
+    crossing: Vec<(&'a Curve, i64, i64)>,
+    half: i64,
+}
+
+impl<'a> Joint<'a> {
+    fn new(curves: &'a [Curve], group: &[usize], offsets_s: &[f64]) -> Self {
+        let crosses =
+            |it: &&Curve| group.contains(&it.cameras[0]) != group.contains(&it.cameras[1]);
+        let crossing = curves.iter().filter(crosses);
+        let crossing: Vec<_> = crossing
+            .map(|it| {
+                let [a, b] = it.cameras;
+                let now = (offsets_s[a] - offsets_s[b] - it.first_s) / it.step_s;
+                let sign = if group.contains(&a) { 1 } else { -1 };
+                (it, now.round() as i64, sign)
+            })
+            .collect();
+        let half = crossing.iter().map(|it| it.0.gain.len() as i64).max();
+        Self {
+            crossing,
+            half: half.unwrap_or(0),
+        }
+    }
+
+    fn entries(&self, by: i64) -> impl Iterator<Item = (&'a Curve, usize)> {
+        let each = self.crossing.iter();
+        each.filter_map(move |&(curve, now, sign)| {
+            let nth = usize::try_from(now + sign * by).ok()?;
+            (nth < curve.gain.len()).then_some((curve, nth))
+        })
+    }
+
+    fn value(&self, by: i64) -> f64 {
+        let (mut gain, mut n) = (0.0, 0.0);
+        for (curve, nth) in self.entries(by) {
+            gain += curve.gain[nth];
+            n += curve.n[nth];
+        }
+        clearness(gain, n)
+    }
+
+    fn best(&self) -> (i64, f64) {
+        let each = (-self.half..=self.half).map(|it| (it, self.value(it)));
+        each.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
+    }
+
+    /// The gains of the blocks of time, at an offset and at none.
+    fn blocks(&self, by: i64) -> Vec<[f64; 2]> {
+        let mut blocks = std::collections::BTreeMap::<(usize, i64), [f64; 2]>::new();
+        for (number, &(curve, now, sign)) in self.crossing.iter().enumerate() {
+            let entries = [now, now + sign * by].map(|it| usize::try_from(it).ok());
+            for sample in &curve.samples {
+                let block = (sample.time_s / BLOCK_S).floor() as i64;
+                let sums = blocks.entry((number, block)).or_default();
+                for (sum, nth) in sums.iter_mut().zip(entries) {
+                    *sum += nth.and_then(|it| sample.gain(it)).unwrap_or(0.0);
+                }
+            }
+        }
+        blocks.into_values().collect()
+    }
+}
+
+/// The second-best offset of a group.
+fn rival(curves: &[Curve], group: &[usize], offsets_s: &[f64]) -> Rival {
+    let joint = Joint::new(curves, group, offsets_s);
+    let values: Vec<f64> = (-joint.half..=joint.half)
+        .map(|it| joint.value(it))
+        .collect();
+    let now = joint.half as usize;
+    let best = values.get(now).copied().unwrap_or(0.0);
+    let other = other_peak(&values, now);
+    let by = other.map_or(0, |it| it as i64 - joint.half);
+    let value = other.map_or(0.0, |it| values[it]);
+    let differences: Vec<f64> = joint.blocks(by).iter().map(|it| it[0] - it[1]).collect();
+    Rival {
+        group: group.to_vec(),
+        away_s: by as f64 * STEP_S,
+        ratio: if best > 0.0 {
+            (value / best).max(0.0)
+        } else {
+            1.0
+        },
+        t: if other.is_some() {
+            sum_in_errors(&differences)
+        } else {
+            f64::INFINITY
+        },
+    }
+}
+
+/// The sum of numbers in units of its standard error, where they are independent.
+fn sum_in_errors(each: &[f64]) -> f64 {
+    let n = each.len() as f64;
+    let sum: f64 = each.iter().sum();
+    let squares: f64 = each.iter().map(|it| (it - sum / n).powi(2)).sum();
+    let error = (squares * n / (n - 1.0).max(1.0)).sqrt();
+    if error > 0.0 { sum / error } else { 0.0 }
+}

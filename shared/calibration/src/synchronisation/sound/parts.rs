@@ -1,0 +1,168 @@
+//! Parts of long recordings one after another: whether the offset stays what it is, or drifts.
+
+use super::beginnings::{Beginnings, HOP_S};
+use super::{HEARD_S, LEAST, LEAST_COSINE, MOST_RATIO, SPARE_S};
+use crate::synchronisation::doubt::Doubt;
+
+/// Length of a part, seconds.
+const PART_S: f64 = 20.0;
+/// Least parts that tell an offset for there to be a drift.
+const LEAST_PARTS: usize = 5;
+/// How far from the offset of all it is searched in a part, seconds.
+const AROUND_S: f64 = 0.5;
+/// A drift is determined where its error makes less than this over the recording, seconds.
+const MOST_ERROR_S: f64 = 0.01;
+/// A drift is taken as such if it is so many standard errors away from none.
+const SURE: f64 = 4.0;
+/// Largest share of parts that contradict the others.
+const MOST_AWAY: f64 = 0.25;
+
+/// The offset of a camera over time.
+#[derive(Debug)]
+pub(super) struct Drift {
+    line: Option<Line>,
+    /// By how much parts contradict the line, seconds, and the most that is accepted, where too many do.
+    contradiction_s: Option<[f64; 2]>,
+}
+
+/// Offset = `at_zero_s + slope * time`, of the clock of the camera.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    at_zero_s: f64,
+    slope: f64,
+    error: f64,
+    length_s: f64,
+}
+
+impl Drift {
+    fn determined(&self) -> Option<Line> {
+        self.line
+            .filter(|it| it.error * it.length_s <= MOST_ERROR_S)
+    }
+
+    /// Its standard error, where it is determined.
+    pub(super) fn error(&self) -> Option<f64> {
+        self.determined().map(|it| it.error)
+    }
+
+    fn line(&self) -> Option<Line> {
+        let line = self.determined();
+        line.filter(|it| it.slope.abs() >= SURE * it.error)
+    }
+
+    /// By how much a second of the camera is longer than one of the reference; 0 where that is not told from none.
+    pub(super) fn sure(&self) -> f64 {
+        self.line().map_or(0.0, |it| it.slope)
+    }
+
+    /// The offset at time 0 of the camera.
+    ///
+    /// * `constant_s`: the offset if there is no drift.
+    pub(super) fn offset_s(&self, constant_s: f64) -> f64 {
+        self.line().map_or(constant_s, |it| it.at_zero_s)
+    }
+
+    pub(super) fn doubt(&self, camera: usize) -> Option<Doubt> {
+        let [away_s, most_s] = self.contradiction_s?;
+        Some(Doubt::Parts {
+            camera,
+            away_s,
+            most_s,
+        })
+    }
+}
+
+/// Compares the parts of a recording with those of another.
+///
+/// * `offset_s`: of all, added to times of the reference to have those of the camera.
+/// * `way_s`: how long sound takes from one to the other.
+pub(super) fn parts(
+    reference: &Beginnings,
+    camera: &Beginnings,
+    offset_s: f64,
+    way_s: f64,
+) -> Drift {
+    let [from, to] = reference.span();
+    let length = (PART_S / HOP_S) as i64;
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    for begin in (from..to - length / 2).step_by(length as usize) {
+        let span = [begin, (begin + length).min(to)];
+        let found = reference.compare(camera, span, [offset_s, AROUND_S]);
+        if found.n >= LEAST && found.cosine >= LEAST_COSINE && found.ratio() <= MOST_RATIO {
+            let middle_s = 0.5 * (span[0] + span[1]) as f64 * HOP_S;
+            points.push([middle_s + found.offset_s, -found.offset_s]);
+        }
+    }
+    if points.len() < LEAST_PARTS {
+        return Drift {
+            line: None,
+            contradiction_s: None,
+        };
+    }
+    let most_s = 2.0 * way_s + SPARE_S;
+    let slope = median(slopes(&points));
+    let at_zero_s = median(points.iter().map(|it| it[1] - slope * it[0]).collect());
+    let away_s = |it: &[f64; 2]| (it[1] - at_zero_s - slope * it[0]).abs();
+    let mut far: Vec<f64> = points
+        .iter()
+        .map(away_s)
+        .filter(|it| *it > most_s)
+        .collect();
+    let too_many = far.len() as f64 > MOST_AWAY * points.len() as f64;
+    far.sort_by(f64::total_cmp);
+    let contradiction_s = far.last().filter(|_| too_many).map(|it| [*it, most_s]);
+    points.retain(|it| away_s(it) <= most_s);
+    Drift {
+        line: fitted(&points),
+        contradiction_s,
+    }
+}
+
+/// Slopes between all pairs of points.
+fn slopes(points: &[[f64; 2]]) -> Vec<f64> {
+    let mut slopes = Vec::new();
+    for (nth, a) in points.iter().enumerate() {
+        slopes.extend(
+            points[nth + 1..]
+                .iter()
+                .map(|b| (b[1] - a[1]) / (b[0] - a[0])),
+        );
+    }
+    slopes
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// The line of least squares.
+fn fitted(points: &[[f64; 2]]) -> Option<Line> {
+    if points.len() < LEAST_PARTS {
+        return None;
+    }
+    let n = points.len() as f64;
+    let [x, y] = [0, 1].map(|axis| points.iter().map(|it| it[axis]).sum::<f64>() / n);
+    let spread: f64 = points.iter().map(|it| (it[0] - x).powi(2)).sum();
+    let slope = points
+        .iter()
+        .map(|it| (it[0] - x) * (it[1] - y))
+        .sum::<f64>()
+        / spread;
+    let at_zero_s = y - slope * x;
+    let residuals = points
+        .iter()
+        .map(|it| (it[1] - at_zero_s - slope * it[0]).powi(2));
+    let variance = (residuals.sum::<f64>() / (n - 2.0)).max(HEARD_S.powi(2));
+    let ends = points.iter().map(|it| it[0]);
+    let [first, last] = [
+        ends.clone().fold(f64::INFINITY, f64::min),
+        ends.fold(f64::NEG_INFINITY, f64::max),
+    ];
+    Some(Line {
+        at_zero_s,
+        slope,
+        error: (variance / spread).sqrt(),
+        length_s: last - first,
+    })
+}

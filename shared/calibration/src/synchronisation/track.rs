@@ -1,0 +1,292 @@
+//! People linked from picture to picture, and where their joints are at any time.
+
+use geometry::Camera;
+use nalgebra::Point2;
+
+use crate::synchronisation::film::{Film, Person};
+
+/// The longest time over which a person is linked, seconds.
+const LONGEST_GAP_S: f64 = 0.25;
+/// How far the joints of a person may move from one picture to the next, sizes of the person, and per second besides.
+const FARTHEST: [f64; 2] = [0.15, 4.0];
+/// A joint farther from where its neighbours in time say than this, sizes of the person, is an outlier; where it moves, by this
+/// share of the way between them more.
+const OUTLIER: f64 = 0.03;
+const TURNING: f64 = 0.25;
+/// Neighbours to each side.
+const NEIGHBOURS: usize = 3;
+/// Joints of lower score are not used.
+const LEAST_SCORE: f64 = 0.05;
+/// The kernel of the smoothing ends at so many standard deviations.
+const KERNEL_END: f64 = 2.5;
+/// The fewest joints of a person that is used.
+pub(crate) const LEAST_JOINTS: usize = 3;
+
+/// A joint at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Ideal pixels.
+    pub at: [f64; 2],
+    /// Ideal pixels per second.
+    pub speed: [f64; 2],
+    /// Share of the score.
+    pub weight: f64,
+}
+
+/// A sample of a joint.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    time_s: f64,
+    at: [f64; 2],
+    score: f64,
+}
+
+/// One person over time, in one camera.
+#[derive(Debug, Clone)]
+pub struct Track {
+    /// First and last time, seconds by the clock of the camera.
+    pub(crate) span: [f64; 2],
+    /// Size of the person, ideal pixels.
+    pub(crate) size: f64,
+    /// Samples of each joint, in the order of time.
+    joints: Vec<Vec<Sample>>,
+    /// Standard deviation of the kernel, seconds.
+    sigma_s: f64,
+}
+
+impl Track {
+    /// First and last time, seconds by the clock of the camera.
+    pub fn span(&self) -> [f64; 2] {
+        self.span
+    }
+
+    /// Size of the person, ideal pixels.
+    pub fn size(&self) -> f64 {
+        self.size
+    }
+
+    /// The mean score of its joints; 0 without any.
+    pub fn score(&self) -> f64 {
+        let scores = self.joints.iter().flatten().map(|it| it.score);
+        let n = self.joints.iter().map(Vec::len).sum::<usize>();
+        scores.sum::<f64>() / n.max(1) as f64
+    }
+
+    /// Where a joint is at a time: a line through its samples nearby, weighted by a Gaussian in time.
+    pub fn place(&self, joint: usize, time_s: f64) -> Option<Place> {
+        let samples = &self.joints[joint];
+        let reach = KERNEL_END * self.sigma_s;
+        let from = samples.partition_point(|it| it.time_s < time_s - reach);
+        let near = samples[from..]
+            .iter()
+            .take_while(|it| it.time_s <= time_s + reach);
+        let (mut n, mut before, mut after) = (0, false, false);
+        let mut sums = [0.0; 3];
+        let mut moments = [[0.0; 2]; 2];
+        let mut scores = 0.0;
+        for it in near {
+            let dt = it.time_s - time_s;
+            let kernel = (-0.5 * (dt / self.sigma_s).powi(2)).exp();
+            let weight = it.score * kernel;
+            n += 1;
+            before |= dt <= 0.0;
+            after |= dt >= 0.0;
+            scores += kernel;
+            for (power, sum) in sums.iter_mut().enumerate() {
+                *sum += weight * dt.powi(power as i32);
+            }
+            for (moments, at) in moments.iter_mut().zip(it.at) {
+                moments[0] += weight * at;
+                moments[1] += weight * dt * at;
+            }
+        }
+        let [s0, s1, s2] = sums;
+        let spread = s0 * s2 - s1 * s1;
+        if n < 2 || !before || !after || spread <= 1e-12 * s0 * s0 {
+            return None;
+        }
+        let line =
+            moments.map(|[m0, m1]| [(s2 * m0 - s1 * m1) / spread, (s0 * m1 - s1 * m0) / spread]);
+        Some(Place {
+            at: line.map(|it| it[0]),
+            speed: line.map(|it| it[1]),
+            weight: s0 / scores,
+        })
+    }
+}
+
+/// A person of a picture, ideal pixels.
+struct Seen {
+    joints: Vec<Option<([f64; 2], f64)>>,
+    size: f64,
+}
+
+/// A track while it is made.
+struct Open {
+    samples: Vec<(f64, Seen)>,
+}
+
+/// The tracks of a film.
+///
+/// * `sigma_s`: standard deviation of the kernel that smooths them, seconds.
+pub fn tracks(film: &Film, camera: &Camera, n_joints: usize, sigma_s: f64) -> Vec<Track> {
+    let [width, height] = camera.intrinsics.size;
+    let least_size = 0.03 * f64::from(width.max(height));
+    let (mut open, mut done) = (Vec::<Open>::new(), Vec::new());
+    for shot in &film.shots {
+        let people = shot.people.iter();
+        let mut people: Vec<Option<Seen>> = people
+            .map(|it| seen(it, camera, n_joints, least_size))
+            .collect();
+        let is_old = |it: &Open| shot.time_s - it.last().0 > LONGEST_GAP_S;
+        let (old, mut fresh): (Vec<Open>, Vec<Open>) = open.into_iter().partition(is_old);
+        done.extend(old);
+        link(shot.time_s, &mut people, &mut fresh);
+        let begun = people.into_iter().flatten().map(|it| Open {
+            samples: vec![(shot.time_s, it)],
+        });
+        fresh.extend(begun);
+        open = fresh;
+    }
+    done.extend(open);
+    let tracks = done.into_iter();
+    tracks
+        .filter_map(|it| it.finish(n_joints, sigma_s))
+        .collect()
+}
+
+/// Gives people to the tracks whose last pictures they are nearest to, the nearest first.
+fn link(time_s: f64, people: &mut [Option<Seen>], open: &mut [Open]) {
+    let mut ties = Vec::new();
+    for (track, it) in open.iter().enumerate() {
+        let (last_s, last) = it.last();
+        let farthest = FARTHEST[0] + FARTHEST[1] * (time_s - last_s);
+        for (person, seen) in people.iter().enumerate() {
+            let Some(seen) = seen else { continue };
+            if let Some(apart) = apart(last, seen).filter(|it| *it < farthest) {
+                ties.push((apart, track, person));
+            }
+        }
+    }
+    ties.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut is_taken = vec![false; open.len()];
+    for (_, track, person) in ties {
+        if !is_taken[track]
+            && let Some(seen) = people[person].take()
+        {
+            is_taken[track] = true;
+            open[track].samples.push((time_s, seen));
+        }
+    }
+}
+
+/// The median distance of the joints of two people, sizes of the larger one.
+fn apart(a: &Seen, b: &Seen) -> Option<f64> {
+    let both = a.joints.iter().zip(&b.joints);
+    let mut each: Vec<f64> = both
+        .filter_map(|(a, b)| {
+            let (a, b) = ((*a)?.0, (*b)?.0);
+            Some((a[0] - b[0]).hypot(a[1] - b[1]))
+        })
+        .collect();
+    if each.len() < LEAST_JOINTS {
+        return None;
+    }
+    each.sort_by(f64::total_cmp);
+    Some(each[each.len() / 2] / a.size.max(b.size))
+}
+
+fn seen(person: &Person, camera: &Camera, n_joints: usize, least_size: f64) -> Option<Seen> {
+    let ideal = |joint: usize| {
+        let it = (*person.joints.get(joint)?)?;
+        let is_good = it.at.iter().all(|it| it.is_finite()) && it.score > LEAST_SCORE;
+        let at = camera
+            .undistorted_px(&Point2::from(it.at))
+            .filter(|_| is_good)?;
+        Some(([at.x, at.y], it.score.min(1.0)))
+    };
+    let joints: Vec<Option<([f64; 2], f64)>> = (0..n_joints).map(ideal).collect();
+    let known = joints.iter().flatten();
+    if known.clone().count() < LEAST_JOINTS {
+        return None;
+    }
+    let extent = |axis: usize| {
+        let each = known.clone().map(|it| it.0[axis]);
+        let [from, to] = each.fold([f64::INFINITY, f64::NEG_INFINITY], |[from, to], it| {
+            [from.min(it), to.max(it)]
+        });
+        to - from
+    };
+    let size = extent(0).max(extent(1)).max(least_size);
+    Some(Seen { joints, size })
+}
+
+impl Open {
+    fn last(&self) -> (f64, &Seen) {
+        let (time_s, seen) = &self.samples[self.samples.len() - 1];
+        (*time_s, seen)
+    }
+
+    fn finish(self, n_joints: usize, sigma_s: f64) -> Option<Track> {
+        if self.samples.len() < 3 {
+            return None;
+        }
+        let mut sizes: Vec<f64> = self.samples.iter().map(|it| it.1.size).collect();
+        sizes.sort_by(f64::total_cmp);
+        // Bent people and people cut off look smaller than they are.
+        let size = sizes[sizes.len() * 3 / 4];
+        let of_joint = |joint: usize| {
+            let each = self.samples.iter();
+            let each = each.filter_map(|(time_s, seen)| {
+                let (at, score) = seen.joints[joint]?;
+                Some(Sample {
+                    time_s: *time_s,
+                    at,
+                    score,
+                })
+            });
+            without_outliers(&each.collect::<Vec<_>>(), OUTLIER * size)
+        };
+        Some(Track {
+            span: [self.samples[0].0, self.last().0],
+            size,
+            joints: (0..n_joints).map(of_joint).collect(),
+            sigma_s,
+        })
+    }
+}
+
+/// Leaves out samples that are far from where those before and after them say: the line between the medians of both.
+fn without_outliers(samples: &[Sample], limit: f64) -> Vec<Sample> {
+    let is_good = |nth: usize| {
+        let before = &samples[nth.saturating_sub(NEIGHBOURS)..nth];
+        let after = &samples[nth + 1..(nth + 1 + NEIGHBOURS).min(samples.len())];
+        let (Some(before), Some(after)) = (middle(before), middle(after)) else {
+            return true;
+        };
+        let it = samples[nth];
+        let share = (it.time_s - before.time_s) / (after.time_s - before.time_s);
+        [0, 1].into_iter().all(|axis| {
+            let way = after.at[axis] - before.at[axis];
+            let away = it.at[axis] - before.at[axis] - share * way;
+            away.abs() < limit + TURNING * way.abs()
+        })
+    };
+    let kept = (0..samples.len()).filter(|it| is_good(*it));
+    kept.map(|it| samples[it]).collect()
+}
+
+/// The median of samples, each number for itself.
+fn middle(samples: &[Sample]) -> Option<Sample> {
+    let median = |of: fn(&Sample) -> f64| {
+        let mut each: Vec<f64> = samples.iter().map(of).collect();
+        each.sort_by(f64::total_cmp);
+        let n = each.len();
+        (n > 0).then(|| f64::midpoint(each[(n - 1) / 2], each[n / 2]))
+    };
+    Some(Sample {
+        time_s: median(|it| it.time_s)?,
+        at: [median(|it| it.at[0])?, median(|it| it.at[1])?],
+        score: 1.0,
+    })
+}

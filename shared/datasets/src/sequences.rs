@@ -1,0 +1,30 @@
+//! Recordings of one person by several calibrated cameras, with the true joints in space where they are known.
+//!
+//! [`read`] takes the folder of a data set in its own layout (`HumanEva-I`, UMPM, synthetic scenes of
+//! Parallax), or a file that describes any other sequence, and returns [`Sequence`]s. No pixels
+//! are read here: a [`View`] has the footage to open and the frame at which the sequence begins.
+//!
+//! [`read_motion`] takes a C3D or TRC file alone: the motion of one person, without cameras.
+//!
+//! Metres; the world is that of the calibration.
+
+mod error;
+mod sequence;
+
+mod described;
+mod synthetic;
+
+mod humaneva;
+mod umpm;
+
+mod motion;
+mod open;
+
+#[cfg(test)]
+mod tests;
+
+pub use error::{SequenceError, SyncError};
+pub use humaneva::{PAPER_TEST, PaperTest, Sync, TRIAL};
+pub use motion::{MarkerTable, Motion, MotionError, MotionOptions, PRESETS, read_motion};
+pub use open::read;
+pub use sequence::{Alignment, Frame, Options, Sequence, View};

@@ -1,0 +1,32 @@
+//! Whether 25 keypoints of which nobody said what they are called lie as those of `body-25` do.
+//!
+//! OpenPose has two sets of 25, and files do not say which: `body-25`, and `body-25b` of its experimental model. The first has a
+//! pelvis in the middle of the hips. What is there in the second, an elbow, a wrist and a hip, lies apart.
+
+use crate::BODY_25;
+use crate::files::SeenKeypoints;
+
+/// A pelvis that is farther than this from the middle of the hips, in half of the people, is none: share of the longer side of
+/// their box. In the demonstration of Pose2Sim, which is `body-25b`, the median of a camera is 0.17 to 0.51.
+const MOST_OFF: f64 = 0.1;
+
+/// How far from the middle of the hips half of the people have their pelvis, at least; `None` where it is near enough, or nobody
+/// has all three.
+pub(crate) fn pelvis_off(people: &mut dyn Iterator<Item = &SeenKeypoints>) -> Option<f64> {
+    let mut off: Vec<f64> = people.filter_map(off).collect();
+    off.sort_by(f64::total_cmp);
+    let median = off.get(off.len() / 2).copied()?;
+    (median > MOST_OFF).then_some(median)
+}
+
+fn off(person: &SeenKeypoints) -> Option<f64> {
+    let at = |name: &str| {
+        let nth = BODY_25.iter().position(|it| *it == name)?;
+        Some(person.keypoints.get(nth)?.as_ref()?.at)
+    };
+    let [pelvis, right, left] = [at("pelvis")?, at("right hip")?, at("left hip")?];
+    let [x0, y0, x1, y1] = person.outline()?;
+    let side = (x1 - x0).max(y1 - y0).max(1.0);
+    let away = [0, 1].map(|axis| pelvis[axis] - f64::midpoint(right[axis], left[axis]));
+    Some(away[0].hypot(away[1]) / side)
+}

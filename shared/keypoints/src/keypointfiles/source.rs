@@ -1,0 +1,196 @@
+//! The people of every frame.
+
+use std::collections::BTreeMap;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use crate::BODY_25;
+use crate::files::{FileError, NameSet, SeenKeypoints, coco, openpose};
+
+use crate::keypointfiles::error::KeypointFileError;
+use crate::keypointfiles::folder;
+use crate::keypointfiles::order::pelvis_off;
+
+/// Largest file of one frame, and of all frames, bytes.
+const MOST_OF_FRAME: u64 = 16 << 20;
+const MOST_OF_FILM: u64 = 1 << 30;
+/// Files with people that are read to see which 25 keypoints they have.
+const N_LOOKED_AT: usize = 20;
+
+/// The keypoints of a film, by the numbers of its frames.
+#[derive(Debug)]
+pub struct KeypointSource {
+    names: NameSet,
+    n_frames: u64,
+    frames: Frames,
+}
+
+#[derive(Debug)]
+enum Frames {
+    /// Files, read when their frame is asked for; rising by number.
+    Files(Vec<(u64, PathBuf)>),
+    /// Read already.
+    Read(BTreeMap<u64, Vec<SeenKeypoints>>),
+}
+
+impl KeypointSource {
+    /// Opens a folder of JSON files in OpenPose's layout, or one JSON file in COCO's.
+    ///
+    /// A file's frame is the last number in its name, counted from the lowest one of the folder. Numbers that no file has are
+    /// frames that tell nothing. Files that do not end in `.json` are passed over.
+    ///
+    /// * `names`: what the keypoints are called; `None`: what the files tell by their number or their category. Then the files of
+    ///   a folder are read up to the first person, or a few more.
+    ///
+    /// # Errors
+    ///
+    /// [`KeypointFileError`], naming the file.
+    pub fn open(path: &Path, names: Option<NameSet>) -> Result<Self, KeypointFileError> {
+        if path.is_dir() {
+            return Self::folder(path, names);
+        }
+        let text = read(path, MOST_OF_FILM)?;
+        let film = coco::parse(&text, names.as_ref()).map_err(|source| in_file(path, source))?;
+        if names.is_none() && is_body_25(&film.names) {
+            checked(path, &mut film.frames.values().flatten())?;
+        }
+        Ok(Self {
+            names: film.names,
+            n_frames: film.n_frames,
+            frames: Frames::Read(film.frames),
+        })
+    }
+
+    fn folder(path: &Path, names: Option<NameSet>) -> Result<Self, KeypointFileError> {
+        let files = folder::files(path)?;
+        let names = match names {
+            Some(names) => names,
+            None => told(path, &files)?,
+        };
+        Ok(Self {
+            names,
+            n_frames: files.last().map_or(0, |it| it.0 + 1),
+            frames: Frames::Files(files),
+        })
+    }
+
+    /// What the keypoints are called.
+    pub fn names(&self) -> &NameSet {
+        &self.names
+    }
+
+    /// Number of frames: one more than the highest number that the files tell of.
+    pub fn n_frames(&self) -> u64 {
+        self.n_frames
+    }
+
+    /// The people of a frame, from 0, in the order of its file.
+    ///
+    /// * `people`: replaced by them; empty where there are none.
+    /// * Returns how many there are; `None` where nothing tells of the frame: a gap, or beyond the end.
+    ///
+    /// # Errors
+    ///
+    /// [`KeypointFileError`] of a file that cannot be read; `people` is empty then. Other frames can still be asked for.
+    pub fn of_frame(
+        &self,
+        frame: u64,
+        people: &mut Vec<SeenKeypoints>,
+    ) -> Result<Option<usize>, KeypointFileError> {
+        people.clear();
+        match &self.frames {
+            Frames::Read(frames) => {
+                let Some(seen) = frames.get(&frame) else {
+                    return Ok(None);
+                };
+                people.extend_from_slice(seen);
+            }
+            Frames::Files(files) => {
+                let Ok(at) = files.binary_search_by_key(&frame, |it| it.0) else {
+                    return Ok(None);
+                };
+                let path = &files[at].1;
+                let text = read(path, MOST_OF_FRAME)?;
+                let seen = openpose::parse(&text, Some(&self.names));
+                *people = seen.map_err(|source| in_file(path, source))?.people;
+            }
+        }
+        Ok(Some(people.len()))
+    }
+}
+
+/// The names that the first file with a person tells.
+fn told(folder: &Path, files: &[(u64, PathBuf)]) -> Result<NameSet, KeypointFileError> {
+    let mut told: Option<NameSet> = None;
+    let mut people = Vec::new();
+    let mut n_looked_at = 0;
+    for (_, path) in files {
+        let text = read(path, MOST_OF_FRAME)?;
+        let frame = openpose::parse(&text, told.as_ref()).map_err(|it| in_file(path, it))?;
+        told = frame.names;
+        let Some(names) = &told else { continue };
+        people.extend(frame.people);
+        n_looked_at += 1;
+        if n_looked_at == N_LOOKED_AT || !is_body_25(names) {
+            break;
+        }
+    }
+    let names = told.ok_or_else(|| KeypointFileError::Nobody {
+        path: folder.to_owned(),
+    })?;
+    if is_body_25(&names) {
+        checked(folder, &mut people.iter())?;
+    }
+    Ok(names)
+}
+
+fn is_body_25(names: &NameSet) -> bool {
+    names.names() == BODY_25
+}
+
+/// Refuses 25 keypoints that are not `body-25`.
+fn checked(
+    path: &Path,
+    people: &mut dyn Iterator<Item = &SeenKeypoints>,
+) -> Result<(), KeypointFileError> {
+    match pelvis_off(people) {
+        None => Ok(()),
+        Some(off) => Err(KeypointFileError::NotBody25 {
+            path: path.to_owned(),
+            off,
+        }),
+    }
+}
+
+fn in_file(path: &Path, source: FileError) -> KeypointFileError {
+    KeypointFileError::File {
+        path: path.to_owned(),
+        source,
+    }
+}
+
+/// The bytes of a file; not more than that, whatever its size is said to be.
+fn read(path: &Path, most: u64) -> Result<Vec<u8>, KeypointFileError> {
+    let failed = |source| KeypointFileError::Read {
+        path: path.to_owned(),
+        source,
+    };
+    let file = files::open(path).map_err(failed)?;
+    let bytes = file.metadata().map_err(failed)?.len();
+    let mut text = Vec::new();
+    if bytes <= most {
+        file.take(most + 1).read_to_end(&mut text).map_err(failed)?;
+    }
+    let bytes = bytes.max(text.len() as u64);
+    if bytes > most {
+        return Err(KeypointFileError::TooLarge {
+            path: path.to_owned(),
+            bytes,
+            most,
+        });
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,9 +1,0 @@
-//! TRC files (`OpenSim` markers), read and written: five header lines, then a row a frame, tab separated. Pure: text in,
-//! text out.
-#![forbid(unsafe_code)]
-
-mod read;
-mod write;
-
-pub use read::{Trc, TrcError};
-pub use write::{Heading, row};
