@@ -11,7 +11,6 @@
 
 mod annotations;
 mod balancing;
-mod bf16;
 mod calibration;
 mod clocks;
 mod footage;

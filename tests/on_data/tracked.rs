@@ -96,7 +96,7 @@ fn search(model: &Arc<Model>, clip: &Clip, track: Option<TrackSettings>) -> Sear
     };
     let [width, height] = SIZE.map(|it| it as usize);
     let layout = Arc::new(fmp::Layout::new(model, width, height).unwrap());
-    let step = ViewStep::new(Arc::clone(model), Arc::clone(&layout), settings).unwrap();
+    let step = ViewStep::new(Arc::clone(model), Arc::clone(&layout), settings);
     let mut responses = vec![0.0; layout.n_responses()];
     let mut n_full = 0;
     let poses = (0..clip.cameras.len()).map(|view| {

@@ -3,22 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use fmp::{Layout, Model};
+use fmp::{ImageTooSmall, Layout, Model};
 use pipeline::{ViewSettings, ViewStep};
 
 /// Prepared searches are kept for so many sizes: pictures of a data set are of many.
 const MOST_SIZES: usize = 8;
-
-/// Why a picture cannot be searched.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum NoSearch {
-    /// The picture is too small for the model.
-    #[error(transparent)]
-    Small(#[from] fmp::ImageTooSmall),
-    /// The machine lacks what the search needs.
-    #[error(transparent)]
-    Machine(#[from] kernels::NoAmx),
-}
 
 /// Searches with one model, by the size of the picture.
 #[derive(Debug)]
@@ -37,13 +26,16 @@ impl Searches {
     }
 
     /// The search of pictures of a size.
-    pub(crate) fn of_size(&self, [width, height]: [usize; 2]) -> Result<Arc<ViewStep>, NoSearch> {
+    pub(crate) fn of_size(
+        &self,
+        [width, height]: [usize; 2],
+    ) -> Result<Arc<ViewStep>, ImageTooSmall> {
         let mut steps = self.steps.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(step) = steps.get(&[width, height]) {
             return Ok(Arc::clone(step));
         }
         let layout = Arc::new(Layout::new(&self.model, width, height)?);
-        let step = ViewStep::new(Arc::clone(&self.model), layout, ViewSettings::default())?;
+        let step = ViewStep::new(Arc::clone(&self.model), layout, ViewSettings::default());
         let step = Arc::new(step);
         if steps.len() < MOST_SIZES {
             steps.insert([width, height], Arc::clone(&step));

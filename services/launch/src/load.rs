@@ -4,7 +4,6 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use capture::Blank;
-use deployment::pose::Precision;
 use deployment::{ConfigError, Deployment, Loaded, Machine};
 use failure::{ExitKind, Fault};
 use scene::Address;
@@ -112,11 +111,6 @@ impl Machine for ThisMachine {
     fn is_live(&self, named: &str) -> bool {
         crate::cameras::is_live(named)
     }
-
-    fn has(&self, precision: Precision) -> Result<(), String> {
-        let checked = pose::precision(precision).check();
-        checked.map_err(|why| why.to_string())
-    }
 }
 
 /// What kind of file it is instead; empty if the error of the system suffices.
@@ -141,24 +135,6 @@ mod tests {
         let file = Path::new("deployment.toml");
         let set = ["pose.network=none".to_owned(), set.to_owned()];
         Loaded::parse(SHORT, file, &set, &ThisMachine)
-    }
-
-    #[test]
-    fn a_precision_that_the_machine_lacks_is_refused_with_the_reason() {
-        let set = "pose.precision=bf16";
-        match kernels::Amx::detect() {
-            Ok(_) => {
-                let pose = parse(set).unwrap().deployment.pose;
-                assert_eq!(pose.precision, Precision::Bf16);
-            }
-            Err(why) => {
-                let got = parse(set).unwrap_err().to_string();
-                assert!(got.contains("`pose.precision` is \"bf16\""), "{got}");
-                assert!(got.contains(&why.to_string()), "{got}");
-            }
-        }
-        let got = parse("pose.precision=f16").unwrap_err().to_string();
-        assert!(got.contains("`bf16`"), "{got}");
     }
 
     #[test]

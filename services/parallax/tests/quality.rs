@@ -63,7 +63,7 @@ fn step_of(plan: &ViewPlan) -> (ViewStep, Arc<Layout>) {
         Arc::clone(&layout),
         ViewSettings::default(),
     );
-    (step.unwrap(), layout)
+    (step, layout)
 }
 
 #[test]

@@ -11,4 +11,4 @@ mod view;
 
 pub use job::{Job, Keypoints, Step};
 pub use service::run;
-pub use settings::{precision, settings};
+pub use settings::settings;

@@ -1,6 +1,6 @@
 //! From the section `[pose]` of a deployment to the settings of the single-view step.
 
-use deployment::pose::{All, Config, Precision, Search, Window};
+use deployment::pose::{All, Config, Search, Window};
 use fmp::TrackSettings;
 use pipeline::{EvidenceWindow, ViewSettings};
 
@@ -13,7 +13,6 @@ pub fn settings(config: &Config) -> ViewSettings {
         },
         n_candidates: config.candidates,
         min_separation: config.min_separation,
-        precision: precision(config.precision),
         track: (config.search == Search::Tracked).then_some(TrackSettings {
             levels: config.tracked_levels,
             margin: config.tracked_margin,
@@ -28,14 +27,6 @@ pub fn settings(config: &Config) -> ViewSettings {
     }
 }
 
-/// How exactly the filters are evaluated.
-pub fn precision(from: Precision) -> fmp::Precision {
-    match from {
-        Precision::F32 => fmp::Precision::F32,
-        Precision::Bf16 => fmp::Precision::Bf16,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -43,14 +34,6 @@ mod tests {
     #[test]
     fn the_defaults_are_those_of_the_step() {
         assert_eq!(settings(&Config::default()), ViewSettings::default());
-    }
-
-    #[test]
-    fn less_precision_is_had_by_its_name_only() {
-        let of = |text: &str| toml::from_str::<Config>(text).map(|it| settings(&it).precision);
-        assert_eq!(of("search = \"tracked\""), Ok(fmp::Precision::F32));
-        assert_eq!(of("precision = \"bf16\""), Ok(fmp::Precision::Bf16));
-        of("precision = \"f16\"").unwrap_err();
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::complaint::Complaint;
 use crate::fuse::{Energy, Views};
-use crate::pose::{Precision, Search};
+use crate::pose::Search;
 use crate::triangulate::Combine;
 use crate::{Deployment, SHIPPED, is_shipped};
 
@@ -53,7 +53,6 @@ fn key_of_filters(it: &Deployment) -> Option<&'static str> {
         (fuse.consistency.is_some(), "fuse.consistency"),
         (!fuse.compatibility.is_empty(), "fuse.compatibility"),
         (it.pose.search != Search::Full, "pose.search"),
-        (it.pose.precision != Precision::F32, "pose.precision"),
         (!is_shipped(&it.pose.orientation), "pose.orientation"),
         (
             !is_shipped(&it.triangulate.joint_map),

@@ -170,7 +170,6 @@ mod tests {
     use std::path::{Path, PathBuf};
 
     use super::*;
-    use crate::pose::Precision;
     use crate::{ConfigError, Loaded};
 
     /// A machine on which what begins with `/dev/` or `rtsp:` is live.
@@ -187,10 +186,6 @@ mod tests {
 
         fn is_live(&self, named: &str) -> bool {
             named.starts_with("/dev/") || named.starts_with("rtsp:")
-        }
-
-        fn has(&self, _precision: Precision) -> Result<(), String> {
-            Ok(())
         }
     }
 

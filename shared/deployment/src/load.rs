@@ -59,9 +59,8 @@ impl Loaded {
         fits(&deployment, &given).map_err(placed)?;
         deployment.resolve(&machine.folder_of(file), machine);
         default_network::settle(&mut deployment, &given).map_err(placed)?;
-        let checked = live::settle(&mut deployment, &given, machine)
-            .and_then(|()| rules::check(&deployment))
-            .and_then(|()| rules::fits_machine(&deployment, machine));
+        let checked =
+            live::settle(&mut deployment, &given, machine).and_then(|()| rules::check(&deployment));
         checked.map_err(placed)?;
         Ok(Self {
             deployment,

@@ -2,8 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::pose::Precision;
-
 /// Answers of the machine that a deployment is loaded on.
 pub trait Machine {
     /// The folder of a file, absolute where the working folder is known.
@@ -17,13 +15,6 @@ pub trait Machine {
     ///
     /// * `named`: as [`Self::footage`] returned it.
     fn is_live(&self, named: &str) -> bool;
-
-    /// Whether this machine computes with a precision.
-    ///
-    /// # Errors
-    ///
-    /// What is missing.
-    fn has(&self, precision: Precision) -> Result<(), String>;
 }
 
 /// A machine that has everything, and on which all footage is files: for tests, and for tools that only look at a file.
@@ -41,9 +32,5 @@ impl Machine for AnyMachine {
 
     fn is_live(&self, _named: &str) -> bool {
         false
-    }
-
-    fn has(&self, _precision: Precision) -> Result<(), String> {
-        Ok(())
     }
 }

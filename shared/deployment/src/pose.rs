@@ -23,7 +23,7 @@ pub struct Config {
     pub orientation: PathBuf,
     /// An ONNX file of a network that finds keypoints, which takes the place of the filters; `"shipped"`: the one that ships;
     /// `"none"`: the filters. Without it the one that ships, unless `model` names filters, or a camera has a network or keypoints. Settings
-    /// that only the filters or the paper's energy have (`quality`, `pose.search`, `pose.precision`, `pose.orientation`,
+    /// that only the filters or the paper's energy have (`quality`, `pose.search`, `pose.orientation`,
     /// `triangulate.joint_map`, `triangulate.combine`, `fuse.views`, `fuse.energy`, `fuse.pairs`, `fuse.workers`, `fuse.consistency`,
     /// `fuse.compatibility`) are refused where nothing says that the filters find people.
     pub network: Option<PathBuf>,
@@ -55,8 +55,6 @@ pub struct Config {
     pub onnx_runtime: Option<PathBuf>,
     /// Threads of one pose process.
     pub threads: usize,
-    /// `f32`: the same bits everywhere; `bf16`: faster and less exact, needs a processor with AMX.
-    pub precision: Precision,
     /// `full`: every frame everywhere; `tracked`: near the last pose, faster and approximate.
     pub search: Search,
     /// `tracked`: levels either side of the last pose's that are searched.
@@ -75,17 +73,6 @@ pub struct Config {
     pub tracked_max_gap_ms: f64,
     /// `tracked`: a frame so long after the last full search is searched in full.
     pub tracked_full_every_ms: f64,
-}
-
-/// How exactly the responses of the filters are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Precision {
-    /// In single precision: the same bits on every machine.
-    #[default]
-    F32,
-    /// Features and weights rounded to bfloat16, sums in single precision: faster and less exact.
-    Bf16,
 }
 
 /// How a pose process looks for poses.
@@ -118,7 +105,6 @@ impl Default for Config {
             mirror: false,
             onnx_runtime: None,
             threads: 1,
-            precision: Precision::F32,
             search: Search::Full,
             tracked_levels: 4,
             tracked_margin: 0.25,

@@ -4,8 +4,7 @@ use crate::complaint::{Complaint, demand, not_negative, positive, whole};
 use crate::older::OLDER;
 use crate::topology::{process_name, services};
 use crate::{
-    Deployment, Machine, capture, fuse, hosts, is_shipped, limits, pose, quality, slips,
-    triangulate,
+    Deployment, capture, fuse, hosts, is_shipped, limits, pose, quality, slips, triangulate,
 };
 
 /// Checks the values that the types alone do not.
@@ -51,15 +50,6 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
         &weight.to_string(),
         "a number of at least 0",
     )
-}
-
-/// Checks what depends on the machine that the deployment shall run on.
-pub(super) fn fits_machine(it: &Deployment, machine: &dyn Machine) -> Result<(), Complaint> {
-    machine.has(it.pose.precision).map_err(|why| Complaint {
-        key: "pose.precision".to_owned(),
-        got: "\"bf16\"".to_owned(),
-        expected: format!("\"f32\", or nothing: {why}"),
-    })
 }
 
 fn name(name: &str) -> Result<(), Complaint> {

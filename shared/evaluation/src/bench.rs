@@ -125,7 +125,7 @@ impl Bench {
                 let layout = Arc::new(it.layout().clone());
                 ViewStep::new(Arc::clone(&setup.model), layout, setup.view.clone())
             })
-            .collect::<Result<_, _>>()?;
+            .collect();
         let responses = views.iter().map(|it| vec![0.0; it.layout().n_responses()]);
         let fuse = setup.trials.iter().map(|it| {
             let model = Arc::clone(&setup.model);

@@ -3,14 +3,12 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use kernels::{
-    Amx, Bf16Bank, Bf16Level, CorrelateWorkspace, FilterBank, Isa, Level, NoAmx, Rgb8View, Template,
-};
+use kernels::{CorrelateWorkspace, FilterBank, Isa, Level, Rgb8View, Template};
 
 use crate::features::Features;
 use crate::pool::{Pool, in_pool, lock};
 use crate::source::Source;
-use crate::{Layout, Model, Precision, Scope};
+use crate::{Layout, Model, Scope};
 
 /// Computes filter responses. Holds what can be prepared once per model, and the workspaces that
 /// are used again from frame to frame.
@@ -18,17 +16,10 @@ use crate::{Layout, Model, Precision, Scope};
 pub struct Extractor {
     model: Arc<Model>,
     isa: Isa,
-    bank: Bank,
+    bank: FilterBank,
     workspaces: Pool<Features>,
     /// One for each thread. A stack and no [`Pool`]: the last one put back is the first one taken, and still in the cache.
     buffers: Mutex<Vec<CorrelateWorkspace>>,
-}
-
-/// The filters in one of the precisions.
-#[derive(Debug)]
-enum Bank {
-    F32(FilterBank),
-    Bf16(Bf16Bank),
 }
 
 impl Extractor {
@@ -39,39 +30,17 @@ impl Extractor {
 
     /// As [`Self::new`], for a given instruction set; the responses are the same on all.
     pub fn on(isa: Isa, model: Arc<Model>) -> Self {
-        Self::with(|it| Bank::F32(FilterBank::new(isa, it)), isa, model)
-    }
-
-    /// As [`Self::new`], in a given precision.
-    ///
-    /// # Errors
-    ///
-    /// What the machine lacks for it.
-    pub fn in_precision(precision: Precision, model: Arc<Model>) -> Result<Self, NoAmx> {
-        match precision {
-            Precision::F32 => Ok(Self::new(model)),
-            Precision::Bf16 => {
-                let amx = Amx::detect()?;
-                let pack = |it: &[Template<'_>]| Bank::Bf16(Bf16Bank::new(amx, it));
-                Ok(Self::with(pack, Isa::best(), model))
-            }
-        }
-    }
-
-    /// The bits of [`Precision::Bf16`] on any machine, by plain loops: far slower than
-    /// [`Precision::F32`], and there to compare with.
-    pub fn bf16_readable(model: Arc<Model>) -> Self {
-        Self::with(|it| Bank::Bf16(Bf16Bank::readable(it)), Isa::best(), model)
+        Self::with(FilterBank::new, isa, model)
     }
 
     /// As [`Self::new`], but every response is the plain sum of its products: slower, and there to
     /// compare with. See [`FilterBank::correlate`] for how far apart they can be.
     pub fn direct(model: Arc<Model>) -> Self {
         let isa = Isa::best();
-        Self::with(|it| Bank::F32(FilterBank::direct(isa, it)), isa, model)
+        Self::with(FilterBank::direct, isa, model)
     }
 
-    fn with(pack: impl FnOnce(&[Template<'_>]) -> Bank, isa: Isa, model: Arc<Model>) -> Self {
+    fn with(pack: fn(Isa, &[Template<'_>]) -> FilterBank, isa: Isa, model: Arc<Model>) -> Self {
         let filters = model.spec().filters.iter();
         let templates: Vec<_> = filters
             .map(|it| Template {
@@ -80,7 +49,7 @@ impl Extractor {
                 weights: &it.weights,
             })
             .collect();
-        let bank = pack(&templates);
+        let bank = pack(isa, &templates);
         Self {
             model,
             isa,
@@ -147,7 +116,6 @@ impl Extractor {
             scope,
             interval: spec.interval,
             cell_px: spec.cell_px,
-            rounded: matches!(self.bank, Bank::Bf16(_)),
         };
         let mut features = self.workspaces.take();
         let n_threads = if in_pool() {
@@ -159,7 +127,7 @@ impl Extractor {
         self.reserve(layout, n_threads);
         let everything = Part {
             levels: usize::from(scope.levels().start)..usize::from(scope.levels().end),
-            panels: 0..self.n_panels(),
+            panels: 0..self.bank.n_panels(),
         };
         let share = if in_pool() {
             self.work(&source, &everything) / (SHARES * n_threads)
@@ -173,27 +141,12 @@ impl Extractor {
 
     /// Makes room for every thread.
     fn reserve(&self, layout: &Layout, n_threads: usize) {
-        let Bank::F32(bank) = &self.bank else { return };
         let cols = layout.levels.iter().map(|it| it.cols).max().unwrap_or(0);
         let mut buffers = lock(&self.buffers);
         let n_buffers = buffers.len().max(n_threads);
         buffers.resize_with(n_buffers, CorrelateWorkspace::default);
         for buffer in buffers.iter_mut() {
-            bank.reserve(cols, buffer);
-        }
-    }
-
-    fn n_panels(&self) -> usize {
-        match &self.bank {
-            Bank::F32(it) => it.n_panels(),
-            Bank::Bf16(it) => it.n_panels(),
-        }
-    }
-
-    fn filters(&self, panels: Range<usize>) -> Range<usize> {
-        match &self.bank {
-            Bank::F32(it) => it.filters(panels),
-            Bank::Bf16(it) => it.filters(panels),
+            self.bank.reserve(cols, buffer);
         }
     }
 
@@ -222,24 +175,13 @@ impl Extractor {
             let window = source.layout.window(source.scope, level);
             [window.rows, window.cols]
         };
-        match &self.bank {
-            Bank::F32(bank) => {
-                let levels = part.levels.map(|level| Level {
-                    map: features.of_level(source, level),
-                    size: size(level),
-                });
-                let mut buffers = lock(&self.buffers).pop().unwrap_or_default();
-                bank.correlate(part.panels, levels, out, &mut buffers);
-                lock(&self.buffers).push(buffers);
-            }
-            Bank::Bf16(bank) => {
-                let levels = part.levels.map(|level| Bf16Level {
-                    map: features.rounded(source, level),
-                    size: size(level),
-                });
-                bank.correlate(part.panels, levels, out);
-            }
-        }
+        let levels = part.levels.map(|level| Level {
+            map: features.of_level(source, level),
+            size: size(level),
+        });
+        let mut buffers = lock(&self.buffers).pop().unwrap_or_default();
+        self.bank.correlate(part.panels, levels, out, &mut buffers);
+        lock(&self.buffers).push(buffers);
     }
 
     /// Number of responses.
@@ -247,7 +189,7 @@ impl Extractor {
         let windows = part.levels.clone();
         let windows = windows.map(|level| source.layout.window(source.scope, level));
         let area: usize = windows.map(|it| it.rows * it.cols).sum();
-        area * self.filters(part.panels.clone()).len()
+        area * self.bank.filters(part.panels.clone()).len()
     }
 
     /// Levels that have about half the work, and the others; of one level, the panels.

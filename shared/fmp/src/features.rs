@@ -3,8 +3,7 @@
 use std::sync::{Mutex, OnceLock};
 
 use kernels::{
-    Bf16Map, FeatureMap, HogWorkspace, PartOfResized, Planes, ShrinkWorkspace, hog, reduce,
-    resize_part,
+    FeatureMap, HogWorkspace, PartOfResized, Planes, ShrinkWorkspace, hog, reduce, resize_part,
 };
 
 use crate::cuts::{Cut, cuts};
@@ -33,12 +32,8 @@ struct Chain {
     spare: Mutex<Maps>,
 }
 
-/// Features of every level of a chain, in either precision.
-#[derive(Debug, Default)]
-struct Maps {
-    exact: Vec<Vec<f32>>,
-    rounded: Vec<Bf16Map>,
-}
+/// Features of every level of a chain.
+type Maps = Vec<Vec<f32>>;
 
 /// The buffers for computing a chain.
 #[derive(Debug, Default)]
@@ -50,8 +45,6 @@ struct Arena {
     cuts: Vec<Cut>,
     /// Features of a cut image with the padding that it would have if it were whole.
     padded: Vec<f32>,
-    /// Features of a level before they are rounded.
-    exact: Vec<f32>,
 }
 
 impl Features {
@@ -74,19 +67,14 @@ impl Features {
     }
 
     /// The features of a level of the scope of `source`, the same one for all levels since
-    /// [`Self::begin`]; for a source that is not rounded.
+    /// [`Self::begin`].
     pub(crate) fn of_level(&self, source: &Source<'_>, level: usize) -> FeatureMap<'_> {
         let [rows, cols] = source.map_size(level);
         FeatureMap {
             rows,
             cols,
-            cells: &self.chain(source, level).exact[level / source.interval],
+            cells: &self.chain(source, level)[level / source.interval],
         }
-    }
-
-    /// The same for a source that is rounded.
-    pub(crate) fn rounded(&self, source: &Source<'_>, level: usize) -> &Bf16Map {
-        &self.chain(source, level).rounded[level / source.interval]
     }
 
     fn chain(&self, source: &Source<'_>, level: usize) -> &Maps {
@@ -118,20 +106,12 @@ impl Arena {
             self.padded.clear();
             self.padded.reserve(rows * cols * N_CHANNELS);
         }
-        if source.rounded {
-            self.exact.clear();
-            self.exact.reserve(rows * cols * N_CHANNELS);
-        }
     }
 
     /// Features of the levels `first`, `first + interval` and so on, as far as the scope goes.
     fn fill(&mut self, source: &Source<'_>, first: usize, maps: &mut Maps) {
         let levels = (first..source.layout.levels.len()).step_by(source.interval);
-        if source.rounded {
-            maps.rounded.resize_with(levels.len(), Bf16Map::default);
-        } else {
-            maps.exact.resize_with(levels.len(), Vec::new);
-        }
+        maps.resize_with(levels.len(), Vec::new);
         cuts(source, first, &mut self.cuts);
         // Images take turns in the two buffers, which keep their places for the next chain.
         let Self {
@@ -139,7 +119,6 @@ impl Arena {
             hog,
             padded,
             cuts,
-            exact,
             ..
         } = self;
         let (mut image, mut other) = (&mut self.image, &mut self.halved);
@@ -158,21 +137,8 @@ impl Arena {
             if !source.scope.levels().contains(&(level as u16)) {
                 continue;
             }
-            if source.rounded {
-                describe(source, (level, cut), image, (hog, padded), exact);
-                let [rows, cols] = source.map_size(level);
-                maps.rounded[octave].round(
-                    source.isa,
-                    FeatureMap {
-                        rows,
-                        cols,
-                        cells: exact,
-                    },
-                );
-            } else {
-                let map = &mut maps.exact[octave];
-                describe(source, (level, cut), image, (hog, padded), map);
-            }
+            let map = &mut maps[octave];
+            describe(source, (level, cut), image, (hog, padded), map);
         }
     }
 }

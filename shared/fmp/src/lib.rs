@@ -5,7 +5,7 @@
 //! [`Solver`], which finds the best tree of parts exactly; and [`Pose`], its result. An
 //! [`IncrementalSolver`] solves the same evidence under changing terms with less work. A [`Scope`]
 //! restricts the search to a part of the pyramid, and a [`Tracker`] chooses it. Responses are
-//! single precision and bit-identical on every machine, unless another [`Precision`] is requested.
+//! single precision and bit-identical on every machine.
 #![forbid(unsafe_code)]
 
 pub mod files;
@@ -20,7 +20,6 @@ mod local;
 mod model;
 mod pool;
 mod pose;
-mod precision;
 mod pyramid;
 mod responses;
 mod scope;
@@ -35,7 +34,6 @@ pub use layout::{ImageTooSmall, Layout, LevelLayout, Placement};
 pub use local::{LocalScore, local_scores};
 pub use model::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};
 pub use pose::Pose;
-pub use precision::Precision;
 pub use pyramid::FeaturePyramid;
 pub use responses::Responses;
 pub use scope::{Region, Scope, ScopeError, Window};

@@ -61,7 +61,6 @@ impl<'a> FeaturePyramid<'a> {
             scope: &self.scope,
             interval: self.interval,
             cell_px: self.cell_px,
-            rounded: false,
         }
     }
 }

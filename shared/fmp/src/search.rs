@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use kernels::{NoAmx, Rgb8View};
+use kernels::Rgb8View;
 
-use crate::{Extractor, Layout, Model, Precision, Responses, Solver};
+use crate::{Extractor, Layout, Model, Responses, Solver};
 
 /// A model, ready to search images.
 #[derive(Debug)]
@@ -18,25 +18,13 @@ pub struct Search {
 }
 
 impl Search {
-    /// Prepares the search, in single precision.
+    /// Prepares the search.
     pub fn new(model: Arc<Model>) -> Self {
         Self {
             extractor: Extractor::new(Arc::clone(&model)),
             solver: Solver::new(Arc::clone(&model)),
             model,
         }
-    }
-
-    /// The same, in a given precision.
-    ///
-    /// # Errors
-    ///
-    /// The machine lacks what the precision needs.
-    pub fn in_precision(precision: Precision, model: Arc<Model>) -> Result<Self, NoAmx> {
-        Ok(Self {
-            extractor: Extractor::in_precision(precision, Arc::clone(&model))?,
-            ..Self::new(model)
-        })
     }
 
     /// Runs `look` on the responses of all filters on all levels of an image.

@@ -14,8 +14,6 @@ pub(crate) struct Source<'a> {
     /// Levels per octave.
     pub(crate) interval: usize,
     pub(crate) cell_px: usize,
-    /// Whether features are kept in bfloat16, or else in single precision.
-    pub(crate) rounded: bool,
 }
 
 impl Source<'_> {

@@ -1,8 +1,7 @@
 //! Grids, images and the hot loops, each loop in two implementations: a readable reference and a
 //! fast one.
 //!
-//! Both give the same bits on every instruction set. [`Bf16Bank`] is less exact and has to be
-//! requested: with [`Amx`], or in plain loops for comparison.
+//! Both give the same bits on every instruction set.
 #![expect(
     unsafe_code,
     reason = "SIMD dispatch, loads and stores; every block states why it is sound"
@@ -12,8 +11,6 @@
     reason = "a body takes on the instruction set of the function that it is inlined into"
 )]
 
-mod amx;
-mod bf16;
 mod correlate;
 mod dispatch;
 mod distance;
@@ -27,7 +24,6 @@ mod peak;
 mod planes;
 mod simd;
 mod spring;
-mod tiles;
 
 /// A size for a test: the second where an interpreter (Miri) takes a thousand times as long.
 #[cfg(test)]
@@ -35,8 +31,6 @@ const fn sized(usual: usize, interpreted: usize) -> usize {
     if cfg!(miri) { interpreted } else { usual }
 }
 
-pub use amx::{Amx, NoAmx};
-pub use bf16::{Bf16Bank, Bf16Level, Bf16Map};
 pub use correlate::{CorrelateWorkspace, FeatureMap, FilterBank, Level, Template, correlate_f64};
 pub use distance::{LengthSpring, ScoredPoints};
 pub use envelope::{Transformed, transform_f64};

@@ -54,11 +54,6 @@ pub(crate) trait Simd: Copy {
     fn store(self, value: Self::V, to: &mut [f32]);
     /// Writes all of `to` or its first `LANES` values, whichever is less.
     fn store_partial(self, value: Self::V, to: &mut [f32]);
-    /// Writes the lanes whose bit is set, side by side; `to` has room for exactly these.
-    fn store_lanes(self, value: Self::V, lanes: u32, to: &mut [f32]);
-    /// Prefetches the cache line of the first value, which will be written soon.
-    #[inline(always)]
-    fn prefetch(self, _there: &[f32]) {}
     /// `a * b + c`, rounded once.
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// `a + b`.
@@ -131,36 +126,6 @@ mod tests {
                     }
                 }
             }
-        }
-    }
-
-    /// Stores every choice of lanes, or many of them.
-    struct LaneStores;
-
-    impl Kernel for LaneStores {
-        #[inline(always)]
-        fn run<S: Simd>(self, simd: S) {
-            let row: [f32; ROW] = std::array::from_fn(|it| it as f32);
-            for lanes in (0..1_u32 << S::LANES).step_by(if S::LANES > 8 { 37 } else { 1 }) {
-                let want: Vec<_> = (0..S::LANES)
-                    .filter(|it| lanes >> it & 1 == 1)
-                    .map(|it| it as f32)
-                    .collect();
-                let mut to = vec![-1.0; want.len()];
-                simd.store_lanes(simd.load(&row), lanes, &mut to);
-                assert_eq!(to, want, "{lanes:b}");
-            }
-            let all = u32::MAX >> (32 - S::LANES);
-            let mut to = vec![-1.0; S::LANES];
-            simd.store_lanes(simd.load(&row), all, &mut to);
-            assert_eq!(to, row[..S::LANES]);
-        }
-    }
-
-    #[test]
-    fn every_instruction_set_stores_chosen_lanes() {
-        for isa in Isa::available() {
-            isa.run(LaneStores);
         }
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use fmp::{ImageTooSmall, Layout, Model, Responses, Scope, Tracker};
 use geometry::Camera;
-use kernels::{NoAmx, Rgb8View};
+use kernels::Rgb8View;
 use multiview::{Settings, ViewPlan};
 use nalgebra::UnitVector3;
 use rayon::prelude::*;
@@ -26,9 +26,6 @@ pub enum EstimatorError {
         /// How small.
         source: ImageTooSmall,
     },
-    /// The machine lacks an instruction set that the precision needs.
-    #[error("precision")]
-    Precision(#[from] NoAmx),
 }
 
 /// The result of one set of images.
@@ -89,7 +86,7 @@ impl Estimator {
                 let layout = Arc::new(plan.layout().clone());
                 ViewStep::new(Arc::clone(model), layout, settings.view.clone())
             })
-            .collect::<Result<_, _>>()?;
+            .collect();
         Ok(Self {
             responses: vec![Vec::new(); steps.len()],
             trackers: steps.iter().map(ViewStep::tracker).collect(),

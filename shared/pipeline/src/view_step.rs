@@ -4,10 +4,10 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use fmp::{
-    Bounds, Extractor, FrameTime, Layout, LocalScore, Model, Pose, Precision, Responses, Scope,
-    Solver, TrackSettings, Tracker, local_scores,
+    Bounds, Extractor, FrameTime, Layout, LocalScore, Model, Pose, Responses, Scope, Solver,
+    TrackSettings, Tracker, local_scores,
 };
-use kernels::{NoAmx, Rgb8View};
+use kernels::Rgb8View;
 use multiview::FrontEvidence;
 use orientation::Detector;
 
@@ -46,8 +46,6 @@ pub struct ViewSettings {
     pub n_candidates: usize,
     /// Smallest mean distance between the part centres of two candidates, box sides.
     pub min_separation: f64,
-    /// Precision of the responses.
-    pub precision: Precision,
     /// How poses are tracked from frame to frame; without it every frame is searched in full.
     pub track: Option<TrackSettings>,
     /// What tells in which direction a person faces; without it nothing does.
@@ -60,7 +58,6 @@ impl Default for ViewSettings {
             window: EvidenceWindow::All,
             n_candidates: 8,
             min_separation: 1.0,
-            precision: Precision::F32,
             track: None,
             orientation: None,
         }
@@ -99,22 +96,14 @@ pub struct ViewStep {
 
 impl ViewStep {
     /// Prepares the step.
-    ///
-    /// # Errors
-    ///
-    /// If the machine lacks an instruction set that the precision needs.
-    pub fn new(
-        model: Arc<Model>,
-        layout: Arc<Layout>,
-        settings: ViewSettings,
-    ) -> Result<Self, NoAmx> {
-        Ok(Self {
-            extractor: Extractor::in_precision(settings.precision, Arc::clone(&model))?,
+    pub fn new(model: Arc<Model>, layout: Arc<Layout>, settings: ViewSettings) -> Self {
+        Self {
+            extractor: Extractor::new(Arc::clone(&model)),
             solver: Solver::new(model),
             layout,
             settings,
             looking: Mutex::default(),
-        })
+        }
     }
 
     /// The pyramid of the frames.

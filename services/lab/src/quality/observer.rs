@@ -9,14 +9,14 @@ use qualitytraining::sample::{Sample, part_errors, picture_size};
 use skeleton::N_PARTS;
 use viewquality::{EvidenceError, Normalisation, Sampler, Tile, TileShape, evidence};
 
-use crate::searches::{NoSearch, Searches};
+use crate::searches::Searches;
 
 /// Why a picture makes no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum NoSample {
     /// The picture cannot be searched.
     #[error(transparent)]
-    Search(#[from] NoSearch),
+    Search(#[from] fmp::ImageTooSmall),
     /// The search found nobody.
     #[error("nobody was found")]
     Nobody,

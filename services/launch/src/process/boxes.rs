@@ -21,8 +21,7 @@ pub(super) fn filters(
     let settings = ViewSettings {
         // More than people: several can be of one, whose boxes are then one.
         n_candidates: resolved.deployment.pose.candidates,
-        precision: prepared.settings.view.precision,
         ..ViewSettings::default()
     };
-    ViewStep::new(model, layout, settings).or_fail(ExitKind::Config)
+    Ok(ViewStep::new(model, layout, settings))
 }

@@ -37,9 +37,7 @@ pub(super) fn of_view(
     let deployment = &resolved.deployment;
     if !deployment.has_maps() {
         let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
-        return Ok(pose::Step::Filters(Box::new(
-            step.or_fail(ExitKind::Config)?,
-        )));
+        return Ok(pose::Step::Filters(Box::new(step)));
     }
     let config = &deployment.pose;
     let step = deployment.capture.frame_step.max(1) as f64;

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use failure::{ExitKind, Failure, OrFail as _};
-use fmp::{CandidateSettings, Layout, Pose, Precision, Search};
+use fmp::{CandidateSettings, Layout, Pose, Search};
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use inputs::Joints;
 use inputs::library::Library;
@@ -57,7 +57,7 @@ The filters find who is there, and the network that ships says where the joints 
 (`model judge` on PARSE 101-200: 80.6 % of the limbs, by the parts 73.9 %). It looks into every box of the filters, widened by 10 %, and then into the \
 box around who is seen there, as a deployment does; each person is told once, those who are seen best first. --network names a network of your own (docs/networks.md). \
 Into a box that --box gives, or those that --detector finds, it looks as they are, at most --max of them.
-With --network none the parts of the filters are told, as with --model, --precision, --joints and --joint-map.
+With --network none the parts of the filters are told, as with --model, --joints and --joint-map.
 
 With --json one line per image, best detection first:
     {\"image\", \"frame\" (of videos), \"width\", \"height\", \"network\", \"searched\": [width, height], \"detections\": [{\"score\": the
@@ -125,12 +125,8 @@ pub(crate) struct Arguments {
     /// model that ships; "none": a joint is the centre of its part, as for other models.
     #[arg(long, value_name = "FILE")]
     joint_map: Option<PathBuf>,
-    /// Precision of the filter responses: f32 (if not given), or bf16, which is faster, changes scores by some thousandths and
-    /// needs a processor with AMX.
-    #[arg(long, value_name = "NAME", value_parser = precision)]
-    precision: Option<Precision>,
     /// Keypoints by this network (.onnx); "shipped": the one that ships; "none": parts by the filters. If not given, the one that
-    /// ships, unless --model, --precision, --joints or --joint-map is.
+    /// ships, unless --model, --joints or --joint-map is.
     #[arg(long, value_name = "FILE")]
     network: Option<PathBuf>,
     /// The card of the network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
@@ -146,7 +142,7 @@ pub(crate) struct Arguments {
     #[arg(
         long,
         value_name = "FILE",
-        conflicts_with_all = ["outline", "model", "threshold", "overlap", "size", "full", "precision"]
+        conflicts_with_all = ["outline", "model", "threshold", "overlap", "size", "full"]
     )]
     detector: Option<PathBuf>,
     /// The card of the detector; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
@@ -165,7 +161,6 @@ impl Arguments {
             (self.joints.is_some(), "--joints"),
             (self.joint_map.is_some(), "--joint-map"),
             (self.model.is_some(), "--model"),
-            (self.precision.is_some(), "--precision"),
         ];
         let of_network = [
             (self.outline.is_some(), "--box"),
@@ -185,7 +180,7 @@ impl Arguments {
         };
         let wrong =
             match network {
-                // The model and its precision are those of the filters that find the boxes.
+                // The model is that of the filters that find the boxes.
                 Some(_) => given(&of_filters[..2])
                     .map(|it| (it, "the filters' parts", "a network", "none")),
                 None => given(&of_network)
@@ -241,18 +236,6 @@ fn side(text: &str) -> Result<usize, String> {
 fn heat(text: &str) -> Result<f64, String> {
     let heat = text.parse().ok().filter(|it| (0.0..=1.0).contains(it));
     heat.ok_or_else(|| format!("expected 0 to 1, got {text:?}"))
-}
-
-/// Parses a precision, and checks that this machine supports it.
-fn precision(name: &str) -> Result<Precision, String> {
-    let precision = match name {
-        "f32" => Precision::F32,
-        "bf16" => Precision::Bf16,
-        _ => return Err("expected f32 or bf16".to_owned()),
-    };
-    let fits = precision.check();
-    fits.map_err(|why| format!("{why}; leave --precision out"))?;
-    Ok(precision)
 }
 
 /// Runs the command.
@@ -322,7 +305,6 @@ impl<'a> Detector<'a> {
         let joint_map = joint_map.unwrap_or(Path::new(deployment::SHIPPED));
         let joints = Joints::of(joint_map, arguments.model.as_deref())?;
         let set = arguments.joints.unwrap_or(&PARSE14);
-        let precision = arguments.precision.unwrap_or(Precision::F32);
         Ok(Self {
             arguments,
             joints: NamedJoints {
@@ -334,7 +316,7 @@ impl<'a> Detector<'a> {
                 overlap: arguments.overlap,
                 max: arguments.max,
             },
-            search: Search::in_precision(precision, model).or_fail(ExitKind::Usage)?,
+            search: Search::new(model),
             eyes: arguments.eyes(network)?,
         })
     }

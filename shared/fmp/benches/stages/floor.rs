@@ -1,10 +1,9 @@
 //! Lower limit of the time of every stage: its arithmetic alone, at the peak rate of the machine.
 
-use fmp::{LevelLayout, N_CHANNELS, Precision, Springs};
-use kernels::{Amx, Peak};
+use fmp::{LevelLayout, N_CHANNELS, Springs};
+use kernels::{Isa, Peak};
 use serde::Serialize;
 
-use crate::arithmetic::Arithmetic;
 use crate::clock::Clock;
 use crate::readable::Ranges;
 use crate::stages::StageTimes;
@@ -23,41 +22,24 @@ pub(crate) struct Peaks {
     pub(crate) isa: &'static str,
     pub(crate) multiply_add: f64,
     pub(crate) max_plus: f64,
-    /// Products that are added in tiles of bfloat16, where they are the filters'.
-    pub(crate) tiles: Option<f64>,
 }
 
 impl Floors {
     /// Counts operations, and measures the peaks beside the stages.
-    pub(crate) fn new(
-        workload: &Workload,
-        ranges: &Ranges,
-        arithmetic: Arithmetic,
-        quick: bool,
-    ) -> Self {
-        let Arithmetic { isa, precision } = arithmetic;
+    pub(crate) fn new(workload: &Workload, ranges: &Ranges, isa: Isa, quick: bool) -> Self {
         let n = if quick { 300 } else { 3000 };
         let [multiply_add, max_plus] =
             [Peak::MultiplyAdd, Peak::MaxPlus].map(|it| per_ms(quick, || it.run(isa, n)));
-        let tiles = match precision {
-            Precision::F32 => None,
-            Precision::Bf16 => Amx::detect().ok().map(|amx| per_ms(quick, || amx.peak(n))),
-        };
-        let filters = tiles.map_or_else(
-            || products(workload, &[8, 10]) / multiply_add,
-            |it| products(workload, &[]) / it,
-        );
         Self {
             peaks: Peaks {
-                isa: arithmetic.name(),
+                isa: isa.name(),
                 multiply_add: multiply_add * 1e-6,
                 max_plus: max_plus * 1e-6,
-                tiles: tiles.map(|it| it * 1e-6),
             },
             ms: StageTimes {
                 shrink: shrinking(workload) / multiply_add,
                 hog: describing(workload) / multiply_add,
-                filters,
+                filters: products(workload, &[8, 10]) / multiply_add,
                 messages: candidates(workload, ranges) / max_plus,
             },
         }

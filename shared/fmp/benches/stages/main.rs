@@ -7,7 +7,6 @@
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
-mod arithmetic;
 mod clock;
 mod floor;
 mod options;
@@ -18,7 +17,8 @@ mod workload;
 
 use std::process::ExitCode;
 
-use self::arithmetic::Arithmetic;
+use kernels::Isa;
+
 use self::clock::Clock;
 use self::floor::Floors;
 use self::options::Options;
@@ -44,17 +44,17 @@ fn main() -> ExitCode {
             continue;
         }
         let readable = Readable::measure(&workload);
-        for arithmetic in Arithmetic::available() {
-            if !options.wants_arithmetic(arithmetic) {
+        for isa in Isa::available() {
+            if !options.wants_isa(isa) {
                 continue;
             }
-            let floors = Floors::new(&workload, &readable.ranges, arithmetic, options.quick);
+            let floors = Floors::new(&workload, &readable.ranges, isa, options.quick);
             table.peaks.push(floors.peaks.clone());
             for &threads in &options.threads {
                 let clock = Clock::new(threads, options.quick);
-                let bench = Bench::new(&workload, arithmetic, threads);
+                let bench = Bench::new(&workload, isa, threads);
                 for (stage, times) in bench.run(&clock, &options) {
-                    let row = Row::new(&workload, (stage, arithmetic, threads), times);
+                    let row = Row::new(&workload, (stage, isa, threads), times);
                     let row = row.compared(&floors, &readable);
                     if !options.json {
                         println!("{row}");

@@ -2,7 +2,6 @@
 
 use kernels::Isa;
 
-use crate::arithmetic::Arithmetic;
 use crate::stages::Stage;
 
 /// See `scripts/bench --help`.
@@ -69,10 +68,10 @@ impl Options {
     }
 
     /// The portable one is slow where it lacks the multiply-add, so it must be asked for.
-    pub(crate) fn wants_arithmetic(&self, it: Arithmetic) -> bool {
+    pub(crate) fn wants_isa(&self, isa: Isa) -> bool {
         if self.isas.is_empty() {
-            return self.quick || it.name() != "portable" || Isa::available().len() == 1;
+            return self.quick || isa.name() != "portable" || Isa::available().len() == 1;
         }
-        self.isas.iter().any(|name| name == it.name())
+        self.isas.iter().any(|name| name == isa.name())
     }
 }

@@ -3,11 +3,10 @@
 use std::hint::black_box;
 use std::sync::{Arc, Mutex};
 
-use fmp::{Extractor, Precision, Responses, Solver, TrackSettings, Tracker};
+use fmp::{Extractor, Responses, Solver, TrackSettings, Tracker};
 use kernels::{HogShape, HogWorkspace, Isa, Planes, ShrinkWorkspace, hog, reduce, resize};
 use rayon::prelude::*;
 
-use crate::arithmetic::Arithmetic;
 use crate::clock::Clock;
 use crate::options::Options;
 use crate::workload::{OtherView, Workload};
@@ -107,15 +106,11 @@ pub(crate) struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    pub(crate) fn new(workload: &'a Workload, arithmetic: Arithmetic, threads: usize) -> Self {
+    pub(crate) fn new(workload: &'a Workload, isa: Isa, threads: usize) -> Self {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        let Arithmetic { isa, precision } = arithmetic;
         let model = Arc::clone(&workload.model);
         Self {
-            extractor: match precision {
-                Precision::F32 => Extractor::on(isa, model),
-                Precision::Bf16 => Extractor::in_precision(precision, model).unwrap(),
-            },
+            extractor: Extractor::on(isa, model),
             solver: Solver::on(isa, Arc::clone(&workload.model)),
             levels: (0..workload.layout.levels.len() as u16).collect(),
             pool: (threads > 1).then(|| pool.build().unwrap()),

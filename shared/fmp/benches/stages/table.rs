@@ -4,9 +4,9 @@ use std::fmt;
 use std::fs;
 use std::path::Path;
 
+use kernels::Isa;
 use serde::Serialize;
 
-use crate::arithmetic::Arithmetic;
 use crate::floor::{Floors, Peaks};
 use crate::options::Options;
 use crate::readable::Readable;
@@ -43,7 +43,7 @@ pub(crate) struct Row {
 impl Row {
     pub(crate) fn new(
         workload: &Workload,
-        (kind, arithmetic, threads): (Stage, Arithmetic, usize),
+        (kind, isa, threads): (Stage, Isa, usize),
         times: Times,
     ) -> Self {
         let image = workload.image_name();
@@ -55,7 +55,7 @@ impl Row {
         Self {
             filter: workload.filter,
             stage: kind.name(),
-            isa: arithmetic.name(),
+            isa: isa.name(),
             threads,
             min_ms: times.min,
             median_ms: times.median,
@@ -153,11 +153,8 @@ impl Table {
                 isa,
                 multiply_add,
                 max_plus,
-                tiles,
             } = it;
-            let tiles = tiles.map(|it| format!(" (in tiles {it:.0})"));
-            let tiles = tiles.unwrap_or_default();
-            format!("{isa} {multiply_add:.0}{tiles} and {max_plus:.0}")
+            format!("{isa} {multiply_add:.0} and {max_plus:.0}")
         };
         let peaks: Vec<_> = self.peaks.iter().map(peak).collect();
         format!(

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use fmp::{
-    Extractor, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Precision,
-    Region as Rectangle, Scope,
+    Extractor, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Region as Rectangle, Scope,
 };
 use kernels::Rgb8View;
 
@@ -37,10 +36,10 @@ fn model() -> Arc<Model> {
 }
 
 /// Allocations and reallocations of frames that come after the first.
-fn of_frames(new: fn(Arc<Model>) -> Extractor, n_frames: usize) -> usize {
+fn of_frames(n_frames: usize) -> usize {
     let model = model();
     let layout = Layout::new(&model, SIZE[0], SIZE[1]).unwrap();
-    let extractor = new(model);
+    let extractor = Extractor::new(model);
     let frames: Vec<Vec<u8>> = (0..=n_frames)
         .map(|seed| {
             (0..3 * SIZE[0] * SIZE[1])
@@ -63,20 +62,11 @@ fn of_frames(new: fn(Arc<Model>) -> Extractor, n_frames: usize) -> usize {
     allocations(|| frames[1..].iter().for_each(|it| respond(it)))
 }
 
-/// In every precision that the machine has; in bfloat16 by plain loops where it has no other.
+/// On one thread, and in a pool.
 pub(crate) fn takes_no_memory() {
-    let rounded = |model: Arc<Model>| {
-        Extractor::in_precision(Precision::Bf16, Arc::clone(&model))
-            .unwrap_or_else(|_| Extractor::bf16_readable(model))
-    };
-    let both: [fn(Arc<Model>) -> Extractor; 2] = [Extractor::new, rounded];
-    for new in both {
-        assert_eq!(of_frames(new, 3), 0, "on one thread");
-    }
+    assert_eq!(of_frames(3), 0, "on one thread");
     // One pool, until the end: a thread that ends takes memory for what it leaves to others, and is counted.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3);
     let pool = pool.build().unwrap();
-    for new in both {
-        assert_eq!(pool.install(|| of_frames(new, 3)), 0, "in a pool");
-    }
+    assert_eq!(pool.install(|| of_frames(3)), 0, "in a pool");
 }

@@ -51,11 +51,6 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn store_lanes(self, value: Four, lanes: u32, to: &mut [f32]) {
-        copy_lanes(&value, lanes, to);
-    }
-
-    #[inline(always)]
     fn mul_add(self, a: Four, b: Four, c: Four) -> Four {
         std::array::from_fn(|it| a[it].mul_add(b[it], c[it]))
     }
@@ -110,16 +105,5 @@ pub(super) fn copy_partial(value: &[f32], to: &mut [f32]) {
             to[done..done + n].copy_from_slice(&value[done..done + n]);
             done += n;
         }
-    }
-}
-
-/// Copies the lanes of a register whose bit is set.
-#[inline(always)]
-pub(super) fn copy_lanes(value: &[f32], lanes: u32, to: &mut [f32]) {
-    assert_eq!(to.len(), lanes.count_ones() as usize, "room for every lane");
-    let chosen = value.iter().enumerate();
-    let chosen = chosen.filter(|(lane, _)| lanes >> lane & 1 == 1);
-    for (to, (_, value)) in to.iter_mut().zip(chosen) {
-        *to = *value;
     }
 }

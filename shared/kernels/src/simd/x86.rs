@@ -1,17 +1,17 @@
 //! AVX2 with FMA, and AVX-512.
 
 use std::arch::x86_64::{
-    __m256, __m512, _CMP_LT_OQ, _MM_HINT_ET0, _mm_prefetch, _mm256_add_ps, _mm256_blendv_ps,
-    _mm256_castpd_ps, _mm256_castps_pd, _mm256_cmp_ps, _mm256_fmadd_ps, _mm256_loadu_ps,
-    _mm256_max_ps, _mm256_min_ps, _mm256_permute2f128_ps, _mm256_set1_ps, _mm256_storeu_ps,
-    _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps,
-    _mm512_add_ps, _mm512_castpd_ps, _mm512_castps_pd, _mm512_fmadd_ps, _mm512_loadu_ps,
-    _mm512_mask_blend_ps, _mm512_mask_storeu_ps, _mm512_maskz_compress_ps, _mm512_max_ps,
-    _mm512_min_ps, _mm512_set1_ps, _mm512_shuffle_f32x4, _mm512_storeu_ps, _mm512_sub_ps,
-    _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps,
+    __m256, __m512, _CMP_LT_OQ, _mm256_add_ps, _mm256_blendv_ps, _mm256_castpd_ps,
+    _mm256_castps_pd, _mm256_cmp_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_max_ps,
+    _mm256_min_ps, _mm256_permute2f128_ps, _mm256_set1_ps, _mm256_storeu_ps, _mm256_sub_ps,
+    _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm512_add_ps,
+    _mm512_castpd_ps, _mm512_castps_pd, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_mask_blend_ps,
+    _mm512_mask_storeu_ps, _mm512_max_ps, _mm512_min_ps, _mm512_set1_ps, _mm512_shuffle_f32x4,
+    _mm512_storeu_ps, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd,
+    _mm512_unpacklo_ps,
 };
 
-use super::portable::{copy_lanes, copy_partial};
+use super::portable::copy_partial;
 use super::{Kernel, Row, Simd};
 
 /// AVX2 and FMA. The private field keeps others from making one without them.
@@ -76,13 +76,6 @@ impl Simd for Avx2 {
         let mut all = [0.0; 8];
         self.store(value, &mut all);
         copy_partial(&all, to);
-    }
-
-    #[inline(always)]
-    fn store_lanes(self, value: __m256, lanes: u32, to: &mut [f32]) {
-        let mut all = [0.0; 8];
-        self.store(value, &mut all);
-        copy_lanes(&all, lanes, to);
     }
 
     #[inline(always)]
@@ -186,23 +179,6 @@ impl Simd for Avx512 {
         // SAFETY: the mask has a bit for every float of `to` and no more, and `self` only exists
         // where AVX-512 F was detected.
         unsafe { _mm512_mask_storeu_ps(to.as_mut_ptr(), mask, value) };
-    }
-
-    #[inline(always)]
-    fn store_lanes(self, value: __m512, lanes: u32, to: &mut [f32]) {
-        assert_eq!(to.len(), lanes.count_ones() as usize, "room for every lane");
-        if to.len() >= 16 {
-            return self.store(value, to);
-        }
-        // SAFETY: `self` only exists where AVX-512 F was detected.
-        let chosen = unsafe { _mm512_maskz_compress_ps(lanes as u16, value) };
-        self.store_partial(chosen, to);
-    }
-
-    #[inline(always)]
-    fn prefetch(self, there: &[f32]) {
-        // SAFETY: a hint about an address, which reads and writes nothing.
-        unsafe { _mm_prefetch::<_MM_HINT_ET0>(there.as_ptr().cast()) };
     }
 
     #[inline(always)]

@@ -12,7 +12,6 @@ pub(super) const OTHERS: &[&str] = &[
     "capture.mode",
     "capture.pace",
     "capture.upright",
-    "pose.precision",
     "pose.search",
     "pose.network",
     "pose.network_card",
