@@ -49,7 +49,7 @@ pub mod summary;
 pub use earlier::make_way;
 pub use find_every::FOLLOWED_S;
 pub use planned::Planned;
-pub use prepare::{Prepared, View, frame_scale};
+pub use prepare::{Prepared, View};
 pub use resolved::{Resolved, SERVICES};
 pub use search_size::{CameraSize, SearchSize};
 

@@ -306,7 +306,7 @@ fn skeleton_settings(
 }
 
 /// The scale of the frames: pixels of the frame per pixel of the footage.
-pub fn frame_scale(framing: &Framing) -> f64 {
+pub(crate) fn frame_scale(framing: &Framing) -> f64 {
     let [[a, b, _], [c, d, _]] = framing.source_from_output();
     1.0 / (a * d - b * c).abs().sqrt()
 }

@@ -166,7 +166,7 @@ pub fn camera_of<'a>(
 /// # Errors
 ///
 /// A file cannot be read, its part types are not those of the model, or the two contradict each other.
-pub fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> {
+fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> {
     let n_types: Vec<usize> = (0..model.n_parts())
         .map(|part| model.n_types(part))
         .collect();

@@ -23,7 +23,7 @@ map of the parts by least squares. Then alpha, the cap on distances and beta are
 were held out: those of the largest area under the curve of PCP3D.
 
 The file belongs beside the model it was learned with: `consistency = \"person.consistency\"` in the [fuse] section \
-of a deployment, or --consistency of `fuse-frame` and `eval`. Its format: cargo doc -p consistency, `Learned`.
+of a deployment, or --consistency of `eval`. Its format: cargo doc -p consistency, `Learned`.
 
 With --json one object: the weights, every choice that was tried and how it did, tau, what the tables know of held-out \
 people by the number of bins, the error of joints with and without the map.
