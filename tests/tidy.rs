@@ -40,7 +40,6 @@ const LAYERS: &[(&str, &[&str])] = &[
             "inference",
             "kernels",
             "keypoints",
-            "layouts",
             "messages",
             "metrics",
             "motion",

@@ -10,63 +10,57 @@ use messages::{
 
 /// The type of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// A number: its name in Rust, in C, and in `NumPy`.
-    Number {
-        /// In Rust: `u32`.
-        rust: &'static str,
-        /// In C: `uint32_t`.
-        c: &'static str,
-        /// In `NumPy`, little-endian: `<u4`.
-        numpy: &'static str,
-    },
+pub(super) enum Kind {
+    /// A number, by its name in `NumPy`, little-endian: `<u4`.
+    Number(&'static str),
     /// One of the structs.
     Struct(&'static str),
 }
 
 /// A field of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Field {
+pub(super) struct Field {
     /// Its name.
-    pub name: &'static str,
+    pub(super) name: &'static str,
     /// Where it begins in its struct, bytes.
-    pub offset: usize,
+    pub(super) offset: usize,
     /// Bytes of the whole field.
-    pub size: usize,
+    #[cfg(test)]
+    size: usize,
     /// Type of its elements.
-    pub kind: Kind,
+    pub(super) kind: Kind,
     /// Lengths of the array, outermost first; empty for a single value.
-    pub lengths: Vec<usize>,
+    pub(super) lengths: Vec<usize>,
 }
 
 /// The layout of a struct.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Layout {
+pub(super) struct Layout {
     /// Its name in the crate `messages`.
-    pub name: &'static str,
+    pub(super) name: &'static str,
     /// Its name for the transport, with its version.
-    pub type_name: &'static str,
+    pub(super) type_name: &'static str,
     /// Its size, bytes.
-    pub size: usize,
+    pub(super) size: usize,
     /// Its alignment, bytes.
-    pub align: usize,
+    pub(super) align: usize,
     /// Its fields, in order.
-    pub fields: Vec<Field>,
+    pub(super) fields: Vec<Field>,
 }
 
 /// What is sent on the topics of one kind.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Topic {
+pub(super) struct Topic {
     /// Its name, with `{}` in place of the view, worker or process.
-    pub name: String,
+    pub(super) name: String,
     /// What it is about: `frame`.
-    pub about: String,
+    pub(super) about: String,
     /// The version in its name.
-    pub version: u32,
+    pub(super) version: u32,
     /// The message, or the header of an array.
-    pub message: &'static str,
+    pub(super) message: &'static str,
     /// The elements of the array behind the header; none for a message alone.
-    pub elements: Option<Kind>,
+    pub(super) elements: Option<Kind>,
 }
 
 /// A type that a field may have.
@@ -76,24 +70,23 @@ trait Shape {
 }
 
 macro_rules! numbers {
-    ($($rust:ty, $c:literal, $numpy:literal;)*) => {
+    ($($rust:ty, $numpy:literal;)*) => {
         $(impl Shape for $rust {
             fn shape() -> (Kind, Vec<usize>) {
-                let rust = stringify!($rust);
-                (Kind::Number { rust, c: $c, numpy: $numpy }, Vec::new())
+                (Kind::Number($numpy), Vec::new())
             }
         })*
     };
 }
 
 numbers! {
-    u8, "uint8_t", "|u1";
-    u16, "uint16_t", "<u2";
-    u32, "uint32_t", "<u4";
-    u64, "uint64_t", "<u8";
-    i64, "int64_t", "<i8";
-    f32, "float", "<f4";
-    f64, "double", "<f8";
+    u8, "|u1";
+    u16, "<u2";
+    u32, "<u4";
+    u64, "<u8";
+    i64, "<i8";
+    f32, "<f4";
+    f64, "<f8";
 }
 
 impl<T: Shape, const N: usize> Shape for [T; N] {
@@ -118,12 +111,13 @@ macro_rules! names_of_numbers {
 names_of_numbers!(u32: Status, Searched, Sides, Kept, Span);
 names_of_numbers!(u64: TimedBy);
 
-/// The field that `of` leads to; the type is the compiler's.
-fn field<S, T: Shape>(name: &'static str, offset: usize, _of: fn(&S) -> &T) -> Field {
+/// The field that `_place` leads to; the type is the compiler's.
+fn field<S, T: Shape>(name: &'static str, offset: usize, _place: fn(&S) -> &T) -> Field {
     let (kind, lengths) = T::shape();
     Field {
         name,
         offset,
+        #[cfg(test)]
         size: size_of::<T>(),
         kind,
         lengths,
@@ -139,7 +133,7 @@ macro_rules! structs {
         })*
 
         /// The layouts of all structs, each after those that it consists of.
-        pub fn layouts() -> Vec<Layout> {
+        pub(super) fn layouts() -> Vec<Layout> {
             vec![$(Layout {
                 name: stringify!($name),
                 type_name: $type_name,
@@ -148,7 +142,7 @@ macro_rules! structs {
                 fields: vec![$(field(
                     stringify!($field),
                     offset_of!($name, $field),
-                    |it: &$name| &it.$field,
+                    |message: &$name| &message.$field,
                 )),*],
             }),*]
         }
@@ -197,7 +191,7 @@ structs! {
 const ANY: usize = 7_777_777;
 
 /// What is sent on which topic.
-pub fn topics() -> Vec<Topic> {
+pub(super) fn topics() -> Vec<Topic> {
     let number = |shape: (Kind, Vec<usize>)| Some(shape.0);
     let any = ANY.to_string();
     let all = [
@@ -238,6 +232,32 @@ mod tests {
                 end += field.size;
             }
             assert_eq!(end, layout.size, "{}: a field is missing here", layout.name);
+        }
+    }
+
+    /// The sources that define the structs.
+    const SOURCES: [&str; 9] = [
+        include_str!("../../../../../shared/messages/src/evidence.rs"),
+        include_str!("../../../../../shared/messages/src/frame.rs"),
+        include_str!("../../../../../shared/messages/src/health.rs"),
+        include_str!("../../../../../shared/messages/src/metrics.rs"),
+        include_str!("../../../../../shared/messages/src/picture.rs"),
+        include_str!("../../../../../shared/messages/src/pose.rs"),
+        include_str!("../../../../../shared/messages/src/pose3d.rs"),
+        include_str!("../../../../../shared/messages/src/quality.rs"),
+        include_str!("../../../../../shared/messages/src/stamp.rs"),
+    ];
+
+    #[test]
+    fn names_are_those_of_the_transport() {
+        for layout in layouts() {
+            let head = format!("pub struct {} {{\n", layout.name);
+            let mut sources = SOURCES.iter();
+            let found = sources.find_map(|source| Some((source, source.find(&head)?)));
+            let (source, at) = found.unwrap();
+            let before = source[..at].rfind("#[type_name(\"").unwrap();
+            let name = source[before..at].split('"').nth(1);
+            assert_eq!(name, Some(layout.type_name));
         }
     }
 
