@@ -69,7 +69,7 @@ def description(name):
     own = whole.get("programs") if isinstance(whole, dict) else None
     if not isinstance(own, dict) or "format" not in own:
         raise ClientError(
-            f"deployment {name!r} does not describe itself to other programs: it is of an earlier version of Parallax"
+            f"deployment {name!r} does not describe itself to other programs: it is of another version of Parallax"
         )
     if own["format"] != DESCRIPTION_VERSION:
         raise VersionMismatch(name, "description", own["format"], DESCRIPTION_VERSION)

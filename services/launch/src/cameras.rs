@@ -22,9 +22,7 @@ pub struct Footage {
     pub n_frames: u64,
     /// Used frames per second of the scene, if known.
     pub frame_rate_hz: Option<f64>,
-    /// Which frame belongs to each common instant, where cameras have clocks of their own; frames are instants then. Not in the
-    /// recordings of earlier versions.
-    #[serde(default)]
+    /// Which frame belongs to each common instant, where cameras have clocks of their own; frames are instants then.
     pub timeline: Option<Timeline>,
 }
 

@@ -20,26 +20,18 @@ pub struct Resolved {
     pub deployment: Deployment,
     /// The footage of every camera.
     pub footage: Vec<Footage>,
-    /// The sizes of the frames, if the deployment sets none. Not in the recordings of earlier versions, which had the size of
-    /// the images then.
-    #[serde(default)]
+    /// The sizes of the frames, if the deployment sets none.
     pub search_size: Option<SearchSize>,
-    /// Names of the keypoints that the networks and keypoint files of the cameras have beside the joints, each once. Not in the
-    /// recordings of earlier versions.
-    #[serde(default)]
+    /// Names of the keypoints that the networks and keypoint files of the cameras have beside the joints, each once.
     pub extra_keypoints: Vec<String>,
-    /// Whether left and right of a network follow the picture: which are those of the person is decided over all views. Not in the
-    /// recordings of earlier versions.
-    #[serde(default)]
+    /// Whether left and right of a network follow the picture: which are those of the person is decided over all views.
     pub sides_as_seen: bool,
-    /// The host that runs, of a deployment of several. Not in the recordings of earlier versions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The host that runs, of a deployment of several.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub host: Option<String>,
     /// The recording to write, if there is one.
-    #[serde(default, alias = "tape")]
     pub recording: Option<RecordingPlan>,
     /// The recording that replaces the first stages, if there is one.
-    #[serde(default)]
     pub replay: Option<Replay>,
 }
 

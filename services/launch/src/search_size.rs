@@ -227,11 +227,4 @@ mod tests {
             "{small}"
         );
     }
-
-    #[test]
-    fn a_recording_of_an_earlier_version_keeps_the_size_of_its_images() {
-        let text = r#"{"deployment": {"name": "n", "rig": "r", "output": "o", "camera": []}, "footage": []}"#;
-        let resolved: crate::Resolved = serde_json::from_str(text).unwrap();
-        assert_eq!(resolved.search_size, None);
-    }
 }

@@ -1,7 +1,5 @@
 //! Why a deployment file was refused: always with the place, and with what would do.
 
-use crate::older::OLDER;
-
 /// Why a deployment file was refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
@@ -94,11 +92,6 @@ fn of_what_is_missing(key: &str) -> &'static str {
 
 /// The nearest known name, or all of them if none is near.
 fn hint(key: &str, known: &[&str]) -> String {
-    let is_older = |name: &str| {
-        let newer = OLDER.iter().find(|it| it.0 == name);
-        newer.is_some_and(|it| known.contains(&it.1))
-    };
-    let known: Vec<&str> = known.iter().copied().filter(|it| !is_older(it)).collect();
     let nearest = known
         .iter()
         .map(|it| (strsim::damerau_levenshtein(key, it), it))

@@ -1,7 +1,6 @@
 //! Every key of a deployment file, in order.
 
 use crate::fields::fields_of;
-use crate::older::OLDER;
 use crate::schema::{Key, Shapes, schema};
 use crate::{
     Deployment, Runtime, Supervision, capture, fuse, hosts, person, pose, quality, results, smooth,
@@ -29,9 +28,8 @@ const SECTIONS: [Section; 11] = [
 pub fn keys() -> Vec<Key> {
     let schema = Shapes(schema());
     let top = fields_of::<Deployment>().iter();
-    let is_older = |name: &str| OLDER.iter().any(|it| it.0 == name);
     let mut keys = Vec::new();
-    for name in top.filter(|it| !is_older(it)) {
+    for name in top {
         match SECTIONS.iter().find(|it| it.0 == *name) {
             Some((section, fields)) => keys.extend(
                 fields()

@@ -31,7 +31,6 @@ mod lists;
 mod live;
 mod load;
 mod machine;
-mod older;
 mod places;
 mod ranges;
 mod reference;
@@ -110,7 +109,7 @@ pub struct Deployment {
     #[serde(default)]
     pub triangulate: triangulate::Config,
     /// What is left behind.
-    #[serde(default, alias = "record")]
+    #[serde(default)]
     pub results: results::Config,
     /// Smoothed trajectories.
     #[serde(default)]

@@ -5,8 +5,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use crate::lists::fits;
-use crate::older::{of_today, rename_older};
-use crate::places::{malformed, of_set, place, span_of, span_of_any};
+use crate::places::{malformed, of_set, place, span_of};
 use crate::{Complaint, ConfigError, Deployment, Machine, default_network, live, rules};
 
 /// A deployment, and what of it was said by whom.
@@ -35,13 +34,7 @@ impl Loaded {
         machine: &dyn Machine,
     ) -> Result<Self, ConfigError> {
         let malformed = |error: &toml::de::Error| malformed(file, text, error);
-        let mut in_file: Result<Table, _> = toml::from_str(text);
-        if let Ok(table) = &mut in_file {
-            rename_older(table).map_err(|it| ConfigError::Malformed {
-                place: place(file, text, span_of(text, it.older)),
-                message: it.message,
-            })?;
-        }
+        let in_file: Result<Table, _> = toml::from_str(text);
         // The complaints of the structs tell more than those of a table: they go first.
         let mut deployment: Deployment = toml::from_str(text).map_err(|it| malformed(&it))?;
         let in_file = in_file.map_err(|it| malformed(&it))?;
@@ -53,7 +46,7 @@ impl Loaded {
             deployment = read.map_err(|error| of_set(&error))?;
         }
         let placed = |it: Complaint| {
-            let at = place(file, text, span_of_any(text, &it.key));
+            let at = place(file, text, span_of(text, &it.key));
             it.at(at)
         };
         fits(&deployment, &given).map_err(placed)?;
@@ -89,7 +82,7 @@ impl Loaded {
         let on_command_line = overrides(set)?;
         for argument in set {
             let key = argument.split('=').next().unwrap_or_default().trim();
-            if let Some(message) = refused(&of_today(key)) {
+            if let Some(message) = refused(key) {
                 let place = format!("--set {argument}");
                 return Err(ConfigError::Malformed { place, message });
             }
@@ -159,10 +152,6 @@ fn overrides(set: &[String]) -> Result<Table, ConfigError> {
             merge(&mut table, nested);
         }
     }
-    rename_older(&mut table).map_err(|it| ConfigError::Malformed {
-        place: "--set".to_owned(),
-        message: it.message,
-    })?;
     Ok(table)
 }
 

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use toml::de::{DeTable, DeValue};
 
-use crate::older::OLDER;
 use crate::{ConfigError, slips};
 
 /// `file:line` of a span; the file alone where there is none.
@@ -31,15 +30,6 @@ pub(super) fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
         }
     }
     found
-}
-
-/// The same, where the file has the older name of its section too.
-pub(super) fn span_of_any(text: &str, key: &str) -> Option<Range<usize>> {
-    span_of(text, key).or_else(|| {
-        let (section, rest) = key.split_once('.')?;
-        let (older, _) = OLDER.iter().find(|it| it.1 == section)?;
-        span_of(text, &format!("{older}.{rest}")).or_else(|| span_of(text, older))
-    })
 }
 
 /// What is wrong with the text of a file, with its line and its key.

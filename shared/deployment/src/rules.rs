@@ -1,7 +1,6 @@
 //! What must hold of a deployment before anything is started.
 
 use crate::complaint::{Complaint, demand, not_negative, positive, whole};
-use crate::older::OLDER;
 use crate::topology::{process_name, services};
 use crate::{
     Deployment, capture, fuse, hosts, is_shipped, limits, pose, quality, slips, triangulate,
@@ -421,12 +420,8 @@ fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Comp
     let is_one = services.iter().any(|&(service, n)| {
         name == service || (0..n).any(|index| name == process_name(service, Some(index)))
     });
-    let expected = if let Some((_, newer)) = OLDER.iter().find(|it| it.0 == name) {
-        format!("{newer:?}, which is what this process is called today")
-    } else {
-        let names: Vec<&str> = services.iter().map(|it| it.0).collect();
-        let names = names.join(", ");
-        format!("{names}, or one process of these, such as pose-0")
-    };
+    let names: Vec<&str> = services.iter().map(|it| it.0).collect();
+    let names = names.join(", ");
+    let expected = format!("{names}, or one process of these, such as pose-0");
     demand(is_one, key, &format!("{name:?}"), &expected)
 }

@@ -48,9 +48,9 @@ pub enum RunningError {
     /// It is not JSON, or not a description.
     #[error("the description of the deployment cannot be read")]
     Malformed(#[source] serde_json::Error),
-    /// It has no part for other programs: the deployment is of an earlier version.
+    /// It has no part for other programs: the deployment is of another version.
     #[error(
-        "the deployment does not describe itself to other programs: it is of an earlier version of Parallax"
+        "the deployment does not describe itself to other programs: it is of another version of Parallax"
     )]
     Absent,
     /// It is of another version.

@@ -219,65 +219,17 @@ fn an_override_without_a_value_is_refused() {
 }
 
 #[test]
-fn the_section_of_the_results_may_have_its_older_name() {
-    let text = format!("{SHORT}\n[record]\noverlay_every = 3\n");
-    let loaded = read(&text, &["record.trc=false"]).unwrap();
-    assert_eq!(loaded.deployment.results.overlay_every, 3);
-    assert!(!loaded.deployment.results.trc);
-    // Whoever gives it, and by whichever name: it is one section, and shown by its name of today.
-    let mixed = read(&text, &["results.overlay_every=4"]).unwrap();
-    assert_eq!(mixed.deployment.results.overlay_every, 4);
-    let entries = loaded.entries().unwrap();
-    let origin = |key: &str| entries.iter().find(|it| it.key == key).unwrap().origin;
-    assert_eq!(origin("results.overlay_every"), crate::Origin::File);
-    assert_eq!(origin("results.trc"), crate::Origin::CommandLine);
-}
-
-#[test]
-fn a_wrong_value_under_the_older_name_is_refused_with_its_line() {
-    let text = format!("{SHORT}\n[record]\nepipolar_part = 0\n");
+fn a_wrong_value_is_refused_with_its_line() {
+    let text = format!("{SHORT}\n[results]\nepipolar_part = 0\n");
     assert_eq!(
         refused(&text, &[]),
         "deployment.toml:19: `results.epipolar_part` is 0, expected 1 to 1000"
     );
-    let text = format!("{SHORT}\n[record]\ntcr = true\n");
+    let text = format!("{SHORT}\n[results]\ntcr = true\n");
     assert_eq!(
         refused(&text, &[]),
         "deployment.toml:19: unknown key `tcr`, did you mean `trc`?"
     );
-}
-
-#[test]
-fn both_names_of_the_results_at_once_are_refused() {
-    let text = format!("{SHORT}\n[record]\ntrc = true\n[results]\noverlay_every = 1\n");
-    assert_eq!(
-        refused(&text, &[]),
-        "deployment.toml:18: `record` is the older name of `results`, and both are given: move the keys of `record` to \
-         `results`"
-    );
-    let got = refused(SHORT, &["record.trc=true", "results.trc=false"]);
-    assert!(
-        got.starts_with("--set: `record` is the older name"),
-        "{got}"
-    );
-}
-
-/// The process of that name today is another one: the file is not taken to mean it, nor guessed about.
-#[test]
-fn cores_of_a_process_by_its_older_name_are_refused_with_the_name_of_today() {
-    for key in ["cores = { record = [0] }", "priority = { record = 10 }"] {
-        let text = format!("{SHORT}\n[record]\ntrc = true\n[runtime]\n{key}\n");
-        let name = key.split(' ').next().unwrap();
-        assert_eq!(
-            refused(&text, &[]),
-            format!(
-                "deployment.toml:21: `runtime.{name}` is \"record\", expected \"results\", which is what this process \
-                 is called today"
-            )
-        );
-        let today = text.replace("{ record", "{ results");
-        assert!(read(&today, &[]).is_ok(), "{today}");
-    }
 }
 
 #[test]
@@ -298,12 +250,6 @@ fn whatever_runs_by_the_file_alone_may_be_given_cores_and_nothing_else() {
         ),
         "{got}"
     );
-}
-
-#[test]
-fn the_older_name_is_not_suggested() {
-    let got = refused(&format!("{SHORT}\n[recrd]\n"), &[]);
-    assert!(!got.contains("`record`"), "{got}");
 }
 
 #[test]
