@@ -96,7 +96,6 @@ const LAYERS: &[(&str, &[&str])] = &[
             "datasets",
             "evaluation",
             "networktraining",
-            "qualitytraining",
             "training",
         ],
     ),

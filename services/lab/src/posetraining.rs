@@ -6,22 +6,19 @@
 mod crop;
 mod photographs;
 mod rendered;
-#[cfg(feature = "train-quality")]
 mod train;
 
 use std::io::{BufReader, Read as _, Write as _};
 use std::path::Path;
 
-use failure::{ExitKind, Failure, Stop};
-use networktraining::{Person, SIDE};
+use networktraining::pose::{Person, SIDE};
 use posenetwork::PoseNetwork;
 
 use crate::person::Chosen;
 use crate::scenes::Scenes;
 use failure::Console;
 
-#[cfg(feature = "train-quality")]
-pub use train::{Earlier, Job, train};
+pub use train::{Earlier, Job, Pass, train};
 
 /// Who is learned from.
 #[derive(Debug)]

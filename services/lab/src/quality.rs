@@ -1,6 +1,5 @@
 //! The network that predicts the errors of single views: its samples, and its training.
 
-#[cfg(feature = "train-quality")]
 pub mod network;
 pub mod samples;
 

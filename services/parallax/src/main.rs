@@ -13,7 +13,7 @@
 //! | at the wire | [`wire`](../wire/index.html): messages to domain types and back, checked |
 //! | the deployment | [`deployment`](../deployment/index.html): keys, defaults, rules, processes |
 //! | pages | [`report`](../report/index.html) |
-//! | offline | [`offline`](../offline/index.html): work from files to files; [`training`](../training/index.html), [`qualitytraining`](../qualitytraining/index.html), [`networktraining`](../networktraining/index.html), [`sequences`](../sequences/index.html), [`experiment`](../experiment/index.html): training and evaluation |
+//! | offline | [`offline`](../offline/index.html): work from files to files; [`training`](../training/index.html), [`networktraining`](../networktraining/index.html), [`sequences`](../sequences/index.html), [`experiment`](../experiment/index.html): training and evaluation |
 //! | composition | [`pipeline`](../pipeline/index.html): all steps in one process; [`evaluation`](../evaluation/index.html), [`datasets`](../datasets/index.html), [`consistency`](../consistency/index.html) |
 //! | method | [`orientation`](../orientation/index.html): which way a person faces; [`multiview`](../multiview/index.html), [`viewquality`](../viewquality/index.html), [`posenetwork`](../posenetwork/index.html), [`calibration`](../calibration/index.html), [`fmp`](../fmp/index.html): the paper |
 //! | transport | [`runtime`](../runtime/index.html), [`join`](../join/index.html); [`client`](../client/index.html): the door for other programs |

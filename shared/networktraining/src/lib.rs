@@ -1,81 +1,36 @@
-//! Training of the network that finds joints in the picture of one person: the method.
+//! Training of networks: the one that finds joints, and the one that predicts the errors of single views.
 //!
-//! * [`Person`]: a picture of a person whose joints are known; [`Marks`] makes one of what was marked and what a
-//!   teacher found.
-//! * [`varied`], [`plain`]: what the network is shown of a person, and what it should find.
-//! * `Trainer`: learns from people, step by step (with the feature `burn`; `libtorch` for real trainings).
-//! * `begun`: the parameters of a network that was trained before, to go on from.
-//! * [`write()`]: the trained network as an ONNX file.
-//! * [`Score`]: how good it is on people.
+//! * [`Network`]: a network, defined once by the operations of [`Ops`]. [`initial`] plans its parameters, [`write()`] writes it as
+//!   an ONNX file.
+//! * [`Task`]: what is learned, from whom, and how. [`pose`] and [`quality`] are the two.
+//! * [`Trainer`]: runs the steps of a task, keeps the best network, and writes everything that it knows as a checkpoint, from which
+//!   a training goes on and ends with the same bits.
+//! * [`Backend`]: what computes. Rust is built in; `LibTorch` comes with the feature `libtorch`, for a processor with fast cores.
 //!
-//! Labels are **as seen**: whoever is seen from behind has the joints of left and right exchanged, so that the label follows
-//! the picture. In which direction the person faces is an output of its own.
-//!
-//! Pixels have their centres at integers. Nothing here reads or writes files.
+//! Nothing here reads or writes files.
 #![forbid(unsafe_code)]
 
-mod card;
-mod marks;
-mod network;
+mod checkpoint;
+mod compute;
 mod onnx;
+mod ops;
+mod optimiser;
+mod order;
 mod parameters;
-mod person;
-mod score;
+mod reference;
 mod settings;
-mod vary;
+#[cfg(feature = "libtorch")]
+mod torch;
+mod training;
 
-#[cfg(feature = "burn")]
-mod begun;
-#[cfg(feature = "burn")]
-mod learn;
-#[cfg(feature = "burn")]
-mod trainer;
+pub mod pose;
+pub mod quality;
 
-#[cfg(feature = "burn")]
-pub use begun::{BeginError, begun};
-pub use card::{About, card};
-#[cfg(feature = "burn")]
-pub use learn::{Batch, Cost, Found, Learner, Memory, Step};
-pub use marks::{Marks, exchange_sides};
-pub use network::{N_JOINTS, STRIDE, Shape};
-pub use onnx::{ERROR, FRONT, MAPS, PICTURE, write};
+pub use checkpoint::StoreError;
+pub use compute::Shown;
+pub use onnx::{Document, write};
+pub use ops::{Conv, Dims, Network, Ops, Output, Places, Scaling};
+pub use optimiser::{Rule, Step};
 pub use parameters::{Parameter, Role, initial};
-pub use person::{Person, SIDE, Source, Target, WINDOW};
-pub use score::{Judged, Score};
-pub use settings::{Backend, Precision, Settings, SettingsError};
-#[cfg(feature = "burn")]
-pub use trainer::{Pass, TrainError, Trainer};
-pub use vary::{DEVIATION, FILL, MARGIN, MEAN, NetworkSample, plain, varied};
-
-/// The joint that is the mirror image of another.
-pub const MIRROR: [usize; N_JOINTS] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
-
-/// Where a map is highest, cells: between cells by a quarter towards the higher neighbour.
-///
-/// * `map`: row major, `columns` wide.
-pub fn peak(map: &[f32], columns: usize) -> [f32; 2] {
-    let mut best = 0;
-    for (at, value) in map.iter().enumerate() {
-        if *value > map[best] {
-            best = at;
-        }
-    }
-    let [x, y] = [best % columns, best / columns];
-    let rows = map.len() / columns;
-    let towards = |before: usize, after: usize| {
-        let difference = map[after] - map[before];
-        if difference == 0.0 {
-            0.0
-        } else {
-            difference.signum() * 0.25
-        }
-    };
-    let mut found = [x as f32, y as f32];
-    if x > 0 && x + 1 < columns {
-        found[0] += towards(best - 1, best + 1);
-    }
-    if y > 0 && y + 1 < rows {
-        found[1] += towards(best - columns, best + columns);
-    }
-    found
-}
+pub use settings::{Backend, Precision, SettingsError};
+pub use training::{Batch, Costed, Kept, Pass, Plan, Task, TrainError, Trainer};

@@ -1,18 +1,16 @@
-//! The parameters of the network, their initialisation, and the standardised weights that it convolves with.
+//! The parameters of a network, their initialisation, and the standardised weights that it convolves with.
 
 use fastrand::Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::network::{self, Conv, Ops, Shape};
+use crate::ops::{Conv, Dims, Network, Ops, Places, Scaling, convolved};
 
-/// The log-odds of an untrained map.
-const MAP_BIAS: f32 = -4.0;
-/// The logarithm of the expected error before training: a tenth of the input's height.
-const ERROR_BIAS: f32 = -2.3;
 /// What keeps the variance of a positive part of a normal variable: `sqrt(2 / (1 - 1 / pi))`.
 pub(crate) const GAIN_OF_RELU: f32 = 1.712_858_6;
-/// Added to a variance before the root is taken.
-pub(crate) const EPSILON: f32 = 1e-8;
+/// Added to the squared length of a channel of weights before the root is taken.
+pub(crate) const EPSILON_OF_LENGTH: f32 = 1e-8;
+/// Added to the variance over a batch before the root is taken.
+pub(crate) const EPSILON_OF_BATCH: f32 = 1e-5;
 
 /// The role of a list of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -21,6 +19,8 @@ pub enum Role {
     Weight,
     /// Trained without weight decay.
     Bias,
+    /// A statistic of the data: not trained.
+    Fixed,
 }
 
 /// One list of parameters.
@@ -36,38 +36,27 @@ pub struct Parameter {
     pub values: Vec<f32>,
 }
 
-/// The parameters at the beginning, in the order in which the network takes them.
+/// The parameters of a network at the beginning, in the order in which it takes them.
 ///
-/// Weights are drawn from a normal distribution with the deviation `sqrt(2 / n_inputs)` (He et al. 2015); those of the last dense
-/// layers are 0, and biases as well but for the last ones.
-pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
+/// Weights are drawn from a normal distribution with the deviation `sqrt(2 / n_inputs)` (He et al. 2015), slopes are 1/4, gains as
+/// the network says, biases and means 0, factors and variances 1.
+pub fn initial(network: &impl Network, seed: u64) -> Vec<Parameter> {
     let mut plan = Plan {
-        shape,
+        inputs: network.inputs(),
         rng: Rng::with_seed(seed),
         all: Vec::new(),
     };
-    network::run(&mut plan, shape);
-    for it in &mut plan.all {
-        match it.name.as_str() {
-            "maps.bias" => it.values.fill(MAP_BIAS),
-            "error2.bias" => it.values.fill(ERROR_BIAS),
-            "error2.weight" | "front2.weight" => it.values.fill(0.0),
-            _ => (),
-        }
-    }
+    network.run(&mut plan);
     plan.all
 }
 
-/// Sizes of a value, without that of the batch: `[channels, rows, columns]` or `[values]`.
-pub(crate) type Dims = Vec<usize>;
-
-struct Plan<'a> {
-    shape: &'a Shape,
+struct Plan {
+    inputs: Vec<(&'static str, Dims)>,
     rng: Rng,
     all: Vec<Parameter>,
 }
 
-impl Plan<'_> {
+impl Plan {
     fn weight(&mut self, layer: &str, dims: Dims) {
         let n_inputs: usize = dims[1..].iter().product();
         let deviation = (2.0 / n_inputs as f32).sqrt();
@@ -82,12 +71,12 @@ impl Plan<'_> {
         });
     }
 
-    fn constant(&mut self, name: String, n: usize, value: f32) {
+    fn constant(&mut self, name: String, n: usize, (role, value): (Role, f32)) {
         let values = vec![value; n];
         self.all.push(Parameter {
             name,
             dims: vec![n],
-            role: Role::Bias,
+            role,
             values,
         });
     }
@@ -99,12 +88,6 @@ pub(crate) fn normal(rng: &mut Rng) -> f32 {
     (radius * (core::f64::consts::TAU * rng.f64()).cos()) as f32
 }
 
-/// Dimensions of the output of a convolution.
-pub(crate) fn convolved(of: &[usize], conv: Conv) -> Dims {
-    let side = |it: usize| (it - 1) / conv.stride + 1;
-    vec![conv.channels, side(of[1]), side(of[2])]
-}
-
 /// The weights of a convolution as they are used: every channel with mean 0, of the length that keeps the variance of positive parts,
 /// times its gain.
 ///
@@ -113,32 +96,52 @@ pub(crate) fn standardised(weights: &[f32], gains: &[f32]) -> Vec<f32> {
     let n_inputs = weights.len() / gains.len();
     let mut all = Vec::with_capacity(weights.len());
     for (channel, gain) in weights.chunks_exact(n_inputs).zip(gains) {
-        let n = n_inputs as f32;
-        let mean = channel.iter().sum::<f32>() / n;
-        let variance = channel.iter().map(|it| (it - mean).powi(2)).sum::<f32>() / n;
-        let factor = gain * GAIN_OF_RELU / (variance * n + EPSILON).sqrt();
-        all.extend(channel.iter().map(|it| (it - mean) * factor));
+        let mean = channel.iter().sum::<f32>() / n_inputs as f32;
+        let squared: f32 = channel.iter().map(|value| (value - mean).powi(2)).sum();
+        let factor = gain * GAIN_OF_RELU / (squared + EPSILON_OF_LENGTH).sqrt();
+        all.extend(channel.iter().map(|value| (value - mean) * factor));
     }
     all
 }
 
-impl Ops for Plan<'_> {
+impl Ops for Plan {
     type Value = Dims;
 
-    fn picture(&mut self) -> Dims {
-        vec![3, self.shape.height, self.shape.width]
+    fn input(&mut self, name: &'static str) -> Dims {
+        let found = self.inputs.iter().find(|input| input.0 == name);
+        found.map(|input| input.1.clone()).unwrap_or_default()
     }
 
-    fn conv(&mut self, of: &Dims, name: &str, conv: Conv) -> Dims {
+    fn centred(&mut self, list: &Dims, name: &str) -> Dims {
+        for (what, value) in [("mean", 0.0), ("factor", 1.0)] {
+            self.constant(format!("{name}.{what}"), list[0], (Role::Fixed, value));
+        }
+        list.clone()
+    }
+
+    fn conv(&mut self, map: &Dims, name: &str, conv: Conv) -> Dims {
+        let inputs = if conv.by_channel { 1 } else { map[0] };
         let n = conv.channels;
-        self.weight(name, vec![n, of[0], conv.kernel, conv.kernel]);
-        self.constant(format!("{name}.gain"), n, conv.gain);
-        self.constant(format!("{name}.bias"), n, 0.0);
-        convolved(of, conv)
+        self.weight(name, vec![n, inputs, conv.kernel, conv.kernel]);
+        let bias = ("bias", Role::Bias, 0.0);
+        let all: &[(&str, Role, f32)] = match conv.scaling {
+            Scaling::Plain => &[bias],
+            Scaling::Standardised { gain } => &[("gain", Role::Bias, gain), bias],
+            Scaling::Batch => &[
+                ("scale", Role::Bias, 1.0),
+                ("shift", Role::Bias, 0.0),
+                ("mean", Role::Fixed, 0.0),
+                ("variance", Role::Fixed, 1.0),
+            ],
+        };
+        for &(what, role, value) in all {
+            self.constant(format!("{name}.{what}"), n, (role, value));
+        }
+        convolved(map, conv)
     }
 
-    fn relu(&mut self, of: &Dims) -> Dims {
-        of.clone()
+    fn relu(&mut self, value: &Dims) -> Dims {
+        value.clone()
     }
 
     fn add(&mut self, a: &Dims, b: &Dims) -> Dims {
@@ -146,37 +149,62 @@ impl Ops for Plan<'_> {
         a.clone()
     }
 
-    fn doubled(&mut self, of: &Dims) -> Dims {
-        vec![of[0], 2 * of[1], 2 * of[2]]
+    fn doubled(&mut self, map: &Dims) -> Dims {
+        vec![map[0], 2 * map[1], 2 * map[2]]
     }
 
-    fn mean(&mut self, of: &Dims) -> Dims {
-        vec![of[0]]
+    fn pool(&mut self, map: &Dims) -> Dims {
+        vec![map[0], map[1] / 2, map[2] / 2]
     }
 
-    fn fixed(&mut self, of: &Dims) -> Dims {
-        of.clone()
+    fn mean(&mut self, map: &Dims) -> Dims {
+        vec![map[0]]
     }
 
-    fn look(&mut self, of: &Dims, maps: &Dims, _: f32) -> Dims {
-        vec![of[0] * maps[0]]
+    fn highest(&mut self, map: &Dims) -> Dims {
+        vec![map[0]]
     }
 
-    fn place(&mut self, maps: &Dims, _: f32) -> Dims {
-        vec![3 * maps[0]]
+    fn flat(&mut self, map: &Dims) -> Dims {
+        vec![map.iter().product()]
     }
 
-    fn highest(&mut self, of: &Dims) -> Dims {
-        vec![of[0]]
+    fn fixed(&mut self, value: &Dims) -> Dims {
+        value.clone()
     }
 
-    fn join(&mut self, of: &[&Dims]) -> Dims {
-        vec![of.iter().map(|it| it[0]).sum()]
+    fn softmax(&mut self, maps: &Dims, _: f32) -> Dims {
+        maps.clone()
     }
 
-    fn dense(&mut self, of: &Dims, name: &str, values: usize) -> Dims {
-        self.weight(name, vec![values, of[0]]);
-        self.constant(format!("{name}.bias"), values, 0.0);
+    fn around(&mut self, _: &Dims, like: &Dims, places: &Places) -> Dims {
+        vec![places.x.len(), like[1], like[2]]
+    }
+
+    fn look(&mut self, map: &Dims, weights: &Dims) -> Dims {
+        vec![map[0] * weights[0]]
+    }
+
+    fn place(&mut self, weights: &Dims) -> Dims {
+        vec![3 * weights[0]]
+    }
+
+    fn join(&mut self, lists: &[&Dims]) -> Dims {
+        vec![lists.iter().map(|list| list[0]).sum()]
+    }
+
+    fn dense(&mut self, list: &Dims, name: &str, values: usize) -> Dims {
+        self.weight(name, vec![values, list[0]]);
+        self.constant(format!("{name}.bias"), values, (Role::Bias, 0.0));
         vec![values]
+    }
+
+    fn prelu(&mut self, list: &Dims, name: &str) -> Dims {
+        self.constant(name.to_owned(), list[0], (Role::Bias, 0.25));
+        list.clone()
+    }
+
+    fn dropout(&mut self, list: &Dims, _: f32) -> Dims {
+        list.clone()
     }
 }

@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use datasets::{Person as Annotated, Picture, ReadOptions, Sides, SkeletonTable};
 use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
-use networktraining::{MIRROR, Marks, N_JOINTS, Person, SIDE, Source, Target, exchange_sides};
+use networktraining::pose::{
+    MIRROR, Marks, N_JOINTS, Person, SIDE, Source, Target, exchange_sides,
+};
 use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace};
 
 use super::crop::Crop;

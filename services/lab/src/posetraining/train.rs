@@ -3,18 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use failure::{ExitKind, Failure, OrFail as _, Stop};
-use networktraining::{About, Backend, Parameter, Pass, Score, Settings, Trainer};
+use networktraining::pose::{self, About, Cost, PoseTask, Score, Settings};
+use networktraining::{Backend, Parameter, TrainError, Trainer};
 use report::curves::{self, Line, Panel};
 
 use super::Prepared;
 use failure::Console;
 use inputs::cards::METADATA_KEY;
 
-/// Steps between two checkpoints, and two lines of progress.
-const STEPS: usize = 100;
-/// Passes of so many steps between two looks at the people who are kept apart.
-const JUDGED: usize = 10;
+/// The results of a hundred steps.
+pub type Pass = networktraining::Pass<Cost, Score>;
 
 /// A network that was trained before.
 #[derive(Debug, Clone)]
@@ -40,7 +38,7 @@ pub struct Job {
 
 /// The parameters of a network that was trained before.
 fn begun(from: &Earlier, settings: &Settings) -> Result<Vec<Parameter>, Failure> {
-    networktraining::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
+    pose::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
         let hint = "--from takes a network of `train network` that has the `shape` of the settings";
         failure::in_file(&from.file, &error).with_hint(hint)
     })
@@ -110,25 +108,21 @@ pub fn train(
         }
         Err(_) => None,
     };
-    let how = (settings, job.backend);
     let learnt = [people.learnt.as_slice(), people.kept.as_slice()];
     let from = job.from.as_ref().map(|it| begun(it, settings));
-    let mut trainer =
-        Trainer::new(how, learnt, from.transpose()?, kept.as_deref()).or_fail(ExitKind::Input)?;
-    let (began, from) = (Instant::now(), trainer.step());
-    while trainer.step() < trainer.n_steps() {
-        let to_end_of = |end: usize| end.saturating_sub(trainer.step());
-        let left = to_end_of(settings.steps);
-        let steps = if left > 0 {
-            left.min(STEPS)
-        } else {
-            to_end_of(trainer.n_steps()).min(STEPS)
+    let task = PoseTask::new(settings, learnt, from.transpose()?).or_fail(ExitKind::Input)?;
+    let trainer = Trainer::new(task, job.backend, kept.as_deref());
+    let mut trainer = trainer.map_err(|error| {
+        let kind = match error {
+            TrainError::Precision => ExitKind::Config,
+            TrainError::Checkpoint(_) | TrainError::Other { .. } => ExitKind::Input,
         };
-        let nth = trainer.passes().len() + 1;
-        let is_last = steps == left || trainer.step() + steps == trainer.n_steps();
-        if !trainer.pass(steps, nth % JUDGED == 0 || is_last, &mut |_| {
-            !stop.is_requested()
-        }) {
+        Failure::new(kind, error)
+    })?;
+    let n_steps = settings.steps + settings.error_steps;
+    let (began, from) = (Instant::now(), trainer.step());
+    while !trainer.is_done() {
+        if !trainer.pass(&mut |_| !stop.is_requested()) {
             let message = format!("stopped after step {}", trainer.step());
             let hint = "go on with --resume";
             return Err(Failure::new(ExitKind::Interrupted, message).with_hint(hint));
@@ -140,9 +134,9 @@ pub fn train(
         )?;
         if let Some(pass) = trainer.passes().last() {
             let done = (trainer.step() - from) as f64;
-            let left = (trainer.n_steps() - trainer.step()) as f64;
+            let left = (n_steps - trainer.step()) as f64;
             let minutes = began.elapsed().as_secs_f64() / 60.0 * left / done;
-            console.message(&line(pass, trainer.n_steps(), minutes));
+            console.message(&line(pass, n_steps, minutes));
         }
     }
     let passes = trainer.passes().to_vec();
@@ -153,7 +147,7 @@ pub fn train(
         goes_on: job.from.is_some(),
         score: score.unwrap_or_default(),
     };
-    let card = networktraining::card(&settings.shape, &about);
+    let card = pose::card(&settings.shape, &about);
     write(&job.out, &trainer.onnx(&[(METADATA_KEY.to_owned(), card)]))?;
     std::fs::remove_file(&file).map_err(|error| failure::in_file(&file, &error))?;
     Ok(passes)

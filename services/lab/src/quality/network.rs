@@ -1,25 +1,27 @@
-//! The training of a network, in a build that includes it.
+//! The training of a network that predicts errors.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use failure::{ExitKind, Failure, OrFail as _, Stop};
-use qualitytraining::judge::Judgement;
-use qualitytraining::parameters::Parameter;
-use qualitytraining::passes::Pass;
-use qualitytraining::sample::Sample;
-use qualitytraining::settings::Settings;
-use qualitytraining::store::Samples;
-use qualitytraining::trainer::{TrainError, Trainer};
-use qualitytraining::vgg;
+use networktraining::quality::judge::Judgement;
+use networktraining::quality::sample::Sample;
+use networktraining::quality::settings::Settings;
+use networktraining::quality::store::Samples;
+use networktraining::quality::task::{QualityTask, Validated};
+use networktraining::quality::vgg;
+use networktraining::{Backend, Parameter, TrainError};
 use report::curves::{self, Line, Panel};
 use serde_json::json;
 
 use super::replace::replace;
 use failure::Console;
 use failure::in_file;
+
+/// The results of a pass over the samples.
+type Pass = networktraining::Pass<f32, Validated>;
+type Trainer<'a> = networktraining::Trainer<QualityTask<'a>>;
 
 /// What a network is trained on, and where to.
 #[derive(Debug, Clone)]
@@ -36,6 +38,16 @@ pub struct Job {
     pub identity: Option<String>,
     /// Whether to go on from the checkpoint of an interrupted training, if there is one.
     pub resume: bool,
+    /// What computes.
+    pub backend: Backend,
+}
+
+/// How good the network was after a pass.
+fn validated(pass: &Pass) -> Validated {
+    pass.score.unwrap_or(Validated {
+        loss: f32::NAN,
+        area: f64::NAN,
+    })
 }
 
 /// The losses above, and the area under the ROC below.
@@ -47,13 +59,15 @@ fn drawn(passes: &[Pass], best: Option<usize>) -> String {
     let losses = Panel {
         what: "loss",
         lines: vec![
-            line("learnt", &|it| f64::from(it.learnt)),
-            line("validated", &|it| f64::from(it.validated)),
+            line("learnt", &|pass| f64::from(pass.cost)),
+            line("validated", &|pass| f64::from(validated(pass).loss)),
         ],
     };
     let area = Panel {
         what: "area",
-        lines: vec![line("area under the ROC, validated", &|it| it.area)],
+        lines: vec![line("area under the ROC, validated", &|pass| {
+            validated(pass).area
+        })],
     };
     curves::svg(&[losses, area], best)
 }
@@ -83,7 +97,8 @@ pub fn train(
         Some(file) => weights(file)?,
         None => Vec::new(),
     };
-    let trainer = Trainer::new(settings, &samples, &weights, checkpoint.as_deref());
+    let task = QualityTask::new(settings, &samples, &weights).or_fail(ExitKind::Input)?;
+    let trainer = Trainer::new(task, job.backend, checkpoint.as_deref());
     let mut trainer = trainer.map_err(|error| refused(error, &kept))?;
     let say = Say {
         console,
@@ -93,7 +108,7 @@ pub fn train(
     };
     say.begin(&trainer)?;
     while !trainer.is_done() {
-        if !trainer.pass(&mut |_, _| !stop.is_requested()) {
+        if !trainer.pass(&mut |_| !stop.is_requested()) {
             let failure = Failure::new(ExitKind::Interrupted, "stopped");
             return Err(failure.with_hint(format!("--resume goes on from {}", kept.display())));
         }
@@ -109,7 +124,7 @@ pub fn train(
             .into_owned()
     });
     replace(out, &trainer.onnx(&identity))?;
-    say.judged("validation", &trainer.judge(trainer.validated()))?;
+    say.judged("validation", &trainer.judge(trainer.task().validated()))?;
     for file in &job.judge {
         let samples = read(file)?;
         let all: Vec<&Sample> = samples.all.iter().collect();
@@ -162,7 +177,7 @@ fn checkpoint(path: &Path, resume: bool) -> Result<Option<Vec<u8>>, Failure> {
 }
 
 fn refused(error: TrainError, checkpoint: &Path) -> Failure {
-    let is_old = matches!(error, TrainError::Checkpoint(_) | TrainError::Other);
+    let is_old = matches!(error, TrainError::Checkpoint(_) | TrainError::Other { .. });
     let failure = Failure::new(ExitKind::Input, error);
     if is_old {
         let path = checkpoint.display();
@@ -184,7 +199,8 @@ struct Say<'a> {
 
 impl Say<'_> {
     fn begin(&self, trainer: &Trainer<'_>) -> Result<(), Failure> {
-        let [learnt, validated] = trainer.n_samples();
+        let [learnt, validated] =
+            [trainer.task().learnt(), trainer.task().validated()].map(<[_]>::len);
         let console = self.console;
         console.event(&json!({
             "event": "data", "learnt": learnt, "validated": validated, "resumed": self.before,
@@ -202,12 +218,13 @@ impl Say<'_> {
         let Some(pass) = trainer.passes().last() else {
             return Ok(());
         };
+        let validated = validated(pass);
         let n = trainer.passes().len();
         let each = self.begin.elapsed().as_secs_f64() / (n - self.before).max(1) as f64;
         let left = each * (self.epochs - n) as f64;
         self.console.event(&json!({
-            "event": "pass", "pass": n, "passes": self.epochs, "learnt": pass.learnt,
-            "validated": pass.validated, "area": pass.area, "seconds_left": left,
+            "event": "pass", "pass": n, "passes": self.epochs, "learnt": pass.cost,
+            "validated": validated.loss, "area": validated.area, "seconds_left": left,
         }))?;
         let best = if trainer.best() == Some(n - 1) {
             ", the best"
@@ -216,7 +233,7 @@ impl Say<'_> {
         };
         self.console.message(&format!(
             "pass {n} of {}: loss {:.4}, validated {:.4}, area {:.3}{best}; {left:.0} s left at most",
-            self.epochs, pass.learnt, pass.validated, pass.area
+            self.epochs, pass.cost, validated.loss, validated.area
         ));
         Ok(())
     }

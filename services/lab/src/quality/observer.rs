@@ -5,7 +5,7 @@ use std::sync::Arc;
 use datasets::SkeletonTable;
 use fmp::{Model, Responses, Scope, local_scores};
 use kernels::Rgb8View;
-use qualitytraining::sample::{Sample, part_errors, picture_size};
+use networktraining::quality::sample::{Sample, part_errors, picture_size};
 use skeleton::N_PARTS;
 use viewquality::{EvidenceError, Normalisation, Sampler, Tile, TileShape, evidence};
 

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use datasets::{Picture, ReadOptions, Selection};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
-use qualitytraining::sample::Sample;
-use qualitytraining::store::Samples;
+use networktraining::quality::sample::Sample;
+use networktraining::quality::store::Samples;
 use rayon::prelude::*;
 use viewquality::TileShape;
 

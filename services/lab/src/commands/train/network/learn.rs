@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use failure::{ExitKind, Failure, OrFail as _};
-#[cfg(feature = "train-quality")]
 use inputs::Shipped;
-use networktraining::Settings;
 use terminal::output;
+use networktraining::Backend;
+use networktraining::pose::Settings;
+use failure::{ExitKind, Failure, OrFail as _};
 
 use terminal::Globals;
 
@@ -21,8 +21,8 @@ After every hundred steps everything that the training knows is in OUT.checkpoin
 
 --from trains a network further; a lower `rate` in --settings is for this. --from shipped means the network that ships.
 
-A real training needs LibTorch: build with --features libtorch (docs/guide/train.md says how). The built-in backend is \
-many times slower, and for small trainings.
+Nothing has to be installed for it. With LibTorch, which has to be (docs/guide/train.md says how; build with --features libtorch), \
+a training takes less time.
 
 Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a setting is wrong; \
 4 the people or the checkpoint cannot be used; 130 stopped by Ctrl-C.
@@ -52,8 +52,8 @@ pub(crate) struct Arguments {
     /// Random seed, instead of that of the settings.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// What calculates: `flex`, built in; `libtorch`, if this executable was built with it.
-    #[arg(long, value_name = "NAME", default_value = "flex", value_parser = ["flex", "libtorch"])]
+    /// What computes: `built-in`, or `libtorch`, if this executable was built with it.
+    #[arg(long, value_name = "NAME", default_value = "built-in", value_parser = ["built-in", "libtorch"])]
     backend: String,
     /// A network of this command to go on from, in place of random weights: more steps, or people of your own.
     #[arg(long, value_name = "NETWORK")]
@@ -66,7 +66,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Runs the command; an error if this executable was built without training.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let settings = settings(arguments)?;
     if arguments.print_settings {
@@ -77,7 +77,6 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     train(arguments, &settings, globals)
 }
 
-#[cfg(feature = "train-quality")]
 fn train(
     arguments: &Arguments,
     settings: &Settings,
@@ -105,7 +104,6 @@ fn train(
 }
 
 /// The network to go on from.
-#[cfg(feature = "train-quality")]
 fn from(file: &std::path::Path) -> Result<lab::posetraining::Earlier, Failure> {
     Ok(lab::posetraining::Earlier {
         bytes: Shipped::PoseNetwork.read(file)?.into_owned(),
@@ -113,27 +111,18 @@ fn from(file: &std::path::Path) -> Result<lab::posetraining::Earlier, Failure> {
     })
 }
 
-#[cfg(feature = "train-quality")]
-fn backend(name: &str) -> Result<networktraining::Backend, Failure> {
+fn backend(name: &str) -> Result<Backend, Failure> {
     match name {
         #[cfg(feature = "libtorch")]
-        "libtorch" => Ok(networktraining::Backend::LibTorch),
+        "libtorch" => Ok(Backend::LibTorch),
         #[cfg(not(feature = "libtorch"))]
         "libtorch" => {
             let message = "this Parallax was built without LibTorch";
             let hint = "build it with --features libtorch: docs/guide/train.md says how";
             Err(Failure::new(ExitKind::Usage, message).with_hint(hint))
         }
-        _ => Ok(networktraining::Backend::Flex),
+        _ => Ok(Backend::BuiltIn),
     }
-}
-
-#[cfg(not(feature = "train-quality"))]
-fn train(_: &Arguments, _: &Settings, _: Globals) -> Result<ExitCode, Failure> {
-    let message = "this Parallax was built without the trainer of networks";
-    Err(Failure::new(ExitKind::Usage, message).with_hint(
-        "build it with: cargo run --release -p parallax-lab --features train-quality -- train network ...",
-    ))
 }
 
 fn settings(arguments: &Arguments) -> Result<Settings, Failure> {

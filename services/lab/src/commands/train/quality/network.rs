@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use networktraining::Backend;
+use networktraining::quality::network::Kind;
+use networktraining::quality::settings::Settings;
 use failure::{ExitKind, Failure, OrFail as _};
-use qualitytraining::network::Kind;
-use qualitytraining::settings::Settings;
 
 use terminal::Globals;
 use terminal::output;
@@ -16,9 +17,6 @@ The samples are made by `parallax-lab train quality-samples`; a share of their g
 never a part of a group. After every pass the state is in OUT.checkpoint: --resume goes on, and on the CPU the \
 network is the same, bit for bit, whatever the interruptions. OUT.svg shows how the training went. The best pass is \
 written as ONNX, with what `[quality]` needs to know of it inside: preprocessing, unit, thresholds.
-
-This command needs a Parallax that was built with it:
-    cargo run --release -p parallax-lab --features train-quality -- train quality ...
 
 VGG-16 (--network vgg16) begins with torchvision's weights, --weights vgg16.safetensors (of a .pth make one \
 with safetensors.torch.save_file), and samples made with --tile vgg16.
@@ -89,7 +87,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Runs the command; an error if this executable was built without training.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let settings = settings(arguments)?;
     if arguments.print_settings {
@@ -100,7 +98,6 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     train(arguments, &settings, globals)
 }
 
-#[cfg(feature = "train-quality")]
 fn train(
     arguments: &Arguments,
     settings: &Settings,
@@ -115,19 +112,12 @@ fn train(
         weights: arguments.weights.clone(),
         identity: arguments.identity.clone(),
         resume: arguments.resume,
+        backend: Backend::BuiltIn,
     };
     let stop = failure::Stop::on_signals().or_fail(ExitKind::Run)?;
     let terminal = Terminal::without_bar(globals.quiet || arguments.json, arguments.json);
     lab::quality::network::train(&job, settings, &stop, &terminal)?;
     Ok(ExitCode::SUCCESS)
-}
-
-#[cfg(not(feature = "train-quality"))]
-fn train(_: &Arguments, _: &Settings, _: Globals) -> Result<ExitCode, Failure> {
-    let message = "this Parallax was built without the trainer of networks";
-    Err(Failure::new(ExitKind::Usage, message).with_hint(
-        "build it with: cargo run --release -p parallax-lab --features train-quality -- train quality ...",
-    ))
 }
 
 fn settings(arguments: &Arguments) -> Result<Settings, Failure> {

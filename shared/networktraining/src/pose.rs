@@ -1,0 +1,69 @@
+//! The network that finds joints in the picture of one person: who it learns from, and how.
+//!
+//! * [`Person`]: a picture of a person whose joints are known; [`Marks`] makes one of what was marked and what a
+//!   teacher found.
+//! * [`varied`], [`plain`]: what the network is shown of a person, and what it should find.
+//! * [`PoseTask`]: the training.
+//! * [`begun`]: the parameters of a network that was trained before, to go on from.
+//! * [`file()`]: a trained network as an ONNX file; [`card()`] says how it is used.
+//! * [`Score`]: how good it is on people.
+//!
+//! Labels are **as seen**: whoever is seen from behind has the joints of left and right exchanged, so that the label follows
+//! the picture. In which direction the person faces is an output of its own.
+//!
+//! Pixels have their centres at integers.
+
+mod begun;
+mod card;
+mod cost;
+mod marks;
+mod network;
+mod person;
+mod score;
+mod settings;
+mod task;
+mod vary;
+
+pub use begun::{BeginError, begun};
+pub use card::{About, card};
+pub use cost::{Cost, Truth};
+pub use marks::{Marks, exchange_sides};
+pub use network::{ERROR, FRONT, MAPS, N_JOINTS, PICTURE, STRIDE, Shape};
+pub use person::{Person, SIDE, Source, Target, WINDOW};
+pub use score::{Judged, Score};
+pub use settings::{Settings, Vary};
+pub use task::{Found, PoseTask, TooFew, file, initial};
+pub use vary::{DEVIATION, FILL, MARGIN, MEAN, NetworkSample, plain, varied};
+
+/// The joint that is the mirror image of another.
+pub const MIRROR: [usize; N_JOINTS] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
+
+/// Where a map is highest, cells: between cells by a quarter towards the higher neighbour.
+///
+/// * `map`: row major, `columns` wide.
+pub fn peak(map: &[f32], columns: usize) -> [f32; 2] {
+    let mut best = 0;
+    for (at, value) in map.iter().enumerate() {
+        if *value > map[best] {
+            best = at;
+        }
+    }
+    let [x, y] = [best % columns, best / columns];
+    let rows = map.len() / columns;
+    let towards = |before: usize, after: usize| {
+        let difference = map[after] - map[before];
+        if difference == 0.0 {
+            0.0
+        } else {
+            difference.signum() * 0.25
+        }
+    };
+    let mut found = [x as f32, y as f32];
+    if x > 0 && x + 1 < columns {
+        found[0] += towards(best - 1, best + 1);
+    }
+    if y > 0 && y + 1 < rows {
+        found[1] += towards(best - columns, best + columns);
+    }
+    found
+}

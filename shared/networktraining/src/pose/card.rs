@@ -1,0 +1,74 @@
+//! The card of a trained network: what Parallax has to know to use it.
+
+use super::network::{ERROR, FRONT, MAPS, PICTURE, Shape};
+use super::score::Score;
+use super::vary::{DEVIATION, FILL, MARGIN, MEAN};
+
+/// What a card tells beside how the network is used.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct About {
+    /// People learned from, and kept apart.
+    pub people: [usize; 2],
+    /// Samples that the network was shown.
+    pub samples: usize,
+    /// Whether it went on from a network that was trained before.
+    pub goes_on: bool,
+    /// How good it is on those who were kept apart.
+    pub score: Score,
+}
+
+/// The text of the card, TOML.
+pub fn card(shape: &Shape, about: &About) -> String {
+    let [learnt, kept] = about.people;
+    let Score {
+        people: judged,
+        mean_of_ends,
+        both_ends,
+        front,
+        area,
+    } = about.score;
+    let [mean_of_ends, both_ends, front] = [mean_of_ends, both_ends, front].map(|it| 100.0 * it);
+    let Shape { width, height, .. } = shape;
+    let before = if about.goes_on {
+        ", after those of another network that it began with"
+    } else {
+        ""
+    };
+    let fill = FILL as u8;
+    format!(
+        "\
+# A network of `parallax-lab train network`: {learnt} people, {samples} samples{before}. Of {judged} of {kept} people who were kept apart it finds
+# {mean_of_ends:.1} % of the limbs by the mean of both ends and {both_ends:.1} % by both, and tells {front:.1} % of the directions from their
+# opposites; joints that are off by more than half a head are told from others with an area under the curve of {area:.3}.
+format = \"parallax-keypoint-network\"
+version = 1
+name = \"Parallax, LSP-14 as seen, {height}x{width}\"
+
+[input]
+name = \"{PICTURE}\"
+width = {width}
+height = {height}
+mean = [{MEAN:?}, {MEAN:?}, {MEAN:?}]
+std = [{DEVIATION:?}, {DEVIATION:?}, {DEVIATION:?}]
+
+[crop]
+margin = {MARGIN:?}
+fill = {fill}
+
+[output]
+codec = \"heat-map\"
+maps = \"{MAPS}\"
+centred = true
+score = \"log-odds\"
+
+[keypoints]
+set = \"lsp-14\"
+sides = \"seen\"
+
+[also]
+front = \"{FRONT}\"
+error = \"{ERROR}\"
+",
+        samples = about.samples
+    )
+}

@@ -1,0 +1,195 @@
+//! The cost of what the network finds in place of what it should find, and its gradients.
+
+use serde::{Deserialize, Serialize};
+
+use super::network::STRIDE;
+use super::peak;
+
+/// Where the logarithm of an expected error counts as it is.
+const LOGARITHMS: core::ops::RangeInclusive<f32> = -8.0..=2.0;
+/// How much more a cell of heat 1 counts than one of heat 0.
+const HEAT: f32 = 9.0;
+/// What all cells of a map without heat count, about.
+const CELLS: f32 = 40.0;
+
+/// What should be found in a batch.
+#[derive(Debug, Clone, Default)]
+pub struct Truth {
+    /// Columns and rows of the maps.
+    pub cells: [usize; 2],
+    /// Heat of every joint, 0 to 1: `[n, joints, rows, columns]`.
+    pub maps: Vec<f32>,
+    /// How much the map of every joint counts: `[n, joints]`.
+    pub weights: Vec<f32>,
+    /// The direction of the trunk, of a length from 0 to 1, its certainty: `[n, 2]`.
+    pub fronts: Vec<f32>,
+    /// Where the joints are, cells of the maps, NaN where that is not certain: `[n, joints, 2]`.
+    pub places: Vec<f32>,
+}
+
+/// The parts of the cost of a step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Of the maps.
+    pub maps: f32,
+    /// Of the direction, nats a person of certain direction.
+    pub front: f32,
+    /// Of the expected errors.
+    pub error: f32,
+}
+
+/// A part of the cost, and its gradient by an output of the network.
+pub(super) struct Part {
+    pub(super) cost: f32,
+    pub(super) gradient: Vec<f32>,
+}
+
+/// log(1 + exp(x)), without overflow.
+fn softplus(x: f32) -> f32 {
+    x.max(0.0) + (-x.abs()).exp().ln_1p()
+}
+
+fn sigmoid(x: f32) -> f32 {
+    1.0 / (1.0 + (-x).exp())
+}
+
+impl Truth {
+    /// Columns and rows for an input of some width and height.
+    pub(super) fn cells([width, height]: [usize; 2]) -> [usize; 2] {
+        [width, height].map(|side| side / STRIDE)
+    }
+
+    /// Cross-entropy of the maps, heat counting tenfold: the mean over joints, a cell of heat 1 worth.
+    pub(super) fn of_maps(&self, maps: &[f32]) -> Part {
+        let [columns, rows] = self.cells;
+        let all = self.weights.iter().sum::<f32>().max(1.0) * CELLS;
+        let mut sum = 0.0;
+        let mut gradient = Vec::with_capacity(maps.len());
+        let targets = self.maps.chunks_exact(columns * rows);
+        let found = maps.chunks_exact(columns * rows).zip(targets);
+        for ((found, target), weight) in found.zip(&self.weights) {
+            let mut of_map = 0.0;
+            for (found, target) in found.iter().zip(target) {
+                let weight = (target * HEAT + 1.0) * weight / all;
+                of_map += weight * (softplus(*found) - found * target);
+                gradient.push(weight * (sigmoid(*found) - target));
+            }
+            sum += of_map;
+        }
+        Part {
+            cost: sum,
+            gradient,
+        }
+    }
+
+    /// Surprise about the direction, weighted by its certainty.
+    pub(super) fn of_front(&self, evidence: &[f32]) -> Part {
+        let directions = self.fronts.as_chunks::<2>().0;
+        let lengths: Vec<f32> = directions.iter().map(|[x, y]| x.hypot(*y)).collect();
+        let certain = lengths.iter().sum::<f32>().max(1.0);
+        let mut cost = 0.0;
+        let mut gradient = Vec::with_capacity(evidence.len());
+        let evidence = evidence.as_chunks::<2>().0;
+        for ((evidence, direction), length) in evidence.iter().zip(directions).zip(lengths) {
+            let along = evidence[0] * direction[0] + evidence[1] * direction[1];
+            let factor = 2.0 / (length + 1e-6);
+            let weight = length / certain;
+            cost += weight * softplus(-along * factor);
+            let slope = -weight * factor * sigmoid(-along * factor);
+            gradient.extend(direction.map(|axis| slope * axis));
+        }
+        Part { cost, gradient }
+    }
+
+    /// Surprise about how far off the maxima of maps are, if that is distributed exponentially with the expected error as mean.
+    pub(super) fn of_error(&self, logarithms: &[f32], maps: &[f32]) -> Part {
+        let off = self.off(maps);
+        let n_known = off.iter().flatten().count().max(1) as f32;
+        let mut cost = 0.0;
+        let gradient = logarithms.iter().zip(off).map(|(logarithm, off)| {
+            let off = off?;
+            let is_free = LOGARITHMS.contains(logarithm);
+            let logarithm = logarithm.clamp(*LOGARITHMS.start(), *LOGARITHMS.end());
+            let heights = off * (-logarithm).exp();
+            cost += (heights + logarithm) / n_known;
+            is_free.then_some((1.0 - heights) / n_known)
+        });
+        let gradient = gradient.map(Option::unwrap_or_default).collect();
+        Part { cost, gradient }
+    }
+
+    /// How far off the maxima of maps are, heights of the input; nothing where the joint is not certain.
+    fn off(&self, maps: &[f32]) -> Vec<Option<f32>> {
+        let [columns, rows] = self.cells;
+        let known = self.places.as_chunks::<2>().0;
+        let off = maps.chunks_exact(columns * rows).zip(known);
+        let off = off.map(|(map, place)| {
+            let [x, y] = peak(map, columns);
+            let off = (x - place[0]).hypot(y - place[1]) / rows as f32;
+            off.is_finite().then_some(off)
+        });
+        off.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+
+    use super::super::N_JOINTS;
+    use super::*;
+
+    /// The gradient of a part is its change with every output.
+    fn check(outputs: &[f32], part: &dyn Fn(&[f32]) -> Part) {
+        let step = 1e-2;
+        let gradient = part(outputs).gradient;
+        assert_eq!(gradient.len(), outputs.len());
+        for (at, gradient) in gradient.iter().enumerate() {
+            let moved = |by: f32| {
+                let mut moved = outputs.to_vec();
+                moved[at] += by;
+                part(&moved).cost
+            };
+            let change = (moved(step) - moved(-step)) / (2.0 * step);
+            assert!(
+                (change - gradient).abs() < 2e-3 * gradient.abs().max(0.05),
+                "{at}: {change}, {gradient}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_gradients_of_the_cost_are_its_changes() {
+        let (n, cells) = (2, [4, 3]);
+        let mut rng = Rng::with_seed(3);
+        let mut numbers = |n: usize| -> Vec<f32> { (0..n).map(|_| rng.f32()).collect() };
+        let mut truth = Truth {
+            cells,
+            maps: numbers(n * N_JOINTS * 12),
+            weights: numbers(n * N_JOINTS),
+            fronts: numbers(n * 2),
+            places: numbers(n * N_JOINTS * 2),
+        };
+        truth.places[4] = f32::NAN;
+        let maps: Vec<f32> = numbers(truth.maps.len())
+            .iter()
+            .map(|x| 8.0 * x - 4.0)
+            .collect();
+        check(&maps, &|maps| truth.of_maps(maps));
+        check(&numbers(n * 2), &|front| truth.of_front(front));
+        let logarithms: Vec<f32> = numbers(n * N_JOINTS).iter().map(|x| x - 2.0).collect();
+        check(&logarithms, &|logarithms| truth.of_error(logarithms, &maps));
+    }
+
+    #[test]
+    fn an_expected_error_out_of_bounds_is_not_pushed_further() {
+        let truth = Truth {
+            cells: [1, 1],
+            places: vec![5.0, 5.0, 0.0, 0.0],
+            ..Truth::default()
+        };
+        let part = truth.of_error(&[-9.0, 3.0], &[0.0, 0.0]);
+        assert_eq!(part.gradient, [0.0, 0.0]);
+        assert!(part.cost.is_finite());
+    }
+}

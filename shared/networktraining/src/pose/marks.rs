@@ -1,0 +1,123 @@
+//! What should be found of a person, by the marks of an annotator and by a teacher: another network.
+
+use super::person::Target;
+use super::{MIRROR, N_JOINTS};
+
+/// Peak of the teacher above which a joint of a pair counts in the question of its sides.
+const SURE_OF_SIDES: f32 = 0.55;
+/// Peak above which its joint stands beside a mark that contradicts it.
+const SURE: f32 = 0.7;
+/// Peak above which its joint is used with a mark that it agrees with.
+const USABLE: f32 = 0.4;
+/// Peak above which its joint is used where nothing is marked.
+const ALONE: f32 = 0.5;
+/// Distance up to which a mark and the teacher agree, lengths of the trunk.
+const AGREED: f32 = 0.24;
+/// Least distance between the sides of a limb for a decision about them, lengths of the trunk.
+const APART: f32 = 0.23;
+/// An exchanged limb must be nearer to the teacher than this share of the distance as it is.
+const NEARER: f32 = 0.6;
+
+/// Both legs, both arms.
+const LIMBS: [[usize; 6]; 2] = [[0, 1, 2, 3, 4, 5], [6, 7, 8, 9, 10, 11]];
+
+/// What is known of the joints of a person, in the order of `skeleton::PARSE14`; not finite where nothing is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marks {
+    /// By the annotator, left and right as the person would call them, pixels.
+    pub marked: [[f32; 2]; N_JOINTS],
+    /// By the teacher, and the height of its peak, 0 to 1.
+    pub taught: [([f32; 2], f32); N_JOINTS],
+    /// Length of the trunk, pixels.
+    pub trunk: f32,
+}
+
+/// The same joints with left and right exchanged.
+pub fn exchange_sides<T: Copy>(of: &[T; N_JOINTS]) -> [T; N_JOINTS] {
+    core::array::from_fn(|joint| of[MIRROR[joint]])
+}
+
+fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+fn mean(of: &[f32]) -> f32 {
+    of.iter().sum::<f32>() / of.len().max(1) as f32
+}
+
+impl Marks {
+    /// Exchanges the sides of limbs whose marks the teacher surely contradicts.
+    ///
+    /// * Returns whether legs, and whether arms were exchanged.
+    pub fn mend_sides(&mut self) -> [bool; 2] {
+        LIMBS.map(|limb| {
+            let is_sure = |joint: &usize| {
+                [*joint, MIRROR[*joint]]
+                    .into_iter()
+                    .all(|it| self.marked[it][0].is_finite() && self.taught[it].1 > SURE_OF_SIDES)
+            };
+            let joints: Vec<usize> = limb.into_iter().filter(is_sure).collect();
+            if joints.len() < 4 {
+                return false;
+            }
+            let each = |of: &dyn Fn(usize) -> f32| {
+                mean(&joints.iter().map(|it| of(*it)).collect::<Vec<f32>>())
+            };
+            let apart = each(&|it| distance(self.marked[it], self.marked[MIRROR[it]]));
+            let exchanged = each(&|it| distance(self.marked[MIRROR[it]], self.taught[it].0));
+            let as_marked = each(&|it| distance(self.marked[it], self.taught[it].0));
+            let is_wrong = apart >= APART * self.trunk && exchanged < NEARER * as_marked;
+            if is_wrong {
+                let before = self.marked;
+                for joint in limb {
+                    self.marked[joint] = before[MIRROR[joint]];
+                }
+            }
+            is_wrong
+        })
+    }
+
+    /// Exchanges left and right of marks and teacher.
+    pub fn exchange(&mut self) {
+        self.marked = exchange_sides(&self.marked);
+        self.taught = exchange_sides(&self.taught);
+    }
+
+    /// What the network should find.
+    ///
+    /// The mean of both where they agree; both places where they differ and the teacher is sure; the teacher's, weighted by its
+    /// peak, where nothing is marked.
+    pub fn targets(&self) -> [Target; N_JOINTS] {
+        core::array::from_fn(|joint| {
+            let marked = self.marked[joint];
+            let (taught, peak) = self.taught[joint];
+            let is_marked = marked[0].is_finite() && marked[1].is_finite();
+            let target = Target {
+                at: marked,
+                or: None,
+                weight: 1.0,
+                is_marked,
+            };
+            if !is_marked {
+                let weight = if peak > ALONE { peak.min(1.0) } else { 0.0 };
+                return Target {
+                    at: taught,
+                    weight,
+                    ..target
+                };
+            }
+            let agree = distance(marked, taught) < AGREED * self.trunk;
+            if agree && peak > USABLE {
+                let at = [0, 1].map(|axis| f32::midpoint(marked[axis], taught[axis]));
+                Target { at, ..target }
+            } else if !agree && peak > SURE {
+                Target {
+                    or: Some(taught),
+                    ..target
+                }
+            } else {
+                target
+            }
+        })
+    }
+}

@@ -1,0 +1,62 @@
+//! A person to learn from.
+
+use serde::{Deserialize, Serialize};
+
+use super::N_JOINTS;
+
+/// Side of the square picture that is kept of a person, pixels.
+pub const SIDE: usize = 256;
+/// Height of the network's window in it, as the box around the marked joints asks for, pixels.
+pub const WINDOW: f64 = 176.0;
+
+/// Where a picture comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Source {
+    /// A photograph, marked by hand.
+    Photograph,
+    /// A scene that does not exist.
+    Scene,
+}
+
+/// What the network should find of a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Target {
+    /// Where it is, pixels; not finite if nobody knows.
+    pub at: [f32; 2],
+    /// Another place that is as likely, where the mark and the teacher contradict each other.
+    pub or: Option<[f32; 2]>,
+    /// How much it counts, 0 to 1.
+    pub weight: f32,
+    /// Whether it was marked, or is exact.
+    pub is_marked: bool,
+}
+
+/// A picture of a person, and where the joints are: as seen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Person {
+    /// Where it comes from.
+    pub source: Source,
+    /// What it is called in messages.
+    pub name: String,
+    /// The picture: [`SIDE`] pixels square, red first.
+    pub rgb: Vec<u8>,
+    /// The joints, in the order of `skeleton::PARSE14`.
+    pub targets: [Target; N_JOINTS],
+    /// In which direction the person faces: towards the right of the picture, downwards, towards the camera; its length is the
+    /// certainty, 0 to 1.
+    pub front: [f32; 3],
+}
+
+impl Person {
+    /// The places of the joints that are known well enough to lay a box around them.
+    pub fn places(&self) -> impl Iterator<Item = [f32; 2]> {
+        let is_known = |it: &&Target| it.weight > 0.0 && it.at.iter().all(|it| it.is_finite());
+        self.targets.iter().filter(is_known).map(|it| it.at)
+    }
+
+    /// From the middle of the hips to the neck, pixels; not finite if one of them is not known.
+    pub fn trunk(&self) -> [f32; 2] {
+        let [right, left, neck] = [2, 3, 12].map(|it: usize| self.targets[it].at);
+        [0, 1].map(|axis| neck[axis] - f32::midpoint(right[axis], left[axis]))
+    }
+}

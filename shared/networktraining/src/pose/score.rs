@@ -1,0 +1,174 @@
+//! How good a network is on people whose joints are known.
+
+use serde::{Deserialize, Serialize};
+
+use super::N_JOINTS;
+
+/// The limbs whose ends are judged (PCP): joints whose mean is one end, and the other.
+const STICKS: [(&[usize], &[usize]); 10] = [
+    (&[8, 9], &[2, 3]),
+    (&[2], &[1]),
+    (&[3], &[4]),
+    (&[1], &[0]),
+    (&[4], &[5]),
+    (&[8], &[7]),
+    (&[9], &[10]),
+    (&[7], &[6]),
+    (&[10], &[11]),
+    (&[12], &[13]),
+];
+
+/// Neck and top of the head.
+const HEAD: [usize; 2] = [12, 13];
+
+/// What was found of one person.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// Where the joints were found, cells.
+    pub found: [[f32; 2]; N_JOINTS],
+    /// Their expected errors, any unit that all people share.
+    pub expected: [f32; N_JOINTS],
+    /// Evidence for the direction.
+    pub front: [f32; 2],
+    /// Where they are; NaN where that is not known.
+    pub truth: [[f32; 2]; N_JOINTS],
+    /// The direction; its length is its certainty.
+    pub facing: [f32; 2],
+}
+
+/// How good a network is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// People.
+    pub people: usize,
+    /// Share of limbs of which the mean distance of both ends is at most half their length.
+    pub mean_of_ends: f32,
+    /// Share of limbs of which both ends are at most half their length off.
+    pub both_ends: f32,
+    /// Share of people of surely known direction of whom it tells the direction from its opposite.
+    pub front: f32,
+    /// Area under the curve: the probability that a joint that is off by more than half a head is expected to be farther off
+    /// than one that is not.
+    pub area: f32,
+}
+
+fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+fn end(of: &[[f32; 2]; N_JOINTS], joints: &[usize]) -> [f32; 2] {
+    let n = joints.len() as f32;
+    [0, 1].map(|axis| joints.iter().map(|it| of[*it][axis]).sum::<f32>() / n)
+}
+
+impl Score {
+    /// Judges what was found.
+    pub fn new(people: &[Judged]) -> Self {
+        let mut limbs = [0.0f32; 3];
+        let mut fronts = [0.0f32; 2];
+        let mut joints: Vec<(f32, bool)> = Vec::new();
+        for it in people {
+            for (a, b) in STICKS {
+                let [from, to] = [end(&it.truth, a), end(&it.truth, b)];
+                let half = 0.5 * distance(from, to);
+                let off = [
+                    distance(end(&it.found, a), from),
+                    distance(end(&it.found, b), to),
+                ];
+                if half.is_finite() {
+                    limbs[0] += 1.0;
+                    limbs[1] += f32::from(u8::from(f32::midpoint(off[0], off[1]) <= half));
+                    limbs[2] += f32::from(u8::from(off[0].max(off[1]) <= half));
+                }
+            }
+            if it.facing[0].hypot(it.facing[1]) > 0.7 {
+                let along = it.front[0] * it.facing[0] + it.front[1] * it.facing[1];
+                fronts[0] += 1.0;
+                fronts[1] += f32::from(u8::from(along > 0.0));
+            }
+            let head = distance(it.truth[HEAD[0]], it.truth[HEAD[1]]);
+            for joint in 0..N_JOINTS {
+                let heads = distance(it.found[joint], it.truth[joint]) / head;
+                if heads.is_finite() {
+                    joints.push((it.expected[joint], heads > 0.5));
+                }
+            }
+        }
+        Self {
+            people: people.len(),
+            mean_of_ends: limbs[1] / limbs[0],
+            both_ends: limbs[2] / limbs[0],
+            front: fronts[1] / fronts[0],
+            area: area(joints),
+        }
+    }
+}
+
+/// The area under the curve (Mann and Whitney); NaN if all joints are alike.
+fn area(mut joints: Vec<(f32, bool)>) -> f32 {
+    joints.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let far = joints.iter().filter(|it| it.1).count();
+    let near = joints.len() - far;
+    let mut below = 0u64;
+    let mut pairs = 0u64;
+    for (_, is_far) in &joints {
+        if *is_far {
+            pairs += below;
+        } else {
+            below += 1;
+        }
+    }
+    (pairs as f64 / (far as f64 * near as f64)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn standing() -> [[f32; 2]; N_JOINTS] {
+        [
+            [0.0, 40.0],
+            [0.0, 30.0],
+            [0.0, 20.0],
+            [4.0, 20.0],
+            [4.0, 30.0],
+            [4.0, 40.0],
+            [-4.0, 20.0],
+            [-4.0, 15.0],
+            [-2.0, 8.0],
+            [6.0, 8.0],
+            [8.0, 15.0],
+            [8.0, 20.0],
+            [2.0, 6.0],
+            [2.0, 0.0],
+        ]
+    }
+
+    #[test]
+    fn a_perfect_network_scores_one_and_a_moved_foot_costs_a_limb() {
+        let mut person = Judged {
+            found: standing(),
+            expected: [0.1; N_JOINTS],
+            front: [0.0, 2.0],
+            truth: standing(),
+            facing: [0.0, 1.0],
+        };
+        let perfect = Score::new(&[person.clone()]);
+        assert_eq!(
+            [perfect.mean_of_ends, perfect.both_ends, perfect.front],
+            [1.0; 3]
+        );
+        person.found[0] = [0.0, 32.0];
+        person.expected[0] = 0.5;
+        person.front = [0.0, -0.1];
+        let score = Score::new(&[person]);
+        assert_eq!(
+            [score.mean_of_ends, score.both_ends, score.front],
+            [1.0, 0.9, 0.0]
+        );
+        assert_eq!(
+            score.area, 1.0,
+            "the joint that is far off is the one that was expected to be"
+        );
+    }
+}

@@ -1,0 +1,15 @@
+//! The networks that predict the error of every part in a single view (the paper's section 4.3): samples, and how they are learned.
+//!
+//! * [`Sample`](sample::Sample): a person in a picture, what the search knows of the pose, and the errors of the parts.
+//! * [`QualityTask`](task::QualityTask): the training, by passes over the samples until the validation does not improve any more.
+//! * [`Kind`](network::Kind): the networks, among them the paper's VGG-16, whose weights [`vgg`] reads.
+
+pub mod judge;
+pub mod network;
+pub mod sample;
+pub mod score;
+pub mod settings;
+pub mod store;
+pub mod task;
+pub mod vary;
+pub mod vgg;

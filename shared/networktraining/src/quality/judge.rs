@@ -1,0 +1,127 @@
+//! Evaluates predicted errors against true ones, part by part.
+
+use skeleton::N_PARTS;
+use statistics::Sorted;
+
+use super::sample::Sample;
+use super::score::{area, rank_correlation};
+
+/// The quality of predictions.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Judgement {
+    /// How many samples.
+    pub n: usize,
+    /// Area under the ROC of "the error is larger than tau"; `None` where all samples are on one side.
+    pub area: Vec<Option<f64>>,
+    /// Rank correlation of predicted and true error.
+    pub rank_correlation: Vec<Option<f64>>,
+    /// Mean of the absolute difference, shares of the height that the tile shows.
+    pub inaccuracy: Vec<f64>,
+    /// Share of the samples whose error is larger than tau.
+    pub beyond: Vec<f64>,
+}
+
+/// The errors of samples, shares of the height that their tiles show: the median of every part is its tau.
+pub fn tau(samples: &[&Sample]) -> Vec<f32> {
+    let of_part = |part: usize| -> Vec<f32> {
+        let share = |it: &&Sample| it.errors_px[part] / it.height_px;
+        samples.iter().map(share).collect()
+    };
+    (0..N_PARTS)
+        .map(|part| Sorted::new(of_part(part)).median().unwrap_or(0.0))
+        .collect()
+}
+
+impl Judgement {
+    /// Judges predictions.
+    ///
+    /// * `predicted`: `[sample][part]`, shares of the height that the tile shows.
+    /// * `truth`: the samples.
+    /// * `tau`: the thresholds, the same shares.
+    ///
+    /// # Panics
+    ///
+    /// If there are fewer predictions than samples.
+    pub fn new(predicted: &[Vec<f32>], truth: &[&Sample], tau: &[f32]) -> Self {
+        let n = truth.len();
+        let mut judgement = Self {
+            n,
+            area: Vec::new(),
+            rank_correlation: Vec::new(),
+            inaccuracy: Vec::new(),
+            beyond: Vec::new(),
+        };
+        for (part, tau) in tau.iter().enumerate() {
+            let expected: Vec<f32> = predicted[..n].iter().map(|it| it[part]).collect();
+            let actual: Vec<f32> = truth
+                .iter()
+                .map(|it| it.errors_px[part] / it.height_px)
+                .collect();
+            let beyond: Vec<bool> = actual.iter().map(|error| error > tau).collect();
+            let off = expected
+                .iter()
+                .zip(&actual)
+                .map(|(a, b)| f64::from((a - b).abs()));
+            let n_beyond = beyond.iter().filter(|it| **it).count();
+            judgement.area.push(area(&expected, &beyond));
+            judgement
+                .rank_correlation
+                .push(rank_correlation(&expected, &actual));
+            judgement.inaccuracy.push(off.sum::<f64>() / n as f64);
+            judgement.beyond.push(n_beyond as f64 / n as f64);
+        }
+        judgement
+    }
+
+    /// Mean area over the parts that have one.
+    pub fn mean_area(&self) -> f64 {
+        mean(&self.area)
+    }
+
+    /// Mean rank correlation over the parts that have one.
+    pub fn mean_rank_correlation(&self) -> f64 {
+        mean(&self.rank_correlation)
+    }
+}
+
+fn mean(of: &[Option<f64>]) -> f64 {
+    let known: Vec<f64> = of.iter().flatten().copied().collect();
+    known.iter().sum::<f64>() / known.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(error_px: f32) -> Sample {
+        Sample {
+            group: String::new(),
+            source: String::new(),
+            picture: Vec::new(),
+            evidence: Vec::new(),
+            height_px: 100.0,
+            errors_px: vec![error_px; N_PARTS],
+        }
+    }
+
+    #[test]
+    fn the_truth_is_the_best_prediction_and_a_constant_is_chance_level() {
+        let samples = [sample(1.0), sample(5.0), sample(3.0), sample(9.0)];
+        let all: Vec<&Sample> = samples.iter().collect();
+        let tau = tau(&all);
+        assert_eq!(tau, [0.04; N_PARTS]);
+        let truth: Vec<Vec<f32>> = samples
+            .iter()
+            .map(|it| it.errors_px.iter().map(|px| px / 100.0).collect())
+            .collect();
+        let judgement = Judgement::new(&truth, &all, &tau);
+        assert_eq!(judgement.mean_area(), 1.0);
+        assert!((judgement.mean_rank_correlation() - 1.0).abs() < 1e-12);
+        assert_eq!(judgement.inaccuracy, [0.0; N_PARTS]);
+        assert_eq!(judgement.beyond, [0.5; N_PARTS]);
+        let constant = vec![vec![0.04; N_PARTS]; 4];
+        let judgement = Judgement::new(&constant, &all, &tau);
+        assert_eq!(judgement.mean_area(), 0.5);
+        assert_eq!(judgement.rank_correlation, [None; N_PARTS]);
+    }
+}
