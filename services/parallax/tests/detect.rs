@@ -12,7 +12,7 @@ use std::process::Command;
 use common::{Case, Ended, PLAIN};
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
-use image::{DynamicImage, ImageEncoder, imageops};
+use image::{DynamicImage, imageops};
 use serde_json::Value;
 
 /// A case with the pictures of one camera in the folder `a`.
@@ -28,22 +28,6 @@ fn detect(case: &Case, more: &[&str]) -> (Ended, Vec<Value>) {
     let lines = ended.stdout.lines();
     let lines = lines.map(|it| serde_json::from_str(it).unwrap()).collect();
     (ended, lines)
-}
-
-/// Adds the orientation tag for a rotation by 90 degrees to the right.
-fn tagged(mut encoder: impl ImageEncoder, image: &DynamicImage) {
-    // TIFF header, one entry: orientation (0x0112), one short, 6.
-    let exif = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
-    encoder.set_exif_metadata(exif.to_vec()).unwrap();
-    let (width, height) = (image.width(), image.height());
-    encoder
-        .write_image(
-            image.to_rgb8().as_raw(),
-            width,
-            height,
-            image::ColorType::Rgb8.into(),
-        )
-        .unwrap();
 }
 
 #[test]
@@ -79,13 +63,19 @@ fn a_damaged_file_is_named_and_the_others_are_searched() {
 #[test]
 fn a_picture_is_searched_with_its_orientation_tag_applied() {
     let (case, picture) = case("detect-turned", 1);
-    let stored = DynamicImage::from(imageops::rotate270(&picture.to_rgb8()));
-    let mut bytes = Vec::new();
-    tagged(PngEncoder::new(&mut bytes), &stored);
-    case.write("turned.png", &bytes);
-    let mut bytes = Vec::new();
-    tagged(JpegEncoder::new_with_quality(&mut bytes, 100), &stored);
-    case.write("turned.jpg", &bytes);
+    let stored = imageops::rotate270(&picture.to_rgb8());
+    let mut png = Vec::new();
+    stored
+        .write_with_encoder(PngEncoder::new(&mut png))
+        .unwrap();
+    let mut jpeg = Vec::new();
+    stored
+        .write_with_encoder(JpegEncoder::new_with_quality(&mut jpeg, 100))
+        .unwrap();
+    // A rotation by 90 degrees to the right.
+    for (name, file) in [("turned.png", png), ("turned.jpg", jpeg)] {
+        case.write(name, &testkit::exif::tagged(&file, 6));
+    }
     let files = ["a/0000.png", "turned.png", "turned.jpg"];
     let (ended, lines) = detect(&case, &[&files[..], &["--overlay", "drawn"]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);

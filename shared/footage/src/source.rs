@@ -1,6 +1,7 @@
 //! Footage, frame by frame.
 
 mod decode;
+mod exif;
 mod images;
 mod listing;
 mod live;

@@ -90,21 +90,14 @@ fn films_are_turned_as_their_display_matrix_asks_where_that_is_wanted() {
 #[test]
 fn every_photograph_of_a_folder_is_turned_as_its_own_tag_asks() {
     let folder = tempfile::tempdir().unwrap();
-    // TIFF header, one entry: orientation (0x0112), one short.
     for (nth, value) in [(0, 6_u8), (1, 8), (2, 6)] {
         let mut file = Vec::new();
-        let mut encoder = JpegEncoder::new(&mut file);
-        let exif = [
-            &b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0"[..],
-            &[value],
-            &[0; 7],
-        ]
-        .concat();
-        encoder.set_exif_metadata(exif).unwrap();
+        let encoder = JpegEncoder::new(&mut file);
         let picture = frame(nth);
         let [width, height] = [SIZE.width, SIZE.height].map(|it| it as u32);
         let written = encoder.write_image(&picture, width, height, ExtendedColorType::Rgb8);
         written.unwrap();
+        let file = testkit::exif::tagged(&file, value);
         fs::write(folder.path().join(format!("{nth}.jpg")), file).unwrap();
     }
     let (info, upright) = frames(&SourceSpec::upright(folder.path().to_str().unwrap()));

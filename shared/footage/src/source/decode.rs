@@ -7,6 +7,7 @@ use image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
+use super::exif;
 use crate::turn::{Rotation, Turn};
 use crate::{FootageError, Size};
 
@@ -78,12 +79,7 @@ impl<'a> Encoded<'a> {
 
     /// The orientation tag (EXIF); a tag that cannot be read counts as none.
     pub(super) fn tag(&self) -> Turn {
-        let decoder = self.decoder();
-        let tag = decoder.and_then(|mut decoder| {
-            let tag = decoder.orientation();
-            tag.map_err(|source| self.error(source))
-        });
-        Turn(tag.unwrap_or(Orientation::NoTransforms))
+        Turn(exif::orientation(&self.bytes).unwrap_or(Orientation::NoTransforms))
     }
 
     /// The pixels, turned, row major: grey is replicated, alpha dropped, 16 bits rounded to 8. Returns the size.
