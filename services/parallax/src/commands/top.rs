@@ -1,6 +1,7 @@
 //! `parallax top`: shows a running deployment as a table that is updated continuously.
 
 mod screen;
+mod terminal;
 
 use core::time::Duration;
 use std::io::{self, IsTerminal as _};
@@ -47,10 +48,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     drop(live);
-    let (asked, pause) = (stop.clone(), Duration::from_secs_f64(arguments.every));
-    // Reading keys does not end where the terminal is gone: it is left behind.
-    let shown = failure::unless_stopped(&stop, move || screen::show(&namespace, &asked, pause))?;
-    if shown.transpose()?.unwrap_or(false) {
+    let pause = Duration::from_secs_f64(arguments.every);
+    if screen::show(&namespace, &stop, pause)? {
         output::message("the deployment has ended");
     }
     Ok(ExitCode::SUCCESS)

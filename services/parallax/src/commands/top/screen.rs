@@ -1,33 +1,17 @@
 //! The table of `top` on a terminal: updated continuously, scrolled by keys.
 
+use core::fmt::Write as _;
 use core::time::Duration;
 use std::time::Instant;
 
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::live::{self, Live};
-use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyModifiers};
-use ratatui::layout::{Constraint, Layout};
-use ratatui::style::{Style, Stylize as _};
-use ratatui::text::Line;
-use ratatui::widgets::Paragraph;
-use ratatui::{DefaultTerminal, Frame};
-use runtime::Namespace;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use runtime::{ExitKind, Failure, Namespace, OrFail as _, Stop};
 
-/// How often a stop request and the end of the deployment are checked.
+use super::terminal::{Key, Size, Terminal};
+
+/// How often a stop request, the size of the terminal and the end of the deployment are checked.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
-
-/// The action of a key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Key {
-    NextPage,
-    PreviousPage,
-    NextLine,
-    PreviousLine,
-    /// The size of the terminal has changed.
-    Resized,
-    Quit,
-}
 
 /// Shows a deployment until it ends, the user quits, or a stop is requested. Returns whether the deployment has ended.
 ///
@@ -38,12 +22,11 @@ enum Key {
 /// The terminal cannot be used, or the metrics cannot be received.
 pub(super) fn show(namespace: &Namespace, stop: &Stop, pause: Duration) -> Result<bool, Failure> {
     let mut live = Live::open(namespace)?;
-    let mut screen = Screen {
-        terminal: ratatui::try_init().or_fail(ExitKind::Run)?,
-    };
+    let terminal = Terminal::open().or_fail(ExitKind::Run)?;
     let mut first = 0;
     let mut text = live::table(&live.snapshot()?);
     let mut updated_at = Instant::now();
+    let mut on_screen = String::new();
     while !stop.is_requested() {
         if live.is_over() {
             return Ok(true);
@@ -52,136 +35,122 @@ pub(super) fn show(namespace: &Namespace, stop: &Stop, pause: Duration) -> Resul
             text = live::table(&live.snapshot()?);
             updated_at = Instant::now();
         }
-        let mut page_len = 1;
-        let drawn = screen.terminal.draw(|frame| {
-            [first, page_len] = draw(frame, &text, first);
-        });
-        drawn.or_fail(ExitKind::Run)?;
-        if is_gone() {
+        let size = terminal.size();
+        let page = Page::new(&text, first, size);
+        let drawn = page.escaped(size);
+        let mut written = Ok(());
+        if drawn != on_screen {
+            written = terminal.write(drawn.as_bytes());
+            on_screen = drawn;
+        }
+        if terminal.is_gone() {
             stop.request();
             break;
         }
+        written.or_fail(ExitKind::Run)?;
+        first = page.first;
+        let page_len = page.len;
         let left = pause.saturating_sub(updated_at.elapsed());
-        match next_key(left.min(POLL_INTERVAL))? {
-            Some(Key::Quit) => break,
-            Some(Key::NextPage) => first += page_len,
-            Some(Key::PreviousPage) => first = first.saturating_sub(page_len),
-            Some(Key::NextLine) => first += 1,
-            Some(Key::PreviousLine) => first = first.saturating_sub(1),
-            Some(Key::Resized) | None => {}
+        for key in terminal
+            .keys(left.min(POLL_INTERVAL))
+            .or_fail(ExitKind::Run)?
+        {
+            match key {
+                Key::Quit => return Ok(false),
+                Key::NextPage => first += page_len,
+                Key::PreviousPage => first = first.saturating_sub(page_len),
+                Key::NextLine => first += 1,
+                Key::PreviousLine => first = first.saturating_sub(1),
+            }
         }
     }
     Ok(false)
 }
 
-/// The terminal, restored when this is dropped.
+/// The lines that are shown: some of a text, above a line that lists the keys.
 #[derive(Debug)]
-struct Screen {
-    terminal: DefaultTerminal,
+struct Page<'t> {
+    lines: Vec<&'t str>,
+    /// First line that is shown. Near the end it is less than asked for, so that the last page is full.
+    first: usize,
+    /// Number of lines that fit.
+    len: usize,
+    keys: String,
 }
 
-impl Drop for Screen {
-    fn drop(&mut self) {
-        if let Err(error) = ratatui::try_restore() {
-            tracing::debug!(%error, "cannot restore the terminal");
+impl<'t> Page<'t> {
+    fn new(text: &'t str, first: usize, size: Size) -> Self {
+        let n = text.trim_end().lines().count();
+        let len = size.rows.saturating_sub(1).max(1);
+        let first = first.min(n.saturating_sub(len));
+        let end = n.min(first + len);
+        let keys = if n > len {
+            format!(
+                "lines {} to {end} of {n}; space: next page, k: previous page, arrows: one line, q: quit",
+                first + 1
+            )
+        } else {
+            "q: quit".to_owned()
+        };
+        Self {
+            lines: text.trim_end().lines().skip(first).take(len).collect(),
+            first,
+            len,
+            keys,
         }
     }
-}
 
-/// Draws the lines from `first` on, above a line that lists the keys. Returns the first line that is shown, which is less
-/// than `first` near the end so that the last page is full, and the number of lines that fit.
-fn draw(frame: &mut Frame<'_>, text: &str, first: usize) -> [usize; 2] {
-    let [body, foot] =
-        Layout::vertical([Constraint::Min(1), Constraint::Length(1)]).areas(frame.area());
-    let lines: Vec<Line<'_>> = text.trim_end().lines().map(styled).collect();
-    let (n, page_len) = (lines.len(), usize::from(body.height).max(1));
-    let first = first.min(n.saturating_sub(page_len));
-    let end = n.min(first + page_len);
-    let keys = if n > page_len {
-        format!(
-            "lines {} to {end} of {n}; space: next page, k: previous page, arrows: one line, q: quit",
-            first + 1
-        )
-    } else {
-        "q: quit".to_owned()
-    };
-    let shown: Vec<Line<'_>> = lines.into_iter().skip(first).take(page_len).collect();
-    frame.render_widget(Paragraph::new(shown), body);
-    frame.render_widget(Paragraph::new(Line::from(keys).dim()), foot);
-    [first, page_len]
-}
-
-/// Styles a line: titles are bold, dead processes red, silent ones yellow.
-fn styled(line: &str) -> Line<'_> {
-    let has = |word: &str| line.split_whitespace().any(|it| it == word);
-    let style = if line.starts_with("PROCESS") {
-        Style::new().bold()
-    } else if has("dead") {
-        Style::new().red()
-    } else if has("silent") {
-        Style::new().yellow()
-    } else {
-        Style::new()
-    };
-    Line::styled(line, style)
-}
-
-/// Whether the terminal has been closed.
-fn is_gone() -> bool {
-    let out = std::io::stdout();
-    let mut watched = [PollFd::new(&out, PollFlags::empty())];
-    let now = Timespec::default();
-    poll(&mut watched, Some(&now)).is_ok()
-        && watched[0]
-            .revents()
-            .intersects(PollFlags::HUP | PollFlags::ERR)
-}
-
-fn next_key(wait: Duration) -> Result<Option<Key>, Failure> {
-    if !event::poll(wait).or_fail(ExitKind::Run)? {
-        return Ok(None);
+    /// Returns the sequences that draw the page over another one.
+    fn escaped(&self, size: Size) -> String {
+        const DIM: &str = "2";
+        let empty = self.len - self.lines.len();
+        let body = self.lines.iter().copied().chain((0..empty).map(|_| ""));
+        let foot = (size.rows > 1).then_some((self.keys.as_str(), DIM));
+        let rows = body.map(|line| (line, style(line))).chain(foot);
+        let mut drawn = String::from("\x1b[H");
+        for (nth, (line, style)) in rows.enumerate() {
+            let end_of_last = if nth == 0 { "" } else { "\r\n" };
+            let shown = line.chars().filter(|letter| !letter.is_control());
+            let shown: String = shown.take(size.columns).collect();
+            // A write to a text does not fail.
+            let _ok = write!(drawn, "{end_of_last}\x1b[{style}m{shown}\x1b[0m\x1b[K");
+        }
+        drawn
     }
-    Ok(match event::read().or_fail(ExitKind::Run)? {
-        Event::Key(key) if key.is_press() => action_of(key),
-        Event::Resize(..) => Some(Key::Resized),
-        _ => None,
-    })
 }
 
-fn action_of(key: KeyEvent) -> Option<Key> {
-    let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
-    Some(match key.code {
-        KeyCode::Char('c') if is_control => Key::Quit,
-        KeyCode::Char('q') | KeyCode::Esc => Key::Quit,
-        KeyCode::Char(' ' | 'j') | KeyCode::PageDown => Key::NextPage,
-        KeyCode::Char('k') | KeyCode::PageUp => Key::PreviousPage,
-        KeyCode::Down => Key::NextLine,
-        KeyCode::Up => Key::PreviousLine,
-        _ => return None,
-    })
+/// Returns the style of a line (ECMA-48, 8.3.117): titles are bold, dead processes red, silent ones yellow.
+fn style(line: &str) -> &'static str {
+    let has = |word: &str| line.split_whitespace().any(|found| found == word);
+    if line.starts_with("PROCESS") {
+        "1"
+    } else if has("dead") {
+        "31"
+    } else if has("silent") {
+        "33"
+    } else {
+        "0"
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use ratatui::Terminal;
-    use ratatui::backend::TestBackend;
-
     use super::*;
 
-    /// The lines of a terminal after drawing, and what [`draw`] returns.
-    fn drawn(text: &str, first: usize, [columns, rows]: [u16; 2]) -> (Vec<String>, [usize; 2]) {
-        let mut terminal = Terminal::new(TestBackend::new(columns, rows)).unwrap();
-        let mut shown = [0, 0];
-        terminal
-            .draw(|frame| shown = draw(frame, text, first))
-            .unwrap();
-        let buffer = terminal.backend().buffer();
-        let cells = buffer.content().chunks(usize::from(columns));
-        let lines = cells.map(|row| {
-            let row: String = row.iter().map(ratatui::buffer::Cell::symbol).collect();
-            row.trim_end().to_owned()
+    /// Draws on a terminal and returns its rows, and the page.
+    fn drawn(text: &str, first: usize, [columns, rows]: [usize; 2]) -> (Vec<String>, [usize; 2]) {
+        let size = Size { columns, rows };
+        let page = Page::new(text, first, size);
+        let escaped = page.escaped(size);
+        let lines = escaped.strip_prefix("\x1b[H").unwrap().split("\r\n");
+        let lines = lines.map(|line| {
+            let (_, line) = line.split_once('m').unwrap();
+            line.strip_suffix("\x1b[0m\x1b[K").unwrap().to_owned()
         });
-        (lines.collect(), shown)
+        let lines: Vec<String> = lines.collect();
+        assert_eq!(lines.len(), rows);
+        assert!(lines.iter().all(|line| line.chars().count() <= columns));
+        (lines, [page.first, page.len])
     }
 
     #[test]
@@ -216,26 +185,15 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_is_dead_or_silent_is_marked() {
-        assert_eq!(
-            styled("pose-1  b  dead  -"),
-            Line::from("pose-1  b  dead  -").red()
-        );
-        assert_eq!(
-            styled("pose-1  b  silent"),
-            Line::from("pose-1  b  silent").yellow()
-        );
-        assert_eq!(styled("pose-1  b  runs"), Line::from("pose-1  b  runs"));
+    fn names_do_not_command_the_terminal() {
+        let (lines, _) = drawn("a\x1b[2Jb\x07\n", 0, [20, 2]);
+        assert_eq!(lines[0], "a[2Jb");
     }
 
     #[test]
-    fn keys_have_the_actions_in_the_help() {
-        let plain = |code| action_of(KeyEvent::new(code, KeyModifiers::NONE));
-        assert_eq!(plain(KeyCode::Char(' ')), Some(Key::NextPage));
-        assert_eq!(plain(KeyCode::Char('k')), Some(Key::PreviousPage));
-        assert_eq!(plain(KeyCode::Char('q')), Some(Key::Quit));
-        assert_eq!(plain(KeyCode::Char('c')), None);
-        let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
-        assert_eq!(action_of(ctrl_c), Some(Key::Quit));
+    fn a_process_that_is_dead_or_silent_is_marked() {
+        assert_eq!(style("pose-1  b  dead  -"), "31");
+        assert_eq!(style("pose-1  b  silent"), "33");
+        assert_eq!(style("pose-1  b  runs"), "0");
     }
 }

@@ -1,0 +1,238 @@
+//! A terminal in raw mode: keys arrive one by one, a screen of its own is drawn, and both end when this is dropped.
+
+use core::time::Duration;
+use std::fs::File;
+use std::io::{self, IsTerminal as _, Write as _};
+use std::os::fd::{AsFd as _, BorrowedFd};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+use rustix::termios::{OptionalActions, Termios, tcgetattr, tcgetwinsize, tcsetattr};
+
+/// Other screen, no cursor, no wrapping of long lines.
+const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[?7l";
+/// The same back.
+const LEAVE: &[u8] = b"\x1b[?7h\x1b[?25h\x1b[?1049l";
+/// How long the rest of a sequence may take to arrive: slow connections cut it behind the escape.
+const REST_OF_SEQUENCE: Duration = Duration::from_millis(50);
+
+/// A key that does something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Key {
+    NextPage,
+    PreviousPage,
+    NextLine,
+    PreviousLine,
+    Quit,
+}
+
+/// Columns and rows of a terminal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Size {
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+}
+
+/// Standard output in raw mode, and the keys that are pressed.
+#[derive(Debug)]
+pub(super) struct Terminal {
+    /// Opened where standard input is no terminal.
+    keyboard: Option<File>,
+    /// Settings before.
+    before: Termios,
+}
+
+impl Terminal {
+    /// Takes the terminal.
+    pub(super) fn open() -> io::Result<Self> {
+        let keyboard = if io::stdin().is_terminal() {
+            None
+        } else {
+            Some(File::open("/dev/tty")?)
+        };
+        let mut raw = tcgetattr(input(keyboard.as_ref()))?;
+        let before = raw.clone();
+        raw.make_raw();
+        tcsetattr(input(keyboard.as_ref()), OptionalActions::Now, &raw)?;
+        let terminal = Self { keyboard, before };
+        terminal.write(ENTER)?;
+        Ok(terminal)
+    }
+
+    /// Returns the size, or that of a usual terminal where it is unknown.
+    pub(super) fn size(&self) -> Size {
+        let size = tcgetwinsize(io::stdout()).ok();
+        let [columns, rows] =
+            size.map_or([0; 2], |size| [size.ws_col, size.ws_row].map(usize::from));
+        let or = |number: usize, usual| if number == 0 { usual } else { number };
+        Size {
+            columns: or(columns, 80),
+            rows: or(rows, 24),
+        }
+    }
+
+    /// Writes text and escape sequences.
+    pub(super) fn write(&self, bytes: &[u8]) -> io::Result<()> {
+        let mut out = io::stdout().lock();
+        out.write_all(bytes)?;
+        out.flush()
+    }
+
+    /// Returns whether the terminal has been closed.
+    pub(super) fn is_gone(&self) -> bool {
+        let out = io::stdout();
+        [out.as_fd(), input(self.keyboard.as_ref())]
+            .into_iter()
+            .any(|side| {
+                events(side, PollFlags::empty(), Duration::ZERO)
+                    .is_ok_and(|found| found.intersects(PollFlags::HUP | PollFlags::ERR))
+            })
+    }
+
+    /// Waits for keys and returns them.
+    pub(super) fn keys(&self, wait: Duration) -> io::Result<Vec<Key>> {
+        let mut bytes = self.read(wait)?;
+        if bytes.last() == Some(&ESCAPE) {
+            bytes.extend(self.read(REST_OF_SEQUENCE)?);
+        }
+        Ok(keys_in(&bytes))
+    }
+
+    /// Waits for bytes and returns those that are there; none after a signal.
+    fn read(&self, wait: Duration) -> io::Result<Vec<u8>> {
+        let input = input(self.keyboard.as_ref());
+        if !events(input, PollFlags::IN, wait)?.contains(PollFlags::IN) {
+            return Ok(Vec::new());
+        }
+        let mut bytes = [0; 64];
+        match rustix::io::read(input, &mut bytes) {
+            Ok(n) => Ok(bytes[..n].to_vec()),
+            Err(Errno::INTR | Errno::AGAIN) => Ok(Vec::new()),
+            Err(error) => Err(error.into()),
+        }
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        let written = self.write(LEAVE);
+        let input = input(self.keyboard.as_ref());
+        let set = tcsetattr(input, OptionalActions::Now, &self.before);
+        if let Err(error) = written.and(set.map_err(io::Error::from)) {
+            tracing::debug!(%error, "cannot restore the terminal");
+        }
+    }
+}
+
+/// Returns where keys are read.
+fn input(keyboard: Option<&File>) -> BorrowedFd<'_> {
+    match keyboard {
+        Some(file) => file.as_fd(),
+        None => rustix::stdio::stdin(),
+    }
+}
+
+/// Waits for events of a file and returns them; none after a signal.
+fn events(file: BorrowedFd<'_>, flags: PollFlags, wait: Duration) -> io::Result<PollFlags> {
+    let mut watched = [PollFd::new(&file, flags)];
+    let wait = Timespec::try_from(wait).map_err(io::Error::other)?;
+    match poll(&mut watched, Some(&wait)) {
+        Ok(_) => Ok(watched[0].revents()),
+        Err(Errno::INTR) => Ok(PollFlags::empty()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+const ESCAPE: u8 = 0x1b;
+const CONTROL_C: u8 = 0x03;
+
+/// Returns the keys whose bytes these are; other bytes and sequences are passed over (ECMA-48, 5.4).
+fn keys_in(mut bytes: &[u8]) -> Vec<Key> {
+    let mut keys = Vec::new();
+    while let Some((&first, rest)) = bytes.split_first() {
+        bytes = rest;
+        let key = match first {
+            b'q' | CONTROL_C => Some(Key::Quit),
+            b' ' | b'j' => Some(Key::NextPage),
+            b'k' => Some(Key::PreviousPage),
+            ESCAPE => match rest {
+                [b'[' | b'O', rest @ ..] => {
+                    let end = rest.iter().position(|byte| (0x40..=0x7e).contains(byte));
+                    let n_bytes = end.map_or(rest.len(), |end| end + 1);
+                    bytes = &rest[n_bytes..];
+                    in_sequence(&rest[..n_bytes])
+                }
+                // Alt and a key.
+                [_, rest @ ..] => {
+                    bytes = rest;
+                    None
+                }
+                [] => Some(Key::Quit),
+            },
+            _ => None,
+        };
+        keys.extend(key);
+    }
+    keys
+}
+
+/// Returns the key of a sequence, without its introducer.
+fn in_sequence(sequence: &[u8]) -> Option<Key> {
+    match sequence {
+        b"A" => Some(Key::PreviousLine),
+        b"B" => Some(Key::NextLine),
+        b"5~" => Some(Key::PreviousPage),
+        b"6~" => Some(Key::NextPage),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_have_the_actions_in_the_help() {
+        let rows: [(&[u8], &[Key]); 12] = [
+            (b" ", &[Key::NextPage]),
+            (b"j", &[Key::NextPage]),
+            (b"\x1b[6~", &[Key::NextPage]),
+            (b"k", &[Key::PreviousPage]),
+            (b"\x1b[5~", &[Key::PreviousPage]),
+            (b"\x1b[B", &[Key::NextLine]),
+            (b"\x1bOA", &[Key::PreviousLine]),
+            (b"q", &[Key::Quit]),
+            (b"\x1b", &[Key::Quit]),
+            (b"\x03", &[Key::Quit]),
+            (b"c", &[]),
+            (
+                b"jk\x1b[Aq",
+                &[
+                    Key::NextPage,
+                    Key::PreviousPage,
+                    Key::PreviousLine,
+                    Key::Quit,
+                ],
+            ),
+        ];
+        for (bytes, keys) in rows {
+            assert_eq!(keys_in(bytes), keys, "{bytes:?}");
+        }
+    }
+
+    #[test]
+    fn keys_without_an_action_are_passed_over_completely() {
+        // Home, F5, control and right, Alt and q, a, umlaut, a sequence that is cut off.
+        for bytes in [
+            &b"\x1b[H"[..],
+            b"\x1b[15~",
+            b"\x1b[1;5C",
+            b"\x1bq",
+            b"a",
+            b"\xc3\xa4",
+            b"\x1b[1;",
+        ] {
+            assert_eq!(keys_in(bytes), [], "{bytes:?}");
+        }
+    }
+}
