@@ -1,15 +1,11 @@
 //! The top level of an `OpenCV` storage: names and what is stored under them.
 
-use std::{collections::BTreeMap, fmt};
-
-use serde::{
-    Deserialize, Deserializer,
-    de::{MapAccess, SeqAccess, Visitor},
-};
+use std::collections::BTreeMap;
 
 use super::ParseError;
 
 mod xml;
+mod yaml;
 
 /// What is stored under one name.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,67 +82,6 @@ fn flatten(key: &str, list: &[Entry], into: &mut Vec<f64>) -> Result<(), ParseEr
     Ok(())
 }
 
-impl<'de> Deserialize<'de> for Entry {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        // Not a derived untagged enum: that would see the tag `!!opencv-matrix` as a map.
-        deserializer.deserialize_any(EntryVisitor)
-    }
-}
-
-struct EntryVisitor;
-
-impl<'de> Visitor<'de> for EntryVisitor {
-    type Value = Entry;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number, a text, a list or a table")
-    }
-
-    fn visit_bool<E>(self, value: bool) -> Result<Entry, E> {
-        Ok(Entry::Number(f64::from(u8::from(value))))
-    }
-
-    fn visit_i64<E>(self, value: i64) -> Result<Entry, E> {
-        Ok(Entry::Number(value as f64))
-    }
-
-    fn visit_u64<E>(self, value: u64) -> Result<Entry, E> {
-        Ok(Entry::Number(value as f64))
-    }
-
-    fn visit_f64<E>(self, value: f64) -> Result<Entry, E> {
-        Ok(Entry::Number(value))
-    }
-
-    fn visit_str<E>(self, value: &str) -> Result<Entry, E> {
-        Ok(Entry::Text(value.to_owned()))
-    }
-
-    fn visit_unit<E>(self) -> Result<Entry, E> {
-        Ok(Entry::Nothing)
-    }
-
-    fn visit_none<E>(self) -> Result<Entry, E> {
-        Ok(Entry::Nothing)
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut access: A) -> Result<Entry, A::Error> {
-        let mut list = Vec::new();
-        while let Some(entry) = access.next_element()? {
-            list.push(entry);
-        }
-        Ok(Entry::List(list))
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Entry, A::Error> {
-        let mut map = BTreeMap::new();
-        while let Some((key, entry)) = access.next_entry()? {
-            map.insert(key, entry);
-        }
-        Ok(Entry::Map(map))
-    }
-}
-
 /// A storage.
 #[derive(Debug, Default)]
 pub(super) struct Storage(BTreeMap<String, Entry>);
@@ -158,11 +93,12 @@ impl Storage {
         if text.trim_start().starts_with('<') {
             return xml::parse(text).map(Self);
         }
-        let syntax = |error| ParseError::Syntax {
-            format: "YAML",
-            source: Box::new(error),
-        };
-        serde_saphyr::from_str(text).map(Self).map_err(syntax)
+        yaml::parse(text)
+            .map(Self)
+            .map_err(|error| ParseError::Syntax {
+                format: "YAML",
+                source: Box::new(error),
+            })
     }
 
     /// Adds the entries of another storage; an entry that exists already is kept.
