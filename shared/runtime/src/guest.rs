@@ -4,21 +4,22 @@
 mod tests;
 
 use core::fmt::Debug;
+use core::marker::PhantomData;
 use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
 use iceoryx2::port::ReceiveError as IoxReceiveError;
-use iceoryx2::port::subscriber::{Subscriber as IoxSubscriber, SubscriberCreateError};
+use iceoryx2::port::subscriber::SubscriberCreateError;
 use iceoryx2::prelude::{
     CallbackProgression, Node, NodeBuilder, NodeName, Service as _, ServiceName,
     SignalHandlingMode, ipc_threadsafe,
 };
-use iceoryx2::sample::Sample as IoxSample;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use rustix::fs::{FlockOperation, flock};
 
+use crate::erased::{Reader, Received, Types};
 use crate::log::adopt_transport_log;
 use crate::observer::{running_supervisor, unless_over};
 use crate::payload::{Header, Message};
@@ -213,11 +214,17 @@ impl Guest {
     /// [`GuestError::Transport`]; [`GuestError::NotRunning`] if the deployment has ended.
     pub fn port<E: Message, H: Header>(&self, topic: &str) -> Result<GuestPort<E, H>, GuestError> {
         let run = (&self.namespace, self.supervisor);
-        self.try_port(topic)
-            .map_err(|error| unless_over(run, error, || not_running(self.namespace.name())))
+        let reader = self
+            .reader(topic, &Types::new::<E, H>())
+            .map_err(|error| unless_over(run, error, || not_running(self.namespace.name())))?;
+        Ok(GuestPort {
+            topic: Arc::from(topic),
+            reader,
+            types: PhantomData,
+        })
     }
 
-    fn try_port<E: Message, H: Header>(&self, topic: &str) -> Result<GuestPort<E, H>, GuestError> {
+    fn reader(&self, topic: &str, types: &Types) -> Result<Reader<Transport>, GuestError> {
         let deployment = || self.namespace.name().to_owned();
         let failed = |what: String| GuestError::Transport {
             name: deployment(),
@@ -225,13 +232,7 @@ impl Guest {
         };
         let name = ServiceName::new(topic)
             .map_err(|error| failed(format!("the name of topic {topic:?}: {error:?}")))?;
-        let attempt = || {
-            self.node
-                .service_builder(&name)
-                .publish_subscribe::<[E]>()
-                .user_header::<H>()
-                .open()
-        };
+        let attempt = || types.builder(&self.node, &name).open();
         let in_flux = |error: &PublishSubscribeOpenError| {
             matches!(
                 error,
@@ -244,7 +245,7 @@ impl Guest {
             PublishSubscribeOpenError::IncompatibleTypes => GuestError::WrongType {
                 name: deployment(),
                 topic: topic.to_owned(),
-                expected: core::any::type_name::<(H, [E; 0])>(),
+                expected: types.name(),
             },
             error => failed(format!("topic {topic:?}: {error:?}")),
         })?;
@@ -257,10 +258,7 @@ impl Guest {
             },
             error => failed(format!("topic {topic:?}: {error:?}")),
         })?;
-        Ok(GuestPort {
-            topic: Arc::from(topic),
-            subscriber,
-        })
+        Ok(Reader::new(subscriber, types))
     }
 
     /// Why a topic is not there: the deployment has another version of it, or has not made it yet.
@@ -308,7 +306,8 @@ impl Guest {
 #[derive(Debug)]
 pub struct GuestPort<E: Message, H: Header> {
     topic: Arc<str>,
-    subscriber: IoxSubscriber<Transport, [E], H>,
+    reader: Reader<Transport>,
+    types: PhantomData<(E, H)>,
 }
 
 impl<E: Message, H: Header> GuestPort<E, H> {
@@ -319,8 +318,11 @@ impl<E: Message, H: Header> GuestPort<E, H> {
     /// [`ReceiveError::TooManyHeld`], [`ReceiveError::Transport`].
     pub fn receive(&self) -> Result<Option<Seen<E, H>>, ReceiveError> {
         let topic = || Arc::clone(&self.topic);
-        match self.subscriber.receive() {
-            Ok(sample) => Ok(sample.map(|sample| Seen { sample })),
+        match self.reader.receive() {
+            Ok(received) => Ok(received.map(|received| Seen {
+                received,
+                types: PhantomData,
+            })),
             Err(IoxReceiveError::ExceedsMaxBorrows) => {
                 Err(ReceiveError::TooManyHeld { topic: topic() })
             }
@@ -335,18 +337,19 @@ impl<E: Message, H: Header> GuestPort<E, H> {
 /// A message in shared memory, which its sender will not overwrite while this is held.
 #[derive(Debug)]
 pub struct Seen<E: Message, H: Header> {
-    sample: IoxSample<Transport, [E], H>,
+    received: Received<Transport>,
+    types: PhantomData<(E, H)>,
 }
 
 impl<E: Message, H: Header> Seen<E, H> {
     /// The array, or one message.
     pub fn payload(&self) -> &[E] {
-        self.sample.payload()
+        self.received.payload::<E, H>()
     }
 
     /// The header. Check it against the array before use: it comes from another process.
     pub fn header(&self) -> &H {
-        self.sample.user_header()
+        self.received.header::<E, H>()
     }
 }
 

@@ -11,6 +11,7 @@ mod bus;
 mod bus_error;
 mod clean;
 mod copies;
+mod erased;
 mod lock;
 mod losses;
 mod mapped;

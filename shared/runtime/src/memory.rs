@@ -1,24 +1,15 @@
 //! Allocating shared memory before it is written to.
-#![expect(
-    unsafe_code,
-    reason = "madvise has no safe binding, and recycled shared memory no safe view"
-)]
+#![expect(unsafe_code, reason = "madvise has no safe binding")]
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-use core::mem::MaybeUninit;
-
-use iceoryx2::prelude::ipc;
-use iceoryx2::sample_mut::SampleMut;
-use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 use rustix::io::Errno;
 use rustix::mm::{Advice, madvise};
 use rustix::process::{Resource, getrlimit};
 
 use crate::mapped::Mapping;
-use crate::payload::{Element, Header};
 use crate::reserve::{self, Refused};
 
 /// The file system of shared memory.
@@ -148,15 +139,6 @@ pub(crate) fn refused(prefix: &str) -> Option<MemoryError> {
             limit_bytes: getrlimit(Resource::Fsize).current.unwrap_or(u64::MAX),
         },
     })
-}
-
-/// Treats a loaned array as initialised, instead of writing megabytes of zeros to it.
-pub(crate) fn assume_written<E: Element, H: Header>(
-    sample: SampleMutUninit<ipc::Service, [MaybeUninit<E>], H>,
-) -> SampleMut<ipc::Service, [E], H> {
-    // SAFETY: the bytes are those of a mapped file, which the kernel zeroed and senders wrote since,
-    // so they are initialised; and every bit pattern is a value of `E` (its trait is sealed).
-    unsafe { sample.assume_init() }
 }
 
 impl Mapping<'_> {

@@ -4,8 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use iceoryx2::prelude::{CallbackProgression, PortFactory as _};
 
-use crate::payload::{Header, Message};
-use crate::service::Messages;
+use crate::erased::Messages;
 use crate::subscriber::onlooker;
 
 /// The onlookers of a topic, shared with the handler that decides what happens when a receiver has no room.
@@ -16,7 +15,7 @@ pub(crate) struct Onlookers {
 
 impl Onlookers {
     /// Lists them again. One that comes after this has an empty queue, so that the next message fits.
-    pub(crate) fn update<E: Message, H: Header>(&self, messages: &Messages<E, H>) {
+    pub(crate) fn update(&self, messages: &Messages) {
         let name = onlooker();
         let mut ids = self.ids.lock().unwrap_or_else(PoisonError::into_inner);
         ids.clear();
@@ -36,7 +35,7 @@ impl Onlookers {
 }
 
 /// Number of subscribers that are no onlookers.
-pub(crate) fn n_waited_for<E: Message, H: Header>(messages: &Messages<E, H>) -> usize {
+pub(crate) fn n_waited_for(messages: &Messages) -> usize {
     let name = onlooker();
     let mut n = 0;
     messages.dynamic_config().list_subscribers(|details| {

@@ -1,5 +1,6 @@
 //! The sending ends of a topic.
 
+use core::marker::PhantomData;
 use core::time::Duration;
 use std::cell::Cell;
 use std::sync::Arc;
@@ -7,22 +8,21 @@ use std::time::Instant;
 
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
-use iceoryx2::port::publisher::Publisher as IoxPublisher;
 use iceoryx2::port::update_connections::{ConnectionFailure, UpdateConnections as _};
 use iceoryx2::port::{BackpressureAction, LoanError as IoxLoanError, SendError as IoxSendError};
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, ipc};
-use iceoryx2::sample_mut::SampleMut;
 
 use crate::bus::Bus;
 use crate::delivery::Delivery;
+use crate::erased::{Chunk, Messages, Types, Writer};
 use crate::losses::{Losses, Patience};
 use crate::memory;
 use crate::onlookers::{self, Onlookers};
 use crate::payload::{Element, Header, Message};
 use crate::room::{connections, note_room, short_of_room};
-use crate::service::{self, Messages, PortError};
-use crate::{Copies, Progress};
+use crate::service::{self, PortError};
 use failure::{ExitKind, Fault, Stop};
+use crate::{Copies, Progress};
 
 /// Longest pause between two checks of a topic's subscribers.
 const CONNECT_PAUSE: Duration = Duration::from_millis(20);
@@ -112,7 +112,8 @@ impl SendError {
 /// Sends messages that are copied into shared memory.
 #[derive(Debug)]
 pub struct Publisher<T: Message> {
-    port: Port<T, ()>,
+    port: Port,
+    message: PhantomData<T>,
 }
 
 impl<T: Message> Publisher<T> {
@@ -124,14 +125,10 @@ impl<T: Message> Publisher<T> {
     ///
     /// [`SendError`].
     pub fn send(&self, message: &T) -> Result<usize, SendError> {
-        let sample = self
-            .port
-            .publisher
-            .loan_slice_uninit(1)
-            .map_err(|source| self.port.loan_failed(1, source))?;
+        let mut chunk = self.port.chunk(1)?;
         self.port.copies.add(size_of::<T>());
-        self.port
-            .deliver(sample.write_from_slice(core::slice::from_ref(message)))
+        chunk.write(message);
+        self.port.deliver(chunk)
     }
 
     /// Processes that are subscribed.
@@ -148,7 +145,8 @@ impl<T: Message> Publisher<T> {
 /// Sends arrays in place, without copying.
 #[derive(Debug)]
 pub struct SlicePublisher<E: Element, H: Header> {
-    port: Port<E, H>,
+    port: Port,
+    types: PhantomData<(E, H)>,
 }
 
 impl<E: Element, H: Header> SlicePublisher<E, H> {
@@ -162,21 +160,13 @@ impl<E: Element, H: Header> SlicePublisher<E, H> {
     /// [`SendError::TooLong`]; [`SendError::Loan`] if an earlier loan is still held;
     /// [`SendError::Stopped`], [`SendError::Stuck`] if no memory was released.
     pub fn loan(&self, len: usize) -> Result<Loan<'_, E, H>, SendError> {
-        let port = &self.port;
-        let begin = Instant::now();
-        loop {
-            let source = match port.publisher.loan_slice_uninit(len) {
-                Ok(sample) => {
-                    let sample = memory::assume_written(sample);
-                    return Ok(Loan { sample, port });
-                }
-                Err(source) => source,
-            };
-            if source != IoxLoanError::OutOfMemory || port.delivery != Delivery::Lossless {
-                return Err(port.loan_failed(len, source));
-            }
-            port.wait_for_a_chunk(begin)?;
-        }
+        let mut chunk = self.port.chunk_in_time(len)?;
+        chunk.write_header::<E, H>();
+        Ok(Loan {
+            chunk,
+            port: &self.port,
+            types: PhantomData,
+        })
     }
 
     /// Longest array, elements.
@@ -201,19 +191,20 @@ impl<E: Element, H: Header> SlicePublisher<E, H> {
 /// A loan: an array in shared memory that has not been sent yet. Dropping it releases the memory.
 #[derive(Debug)]
 pub struct Loan<'a, E: Element, H: Header> {
-    sample: SampleMut<ipc::Service, [E], H>,
-    port: &'a Port<E, H>,
+    chunk: Chunk,
+    port: &'a Port,
+    types: PhantomData<(E, H)>,
 }
 
 impl<E: Element, H: Header> Loan<'_, E, H> {
     /// The array. It begins on a multiple of 64 bytes.
     pub fn payload_mut(&mut self) -> &mut [E] {
-        self.sample.payload_mut()
+        self.chunk.payload_mut::<E, H>()
     }
 
     /// The header; initially its default.
     pub fn header_mut(&mut self) -> &mut H {
-        self.sample.user_header_mut()
+        self.chunk.header_mut::<E, H>()
     }
 
     /// Sends the array and notifies the receivers. With [`Delivery::Lossless`] it waits for room.
@@ -224,23 +215,23 @@ impl<E: Element, H: Header> Loan<'_, E, H> {
     ///
     /// [`SendError::Stopped`], [`SendError::Stuck`], [`SendError::Transport`].
     pub fn send(self) -> Result<usize, SendError> {
-        self.port.deliver(self.sample)
+        self.port.deliver(self.chunk)
     }
 }
 
 #[derive(Debug)]
-struct Port<E: Message, H: Header> {
+struct Port {
     topic: Arc<str>,
     max_len: usize,
     delivery: Delivery,
-    publisher: IoxPublisher<ipc::Service, [E], H>,
+    writer: Writer,
     notifier: Option<Notifier<ipc::Service>>,
     /// The subscribers that are not waited for.
     onlookers: Onlookers,
     /// Receives the acknowledgements of subscribers.
     ready: Option<Listener<ipc::Service>>,
     n_ready: Cell<usize>,
-    messages: Messages<E, H>,
+    messages: Messages,
     stop: Stop,
     progress: Progress,
     copies: Copies,
@@ -257,7 +248,8 @@ impl Bus {
     /// [`PortError`].
     pub fn publisher<T: Message>(&self, topic: &str) -> Result<Publisher<T>, PortError> {
         Ok(Publisher {
-            port: Port::open(self, topic)?,
+            port: Port::open(self, topic, &Types::new::<T, ()>())?,
+            message: PhantomData,
         })
     }
 
@@ -271,14 +263,15 @@ impl Bus {
         topic: &str,
     ) -> Result<SlicePublisher<E, H>, PortError> {
         Ok(SlicePublisher {
-            port: Port::open(self, topic)?,
+            port: Port::open(self, topic, &Types::new::<E, H>())?,
+            types: PhantomData,
         })
     }
 }
 
-impl<E: Message, H: Header> Port<E, H> {
-    fn open(bus: &Bus, topic: &str) -> Result<Self, PortError> {
-        let messages = service::open_messages::<E, H>(bus.node(), topic)?;
+impl Port {
+    fn open(bus: &Bus, topic: &str, types: &Types) -> Result<Self, PortError> {
+        let messages = service::open_messages(bus.node(), topic, types)?;
         let extras = service::extras(&messages);
         // The listener is created first: subscribers that see the publisher must find it.
         let ready = match extras.delivery {
@@ -322,7 +315,7 @@ impl<E: Message, H: Header> Port<E, H> {
             topic: Arc::from(topic),
             max_len: extras.max_len,
             delivery: extras.delivery,
-            publisher,
+            writer: Writer::new(publisher, types),
             notifier,
             onlookers,
             ready,
@@ -336,6 +329,24 @@ impl<E: Message, H: Header> Port<E, H> {
         })
     }
 
+    fn chunk(&self, len: usize) -> Result<Chunk, SendError> {
+        let chunk = self.writer.loan(len);
+        chunk.map_err(|source| self.loan_failed(len, source))
+    }
+
+    /// The same; with lossless delivery it waits for a receiver to release one.
+    fn chunk_in_time(&self, len: usize) -> Result<Chunk, SendError> {
+        let begin = Instant::now();
+        loop {
+            match self.writer.loan(len) {
+                Err(IoxLoanError::OutOfMemory) if self.delivery == Delivery::Lossless => {
+                    self.wait_for_a_chunk(begin)?;
+                }
+                chunk => return chunk.map_err(|source| self.loan_failed(len, source)),
+            }
+        }
+    }
+
     /// Pauses, or fails if the wait has been too long.
     fn wait_for_a_chunk(&self, begin: Instant) -> Result<(), SendError> {
         let (topic, waited) = (Arc::clone(&self.topic), begin.elapsed());
@@ -347,7 +358,7 @@ impl<E: Message, H: Header> Port<E, H> {
         }
         self.progress.tick();
         // Chunks held by a dead receiver are released when the connections are updated.
-        let updated = self.publisher.update_connections();
+        let updated = self.writer.port().update_connections();
         let updated = updated.inspect_err(note_room);
         updated.map_err(|source| SendError::Connection { topic, source })?;
         std::thread::sleep(CHUNK_PAUSE);
@@ -366,12 +377,12 @@ impl<E: Message, H: Header> Port<E, H> {
         SendError::Loan { topic, source }
     }
 
-    fn deliver(&self, sample: SampleMut<ipc::Service, [E], H>) -> Result<usize, SendError> {
+    fn deliver(&self, chunk: Chunk) -> Result<usize, SendError> {
         if self.delivery == Delivery::Lossless {
             self.onlookers.update(&self.messages);
         }
         let begin = Instant::now();
-        let sent = sample.send();
+        let sent = chunk.send();
         if let Some(notifier) = &self.notifier
             && let Err(error) = notifier.notify()
         {

@@ -16,11 +16,10 @@ use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
-use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use crate::delivery::Delivery;
+use crate::erased::{Messages, Types};
 use crate::memory::MemoryError;
-use crate::payload::{Header, Message};
 use crate::room::{ROOM, note_room, short_of_room};
 use failure::Fault;
 
@@ -39,8 +38,6 @@ const MAPPED: &str = "parallax.mapped";
 /// Attribute of a service: 1 if senders wake receivers.
 const WAKES: &str = "parallax.wakes";
 
-/// The services of a topic in one process.
-pub(crate) type Messages<E, H> = PortFactory<ipc::Service, [E], H>;
 /// The wake-up of a topic in one process.
 pub(crate) type WakeUp = EventFactory<ipc::Service>;
 
@@ -157,17 +154,13 @@ pub(crate) fn ready_name(topic: &str) -> String {
     format!("{topic}/ready")
 }
 
-pub(crate) fn open_messages<E: Message, H: Header>(
+pub(crate) fn open_messages(
     node: &Node<ipc::Service>,
     topic: &str,
-) -> Result<Messages<E, H>, PortError> {
+    types: &Types,
+) -> Result<Messages, PortError> {
     let name = service_name(topic)?;
-    let attempt = || {
-        node.service_builder(&name)
-            .publish_subscribe::<[E]>()
-            .user_header::<H>()
-            .open()
-    };
+    let attempt = || types.builder(node, &name).open();
     let in_flux = |error: &PublishSubscribeOpenError| {
         use PublishSubscribeOpenError as E;
         matches!(
@@ -181,7 +174,7 @@ pub(crate) fn open_messages<E: Message, H: Header>(
         },
         PublishSubscribeOpenError::IncompatibleTypes => PortError::WrongType {
             topic: topic.to_owned(),
-            expected: core::any::type_name::<(H, [E; 0])>(),
+            expected: types.name(),
         },
         source => PortError::Open {
             topic: topic.to_owned(),
@@ -246,7 +239,7 @@ impl Extras {
     }
 }
 
-pub(crate) fn extras<E: Message, H: Header>(messages: &Messages<E, H>) -> Extras {
+pub(crate) fn extras(messages: &Messages) -> Extras {
     let set = messages.attributes();
     Extras {
         max_len: attribute(set, MAX_LEN).unwrap_or(1),

@@ -1,24 +1,24 @@
 //! The receiving ends of a topic.
 
 use core::fmt::Debug;
+use core::marker::PhantomData;
 use std::cell::RefCell;
 use std::sync::Arc;
 
 use iceoryx2::port::ReceiveError as IoxReceiveError;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::port_name::PortName;
-use iceoryx2::port::subscriber::Subscriber as IoxSubscriber;
 use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::prelude::{CallbackProgression, PortFactory as _, ipc};
-use iceoryx2::sample::Sample as IoxSample;
 
 use crate::bus::Bus;
 use crate::delivery::Delivery;
+use crate::erased::{Messages, Reader, Received, Types};
 use crate::payload::{Element, Header, Message};
 use crate::room::{connections, note_room, short_of_room};
-use crate::service::{self, Messages, PortError};
-use crate::{Copies, Waiter};
+use crate::service::{self, PortError};
 use failure::Fault;
+use crate::{Copies, Waiter};
 
 /// A message could not be received.
 #[derive(Debug, thiserror::Error)]
@@ -60,7 +60,8 @@ impl Fault for ReceiveError {
 /// Receives messages as copies.
 #[derive(Debug)]
 pub struct Subscriber<T: Message> {
-    port: Port<T, ()>,
+    port: Port,
+    message: PhantomData<T>,
 }
 
 impl<T: Message> Subscriber<T> {
@@ -70,8 +71,8 @@ impl<T: Message> Subscriber<T> {
     ///
     /// [`ReceiveError`].
     pub fn receive(&self) -> Result<Option<T>, ReceiveError> {
-        while let Some(sample) = self.port.receive()? {
-            if let Some(message) = sample.payload().first() {
+        while let Some(received) = self.port.receive()? {
+            if let Some(message) = received.payload::<T, ()>().first() {
                 self.port.copies.add(size_of::<T>());
                 return Ok(Some(*message));
             }
@@ -107,7 +108,8 @@ impl<T: Message> Subscriber<T> {
 /// Receives arrays in place, without copying.
 #[derive(Debug)]
 pub struct SliceSubscriber<E: Element, H: Header> {
-    port: Port<E, H>,
+    port: Port,
+    types: PhantomData<(E, H)>,
 }
 
 impl<E: Element, H: Header> SliceSubscriber<E, H> {
@@ -117,7 +119,11 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
     ///
     /// [`ReceiveError`].
     pub fn receive(&self) -> Result<Option<Sample<E, H>>, ReceiveError> {
-        Ok(self.port.receive()?.map(|sample| Sample { sample }))
+        let received = self.port.receive()?;
+        Ok(received.map(|received| Sample {
+            received,
+            types: PhantomData,
+        }))
     }
 
     /// Takes all waiting arrays and returns the newest.
@@ -155,18 +161,19 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
 /// An array in shared memory, which its sender will not overwrite while this is held.
 #[derive(Debug)]
 pub struct Sample<E: Element, H: Header> {
-    sample: IoxSample<ipc::Service, [E], H>,
+    received: Received,
+    types: PhantomData<(E, H)>,
 }
 
 impl<E: Element, H: Header> Sample<E, H> {
     /// The array. It begins on a multiple of 64 bytes.
     pub fn payload(&self) -> &[E] {
-        self.sample.payload()
+        self.received.payload::<E, H>()
     }
 
     /// The header. Check it against the array before use: it comes from another process.
     pub fn header(&self) -> &H {
-        self.sample.user_header()
+        self.received.header::<E, H>()
     }
 }
 
@@ -177,10 +184,10 @@ pub(crate) fn onlooker() -> PortName {
 }
 
 #[derive(Debug)]
-struct Port<E: Message, H: Header> {
+struct Port {
     topic: Arc<str>,
-    subscriber: IoxSubscriber<ipc::Service, [E], H>,
-    messages: Messages<E, H>,
+    reader: Reader,
+    messages: Messages,
     /// Tells publishers that this subscriber is connected; only with lossless delivery.
     ready: Option<Notifier<ipc::Service>>,
     known_publishers: RefCell<Vec<u128>>,
@@ -199,7 +206,8 @@ impl Bus {
         waiter: &mut Waiter,
     ) -> Result<Subscriber<T>, PortError> {
         Ok(Subscriber {
-            port: Port::open(self, topic, waiter)?,
+            port: Port::open(self, topic, &Types::new::<T, ()>(), waiter)?,
+            message: PhantomData,
         })
     }
 
@@ -214,14 +222,15 @@ impl Bus {
         waiter: &mut Waiter,
     ) -> Result<SliceSubscriber<E, H>, PortError> {
         Ok(SliceSubscriber {
-            port: Port::open(self, topic, waiter)?,
+            port: Port::open(self, topic, &Types::new::<E, H>(), waiter)?,
+            types: PhantomData,
         })
     }
 }
 
-impl<E: Message, H: Header> Port<E, H> {
-    fn open(bus: &Bus, topic: &str, waiter: &mut Waiter) -> Result<Self, PortError> {
-        let messages = service::open_messages::<E, H>(bus.node(), topic)?;
+impl Port {
+    fn open(bus: &Bus, topic: &str, types: &Types, waiter: &mut Waiter) -> Result<Self, PortError> {
+        let messages = service::open_messages(bus.node(), topic, types)?;
         let extras = service::extras(&messages);
         let ready = match extras.delivery {
             Delivery::Lossless if !bus.looks_on() => {
@@ -253,7 +262,7 @@ impl<E: Message, H: Header> Port<E, H> {
                 })?;
         let port = Self {
             topic: Arc::from(topic),
-            subscriber,
+            reader: Reader::new(subscriber, types),
             messages,
             ready,
             known_publishers: RefCell::new(Vec::new()),
@@ -268,7 +277,7 @@ impl<E: Message, H: Header> Port<E, H> {
         // Listed before connecting, so that only connected publishers are acknowledged: a new one may
         // appear in between.
         let publishers = self.publishers();
-        let connected = self.subscriber.update_connections();
+        let connected = self.reader.port().update_connections();
         connected
             .inspect_err(note_room)
             .map_err(|source| PortError::Connection {
@@ -279,12 +288,12 @@ impl<E: Message, H: Header> Port<E, H> {
         Ok(())
     }
 
-    fn receive(&self) -> Result<Option<IoxSample<ipc::Service, [E], H>>, ReceiveError> {
+    fn receive(&self) -> Result<Option<Received>, ReceiveError> {
         // Listed before connecting, as in `connect`.
         let publishers = self.ready.as_ref().map(|_| self.publishers());
         let topic = || Arc::clone(&self.topic);
         let sample =
-            self.subscriber
+            self.reader
                 .receive()
                 .inspect_err(note_room)
                 .map_err(|source| match source {

@@ -1,15 +1,14 @@
 //! One topic: its quality of service, fixed before any process starts, and its creation.
 
-use core::fmt::Debug;
-
 use iceoryx2::prelude::{Node, ServiceName, ipc};
 use iceoryx2::service::builder::event::EventCreateError;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeCreateError;
 
 use crate::bus_error::BusError;
 use crate::delivery::{Delivery, Limits};
+use crate::erased::{Messages, Types};
 use crate::payload::{Element, Header, Message};
-use crate::service::{Extras, Messages, WakeUp, patiently, ready_name};
+use crate::service::{Extras, WakeUp, patiently, ready_name};
 
 /// Processes that may open one topic: more than a deployment has, since dead ones count until they are
 /// cleaned up.
@@ -28,7 +27,7 @@ pub struct TopicPlan {
     /// See [`Self::with_few_chunks`].
     usual_chunks: Option<usize>,
     wakes: bool,
-    create: fn(&Node<ipc::Service>, &Self) -> Result<Topic, BusError>,
+    types: Types,
 }
 
 impl TopicPlan {
@@ -43,7 +42,7 @@ impl TopicPlan {
             chunk_bytes: chunk_bytes(0, size_of::<T>()),
             usual_chunks: None,
             wakes: true,
-            create: create::<T, ()>,
+            types: Types::new::<T, ()>(),
         }
     }
 
@@ -69,7 +68,7 @@ impl TopicPlan {
             chunk_bytes: chunk_bytes(size_of::<H>(), size_of::<E>() * max_len),
             usual_chunks: None,
             wakes: true,
-            create: create::<E, H>,
+            types: Types::new::<E, H>(),
         }
     }
 
@@ -152,7 +151,15 @@ impl TopicPlan {
 
     /// Creates the services of the topic.
     pub(crate) fn create(&self, node: &Node<ipc::Service>) -> Result<Topic, BusError> {
-        (self.create)(node, self)
+        let messages = create_messages(node, self)?;
+        let mut wake_ups = Vec::new();
+        for name in wake_up_names(self) {
+            wake_ups.push(create_wake_up(node, &name)?);
+        }
+        Ok(Topic {
+            _messages: messages,
+            _wake_ups: wake_ups,
+        })
     }
 
     fn extras(&self) -> Extras {
@@ -170,24 +177,8 @@ impl TopicPlan {
 /// Keeps a topic alive while no process uses it.
 #[derive(Debug)]
 pub struct Topic {
-    _messages: Box<dyn Debug>,
+    _messages: Messages,
     _wake_ups: Vec<WakeUp>,
-}
-
-/// Creates the services of one topic; the type parameters were fixed by its plan.
-fn create<E: Message, H: Header>(
-    node: &Node<ipc::Service>,
-    plan: &TopicPlan,
-) -> Result<Topic, BusError> {
-    let messages = create_messages::<E, H>(node, plan)?;
-    let mut wake_ups = Vec::new();
-    for name in wake_up_names(plan) {
-        wake_ups.push(create_wake_up(node, &name)?);
-    }
-    Ok(Topic {
-        _messages: Box::new(messages),
-        _wake_ups: wake_ups,
-    })
 }
 
 /// The events of a topic: its wake-up if it has one, and with lossless delivery the acknowledgement of
@@ -203,10 +194,7 @@ fn wake_up_names(plan: &TopicPlan) -> Vec<String> {
     names
 }
 
-fn create_messages<E: Message, H: Header>(
-    node: &Node<ipc::Service>,
-    plan: &TopicPlan,
-) -> Result<Messages<E, H>, BusError> {
+fn create_messages(node: &Node<ipc::Service>, plan: &TopicPlan) -> Result<Messages, BusError> {
     let bad_name = || BusError::Name {
         name: plan.topic().to_owned(),
     };
@@ -214,9 +202,8 @@ fn create_messages<E: Message, H: Header>(
     let attributes = plan.extras().attributes().ok_or_else(bad_name)?;
     let limits = plan.limits();
     let attempt = || {
-        node.service_builder(&name)
-            .publish_subscribe::<[E]>()
-            .user_header::<H>()
+        plan.types
+            .builder(node, &name)
             .enable_safe_overflow(plan.delivery() == Delivery::Realtime)
             .max_publishers(limits.publishers)
             .max_subscribers(limits.subscribers + limits.onlookers)

@@ -6,7 +6,8 @@ use std::time::Instant;
 
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::live::{self, Live};
-use runtime::{ExitKind, Failure, Namespace, OrFail as _, Stop};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use runtime::Namespace;
 
 use super::terminal::{Key, Size, Terminal};
 
