@@ -92,12 +92,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("whole runs", &["launch", "trials", "view"]),
     (
         "laboratory",
-        &[
-            "datasets",
-            "evaluation",
-            "networktraining",
-            "training",
-        ],
+        &["datasets", "evaluation", "networktraining", "training"],
     ),
     ("executables", &["lab", "parallax"]),
 ];

@@ -16,7 +16,7 @@ use posenetwork::PoseNetwork;
 
 use crate::person::Chosen;
 use crate::scenes::Scenes;
-use failure::Console;
+use failure::{Console, ExitKind, Failure, Stop};
 
 pub use train::{Earlier, Job, Pass, train};
 

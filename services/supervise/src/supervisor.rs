@@ -6,7 +6,10 @@ use std::time::Instant;
 
 use failure::{ExitKind, Fault, Stop};
 use messages::{Health, Metrics, topic};
-use runtime::{Bus, BusError, Child, Cleaner, Launch, LockError, Losses, PortError, PreflightError, preflight, wait_for_any};
+use runtime::{
+    Bus, BusError, Child, Cleaner, Launch, LockError, Losses, PortError, PreflightError, preflight,
+    wait_for_any,
+};
 
 use crate::stall::Stall;
 use crate::watch::{Phase, Sequel, Watch, death_of};

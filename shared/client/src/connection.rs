@@ -7,7 +7,10 @@ use std::time::Instant;
 
 use messages::{FrameHeader, Pose3d, Status, ViewPose, topic};
 use runfiles::Running;
-use runtime::{Guest, GuestError, GuestPort, Namespace, ReceiveError, running_deployments, wait_for_description};
+use runtime::{
+    Guest, GuestError, GuestPort, Namespace, ReceiveError, running_deployments,
+    wait_for_description,
+};
 
 use crate::check;
 use crate::error::ClientError;

@@ -11,7 +11,10 @@ use std::time::{Duration, Instant};
 
 use failure::Stop;
 use messages::EvidenceHeader;
-use runtime::{Bus, Child, Delivery, Limits, Namespace, Sample, SlicePublisher, SliceSubscriber, TopicPlan, Waiter};
+use runtime::{
+    Bus, Child, Delivery, Limits, Namespace, Sample, SlicePublisher, SliceSubscriber, TopicPlan,
+    Waiter,
+};
 
 /// Values of f32.
 const WORKLOADS: [(&str, usize, usize); 4] = [

@@ -21,8 +21,8 @@ use crate::onlookers::{self, Onlookers};
 use crate::payload::{Element, Header, Message};
 use crate::room::{connections, note_room, short_of_room};
 use crate::service::{self, PortError};
-use failure::{ExitKind, Fault, Stop};
 use crate::{Copies, Progress};
+use failure::{ExitKind, Fault, Stop};
 
 /// Longest pause between two checks of a topic's subscribers.
 const CONNECT_PAUSE: Duration = Duration::from_millis(20);

@@ -17,8 +17,8 @@ use crate::erased::{Messages, Reader, Received, Types};
 use crate::payload::{Element, Header, Message};
 use crate::room::{connections, note_room, short_of_room};
 use crate::service::{self, PortError};
-use failure::Fault;
 use crate::{Copies, Waiter};
+use failure::Fault;
 
 /// A message could not be received.
 #[derive(Debug, thiserror::Error)]

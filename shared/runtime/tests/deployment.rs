@@ -9,7 +9,10 @@ use common::{Deployment, shared_memory};
 use messages::{
     EvidenceHeader, FrameHeader, Health, PairPose, Pose3d, ViewPose, ViewQuality, topic,
 };
-use runtime::{Bus, Delivery, Limits, Publisher, SlicePublisher, SliceSubscriber, Subscriber, TopicPlan, Waiter, process_topics};
+use runtime::{
+    Bus, Delivery, Limits, Publisher, SlicePublisher, SliceSubscriber, Subscriber, TopicPlan,
+    Waiter, process_topics,
+};
 
 const N_VIEWS: usize = 8;
 const N_WORKERS: usize = 3;

@@ -9,7 +9,9 @@ use std::time::{Duration, Instant};
 use common::{Deployment, shared_memory};
 use failure::Stop;
 use messages::{EvidenceHeader, FrameHeader, ViewQuality};
-use runtime::{Bus, Delivery, Limits, Losses, Patience, PortError, SendError, TopicPlan, Waiter, Woken};
+use runtime::{
+    Bus, Delivery, Limits, Losses, Patience, PortError, SendError, TopicPlan, Waiter, Woken,
+};
 
 const SOON: Duration = Duration::from_secs(20);
 

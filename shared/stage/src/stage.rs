@@ -8,7 +8,9 @@ use std::rc::Rc;
 use crate::join::Joined;
 use failure::{Failure, now_nanos};
 use messages::{EvidenceHeader, FrameHeader, PairPose, Stamp, topic};
-use runtime::{Delivery, Element, Message, Service, SlicePublisher, Subscriber, WaitError, Waiter, Woken};
+use runtime::{
+    Delivery, Element, Message, Service, SlicePublisher, Subscriber, WaitError, Waiter, Woken,
+};
 use wire::WireError;
 
 use crate::held::Bulk;

@@ -4,7 +4,7 @@
 
 mod causes;
 
-pub use wording::{chain, in_one_line};
+pub use causes::{chain, in_one_line};
 
 use core::fmt::Display;
 

@@ -8,7 +8,7 @@ use networktraining::{Backend, Parameter, TrainError, Trainer};
 use report::curves::{self, Line, Panel};
 
 use super::Prepared;
-use failure::Console;
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use inputs::cards::METADATA_KEY;
 
 /// The results of a hundred steps.

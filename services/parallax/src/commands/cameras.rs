@@ -8,7 +8,9 @@ use clap::{Args, Subcommand};
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use footage::{Canvas, LiveAddress};
 use launch::load;
-use runtime::{VideoAbout, VideoControl, VideoDevice, VideoError, VideoFormat, VideoMode, video_devices};
+use runtime::{
+    VideoAbout, VideoControl, VideoDevice, VideoError, VideoFormat, VideoMode, video_devices,
+};
 use serde_json::{Value, json};
 use terminal::output;
 

@@ -7,7 +7,10 @@ use clap::Args;
 use deployment::{Deployment, Replay, Stage};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use inputs::Shipped;
-use launch::{Planned, Resolved, load, plan, recorded::{self, Settings}};
+use launch::{
+    Planned, Resolved, load, plan,
+    recorded::{self, Settings},
+};
 use messages::topic;
 use recording::{Kind, Recording};
 use terminal::output;

@@ -5,7 +5,10 @@ use std::time::{Duration, Instant};
 
 use failure::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use messages::{FrameHeader, Stamp, Status, Timing, topic};
-use runtime::{Bus, Child, Delivery, Launch, Limits, Namespace, Scheduling, SlicePublisher, TopicPlan, preflight, process_topics};
+use runtime::{
+    Bus, Child, Delivery, Launch, Limits, Namespace, Scheduling, SlicePublisher, TopicPlan,
+    preflight, process_topics,
+};
 use terminal::output;
 use tracing::Level;
 

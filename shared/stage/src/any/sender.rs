@@ -5,7 +5,10 @@ use messages::{
     EvidenceHeader, FrameHeader, PairPose, PictureHeader, Pose3d, Status, ViewPose, ViewQuality,
 };
 use recording::{Envelope, Kind, Message};
-use runtime::{Bus, Element, Header, Message as PlainMessage, Patience, PortError, Publisher, SendError, SlicePublisher};
+use runtime::{
+    Bus, Element, Header, Message as PlainMessage, Patience, PortError, Publisher, SendError,
+    SlicePublisher,
+};
 
 use crate::receivers::Receivers;
 

@@ -6,7 +6,6 @@ use std::time::Instant;
 
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::live::{self, Live};
-use failure::{ExitKind, Failure, OrFail as _, Stop};
 use runtime::Namespace;
 
 use super::terminal::{Key, Size, Terminal};

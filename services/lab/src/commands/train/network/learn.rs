@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use failure::{ExitKind, Failure, OrFail as _};
 use inputs::Shipped;
-use terminal::output;
 use networktraining::Backend;
 use networktraining::pose::Settings;
-use failure::{ExitKind, Failure, OrFail as _};
+use terminal::output;
 
 use terminal::Globals;
 

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use failure::{ExitKind, Failure, OrFail as _};
 use networktraining::Backend;
 use networktraining::quality::network::Kind;
 use networktraining::quality::settings::Settings;
-use failure::{ExitKind, Failure, OrFail as _};
 
 use terminal::Globals;
 use terminal::output;
