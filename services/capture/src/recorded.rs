@@ -10,7 +10,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use footage::{FootageError, FrameView, PixelFormat, RemadeStream, SourceSpec};
-use recording::{Kind, ReadError};
+use recording::{Buffer, Kind, ReadError};
 
 use crate::info::FeedInfo;
 use table::{Picture, Table};
@@ -107,7 +107,7 @@ pub struct RecordedFeed {
     name: String,
     path: PathBuf,
     file: File,
-    buffer: Vec<u8>,
+    buffer: Buffer,
     /// The next picture of the table, and the frames that are wanted.
     at: usize,
     next: u64,
@@ -140,7 +140,7 @@ impl RecordedFeed {
             name: Recorded::address(&recorded.file, &recorded.camera),
             path: recorded.file.clone(),
             file,
-            buffer: Vec::new(),
+            buffer: Buffer::default(),
             at: table.first_at(spec.start),
             table,
             next: spec.start,

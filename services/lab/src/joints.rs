@@ -5,14 +5,13 @@ use std::sync::Arc;
 
 use consistency::{JointFile, JointsLearned, LearnedSet, Marked, best_local, mean_error, try_all};
 use datasets::{Person, SkeletonTable};
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Model, Search};
 use rayon::prelude::*;
 
 use crate::failures::dataset_failure;
 use crate::judged;
 use crate::person::{Chosen, deal, read_options, sides_of};
-use failure::Console;
 
 /// Fewest people of a data set who were found: fewer cannot be dealt into shares.
 const FEWEST: usize = 20;

@@ -2,7 +2,7 @@
 
 use datasets::{People, Person, Picture, Sides};
 use evaluation::{Joints, Pictures};
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Layout, Pose, Search};
 use keypoints::Keypoint;
 use pipeline::ViewSettings;
@@ -11,7 +11,6 @@ use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Turn,
 use skeleton::PARSE14;
 
 use crate::judged::{go_on, pictures, truth};
-use failure::Console;
 use inputs::pictures::{BOXES_PX, Picture as Shown, Searched};
 
 /// Of the neck and the top of the head in `skeleton::PARSE14`.

@@ -12,12 +12,11 @@ pub(crate) use rendered::front_in_view;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use failure::{ExitKind, Failure, Stop};
+use failure::{Console, ExitKind, Failure, Stop};
 use fmp::Model;
 use orientation::{Detector, Network, Score, Settings};
 
 use crate::scenes::Scenes;
-use failure::Console;
 
 /// What to learn from, and what to judge on.
 #[derive(Debug, Clone)]

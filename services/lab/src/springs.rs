@@ -3,13 +3,12 @@
 use std::path::Path;
 
 use datasets::SkeletonTable;
-use failure::{ExitKind, Failure, OrFail as _};
+use failure::{Console, ExitKind, Failure, OrFail as _};
 use posenetwork::springs::{SpringSettings, WINDOW_CELLS, learn};
 
 use crate::failures::dataset_failure;
 use crate::judged;
 use crate::person::{Chosen, deal, read_options, sides_of};
-use failure::Console;
 
 /// Fewest people: each of the types needs some of them.
 const FEWEST: usize = 50;

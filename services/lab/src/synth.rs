@@ -8,11 +8,10 @@ mod sequence;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use failure::{ExitKind, Failure, Stop};
+use failure::{Console, ExitKind, Failure, Stop};
 use scene::{Action, Flaws, Recording, RigChoice, RigChoiceError, Settings};
 use serde_json::{Value, json};
 
-use failure::Console;
 pub use files::Format;
 pub use motion::{marker_table, n_frames, recording};
 use people::People;

@@ -11,8 +11,7 @@ use std::path::{Path, PathBuf};
 
 pub use exports::Naming;
 use exports::{FILES, FileFormat, Notes, Trial, ViewCamera};
-use failure::Console;
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use serde_json::{Value, json};
 
 pub use origin::{Given, Lines, Origin};

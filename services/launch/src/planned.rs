@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use deployment::Deployment;
-use failure::{Failure, Stop};
+use failure::{Claim, Failure, Stop};
 use runtime::Scheduling;
 use supervise::{Event, Plan};
 use tracing::Level;
@@ -15,7 +15,6 @@ use crate::resolved::Resolved;
 use crate::scheduling;
 use crate::search_size::SearchSize;
 use crate::summary::{Report, Watcher};
-use failure::Claim;
 
 /// A deployment with the plan of its run.
 #[derive(Debug)]

@@ -1,14 +1,14 @@
 //! The settings of a run in its recording, and the description of a recording.
 
 use core::fmt::Write as _;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use deployment::{Deployment, RecordingPlan, Stage};
 use failure::{ExitKind, Failure, OrFail as _};
 use messages::topic;
-use recording::{About, Checked, Damaged, Kind, Recording, Without};
+use recording::{About, Damaged, Kind, Recording, Without};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -141,7 +141,7 @@ pub fn is_undamaged(recording: &Recording) -> bool {
         && recording.n_missing() == 0
 }
 
-/// Reads the messages that a replay sends, and returns those whose checksums do not match.
+/// Reads the messages that a replay sends, and returns those whose chunks do not match their checksums.
 ///
 /// * `from`: the first stage that the replay runs.
 ///
@@ -171,15 +171,23 @@ pub fn damaged(
 
 /// Describes the damaged messages as text, and lists the first of them; none if there are none.
 pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
+    let chunks: BTreeSet<u64> = damaged.iter().map(|message| message.chunk).collect();
     let mut text = format!(
-        "  {} damaged messages are left out: they are not what their checksums say",
-        damaged.len()
+        "  {} messages of {} damaged chunks are left out: the chunks are not what their checksums say",
+        damaged.len(),
+        chunks.len()
     );
     let named = damaged.iter().take(MAX_LISTED).map(|message| {
         let frame = message
             .frame
             .map_or(String::new(), |it| format!(", frame {it}"));
-        format!("\n    {}{frame}, at byte {}", message.topic, message.offset)
+        let Damaged {
+            topic,
+            offset,
+            chunk,
+            ..
+        } = message;
+        format!("\n    {topic}{frame}, at byte {offset}, in the chunk at byte {chunk}")
     });
     text.extend(named);
     if damaged.len() > MAX_LISTED {
@@ -193,7 +201,7 @@ pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
 pub fn damaged_json(damaged: &[Damaged]) -> Value {
     let damaged = damaged
         .iter()
-        .map(|it| json!({ "topic": it.topic, "frame": it.frame, "offset": it.offset }));
+        .map(|it| json!({ "topic": it.topic, "frame": it.frame, "offset": it.offset, "chunk": it.chunk }));
     damaged.collect()
 }
 
@@ -236,11 +244,6 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
     for (topic, n) in &extent.missing {
         write!(text, "\n  {topic}: {n} messages are damaged and not found")?;
     }
-    if extent.checks == Checked::Chunks {
-        text.push_str(
-            "\n  written by an earlier version: only its chunks have checksums, not its messages and settings",
-        );
-    }
     if extent.n_malformed > 0 {
         let n = extent.n_malformed;
         write!(
@@ -273,10 +276,6 @@ pub fn json(file: &Path, recording: &Recording) -> Value {
         "complete": extent.is_complete,
         "damage": extent.damage.iter().map(|it| json!({ "offset": it.offset, "what": it.what })).collect::<Vec<_>>(),
         "missing": extent.missing,
-        "checksums_of": match extent.checks {
-            Checked::Messages => "messages",
-            Checked::Chunks => "chunks",
-        },
         "malformed": extent.n_malformed,
         "messages": recording.n_messages(),
         "lost": recording.n_lost(),

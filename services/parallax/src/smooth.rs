@@ -12,14 +12,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use deployment::smooth::{Config, Method};
-use failure::{ExitKind, Failure};
+use failure::{Console, ExitKind, Failure};
 use motion::live::{self, OneEuro};
 use motion::{Motion, Recorded, Report, butterworth};
 use nalgebra::UnitVector3;
 use runfiles::{SmoothReport, SmoothedJoint, Unsure};
 
 pub use compare::{Comparison, Mean, Row, compare, table};
-use failure::Console;
 pub use folder::{read_lines, settings};
 
 /// The files that are written beside the results.

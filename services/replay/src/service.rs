@@ -5,7 +5,7 @@ use std::fs::File;
 
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use messages::{Cause, Status, Timing};
-use recording::{Entry, Envelope, ReadError, Recording, Track, in_order};
+use recording::{Buffer, Entry, Envelope, ReadError, Recording, Track, in_order};
 use runtime::{Place, SendError, Service, Woken};
 use stage::Stage;
 use stage::any::Sender;
@@ -34,7 +34,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let mut place = Place::of(service.bus());
     let noted = place.noted().filter(|_| service.epoch() > 0);
     let [begin]: [u64; 1] = noted.unwrap_or([0]);
-    let mut buffer = Vec::new();
+    let mut buffer = Buffer::default();
     let mut end = None;
     for (nth, (output, entry)) in (0_u64..).zip(&order).skip(begin as usize) {
         if playback.stage.wait(Duration::ZERO)? == Woken::Stop || !playback.wait_until_due(entry)? {
@@ -94,7 +94,7 @@ fn end_after(
     job: &Job,
     session: u64,
 ) -> Envelope {
-    let mut buffer = Vec::new();
+    let mut buffer = Buffer::default();
     let mut last_of = |output: usize| {
         let entries = order.iter().rev().filter(|(other, _)| *other == output);
         entries.into_iter().find_map(|(_, entry)| {

@@ -4,9 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use failure::{ExitKind, Failure};
-
-use failure::in_file;
+use failure::{ExitKind, Failure, in_file};
 
 /// The images that are named, those of folders in the order of their names.
 ///

@@ -25,8 +25,7 @@ use std::sync::Arc;
 
 use consistency::{Appearance, Learned, Shape};
 use deployment::Deployment;
-use failure::no_text;
-use failure::{ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _, no_text};
 use fmp::Model;
 use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use failure::{ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _, in_file};
 use fmp::{Layout, Model, Pose, Search};
 use footage::{Fill, Rotation, Size, Source, SourceSpec, Turn, Warp, resize_map};
 use kernels::Rgb8View;
@@ -10,7 +10,6 @@ use posenetwork::outline_of_parts;
 
 use crate::images::has_image_name;
 use crate::memory::check_memory;
-use failure::in_file;
 
 /// Which frames of a video are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

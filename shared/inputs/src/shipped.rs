@@ -5,9 +5,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use deployment::{SHIPPED, is_shipped};
-use failure::{ExitKind, Failure};
-
-use failure::in_file;
+use failure::{ExitKind, Failure, in_file};
 
 /// A shipped file; its model card is beside it in `configs/models`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

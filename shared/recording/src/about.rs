@@ -6,10 +6,8 @@ use std::collections::BTreeMap;
 pub(crate) const NAME: &str = "parallax";
 /// Name of the metadata record that names the topics by the numbers of their channels.
 pub(crate) const TOPICS: &str = "parallax.topics";
-/// Version of the format that this crate writes.
-const FORMAT: &str = "2";
-/// The previous version, which can be read too: only chunks have checksums.
-pub(crate) const OLDER: &str = "1";
+/// Version of the format that this crate writes, and the only one that it reads.
+const FORMAT: &str = "3";
 
 /// What was left out on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -50,7 +48,7 @@ pub enum AboutError {
         got: String,
     },
     /// It was written by another version.
-    #[error("the recording has format {got:?}, this program reads formats {OLDER} and {FORMAT}")]
+    #[error("the recording has format {got:?}, this program reads format {FORMAT}")]
     Format {
         /// What stands there.
         got: String,
@@ -88,7 +86,7 @@ impl About {
             other => Err(refused(key, other)),
         };
         let format = text("format")?;
-        if ![OLDER, FORMAT].contains(&format.as_str()) {
+        if format != FORMAT {
             let got = format.chars().take(40).collect();
             return Err(AboutError::Format { got });
         }
@@ -103,11 +101,6 @@ impl About {
             },
         })
     }
-}
-
-/// Whether a map belongs to a recording of format 1, whose maps have no checksum.
-pub(crate) fn is_older(map: &BTreeMap<String, String>) -> bool {
-    map.get("format").is_some_and(|it| it == OLDER) && !map.contains_key(crate::seal::KEY)
 }
 
 #[cfg(test)]
@@ -149,7 +142,7 @@ mod tests {
             map.insert(key.to_owned(), value.to_owned());
             About::from_map(&map).unwrap_err().to_string()
         };
-        assert!(refused("format", "3").contains("format \"3\""));
+        assert!(refused("format", "4").contains("format \"4\""));
         assert!(refused("session", "-1").contains("session is \"-1\""));
         assert!(refused("without_pixels", "maybe").contains("\"maybe\""));
     }

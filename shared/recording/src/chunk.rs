@@ -1,73 +1,73 @@
-//! Reads a chunk as in standard MCAP: its checksum, and its records.
-
-use std::io::{Read, Seek};
+//! The head of a chunk that is not compressed, and of its messages.
 
 use crate::Entry;
-use crate::contents::Contents;
-use crate::cursor::{Cursor, Stop};
-use crate::mcap::{CHUNK_HEAD_BYTES, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES, op};
+use crate::message::PREAMBLE;
 
-/// Reads the messages of a chunk; a damaged one is skipped. A truncated chunk cannot be checked: its complete
-/// records are read.
-///
-/// * `record`: called for its records that are not messages.
-pub(crate) fn take<R: Read + Seek>(
-    cursor: &mut Cursor<'_, R>,
-    found: &mut Contents,
-    len: u64,
-    mut record: impl FnMut(&mut Cursor<'_, R>, &mut Contents, u8, u64) -> Result<(), Stop>,
-) -> Result<(), Stop> {
-    let begin = cursor.at();
-    cursor.skip(8 + 8 + 8)?;
-    let checksum = u32::from_le_bytes(cursor.array()?);
-    let n_name = u64::from(u32::from_le_bytes(cursor.array()?));
-    if n_name > 0 {
-        return Err(Stop::Damaged("a compressed chunk, which is not supported"));
-    }
-    let records = u64::from_le_bytes(cursor.array()?);
-    if len.checked_sub(CHUNK_HEAD_BYTES) != Some(records) {
-        return Err(Stop::Damaged("a chunk whose lengths contradict each other"));
-    }
-    let end = cursor.at().checked_add(records).ok_or(Stop::Cut)?;
-    if checksum != 0 && end <= cursor.end() && cursor.checksum(records)? != checksum {
-        found.damaged(begin, "a chunk that is not what its checksum says");
-        return cursor.skip(records);
-    }
-    while cursor.at() < end {
-        found.extent.whole_bytes = cursor.at();
-        let room = end - cursor.at();
-        let (op, len) = cursor.record_head()?;
-        if room < RECORD_HEAD_BYTES || room - RECORD_HEAD_BYTES < len {
-            return Err(Stop::Damaged("a record that is longer than its chunk"));
-        }
-        match op {
-            op::CHUNK => return Err(Stop::Damaged("a chunk within a chunk")),
-            op::MESSAGE => message(cursor, found, len)?,
-            _ => record(cursor, found, op, len)?,
-        }
-    }
-    Ok(())
+/// Bytes of the head of a record: opcode and length.
+pub(crate) const RECORD_HEAD_BYTES: u64 = 1 + 8;
+/// Bytes before the records of a chunk: the head of the record, times, length, checksum, compression, length.
+pub(crate) const HEAD_BYTES: usize = 1 + 8 + 8 + 8 + 8 + 4 + 4 + 8;
+/// Longest chunk that is read, bytes.
+const MOST_BYTES: u64 = 1 << 30;
+/// Bytes of a message before its data.
+pub(crate) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
+
+/// Where the records of a chunk lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Chunk {
+    /// Bytes of its records.
+    pub(crate) n_bytes: u64,
+    /// Their checksum.
+    pub(crate) checksum: u32,
 }
 
-/// Reads a message.
-pub(crate) fn message<R: Read + Seek>(
-    cursor: &mut Cursor<'_, R>,
-    found: &mut Contents,
-    len: u64,
-) -> Result<(), Stop> {
-    let Some(n_data) = len.checked_sub(MESSAGE_HEAD_BYTES) else {
-        return Err(Stop::Damaged("a message shorter than its head"));
-    };
-    let channel = u16::from_le_bytes(cursor.array()?);
-    let nth = u32::from_le_bytes(cursor.array()?);
-    let entry = Entry {
-        log_time: u64::from_le_bytes(cursor.array()?),
-        publish_time: u64::from_le_bytes(cursor.array()?),
-        offset: cursor.at(),
-        len: n_data,
-        ..Entry::default()
-    };
-    cursor.skip(n_data)?;
-    found.message(channel, nth.into(), entry);
-    Ok(())
+impl Chunk {
+    /// Reads the head of a chunk; none if it is none of an uncompressed chunk, or its lengths contradict each other.
+    pub(crate) fn read(head: &[u8; HEAD_BYTES]) -> Option<Self> {
+        let number = |at: usize| -> Option<u64> {
+            Some(u64::from_le_bytes(*head.get(at..)?.first_chunk()?))
+        };
+        let short = |at: usize| -> Option<u32> {
+            Some(u32::from_le_bytes(*head.get(at..)?.first_chunk()?))
+        };
+        let n_bytes = number(41)?;
+        let rest = HEAD_BYTES as u64 - RECORD_HEAD_BYTES;
+        let agrees = head[0] == mcap::records::op::CHUNK
+            && number(25)? == n_bytes
+            && Some(number(1)?) == n_bytes.checked_add(rest)
+            && short(37)? == 0
+            && n_bytes <= MOST_BYTES;
+        agrees.then_some(Self {
+            n_bytes,
+            checksum: short(33)?,
+        })
+    }
 }
+
+/// The head of a message: its channel, and its number among the messages of its topic.
+pub(crate) struct MessageHead {
+    pub(crate) channel: u16,
+    pub(crate) nth: u64,
+    /// Without its place.
+    pub(crate) entry: Entry,
+}
+
+impl MessageHead {
+    pub(crate) fn read(head: &[u8; MESSAGE_HEAD_BYTES as usize]) -> Self {
+        let [c0, c1, n0, n1, n2, n3, times @ ..] = head;
+        let (times, _) = times.as_chunks::<8>();
+        let time = |nth: usize| times.get(nth).map_or(0, |bytes| u64::from_le_bytes(*bytes));
+        Self {
+            channel: u16::from_le_bytes([*c0, *c1]),
+            nth: u32::from_le_bytes([*n0, *n1, *n2, *n3]).into(),
+            entry: Entry {
+                log_time: time(0),
+                publish_time: time(1),
+                ..Entry::default()
+            },
+        }
+    }
+}
+
+/// Bytes at the beginning of a message up to the end of its frame: what stands before CDR, the session, the frame.
+pub(crate) const FRAME_END: usize = PREAMBLE.len() + 8 + 8;

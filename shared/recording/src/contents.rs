@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::{About, AboutError, Checked, Count, Damage, Entry, Extent, Kind, Recording, Track};
+use crate::chunk::MessageHead;
+use crate::{About, AboutError, Count, Damage, Entry, Extent, Kind, Recording, Track};
 use crate::{about, count, message};
 
 /// Most damaged positions that are kept.
@@ -21,7 +22,7 @@ pub(crate) struct Contents {
 }
 
 impl Contents {
-    pub(crate) fn new(file_bytes: u64, checks: Checked) -> Self {
+    pub(crate) fn new(file_bytes: u64) -> Self {
         Self {
             about: Err(AboutError::Missing("settings")),
             counts: BTreeMap::new(),
@@ -32,7 +33,6 @@ impl Contents {
                 damage: Vec::new(),
                 n_malformed: 0,
                 missing: BTreeMap::new(),
-                checks,
             },
             channels: BTreeMap::new(),
             messages: BTreeMap::new(),
@@ -46,12 +46,19 @@ impl Contents {
         }
     }
 
-    /// A message of a channel, the `nth` of its topic.
-    pub(crate) fn message(&mut self, channel: u16, nth: u64, entry: Entry) {
-        let [due, n] = self.numbers.entry(channel).or_default();
-        *due = (*due).max(nth.saturating_add(1));
+    /// The type of the messages of a channel, if it is known here.
+    pub(crate) fn kind(&self, channel: u16) -> Option<Kind> {
+        let name = self.channels.get(&channel)?.as_ref()?;
+        Kind::of_topic(name)
+    }
+
+    /// Takes in a message.
+    pub(crate) fn message(&mut self, message: MessageHead) {
+        let [due, n] = self.numbers.entry(message.channel).or_default();
+        *due = (*due).max(message.nth.saturating_add(1));
         *n += 1;
-        self.messages.entry(channel).or_default().push(entry);
+        let entries = self.messages.entry(message.channel).or_default();
+        entries.push(message.entry);
     }
 
     pub(crate) fn metadata(&mut self, name: &str, map: BTreeMap<String, String>) {

@@ -15,10 +15,10 @@ pub struct Entry {
     pub offset: u64,
     /// Its length, bytes.
     pub len: u64,
-    /// Its frame; none for heartbeats, and if the recording does not contain it.
+    /// Its frame; none for heartbeats, and where the topic was not known yet.
     pub frame: Option<u64>,
-    /// Checksum of its data, compared when it is read; none in recordings without a checksum per message.
-    pub checksum: Option<u32>,
+    /// Offset of its chunk, bytes from the start of the file.
+    pub chunk: u64,
 }
 
 /// One topic.
@@ -45,8 +45,6 @@ pub struct Extent {
     pub n_malformed: u64,
     /// Messages that were written but not found, by topic: gaps in the consecutive numbers.
     pub missing: BTreeMap<String, u64>,
-    /// What the checksums cover.
-    pub checks: Checked,
 }
 
 /// A damaged position in a file.
@@ -56,16 +54,6 @@ pub struct Damage {
     pub offset: u64,
     /// What is wrong.
     pub what: &'static str,
-}
-
-/// What the checksums of a recording cover.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Checked {
-    /// Every message has its own, and so has the metadata.
-    #[default]
-    Messages,
-    /// Only chunks of a megabyte or more: a recording of format 1.
-    Chunks,
 }
 
 /// The contents of a recording.

@@ -2,33 +2,33 @@
 //!
 //! The file is standard MCAP: chunked, indexed, not compressed. Messages are little-endian CDR with ROS 2
 //! schemas (`msg/`), which other programs can read: a `repr(C)` struct without padding has the layout of CDR.
-//! Every message has a checksum, which is compared when it is read; so have the positions of messages and the
-//! metadata. Nothing here uses files, clocks or threads.
+//! Every chunk has a checksum, which is compared when a message of it is read; so has the metadata. Nothing here
+//! uses files, clocks or threads.
 #![forbid(unsafe_code)]
 
 mod kind;
 mod message;
 
-mod mcap;
-
-mod checks;
 mod seal;
 
 mod about;
 mod count;
+mod gate;
 mod write;
 
 mod chunk;
 mod contents;
 mod cursor;
 mod index;
-mod older;
 mod scan;
+
+mod read;
 
 pub use about::{About, AboutError, Without};
 pub use count::Count;
-pub use index::{Checked, Damage, Entry, Extent, Recording, Track, in_order};
+pub use index::{Damage, Entry, Extent, Recording, Track, in_order};
 pub use kind::Kind;
 pub use message::{Envelope, Malformed, Message, encode};
-pub use scan::{Damaged, ReadError, check, read, read_head, scan};
+pub use read::{Buffer, Damaged, ReadError, check, read, read_head};
+pub use scan::scan;
 pub use write::{Foreign, WriteError, Writer};

@@ -1,52 +1,35 @@
-//! Scans a recording for the positions of all messages, up to the last complete record.
+//! Scans a recording for the positions of all messages, up to the last complete chunk.
 //!
-//! Reads the file from its start, using the record before each chunk that lists its messages, and skips the
-//! contents of messages. So it needs no index at the end, and truncated files are read like complete ones.
-//! After damage it searches for the next valid record.
+//! Reads the file from its start, and skips the contents of messages. So it needs no index at the end, and what a killed
+//! run leaves is read like a complete file. After damage it searches for the next chunk. The reader of the crate `mcap`
+//! reads every byte that it passes, and stops at the first that is wrong.
 
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek};
 
-use crate::checks::{Checks, TAG};
+use mcap::MAGIC;
+use mcap::records::{Record, op};
+
+use crate::chunk::{
+    Chunk, FRAME_END, HEAD_BYTES, MESSAGE_HEAD_BYTES, MessageHead, RECORD_HEAD_BYTES,
+};
 use crate::contents::Contents;
 use crate::cursor::{Cursor, Stop};
-use crate::mcap::{MAGIC, MAX_RECORD_BYTES, RECORD_HEAD_BYTES, metadata, op};
-use crate::message::PREAMBLE;
 use crate::seal::unseal;
-use crate::{Checked, Entry, Kind, Message, Recording, about, chunk, message, older};
+use crate::{ReadError, Recording, about};
 
 /// Block size of the search, bytes.
 const WINDOW_BYTES: u64 = 1 << 16;
+/// Longest record that is not a message or a chunk, bytes.
+const MAX_RECORD_BYTES: u64 = 16 << 20;
 /// Most false starts of records in a search.
 const MOST_FALSE_STARTS: u32 = 10_000;
-
-/// A recording cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadError {
-    /// It is another kind of file.
-    #[error("this is not an MCAP file")]
-    NotMcap,
-    /// The file cannot be read.
-    #[error("cannot read the recording")]
-    Read(#[from] io::Error),
-    /// A message does not match its checksum.
-    #[error("the message at byte {offset} is not what its checksum says")]
-    Checksum {
-        /// Its offset in the file, bytes.
-        offset: u64,
-    },
-    /// A message has changed since the file was scanned.
-    #[error("the message at byte {offset} cannot be read")]
-    Message {
-        /// Its offset in the file, bytes.
-        offset: u64,
-        /// Why.
-        #[source]
-        source: message::Malformed,
-    },
-}
+/// Bytes of a record of metadata before the text of its name.
+const NAME_AT: usize = RECORD_HEAD_BYTES as usize + 4;
+/// Most topics.
+const MOST_TOPICS: usize = 1024;
 
 /// Finds every message of a file. For any file content it takes memory only for existing messages, 56 bytes
-/// each. Contents of messages are not read: see [`read`] and [`check`].
+/// each. Contents of messages are not read: see [`read`](crate::read()) and [`check`](crate::check).
 ///
 /// # Errors
 ///
@@ -55,112 +38,22 @@ pub enum ReadError {
 pub fn scan<R: Read + Seek>(input: &mut R) -> Result<Recording, ReadError> {
     let mut cursor = Cursor::new(input)?;
     match cursor.array::<{ MAGIC.len() }>() {
-        Ok(magic) if magic == *MAGIC => {}
+        Ok(magic) if magic == MAGIC => {}
         Err(Stop::Io(error)) => return Err(error.into()),
         _ => return Err(ReadError::NotMcap),
     }
     let mut scan = Scan {
-        found: Contents::new(cursor.end(), Checked::Messages),
+        found: Contents::new(cursor.end()),
         cursor,
-        is_older: false,
         n_false_starts: 0,
     };
     scan.records()?;
-    if scan.is_older {
-        scan.cursor.go(MAGIC.len() as u64)?;
-        return Ok(older::scan(&mut scan.cursor)?);
-    }
     Ok(scan.found.finish())
-}
-
-/// Reads a message into `buffer`, compares its checksum, and takes it apart.
-///
-/// # Errors
-///
-/// [`ReadError::Read`], [`ReadError::Checksum`], [`ReadError::Message`].
-pub fn read<'a, R: Read + Seek>(
-    input: &mut R,
-    kind: Kind,
-    entry: &Entry,
-    buffer: &'a mut Vec<u8>,
-) -> Result<Message<'a>, ReadError> {
-    let offset = entry.offset;
-    input.seek(SeekFrom::Start(offset))?;
-    buffer.resize(entry.len as usize, 0);
-    input.read_exact(buffer)?;
-    if entry
-        .checksum
-        .is_some_and(|it| it != crc32fast::hash(buffer))
-    {
-        return Err(ReadError::Checksum { offset });
-    }
-    Message::parse(kind, buffer).map_err(|source| ReadError::Message { offset, source })
-}
-
-/// Reads the struct of a message into `buffer`, without its array, and so without its checksum.
-///
-/// # Errors
-///
-/// [`ReadError::Read`].
-pub fn read_head<'a, R: Read + Seek>(
-    input: &mut R,
-    kind: Kind,
-    entry: &Entry,
-    buffer: &'a mut Vec<u8>,
-) -> Result<&'a [u8], ReadError> {
-    input.seek(SeekFrom::Start(entry.offset + PREAMBLE.len() as u64))?;
-    buffer.resize(kind.head_bytes(), 0);
-    input.read_exact(buffer)?;
-    Ok(buffer)
-}
-
-/// A damaged message.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Damaged {
-    /// Its topic.
-    pub topic: String,
-    /// Its frame.
-    pub frame: Option<u64>,
-    /// Its offset, bytes from the start of the file.
-    pub offset: u64,
-}
-
-/// Reads all messages of some topics, and returns those that [`read`] would refuse.
-///
-/// * `wanted`: whether a topic is checked.
-///
-/// # Errors
-///
-/// If the file cannot be read.
-pub fn check<R: Read + Seek>(
-    input: &mut R,
-    recording: &Recording,
-    wanted: impl Fn(&str) -> bool,
-) -> Result<Vec<Damaged>, ReadError> {
-    let tracks = recording.tracks.iter().filter(|it| wanted(it.0));
-    let mut all: Vec<_> = tracks
-        .flat_map(|(topic, track)| track.entries.iter().map(move |it| (topic, track.kind, it)))
-        .collect();
-    all.sort_by_key(|it| it.2.offset);
-    let (mut damaged, mut buffer) = (Vec::new(), Vec::new());
-    for (topic, kind, entry) in all {
-        match read(input, kind, entry, &mut buffer) {
-            Ok(_) => {}
-            Err(error @ ReadError::Read(_)) => return Err(error),
-            Err(_) => damaged.push(Damaged {
-                topic: topic.clone(),
-                frame: entry.frame,
-                offset: entry.offset,
-            }),
-        }
-    }
-    Ok(damaged)
 }
 
 struct Scan<'a, R: Read + Seek> {
     cursor: Cursor<'a, R>,
     found: Contents,
-    is_older: bool,
     n_false_starts: u32,
 }
 
@@ -197,32 +90,12 @@ impl<R: Read + Seek> Scan<'_, R> {
         let begin = self.cursor.at();
         let (op, len) = self.cursor.record_head()?;
         match op {
-            op::CHECKS if len <= MAX_RECORD_BYTES => {
-                let body = self.cursor.bytes(len)?;
-                match Checks::read(&body) {
-                    Some(checks) => self.take(checks)?,
-                    // The chunk has a checksum as well.
-                    None => self.found.damaged(begin, "what says where messages lie"),
-                }
-            }
+            op::CHUNK => self.chunk(begin)?,
             op::METADATA if len <= MAX_RECORD_BYTES => {
                 let body = self.cursor.bytes(len)?;
-                let (name, map) =
-                    metadata(&body).ok_or(Stop::Damaged("a record that contradicts itself"))?;
-                if name == about::NAME && about::is_older(&map) {
-                    self.is_older = true;
-                    return Ok(true);
-                }
-                let map = unseal(&name, map);
-                let map = map.ok_or(Stop::Damaged("what is said about the run"))?;
-                self.found.metadata(&name, map);
+                self.metadata(&body)
+                    .ok_or(Stop::Damaged("what is said about the run"))?;
             }
-            op::CHUNK => chunk::take(
-                &mut self.cursor,
-                &mut self.found,
-                len,
-                |cursor, _, _, len| cursor.skip(len),
-            )?,
             op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE_INDEX | op::ATTACHMENT => {
                 self.cursor.skip(len)?;
             }
@@ -236,24 +109,89 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(false)
     }
 
-    /// Takes the messages of a chunk from its list, and skips the chunk.
-    fn take(&mut self, checks: Checks) -> Result<(), Stop> {
-        let base = self.cursor.at();
-        let [begin, end, next] = checks.ends;
-        for (channel, nth, entry) in checks.messages {
-            let last = [begin, entry.offset, entry.len];
-            let last = last.iter().try_fold(0_u64, |sum, it| sum.checked_add(*it));
-            let last = last.filter(|it| *it <= end);
-            let last = last.ok_or(Stop::Damaged("a message beyond its chunk"))?;
-            let last = base.checked_add(last).ok_or(Stop::Cut)?;
-            if last > self.cursor.end() {
-                return Err(Stop::Cut);
+    /// Takes in what is said about the run; none if it is damaged.
+    fn metadata(&mut self, body: &[u8]) -> Option<()> {
+        let Ok(Record::Metadata(said)) = mcap::parse_record(op::METADATA, body) else {
+            return None;
+        };
+        let map = unseal(&said.name, said.metadata)?;
+        self.found.metadata(&said.name, map);
+        Some(())
+    }
+
+    /// Finds the messages of a chunk. One that contradicts itself is left out as a whole.
+    fn chunk(&mut self, begin: u64) -> Result<(), Stop> {
+        self.cursor.go(begin).map_err(Stop::Io)?;
+        let head = self.cursor.array::<HEAD_BYTES>()?;
+        let chunk = Chunk::read(&head);
+        let chunk = chunk.ok_or(Stop::Damaged(
+            "a chunk whose lengths contradict each other, or that is compressed",
+        ))?;
+        let end = self.cursor.at().checked_add(chunk.n_bytes);
+        let end = end.filter(|end| *end <= self.cursor.end());
+        let end = end.ok_or(Stop::Cut)?;
+        let mut messages = Vec::new();
+        match self.messages(begin, end, &mut messages) {
+            Ok(()) => {
+                for message in messages {
+                    self.found.message(message);
+                }
             }
-            self.found.extent.whole_bytes = last;
-            let offset = base + begin + entry.offset;
-            self.found.message(channel, nth, Entry { offset, ..entry });
+            Err(Stop::Damaged(what)) => self.found.damaged(begin, what),
+            Err(stop) => return Err(stop),
         }
-        self.cursor.skip(next)
+        self.cursor.go(end).map_err(Stop::Io)?;
+        self.found.extent.whole_bytes = end;
+        Ok(())
+    }
+
+    fn messages(
+        &mut self,
+        begin: u64,
+        end: u64,
+        messages: &mut Vec<MessageHead>,
+    ) -> Result<(), Stop> {
+        let damaged = Stop::Damaged("a chunk whose records are longer or shorter than it");
+        while self.cursor.at() < end {
+            let room = end - self.cursor.at();
+            if room < RECORD_HEAD_BYTES {
+                return Err(damaged);
+            }
+            let (op, len) = self.cursor.record_head()?;
+            if room - RECORD_HEAD_BYTES < len {
+                return Err(damaged);
+            }
+            let next = self.cursor.at() + len;
+            match op {
+                op::MESSAGE if len >= MESSAGE_HEAD_BYTES => {
+                    let mut message = MessageHead::read(&self.cursor.array()?);
+                    message.entry.chunk = begin;
+                    message.entry.offset = self.cursor.at();
+                    message.entry.len = len - MESSAGE_HEAD_BYTES;
+                    let kind = self.found.kind(message.channel);
+                    let has_frame = kind.is_some_and(|kind| kind.status_at().is_some());
+                    if has_frame && message.entry.len >= FRAME_END as u64 {
+                        let head = self.cursor.array::<FRAME_END>()?;
+                        let frame = head.last_chunk().copied();
+                        message.entry.frame = frame.map(u64::from_le_bytes);
+                    }
+                    messages.push(message);
+                }
+                op::CHANNEL if len <= MAX_RECORD_BYTES => {
+                    let body = self.cursor.bytes(len)?;
+                    if let Ok(Record::Channel(channel)) = mcap::parse_record(op, &body)
+                        && self.found.channels.len() < MOST_TOPICS
+                    {
+                        let name = Some(channel.topic);
+                        self.found.channels.entry(channel.id).or_insert(name);
+                    }
+                }
+                op::SCHEMA => {}
+                _ => return Err(Stop::Damaged("a record that no chunk has")),
+            }
+            self.cursor.skip(next - self.cursor.at())?;
+        }
+        Ok(())
     }
 
     /// Reads the end of the file: an index for other programs, and its checksum.
@@ -281,45 +219,49 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(())
     }
 
-    /// Moves to the next valid record; `false` if there is none.
+    /// Moves to the next chunk or metadata; `false` if there is none.
     fn go_to_next(&mut self, mut from: u64) -> io::Result<bool> {
-        let (least, overlap) = (from, TAG.len() as u64 - 1);
-        while from + overlap < self.cursor.end() {
+        let overlap = HEAD_BYTES as u64 - 1;
+        while from < self.cursor.end() {
             self.cursor.go(from)?;
-            let n = WINDOW_BYTES.min(self.cursor.end() - from);
+            let n = (WINDOW_BYTES + overlap).min(self.cursor.end() - from);
             let Some(window) = or_io(self.cursor.bytes(n))? else {
                 return Ok(false);
             };
-            for (nth, it) in (from..).zip(window.windows(TAG.len())) {
-                let before = match it {
-                    it if it == TAG => RECORD_HEAD_BYTES,
-                    it if it == about::NAME.as_bytes() => RECORD_HEAD_BYTES + 4,
-                    _ => continue,
+            for at in 0..window.len().min(WINDOW_BYTES as usize) {
+                let begin = from + at as u64;
+                let is_sound = match window[at] {
+                    op::CHUNK => self.is_chunk(&window[at..], begin),
+                    op::METADATA if is_ours(&window[at..]) => {
+                        self.n_false_starts += 1;
+                        self.is_metadata(begin)?
+                    }
+                    _ => false,
                 };
-                let Some(begin) = nth.checked_sub(before) else {
-                    continue;
-                };
-                if begin < least {
-                    continue;
-                }
-                if self.is_sound(begin)? {
+                if is_sound {
                     self.cursor.go(begin)?;
                     return Ok(true);
                 }
-                self.n_false_starts += 1;
                 if self.n_false_starts > MOST_FALSE_STARTS {
                     return Ok(false);
                 }
             }
-            from += n - overlap.min(n - 1);
+            from += WINDOW_BYTES;
         }
         Ok(false)
     }
 
-    /// Whether a valid record starts here.
-    fn is_sound(&mut self, begin: u64) -> io::Result<bool> {
+    /// Whether the head of a whole chunk stands here. Its lengths say so in three places.
+    fn is_chunk(&self, bytes: &[u8], begin: u64) -> bool {
+        let chunk = bytes.first_chunk().and_then(Chunk::read);
+        let head = begin + HEAD_BYTES as u64;
+        chunk.is_some_and(|chunk| head + chunk.n_bytes <= self.cursor.end())
+    }
+
+    /// Whether undamaged metadata stands here.
+    fn is_metadata(&mut self, begin: u64) -> io::Result<bool> {
         self.cursor.go(begin)?;
-        let Some((op, len)) = or_io(self.cursor.record_head())? else {
+        let Some((_, len)) = or_io(self.cursor.record_head())? else {
             return Ok(false);
         };
         if len > MAX_RECORD_BYTES {
@@ -328,12 +270,18 @@ impl<R: Read + Seek> Scan<'_, R> {
         let Some(body) = or_io(self.cursor.bytes(len))? else {
             return Ok(false);
         };
-        Ok(match op {
-            op::CHECKS => Checks::read(&body).is_some(),
-            op::METADATA => metadata(&body).is_some_and(|(name, map)| unseal(&name, map).is_some()),
+        let read = mcap::parse_record(op::METADATA, &body);
+        Ok(match read {
+            Ok(Record::Metadata(said)) => unseal(&said.name, said.metadata).is_some(),
             _ => false,
         })
     }
+}
+
+/// Whether metadata that this program writes may begin here.
+fn is_ours(bytes: &[u8]) -> bool {
+    let name = bytes.get(NAME_AT..);
+    name.is_some_and(|name| name.starts_with(about::NAME.as_bytes()))
 }
 
 /// None if the file is truncated or the content invalid.

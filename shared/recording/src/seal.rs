@@ -1,25 +1,28 @@
-//! Metadata with a checksum.
+//! Metadata with a checksum, which MCAP has for chunks only.
 
 use std::collections::BTreeMap;
 
-use crate::mcap::Body;
-
 /// The key of the checksum in the map.
-pub(crate) const KEY: &str = "checksum";
+const KEY: &str = "checksum";
 
 fn checksum(name: &str, map: &BTreeMap<String, String>) -> String {
-    let body = Body::default().bytes(name.as_bytes()).map(map);
-    format!("{:08x}", crc32fast::hash(body.fields()))
+    let mut hasher = crc32fast::Hasher::new();
+    let entries = map.iter().flat_map(|(key, value)| [key, value]);
+    for text in std::iter::once(name).chain(entries.map(String::as_str)) {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    }
+    format!("{:08x}", hasher.finalize())
 }
 
-/// A map with its checksum.
+/// Returns the map with its checksum.
 pub(crate) fn seal(name: &str, mut map: BTreeMap<String, String>) -> BTreeMap<String, String> {
     let checksum = checksum(name, &map);
     map.insert(KEY.to_owned(), checksum);
     map
 }
 
-/// The map without its checksum; none if it is damaged.
+/// Returns the map without its checksum; none if it is damaged.
 pub(crate) fn unseal(
     name: &str,
     mut map: BTreeMap<String, String>,

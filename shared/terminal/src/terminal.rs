@@ -2,8 +2,7 @@
 
 use core::time::Duration;
 
-use failure::Console;
-use failure::Failure;
+use failure::{Console, Failure};
 use indicatif::ProgressBar;
 use serde_json::Value;
 

@@ -11,7 +11,7 @@ libfuzzer_sys::fuzz_target!(|input: &[u8]| {
     let extent = &recording.extent;
     assert!(extent.whole_bytes <= extent.file_bytes);
     assert!(recording.n_messages() * 22 <= extent.file_bytes);
-    let mut buffer = Vec::new();
+    let mut buffer = recording::Buffer::default();
     for track in recording.tracks.values() {
         for entry in &track.entries {
             if let Ok(message) = recording::read(&mut file, track.kind, entry, &mut buffer) {

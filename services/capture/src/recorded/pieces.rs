@@ -3,7 +3,7 @@
 use std::io;
 use std::path::Path;
 
-use recording::Kind;
+use recording::{Buffer, Kind};
 
 use super::table::{Part, Picture, Table};
 
@@ -25,7 +25,7 @@ pub(super) fn from(
     let begin = own[..here.unwrap_or(0)].iter().rposition(head);
     let mut state = State::Begin;
     let mut last = None;
-    let mut buffer = Vec::new();
+    let mut buffer = Buffer::default();
     let from_begin = own.into_iter().skip(begin.unwrap_or(0));
     Ok(from_begin.filter_map(move |part| {
         let is_next = last.is_none_or(|it: u64| it.checked_add(1) == Some(part.number));

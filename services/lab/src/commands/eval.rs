@@ -16,8 +16,7 @@ use datasets::sequences::{Alignment, Sequence};
 use deployment::fuse::Config;
 use deployment::fuse_numbers;
 use evaluation::{FilmSettings, Version};
-use failure::Claim;
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Claim, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use inputs::Shipped;
 use lab::eval::{Done, Fusion, Job};
@@ -25,8 +24,7 @@ use skeleton::JointSet;
 use viewquality::{Forecaster, Network, Table};
 
 use super::judge::selection;
-use terminal::Globals;
-use terminal::Terminal;
+use terminal::{Globals, Terminal};
 
 /// The template of the progress bar.
 const BAR: &str = "{elapsed_precise} {bar:30} {pos}/{len} frames, {msg}";

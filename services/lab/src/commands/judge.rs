@@ -15,10 +15,7 @@ use lab::judged::{self, Reader};
 use score::Bootstrap;
 use serde_json::json;
 use skeleton::PARSE14;
-use terminal::output;
-
-use terminal::Globals;
-use terminal::Terminal;
+use terminal::{Globals, Terminal, output};
 
 /// The progress bar.
 pub(super) const BAR: &str =

@@ -11,12 +11,10 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use lab::synth::{self, Done, Job, Written};
 use scene::{Action, Flaws, RigChoice};
 use serde_json::json;
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 use motion::MotionArguments;
 use parse::{actions, rig, subjects};
-use terminal::Globals;
-use terminal::Terminal;
 
 const HELP: &str = "\
 OUT holds what a recording would, and more: deployment.toml (`parallax run OUT/deployment.toml`), rig.toml, the pictures \

@@ -19,9 +19,7 @@ use lab::person::{Job, Progress, Store};
 use training::Settings;
 
 use people::People;
-use terminal::Globals;
-use terminal::Terminal;
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 /// The template of the progress bar.
 const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} images{msg}";

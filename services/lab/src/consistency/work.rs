@@ -6,14 +6,13 @@ use std::time::{Duration, Instant};
 use ::consistency::{Grid, Learned, Learner, Point, Settings, Shape, Tally, Weights, best};
 use datasets::sequences::{Frame, Sequence};
 use evaluation::{Bench, Combining, Film, FilmSettings, Setup, Terms, Trial, Version, score};
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use kernels::Rgb8View;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
 use score::Point as Joint;
 
 use crate::failures::film_failure;
-use failure::Console;
 
 /// Numbers of bins that are compared.
 const BINS: [usize; 5] = [3, 6, 9, 12, 18];

@@ -5,7 +5,7 @@ use evaluation::{
     Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
     projected,
 };
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Layout, Pose, Search};
 use geometry::Camera;
 use kernels::Rgb8View;
@@ -18,8 +18,6 @@ use posenetwork::{
 };
 use score::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
 use skeleton::PARSE14;
-
-use failure::Console;
 
 /// Least share of a segment's length at which it is not found (eq. 13 of the paper).
 const GAMMA: f64 = 0.5;

@@ -11,7 +11,7 @@ use evaluation::{
     Bench, Expectation, Film, FilmSettings, Header, Predicted, Record, Setup, SingleView, Trial,
     Version, parse14, part_errors, projected, read_records, tenth_of,
 };
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop, in_file, read_text};
 use fmp::Model;
 use orientation::Detector;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
@@ -20,8 +20,6 @@ use viewquality::{ForecastInput, Forecaster, Table};
 
 use super::progress::Progress;
 use crate::failures::film_failure;
-use failure::Console;
-use failure::{in_file, read_text};
 
 /// How the views of a sequence are solved together, and the part-type tables of its cameras.
 pub type Fusion = (multiview::Settings, PairTables);

@@ -6,12 +6,11 @@ use std::path::Path;
 use datasets::People;
 use evaluation::page::pictures_html;
 use evaluation::{Intervals, Judged, Pictures, pictures_latex};
-use failure::{ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _, in_file};
 use score::Bootstrap;
 use serde_json::{Value, json};
 
 use crate::judged;
-use failure::in_file;
 
 /// Whether a path is a data set of single pictures, by what lies there.
 pub fn is_one(path: &Path) -> bool {

@@ -4,11 +4,10 @@ use std::path::Path;
 
 use evaluation::page::{Page, html};
 use evaluation::{FrameScore, Group, Measured, Summary, Version, judge, latex, score, summarise};
-use failure::{ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _, in_file};
 use score::Bootstrap;
 
 use super::Done;
-use failure::in_file;
 
 impl Done {
     /// Scores what was found.

@@ -6,11 +6,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use datasets::Problem;
-use failure::{ExitKind, Failure, Stop};
+use failure::{Console, ExitKind, Failure, Stop};
 use serde_json::{Map, Value, json};
 use training::{Event, Gap, Step, Watch};
-
-use failure::Console;
 
 /// Tells a console what is being done, and how long it will take.
 #[derive(Debug)]

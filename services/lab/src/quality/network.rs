@@ -16,8 +16,7 @@ use report::curves::{self, Line, Panel};
 use serde_json::json;
 
 use super::replace::replace;
-use failure::in_file;
-use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop, in_file};
 
 /// The results of a pass over the samples.
 type Pass = networktraining::Pass<f32, Validated>;

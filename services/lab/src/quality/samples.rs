@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use datasets::{Picture, ReadOptions, Selection};
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use networktraining::quality::sample::Sample;
 use networktraining::quality::store::Samples;
@@ -17,7 +17,6 @@ use super::work::Work;
 use crate::failures::dataset_failure;
 use crate::person::deal;
 use crate::scenes::{Scenes, of_pictures};
-use failure::Console;
 
 /// Which pictures.
 #[derive(Debug, Clone)]

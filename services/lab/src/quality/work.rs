@@ -2,10 +2,9 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use failure::{ExitKind, Failure, Stop};
+use failure::{Console, ExitKind, Failure, Stop};
 
 use super::observer::Observer;
-use failure::Console;
 
 /// What all threads share.
 pub(super) struct Work<'a> {

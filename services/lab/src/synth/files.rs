@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use failure::{ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _, in_file};
 use footage::Size;
 use geometry::files::Format as RigFormat;
 use image::codecs::jpeg::JpegEncoder;
@@ -13,7 +13,6 @@ use scene::truth::{Frame, Header};
 use scene::{Address, Scene};
 
 use super::{Job, absolute_path};
-use failure::in_file;
 
 const JPEG_QUALITY: u8 = 95;
 

@@ -4,14 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use datasets::Person;
-use failure::{ExitKind, Failure, Stop};
+use failure::{Console, ExitKind, Failure, Stop};
 use rayon::prelude::*;
 use scene::truth::{Frame, View as Seen};
 use scene::{Scene, SceneError, Settings, View};
 
 use super::people::People;
 use super::{Job, files, rig_failure};
-use failure::Console;
 use inputs::make_folder;
 
 /// Frames that one thread makes one after the other, of one camera.

@@ -301,7 +301,7 @@ fn messages(
     let mut input = files::open(file).map_err(|error| in_file(file, &error))?;
     let mut gathering = Gathering::new(views(Some(resolved)));
     let track = recording.tracks.get(&topic::pose3d());
-    let (mut buffer, mut n_damaged) = (Vec::new(), 0);
+    let (mut buffer, mut n_damaged) = (recording::Buffer::default(), 0);
     for entry in track.map_or(&[][..], |it| &it.entries) {
         let message = match recording::read(&mut input, Kind::Pose3d, entry, &mut buffer) {
             Ok(message) => message,

@@ -5,8 +5,7 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use exports::{Trial, ViewCamera, annotate, openpose};
-use failure::Console;
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use footage::{Canvas, FootageError, Size, VideoWriter};
 
 use super::pictures::Pictures;

@@ -9,7 +9,7 @@ use exports::ViewCamera;
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use footage::SourceSpec;
 use messages::topic;
-use recording::{Entry, Kind, Recording};
+use recording::{Buffer, Entry, Kind, Recording};
 
 use super::origin::camera as camera_of;
 use super::{Origin, of_footage};
@@ -36,7 +36,7 @@ enum From {
         path: PathBuf,
         file: File,
         frames: BTreeMap<u64, Entry>,
-        buffer: Vec<u8>,
+        buffer: Buffer,
     },
 }
 
@@ -161,6 +161,6 @@ fn recorded(origin: &Origin, recording: &Recording, nth: usize) -> Option<From> 
         path: origin.source.clone(),
         file: files::open(&origin.source).ok()?,
         frames: frames.collect(),
-        buffer: Vec::new(),
+        buffer: Buffer::default(),
     })
 }

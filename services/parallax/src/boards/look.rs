@@ -5,13 +5,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use calibration::board::Sight;
 use calibration::boards::{Board, Finder, Found, Hints, Nothing, Picture};
-use failure::{ExitKind, Failure, Stop};
+use failure::{Console, ExitKind, Failure, Stop};
 use footage::{Source, SourceInfo, SourceSpec};
 use rayon::prelude::*;
 
 use super::frames::{beside, by_clock, slowest};
 use super::{CameraFootage, FrameTable, Looked, Seen, footage_failure};
-use failure::Console;
 
 /// Pictures in which the board was read in one way before it is believed of the camera.
 const SURE: usize = 3;

@@ -6,13 +6,12 @@ use calibration::board::{
     BoardError, LensKind, Outcome, Sight, Task, Together, calibrate as adjust,
 };
 use calibration::boards::{Board, Kind, dictionary_names};
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use geometry::{Camera, Rig};
 use nalgebra::Point2;
 use report::boards::Page;
 
 use super::{CameraFootage, LookSettings, Looked, Overlay, look, read_corners, worst};
-use failure::Console;
 
 /// The pictures that fit worst and are shown.
 const WORST: usize = 8;

@@ -9,10 +9,8 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 use failure::{ExitKind, Failure};
-use terminal::output;
+use terminal::{Globals, output};
 use trials::bench::{self, Kind, Report};
-
-use terminal::Globals;
 
 /// The benchmark to run.
 #[derive(Debug, Subcommand)]

@@ -5,10 +5,8 @@ use std::process::ExitCode;
 
 use clap::Args;
 use failure::{ExitKind, Failure};
-use terminal::output;
+use terminal::{Globals, output};
 use trials::chaos::{self, Options, Scenario};
-
-use terminal::Globals;
 
 const HELP: &str = "\
 Every scenario is a run of its own, with real processes and a real fault; --list names them. Without a DEPLOYMENT the \

@@ -6,12 +6,10 @@ use std::process::ExitCode;
 use clap::Args;
 use failure::{ExitKind, Failure};
 use scene::Action;
-use terminal::output;
+use terminal::{Globals, output, rate};
 use trials::demo::{self, Options};
 
 use super::view;
-use terminal::Globals;
-use terminal::rate;
 
 const HELP: &str = "\
 Nothing is needed but this program: the capture processes render pictures of a synthetic person during the run (see \

@@ -17,11 +17,10 @@ use kernels::Rgb8View;
 use posenetwork::springs::TurnedSprings;
 use serde_json::json;
 use skeleton::{JointSet, PARSE14};
-use terminal::output;
+use terminal::{Outline, outline, output};
 
 use crate::describe::{self, NamedJoints, Placed};
 use by_network::Eyes;
-use terminal::{Outline, outline};
 
 /// Default of `--size`: the longest side of a searched image, pixels.
 const SIZE: usize = 1280;

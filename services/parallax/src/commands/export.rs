@@ -7,10 +7,7 @@ use clap::{Args, ValueEnum};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::export::{Format, Given, Job, Lines, Naming, Origin, Written, as_json, export};
 use nalgebra::{UnitVector3, Vector3};
-use terminal::output;
-
-use terminal::Globals;
-use terminal::Terminal;
+use terminal::{Globals, Terminal, output};
 
 /// What is said where the format is not in the build.
 const NO_PARQUET: &str = "this build writes none: cargo build --release --features parquet";

@@ -9,10 +9,9 @@ use clap::Args;
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use nalgebra::UnitVector3;
 use rigs::boards::CameraFootage;
-use terminal::output;
+use terminal::{Globals, output};
 
 use crate::commands::calibrate::height;
-use terminal::Globals;
 
 /// Options of `parallax new`.
 #[derive(Debug, Args)]

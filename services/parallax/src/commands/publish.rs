@@ -6,9 +6,7 @@ use clap::Args;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::live;
 use publish::{Companion, Target};
-use terminal::output;
-
-use terminal::Globals;
+use terminal::{Globals, output};
 
 /// Options of `parallax publish`.
 #[derive(Debug, Args)]

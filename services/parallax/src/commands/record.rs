@@ -10,11 +10,10 @@ use clap::{Args, ValueEnum};
 use deployment::RecordingPlan;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::{Planned, Resolved, load, recorded};
-use terminal::output;
+use terminal::{Globals, output};
 
 use super::hosts;
 use disk_space::{Forecast, Growth, PerFrame};
-use terminal::Globals;
 
 /// The maximal number of epochs of the recording process whose files are looked for.
 const MAX_EPOCHS: u32 = 64;

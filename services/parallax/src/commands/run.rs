@@ -8,10 +8,9 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::{Planned, load};
 use runtime::{free_shared_memory, needed_bytes, preflight};
 use supervise::Plan;
-use terminal::output;
+use terminal::{Globals, output};
 
 use super::{hosts, publish, view};
-use terminal::Globals;
 
 /// Options of `parallax run`.
 #[derive(Debug, Args)]

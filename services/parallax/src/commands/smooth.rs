@@ -10,10 +10,7 @@ use nalgebra::{UnitVector3, Vector3};
 use rigs::smooth::trial::{self, Trial};
 use rigs::smooth::{self, Comparison, Outcome, Request, Row};
 use serde_json::{Value, json};
-use terminal::output;
-
-use terminal::Globals;
-use terminal::Terminal;
+use terminal::{Globals, Terminal, output};
 
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} motions{left} {prefix} {msg}";

@@ -8,16 +8,11 @@ use std::process::ExitCode;
 use calibration::synchronisation::{Outcome, Settings, estimate};
 use clap::{Args, Subcommand, ValueEnum};
 use deployment::{ClockKeys, Deployment, with_clocks};
-use failure::Console as _;
-use failure::unless_stopped;
-use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
+use failure::{Console as _, ExitKind, Failure, OrFail as _, Stop, in_file, unless_stopped};
 use launch::films::{Films, Part, Poses, films};
 use launch::load;
 use serde_json::{Value, json};
-use terminal::output;
-
-use terminal::Globals;
-use terminal::Terminal;
+use terminal::{Globals, Terminal, output};
 
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";

@@ -11,10 +11,8 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::load;
 use runtime::{Namespace, deployments};
 use serde_json::json;
-use terminal::output;
+use terminal::{Globals, output};
 use view::{Listen, Options, Subject};
-
-use terminal::Globals;
 
 /// Shortest token that is accepted, characters.
 const SHORTEST_TOKEN: usize = 16;

@@ -3,14 +3,13 @@
 mod noise;
 
 use deployment::smooth::Config;
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use nalgebra::Vector3;
 use scene::{Action, Scene};
 use score::Bootstrap;
 use serde_json::{Value, json};
 
 use super::compare::{self, Row, Tried};
-use failure::Console;
 pub use noise::Flaws;
 
 /// What is tried.

@@ -9,7 +9,7 @@ use bytemuck::pod_read_unaligned;
 use failure::{ExitKind, Failure};
 use launch::recorded::{self, Settings};
 use messages::{FrameHeader, Pose3d, Status, topic};
-use recording::{Entry, Kind, Recording};
+use recording::{Buffer, Entry, Kind, Recording};
 
 use super::Frame;
 use crate::moment::Moment;
@@ -116,7 +116,7 @@ impl Tape {
     pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
         let (frame, entry) = self.pictures.get(view)?.range(..=frame).next_back()?;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut buffer = Vec::new();
+        let mut buffer = Buffer::default();
         let message = recording::read(&mut *file, Kind::Frame, entry, &mut buffer).ok()?;
         let head: FrameHeader = pod_read_unaligned(message.head);
         let size = [head.width as usize, head.height as usize];
@@ -125,7 +125,7 @@ impl Tape {
 }
 
 fn read_pose(file: &mut File, entry: &Entry) -> Result<Pose3d, Failure> {
-    let mut buffer = Vec::new();
+    let mut buffer = Buffer::default();
     let message = recording::read(file, Kind::Pose3d, entry, &mut buffer);
     let message = message.map_err(|why| Failure::new(ExitKind::Input, why))?;
     Ok(pod_read_unaligned(message.head))

@@ -5,18 +5,15 @@ use std::process::ExitCode;
 
 use clap::Args;
 use evaluation::{FilmSettings, Stress};
-use failure::Claim;
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{Claim, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use inputs::library::Library;
 use lab::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
 use posenetwork::springs::TurnedSprings;
 use score::Bootstrap;
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 use super::Arguments;
-use terminal::Globals;
-use terminal::Terminal;
 
 /// Options of the evaluation on a network.
 #[derive(Debug, Args)]

@@ -10,12 +10,10 @@ use lab::eval::pictures;
 use lab::judged::{self, Reader};
 use score::Bootstrap;
 use skeleton::PARSE14;
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 use super::Arguments;
 use crate::commands::judge;
-use terminal::Globals;
-use terminal::Terminal;
 
 /// Runs the evaluation.
 pub(super) fn run(

@@ -5,8 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use evaluation::{Intervals, Judged, Pictures};
-use failure::Console;
-use failure::{ExitKind, Failure, Stop};
+use failure::{Console, ExitKind, Failure, Stop};
 use fmp::Search;
 use inputs::library::Library;
 use lab::judged;

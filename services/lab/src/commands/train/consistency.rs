@@ -10,9 +10,7 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use lab::consistency::{Done, Job, Learning, Sequences};
 
 use crate::commands::eval::size;
-use terminal::Globals;
-use terminal::Terminal;
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
 SEQUENCE is what `parallax-lab eval` takes: a folder of HumanEva-I, of UMPM, of `parallax-lab synth`, or a description. \

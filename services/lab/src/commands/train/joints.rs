@@ -10,9 +10,7 @@ use lab::joints::Learned;
 use serde_json::json;
 
 use super::marked::Marked;
-use terminal::Globals;
-use terminal::Terminal;
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
 A joint is the centre of one part, unless a file says better: this command searches the pictures of marked people with the \

@@ -11,9 +11,7 @@ use orientation::Settings;
 use serde_json::json;
 
 use super::subjects;
-use terminal::Globals;
-use terminal::Terminal;
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
 Exchanging left and right in all views changes no energy: which side is which follows from whether the person is seen \

@@ -7,11 +7,9 @@ use clap::Args;
 use failure::Failure;
 use posenetwork::springs::SpringSettings;
 use serde_json::json;
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 use super::marked::Marked;
-use terminal::Globals;
-use terminal::Terminal;
 
 const HELP: &str = "\
 A network that finds keypoints says where every joint may be, and nothing about which joints belong together. The springs do: \

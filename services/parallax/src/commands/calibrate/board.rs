@@ -9,18 +9,15 @@ use std::process::ExitCode;
 use calibration::board::LensKind;
 use calibration::boards::{Board, Paper};
 use clap::{Args, ValueEnum};
-use failure::Console as _;
-use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
+use failure::{Console as _, ExitKind, Failure, OrFail as _, Stop, in_file};
 use geometry::files::ReadOptions;
 use rigs::boards::{
     Back, BoardSettings, Calibrated, CameraFootage, LookSettings, calibrate, read_frames,
     write_corners,
 };
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 use crate::commands::calib::To;
-use terminal::Globals;
-use terminal::Terminal;
 
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";

@@ -14,10 +14,7 @@ use geometry::Rig;
 use geometry::files::{Format, ReadOptions};
 use nalgebra::Point2;
 use rigs::boards::{CameraFootage, LookSettings, look};
-use terminal::output;
-
-use terminal::Globals;
-use terminal::Terminal;
+use terminal::{Globals, Terminal, output};
 
 /// Options of `parallax calibrate origin`.
 #[derive(Debug, Args)]

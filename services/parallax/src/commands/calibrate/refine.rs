@@ -8,11 +8,10 @@ use clap::Args;
 use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use launch::films::Poses;
 use serde_json::{Value, json};
-use terminal::output;
+use terminal::{Globals, output};
 
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
-use terminal::Globals;
 
 /// What to try where the answer is refused.
 const HINT: &str = "let one person walk through the whole volume for half a minute; if a camera was moved far, \

@@ -5,16 +5,14 @@ use std::path::{Path, PathBuf};
 use calibration::people::Doubt;
 use clap::Args;
 use deployment::Deployment;
-use failure::unless_stopped;
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{ExitKind, Failure, OrFail as _, Stop, unless_stopped};
 use geometry::files::Format;
 use geometry::{Camera, Rig};
 use launch::films::{Films, Part, Poses, films};
 use launch::load;
 use nalgebra::UnitVector3;
 
-use terminal::Globals;
-use terminal::Terminal;
+use terminal::{Globals, Terminal};
 
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";

@@ -2,8 +2,7 @@
 
 use calibration::synchronisation::{Outcome, Sound, SoundSettings, estimate_by_sound};
 use deployment::Deployment;
-use failure::unless_stopped;
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{ExitKind, Failure, OrFail as _, Stop, unless_stopped};
 use footage::{RecordedSound, SourceSpec, read_sound};
 use geometry::Camera;
 use launch::films::{Part, cameras};

@@ -8,9 +8,7 @@ use failure::{ExitKind, Failure, OrFail as _};
 use inputs::Shipped;
 use networktraining::Backend;
 use networktraining::pose::Settings;
-use terminal::output;
-
-use terminal::Globals;
+use terminal::{Globals, output};
 
 const HELP: &str = "\
 PEOPLE is a file of `parallax-lab train network-people`. The network finds 14 joints as seen, the direction in which the trunk faces, and \

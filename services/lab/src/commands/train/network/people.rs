@@ -9,12 +9,10 @@ use inputs::network::NetworkFile;
 use lab::posetraining::{self, People};
 use lab::quality::Scenes;
 use serde_json::json;
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 use crate::commands::train::marked::Marked;
 use crate::commands::train::subjects;
-use terminal::Globals;
-use terminal::Terminal;
 
 /// The template of the progress bar.
 const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} {msg}";

@@ -9,8 +9,7 @@ use networktraining::Backend;
 use networktraining::quality::network::Kind;
 use networktraining::quality::settings::Settings;
 
-use terminal::Globals;
-use terminal::output;
+use terminal::{Globals, output};
 
 const HELP: &str = "\
 The samples are made by `parallax-lab train quality-samples`; a share of their groups (subjects, images) is validated on, \

@@ -9,9 +9,7 @@ use lab::quality::{Scenes, samples};
 use viewquality::TileShape;
 
 use crate::commands::train::subjects;
-use terminal::Globals;
-use terminal::Terminal;
-use terminal::output;
+use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
 Two sources, together or alone: scenes that do not exist (--scenes N, of the subjects of --subjects, every one of \

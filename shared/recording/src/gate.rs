@@ -1,0 +1,59 @@
+//! The way to the file: counts what it holds, and closes once something could not be written.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Counts the bytes of the file, and closes the way to it; shared with the [`Gate`].
+#[derive(Debug, Default, Clone)]
+pub(crate) struct Keeper(Arc<State>);
+
+#[derive(Debug, Default)]
+struct State {
+    n_bytes: AtomicU64,
+    is_closed: AtomicBool,
+}
+
+impl Keeper {
+    /// Returns the number of bytes that the file holds.
+    pub(crate) fn n_bytes(&self) -> u64 {
+        self.0.n_bytes.load(Ordering::Relaxed)
+    }
+
+    /// Returns whether nothing more is written.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.0.is_closed.load(Ordering::Relaxed)
+    }
+
+    /// Lets nothing more through: what follows would lie in a wrong place.
+    pub(crate) fn close(&self) {
+        self.0.is_closed.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Passes bytes on until it is closed.
+pub(crate) struct Gate<W> {
+    out: W,
+    keeper: Keeper,
+}
+
+impl<W> Gate<W> {
+    pub(crate) fn new(out: W, keeper: Keeper) -> Self {
+        Self { out, keeper }
+    }
+}
+
+impl<W: Write> Write for Gate<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.keeper.is_closed() {
+            return Err(io::Error::other("it could not be written before"));
+        }
+        let n = self.out.write(bytes)?;
+        self.keeper.0.n_bytes.fetch_add(n as u64, Ordering::Relaxed);
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
