@@ -5,15 +5,13 @@
 
 mod compare;
 mod folder;
-pub mod trial;
 mod write;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use deployment::smooth::{Config, Method};
-use failure::{Console, ExitKind, Failure};
-use motion::live::{self, OneEuro};
+use motion::live;
 use motion::{Motion, Recorded, Report, butterworth};
 use nalgebra::UnitVector3;
 use runfiles::{SmoothReport, SmoothedJoint, Unsure};
@@ -89,7 +87,6 @@ pub fn smoothed(recorded: &Recorded, settings: &Config) -> Result<Motion, Failur
         fill_s: settings.fill_s,
         constant_bones: settings.constant_bones,
     };
-    let causal = |method| Ok(live::over(recorded, method, settings.fill_s));
     match settings.method {
         Method::Rts => Ok(motion::smooth(recorded, &of_rts)),
         Method::Butterworth => {
@@ -100,18 +97,8 @@ pub fn smoothed(recorded: &Recorded, settings: &Config) -> Result<Motion, Failur
                 Failure::new(ExitKind::Usage, error).with_hint(hint)
             })
         }
-        Method::OneEuro => causal(live::Method::OneEuro(one_euro(settings))),
-        Method::Kalman => causal(live::Method::Kalman),
+        Method::Kalman => Ok(live::over(recorded, settings.fill_s)),
         Method::None => Ok(motion::as_measured(recorded)),
-    }
-}
-
-/// The one-euro filter of the settings.
-fn one_euro(settings: &Config) -> OneEuro {
-    OneEuro {
-        min_cutoff_hz: settings.min_cutoff_hz,
-        beta: settings.beta,
-        ..OneEuro::default()
     }
 }
 

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io;
 
 use deployment::smooth::{Config, Live};
-use motion::live::{Method, OneEuro, Smoother};
+use motion::live::Smoother;
 use motion::{Measured, Smoothed, State, lines};
 use runfiles::{FrameLine, JointLine, SmoothReport, SmoothedJoint};
 
@@ -34,22 +34,16 @@ impl Smoothing {
         settings: &Config,
         file: impl FnOnce() -> io::Result<File>,
     ) -> io::Result<Option<Self>> {
-        let method = match settings.live {
-            Live::Off => return Ok(None),
-            Live::Kalman => Method::Kalman,
-            Live::OneEuro => Method::OneEuro(OneEuro {
-                min_cutoff_hz: settings.min_cutoff_hz,
-                beta: settings.beta,
-                ..OneEuro::default()
-            }),
-        };
+        if settings.live == Live::Off {
+            return Ok(None);
+        }
         let joints = scene.joints.joints.iter().map(|it| it.name.to_owned());
         let names: Vec<String> = joints
             .chain(scene.extra_keypoints.iter().cloned())
             .collect();
         let known: Vec<&str> = names.iter().map(String::as_str).collect();
         Ok(Some(Self {
-            smoother: Smoother::new(&known, method, settings.fill_s),
+            smoother: Smoother::new(&known, settings.fill_s),
             n_joints: scene.joints.joints.len(),
             counts: vec![SmoothedJoint::default(); names.len()],
             n_frames: 0,

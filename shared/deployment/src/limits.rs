@@ -32,8 +32,6 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     let smooth = &it.smooth;
     between("smooth.cutoff_hz", smooth.cutoff_hz)?;
     between("smooth.fill_s", smooth.fill_s)?;
-    between("smooth.min_cutoff_hz", smooth.min_cutoff_hz)?;
-    between("smooth.beta", smooth.beta)?;
     supervise(it)
 }
 

@@ -18,7 +18,7 @@ const MOST_FRAMES: f64 = 1e12;
 /// `camera` the length of the list.
 ///
 /// Whole numbers are among them: all of these are exact.
-pub(crate) const RANGES: [(&str, f64, f64); 52] = [
+pub(crate) const RANGES: [(&str, f64, f64); 50] = [
     ("capture.size", 1.0, 16_384.0),
     ("capture.scale", 0.001, 8.0),
     ("capture.frame_rate_hz", 0.001, 1e5),
@@ -56,8 +56,6 @@ pub(crate) const RANGES: [(&str, f64, f64); 52] = [
     ("results.epipolar_part", 1.0, 1000.0),
     ("smooth.cutoff_hz", 0.1, 1000.0),
     ("smooth.fill_s", 0.0, 10.0),
-    ("smooth.min_cutoff_hz", 0.01, 1000.0),
-    ("smooth.beta", 0.0, 1000.0),
     ("link.jpeg_quality", 1.0, 100.0),
     ("link.max_clock_share", 0.001, 1.0),
     ("supervise.deadline_ms", 1.0, HOUR_MS),

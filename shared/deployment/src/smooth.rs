@@ -9,10 +9,9 @@ use serde::{Deserialize, Serialize};
 #[schemars(rename = "Smooth")]
 pub struct Config {
     /// How `parallax smooth` does it: `rts`, a smoother on the measured covariances that looks ahead; `butterworth`, a zero-phase
-    /// low-pass filter; `one-euro` and `kalman`, as they would have been live; `none`, only angles are computed.
+    /// low-pass filter; `kalman`, as it would have been live; `none`, only angles are computed.
     pub method: Method,
-    /// What is written while the run lasts, into `pose3d-smooth.jsonl`: `off` nothing; `kalman`, filters on the measured covariances;
-    /// `one-euro`, a low-pass filter whose cutoff rises with the speed.
+    /// What is written while the run lasts, into `pose3d-smooth.jsonl`: `off` nothing; `kalman`, filters on the measured covariances.
     pub live: Live,
     /// Cutoff of `butterworth`, Hz.
     pub cutoff_hz: f64,
@@ -20,10 +19,6 @@ pub struct Config {
     pub fill_s: f64,
     /// Whether `rts` keeps the lengths of the limbs' bones constant over the run.
     pub constant_bones: bool,
-    /// Cutoff of `one-euro` at rest, Hz.
-    pub min_cutoff_hz: f64,
-    /// By how much the cutoff of `one-euro` rises with the speed, Hz for each m/s.
-    pub beta: f64,
 }
 
 impl Default for Config {
@@ -34,8 +29,6 @@ impl Default for Config {
             cutoff_hz: 6.0,
             fill_s: 0.25,
             constant_bones: false,
-            min_cutoff_hz: 1.0,
-            beta: 4.0,
         }
     }
 }
@@ -49,8 +42,6 @@ pub enum Method {
     Rts,
     /// By a zero-phase low-pass filter.
     Butterworth,
-    /// By a causal low-pass filter.
-    OneEuro,
     /// By causal filters on the measured covariances.
     Kalman,
     /// Not at all.
@@ -59,20 +50,13 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 5] = [
-        Self::Rts,
-        Self::Butterworth,
-        Self::OneEuro,
-        Self::Kalman,
-        Self::None,
-    ];
+    pub const ALL: [Self; 4] = [Self::Rts, Self::Butterworth, Self::Kalman, Self::None];
 
     /// The word of the deployment file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rts => "rts",
             Self::Butterworth => "butterworth",
-            Self::OneEuro => "one-euro",
             Self::Kalman => "kalman",
             Self::None => "none",
         }
@@ -88,8 +72,6 @@ pub enum Live {
     Off,
     /// By Kalman filters on the measured covariances.
     Kalman,
-    /// By a low-pass filter whose cutoff rises with the speed.
-    OneEuro,
 }
 
 impl Live {
@@ -98,7 +80,6 @@ impl Live {
         match self {
             Self::Off => "off",
             Self::Kalman => "kalman",
-            Self::OneEuro => "one-euro",
         }
     }
 }

@@ -1,38 +1,22 @@
 //! Smoothing while it happens: with what was before alone.
 
 mod kalman;
-mod one_euro;
 
 use crate::prior::prior;
 use crate::recorded::{Counts, Motion, Recorded, Report, Sides};
 use crate::role::Role;
 use crate::track::{Absent, Measured, Smoothed};
 use kalman::Models;
-pub use one_euro::OneEuro;
 
-/// How to smooth.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Method {
-    /// Several Kalman filters of different restlessness, weighted by how well they predict.
-    Kalman,
-    /// The one-euro filter.
-    OneEuro(OneEuro),
-}
-
-/// Smooths the joints of a person as they come.
+/// Smooths the joints of a person as they come: by several Kalman filters of different restlessness for each joint, weighted by
+/// how well they predict.
 #[derive(Debug)]
 pub struct Smoother {
-    joints: Vec<Filter>,
+    joints: Vec<Models>,
     /// Of every joint, whether it has a side.
     is_sided: Vec<bool>,
     fill_s: f64,
     delay: Delay,
-}
-
-#[derive(Debug)]
-enum Filter {
-    Kalman(Box<Models>),
-    OneEuro(one_euro::Filter),
 }
 
 /// Mean delay over all steps.
@@ -45,13 +29,10 @@ struct Delay {
 impl Smoother {
     /// * `names`: of the joints.
     /// * `fill_s`: how long a joint that is not measured is given a position that is only predicted, seconds.
-    pub fn new(names: &[&str], method: Method, fill_s: f64) -> Self {
-        let filter = |name: &&str| match method {
-            Method::Kalman => Filter::Kalman(Box::new(Models::new(prior(Role::of(name))))),
-            Method::OneEuro(settings) => Filter::OneEuro(one_euro::Filter::new(settings)),
-        };
+    pub fn new(names: &[&str], fill_s: f64) -> Self {
+        let models = |name: &&str| Models::new(prior(Role::of(name)));
         Self {
-            joints: names.iter().map(filter).collect(),
+            joints: names.iter().map(models).collect(),
             is_sided: names
                 .iter()
                 .map(|it| crate::mirrored_name(it).is_some())
@@ -74,14 +55,11 @@ impl Smoother {
     ) -> Vec<Smoothed> {
         let fill_s = self.fill_s;
         let mut all = Vec::with_capacity(self.joints.len());
-        for (joint, filter) in self.joints.iter_mut().enumerate() {
+        for (joint, models) in self.joints.iter_mut().enumerate() {
             let it = measured.get(joint).copied().flatten();
             let is_withheld = self.is_sided[joint] && sides == Sides::Unsure;
             let used = it.filter(|_| !is_withheld);
-            let (smoothed, delay_s) = match filter {
-                Filter::Kalman(models) => models.step(time_s, used.as_ref(), fill_s),
-                Filter::OneEuro(filter) => filter.step(time_s, used.as_ref(), fill_s),
-            };
+            let (smoothed, delay_s) = models.step(time_s, used.as_ref(), fill_s);
             if let Some(delay_s) = delay_s {
                 self.delay.sum_s += delay_s;
                 self.delay.n += 1.0;
@@ -94,8 +72,7 @@ impl Smoother {
         all
     }
 
-    /// The mean delay that was added, seconds: of slow movement for one-euro, of movement at 1 Hz for Kalman filters; none before
-    /// anything was measured twice.
+    /// The mean delay that was added, seconds, of movement at 1 Hz; none before anything was measured twice.
     pub fn delay_s(&self) -> Option<f64> {
         (self.delay.n > 0.0).then(|| self.delay.sum_s / self.delay.n)
     }
@@ -104,9 +81,9 @@ impl Smoother {
 /// Runs a causal smoother over a finished run.
 ///
 /// The times must be [checked](Recorded::check).
-pub fn over(recorded: &Recorded, method: Method, fill_s: f64) -> Motion {
+pub fn over(recorded: &Recorded, fill_s: f64) -> Motion {
     let names: Vec<&str> = recorded.joints.iter().map(|it| it.name.as_str()).collect();
-    let mut smoother = Smoother::new(&names, method, fill_s);
+    let mut smoother = Smoother::new(&names, fill_s);
     let n = recorded.times.len();
     let mut joints: Vec<Vec<Smoothed>> = vec![Vec::with_capacity(n); names.len()];
     for (at, &time_s) in recorded.times.iter().enumerate() {

@@ -40,7 +40,7 @@ pub struct SmoothReport {
     pub frames_of_breaks: Vec<u64>,
     /// Every joint and keypoint, by name.
     pub joints: BTreeMap<String, SmoothedJoint>,
-    /// `rts`, `butterworth`, `one-euro`, `kalman` or `none`.
+    /// `rts`, `butterworth`, `kalman` or `none`.
     pub method: String,
     /// Lines.
     pub n_frames: u64,

@@ -7,7 +7,6 @@ use clap::Args;
 use deployment::smooth::{Config, Method};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use nalgebra::{UnitVector3, Vector3};
-use rigs::smooth::trial::{self, Trial};
 use rigs::smooth::{self, Comparison, Outcome, Request, Row};
 use serde_json::{Value, json};
 use terminal::{Globals, Terminal, output};
@@ -27,8 +26,7 @@ Everything has a default: how restless each joint is, and how far its covariance
 Defaults of the options are those of the section [smooth] of the deployment that the run is of. docs/guide/smooth.md explains.
 
 With --truth all methods are compared with the true joints, at the instants that all of them have; what `parallax-lab eval` takes is a
-TRUTH: a folder of `parallax-lab synth`, or a file as configs/sequences/pose2sim-balancing.toml. With --trial the same is done on motions and
-errors that are made up: every action of `parallax-lab synth` with each seed.
+TRUTH: a folder of `parallax-lab synth`, or a file as configs/sequences/pose2sim-balancing.toml.
 
 Exit codes: 0 done; 7 done, but something speaks against the result (`doubts`: the file is cut off, nothing was measured, many
 measurements contradict each other); 2 an option is wrong, or a cutoff too high for the rate; 4 the folder or the truth cannot be read, a
@@ -37,20 +35,17 @@ line is wrong, times do not ascend.
 With --json one object:
     {\"report\": what smooth.json holds, \"files\": [path], \"has_up\", \"truth\": {\"compared\", \"methods\": [{\"method\", \"position_mm\", \
 \"velocity_m_s\", \"acceleration_m_s2\", \"jitter_mm\", \"lag_ms\", \"filled_mm\": {\"mean\", \"interval\"}}]}}
-and with --trial {\"cells\": [{\"rate_hz\", \"noise_mm\", \"motions\", \"methods\"}]}.
 
 Examples:
     parallax smooth out/run
     parallax smooth out/run --constant-bones --fill-s 0.5
     parallax smooth out/run --method butterworth --cutoff-hz 6
-    parallax smooth out/walk/out --truth out/walk --json
-    parallax smooth --trial --seeds 101,102 --rates-hz 30,120")]
+    parallax smooth out/walk/out --truth out/walk --json")]
 pub(crate) struct Arguments {
-    /// The results of a run; none with --trial.
-    #[arg(conflicts_with = "trial")]
-    folder: Option<PathBuf>,
-    /// How: `rts` looks ahead, on the measured covariances; `butterworth` is a zero-phase low-pass filter; `one-euro` and `kalman` are
-    /// what would have been seen live; `none` only computes angles.
+    /// The results of a run.
+    folder: PathBuf,
+    /// How: `rts` looks ahead, on the measured covariances; `butterworth` is a zero-phase low-pass filter; `kalman` is what
+    /// would have been seen live; `none` only computes angles.
     #[arg(long, value_name = "METHOD", value_parser = method)]
     method: Option<Method>,
     /// Cutoff of `butterworth`, Hz; 6 if nothing says otherwise.
@@ -69,20 +64,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "X,Y,Z", value_parser = up, allow_hyphen_values = true)]
     up: Option<UnitVector3<f64>>,
     /// Compare all methods with the true joints.
-    #[arg(long, value_name = "TRUTH", conflicts_with = "trial")]
+    #[arg(long, value_name = "TRUTH")]
     truth: Option<PathBuf>,
-    /// Compare all methods on motions and errors that are made up.
-    #[arg(long)]
-    trial: bool,
-    /// Seeds of the motions of --trial.
-    #[arg(long, value_name = "SEEDS", value_delimiter = ',', requires = "trial", default_values_t = Trial::default().seeds)]
-    seeds: Vec<u64>,
-    /// Rates of --trial.
-    #[arg(long, value_name = "HZ", value_delimiter = ',', requires = "trial", value_parser = rate, default_values_t = Trial::default().rates_hz)]
-    rates_hz: Vec<f64>,
-    /// Errors of --trial, standard deviations in mm.
-    #[arg(long, value_name = "MM", value_delimiter = ',', requires = "trial", value_parser = noise, default_values_t = Trial::default().noises_mm)]
-    noises_mm: Vec<f64>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -110,10 +93,6 @@ fn rate(text: &str) -> Result<f64, String> {
     within(text, [0.001, 1e5])
 }
 
-fn noise(text: &str) -> Result<f64, String> {
-    within(text, [0.01, 1000.0])
-}
-
 fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, String> {
     let number = text.parse().ok().filter(|it| (least..=most).contains(it));
     number.ok_or_else(|| format!("expected {least} to {most}"))
@@ -128,16 +107,8 @@ fn up(text: &str) -> Result<UnitVector3<f64>, String> {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let terminal = Terminal::with_bar(globals.quiet, false, BAR);
-    let Some(folder) = &arguments.folder else {
-        if !arguments.trial {
-            let what = "a FOLDER with the results of a run is missing";
-            let hint = "parallax smooth FOLDER, with the folder that `output` of the deployment names; or --trial";
-            return Err(Failure::new(ExitKind::Usage, what).with_hint(hint));
-        }
-        return run_trial(arguments, &stop, &terminal);
-    };
+    let folder = &arguments.folder;
     let request = Request {
         folder: folder.clone(),
         settings: settings(arguments, &smooth::settings(folder)),
@@ -238,29 +209,4 @@ fn tell(request: &Request, outcome: &Outcome, truth: Option<&Comparison>) -> Res
         ))?;
     }
     Ok(())
-}
-
-fn run_trial(arguments: &Arguments, stop: &Stop, terminal: &Terminal) -> Result<ExitCode, Failure> {
-    let trial = Trial {
-        seeds: arguments.seeds.clone(),
-        rates_hz: arguments.rates_hz.clone(),
-        noises_mm: arguments.noises_mm.clone(),
-        ..Trial::default()
-    };
-    let cells = trial::run(&trial, stop, terminal)?;
-    if arguments.json {
-        let cells: Vec<Value> = cells.iter().map(trial::Cell::to_json).collect();
-        output::json(&json!({ "cells": cells }))?;
-        return Ok(ExitCode::SUCCESS);
-    }
-    for cell in cells {
-        output::line(format_args!(
-            "\n{} Hz, errors of {} mm, {} motions\n{}",
-            cell.rate_hz,
-            cell.noise_mm,
-            cell.n_motions,
-            smooth::table(&cell.rows)
-        ))?;
-    }
-    Ok(ExitCode::SUCCESS)
 }

@@ -10,17 +10,8 @@ use nalgebra::Vector3;
 use score::{Bootstrap, Share};
 use serde_json::{Value, json};
 
-use super::one_euro;
-
 /// What is compared, in the order of tables.
-pub(super) const METHODS: [&str; 6] = [
-    "raw",
-    "rts",
-    "rts, constant bones",
-    "butterworth",
-    "one-euro",
-    "kalman",
-];
+const METHODS: [&str; 5] = ["raw", "rts", "rts, constant bones", "butterworth", "kalman"];
 
 /// A mean and its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,7 +52,7 @@ pub struct Comparison {
 }
 
 /// The errors of a method at an instant, and the distances where it filled.
-pub(super) type Tried = (Errors, Sum);
+type Tried = (Errors, Sum);
 
 /// Compares all methods.
 ///
@@ -91,7 +82,7 @@ pub fn compare(
 }
 
 /// The errors of every method at every instant.
-pub(super) fn tried(
+fn tried(
     recorded: &Recorded,
     settings: &Config,
     truth: &[Vec<Option<Vector3<f64>>>],
@@ -104,14 +95,12 @@ pub(super) fn tried(
         };
         Some(motion::smooth(recorded, &settings))
     };
-    let one_euro = live::Method::OneEuro(one_euro(settings));
-    let tracks: [Option<Motion>; 6] = [
+    let tracks: [Option<Motion>; 5] = [
         Some(motion::as_measured(recorded)),
         rts(false),
         rts(true),
         butterworth::filter(recorded, settings.cutoff_hz, fill_s).ok(),
-        Some(live::over(recorded, one_euro, fill_s)),
-        Some(live::over(recorded, live::Method::Kalman, fill_s)),
+        Some(live::over(recorded, fill_s)),
     ];
     let n = recorded.times.len();
     let mut all = vec![vec![Tried::default(); n]; tracks.len()];
@@ -149,8 +138,8 @@ pub(super) fn tried(
 
 /// The row of every method that has positions.
 ///
-/// * `tried`: of every method the errors of what is drawn: instants, or whole motions.
-pub(super) fn rows(tried: &[Vec<Tried>], bootstrap: &Bootstrap) -> Vec<Row> {
+/// * `tried`: of every method the errors at every instant.
+fn rows(tried: &[Vec<Tried>], bootstrap: &Bootstrap) -> Vec<Row> {
     let row = |(method, tried): (&&'static str, &Vec<Tried>)| {
         let mean = |factor: f64, of: &dyn Fn(&Tried) -> Sum| {
             let shares: Vec<Share> = tried

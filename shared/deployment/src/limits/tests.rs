@@ -39,8 +39,6 @@ const ROWS: &[Row] = &[
     ("capture.max_skew_ms", &[("0", "is 0")], &["20"]),
     ("smooth.cutoff_hz", &[("0", "is 0")], &["6"]),
     ("smooth.fill_s", &[("-1", "is -1")], &["0", "0.5"]),
-    ("smooth.min_cutoff_hz", &[("0", "is 0")], &["1"]),
-    ("smooth.beta", &[("-1", "is -1")], &["0", "4"]),
     (
         "capture.size",
         &[
