@@ -1,13 +1,15 @@
 //! The newest of everything that pages show. One thread puts it there; every page takes what it has not seen.
 
 use std::collections::VecDeque;
+use std::io;
+use std::os::fd::OwnedFd;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-use axum::extract::ws::Message;
 use messages::MAX_VIEWS;
+use rustix::event::{EventfdFlags, eventfd};
 use serde_json::{Value, json};
-use tokio::sync::watch;
+use tungstenite::Message;
 
 use crate::date::unix_ms;
 use crate::scene::Scene;
@@ -40,8 +42,6 @@ impl Weight {
 #[derive(Debug)]
 pub(crate) struct Board {
     inner: Mutex<Inner>,
-    /// The number of the last change.
-    tick: watch::Sender<u64>,
     /// Pages that show the pictures of a view.
     wanted: [AtomicUsize; MAX_VIEWS],
     n_pages: Arc<AtomicUsize>,
@@ -57,6 +57,8 @@ struct Inner {
     pictures: [Slot; MAX_VIEWS],
     events: VecDeque<(u64, Message)>,
     scene: Option<Arc<Scene>>,
+    /// Rung after every change.
+    bells: Vec<Weak<OwnedFd>>,
     /// Whether what runs is to be recorded; taken by the thread that looks on.
     record: Option<bool>,
     /// The page that has asked for it last.
@@ -75,7 +77,6 @@ impl Board {
     pub(crate) fn new() -> Self {
         Self {
             inner: Mutex::default(),
-            tick: watch::Sender::new(0),
             wanted: Default::default(),
             n_pages: Arc::default(),
             n_opened: AtomicUsize::new(0),
@@ -152,9 +153,15 @@ impl Board {
         (inner.version, new)
     }
 
-    /// Tells of changes.
-    pub(crate) fn changes(&self) -> watch::Receiver<u64> {
-        self.tick.subscribe()
+    /// Returns a file that can be read after every change, until it is dropped.
+    ///
+    /// # Errors
+    ///
+    /// The system gives none.
+    pub(crate) fn bell(&self) -> io::Result<Arc<OwnedFd>> {
+        let bell = Arc::new(eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?);
+        self.lock().bells.push(Arc::downgrade(&bell));
+        Ok(bell)
     }
 
     /// The cameras and joints that are shown.
@@ -220,12 +227,21 @@ impl Board {
         inner.version += 1;
         let version = inner.version;
         change(&mut inner, version);
-        drop(inner);
-        self.tick.send_replace(version);
+        inner
+            .bells
+            .retain(|bell| bell.upgrade().is_some_and(|bell| ring(&bell)));
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Rings a bell. One that is full has been rung already.
+fn ring(bell: &OwnedFd) -> bool {
+    match rustix::io::write(bell, &1_u64.to_ne_bytes()) {
+        Ok(_) | Err(rustix::io::Errno::AGAIN | rustix::io::Errno::INTR) => true,
+        Err(_) => false,
     }
 }
 

@@ -1,66 +1,70 @@
 //! Connections: how many, how long, and of which user.
 
 use core::net::SocketAddr;
-use core::pin::Pin;
-use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use core::task::{Context, Poll};
+use core::sync::atomic::{AtomicUsize, Ordering};
 use core::time::Duration;
 use std::io;
+use std::net::{TcpListener, TcpStream};
+use std::os::fd::AsFd as _;
 use std::sync::Arc;
 
-use axum::extract::connect_info::Connected;
-use axum::serve::{IncomingStream, Listener};
+use failure::Stop;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::geteuid;
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::{TcpListener, TcpStream};
-use tokio::time::{Sleep, sleep};
 
 /// Most connections at the same time.
 const MOST_CONNECTIONS: usize = 256;
 /// How long a connection lives that is no page: a request that is not finished by then never will be.
-const LONGEST_REQUEST: Duration = Duration::from_secs(10);
+pub(crate) const LONGEST_REQUEST: Duration = Duration::from_secs(10);
 /// Pause after a failure to accept, for example for want of descriptors.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// Accepts connections, up to a limit.
-#[derive(Debug)]
-pub(crate) struct Door {
-    listener: TcpListener,
-    n_open: Arc<AtomicUsize>,
-}
-
-impl Door {
-    pub(crate) fn new(listener: TcpListener) -> Self {
-        let n_open = Arc::default();
-        Self { listener, n_open }
-    }
-}
-
-impl Listener for Door {
-    type Io = Connection;
-    type Addr = SocketAddr;
-
-    async fn accept(&mut self) -> (Connection, SocketAddr) {
-        loop {
-            let Ok((stream, address)) = self.listener.accept().await else {
-                sleep(PAUSE).await;
-                continue;
-            };
-            // One that is not counted is closed by being dropped.
-            if let Some(seat) = Seat::take(&self.n_open, MOST_CONNECTIONS) {
-                let connection = Connection {
-                    stream,
-                    deadline: Box::pin(sleep(LONGEST_REQUEST)),
-                    is_page: Arc::default(),
-                    _seat: seat,
+/// Accepts connections, up to a limit, until a stop is requested; `talk` has a thread for each.
+///
+/// # Errors
+///
+/// The listener cannot be used.
+pub(crate) fn open(
+    listener: &TcpListener,
+    stop: &Stop,
+    talk: impl Fn(TcpStream) + Clone + Send + 'static,
+) -> io::Result<()> {
+    listener.set_nonblocking(true)?;
+    let n_open = Arc::default();
+    while !stop.is_requested() {
+        match listener.accept() {
+            Ok((stream, _)) => {
+                // One that is not counted is closed by being dropped.
+                let Some(seat) = Seat::take(&n_open, MOST_CONNECTIONS) else {
+                    continue;
                 };
-                return (connection, address);
+                let talk = talk.clone();
+                let thread = std::thread::Builder::new().name("connection".to_owned());
+                let started = thread.spawn(move || {
+                    talk(stream);
+                    drop(seat);
+                });
+                if let Err(error) = started {
+                    tracing::debug!(%error, "a connection is closed: there is no thread for it");
+                }
             }
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => wait(listener, stop),
+            Err(_) => std::thread::sleep(PAUSE),
         }
     }
+    Ok(())
+}
 
-    fn local_addr(&self) -> io::Result<SocketAddr> {
-        self.listener.local_addr()
+/// Waits for a connection or a stop request.
+fn wait(listener: &TcpListener, stop: &Stop) {
+    let (listener, stop) = (listener.as_fd(), stop.as_fd());
+    let mut watched = [&listener, &stop].map(|side| PollFd::new(side, PollFlags::IN));
+    let pause = Timespec {
+        tv_sec: 1,
+        tv_nsec: 0,
+    };
+    if poll(&mut watched, Some(&pause)).is_err() {
+        std::thread::sleep(PAUSE);
     }
 }
 
@@ -83,91 +87,30 @@ impl Drop for Seat {
     }
 }
 
-/// A connection that ends after a while if it is not a page.
-#[derive(Debug)]
-pub(crate) struct Connection {
-    stream: TcpStream,
-    deadline: Pin<Box<Sleep>>,
-    is_page: Arc<AtomicBool>,
-    _seat: Seat,
-}
-
-impl Connection {
-    fn check(&mut self, context: &mut Context<'_>) -> io::Result<()> {
-        let is_late = !self.is_page.load(Ordering::Relaxed)
-            && self.deadline.as_mut().poll(context).is_ready();
-        if is_late {
-            return Err(io::ErrorKind::TimedOut.into());
-        }
-        Ok(())
-    }
-}
-
-impl AsyncRead for Connection {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        self.check(context)?;
-        Pin::new(&mut self.stream).poll_read(context, buffer)
-    }
-}
-
-impl AsyncWrite for Connection {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<io::Result<usize>> {
-        self.check(context)?;
-        Pin::new(&mut self.stream).poll_write(context, bytes)
-    }
-
-    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        self.check(context)?;
-        Pin::new(&mut self.stream).poll_flush(context)
-    }
-
-    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        self.check(context)?;
-        Pin::new(&mut self.stream).poll_shutdown(context)
-    }
-}
-
 /// The other end of a connection.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Peer {
-    own: Option<SocketAddr>,
+    own: SocketAddr,
     other: SocketAddr,
-    is_page: Arc<AtomicBool>,
-}
-
-impl Connected<IncomingStream<'_, Door>> for Peer {
-    fn connect_info(stream: IncomingStream<'_, Door>) -> Self {
-        Self {
-            own: stream.io().stream.local_addr().ok(),
-            other: *stream.remote_addr(),
-            is_page: Arc::clone(&stream.io().is_page),
-        }
-    }
 }
 
 impl Peer {
-    /// Lets the connection live on as a page.
-    pub(crate) fn become_page(&self) {
-        self.is_page.store(true, Ordering::Relaxed);
+    /// # Errors
+    ///
+    /// The connection has ended.
+    pub(crate) fn new(stream: &TcpStream) -> io::Result<Self> {
+        Ok(Self {
+            own: stream.local_addr()?,
+            other: stream.peer_addr()?,
+        })
     }
 
     /// Whether the other end is a process of the same user on this machine, or of root.
-    pub(crate) fn is_same_user(&self) -> bool {
-        let Some(own) = self.own else {
-            return false;
-        };
+    pub(crate) fn is_same_user(self) -> bool {
         let tables = ["/proc/net/tcp", "/proc/net/tcp6"];
         let owner = tables.iter().find_map(|table| {
             let table = std::fs::read_to_string(table).ok()?;
-            owner(&table, self.other, own)
+            owner(&table, self.other, self.own)
         });
         owner.is_some_and(|uid| uid == geteuid().as_raw() || uid == 0)
     }
@@ -202,13 +145,10 @@ mod tests {
 
     #[test]
     fn the_user_of_the_other_end_is_read_from_the_table_of_the_kernel() {
-        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-        let client = std::net::TcpStream::connect(listener.local_addr().unwrap()).unwrap();
-        let peer = Peer {
-            own: Some(listener.local_addr().unwrap()),
-            other: client.local_addr().unwrap(),
-            is_page: Arc::default(),
-        };
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let peer = Peer::new(&listener.accept().unwrap().0).unwrap();
+        assert_eq!(peer.other, client.local_addr().unwrap());
         assert!(peer.is_same_user());
         let stranger = Peer {
             other: "127.0.0.1:1".parse().unwrap(),

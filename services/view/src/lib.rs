@@ -2,7 +2,7 @@
 //! uncertainty, every camera's picture, rates, latency, who is missing, errors.
 //!
 //! A thread looks on ([`runtime::Bus::as_onlooker`]) and puts the newest of everything on a board; every open page has a
-//! task that sends what is new on the board. So no sender of the deployment waits for the page, a page that is slow misses
+//! thread that sends what is new on the board. So no sender of the deployment waits for the page, a page that is slow misses
 //! frames, and the memory does not grow with the number of frames or with what a page does not take.
 //!
 //! | part | where |
@@ -14,12 +14,14 @@
 //! | a running deployment | `live` |
 //! | a finished one: its folder, its recording | `finished` |
 //! | who may ask, and the files of the page | `server` |
+//! | connections and requests | `door`, `http` |
 //! | the conversation with one page | `socket` |
 #![forbid(unsafe_code)]
 
 mod board;
 mod date;
 mod door;
+mod http;
 mod moment;
 mod picture;
 mod scene;

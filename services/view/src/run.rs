@@ -1,24 +1,19 @@
 //! Serves the page until a stop is requested.
 
 use core::net::SocketAddr;
-use core::time::Duration;
 use std::io;
 use std::net::TcpListener;
 use std::sync::Arc;
 
 use failure::{ExitKind, Failure, OrFail as _, Stop};
-use tokio::runtime::Builder;
 
 use crate::board::Board;
-use crate::door::{Door, Peer};
+use crate::door;
 use crate::finished::Finished;
 use crate::live;
 use crate::options::{Listen, Options, Subject};
-use crate::server::router;
+use crate::server;
 use crate::site::Site;
-
-/// How often the stop request is checked.
-const CHECK: Duration = Duration::from_millis(50);
 
 /// Serves a page until a stop is requested.
 ///
@@ -47,6 +42,7 @@ pub fn run(options: &Options, stop: &Stop, say: &mut dyn FnMut(&str)) -> Result<
     let site = Site {
         board: Arc::clone(&board),
         finished: finished.map(Arc::new),
+        reading: Arc::default(),
         token: options.listen.token.clone(),
     };
     let looker = match &options.subject {
@@ -60,13 +56,13 @@ pub fn run(options: &Options, stop: &Stop, say: &mut dyn FnMut(&str)) -> Result<
         _ => None,
     };
     say(&url(address, options.listen.token.as_deref()));
-    let served = serve(listener, site, stop);
+    let served = door::open(&listener, stop, move |stream| server::talk(stream, &site));
     stop.request();
     if let Some(looker) = looker {
         let panicked = |_| Failure::new(ExitKind::Run, "the thread that looks on panicked");
         looker.join().map_err(panicked)?;
     }
-    served
+    served.or_fail(ExitKind::Run)
 }
 
 fn check(listen: &Listen) -> Result<(), Failure> {
@@ -96,30 +92,6 @@ fn bind(listen: &Listen) -> Result<TcpListener, Failure> {
 fn url(address: SocketAddr, token: Option<&str>) -> String {
     let token = token.map_or_else(String::new, |it| format!("?token={it}"));
     format!("http://{address}/{token}")
-}
-
-fn serve(listener: TcpListener, site: Site, stop: &Stop) -> Result<(), Failure> {
-    let runtime = Builder::new_current_thread()
-        .enable_all()
-        .max_blocking_threads(2)
-        .thread_name("read")
-        .build()
-        .or_fail(ExitKind::Run)?;
-    runtime.block_on(async {
-        listener.set_nonblocking(true).or_fail(ExitKind::Run)?;
-        let listener = tokio::net::TcpListener::from_std(listener).or_fail(ExitKind::Run)?;
-        let stopped = async {
-            while !stop.is_requested() {
-                tokio::time::sleep(CHECK).await;
-            }
-        };
-        let pages = router(site).into_make_service_with_connect_info::<Peer>();
-        let serve = axum::serve(Door::new(listener), pages);
-        tokio::select! {
-            served = async { serve.await } => served.or_fail(ExitKind::Run),
-            () = stopped => Ok(()),
-        }
-    })
 }
 
 #[cfg(test)]

@@ -7,21 +7,19 @@
 
 use core::net::IpAddr;
 
-use axum::Router;
-use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{ConnectInfo, RawQuery, Request, State};
-use axum::http::header::{HOST, ORIGIN};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode};
-use axum::middleware::{Next, from_fn, from_fn_with_state};
-use axum::response::{IntoResponse as _, Response};
-use axum::routing::get;
+use std::io;
+use std::net::TcpStream;
+use std::time::Instant;
 
-use crate::door::{Peer, Seat};
+use tungstenite::handshake::server::{create_response, write_response};
+use tungstenite::http::HeaderMap;
+use tungstenite::http::header::{HOST, ORIGIN};
+
+use crate::door::{LONGEST_REQUEST, Peer, Seat};
+use crate::http::{self, Answer, Asked, Timed};
 use crate::site::Site;
-use crate::socket;
+use crate::socket::Opened;
 
-/// The largest message of a page, bytes.
-const LARGEST_QUESTION: usize = 16 << 10;
 /// Most pages at the same time.
 pub(crate) const MOST_PAGES: usize = 64;
 
@@ -38,55 +36,79 @@ const MODULES: [(&str, &str); 4] = [
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
     connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// The files of the page and its web socket.
-pub(crate) fn router(site: Site) -> Router {
-    let script = |text: &'static str| get(move || async move { file("text/javascript", text) });
-    let mut router = Router::new()
-        .route("/", get(|| async { file("text/html", INDEX) }))
-        .route(
-            "/look.css",
-            get(|| async { file("text/css", ::report::STYLE) }),
-        )
-        .route("/view.css", get(|| async { file("text/css", STYLE) }))
-        .route("/stage.js", script(::report::STAGE));
-    for (path, text) in MODULES {
-        router = router.route(path, script(text));
-    }
-    router
-        .route("/ws", get(upgrade))
-        .fallback(|| async { (StatusCode::NOT_FOUND, "there is no such file") })
-        .layer(from_fn(with_headers))
-        .layer(from_fn_with_state(site.clone(), guard))
-        .with_state(site)
-}
+/// Headers of every answer.
+const HEADERS: [(&str, &str); 5] = [
+    ("Content-Security-Policy", POLICY),
+    ("X-Content-Type-Options", "nosniff"),
+    ("Referrer-Policy", "no-referrer"),
+    ("Cross-Origin-Resource-Policy", "same-origin"),
+    ("Cache-Control", "no-store"),
+];
 
-fn file(kind: &'static str, text: &'static str) -> Response {
-    let kind = format!("{kind}; charset=utf-8");
-    ([("content-type", kind)], text).into_response()
-}
-
-async fn upgrade(
-    State(site): State<Site>,
-    ConnectInfo(peer): ConnectInfo<Peer>,
-    RawQuery(asked): RawQuery,
-    socket: WebSocketUpgrade,
-) -> Response {
-    if let Some(token) = &site.token
-        && !is_same(token, token_in(asked.as_deref()))
-    {
-        return (StatusCode::FORBIDDEN, "the token is missing or wrong").into_response();
-    }
-    let Some(seat) = Seat::take(site.board.pages(), MOST_PAGES) else {
-        let what = format!("{MOST_PAGES} pages are open already");
-        return (StatusCode::SERVICE_UNAVAILABLE, what).into_response();
+/// Answers the request of a connection; that of a page becomes its conversation.
+pub(crate) fn talk(stream: TcpStream, site: &Site) {
+    let mut timed = Timed {
+        stream: &stream,
+        until: Instant::now() + LONGEST_REQUEST,
     };
-    let may_record = site.token.is_some() || peer.is_same_user();
-    let socket = socket.max_message_size(LARGEST_QUESTION);
-    let socket = socket.max_frame_size(LARGEST_QUESTION);
-    socket.on_upgrade(move |socket| {
-        peer.become_page();
-        socket::talk(socket, site, seat, may_record)
+    let page = http::read(&mut timed).and_then(|asked| {
+        let answer = match asked {
+            Ok(asked) => match answer(&stream, asked, site) {
+                Ok(page) => {
+                    write_response(&mut timed, &page.response).map_err(io::Error::other)?;
+                    return Ok(Some(page));
+                }
+                Err(answer) => answer,
+            },
+            Err(answer) => answer,
+        };
+        answer.write(&mut timed, &HEADERS)?;
+        Ok(None)
+    });
+    match page {
+        Ok(Some(page)) => page.talk(stream, site.clone()),
+        Ok(None) => {}
+        Err(error) => tracing::debug!(%error, "a connection ended before its answer"),
+    }
+}
+
+/// Opens a page, or returns another answer.
+fn answer(stream: &TcpStream, asked: Asked, site: &Site) -> Result<Opened, Answer> {
+    let request = &asked.request;
+    check(request.headers(), site.token.is_some()).map_err(|why| Answer::text(403, why))?;
+    if request.uri().path() != "/ws" {
+        return Err(file(request.uri().path()));
+    }
+    let response = create_response(request).map_err(|why| Answer::text(400, &why.to_string()))?;
+    if let Some(token) = &site.token
+        && !is_same(token, token_in(request.uri().query()))
+    {
+        return Err(Answer::text(403, "the token is missing or wrong"));
+    }
+    let seat = Seat::take(site.board.pages(), MOST_PAGES)
+        .ok_or_else(|| Answer::text(503, &format!("{MOST_PAGES} pages are open already")))?;
+    let is_own = || Peer::new(stream).is_ok_and(Peer::is_same_user);
+    Ok(Opened {
+        response,
+        rest: asked.rest,
+        seat,
+        may_record: site.token.is_some() || is_own(),
     })
+}
+
+/// Returns a file of the page.
+fn file(path: &str) -> Answer {
+    let script = |text| Answer::file("text/javascript", text);
+    match path {
+        "/" => Answer::file("text/html", INDEX),
+        "/look.css" => Answer::file("text/css", ::report::STYLE),
+        "/view.css" => Answer::file("text/css", STYLE),
+        "/stage.js" => script(::report::STAGE),
+        _ => match MODULES.iter().find(|module| module.0 == path) {
+            Some((_, text)) => script(text),
+            None => Answer::text(404, "there is no such file"),
+        },
+    }
 }
 
 /// The token in what stands behind `?`; tokens have no characters that are written in another way there.
@@ -104,13 +126,7 @@ fn is_same(token: &str, other: &str) -> bool {
 }
 
 /// Refuses what a page of another site asks for.
-async fn guard(State(site): State<Site>, request: Request, next: Next) -> Response {
-    match check(request.headers(), site.token.is_some()) {
-        Ok(()) => next.run(request).await,
-        Err(why) => (StatusCode::FORBIDDEN, why).into_response(),
-    }
-}
-
+///
 /// * `has_token`: whether pages have to know a token, so that any name of this machine will do.
 fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {
     let mut hosts = headers.get_all(HOST).iter();
@@ -145,25 +161,10 @@ fn is_loopback(host: &str) -> bool {
     name.eq_ignore_ascii_case("localhost") || is_address(inner.unwrap_or(name))
 }
 
-async fn with_headers(request: Request, next: Next) -> Response {
-    let mut response = next.run(request).await;
-    for (name, value) in [
-        ("content-security-policy", POLICY),
-        ("x-content-type-options", "nosniff"),
-        ("referrer-policy", "no-referrer"),
-        ("cross-origin-resource-policy", "same-origin"),
-        ("cache-control", "no-store"),
-    ] {
-        let name = HeaderName::from_static(name);
-        response
-            .headers_mut()
-            .insert(name, HeaderValue::from_static(value));
-    }
-    response
-}
-
 #[cfg(test)]
 mod tests {
+    use tungstenite::http::HeaderValue;
+
     use super::*;
 
     fn checked(host: &str, origin: Option<&str>, has_token: bool) -> bool {

@@ -1,6 +1,6 @@
 //! What every page gets its answers from.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use crate::board::Board;
 use crate::finished::Finished;
@@ -12,6 +12,8 @@ pub(crate) struct Site {
     pub board: Arc<Board>,
     /// The finished run, if it is one.
     pub finished: Option<Arc<Finished>>,
+    /// Held while a frame of it is read: pages take turns.
+    pub reading: Arc<Mutex<()>>,
     /// What a page must know; none only on the loopback.
     pub token: Option<String>,
 }

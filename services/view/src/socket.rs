@@ -2,13 +2,19 @@
 
 use core::sync::atomic::Ordering;
 use core::time::Duration;
-use std::sync::Arc;
+use std::io;
+use std::net::TcpStream;
+use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
+use std::sync::{Arc, PoisonError};
+use std::time::Instant;
 
-use axum::extract::ws::{Message, WebSocket};
 use messages::MAX_VIEWS;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde::Deserialize;
 use serde_json::{Value, json};
-use tokio::time::timeout;
+use tungstenite::handshake::server::Response;
+use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::{Error, Message, WebSocket};
 
 use crate::board::Board;
 use crate::door::Seat;
@@ -17,6 +23,10 @@ use crate::site::Site;
 
 /// How long a page may take to accept a message.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// The largest message of a page, bytes.
+const LARGEST_QUESTION: usize = 16 << 10;
+/// Longest sleep: nothing is asked and nothing changes.
+const LONGEST_SLEEP: Duration = Duration::from_secs(10);
 /// Messages that make no sense before a page is left.
 const MOST_REFUSED: u32 = 20;
 /// Most points whose lines are asked for at once.
@@ -54,52 +64,79 @@ impl Drop for Page {
     }
 }
 
-/// Talks with a page until it goes, takes too long, or makes no sense.
-///
-/// * `_seat`: counts the page while it is open.
-/// * `may_record`: whether it may begin and end recordings.
-pub(crate) async fn talk(mut socket: WebSocket, site: Site, _seat: Seat, may_record: bool) {
-    let mut changes = site.board.changes();
-    let mut page = Page {
-        number: site.board.open_page(),
-        may_record,
-        site,
-        shown: [false; MAX_VIEWS],
-        seen: 0,
-        n_refused: 0,
-    };
-    loop {
-        let (seen, new) = page.board().since(page.seen, &page.shown);
-        page.seen = seen;
-        for message in new {
-            if !send(&mut socket, message).await {
+/// A page that may be talked with.
+#[derive(Debug)]
+pub(crate) struct Opened {
+    /// What it is told first.
+    pub(crate) response: Response,
+    /// Bytes that it has sent already.
+    pub(crate) rest: Vec<u8>,
+    /// Counts the page while it is open.
+    pub(crate) seat: Seat,
+    /// Whether it may begin and end recordings.
+    pub(crate) may_record: bool,
+}
+
+impl Opened {
+    /// Talks with a page until it goes, takes too long, or makes no sense.
+    pub(crate) fn talk(self, stream: TcpStream, site: Site) {
+        let bell = stream
+            .set_nonblocking(true)
+            .and_then(|()| stream.set_nodelay(true))
+            .and_then(|()| site.board.bell());
+        let bell = match bell {
+            Ok(bell) => bell,
+            Err(error) => {
+                tracing::debug!(%error, "a page cannot be talked with");
                 return;
             }
-        }
-        tokio::select! {
-            changed = changes.changed() => if changed.is_err() { return },
-            asked = socket.recv() => match asked {
-                Some(Ok(Message::Text(text))) => {
-                    for answer in page.answer(&text).await {
-                        if !send(&mut socket, answer).await {
-                            return;
-                        }
-                    }
-                }
-                Some(Ok(Message::Binary(_))) => page.n_refused += 1,
-                Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
-                Some(Ok(Message::Close(_)) | Err(_)) | None => return,
-            },
-        }
-        if page.n_refused > MOST_REFUSED {
-            return;
-        }
+        };
+        let mut page = Page {
+            number: site.board.open_page(),
+            may_record: self.may_record,
+            site,
+            shown: [false; MAX_VIEWS],
+            seen: 0,
+            n_refused: 0,
+        };
+        let config = WebSocketConfig::default()
+            .max_message_size(Some(LARGEST_QUESTION))
+            .max_frame_size(Some(LARGEST_QUESTION));
+        let mut socket =
+            WebSocket::from_partially_read(stream, self.rest, Role::Server, Some(config));
+        while page.turn(&mut socket, &bell).is_ok() && page.n_refused <= MOST_REFUSED {}
+        drop(self.seat);
     }
 }
 
-/// Whether the page has taken it.
-async fn send(socket: &mut WebSocket, message: Message) -> bool {
-    matches!(timeout(PATIENCE, socket.send(message)).await, Ok(Ok(())))
+/// Sends a message, unless the page does not take it in time.
+fn send(socket: &mut WebSocket<TcpStream>, message: Message) -> Result<(), Error> {
+    let until = Instant::now() + PATIENCE;
+    let mut sent = socket.write(message);
+    loop {
+        match sent.and_then(|()| socket.flush()) {
+            Err(Error::Io(error)) if error.kind() == io::ErrorKind::WouldBlock => {
+                let left = until.saturating_duration_since(Instant::now());
+                if left.is_zero() {
+                    return Err(io::Error::from(io::ErrorKind::TimedOut).into());
+                }
+                wait(&[(socket.get_ref().as_fd(), PollFlags::OUT)], left)?;
+            }
+            sent => return sent,
+        }
+        sent = Ok(());
+    }
+}
+
+/// Waits for one of several files, or for time to pass.
+fn wait(files: &[(BorrowedFd<'_>, PollFlags)], limit: Duration) -> io::Result<()> {
+    let watched = files.iter().map(|(file, flags)| PollFd::new(file, *flags));
+    let mut watched: Vec<PollFd<'_>> = watched.collect();
+    let limit = Timespec::try_from(limit).map_err(io::Error::other)?;
+    match poll(&mut watched, Some(&limit)) {
+        Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
+        Err(error) => Err(error.into()),
+    }
 }
 
 fn text(value: &Value) -> Message {
@@ -111,7 +148,40 @@ impl Page {
         &self.site.board
     }
 
-    async fn answer(&mut self, question: &str) -> Vec<Message> {
+    /// Sends what is new, and answers what is asked or waits.
+    ///
+    /// * `bell`: is rung when there is something new.
+    fn turn(&mut self, socket: &mut WebSocket<TcpStream>, bell: &OwnedFd) -> Result<(), Error> {
+        // Before the board is read: what changes later rings again.
+        let _rung = rustix::io::read(bell, &mut [0; 8]).is_ok();
+        let (seen, new) = self.board().since(self.seen, &self.shown);
+        self.seen = seen;
+        for message in new {
+            send(socket, message)?;
+        }
+        match socket.read() {
+            Ok(Message::Text(text)) => {
+                for answer in self.answer(&text) {
+                    send(socket, answer)?;
+                }
+            }
+            Ok(Message::Binary(_)) => self.n_refused += 1,
+            Ok(Message::Close(_)) => {
+                socket.flush()?;
+                return Err(Error::ConnectionClosed);
+            }
+            Ok(_) => {}
+            Err(Error::Io(error)) if error.kind() == io::ErrorKind::WouldBlock => {
+                let page = socket.get_ref().as_fd();
+                let sides = [(page, PollFlags::IN), (bell.as_fd(), PollFlags::IN)];
+                wait(&sides, LONGEST_SLEEP)?;
+            }
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, question: &str) -> Vec<Message> {
         let question: Question = match serde_json::from_str(question) {
             Ok(question) => question,
             Err(why) => {
@@ -136,9 +206,9 @@ impl Page {
             answers.push(self.lines(points));
         }
         if let Some((at, finished)) = question.at.zip(self.site.finished.clone()) {
-            let shown = self.shown;
-            let read = tokio::task::spawn_blocking(move || read(&finished, at, &shown)).await;
-            answers.extend(read.unwrap_or_default());
+            let turn = self.site.reading.lock();
+            let _turn = turn.unwrap_or_else(PoisonError::into_inner);
+            answers.extend(read(&finished, at, &self.shown));
         }
         answers
     }
@@ -241,6 +311,7 @@ mod tests {
             site: Site {
                 board: Arc::new(board),
                 finished: None,
+                reading: Arc::default(),
                 token: None,
             },
             shown: [false; MAX_VIEWS],
@@ -252,8 +323,7 @@ mod tests {
     /// The answers to a question; they must be JSON, and only what is no question is refused.
     fn ask(page: &mut Page, question: &str) -> Vec<Value> {
         let refused_before = page.n_refused;
-        let runtime = tokio::runtime::Builder::new_current_thread().build();
-        let answers = runtime.unwrap().block_on(page.answer(question));
+        let answers = page.answer(question);
         let is_question = serde_json::from_str::<Question>(question).is_ok();
         assert_eq!(
             page.n_refused - refused_before,
