@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use deployment::smooth::{Config, Method};
+use failure::{Console, ExitKind, Failure};
 use motion::live;
 use motion::{Motion, Recorded, Report, butterworth};
 use nalgebra::UnitVector3;

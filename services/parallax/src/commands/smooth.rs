@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use deployment::smooth::{Config, Method};
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{ExitKind, Failure};
 use nalgebra::{UnitVector3, Vector3};
 use rigs::smooth::{self, Comparison, Outcome, Request, Row};
 use serde_json::{Value, json};

@@ -7,10 +7,10 @@ use core::time::Duration;
 use std::io::{self, IsTerminal as _};
 use std::process::ExitCode;
 
+use ::terminal::output;
 use clap::Args;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::live::{self, Live};
-use terminal::output;
 
 /// Options of `parallax top`.
 #[derive(Debug, Args)]
