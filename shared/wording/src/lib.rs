@@ -1,12 +1,14 @@
 //! Error texts for users: an error with its causes in one line, the texts of TOML and JSON parsers and of the transport in
-//! words that users know; and words of commands, quoted.
+//! words that users know; and words of commands, quoted; and tables, aligned.
 #![forbid(unsafe_code)]
 
 mod causes;
-
-pub use causes::{chain, in_one_line};
+mod table;
 
 use core::fmt::Display;
+
+pub use causes::{chain, in_one_line};
+pub use table::Table;
 
 /// A word of a command that is printed, quoted where a shell would take it for something else.
 ///

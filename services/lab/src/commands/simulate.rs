@@ -10,6 +10,7 @@ use clap::{Args, Subcommand};
 use failure::Failure;
 use serde_json::json;
 use terminal::output;
+use wording::Table;
 
 /// The costs of the machine that the guide names, with the network that ships.
 const DEFAULT: Costs = Costs {
@@ -138,27 +139,37 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
 
 /// Prints a row for each number of cameras and hosts.
 fn table(rows: &[(Load, Forecast)]) -> Result<ExitCode, Failure> {
-    output::line(
-        "cameras  hosts  crosses  views (fusing, other)  cores (fusing, other)  MB/s in  latency ms  fits",
-    )?;
+    let mut table = Table::new([
+        "cameras",
+        "hosts",
+        "crosses",
+        "views fusing",
+        "other",
+        "cores fusing",
+        "other",
+        "MB/s in",
+        "latency ms",
+        "<fits",
+    ]);
     for (load, got) in rows {
         let crosses = match (load.n_hosts, load.with_poses) {
             (1, _) => "-",
             (_, true) => "poses",
             (_, false) => "frames",
         };
-        output::line(format_args!(
-            "{:>7}  {:>5}  {crosses:>7}  {:>10} {:>10}  {:>10.1} {:>10.1}  {:>7.2}  {:>10.0}  {}",
-            load.n_cameras,
-            load.n_hosts,
-            got.views[0],
-            got.views[1],
-            got.cores[0],
-            got.cores[1],
-            got.bytes_s[0] / 1e6,
-            got.latency_ms,
-            if got.fits { "yes" } else { "no" }
-        ))?;
+        table.row([
+            load.n_cameras.to_string(),
+            load.n_hosts.to_string(),
+            crosses.to_owned(),
+            got.views[0].to_string(),
+            got.views[1].to_string(),
+            format!("{:.1}", got.cores[0]),
+            format!("{:.1}", got.cores[1]),
+            format!("{:.2}", got.bytes_s[0] / 1e6),
+            format!("{:.0}", got.latency_ms),
+            if got.fits { "yes" } else { "no" }.to_owned(),
+        ]);
     }
+    output::line(table)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,9 +1,8 @@
 //! A snapshot of a deployment as text: a table of the processes, and one of their times.
 
-use core::fmt::Write as _;
-
 use messages::{Cause, UNMEASURED};
 use metrics::{Reading, Timed};
+use wording::Table;
 
 use super::snapshot::{ProcessSnapshot, Snapshot, State};
 
@@ -27,7 +26,7 @@ pub fn table(snapshot: &Snapshot) -> String {
         .processes
         .iter()
         .map(|process| process_row(snapshot, process));
-    push_table(&mut text, &PROCESSES, &rows.collect::<Vec<_>>());
+    push_table(&mut text, &PROCESSES, rows);
     let problems = snapshot.processes.iter().filter_map(|process| {
         let problem = process.problem?;
         Some(format!("{} cannot be read: {problem}\n", process.name))
@@ -44,7 +43,7 @@ pub fn table(snapshot: &Snapshot) -> String {
         .processes
         .iter()
         .flat_map(|process| time_rows(snapshot, process));
-    push_table(&mut text, &TIMES, &rows.collect::<Vec<_>>());
+    push_table(&mut text, &TIMES, rows);
     text
 }
 
@@ -108,7 +107,7 @@ fn cameras(snapshot: &Snapshot) -> String {
         .collect();
     let mut text = String::new();
     if !rows.is_empty() {
-        push_table(&mut text, &CAMERAS, &rows);
+        push_table(&mut text, &CAMERAS, rows);
         text.push('\n');
     }
     text
@@ -244,30 +243,14 @@ fn milliseconds(nanos: u64) -> String {
     }
 }
 
-/// Appends a table; every column is as wide as its widest cell.
-fn push_table<const N: usize>(text: &mut String, titles: &[&str; N], rows: &[Vec<String>]) {
-    let width_of = |cell: &str| cell.chars().count();
-    let widths: [usize; N] = core::array::from_fn(|column| {
-        let title = width_of(titles[column].trim_start_matches('<'));
-        let cells = rows.iter().map(|row| width_of(&row[column]));
-        cells.fold(title, usize::max)
-    });
-    let head = titles
-        .map(|it| it.trim_start_matches('<').to_owned())
-        .to_vec();
-    for row in core::iter::once(&head).chain(rows) {
-        let mut line = String::new();
-        for ((cell, title), width) in row.iter().zip(titles).zip(widths) {
-            // Writing to a string cannot fail.
-            let _infallible = if title.starts_with('<') {
-                write!(line, "{cell:<width$}  ")
-            } else {
-                write!(line, "{cell:>width$}  ")
-            };
-        }
-        text.push_str(line.trim_end());
-        text.push('\n');
+/// Appends a table.
+fn push_table(text: &mut String, titles: &[&str], rows: impl IntoIterator<Item = Vec<String>>) {
+    let mut table = Table::new(titles.iter().copied());
+    for row in rows {
+        table.row(row);
     }
+    text.push_str(&table.to_string());
+    text.push('\n');
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use launch::films::{Films, Part, Poses, films};
 use launch::load;
 use serde_json::{Value, json};
 use terminal::{Globals, Terminal, output};
+use wording::Table;
 
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";
@@ -225,30 +226,32 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
         "offsets against {} from {:.1} s of footage; what is added to a camera's times to have the common ones",
         names[reference], outcome.length_s
     ))?;
-    output::line(format_args!(
-        "{:<12} {:>12} {:>8} {:>11} {:>8} {:>8} {:>10} {:>9}",
-        "camera", "offset, ms", "+-", "drift, ppm", "+-", counted, "before, px", "after, px"
-    ))?;
-    for (name, it) in names.iter().zip(&outcome.cameras) {
-        let drift = it
-            .drift_error
-            .map_or(["-".to_owned(), "-".to_owned()], |error| {
-                [
-                    format!("{:.1}", 1e6 * it.drift),
-                    format!("{:.1}", 1e6 * error),
-                ]
-            });
-        output::line(format_args!(
-            "{name:<12} {:>12.2} {:>8.2} {:>11} {:>8} {:>8} {:>10} {:>9}",
-            1e3 * it.offset_s,
-            1e3 * it.error_s,
-            drift[0],
-            drift[1],
-            it.n,
-            pixels(it.before_px),
-            pixels(it.after_px)
-        ))?;
+    let mut table = Table::new([
+        "<camera",
+        "offset, ms",
+        "+-",
+        "drift, ppm",
+        "+-",
+        counted,
+        "before, px",
+        "after, px",
+    ]);
+    for (name, clock) in names.iter().zip(&outcome.cameras) {
+        let ppm = |drift: f64| format!("{:.1}", 1e6 * drift);
+        let drift = clock.drift_error.map(|error| [clock.drift, error].map(ppm));
+        let [drift, drift_error] = drift.unwrap_or_else(|| ["-"; 2].map(str::to_owned));
+        table.row([
+            (*name).to_owned(),
+            format!("{:.2}", 1e3 * clock.offset_s),
+            format!("{:.2}", 1e3 * clock.error_s),
+            drift,
+            drift_error,
+            clock.n.to_string(),
+            pixels(clock.before_px),
+            pixels(clock.after_px),
+        ]);
     }
+    output::line(table)?;
     if outcome.cameras.iter().all(|it| it.drift_error.is_none()) {
         output::line("drift: the footage does not determine it, 0 is taken")?;
     } else if outcome.cameras.iter().any(|it| it.drift == 0.0) {

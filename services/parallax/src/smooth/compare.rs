@@ -1,7 +1,5 @@
 //! Methods beside each other, against the truth, at the same instants.
 
-use core::fmt::Write as _;
-
 use deployment::smooth::Config;
 use motion::judge::{self, Errors, Sum};
 use motion::live;
@@ -9,6 +7,7 @@ use motion::{Motion, Recorded, Settings, butterworth};
 use nalgebra::Vector3;
 use score::{Bootstrap, Share};
 use serde_json::{Value, json};
+use wording::Table;
 
 /// What is compared, in the order of tables.
 const METHODS: [&str; 5] = ["raw", "rts", "rts, constant bones", "butterworth", "kalman"];
@@ -201,27 +200,23 @@ impl Row {
 
 /// A table of rows for people.
 pub fn table(rows: &[Row]) -> String {
-    // Writing to a string cannot fail.
-    let mut text = format!("{:<20}", "");
-    for title in [
+    let mut table = Table::new([
+        "<",
         "position mm",
         "velocity m/s",
         "acceleration m/s²",
         "jitter mm",
         "lag ms",
         "filled mm",
-    ] {
-        let _infallible = write!(text, " {title:>24}");
-    }
+    ]);
     for row in rows {
-        let _infallible = write!(text, "\n{:<20}", row.method);
-        for (_, mean) in row.numbers() {
-            let cell = mean.map_or("-".to_owned(), |it| {
-                let [low, high] = it.interval;
-                format!("{:.2} ({low:.2} to {high:.2})", it.mean)
-            });
-            let _infallible = write!(text, " {cell:>24}");
-        }
+        let numbers = row.numbers().map(|(_, mean)| {
+            mean.map_or("-".to_owned(), |found| {
+                let [low, high] = found.interval;
+                format!("{:.2} ({low:.2} to {high:.2})", found.mean)
+            })
+        });
+        table.row([row.method.to_owned()].into_iter().chain(numbers));
     }
-    text
+    table.to_string()
 }

@@ -4,6 +4,7 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use report::run::Limit;
 use serde_json::{Value, json};
 use terminal::output::{self, Verbosity};
+use wording::Table;
 
 use super::options::Options;
 use super::provenance::Provenance;
@@ -137,12 +138,11 @@ impl Options {
     }
 }
 
-/// The table: a header, and per run a row and one row per stage.
-fn table(all: &[Measured]) -> Vec<Vec<String>> {
-    let heads = [
-        "run", "results", "a second", "p50", "p99", "p99.9", "max", "cpu", "dropped",
-    ];
-    let mut rows = vec![heads.map(str::to_owned).to_vec()];
+/// The table: per run a row and one row per stage.
+fn table(all: &[Measured]) -> Table {
+    let mut table = Table::new([
+        "<run", "results", "a second", "p50", "p99", "p99.9", "max", "cpu", "dropped",
+    ]);
     for measured in all {
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |it| format!("{it:.1}"));
         let mut row = vec![
@@ -155,14 +155,14 @@ fn table(all: &[Measured]) -> Vec<Vec<String>> {
             number(measured.cpu_ms_per_result()),
             measured.n_dropped.to_string(),
         ]);
-        rows.push(row);
+        table.row(row);
         for (stage, spread) in &measured.stages {
             let mut row = vec![format!("  {stage}"), String::new(), String::new()];
             row.extend(Spread::cells(Some(*spread), 1));
-            rows.push(row);
+            table.row(row);
         }
     }
-    rows
+    table
 }
 
 #[cfg(test)]

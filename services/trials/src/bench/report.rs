@@ -7,6 +7,7 @@ use std::path::Path;
 use failure::Failure;
 use report::run::Limit;
 use serde_json::{Value, json};
+use wording::Table;
 
 use super::provenance::Provenance;
 
@@ -21,8 +22,8 @@ pub struct Report {
     pub(super) provenance: Provenance,
     /// The settings, by name.
     pub(super) settings: Value,
-    /// The table: a header, then rows.
-    pub(super) table: Vec<Vec<String>>,
+    /// The numbers.
+    pub(super) table: Table,
     /// Lines below the table.
     pub(super) notes: Vec<String>,
     /// The limits, with what was measured.
@@ -84,7 +85,7 @@ impl Report {
         lines.extend(self.provenance.text().lines().map(str::to_owned));
         lines.push(settings(&self.settings));
         lines.push(String::new());
-        lines.extend(aligned(&self.table));
+        lines.extend(self.table.lines());
         lines.extend(self.notes.iter().cloned());
         for it in &self.limits {
             let word = if it.held { "held  " } else { "MISSED" };
@@ -108,45 +109,20 @@ fn settings(value: &Value) -> String {
     texts.collect::<Vec<_>>().join(", ")
 }
 
-/// The rows as lines: the first column left-aligned, the others right-aligned.
-fn aligned(table: &[Vec<String>]) -> Vec<String> {
-    let n_columns = table.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |column: usize| {
-        let cells = table.iter().filter_map(|row| row.get(column));
-        cells.map(|it| it.chars().count()).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..n_columns).map(width).collect();
-    let line = |row: &Vec<String>| {
-        let cells = row.iter().zip(&widths).enumerate();
-        let cells = cells.map(|(column, (cell, &width))| {
-            if column == 0 {
-                format!("{cell:<width$}")
-            } else {
-                format!("{cell:>width$}")
-            }
-        });
-        let line = cells.collect::<Vec<_>>().join("  ");
-        line.trim_end().to_owned()
-    };
-    table.iter().map(line).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::trial::limit;
 
     fn report(got: f64) -> Report {
-        let row = |cells: [&str; 3]| cells.map(str::to_owned).to_vec();
+        let mut table = Table::new(["<who", "p50", "max"]);
+        table.row(["somebody", "1.5", "10.25"].map(str::to_owned));
         Report {
             bench: "transport",
             title: "one hop".to_owned(),
             provenance: Provenance::now(),
             settings: json!({ "messages": 7, "cores": "" }),
-            table: vec![
-                row(["who", "p50", "max"]),
-                row(["somebody", "1.5", "10.25"]),
-            ],
+            table,
             notes: vec!["a note".to_owned()],
             limits: vec![limit::at_most("p50, us", 2.0, Some(got))],
             numbers: json!([1.5]),

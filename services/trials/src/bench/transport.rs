@@ -7,6 +7,7 @@ use report::run::Limit;
 use runtime::{Policy, RealTime, Scheduling};
 use serde_json::{Value, json};
 use terminal::output::{self, Verbosity};
+use wording::Table;
 
 use super::hop::{self, Measured, Series};
 use super::provenance::Provenance;
@@ -117,8 +118,11 @@ impl Transport {
     }
 
     fn report(&self, provenance: Provenance, rows: &[Row]) -> Report {
-        let heads = ["receiver", "bytes", "p50", "p99", "p99.9", "max", "lost"];
-        let table = [heads.map(str::to_owned).to_vec()].into_iter();
+        let heads = ["<receiver", "bytes", "p50", "p99", "p99.9", "max", "lost"];
+        let mut table = Table::new(heads);
+        for row in rows {
+            table.row(row.cells());
+        }
         let [sender, receiver] = [0, 1].map(|index| {
             let core = self.cores.get(index).map(ToString::to_string);
             core.unwrap_or_else(|| "any".to_owned())
@@ -134,7 +138,7 @@ impl Transport {
                 "receiver_core": receiver,
                 "real_time_priority": self.priority.map_or_else(|| "none".to_owned(), |it| it.to_string()),
             }),
-            table: table.chain(rows.iter().map(Row::cells)).collect(),
+            table,
             notes: Vec::new(),
             limits: self.limits(rows),
             numbers: rows.iter().map(Row::json).collect(),

@@ -1,9 +1,9 @@
 //! Reports a long run in parts: latency, kills and resources of each.
 
-use core::fmt::Write as _;
 use core::ops::Range;
 
 use serde::Serialize;
+use wording::Table;
 
 use super::random_kills::Kill;
 use super::resources::{ResourceMonitor, ResourceUse};
@@ -61,10 +61,25 @@ pub(super) fn table(parts: &[Part]) -> Vec<String> {
     if parts.len() < 2 {
         return Vec::new();
     }
-    let head = "  from s  kills  results   p50 ms   p99 ms  p99.9 ms   max ms  memory MB  shared MB  descriptors  files";
-    let lines = parts.iter().map(|part| {
-        let mut line = format!("{:>8.0}{:>7}{:>9}", part.from_s, part.kills, part.results);
-        let latency = Spread::cells(part.end_to_end_ms, 0);
+    let mut table = Table::new([
+        "from s",
+        "kills",
+        "results",
+        "p50 ms",
+        "p99 ms",
+        "p99.9 ms",
+        "max ms",
+        "memory MB",
+        "shared MB",
+        "descriptors",
+        "files",
+    ]);
+    for part in parts {
+        let counts = [
+            format!("{:.0}", part.from_s),
+            part.kills.to_string(),
+            part.results.to_string(),
+        ];
         let resources = part.resources.map(|used| {
             let mb = |bytes: u64| format!("{:.1}", bytes as f64 / 1e6);
             let memory = used.memory_bytes + used.supervisor_memory_bytes;
@@ -77,17 +92,10 @@ pub(super) fn table(parts: &[Part]) -> Vec<String> {
             ]
         });
         let resources = resources.unwrap_or_else(|| ["-"; 4].map(str::to_owned));
-        for (cell, width) in latency
-            .iter()
-            .chain(&resources)
-            .zip([9, 9, 10, 9, 11, 11, 13, 7])
-        {
-            // Writing to a string cannot fail.
-            let _infallible = write!(line, "{cell:>width$}");
-        }
-        line
-    });
-    core::iter::once(head.to_owned()).chain(lines).collect()
+        let latency = Spread::cells(part.end_to_end_ms, 0);
+        table.row(counts.into_iter().chain(latency).chain(resources));
+    }
+    table.lines()
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use launch::films::Poses;
 use launch::load;
 use serde_json::{Value, json};
 use terminal::{Globals, output};
+use wording::Table;
 
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
@@ -264,9 +265,8 @@ fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
             "as given"
         }
     ))?;
-    output::line(format_args!(
-        "{:<12} {:>24} {:>8} {:>9} {:>9} {:>8} {:>8} {:>19} {:>16}",
-        "camera",
+    let mut table = Table::new([
+        "<camera",
         "centre, m",
         "joints",
         "resid, px",
@@ -274,24 +274,27 @@ fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
         "+- deg",
         "+- mm",
         "halves, deg and mm",
-        "offset, ms"
-    ))?;
-    for ((name, camera), it) in names.iter().zip(&outcome.cameras).zip(&outcome.reports) {
+        "offset, ms",
+    ]);
+    for ((name, camera), found) in names.iter().zip(&outcome.cameras).zip(&outcome.reports) {
         let centre = camera.centre_in_world();
-        let halves = it.halves.map_or("-".to_owned(), |[degrees, metres]| {
+        let halves = found.halves.map_or("-".to_owned(), |[degrees, metres]| {
             format!("{degrees:.2} {:.0}", 1e3 * metres)
         });
-        output::line(format_args!(
-            "{name:<12} {:>24} {:>8} {:>9.2} {:>9.0} {:>8.2} {:>8.0} {halves:>19} {:>16}",
+        let [offset_ms, offset_sd_ms] = found.offset_s.map(|seconds| 1e3 * seconds);
+        table.row([
+            (*name).to_owned(),
             format!("{:.3} {:.3} {:.3}", centre.x, centre.y, centre.z),
-            it.joints,
-            it.residual_px,
-            100.0 * it.inliers,
-            it.sd[0],
-            1e3 * it.sd[1],
-            format!("{:.1} +- {:.1}", 1e3 * it.offset_s[0], 1e3 * it.offset_s[1]),
-        ))?;
+            found.joints.to_string(),
+            format!("{:.2}", found.residual_px),
+            format!("{:.0}", 100.0 * found.inliers),
+            format!("{:.2}", found.sd[0]),
+            format!("{:.0}", 1e3 * found.sd[1]),
+            halves,
+            format!("{offset_ms:.1} +- {offset_sd_ms:.1}"),
+        ]);
     }
+    output::line(table)?;
     for ((name, camera), it) in names.iter().zip(&outcome.cameras).zip(&outcome.reports) {
         if let Some(sd) = it.focal_sd_px {
             let focal = camera.intrinsics.fx;

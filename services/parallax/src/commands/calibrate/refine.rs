@@ -9,6 +9,7 @@ use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use launch::films::Poses;
 use serde_json::{Value, json};
 use terminal::{Globals, output};
+use wording::Table;
 
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
@@ -157,9 +158,8 @@ fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
         outcome.blocks[0],
         outcome.certainty
     ))?;
-    output::line(format_args!(
-        "{:<12} {:>11} {:>9} {:>8} {:>8} {:>6} {:>11} {:>10} {:>11}",
-        "camera",
+    let mut table = Table::new([
+        "<camera",
         "moved, deg",
         "mm",
         "+- deg",
@@ -167,21 +167,22 @@ fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
         "told",
         "before, px",
         "after, px",
-        "offset, ms"
-    ))?;
-    for (name, it) in names.iter().zip(&outcome.changes) {
-        output::line(format_args!(
-            "{name:<12} {:>11.2} {:>9.1} {:>8.2} {:>8.1} {:>6} {:>11.2} {:>10.2} {:>11.1}",
-            it.moved[0],
-            1e3 * it.moved[1],
-            it.sd[0],
-            1e3 * it.sd[1],
-            if it.is_told { "yes" } else { "held" },
-            it.held_out_px[0],
-            it.held_out_px[1],
-            1e3 * it.offset_s
-        ))?;
+        "offset, ms",
+    ]);
+    for (name, change) in names.iter().zip(&outcome.changes) {
+        table.row([
+            (*name).to_owned(),
+            format!("{:.2}", change.moved[0]),
+            format!("{:.1}", 1e3 * change.moved[1]),
+            format!("{:.2}", change.sd[0]),
+            format!("{:.1}", 1e3 * change.sd[1]),
+            if change.is_told { "yes" } else { "held" }.to_owned(),
+            format!("{:.2}", change.held_out_px[0]),
+            format!("{:.2}", change.held_out_px[1]),
+            format!("{:.1}", 1e3 * change.offset_s),
+        ]);
     }
+    output::line(table)?;
     Ok(())
 }
 

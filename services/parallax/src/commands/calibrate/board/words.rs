@@ -5,6 +5,7 @@ use failure::Failure;
 use rigs::boards::Calibrated;
 use serde_json::{Map, Value, json};
 use terminal::output;
+use wording::Table;
 
 use super::Arguments;
 
@@ -14,9 +15,8 @@ pub(super) fn table(calibrated: &Calibrated) -> Result<(), Failure> {
         output::line(format_args!("note: {note}"))?;
     }
     let outcome = &calibrated.outcome;
-    output::line(format_args!(
-        "{:<14} {:>8} {:>7} {:>5} {:>8} {:>9} {:>9} {:>9} {:>10} {:>7}",
-        "camera",
+    let mut table = Table::new([
+        "<camera",
         "pictures",
         "boards",
         "used",
@@ -25,23 +25,25 @@ pub(super) fn table(calibrated: &Calibrated) -> Result<(), Failure> {
         "rms, px",
         "covered",
         "focal, px",
-        "+-"
-    ))?;
-    for (nth, it) in outcome.cameras.iter().enumerate() {
-        let wrong = it.residuals.iter().filter(|it| it.is_wrong).count();
-        let pictures = pictures(calibrated, nth).map_or("-".to_owned(), |it| it.to_string());
-        let sd = focal_sd(it).map_or("given".to_owned(), |it| format!("{it:.2}"));
-        output::line(format_args!(
-            "{:<14} {pictures:>8} {:>7} {:>5} {:>8} {wrong:>9} {:>9.3} {:>7.0} % {:>10.1} {sd:>7}",
-            calibrated.task.names[nth],
-            it.n_boards[0],
-            it.n_boards[1],
-            it.residuals.len() - wrong,
-            it.rms_px,
-            100.0 * it.coverage,
-            it.camera.intrinsics.fx,
-        ))?;
+        "+-",
+    ]);
+    for (nth, camera) in outcome.cameras.iter().enumerate() {
+        let wrong = camera.residuals.iter().filter(|corner| corner.is_wrong);
+        let wrong = wrong.count();
+        table.row([
+            calibrated.task.names[nth].clone(),
+            pictures(calibrated, nth).map_or("-".to_owned(), |n| n.to_string()),
+            camera.n_boards[0].to_string(),
+            camera.n_boards[1].to_string(),
+            (camera.residuals.len() - wrong).to_string(),
+            wrong.to_string(),
+            format!("{:.3}", camera.rms_px),
+            format!("{:.0} %", 100.0 * camera.coverage),
+            format!("{:.1}", camera.camera.intrinsics.fx),
+            focal_sd(camera).map_or("given".to_owned(), |sd| format!("{sd:.2}")),
+        ]);
     }
+    output::line(table)?;
     for it in &outcome.pairs {
         let [a, b] = it.cameras.map(|nth| &calibrated.task.names[nth]);
         output::line(format_args!(
