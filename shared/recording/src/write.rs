@@ -59,6 +59,13 @@ struct Topic {
     n_recorded: u64,
 }
 
+/// The schema of a topic, for other programs.
+struct Schema<'a> {
+    name: &'a str,
+    encoding: &'a str,
+    text: &'a str,
+}
+
 /// A topic whose messages are for other programs: JSON, by a JSON schema. Readers of recordings leave it out.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Foreign {
@@ -128,12 +135,20 @@ impl<W: Write> Writer<W> {
         writer.say_about()?;
         for name in topics {
             let kind = Kind::of_topic(name).ok_or_else(|| WriteError::Topic(name.clone()))?;
-            let schema = (kind.schema_name(), "ros2msg", kind.schema());
-            writer.introduce((name, Some(kind)), &schema, "cdr")?;
+            let schema = Schema {
+                name: kind.schema_name(),
+                encoding: "ros2msg",
+                text: &kind.schema(),
+            };
+            writer.introduce((name, Some(kind)), schema, "cdr")?;
         }
         for strange in foreign {
-            let schema = (strange.schema_name, "jsonschema", strange.schema.to_owned());
-            writer.introduce((&strange.topic, None), &schema, "json")?;
+            let schema = Schema {
+                name: strange.schema_name,
+                encoding: "jsonschema",
+                text: strange.schema,
+            };
+            writer.introduce((&strange.topic, None), schema, "json")?;
         }
         writer.flush(&vec![0; topics.len()])?;
         Ok(writer)
@@ -148,18 +163,16 @@ impl<W: Write> Writer<W> {
     }
 
     /// Adds the next topic.
-    ///
-    /// * `schema`: name, encoding and text.
     fn introduce(
         &mut self,
         (name, kind): (&str, Option<Kind>),
-        (schema_name, schema_encoding, schema): &(&str, &str, String),
+        schema: Schema<'_>,
         encoding: &str,
     ) -> Result<(), WriteError> {
         let channel = self.topics.len() as u16 + 1;
         let added = self
             .out
-            .add_schema(schema_name, schema_encoding, schema.as_bytes())
+            .add_schema(schema.name, schema.encoding, schema.text.as_bytes())
             .and_then(|schema| {
                 let nothing = BTreeMap::new();
                 self.out
