@@ -1,10 +1,14 @@
 //! Resizes, turns and crops an image by an affine map, into a given buffer.
+#![expect(
+    clippy::inline_always,
+    reason = "only inlined functions are compiled for the chosen instruction set"
+)]
 
 mod area;
 mod sampled;
 
 use area::Area;
-use fearless_simd::{Level, dispatch};
+use kernels::{Body, Isa, dispatch};
 use sampled::Sampled;
 
 use crate::Size;
@@ -156,19 +160,31 @@ impl Warp {
             "the output is {}",
             self.output
         );
-        self.apply_with(Level::new(), source, out);
+        self.apply_with(Isa::best(), source, out);
     }
 
     /// The same loops, compiled for every instruction set.
-    fn apply_with(&mut self, level: Level, source: &[u8], out: &mut [u8]) {
+    fn apply_with(&mut self, isa: Isa, source: &[u8], out: &mut [u8]) {
         let plan = &mut self.plan;
-        dispatch!(level, _ => {
-            match plan {
-                Plan::Copy => out.copy_from_slice(source),
-                Plan::Area(area) => area.apply(source, out),
-                Plan::Sampled(sampled) => sampled.apply(source, out),
-            }
-        });
+        dispatch(isa, Run { plan, source, out });
+    }
+}
+
+/// The loops of a plan.
+struct Run<'a> {
+    plan: &'a mut Plan,
+    source: &'a [u8],
+    out: &'a mut [u8],
+}
+
+impl Body for Run<'_> {
+    #[inline(always)]
+    fn run(self) {
+        match self.plan {
+            Plan::Copy => self.out.copy_from_slice(self.source),
+            Plan::Area(area) => area.apply(self.source, self.out),
+            Plan::Sampled(sampled) => sampled.apply(self.source, self.out),
+        }
     }
 }
 
@@ -217,22 +233,6 @@ mod tests {
         (0..SOURCE.rgb_bytes()).map(|_| next()).collect()
     }
 
-    fn levels() -> Vec<Level> {
-        #[cfg(target_arch = "x86_64")]
-        {
-            let best = Level::new();
-            let known = [
-                best.as_sse2().map(Level::Sse2),
-                best.as_sse4_2().map(Level::Sse4_2),
-                best.as_avx2().map(Level::Avx2),
-                Some(best),
-            ];
-            known.into_iter().flatten().collect()
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        vec![Level::new()]
-    }
-
     proptest! {
         #[test]
         fn every_instruction_set_gives_the_same_bits(
@@ -247,11 +247,11 @@ mod tests {
             prop_assume!(scales(&map).is_ok());
             let output = Size::new(11, 7);
             let mut warp = Warp::new(SOURCE, output, &map, Fill::Black).unwrap();
-            let results: Vec<Vec<u8>> = levels()
+            let results: Vec<Vec<u8>> = Isa::available()
                 .into_iter()
-                .map(|level| {
+                .map(|isa| {
                     let mut out = vec![99; output.rgb_bytes()];
-                    warp.apply_with(level, &noise(), &mut out);
+                    warp.apply_with(isa, &noise(), &mut out);
                     out
                 })
                 .collect();

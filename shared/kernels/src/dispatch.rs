@@ -8,14 +8,14 @@ use crate::simd::{Kernel, Simd};
 ///
 /// [`run`](Self::run) and everything it calls must be `#[inline(always)]`: a body takes on the
 /// instruction set of the function that it is inlined into.
-pub(crate) trait Body {
+pub trait Body {
     /// Runs it.
     fn run(self);
 }
 
 /// Runs `body` with the instructions of `isa`.
 #[inline]
-pub(crate) fn dispatch(isa: Isa, body: impl Body) {
+pub fn dispatch(isa: Isa, body: impl Body) {
     isa.run(Plain(body));
 }
 

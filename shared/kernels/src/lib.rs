@@ -32,6 +32,7 @@ const fn sized(usual: usize, interpreted: usize) -> usize {
 }
 
 pub use correlate::{CorrelateWorkspace, FeatureMap, FilterBank, Level, Template, correlate_f64};
+pub use dispatch::{Body, dispatch};
 pub use distance::{LengthSpring, ScoredPoints};
 pub use envelope::{Transformed, transform_f64};
 pub use hog::{HogShape, HogWorkspace, MIRRORED_CHANNEL, N_CHANNELS, hog, hog_f64};

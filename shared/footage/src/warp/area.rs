@@ -1,8 +1,4 @@
 //! The exact area mean, for maps that keep rows and columns.
-#![expect(
-    clippy::inline_always,
-    reason = "only inlined functions are compiled for the chosen instruction set"
-)]
 
 use super::Fill;
 use crate::Size;

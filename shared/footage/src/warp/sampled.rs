@@ -3,10 +3,6 @@
 //! All samples of an output pixel are one weighted sum of the source pixels around its centre, and the
 //! weights depend only on where between source pixels the centre falls. So they are tabulated, per
 //! *phase*, and a pixel costs one short integer correlation, whatever the number of samples.
-#![expect(
-    clippy::inline_always,
-    reason = "only inlined functions are compiled for the chosen instruction set"
-)]
 
 use super::{Affine, Fill};
 use crate::Size;
