@@ -191,15 +191,15 @@ fn groups_are_not_split_and_a_single_group_is_refused() {
     let validated: Vec<&str> = task
         .validated()
         .iter()
-        .map(|it| it.group.as_str())
+        .map(|sample| sample.group.as_str())
         .collect();
     let of_these = samples
         .all
         .iter()
-        .filter(|it| validated.contains(&it.group.as_str()));
+        .filter(|sample| validated.contains(&sample.group.as_str()));
     assert_eq!(of_these.count(), validated.len());
     assert!(!validated.is_empty() && validated.len() < 120);
-    samples.all.iter_mut().for_each(|it| it.group.clear());
+    samples.all.iter_mut().for_each(|sample| sample.group.clear());
     let result = QualityTask::new(&settings, &samples, &[]);
     assert!(matches!(result, Err(TaskError::TooFew { .. })));
 }
@@ -214,7 +214,7 @@ fn weights_of_no_layer_are_refused_and_frozen_ones_do_not_change() {
     };
     let plain = begun(&settings, &samples, None).unwrap();
     let mut first: Parameter = plain.parameters()[0].clone();
-    first.values.iter_mut().for_each(|it| *it *= 0.5);
+    first.values.iter_mut().for_each(|value| *value *= 0.5);
     let weights = [first.clone()];
     let task = QualityTask::new(&settings, &samples, &weights).unwrap();
     let mut trainer = Trainer::new(task, Backend::BuiltIn, None).unwrap();

@@ -63,7 +63,7 @@ pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Vec<Parameter>, Be
         let values = numbers(&constants, &all[at])?;
         let (these, next) = all.split_at_mut(at + 1);
         let own = &mut these[at].values;
-        match next.first_mut().filter(|it| is_gain(it)) {
+        match next.first_mut().filter(|next| is_gain(next)) {
             // The gains of a convolution follow its weights.
             Some(gains) => split(&values, own, &mut gains.values),
             None => *own = values,
@@ -72,8 +72,8 @@ pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Vec<Parameter>, Be
     Ok(all)
 }
 
-fn is_gain(it: &Parameter) -> bool {
-    it.name.rsplit_once('.').is_some_and(|it| it.1 == "gain")
+fn is_gain(parameter: &Parameter) -> bool {
+    parameter.name.rsplit_once('.').is_some_and(|name| name.1 == "gain")
 }
 
 /// Standardised weights as weights and gains.
@@ -94,17 +94,17 @@ fn split(standardised: &[f32], weights: &mut [f32], gains: &mut [f32]) {
 }
 
 fn length(of: &[f32]) -> f32 {
-    of.iter().map(|it| it * it).sum::<f32>().sqrt()
+    of.iter().map(|value| value * value).sum::<f32>().sqrt()
 }
 
 /// The numbers of a parameter in the file.
 fn numbers(constants: &[TensorProto], of: &Parameter) -> Result<Vec<f32>, BeginError> {
     let Parameter { name, dims, .. } = of;
     let half = format!("{name}.half");
-    let named = |it: &&TensorProto| {
-        it.name
+    let named = |tensor: &&TensorProto| {
+        tensor.name
             .as_ref()
-            .is_some_and(|it| *it == *name || *it == half)
+            .is_some_and(|own| *own == *name || *own == half)
     };
     let constant = constants
         .iter()
@@ -121,23 +121,23 @@ fn numbers(constants: &[TensorProto], of: &Parameter) -> Result<Vec<f32>, BeginE
             expected: dims.clone(),
         });
     }
-    let bytes = constant.raw_data.as_ref().map(|it| it.borrow());
+    let bytes = constant.raw_data.as_ref().map(|bytes| bytes.borrow());
     let bytes = bytes.as_deref().map_or(&[][..], Vec::as_slice);
     let values: Vec<f32> = match constant.data_type {
         Some(DataType::FLOAT16) => {
             let (each, _) = bytes.as_chunks::<2>();
             each.iter()
-                .map(|it| value_of_half(u16::from_le_bytes(*it)))
+                .map(|half| value_of_half(u16::from_le_bytes(*half)))
                 .collect()
         }
         Some(DataType::FLOAT) => {
             let (each, _) = bytes.as_chunks::<4>();
-            each.iter().map(|it| f32::from_le_bytes(*it)).collect()
+            each.iter().map(|value| f32::from_le_bytes(*value)).collect()
         }
         _ => Vec::new(),
     };
     let n = of.values.len();
-    if values.len() != n || !values.iter().all(|it| it.is_finite()) {
+    if values.len() != n || !values.iter().all(|value| value.is_finite()) {
         let name = name.clone();
         return Err(BeginError::Numbers { name, n });
     }

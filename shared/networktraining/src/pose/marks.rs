@@ -54,18 +54,18 @@ impl Marks {
             let is_sure = |joint: &usize| {
                 [*joint, MIRROR[*joint]]
                     .into_iter()
-                    .all(|it| self.marked[it][0].is_finite() && self.taught[it].1 > SURE_OF_SIDES)
+                    .all(|joint| self.marked[joint][0].is_finite() && self.taught[joint].1 > SURE_OF_SIDES)
             };
             let joints: Vec<usize> = limb.into_iter().filter(is_sure).collect();
             if joints.len() < 4 {
                 return false;
             }
             let each = |of: &dyn Fn(usize) -> f32| {
-                mean(&joints.iter().map(|it| of(*it)).collect::<Vec<f32>>())
+                mean(&joints.iter().map(|joint| of(*joint)).collect::<Vec<f32>>())
             };
-            let apart = each(&|it| distance(self.marked[it], self.marked[MIRROR[it]]));
-            let exchanged = each(&|it| distance(self.marked[MIRROR[it]], self.taught[it].0));
-            let as_marked = each(&|it| distance(self.marked[it], self.taught[it].0));
+            let apart = each(&|joint| distance(self.marked[joint], self.marked[MIRROR[joint]]));
+            let exchanged = each(&|joint| distance(self.marked[MIRROR[joint]], self.taught[joint].0));
+            let as_marked = each(&|joint| distance(self.marked[joint], self.taught[joint].0));
             let is_wrong = apart >= APART * self.trunk && exchanged < NEARER * as_marked;
             if is_wrong {
                 let before = self.marked;

@@ -50,13 +50,14 @@ pub struct Person {
 impl Person {
     /// The places of the joints that are known well enough to lay a box around them.
     pub fn places(&self) -> impl Iterator<Item = [f32; 2]> {
-        let is_known = |it: &&Target| it.weight > 0.0 && it.at.iter().all(|it| it.is_finite());
-        self.targets.iter().filter(is_known).map(|it| it.at)
+        let is_known =
+            |target: &&Target| target.weight > 0.0 && target.at.iter().all(|side| side.is_finite());
+        self.targets.iter().filter(is_known).map(|target| target.at)
     }
 
     /// From the middle of the hips to the neck, pixels; not finite if one of them is not known.
     pub fn trunk(&self) -> [f32; 2] {
-        let [right, left, neck] = [2, 3, 12].map(|it: usize| self.targets[it].at);
+        let [right, left, neck] = [2, 3, 12].map(|joint: usize| self.targets[joint].at);
         [0, 1].map(|axis| neck[axis] - f32::midpoint(right[axis], left[axis]))
     }
 }

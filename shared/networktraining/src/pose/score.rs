@@ -58,7 +58,7 @@ fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
 
 fn end(of: &[[f32; 2]; N_JOINTS], joints: &[usize]) -> [f32; 2] {
     let n = joints.len() as f32;
-    [0, 1].map(|axis| joints.iter().map(|it| of[*it][axis]).sum::<f32>() / n)
+    [0, 1].map(|axis| joints.iter().map(|joint| of[*joint][axis]).sum::<f32>() / n)
 }
 
 impl Score {
@@ -67,13 +67,13 @@ impl Score {
         let mut limbs = [0.0f32; 3];
         let mut fronts = [0.0f32; 2];
         let mut joints: Vec<(f32, bool)> = Vec::new();
-        for it in people {
+        for person in people {
             for (a, b) in STICKS {
-                let [from, to] = [end(&it.truth, a), end(&it.truth, b)];
+                let [from, to] = [end(&person.truth, a), end(&person.truth, b)];
                 let half = 0.5 * distance(from, to);
                 let off = [
-                    distance(end(&it.found, a), from),
-                    distance(end(&it.found, b), to),
+                    distance(end(&person.found, a), from),
+                    distance(end(&person.found, b), to),
                 ];
                 if half.is_finite() {
                     limbs[0] += 1.0;
@@ -81,16 +81,16 @@ impl Score {
                     limbs[2] += f32::from(u8::from(off[0].max(off[1]) <= half));
                 }
             }
-            if it.facing[0].hypot(it.facing[1]) > 0.7 {
-                let along = it.front[0] * it.facing[0] + it.front[1] * it.facing[1];
+            if person.facing[0].hypot(person.facing[1]) > 0.7 {
+                let along = person.front[0] * person.facing[0] + person.front[1] * person.facing[1];
                 fronts[0] += 1.0;
                 fronts[1] += f32::from(u8::from(along > 0.0));
             }
-            let head = distance(it.truth[HEAD[0]], it.truth[HEAD[1]]);
+            let head = distance(person.truth[HEAD[0]], person.truth[HEAD[1]]);
             for joint in 0..N_JOINTS {
-                let heads = distance(it.found[joint], it.truth[joint]) / head;
+                let heads = distance(person.found[joint], person.truth[joint]) / head;
                 if heads.is_finite() {
-                    joints.push((it.expected[joint], heads > 0.5));
+                    joints.push((person.expected[joint], heads > 0.5));
                 }
             }
         }
@@ -107,7 +107,7 @@ impl Score {
 /// The area under the curve (Mann and Whitney); NaN if all joints are alike.
 fn area(mut joints: Vec<(f32, bool)>) -> f32 {
     joints.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let far = joints.iter().filter(|it| it.1).count();
+    let far = joints.iter().filter(|joint| joint.1).count();
     let near = joints.len() - far;
     let mut below = 0u64;
     let mut pairs = 0u64;

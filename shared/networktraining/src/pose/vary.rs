@@ -91,7 +91,7 @@ fn middle() -> f32 {
 
 /// A point of the picture after the picture was turned about its middle, which becomes the origin.
 fn turned(at: [f32; 2], [cosine, sine]: [f32; 2]) -> [f32; 2] {
-    let [x, y] = at.map(|it| it - middle());
+    let [x, y] = at.map(|side| side - middle());
     [cosine * x - sine * y, sine * x + cosine * y]
 }
 
@@ -289,11 +289,11 @@ fn recolour(rgb: &mut [[f32; 3]], vary: &Vary, rng: &mut Rng) {
     } else {
         0.0
     };
-    for it in rgb {
+    for colour in rgb {
         if is_grey {
-            *it = [it.iter().sum::<f32>() / 3.0; 3];
+            *colour = [colour.iter().sum::<f32>() / 3.0; 3];
         }
-        for (value, tint) in it.iter_mut().zip(tint) {
+        for (value, tint) in colour.iter_mut().zip(tint) {
             // Uniform noise of the deviation asked for.
             let noise = noise * 3.46 * (rng.f32() - 0.5);
             let changed = (*value - MEAN) * contrast + MEAN + brightness + tint + noise;
@@ -304,7 +304,7 @@ fn recolour(rgb: &mut [[f32; 3]], vary: &Vary, rng: &mut Rng) {
 
 fn sample(person: &Person, shape: &Shape, view: &View, rgb: &[[f32; 3]]) -> NetworkSample {
     let picture =
-        (0..3).flat_map(|channel| rgb.iter().map(move |it| (it[channel] - MEAN) / DEVIATION));
+        (0..3).flat_map(|channel| rgb.iter().map(move |pixel| (pixel[channel] - MEAN) / DEVIATION));
     let picture = picture.collect();
     let targets = if view.is_mirrored {
         exchange_sides(&person.targets)
@@ -314,7 +314,7 @@ fn sample(person: &Person, shape: &Shape, view: &View, rgb: &[[f32; 3]]) -> Netw
     let [columns, rows] = shape.cells();
     let in_cells = |at: [f32; 2]| {
         let half = 0.5 * (STRIDE - 1) as f32;
-        view.in_input(at).map(|it| (it - half) / STRIDE as f32)
+        view.in_input(at).map(|side| (side - half) / STRIDE as f32)
     };
     let is_inside = |[x, y]: [f32; 2]| {
         (-0.5..columns as f32 - 0.5).contains(&x) && (-0.5..rows as f32 - 0.5).contains(&y)
@@ -325,7 +325,7 @@ fn sample(person: &Person, shape: &Shape, view: &View, rgb: &[[f32; 3]]) -> Netw
     for (joint, target) in targets.iter().enumerate() {
         let at = in_cells(target.at);
         let or = target.or.map(in_cells);
-        let is_known = target.weight > 0.0 && at.iter().all(|it| it.is_finite());
+        let is_known = target.weight > 0.0 && at.iter().all(|side| side.is_finite());
         if is_known {
             weights[joint] = target.weight;
             let is_certain = is_inside(at) && target.is_marked && or.is_none();

@@ -24,7 +24,7 @@ pub struct Judgement {
 /// The errors of samples, shares of the height that their tiles show: the median of every part is its tau.
 pub fn tau(samples: &[&Sample]) -> Vec<f32> {
     let of_part = |part: usize| -> Vec<f32> {
-        let share = |it: &&Sample| it.errors_px[part] / it.height_px;
+        let share = |sample: &&Sample| sample.errors_px[part] / sample.height_px;
         samples.iter().map(share).collect()
     };
     (0..N_PARTS)
@@ -52,17 +52,17 @@ impl Judgement {
             beyond: Vec::new(),
         };
         for (part, tau) in tau.iter().enumerate() {
-            let expected: Vec<f32> = predicted[..n].iter().map(|it| it[part]).collect();
+            let expected: Vec<f32> = predicted[..n].iter().map(|values| values[part]).collect();
             let actual: Vec<f32> = truth
                 .iter()
-                .map(|it| it.errors_px[part] / it.height_px)
+                .map(|sample| sample.errors_px[part] / sample.height_px)
                 .collect();
             let beyond: Vec<bool> = actual.iter().map(|error| error > tau).collect();
             let off = expected
                 .iter()
                 .zip(&actual)
                 .map(|(a, b)| f64::from((a - b).abs()));
-            let n_beyond = beyond.iter().filter(|it| **it).count();
+            let n_beyond = beyond.iter().filter(|is_beyond| **is_beyond).count();
             judgement.area.push(area(&expected, &beyond));
             judgement
                 .rank_correlation
@@ -112,7 +112,7 @@ mod tests {
         assert_eq!(tau, [0.04; N_PARTS]);
         let truth: Vec<Vec<f32>> = samples
             .iter()
-            .map(|it| it.errors_px.iter().map(|px| px / 100.0).collect())
+            .map(|sample| sample.errors_px.iter().map(|px| px / 100.0).collect())
             .collect();
         let judgement = Judgement::new(&truth, &all, &tau);
         assert_eq!(judgement.mean_area(), 1.0);

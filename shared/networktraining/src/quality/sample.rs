@@ -26,7 +26,7 @@ pub struct Sample {
 
 /// Sides of the picture that a sample of such a tile keeps, height and width.
 pub fn picture_size(tile: TileShape) -> [usize; 2] {
-    [tile.height, tile.width].map(|it| it + 2 * MARGIN)
+    [tile.height, tile.width].map(|side| side + 2 * MARGIN)
 }
 
 /// Distance of every part from the truth.
@@ -58,8 +58,8 @@ mod tests {
 
     #[test]
     fn the_better_reading_of_left_and_right_counts() {
-        let truth: Vec<[f64; 2]> = (0..N_PARTS).map(|it| [it as f64 * 10.0, 5.0]).collect();
-        let exchanged: Vec<[f64; 2]> = MIRROR.iter().map(|it| truth[*it]).collect();
+        let truth: Vec<[f64; 2]> = (0..N_PARTS).map(|part| [part as f64 * 10.0, 5.0]).collect();
+        let exchanged: Vec<[f64; 2]> = MIRROR.iter().map(|part| truth[*part]).collect();
         assert_eq!(part_errors(&truth, &truth), [0.0; N_PARTS]);
         assert_eq!(part_errors(&exchanged, &truth), [0.0; N_PARTS]);
         let mut off = exchanged;

@@ -6,10 +6,10 @@
 /// * Returns `None` if all are positive, or none is.
 pub fn area(scores: &[f32], positive: &[bool]) -> Option<f64> {
     let ranks = ranks(scores);
-    let of_positive = ranks.iter().zip(positive).filter(|it| *it.1);
-    let n_positive = positive.iter().filter(|it| **it).count() as f64;
+    let of_positive = ranks.iter().zip(positive).filter(|ranked| *ranked.1);
+    let n_positive = positive.iter().filter(|is_positive| **is_positive).count() as f64;
     let n_other = positive.len() as f64 - n_positive;
-    let sum: f64 = of_positive.map(|it| it.0).sum();
+    let sum: f64 = of_positive.map(|ranked| ranked.0).sum();
     let above = sum - n_positive * (n_positive + 1.0) / 2.0;
     (n_positive > 0.0 && n_other > 0.0).then(|| above / (n_positive * n_other))
 }
@@ -70,7 +70,7 @@ mod tests {
         let a = [1.0, 5.0, 2.0, 9.0];
         let b = a.map(f32::exp);
         assert!((rank_correlation(&a, &b).unwrap() - 1.0).abs() < 1e-12);
-        let falling = a.map(|it| -it);
+        let falling = a.map(|value| -value);
         assert!((rank_correlation(&a, &falling).unwrap() + 1.0).abs() < 1e-12);
         assert_eq!(rank_correlation(&a, &[1.0; 4]), None);
     }
@@ -80,11 +80,11 @@ mod tests {
         fn the_area_is_the_share_of_pairs_in_the_right_order(
             cases in proptest::collection::vec((0_u8..12, any::<bool>()), 2..40)
         ) {
-            let scores: Vec<f32> = cases.iter().map(|it| f32::from(it.0)).collect();
-            let positive: Vec<bool> = cases.iter().map(|it| it.1).collect();
+            let scores: Vec<f32> = cases.iter().map(|case| f32::from(case.0)).collect();
+            let positive: Vec<bool> = cases.iter().map(|case| case.1).collect();
             let (mut n, mut right) = (0.0, 0.0);
-            for (a, _) in cases.iter().filter(|it| it.1) {
-                for (b, _) in cases.iter().filter(|it| !it.1) {
+            for (a, _) in cases.iter().filter(|case| case.1) {
+                for (b, _) in cases.iter().filter(|case| !case.1) {
                     n += 1.0;
                     right += 0.5 * (f64::from(u8::from(a > b)) + f64::from(u8::from(a >= b)));
                 }

@@ -114,7 +114,7 @@ mod tests {
         let sample = |group: &str| Sample {
             group: group.to_owned(),
             source: "a picture".to_owned(),
-            picture: (0..3 * rows * cols).map(|it| it as u8).collect(),
+            picture: (0..3 * rows * cols).map(|at| at as u8).collect(),
             evidence: vec![0.5; n_evidence(N_PARTS)],
             height_px: 200.0,
             errors_px: vec![3.0; N_PARTS],

@@ -82,8 +82,8 @@ pub fn varied(
         }
         if dice.f32() < vary.noise {
             let level = vary.noise_level * dice.f32();
-            for it in &mut planes {
-                *it += level * normal(dice);
+            for value in &mut planes {
+                *value += level * normal(dice);
             }
         }
         normalised(&planes, tile)
@@ -91,7 +91,7 @@ pub fn varied(
         Vec::new()
     };
     let errors =
-        (0..N_PARTS).map(|it| sample.errors_px[if place.mirrored { MIRROR[it] } else { it }]);
+        (0..N_PARTS).map(|part| sample.errors_px[if place.mirrored { MIRROR[part] } else { part }]);
     NetworkSample {
         tile: tile_values,
         evidence: moved(&sample.evidence, tile, place, unknown),
@@ -112,7 +112,7 @@ fn moved(evidence: &[f32], tile: TileShape, place: Place, unknown: &[f32]) -> Ve
             to[PART_NUMBERS.len()..].copy_from_slice(&unknown[types..][..N_TYPES]);
         }
     }
-    let heights = place.shift.map(|it| it / tile.height as f32);
+    let heights = place.shift.map(|pixels| pixels / tile.height as f32);
     for part in 0..N_PARTS {
         for (axis, name) in ["x", "y"].into_iter().enumerate() {
             let Some(at) = column(part, name) else {
@@ -123,7 +123,7 @@ fn moved(evidence: &[f32], tile: TileShape, place: Place, unknown: &[f32]) -> Ve
             moved[at] = (value - heights[axis]) / place.scale;
         }
     }
-    let of_pose = POSE_NUMBERS.iter().position(|it| *it == "tile_height");
+    let of_pose = POSE_NUMBERS.iter().position(|name| *name == "tile_height");
     if let Some(at) = of_pose {
         moved[N_PARTS * PER_PART + at] *= place.scale;
     }
@@ -174,13 +174,13 @@ fn blur(planes: &mut [f32], tile: TileShape, deviation: f32) {
         return;
     }
     let reach = (3.0 * deviation).ceil() as i64;
-    let weight = |it: i64| (-0.5 * (it as f32 / deviation).powi(2)).exp();
+    let weight = |off: i64| (-0.5 * (off as f32 / deviation).powi(2)).exp();
     let total: f32 = (-reach..=reach).map(weight).sum();
-    let weights: Vec<f32> = (-reach..=reach).map(|it| weight(it) / total).collect();
+    let weights: Vec<f32> = (-reach..=reach).map(|off| weight(off) / total).collect();
     let mut line = Vec::new();
     let mut pass = |plane: &mut [f32], n: usize, first: usize, step: usize| {
         line.clear();
-        line.extend((0..n).map(|it| plane[first + it * step]));
+        line.extend((0..n).map(|at| plane[first + at * step]));
         for i in 0..n {
             let near = |k: usize| (i as i64 + k as i64 - reach).clamp(0, n as i64 - 1) as usize;
             let sum = weights
@@ -201,7 +201,7 @@ fn blur(planes: &mut [f32], tile: TileShape, deviation: f32) {
 fn normalised(planes: &[f32], tile: TileShape) -> Vec<f32> {
     let Normalisation { mean, deviation } = Normalisation::IMAGENET;
     let area = tile.height * tile.width;
-    let value = |(at, it): (usize, &f32)| (it - mean[at / area]) / deviation[at / area];
+    let value = |(at, value): (usize, &f32)| (value - mean[at / area]) / deviation[at / area];
     planes.iter().enumerate().map(value).collect()
 }
 

@@ -54,7 +54,7 @@ struct Entry {
 pub fn parse(bytes: &[u8]) -> Result<Vec<Parameter>, VggError> {
     let (length, rest) = bytes.split_first_chunk().ok_or(VggError::Truncated)?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok();
-    let split = length.and_then(|it| rest.split_at_checked(it));
+    let split = length.and_then(|length| rest.split_at_checked(length));
     let (header, data) = split.ok_or(VggError::Truncated)?;
     let mut header: BTreeMap<String, serde_json::Value> = serde_json::from_slice(header)?;
     let mut all = Vec::new();
@@ -101,7 +101,7 @@ fn numbers(data: &[u8], entry: Entry, name: &str, dims: &[usize]) -> Result<Vec<
         });
     }
     let words = of.as_chunks::<4>().0;
-    Ok(words.iter().map(|it| f32::from_le_bytes(*it)).collect())
+    Ok(words.iter().map(|word| f32::from_le_bytes(*word)).collect())
 }
 
 #[cfg(test)]
@@ -142,7 +142,7 @@ mod tests {
     fn every_convolution_gets_its_weights() {
         let read = parse(&file(|_| ())).unwrap();
         assert_eq!(read.len(), 26);
-        let of = |name: &str| read.iter().find(|it| it.name == name).unwrap();
+        let of = |name: &str| read.iter().find(|parameter| parameter.name == name).unwrap();
         assert_eq!(of("conv1_1.weight").dims, [64, 3, 3, 3]);
         assert_eq!(of("conv3_2.bias").values, [12.0; 256]);
         assert_eq!(of("conv5_3.weight").values[0], 28.0);
@@ -151,9 +151,9 @@ mod tests {
     #[test]
     fn what_is_not_vgg_16_is_refused_by_the_name_of_the_layer() {
         let said = |change: &dyn Fn(&mut String)| parse(&file(change)).unwrap_err().to_string();
-        let renamed = said(&|it| *it = it.replace("features.28.bias", "features.30.bias"));
+        let renamed = said(&|header| *header = header.replace("features.28.bias", "features.30.bias"));
         assert_eq!(renamed, "there is no `features.28.bias`");
-        let half = said(&|it| *it = it.replacen("F32", "F16", 1));
+        let half = said(&|header| *header = header.replacen("F32", "F16", 1));
         assert!(half.starts_with("`features.0.weight` is F16"), "{half}");
         assert!(matches!(
             parse(&file(String::clear)),

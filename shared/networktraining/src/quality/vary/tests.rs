@@ -17,14 +17,14 @@ fn sample() -> Sample {
         source: String::new(),
         picture: vec![0; 3 * rows * cols],
         evidence: (0..n_evidence(N_PARTS))
-            .map(|it| it as f32 / 100.0)
+            .map(|at| at as f32 / 100.0)
             .collect(),
         height_px: 200.0,
-        errors_px: (0..N_PARTS).map(|it| it as f32).collect(),
+        errors_px: (0..N_PARTS).map(|part| part as f32).collect(),
     };
     for part in 0..N_PARTS {
         let [col, row] = [MARGIN + 4 + part * 3 % 16, MARGIN + 5 + part];
-        let middle = [cols, rows].map(|it| (it as f32 - 1.0) / 2.0);
+        let middle = [cols, rows].map(|side| (side as f32 - 1.0) / 2.0);
         let place = [col as f32 - middle[0], row as f32 - middle[1]];
         for (axis, name) in ["x", "y"].into_iter().enumerate() {
             sample.evidence[column(part, name).unwrap()] = place[axis] / TILE.height as f32;
@@ -42,8 +42,8 @@ fn unknown() -> Vec<f32> {
 
 /// Brightness of the first plane at the position of a part in the evidence.
 fn brightness(planes: &[f32], evidence: &[f32], part: usize) -> f32 {
-    let place = ["x", "y"].map(|it| evidence[column(part, it).unwrap()] * TILE.height as f32);
-    let middle = [TILE.width, TILE.height].map(|it| (it as f32 - 1.0) / 2.0);
+    let place = ["x", "y"].map(|axis| evidence[column(part, axis).unwrap()] * TILE.height as f32);
+    let middle = [TILE.width, TILE.height].map(|side| (side as f32 - 1.0) / 2.0);
     let [x, y] = [0, 1].map(|axis| (place[axis] + middle[axis]).round() as usize);
     planes[y * TILE.width + x]
 }
@@ -72,11 +72,11 @@ fn evidence_and_picture_agree_for_every_position_of_the_tile() {
             };
             let planes = pixels(&sample, TILE, place);
             let evidence = moved(&sample.evidence, TILE, place, &unknown());
-            let dark = planes.iter().filter(|it| **it < 0.15).count();
+            let dark = planes.iter().filter(|value| **value < 0.15).count();
             assert!(dark > 800, "{dark}: most of the picture is dark");
             for part in 0..N_PARTS {
-                let it = brightness(&planes, &evidence, part);
-                assert!(it > 0.2, "part {part}, {place:?}: {it}");
+                let light = brightness(&planes, &evidence, part);
+                assert!(light > 0.2, "part {part}, {place:?}: {light}");
             }
         }
     }
