@@ -12,6 +12,7 @@
 
 mod checkpoint;
 mod compute;
+mod lesson;
 mod onnx;
 mod ops;
 mod optimiser;
@@ -27,7 +28,7 @@ pub mod pose;
 pub mod quality;
 
 pub use checkpoint::StoreError;
-pub use compute::Shown;
+pub use lesson::Shown;
 pub use onnx::{Document, write};
 pub use ops::{Conv, Dims, Network, Ops, Output, Places, Scaling};
 pub use optimiser::{Rule, Step};

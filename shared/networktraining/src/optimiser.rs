@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::compute::Lesson;
+use crate::lesson::Lesson;
 use crate::parameters::{Parameter, Role};
 
 /// Decay of the running means of gradients and of their squares (`AdamW`: Loshchilov and Hutter 2019).

@@ -3,6 +3,7 @@
 //! Batches are computed sample by sample on rayon's current pool; the order of all sums is fixed, so that equal numbers give equal
 //! bits, whatever the number of threads.
 
+mod batch;
 mod convolution;
 mod lists;
 mod maps;
@@ -13,7 +14,7 @@ mod record;
 mod tests;
 
 use self::record::Record;
-use crate::compute::{Lesson, Running, Shown};
+use crate::lesson::{Lesson, Running, Shown};
 use crate::ops::Network;
 use crate::parameters::Parameter;
 

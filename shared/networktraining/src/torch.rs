@@ -1,141 +1,132 @@
-//! Runs and trains the network on `LibTorch`, which records the forward pass itself.
+//! Runs and trains networks on `LibTorch`, which records the forward pass itself.
 //!
-//! burn could use `LibTorch`, too, but calculates the gradients of weights by convolutions whose kernels are as large as the maps:
-//! a step takes 1.8 times as long. Maps lie here with the channels of a cell side by side, as the convolutions want them.
+//! Maps lie here with the channels of a cell side by side, as the convolutions want them.
 
 use std::rc::Rc;
 
+use fastrand::Rng;
 use tch::{Kind, Tensor};
 
-use super::{Batch, Cost, Found, Gradients, Network, Step};
-use crate::network::{self, Conv, N_JOINTS, Ops, STRIDE, grid};
-use crate::parameters::{EPSILON, GAIN_OF_RELU, Parameter};
+use crate::lesson::{Lesson, Running, Shown, Statistics};
+use crate::ops::{Along, Conv, Dims, Network, Ops, Places, Scaling, grid};
+use crate::parameters::{EPSILON_OF_BATCH, EPSILON_OF_LENGTH, GAIN_OF_RELU, Parameter};
 use crate::settings::Precision;
 
-/// What a network finds in pictures, `[n, 3, height, width]`.
-pub(super) fn find(network: Network<'_>, n: usize, pictures: &[f32]) -> Found {
+/// The outputs of a network.
+pub(crate) fn find(
+    network: &impl Network,
+    parameters: &[Parameter],
+    (shown, precision): (&Shown, Precision),
+) -> Vec<Vec<f32>> {
     tch::no_grad(|| {
-        let tensors = tensors(network.parameters, &|_| false);
-        let sides = [network.shape.width, network.shape.height];
-        let mut forward = Forward::new(network, (n, sides, pictures), &tensors);
-        let found = network::run(&mut forward, network.shape);
-        Found {
-            maps: numbers(&found.maps),
-            fronts: numbers(&found.front),
-            errors: numbers(&found.error),
-        }
+        let tensors = tensors(parameters, &|_| false);
+        let mut forward = Forward::new(network, (parameters, &tensors), (shown, precision));
+        let outputs = network.run(&mut forward);
+        outputs.iter().map(|output| numbers(output)).collect()
     })
 }
 
-/// The gradients of the cost, and the cost.
-pub(super) fn gradients(network: Network<'_>, batch: &Batch, step: Step) -> (Gradients, Cost) {
-    let tensors = tensors(network.parameters, &|it| step.learns(it));
-    let pictures = (batch.n, batch.sides, batch.pictures.as_slice());
-    let mut forward = Forward::new(network, pictures, &tensors);
-    let found = network::run(&mut forward, network.shape);
-    let maps = found.maps.to_kind(Kind::Float);
-    let places = numbers(&maps.detach());
-    let of_maps = of_maps(batch, &maps);
-    let of_front = of_front(batch, &found.front);
-    let of_error = of_error(batch, &found.error, &places);
-    let cost = if step.error_only {
-        &of_error * f64::from(step.error)
-    } else {
-        &of_maps + &of_front * f64::from(step.front) + &of_error * f64::from(step.error)
-    };
-    cost.backward();
-    let gradients = tensors.iter().map(|it| {
-        let gradient = it.grad();
+/// The gradients of a cost.
+///
+/// * `cost`: the gradients of the cost of outputs.
+pub(crate) fn learn(
+    network: &impl Network,
+    running: Running<'_>,
+    (shown, precision): (&Shown, Precision),
+    cost: &mut dyn FnMut(&[Vec<f32>]) -> Vec<Vec<f32>>,
+) -> Lesson {
+    let tensors = tensors(running.parameters, &|at| running.learned[at]);
+    let mut forward = Forward::new(network, (running.parameters, &tensors), (shown, precision));
+    forward.dice = Some(running.dice);
+    let outputs = network.run(&mut forward);
+    let values: Vec<Vec<f32>> = outputs.iter().map(|output| numbers(output)).collect();
+    // Its gradients by the outputs are those of the cost.
+    let slope = outputs
+        .iter()
+        .zip(cost(&values))
+        .filter(|(output, _)| output.requires_grad())
+        .map(|(output, gradient)| {
+            let gradient = tensor(&gradient, &output.size());
+            (output.to_kind(Kind::Float) * gradient).sum(Kind::Float)
+        })
+        .reduce(|sum, part| sum + part);
+    if let Some(slope) = slope {
+        slope.backward();
+    }
+    let gradients = tensors.iter().map(|tensor| {
+        let gradient = tensor.grad();
         gradient.defined().then(|| numbers(&gradient))
     });
-    let [maps, front, error] = [of_maps, of_front, of_error].map(|it| it.double_value(&[]) as f32);
-    (gradients.collect(), Cost { maps, front, error })
-}
-
-/// Cross-entropy of the maps, heat counting tenfold: the mean over joints, a cell of heat 1 worth.
-fn of_maps(batch: &Batch, maps: &Tensor) -> Tensor {
-    let [columns, rows] = batch.sides.map(|it| (it / STRIDE) as i64);
-    let joints = N_JOINTS as i64;
-    let n = batch.n as i64;
-    let target = tensor(&batch.maps, &[n, joints, rows, columns]);
-    let weights = tensor(&batch.weights, &[n, joints, 1, 1]);
-    let weights = weights * (&target * 9.0 + 1.0);
-    // log(1 + exp(x)) - x t, without overflow.
-    let entropy = maps.softplus() - maps * target;
-    (entropy * weights).sum(Kind::Float) / (f64::from(batch.sum_of_weights()) * 40.0)
-}
-
-/// Surprise about the direction, weighted by its certainty.
-fn of_front(batch: &Batch, evidence: &Tensor) -> Tensor {
-    let lengths = batch.certainties();
-    let n = batch.n as i64;
-    let certain = lengths.iter().sum::<f32>().max(1.0);
-    let direction = tensor(&batch.fronts, &[n, 2]);
-    let lengths = tensor(&lengths, &[n, 1]);
-    let along = (evidence * direction).sum_dim_intlist(1, true, Kind::Float);
-    let ratio = along * 2.0 / (&lengths + 1e-6);
-    (ratio.neg().softplus() * lengths).sum(Kind::Float) / f64::from(certain)
-}
-
-/// Surprise about the errors of the maxima, if they are distributed exponentially with the expected error as mean.
-fn of_error(batch: &Batch, logarithms: &Tensor, maps: &[f32]) -> Tensor {
-    let [off, is_known] = batch.off(maps);
-    let n_known = is_known.iter().sum::<f32>().max(1.0);
-    let dims = [batch.n as i64, N_JOINTS as i64];
-    let logarithms = logarithms.clamp(-8.0, 2.0);
-    let surprise = tensor(&off, &dims) * logarithms.neg().exp() + logarithms;
-    (surprise * tensor(&is_known, &dims)).sum(Kind::Float) / f64::from(n_known)
+    Lesson {
+        gradients: gradients.collect(),
+        statistics: forward.statistics,
+    }
 }
 
 fn tensor(values: &[f32], dims: &[i64]) -> Tensor {
     Tensor::from_slice(values).reshape(dims)
 }
 
-fn tensors(parameters: &[Parameter], learned: &dyn Fn(&Parameter) -> bool) -> Vec<Tensor> {
-    let tensor = |it: &Parameter| Tensor::from_slice(&it.values).set_requires_grad(learned(it));
-    parameters.iter().map(tensor).collect()
+fn tensors(parameters: &[Parameter], learned: &dyn Fn(usize) -> bool) -> Vec<Tensor> {
+    let tensor = |(at, parameter): (usize, &Parameter)| {
+        Tensor::from_slice(&parameter.values).set_requires_grad(learned(at))
+    };
+    parameters.iter().enumerate().map(tensor).collect()
 }
 
 /// The values in the order of the dimensions.
-fn numbers(of: &Tensor) -> Vec<f32> {
-    let flat = of.to_kind(Kind::Float).contiguous().flatten(0, -1);
+fn numbers(value: &Tensor) -> Vec<f32> {
+    let flat = value
+        .detach()
+        .to_kind(Kind::Float)
+        .contiguous()
+        .flatten(0, -1);
     Vec::try_from(flat).unwrap_or_default()
 }
 
 /// The same numbers, with the channels of a cell side by side.
-fn channels_last(of: &Tensor) -> Tensor {
-    of.permute([0, 2, 3, 1]).contiguous().permute([0, 3, 1, 2])
+fn channels_last(map: &Tensor) -> Tensor {
+    map.permute([0, 2, 3, 1]).contiguous().permute([0, 3, 1, 2])
 }
 
 /// Runs a network on a batch.
 struct Forward<'a> {
+    n: usize,
+    inputs: Vec<(&'static str, Dims, &'a [f32])>,
     /// Names and sizes.
     parameters: &'a [Parameter],
     /// The same values as flat tensors.
     tensors: &'a [Tensor],
-    picture: Tensor,
     /// Type of the numbers in maps.
     numbers: Kind,
     /// Number of the next parameter.
     next: usize,
+    /// Nothing outside training.
+    dice: Option<Rng>,
+    statistics: Vec<Statistics>,
 }
 
 impl<'a> Forward<'a> {
     fn new(
-        network: Network<'a>,
-        (n, [width, height], pictures): (usize, [usize; 2], &[f32]),
-        tensors: &'a [Tensor],
+        network: &impl Network,
+        (parameters, tensors): (&'a [Parameter], &'a [Tensor]),
+        (shown, precision): (&'a Shown, Precision),
     ) -> Self {
-        let dims = [n, 3, height, width].map(|it| it as i64);
+        let inputs = network.inputs().into_iter().zip(&shown.inputs);
         Self {
-            parameters: network.parameters,
+            n: shown.n,
+            inputs: inputs
+                .map(|((name, dims), values)| (name, dims, values.as_slice()))
+                .collect(),
+            parameters,
             tensors,
-            picture: channels_last(&tensor(pictures, &dims)),
-            numbers: match network.precision {
+            numbers: match precision {
                 Precision::F32 => Kind::Float,
                 Precision::Bf16 => Kind::BFloat16,
             },
             next: 0,
+            dice: None,
+            statistics: Vec::new(),
         }
     }
 
@@ -150,92 +141,195 @@ impl<'a> Forward<'a> {
     }
 
     fn dims<const D: usize>(&self) -> [i64; D] {
-        core::array::from_fn(|it| self.parameters[self.next].dims[it] as i64)
+        core::array::from_fn(|at| self.parameters[self.next].dims[at] as i64)
     }
 
-    /// The standardised weights of a convolution: [`standardised`](crate::parameters::standardised).
-    fn weight(&mut self, name: &str) -> Tensor {
+    /// The weights of a convolution, [standardised](crate::parameters::standardised) where it asks for that.
+    fn weight(&mut self, name: &str, scaling: Scaling) -> Tensor {
         let dims: [i64; 4] = self.dims();
         let weight = self.parameter(&format!("{name}.weight"));
-        let gain = self.parameter(&format!("{name}.gain"));
         let rows = weight.reshape([dims[0], -1]);
-        let rows = &rows - rows.mean_dim(1, true, Kind::Float);
-        let squared = rows.square().sum_dim_intlist(1, true, Kind::Float);
-        let factor =
-            gain.reshape([-1, 1]) * f64::from(GAIN_OF_RELU) / (squared + f64::from(EPSILON)).sqrt();
-        let weight = (rows * factor).reshape(dims).to_kind(self.numbers);
-        channels_last(&weight)
+        let rows = if matches!(scaling, Scaling::Standardised { .. }) {
+            let gain = self.parameter(&format!("{name}.gain"));
+            let rows = &rows - rows.mean_dim(1, true, Kind::Float);
+            let squared = rows.square().sum_dim_intlist(1, true, Kind::Float);
+            let length = (squared + f64::from(EPSILON_OF_LENGTH)).sqrt();
+            let factor = gain.reshape([-1, 1]) * f64::from(GAIN_OF_RELU) / length;
+            rows * factor
+        } else {
+            rows
+        };
+        channels_last(&rows.reshape(dims).to_kind(self.numbers))
+    }
+
+    /// Normalises every channel over the batch; outside training by running statistics.
+    fn normalised(&mut self, map: &Tensor, name: &str) -> Tensor {
+        let [scale, shift] =
+            ["scale", "shift"].map(|what| self.parameter(&format!("{name}.{what}")));
+        let at = self.next;
+        let [mean, variance] =
+            ["mean", "variance"].map(|what| self.parameter(&format!("{name}.{what}")));
+        let all = [0, 2, 3];
+        let (mean, variance) = if self.dice.is_some() {
+            let mean = map.mean_dim(&all[..], true, Kind::Float);
+            let off = map - &mean;
+            let variance = off.square().mean_dim(&all[..], false, Kind::Float);
+            let mean = mean.reshape([-1]);
+            self.statistics.push(Statistics {
+                at,
+                mean: numbers(&mean),
+                variance: numbers(&variance),
+            });
+            (mean, variance)
+        } else {
+            (mean.shallow_clone(), variance.shallow_clone())
+        };
+        let factor = scale / (variance + f64::from(EPSILON_OF_BATCH)).sqrt();
+        let shift = shift - mean * &factor;
+        map * factor.reshape([1, -1, 1, 1]) + shift.reshape([1, -1, 1, 1])
     }
 }
 
 /// The cells of every channel in a row, single precision.
-fn rows(of: &Tensor) -> Tensor {
-    of.to_kind(Kind::Float).flatten(2, 3)
+fn rows(map: &Tensor) -> Tensor {
+    map.to_kind(Kind::Float).flatten(2, 3)
 }
 
 impl Ops for Forward<'_> {
     type Value = Rc<Tensor>;
 
-    fn picture(&mut self) -> Rc<Tensor> {
-        Rc::new(self.picture.to_kind(self.numbers))
+    fn input(&mut self, name: &'static str) -> Rc<Tensor> {
+        let found = self.inputs.iter().find(|input| input.0 == name);
+        let (dims, values) = found.map_or((vec![0], &[][..]), |(_, dims, values)| {
+            (dims.clone(), *values)
+        });
+        let dims: Vec<i64> = core::iter::once(self.n)
+            .chain(dims)
+            .map(|dim| dim as i64)
+            .collect();
+        let values = tensor(values, &dims);
+        Rc::new(if dims.len() == 4 {
+            channels_last(&values).to_kind(self.numbers)
+        } else {
+            values
+        })
     }
 
-    fn conv(&mut self, of: &Rc<Tensor>, name: &str, conv: Conv) -> Rc<Tensor> {
-        let weight = self.weight(name);
-        let bias = self
-            .parameter(&format!("{name}.bias"))
-            .to_kind(self.numbers);
-        let [stride, half] = [conv.stride, conv.kernel / 2].map(|it| it as i64);
-        Rc::new(of.conv2d(&weight, Some(&bias), stride, half, 1, 1))
+    fn centred(&mut self, list: &Rc<Tensor>, name: &str) -> Rc<Tensor> {
+        let [mean, factor] =
+            ["mean", "factor"].map(|what| self.parameter(&format!("{name}.{what}")));
+        Rc::new((&**list - mean) * factor)
     }
 
-    fn relu(&mut self, of: &Rc<Tensor>) -> Rc<Tensor> {
-        Rc::new(of.relu())
+    fn conv(&mut self, map: &Rc<Tensor>, name: &str, conv: Conv) -> Rc<Tensor> {
+        let weight = self.weight(name, conv.scaling);
+        let bias = (conv.scaling != Scaling::Batch).then(|| {
+            self.parameter(&format!("{name}.bias"))
+                .to_kind(self.numbers)
+        });
+        let [stride, half] = [conv.stride, conv.kernel / 2].map(|size| size as i64);
+        let groups = if conv.by_channel { conv.channels } else { 1 };
+        let map = map.conv2d(&weight, bias, stride, half, 1, groups as i64);
+        Rc::new(if conv.scaling == Scaling::Batch {
+            self.normalised(&map, name)
+        } else {
+            map
+        })
+    }
+
+    fn relu(&mut self, value: &Rc<Tensor>) -> Rc<Tensor> {
+        Rc::new(value.relu())
     }
 
     fn add(&mut self, a: &Rc<Tensor>, b: &Rc<Tensor>) -> Rc<Tensor> {
         Rc::new(&**a + &**b)
     }
 
-    fn doubled(&mut self, of: &Rc<Tensor>) -> Rc<Tensor> {
-        let size = of.size();
-        Rc::new(of.upsample_nearest2d([2 * size[2], 2 * size[3]], None, None))
+    fn doubled(&mut self, map: &Rc<Tensor>) -> Rc<Tensor> {
+        let size = map.size();
+        Rc::new(map.upsample_nearest2d([2 * size[2], 2 * size[3]], None, None))
     }
 
-    fn mean(&mut self, of: &Rc<Tensor>) -> Rc<Tensor> {
-        Rc::new(rows(of).mean_dim(2, false, Kind::Float))
+    fn pool(&mut self, map: &Rc<Tensor>) -> Rc<Tensor> {
+        Rc::new(map.max_pool2d([2, 2], [2, 2], [0, 0], [1, 1], false))
     }
 
-    fn fixed(&mut self, of: &Rc<Tensor>) -> Rc<Tensor> {
-        Rc::new(of.detach())
+    fn mean(&mut self, map: &Rc<Tensor>) -> Rc<Tensor> {
+        Rc::new(rows(map).mean_dim(2, false, Kind::Float))
     }
 
-    fn look(&mut self, of: &Rc<Tensor>, maps: &Rc<Tensor>, sharpness: f32) -> Rc<Tensor> {
+    fn highest(&mut self, map: &Rc<Tensor>) -> Rc<Tensor> {
+        Rc::new(rows(map).max_dim(2, false).0)
+    }
+
+    fn flat(&mut self, map: &Rc<Tensor>) -> Rc<Tensor> {
+        Rc::new(map.to_kind(Kind::Float).flatten(1, -1))
+    }
+
+    fn fixed(&mut self, value: &Rc<Tensor>) -> Rc<Tensor> {
+        Rc::new(value.detach())
+    }
+
+    fn softmax(&mut self, maps: &Rc<Tensor>, sharpness: f32) -> Rc<Tensor> {
         let weights = (rows(maps) * f64::from(sharpness)).softmax(2, Kind::Float);
-        let looked = weights.matmul(&rows(of).transpose(1, 2));
+        Rc::new(weights.reshape(maps.size()))
+    }
+
+    fn around(&mut self, list: &Rc<Tensor>, like: &Rc<Tensor>, places: &Places) -> Rc<Tensor> {
+        let size = like.size();
+        let (down, across) = (size[2] as usize, size[3] as usize);
+        let along = |columns: &[usize], along: &Along| -> Tensor {
+            let columns: Vec<i64> = columns.iter().map(|column| *column as i64).collect();
+            let places = list.index_select(1, &Tensor::from_slice(&columns));
+            let off = places.unsqueeze(2) - Tensor::from_slice(&along.centres);
+            (off.square() * f64::from(along.factor)).exp()
+        };
+        let x = along(
+            &places.x,
+            &Along::new(across, places.width, places.deviation),
+        );
+        let y = along(&places.y, &Along::new(down, 1.0, places.deviation));
+        Rc::new((y.unsqueeze(3) * x.unsqueeze(2)).detach())
+    }
+
+    fn look(&mut self, map: &Rc<Tensor>, weights: &Rc<Tensor>) -> Rc<Tensor> {
+        let looked = rows(weights).matmul(&rows(map).transpose(1, 2));
         Rc::new(looked.flatten(1, 2))
     }
 
-    fn place(&mut self, maps: &Rc<Tensor>, sharpness: f32) -> Rc<Tensor> {
-        let size = maps.size();
+    fn place(&mut self, weights: &Rc<Tensor>) -> Rc<Tensor> {
+        let size = weights.size();
         let grid = grid(size[3] as usize, size[2] as usize);
-        let weights = (rows(maps) * f64::from(sharpness)).softmax(2, Kind::Float);
-        Rc::new(weights.matmul(&tensor(&grid, &[-1, 3])).flatten(1, 2))
+        let places = rows(weights).matmul(&tensor(&grid, &[-1, 3]));
+        Rc::new(places.flatten(1, 2))
     }
 
-    fn highest(&mut self, of: &Rc<Tensor>) -> Rc<Tensor> {
-        Rc::new(rows(of).amax(2, false))
-    }
-
-    fn join(&mut self, of: &[&Rc<Tensor>]) -> Rc<Tensor> {
-        let all: Vec<&Tensor> = of.iter().map(|it| it.as_ref().as_ref()).collect();
+    fn join(&mut self, lists: &[&Rc<Tensor>]) -> Rc<Tensor> {
+        let all: Vec<&Tensor> = lists.iter().map(|list| list.as_ref().as_ref()).collect();
         Rc::new(Tensor::cat(&all, 1))
     }
 
-    fn dense(&mut self, of: &Rc<Tensor>, name: &str, _: usize) -> Rc<Tensor> {
+    fn dense(&mut self, list: &Rc<Tensor>, name: &str, _: usize) -> Rc<Tensor> {
         let dims: [i64; 2] = self.dims();
         let weight = self.parameter(&format!("{name}.weight")).reshape(dims);
         let bias = self.parameter(&format!("{name}.bias"));
-        Rc::new(of.matmul(&weight.transpose(0, 1)) + bias)
+        Rc::new(list.matmul(&weight.transpose(0, 1)) + bias)
+    }
+
+    fn prelu(&mut self, list: &Rc<Tensor>, name: &str) -> Rc<Tensor> {
+        let slope = self.parameter(name);
+        Rc::new(list.prelu(slope))
+    }
+
+    fn dropout(&mut self, list: &Rc<Tensor>, share: f32) -> Rc<Tensor> {
+        let Some(dice) = &mut self.dice else {
+            return Rc::clone(list);
+        };
+        let size = list.size();
+        let kept = 1.0 / (1.0 - share);
+        let factors: Vec<f32> = (0..size.iter().product())
+            .map(|_: i64| if dice.f32() < share { 0.0 } else { kept })
+            .collect();
+        Rc::new(&**list * tensor(&factors, &size))
     }
 }

@@ -5,7 +5,8 @@ use core::fmt::Debug;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::checkpoint::{CHECKPOINT, StoreError, unwrap, wrap};
-use crate::compute::{Computer, Running, Shown};
+use crate::compute::Computer;
+use crate::lesson::{Running, Shown};
 use crate::onnx::{self, Document};
 use crate::ops::Network;
 use crate::optimiser::{Memory, Step};

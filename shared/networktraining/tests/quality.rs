@@ -199,7 +199,10 @@ fn groups_are_not_split_and_a_single_group_is_refused() {
         .filter(|sample| validated.contains(&sample.group.as_str()));
     assert_eq!(of_these.count(), validated.len());
     assert!(!validated.is_empty() && validated.len() < 120);
-    samples.all.iter_mut().for_each(|sample| sample.group.clear());
+    samples
+        .all
+        .iter_mut()
+        .for_each(|sample| sample.group.clear());
     let result = QualityTask::new(&settings, &samples, &[]);
     assert!(matches!(result, Err(TaskError::TooFew { .. })));
 }

@@ -19,7 +19,13 @@ fn the_shipped_network_has_its_card_and_matches_onnx_runtime() {
     assert_eq!(network.tile_shape(), TileShape::SMALL);
     assert_eq!(network.card().unit, Unit::LogRelative);
     assert_eq!(network.card().identity, "person.quality");
-    assert!(network.card().tau.iter().all(|tau| (0.01..0.2).contains(tau)));
+    assert!(
+        network
+            .card()
+            .tau
+            .iter()
+            .all(|tau| (0.01..0.2).contains(tau))
+    );
     let tile: Vec<f32> = (0..TileShape::SMALL.n_values())
         .map(|at| ((at % 11) as f32 - 5.0) * 0.1)
         .collect();

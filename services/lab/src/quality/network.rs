@@ -37,8 +37,6 @@ pub struct Job {
     pub identity: Option<String>,
     /// Whether to go on from the checkpoint of an interrupted training, if there is one.
     pub resume: bool,
-    /// What computes.
-    pub backend: Backend,
 }
 
 /// How good the network was after a pass.
@@ -97,7 +95,7 @@ pub fn train(
         None => Vec::new(),
     };
     let task = QualityTask::new(settings, &samples, &weights).or_fail(ExitKind::Input)?;
-    let trainer = Trainer::new(task, job.backend, checkpoint.as_deref());
+    let trainer = Trainer::new(task, Backend::BuiltIn, checkpoint.as_deref());
     let mut trainer = trainer.map_err(|error| refused(error, &kept))?;
     let say = Say {
         console,

@@ -73,7 +73,10 @@ pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Vec<Parameter>, Be
 }
 
 fn is_gain(parameter: &Parameter) -> bool {
-    parameter.name.rsplit_once('.').is_some_and(|name| name.1 == "gain")
+    parameter
+        .name
+        .rsplit_once('.')
+        .is_some_and(|name| name.1 == "gain")
 }
 
 /// Standardised weights as weights and gains.
@@ -102,7 +105,8 @@ fn numbers(constants: &[TensorProto], of: &Parameter) -> Result<Vec<f32>, BeginE
     let Parameter { name, dims, .. } = of;
     let half = format!("{name}.half");
     let named = |tensor: &&TensorProto| {
-        tensor.name
+        tensor
+            .name
             .as_ref()
             .is_some_and(|own| *own == *name || *own == half)
     };
@@ -132,7 +136,9 @@ fn numbers(constants: &[TensorProto], of: &Parameter) -> Result<Vec<f32>, BeginE
         }
         Some(DataType::FLOAT) => {
             let (each, _) = bytes.as_chunks::<4>();
-            each.iter().map(|value| f32::from_le_bytes(*value)).collect()
+            each.iter()
+                .map(|value| f32::from_le_bytes(*value))
+                .collect()
         }
         _ => Vec::new(),
     };

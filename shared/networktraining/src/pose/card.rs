@@ -27,7 +27,8 @@ pub fn card(shape: &Shape, about: &About) -> String {
         front,
         area,
     } = about.score;
-    let [mean_of_ends, both_ends, front] = [mean_of_ends, both_ends, front].map(|share| 100.0 * share);
+    let [mean_of_ends, both_ends, front] =
+        [mean_of_ends, both_ends, front].map(|share| 100.0 * share);
     let Shape { width, height, .. } = shape;
     let before = if about.goes_on {
         ", after those of another network that it began with"

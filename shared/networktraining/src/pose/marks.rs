@@ -52,9 +52,9 @@ impl Marks {
     pub fn mend_sides(&mut self) -> [bool; 2] {
         LIMBS.map(|limb| {
             let is_sure = |joint: &usize| {
-                [*joint, MIRROR[*joint]]
-                    .into_iter()
-                    .all(|joint| self.marked[joint][0].is_finite() && self.taught[joint].1 > SURE_OF_SIDES)
+                [*joint, MIRROR[*joint]].into_iter().all(|joint| {
+                    self.marked[joint][0].is_finite() && self.taught[joint].1 > SURE_OF_SIDES
+                })
             };
             let joints: Vec<usize> = limb.into_iter().filter(is_sure).collect();
             if joints.len() < 4 {
@@ -64,7 +64,8 @@ impl Marks {
                 mean(&joints.iter().map(|joint| of(*joint)).collect::<Vec<f32>>())
             };
             let apart = each(&|joint| distance(self.marked[joint], self.marked[MIRROR[joint]]));
-            let exchanged = each(&|joint| distance(self.marked[MIRROR[joint]], self.taught[joint].0));
+            let exchanged =
+                each(&|joint| distance(self.marked[MIRROR[joint]], self.taught[joint].0));
             let as_marked = each(&|joint| distance(self.marked[joint], self.taught[joint].0));
             let is_wrong = apart >= APART * self.trunk && exchanged < NEARER * as_marked;
             if is_wrong {

@@ -9,7 +9,7 @@ use super::person::Person;
 use super::score::{Judged, Score};
 use super::settings::Settings;
 use super::vary::{NetworkSample, plain, varied};
-use crate::compute::Shown;
+use crate::lesson::Shown;
 use crate::onnx::{self, Document};
 use crate::optimiser::{Rule, Step};
 use crate::order;

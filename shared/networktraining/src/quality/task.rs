@@ -11,7 +11,7 @@ use super::sample::Sample;
 use super::settings::Settings;
 use super::store::Samples;
 use super::vary::{NetworkSample, plain, varied};
-use crate::compute::Shown;
+use crate::lesson::Shown;
 use crate::onnx::Document;
 use crate::optimiser::{Rule, Step};
 use crate::order;

@@ -142,7 +142,11 @@ mod tests {
     fn every_convolution_gets_its_weights() {
         let read = parse(&file(|_| ())).unwrap();
         assert_eq!(read.len(), 26);
-        let of = |name: &str| read.iter().find(|parameter| parameter.name == name).unwrap();
+        let of = |name: &str| {
+            read.iter()
+                .find(|parameter| parameter.name == name)
+                .unwrap()
+        };
         assert_eq!(of("conv1_1.weight").dims, [64, 3, 3, 3]);
         assert_eq!(of("conv3_2.bias").values, [12.0; 256]);
         assert_eq!(of("conv5_3.weight").values[0], 28.0);
@@ -151,7 +155,8 @@ mod tests {
     #[test]
     fn what_is_not_vgg_16_is_refused_by_the_name_of_the_layer() {
         let said = |change: &dyn Fn(&mut String)| parse(&file(change)).unwrap_err().to_string();
-        let renamed = said(&|header| *header = header.replace("features.28.bias", "features.30.bias"));
+        let renamed =
+            said(&|header| *header = header.replace("features.28.bias", "features.30.bias"));
         assert_eq!(renamed, "there is no `features.28.bias`");
         let half = said(&|header| *header = header.replacen("F32", "F16", 1));
         assert!(half.starts_with("`features.0.weight` is F16"), "{half}");

@@ -3,9 +3,8 @@
 use super::convolution::Sizes;
 use super::matrix::{Matrix, add_product, dot, sum};
 use super::record::{At, Back, Record, by_sample, each};
-use crate::compute::Statistics;
 use crate::ops::{Along, Conv, Places, Scaling, convolved, grid};
-use crate::parameters::{EPSILON_OF_BATCH, EPSILON_OF_LENGTH, GAIN_OF_RELU, standardised};
+use crate::parameters::{EPSILON_OF_LENGTH, GAIN_OF_RELU, standardised};
 
 impl<'a> Record<'a> {
     pub(super) fn convolve(&mut self, map: At, name: &str, conv: Conv) -> At {
@@ -44,90 +43,6 @@ impl<'a> Record<'a> {
                 } else {
                     all.of_parameter(weight, of.weights);
                 }
-            })
-        });
-        self.record(dims, values, back)
-    }
-
-    /// Normalises every channel over the batch; outside training by running statistics.
-    pub(super) fn normalise(&mut self, map: At, name: &str) -> At {
-        let [scale, shift, mean, variance] =
-            self.parameters(name, ["scale", "shift", "mean", "variance"]);
-        let [n_channels, cells] = self.channels(map);
-        let is_learning = self.dice.is_some();
-        let (means, variances) = if is_learning {
-            let all = by_channel(self.values(map), [n_channels, cells]);
-            self.statistics.push(Statistics {
-                at: mean,
-                mean: all.0.clone(),
-                variance: all.1.clone(),
-            });
-            all
-        } else {
-            let running = [mean, variance].map(|at| self.of_parameter(at).to_vec());
-            let [mean, variance] = running;
-            (mean, variance)
-        };
-        let inverse: Vec<f32> = variances
-            .iter()
-            .map(|variance| 1.0 / (variance + EPSILON_OF_BATCH).sqrt())
-            .collect();
-        let (scales, shifts) = (self.of_parameter(scale), self.of_parameter(shift));
-        let size = n_channels * cells;
-        let from = self.values(map);
-        let values = by_sample(self.n, size, |sample, to| {
-            let from = &from[sample * size..(sample + 1) * size];
-            let channels = to.chunks_exact_mut(cells).zip(from.chunks_exact(cells));
-            for (channel, (to, from)) in channels.enumerate() {
-                let factor = scales[channel] * inverse[channel];
-                let shift = shifts[channel] - means[channel] * factor;
-                for (to, from) in to.iter_mut().zip(from) {
-                    *to = from * factor + shift;
-                }
-            }
-        });
-        let dims = self.dims(map).to_vec();
-        let leads = self.leads(map);
-        let back = (leads || self.learns(&[scale, shift])).then(|| -> Back<'a> {
-            Box::new(move |record, gradient, all| {
-                let from = record.values(map);
-                let scales = record.of_parameter(scale);
-                let n = record.n;
-                let runs = |channel: usize| {
-                    (0..n).map(move |sample| {
-                        let first = sample * size + channel * cells;
-                        first..first + cells
-                    })
-                };
-                let of_shift: Vec<f32> = (0..n_channels)
-                    .map(|channel| runs(channel).map(|run| sum(&gradient[run])).sum())
-                    .collect();
-                let of_scale: Vec<f32> = (0..n_channels)
-                    .map(|channel| {
-                        let along: f32 = runs(channel)
-                            .map(|run| dot(&gradient[run.clone()], &from[run]))
-                            .sum();
-                        (along - means[channel] * of_shift[channel]) * inverse[channel]
-                    })
-                    .collect();
-                if leads {
-                    let total = (n * cells) as f32;
-                    let of_map = by_sample(n, size, |sample, to| {
-                        for (channel, to) in to.chunks_exact_mut(cells).enumerate() {
-                            let first = sample * size + channel * cells;
-                            let factor = scales[channel] * inverse[channel];
-                            let slope = of_scale[channel] * inverse[channel] / total;
-                            let level = of_shift[channel] / total - slope * means[channel];
-                            let pairs = gradient[first..].iter().zip(&from[first..]);
-                            for (to, (gradient, from)) in to.iter_mut().zip(pairs) {
-                                *to = factor * (gradient - level - slope * from);
-                            }
-                        }
-                    });
-                    all.add(map, of_map);
-                }
-                all.of_parameter(scale, of_scale);
-                all.of_parameter(shift, of_shift);
             })
         });
         self.record(dims, values, back)
@@ -376,20 +291,6 @@ impl<'a> Record<'a> {
         });
         self.record(self.dims(a).to_vec(), values, back)
     }
-}
-
-/// Mean and variance of every channel over a batch.
-fn by_channel(values: &[f32], [channels, cells]: [usize; 2]) -> (Vec<f32>, Vec<f32>) {
-    let n = (values.len() / channels) as f32;
-    let runs = |channel: usize| values.chunks_exact(cells).skip(channel).step_by(channels);
-    let of_channel = |channel: usize| {
-        let mean = runs(channel).map(sum).sum::<f32>() / n;
-        let squared = |run: &[f32]| {
-            super::matrix::sum_of(run, run, |value, _| (value - mean) * (value - mean))
-        };
-        (mean, runs(channel).map(squared).sum::<f32>() / n)
-    };
-    (0..channels).map(of_channel).unzip()
 }
 
 /// The gradients of what standardised weights are made of.

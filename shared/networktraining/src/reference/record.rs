@@ -4,7 +4,7 @@ use fastrand::Rng;
 use rayon::prelude::*;
 
 use super::matrix::add_to;
-use crate::compute::{Lesson, Running, Shown, Statistics};
+use crate::lesson::{Lesson, Running, Shown, Statistics};
 use crate::ops::{Dims, Network};
 use crate::parameters::Parameter;
 

@@ -2,7 +2,8 @@
 
 use fastrand::Rng;
 
-use crate::compute::{Computer, Lesson, Running, Shown};
+use crate::compute::Computer;
+use crate::lesson::{Lesson, Running, Shown};
 use crate::onnx::{Document, write};
 use crate::ops::{Conv, Dims, Network, Ops, Output, Places, Scaling};
 use crate::parameters::{Parameter, Role, initial, normal};
@@ -179,6 +180,14 @@ fn parameters(network: &One) -> Vec<Parameter> {
 
 /// The cost of outputs: their sum with random factors.
 fn lesson(network: &One, parameters: &[Parameter], shown: &Shown) -> (f64, Lesson) {
+    lesson_by(COMPUTER, network, (parameters, shown))
+}
+
+fn lesson_by(
+    computer: Computer,
+    network: &One,
+    (parameters, shown): (&[Parameter], &Shown),
+) -> (f64, Lesson) {
     let learned: Vec<bool> = parameters
         .iter()
         .map(|parameter| parameter.role != Role::Fixed)
@@ -189,7 +198,7 @@ fn lesson(network: &One, parameters: &[Parameter], shown: &Shown) -> (f64, Lesso
         dice: Rng::with_seed(11),
     };
     let mut cost = 0.0;
-    let lesson = COMPUTER.learn(network, running, shown, &mut |outputs| {
+    let lesson = computer.learn(network, running, shown, &mut |outputs| {
         let mut dice = Rng::with_seed(13);
         let mut gradients = Vec::new();
         for output in outputs {
@@ -314,4 +323,42 @@ fn the_number_of_threads_changes_no_bit() {
         })
     };
     assert!(learned(1) == learned(5));
+}
+
+/// Sums in another order: what both give is near, not equal.
+#[cfg(feature = "libtorch")]
+#[test]
+fn both_backends_give_the_same_values_and_gradients() {
+    let torch = Computer {
+        backend: Backend::LibTorch,
+        ..COMPUTER
+    };
+    let near = |network: &One, a: &[f32], b: &[f32]| {
+        assert_eq!(a.len(), b.len(), "{network:?}");
+        for (a, b) in a.iter().zip(b) {
+            assert!(
+                (a - b).abs() < 1e-4 * a.abs().max(1.0),
+                "{network:?}: {a}, {b}"
+            );
+        }
+    };
+    for network in all() {
+        let shown = shown(&network, 3);
+        let parameters = parameters(&network);
+        let found = [COMPUTER, torch].map(|computer| computer.find(&network, &parameters, &shown));
+        for (a, b) in found[0].iter().zip(&found[1]) {
+            near(&network, a, b);
+        }
+        let lessons = [COMPUTER, torch]
+            .map(|computer| lesson_by(computer, &network, (&parameters, &shown)).1);
+        for (a, b) in lessons[0].gradients.iter().zip(&lessons[1].gradients) {
+            let [a, b] = [a, b].map(|gradient| gradient.clone().unwrap_or_default());
+            near(&network, &a, &b);
+        }
+        for (a, b) in lessons[0].statistics.iter().zip(&lessons[1].statistics) {
+            assert_eq!(a.at, b.at, "{network:?}");
+            near(&network, &a.mean, &b.mean);
+            near(&network, &a.variance, &b.variance);
+        }
+    }
 }

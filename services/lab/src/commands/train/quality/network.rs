@@ -5,7 +5,6 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use failure::{ExitKind, Failure, OrFail as _};
-use networktraining::Backend;
 use networktraining::quality::network::Kind;
 use networktraining::quality::settings::Settings;
 
@@ -111,7 +110,6 @@ fn train(
         weights: arguments.weights.clone(),
         identity: arguments.identity.clone(),
         resume: arguments.resume,
-        backend: Backend::BuiltIn,
     };
     let stop = failure::Stop::on_signals().or_fail(ExitKind::Run)?;
     let terminal = Terminal::without_bar(globals.quiet || arguments.json, arguments.json);
