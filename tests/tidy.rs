@@ -7,6 +7,8 @@
 
 #[path = "tidy/circles.rs"]
 mod circles;
+#[path = "tidy/dialect.rs"]
+mod dialect;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,6 +22,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "checksum",
             "files",
             "formats",
+            "kernels",
             "onnx",
             "skeleton",
             "statistics",
@@ -38,7 +41,6 @@ const LAYERS: &[(&str, &[&str])] = &[
             "geometry",
             "hosts",
             "inference",
-            "kernels",
             "keypoints",
             "messages",
             "metrics",
@@ -211,6 +213,27 @@ fn no_files_import_one_another_in_a_circle() {
              or to one of its own that needs none of them"
         );
     }
+}
+
+/// Places in the old dialect. This number only goes down.
+const DIALECT: usize = 6744;
+
+#[test]
+fn the_old_dialect_goes() {
+    let files: Vec<PathBuf> = crates()
+        .iter()
+        .flat_map(|(_, dir)| rust_files(dir))
+        .collect();
+    let n = dialect::count(&files);
+    assert!(
+        n <= DIALECT,
+        "{n} places in the old dialect, {DIALECT} before: name closure arguments, begin documentation with a name or a verb, \
+         call no function `of`"
+    );
+    assert_eq!(
+        n, DIALECT,
+        "fewer places in the old dialect: write {n} into DIALECT"
+    );
 }
 
 #[test]
