@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use terminal::{EXIT_CODES, Globals, completions};
 
-use crate::commands::{eval, judge, model, simulate, synth, train};
+use crate::commands::{eval, judge, model, simulate, smooth, synth, train};
 
 const LONG_ABOUT: &str = "\
 The laboratory of Parallax: trainings, evaluations, and synthetic sequences with their truth.
@@ -57,6 +57,8 @@ pub(crate) enum Command {
     Model(model::Command),
     /// Make synthetic sequences of people, with the truth.
     Synth(Box<synth::Arguments>),
+    /// Compare the ways to smooth a finished run with the truth.
+    Smooth(smooth::Arguments),
     /// Work out what a deployment will take, before there is one.
     #[command(subcommand)]
     Simulate(simulate::Command),

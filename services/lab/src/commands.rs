@@ -5,6 +5,7 @@ pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod network;
 pub(crate) mod simulate;
+pub(crate) mod smooth;
 pub(crate) mod synth;
 pub(crate) mod train;
 
@@ -25,6 +26,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Judge(arguments) => judge::run(&arguments, cli.globals),
         Command::Model(command) => model::run(&command),
         Command::Synth(arguments) => synth::run(&arguments, cli.globals),
+        Command::Smooth(arguments) => smooth::run(&arguments),
         Command::Simulate(command) => simulate::run(&command),
         Command::Completions(arguments) => completions::run(&arguments, Cli::command()),
         Command::Man(arguments) => completions::man(&arguments, Cli::command()),

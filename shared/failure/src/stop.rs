@@ -100,6 +100,10 @@ impl Stop {
     /// it as after any other death.
     ///
     /// * `supervisor`: its process id.
+    ///
+    /// # Errors
+    ///
+    /// A signal handler cannot be installed.
     pub fn on_signals_of(supervisor: u32) -> io::Result<Self> {
         let stop = Self::new()?;
         for signal in SIGNALS {

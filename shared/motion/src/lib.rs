@@ -14,6 +14,7 @@
 
 pub mod angles;
 pub mod butterworth;
+pub mod finished;
 pub mod judge;
 pub mod lines;
 pub mod live;

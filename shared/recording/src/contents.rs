@@ -53,7 +53,7 @@ impl Contents {
     }
 
     /// Takes in a message.
-    pub(crate) fn message(&mut self, message: MessageHead) {
+    pub(crate) fn message(&mut self, message: &MessageHead) {
         let [due, n] = self.numbers.entry(message.channel).or_default();
         *due = (*due).max(message.nth.saturating_add(1));
         *n += 1;

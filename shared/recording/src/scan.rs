@@ -134,7 +134,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         match self.messages(begin, end, &mut messages) {
             Ok(()) => {
                 for message in messages {
-                    self.found.message(message);
+                    self.found.message(&message);
                 }
             }
             Err(Stop::Damaged(what)) => self.found.damaged(begin, what),

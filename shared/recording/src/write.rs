@@ -60,6 +60,7 @@ struct Topic {
 }
 
 /// The schema of a topic, for other programs.
+#[derive(Clone, Copy)]
 struct Schema<'a> {
     name: &'a str,
     encoding: &'a str,

@@ -3,7 +3,12 @@
 use std::process::Command;
 
 /// Fails if the browser complains about the page. Says so if there is no browser.
+///
+/// # Panics
+///
+/// The browser fails, or the page complains on its console.
 #[expect(clippy::print_stderr, reason = "a test that is skipped says so")]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 pub fn check_in_browser(page: &str) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("page.html");

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use clap::Args;
 use deployment::smooth::{Config, Method};
 use failure::{ExitKind, Failure};
+use motion::finished::{self, Outcome, Request};
 use nalgebra::{UnitVector3, Vector3};
-use rigs::smooth::{self, Comparison, Outcome, Request, Row};
 use serde_json::{Value, json};
 use terminal::{Globals, Terminal, output};
 
@@ -25,22 +25,19 @@ FOLDER holds the results of a run; nothing in it is changed. Beside them are wri
 Everything has a default: how restless each joint is, and how far its covariances can be believed, is found from the measurements.
 Defaults of the options are those of the section [smooth] of the deployment that the run is of. docs/guide/smooth.md explains.
 
-With --truth all methods are compared with the true joints, at the instants that all of them have; what `parallax-lab eval` takes is a
-TRUTH: a folder of `parallax-lab synth`, or a file as configs/sequences/pose2sim-balancing.toml.
+How far the result is from the truth, where that is known: `parallax-lab smooth`.
 
 Exit codes: 0 done; 7 done, but something speaks against the result (`doubts`: the file is cut off, nothing was measured, many
-measurements contradict each other); 2 an option is wrong, or a cutoff too high for the rate; 4 the folder or the truth cannot be read, a
-line is wrong, times do not ascend.
+measurements contradict each other); 2 an option is wrong, or a cutoff too high for the rate; 4 the folder cannot be read, a line is
+wrong, times do not ascend.
 
 With --json one object:
-    {\"report\": what smooth.json holds, \"files\": [path], \"has_up\", \"truth\": {\"compared\", \"methods\": [{\"method\", \"position_mm\", \
-\"velocity_m_s\", \"acceleration_m_s2\", \"jitter_mm\", \"lag_ms\", \"filled_mm\": {\"mean\", \"interval\"}}]}}
+    {\"report\": what smooth.json holds, \"files\": [path], \"has_up\"}
 
 Examples:
     parallax smooth out/run
     parallax smooth out/run --constant-bones --fill-s 0.5
-    parallax smooth out/run --method butterworth --cutoff-hz 6
-    parallax smooth out/walk/out --truth out/walk --json")]
+    parallax smooth out/run --method butterworth --cutoff-hz 6")]
 pub(crate) struct Arguments {
     /// The results of a run.
     folder: PathBuf,
@@ -63,9 +60,6 @@ pub(crate) struct Arguments {
     /// Direction against gravity in the world of the run, in place of that of its calibration.
     #[arg(long, value_name = "X,Y,Z", value_parser = up, allow_hyphen_values = true)]
     up: Option<UnitVector3<f64>>,
-    /// Compare all methods with the true joints.
-    #[arg(long, value_name = "TRUTH")]
-    truth: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -111,19 +105,15 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let folder = &arguments.folder;
     let request = Request {
         folder: folder.clone(),
-        settings: settings(arguments, &smooth::settings(folder)),
+        settings: settings(arguments, &finished::settings(folder)),
         rate_hz: arguments.rate_hz,
         up: arguments.up,
     };
-    let outcome = smooth::run(&request, &terminal)?;
-    let truth = arguments.truth.as_ref();
-    let truth = truth
-        .map(|it| smooth::against(&outcome, &request.settings, it))
-        .transpose()?;
+    let outcome = finished::run(&request, &terminal)?;
     if arguments.json {
-        output::json(&as_json(&request, &outcome, truth.as_ref()))?;
+        output::json(&as_json(&request, &outcome))?;
     } else if !globals.quiet {
-        tell(&request, &outcome, truth.as_ref())?;
+        tell(&request, &outcome)?;
     }
     for it in &outcome.report.doubts {
         output::message(format_args!("doubtful: {it}"));
@@ -146,21 +136,16 @@ fn settings(arguments: &Arguments, of_run: &Config) -> Config {
     }
 }
 
-fn as_json(request: &Request, outcome: &Outcome, truth: Option<&Comparison>) -> Value {
-    let files = smooth::FILES.map(|it| request.folder.join(it));
-    let truth = truth.map(|it| {
-        let methods: Vec<Value> = it.rows.iter().map(Row::to_json).collect();
-        json!({ "compared": it.n_compared, "methods": methods })
-    });
+fn as_json(request: &Request, outcome: &Outcome) -> Value {
+    let files = finished::FILES.map(|file| request.folder.join(file));
     json!({
         "report": outcome.report,
         "files": files,
         "has_up": outcome.has_up,
-        "truth": truth,
     })
 }
 
-fn tell(request: &Request, outcome: &Outcome, truth: Option<&Comparison>) -> Result<(), Failure> {
+fn tell(request: &Request, outcome: &Outcome) -> Result<(), Failure> {
     let report = &outcome.report;
     output::line(format_args!(
         "{} over {} frames of {} joints, {:.0} ms late",
@@ -169,7 +154,7 @@ fn tell(request: &Request, outcome: &Outcome, truth: Option<&Comparison>) -> Res
         report.joints.len(),
         report.delay_ms
     ))?;
-    let counts: Vec<String> = smooth::totals(report)
+    let counts: Vec<String> = finished::totals(report)
         .iter()
         .map(|(name, n)| format!("{n} {name}"))
         .collect();
@@ -195,18 +180,11 @@ fn tell(request: &Request, outcome: &Outcome, truth: Option<&Comparison>) -> Res
             "angles with the vertical are missing: the calibration does not say which way is up; --up X,Y,Z does",
         )?;
     }
-    for name in smooth::FILES {
+    for name in finished::FILES {
         output::message(format_args!(
             "wrote {}",
             request.folder.join(name).display()
         ));
-    }
-    if let Some(truth) = truth {
-        output::line(format_args!(
-            "\nagainst the truth, {} positions that every method has, means and 95 % intervals:\n{}",
-            truth.n_compared,
-            smooth::table(&truth.rows)
-        ))?;
     }
     Ok(())
 }

@@ -28,7 +28,8 @@ fn program(arguments: &[&str]) -> PathBuf {
     const LAB: [&str; 6] = ["eval", "judge", "model", "simulate", "synth", "train"];
     let is_lab = arguments
         .first()
-        .is_some_and(|command| LAB.contains(command));
+        .is_some_and(|command| LAB.contains(command))
+        || arguments.contains(&"--truth");
     built(if is_lab { "parallax-lab" } else { "parallax" })
 }
 

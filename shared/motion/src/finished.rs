@@ -1,24 +1,22 @@
-//! A finished run smoothed: `pose3d-smooth.jsonl`, `smooth.json`, `angles.csv`; and how far it is from the truth.
+//! A finished run smoothed: `pose3d-smooth.jsonl`, `smooth.json`, `angles.csv`.
 //!
 //! What was measured is read line by line, and read again as the result is written, so that the memory that is needed
 //! does not grow with what else stands in a line.
 
-mod compare;
 mod folder;
 mod write;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use crate::live;
+use crate::{Motion, Recorded, Report, butterworth};
 use deployment::smooth::{Config, Method};
 use failure::{Console, ExitKind, Failure};
-use motion::live;
-use motion::{Motion, Recorded, Report, butterworth};
 use nalgebra::UnitVector3;
 use runfiles::{SmoothReport, SmoothedJoint, Unsure};
 
-pub use compare::{Comparison, Mean, Row, compare, table};
-pub use folder::{read_lines, settings};
+pub use folder::{Run, read, read_lines, settings};
 
 /// The files that are written beside the results.
 pub const FILES: [&str; 3] = ["pose3d-smooth.jsonl", "angles.csv", "smooth.json"];
@@ -56,7 +54,7 @@ pub struct Outcome {
 /// Files that cannot be read or written, lines that are none, times that do not ascend, a cutoff above what the rate allows.
 pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure> {
     console.begin("", "reading");
-    let run = folder::read(&request.folder, request.rate_hz)?;
+    let run = read(&request.folder, request.rate_hz)?;
     console.begin("", "smoothing");
     let motion = smoothed(&run.recorded, &request.settings)?;
     let up = request.up.or_else(|| folder::up(&request.folder));
@@ -84,12 +82,12 @@ pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure>
 ///
 /// A cutoff above what the rate allows.
 pub fn smoothed(recorded: &Recorded, settings: &Config) -> Result<Motion, Failure> {
-    let of_rts = motion::Settings {
+    let of_rts = crate::Settings {
         fill_s: settings.fill_s,
         constant_bones: settings.constant_bones,
     };
     match settings.method {
-        Method::Rts => Ok(motion::smooth(recorded, &of_rts)),
+        Method::Rts => Ok(crate::smooth(recorded, &of_rts)),
         Method::Butterworth => {
             let filtered = butterworth::filter(recorded, settings.cutoff_hz, settings.fill_s);
             filtered.map_err(|error| {
@@ -99,7 +97,7 @@ pub fn smoothed(recorded: &Recorded, settings: &Config) -> Result<Motion, Failur
             })
         }
         Method::Kalman => Ok(live::over(recorded, settings.fill_s)),
-        Method::None => Ok(motion::as_measured(recorded)),
+        Method::None => Ok(crate::as_measured(recorded)),
     }
 }
 
@@ -147,7 +145,7 @@ fn report(recorded: &Recorded, frames: &[u64], found: &Report, settings: &Config
 }
 
 /// What speaks against trusting the result.
-fn doubts(run: &folder::Run, report: &SmoothReport) -> Vec<String> {
+fn doubts(run: &Run, report: &SmoothReport) -> Vec<String> {
     let mut doubts = Vec::new();
     doubts.extend(run.cut.clone());
     let sum = |of: fn(&SmoothedJoint) -> usize| report.joints.values().map(of).sum::<usize>();
@@ -185,16 +183,4 @@ pub fn totals(report: &SmoothReport) -> BTreeMap<&'static str, usize> {
         ("absent", sum(|it| it.absent)),
     ]
     .into()
-}
-
-/// Compares what was measured, and every method, with the truth of a sequence.
-///
-/// * `truth`: what `parallax-lab eval` takes: a folder of `parallax-lab synth`, or a description.
-///
-/// # Errors
-///
-/// The truth cannot be read, is of several sequences, or of none of the frames or joints.
-pub fn against(outcome: &Outcome, settings: &Config, truth: &Path) -> Result<Comparison, Failure> {
-    let truth = folder::truth(truth, &outcome.recorded, &outcome.frames)?;
-    Ok(compare(&outcome.recorded, settings, &truth))
 }

@@ -1,9 +1,13 @@
-//! Methods beside each other, against the truth, at the same instants.
+//! Ways to smooth a finished run beside each other, against the truth, at the same instants.
+
+use std::path::Path;
 
 use deployment::smooth::Config;
+use failure::{ExitKind, Failure, in_file};
+use motion::finished::Run;
 use motion::judge::{self, Errors, Sum};
 use motion::live;
-use motion::{Motion, Recorded, Settings, butterworth};
+use motion::{Joint, Motion, Recorded, Role, Settings, butterworth};
 use nalgebra::Vector3;
 use score::{Bootstrap, Share};
 use serde_json::{Value, json};
@@ -52,6 +56,65 @@ pub struct Comparison {
 
 /// The errors of a method at an instant, and the distances where it filled.
 type Tried = (Errors, Sum);
+
+/// Compares what a finished run measured, and every method, with the truth of a sequence.
+///
+/// * `truth`: what `parallax-lab eval` takes: a folder of `parallax-lab synth`, or a description.
+///
+/// # Errors
+///
+/// The truth cannot be read, is of several sequences, or of none of the frames or joints.
+pub fn against(run: &Run, settings: &Config, truth_file: &Path) -> Result<Comparison, Failure> {
+    let truth = truth(truth_file, &run.recorded, &run.frames)?;
+    Ok(compare(&run.recorded, settings, &truth))
+}
+
+/// The true joints of every instant, in the order of the joints; `None` where one is not known.
+fn truth(
+    path: &Path,
+    recorded: &Recorded,
+    frames: &[u64],
+) -> Result<Vec<Vec<Option<Vector3<f64>>>>, Failure> {
+    let sequences = datasets::sequences::read(path, &datasets::sequences::Options::default())
+        .map_err(|error| in_file(path, &error))?;
+    let [sequence] = &sequences[..] else {
+        let what = format!(
+            "{}: {} sequences, expected one",
+            path.display(),
+            sequences.len()
+        );
+        return Err(Failure::new(ExitKind::Usage, what).with_hint("name the folder of one of them"));
+    };
+    let first = sequence.views.first().map_or(0, |it| it.first);
+    let mut all = vec![vec![None; frames.len()]; recorded.joints.len()];
+    let mut n_known = 0;
+    for frame in &sequence.frames {
+        let Ok(at) = frames.binary_search(&(first + frame.index)) else {
+            continue;
+        };
+        for (joint, place) in sequence.joints.joints.iter().zip(&frame.joints) {
+            let is_it = |it: &Joint| {
+                let same_role = it.role.is_some() && it.role == Role::of(joint.name);
+                it.name == joint.name || same_role
+            };
+            let known = recorded.joints.iter().position(is_it);
+            if let (Some(known), Some(place)) = (known, place) {
+                all[known][at] = Some(Vector3::from(*place));
+                n_known += 1;
+            }
+        }
+    }
+    if n_known == 0 {
+        let what = format!(
+            "{}: the truth is of none of the {} frames (from {}) and joints of the run",
+            path.display(),
+            frames.len(),
+            frames.first().copied().unwrap_or_default()
+        );
+        return Err(Failure::new(ExitKind::Input, what));
+    }
+    Ok(all)
+}
 
 /// Compares all methods.
 ///

@@ -3,9 +3,9 @@
 use std::io::{self, Write as _};
 use std::path::Path;
 
+use crate::angles::{self, Unknown};
+use crate::{Estimate, Motion, Role, lines};
 use failure::{ExitKind, Failure, OrFail as _, in_file};
-use motion::angles::{self, Unknown};
-use motion::{Estimate, Motion, Role, lines};
 use nalgebra::UnitVector3;
 use runfiles::{FrameLine, Line as _, SmoothLine, SmoothReport};
 

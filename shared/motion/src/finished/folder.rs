@@ -3,24 +3,25 @@
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
+use crate::{Joint, Recorded, Role, lines};
 use deployment::smooth::Config;
 use failure::{ExitKind, Failure, in_file};
 use geometry::files::ReadOptions;
-use motion::{Joint, Recorded, Role, lines};
-use nalgebra::{UnitVector3, Vector3};
+use nalgebra::UnitVector3;
 use runfiles::{FrameLine, JointLine, Line as _};
 use serde_json::Value;
 
 /// A run.
 #[derive(Debug)]
-pub(super) struct Run {
-    pub(super) recorded: Recorded,
+pub struct Run {
+    /// The measured joints.
+    pub recorded: Recorded,
     /// The number of the frame of every instant.
-    pub(super) frames: Vec<u64>,
+    pub frames: Vec<u64>,
     /// The joints before this are joints, the others extra keypoints.
-    pub(super) n_joints: usize,
+    pub n_joints: usize,
     /// What is missing at the end of the file, in words.
-    pub(super) cut: Option<String>,
+    pub cut: Option<String>,
 }
 
 /// Lines of `pose3d.jsonl`, one after the other.
@@ -83,7 +84,7 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
 }
 
 /// Reads a run.
-pub(super) fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
+pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
     let mut run = Run {
         recorded: Recorded::default(),
         frames: Vec::new(),
@@ -170,7 +171,7 @@ pub fn settings(folder: &Path) -> Config {
 }
 
 /// Against gravity in the world of a run: from its deployment, else from its calibration if that is still there.
-pub(super) fn up(folder: &Path) -> Option<UnitVector3<f64>> {
+pub(crate) fn up(folder: &Path) -> Option<UnitVector3<f64>> {
     let deployment = deployment_of(folder)?;
     if let Ok(up) = serde_json::from_value::<[f64; 3]>(deployment.get("up")?.clone()) {
         return UnitVector3::try_new(up.into(), 1e-9);
@@ -178,51 +179,4 @@ pub(super) fn up(folder: &Path) -> Option<UnitVector3<f64>> {
     let rig = deployment.get("rig")?.as_str()?;
     let rig = geometry::files::read(Path::new(rig), &ReadOptions::default()).ok()?;
     rig.up_in_world()
-}
-
-/// The true joints of every instant, in the order of the joints; `None` where one is not known.
-pub(super) fn truth(
-    path: &Path,
-    recorded: &Recorded,
-    frames: &[u64],
-) -> Result<Vec<Vec<Option<Vector3<f64>>>>, Failure> {
-    let sequences = datasets::sequences::read(path, &datasets::sequences::Options::default())
-        .map_err(|error| in_file(path, &error))?;
-    let [sequence] = &sequences[..] else {
-        let what = format!(
-            "{}: {} sequences, expected one",
-            path.display(),
-            sequences.len()
-        );
-        return Err(Failure::new(ExitKind::Usage, what).with_hint("name the folder of one of them"));
-    };
-    let first = sequence.views.first().map_or(0, |it| it.first);
-    let mut all = vec![vec![None; frames.len()]; recorded.joints.len()];
-    let mut n_known = 0;
-    for frame in &sequence.frames {
-        let Ok(at) = frames.binary_search(&(first + frame.index)) else {
-            continue;
-        };
-        for (joint, place) in sequence.joints.joints.iter().zip(&frame.joints) {
-            let is_it = |it: &Joint| {
-                let same_role = it.role.is_some() && it.role == Role::of(joint.name);
-                it.name == joint.name || same_role
-            };
-            let known = recorded.joints.iter().position(is_it);
-            if let (Some(known), Some(place)) = (known, place) {
-                all[known][at] = Some(Vector3::from(*place));
-                n_known += 1;
-            }
-        }
-    }
-    if n_known == 0 {
-        let what = format!(
-            "{}: the truth is of none of the {} frames (from {}) and joints of the run",
-            path.display(),
-            frames.len(),
-            frames.first().copied().unwrap_or_default()
-        );
-        return Err(Failure::new(ExitKind::Input, what));
-    }
-    Ok(all)
 }

@@ -1,0 +1,55 @@
+//! `parallax-lab smooth`: compares the ways to smooth a finished run with the truth.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use failure::Failure;
+use lab::smoothed::{self, Row};
+use motion::finished;
+use serde_json::{Value, json};
+use terminal::output;
+
+/// Options of `parallax-lab smooth`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+All methods of `parallax smooth` are compared with the true joints, at the instants that all of them have; nothing is written. What
+`parallax-lab eval` takes is a TRUTH: a folder of `parallax-lab synth`, or a file as configs/sequences/pose2sim-balancing.toml. The settings
+are those of the section [smooth] of the deployment that the run is of. docs/guide/smooth.md explains.
+
+Exit codes: 0 done; 4 the folder or the truth cannot be read, or the truth is of none of the frames or joints of the run.
+
+With --json one object:
+    {\"compared\", \"methods\": [{\"method\", \"position_mm\", \"velocity_m_s\", \"acceleration_m_s2\", \"jitter_mm\", \"lag_ms\", \
+\"filled_mm\": {\"mean\", \"interval\"}}]}
+
+Examples:
+    parallax-lab smooth out/walk/out --truth out/walk --json")]
+pub(crate) struct Arguments {
+    /// The results of a run.
+    folder: PathBuf,
+    /// The true joints.
+    #[arg(long, value_name = "TRUTH")]
+    truth: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let run = finished::read(&arguments.folder, None)?;
+    let settings = finished::settings(&arguments.folder);
+    let comparison = smoothed::against(&run, &settings, &arguments.truth)?;
+    if arguments.json {
+        let methods: Vec<Value> = comparison.rows.iter().map(Row::to_json).collect();
+        output::json(&json!({ "compared": comparison.n_compared, "methods": methods }))?;
+    } else {
+        output::line(format_args!(
+            "{} positions that every method has, means and 95 % intervals:\n{}",
+            comparison.n_compared,
+            smoothed::table(&comparison.rows)
+        ))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
