@@ -74,7 +74,7 @@ fn a_picture_is_searched_with_its_orientation_tag_applied() {
         .unwrap();
     // A rotation by 90 degrees to the right.
     for (name, file) in [("turned.png", png), ("turned.jpg", jpeg)] {
-        case.write(name, &testkit::exif::tagged(&file, 6));
+        case.write(name, testkit::exif::tagged(&file, 6));
     }
     let files = ["a/0000.png", "turned.png", "turned.jpg"];
     let (ended, lines) = detect(&case, &[&files[..], &["--overlay", "drawn"]].concat());

@@ -190,7 +190,7 @@ mod tests {
             stream: &stream,
             until: begin + Duration::from_millis(50),
         };
-        assert!(read(&mut timed).is_err());
+        read(&mut timed).unwrap_err();
         assert!(begin.elapsed() < Duration::from_secs(5));
     }
 }

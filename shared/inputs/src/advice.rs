@@ -9,6 +9,10 @@ use geometry::files::RigFileError;
 /// What all cameras gave, or the first failure with what the other cameras fail at.
 ///
 /// * `cameras`: names and outcomes.
+///
+/// # Errors
+///
+/// A camera failed; the hint names the others that did.
 pub fn of_all<T>(cameras: Vec<(&str, Result<T, Failure>)>) -> Result<Vec<T>, Failure> {
     let (mut all, mut first, mut others) = (Vec::new(), None, Vec::new());
     for (name, outcome) in cameras {

@@ -1,6 +1,6 @@
 //! What computes networks and their gradients: Rust, or `LibTorch`.
 
-use crate::lesson::{Lesson, Running, Shown};
+use crate::lesson::{Cost, Lesson, Running, Shown};
 use crate::ops::Network;
 use crate::parameters::Parameter;
 use crate::settings::{Backend, Precision};
@@ -35,7 +35,7 @@ impl Computer {
         network: &impl Network,
         running: Running<'_>,
         shown: &Shown,
-        cost: &mut dyn FnMut(&[Vec<f32>]) -> Vec<Vec<f32>>,
+        cost: &mut Cost<'_>,
     ) -> Lesson {
         match self.backend {
             Backend::BuiltIn => crate::reference::learn(network, running, shown, cost),

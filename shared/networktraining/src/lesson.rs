@@ -4,6 +4,9 @@ use fastrand::Rng;
 
 use crate::parameters::Parameter;
 
+/// Returns the gradients of a cost by the outputs of a network.
+pub(crate) type Cost<'a> = dyn FnMut(&[Vec<f32>]) -> Vec<Vec<f32>> + 'a;
+
 /// What a network is shown: a batch.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Shown {

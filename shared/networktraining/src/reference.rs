@@ -14,7 +14,7 @@ mod record;
 mod tests;
 
 use self::record::Record;
-use crate::lesson::{Lesson, Running, Shown};
+use crate::lesson::{Cost, Lesson, Running, Shown};
 use crate::ops::Network;
 use crate::parameters::Parameter;
 
@@ -38,7 +38,7 @@ pub(crate) fn learn(
     network: &impl Network,
     running: Running<'_>,
     shown: &Shown,
-    cost: &mut dyn FnMut(&[Vec<f32>]) -> Vec<Vec<f32>>,
+    cost: &mut Cost<'_>,
 ) -> Lesson {
     let mut record = Record::new(network, running.parameters, shown).learning(running);
     let outputs = network.run(&mut record);

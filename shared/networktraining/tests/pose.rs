@@ -1,4 +1,5 @@
 //! The network learns, and what it learned can be kept, taken up again and written.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use networktraining::pose::{
     N_JOINTS, Person, PoseTask, Settings, Shape, Source, Target, peak, plain,

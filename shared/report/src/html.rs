@@ -80,6 +80,10 @@ pub(crate) use {html, put};
 /// What may stand in the braces of [`put!`].
 pub trait Value {
     /// Writes it as markup.
+    ///
+    /// # Errors
+    ///
+    /// The output refuses it.
     fn write(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result;
 }
 

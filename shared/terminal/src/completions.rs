@@ -24,6 +24,10 @@ pub struct Arguments {
 /// Prints the script of a shell.
 ///
 /// * `command`: the tree of commands.
+///
+/// # Errors
+///
+/// Standard output cannot be written to.
 pub fn run(arguments: &Arguments, mut command: Command) -> Result<ExitCode, Failure> {
     let mut script = Vec::new();
     let name = command.get_name().to_owned();
@@ -45,6 +49,10 @@ pub struct ManArguments {
 /// Writes the manual pages.
 ///
 /// * `command`: the tree of commands.
+///
+/// # Errors
+///
+/// The folder or a page cannot be written.
 pub fn man(arguments: &ManArguments, mut command: Command) -> Result<ExitCode, Failure> {
     let folder = &arguments.folder;
     std::fs::create_dir_all(folder).map_err(|error| in_file(folder, &error))?;
@@ -55,6 +63,10 @@ pub fn man(arguments: &ManArguments, mut command: Command) -> Result<ExitCode, F
 }
 
 /// Writes the page of a command and those below it; returns how many.
+///
+/// # Errors
+///
+/// A page cannot be written.
 pub fn write_pages(command: Command, folder: &Path) -> Result<usize, Failure> {
     let below: Vec<Command> = command.get_subcommands().cloned().collect();
     let name = command

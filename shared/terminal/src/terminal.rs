@@ -39,6 +39,7 @@ impl Terminal {
     }
 
     /// Redraws the bar twice a second, also without progress.
+    #[must_use]
     pub fn ticking(self) -> Self {
         self.bar.enable_steady_tick(Duration::from_millis(500));
         self

@@ -84,6 +84,10 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
 }
 
 /// Reads a run.
+///
+/// # Errors
+///
+/// A file cannot be read, a line is none, or times do not ascend.
 pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
     let mut run = Run {
         recorded: Recorded::default(),

@@ -330,8 +330,7 @@ fn sample(person: &Person, shape: &Shape, view: &View, rgb: &[[f32; 3]]) -> Netw
         let is_known = target.weight > 0.0 && at.iter().all(|side| side.is_finite());
         if is_known {
             weights[joint] = target.weight;
-            let is_certain = is_inside(at) && target.is_marked && or.is_none();
-            if is_certain {
+            if is_inside(at) && target.is_marked && or.is_none() {
                 places[joint] = at;
             }
         }

@@ -166,7 +166,9 @@ impl<'a> Record<'a> {
                     *to = ((from - most) * sharpness).exp();
                 }
                 let total = sum(to);
-                to.iter_mut().for_each(|weight| *weight /= total);
+                for weight in to {
+                    *weight /= total;
+                }
             }
         });
         let dims = self.dims(maps).to_vec();

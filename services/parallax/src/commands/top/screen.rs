@@ -35,12 +35,12 @@ pub(super) fn show(namespace: &Namespace, stop: &Stop, pause: Duration) -> Resul
             text = live::table(&live.snapshot()?);
             updated_at = Instant::now();
         }
-        let size = terminal.size();
+        let size = Terminal::size();
         let page = Page::new(&text, first, size);
         let drawn = page.escaped(size);
         let mut written = Ok(());
         if drawn != on_screen {
-            written = terminal.write(drawn.as_bytes());
+            written = Terminal::write(drawn.as_bytes());
             on_screen = drawn;
         }
         if terminal.is_gone() {

@@ -55,12 +55,12 @@ impl Terminal {
         raw.make_raw();
         tcsetattr(input(keyboard.as_ref()), OptionalActions::Now, &raw)?;
         let terminal = Self { keyboard, before };
-        terminal.write(ENTER)?;
+        Self::write(ENTER)?;
         Ok(terminal)
     }
 
     /// Returns the size, or that of a usual terminal where it is unknown.
-    pub(super) fn size(&self) -> Size {
+    pub(super) fn size() -> Size {
         let size = tcgetwinsize(io::stdout()).ok();
         let [columns, rows] =
             size.map_or([0; 2], |size| [size.ws_col, size.ws_row].map(usize::from));
@@ -72,7 +72,7 @@ impl Terminal {
     }
 
     /// Writes text and escape sequences.
-    pub(super) fn write(&self, bytes: &[u8]) -> io::Result<()> {
+    pub(super) fn write(bytes: &[u8]) -> io::Result<()> {
         let mut out = io::stdout().lock();
         out.write_all(bytes)?;
         out.flush()
@@ -115,7 +115,7 @@ impl Terminal {
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        let written = self.write(LEAVE);
+        let written = Self::write(LEAVE);
         let input = input(self.keyboard.as_ref());
         let set = tcsetattr(input, OptionalActions::Now, &self.before);
         if let Err(error) = written.and(set.map_err(io::Error::from)) {
