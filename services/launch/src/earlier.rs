@@ -4,8 +4,10 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+use deployment::Deployment;
 use failure::{ExitKind, Failure, in_file};
 use runfiles::{FrameLine, LatencyReport, Line as _, RunSummary, SmoothLine, TimesLine, ViewLine};
+use runtime::Namespace;
 use serde_json::Value;
 
 /// Files and folders that a run writes.
@@ -25,6 +27,20 @@ const RESULTS: [&str; 10] = [
 const EXPORT: &str = "export";
 /// End of the name of the file that lists what was exported.
 const MANIFEST: &str = ".export.json";
+
+/// Refuses a deployment whose name another one that runs has, before anything is looked at that takes time.
+///
+/// Of several hosts each has a name of its own, which is known later: they are refused as their processes start.
+///
+/// # Errors
+///
+/// It runs already; its files in shared memory cannot be made.
+pub fn check_name(deployment: &Deployment) -> Result<(), Failure> {
+    if deployment.hosts.is_empty() {
+        drop(Namespace::new(&deployment.name)?.acquire()?);
+    }
+    Ok(())
+}
 
 /// Refuses a folder with results of an earlier run, or with files of the same names that no run has written.
 ///

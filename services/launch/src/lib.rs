@@ -46,7 +46,7 @@ pub mod process;
 pub mod recorded;
 pub mod summary;
 
-pub use earlier::make_way;
+pub use earlier::{check_name, make_way};
 pub use find_every::FOLLOWED_S;
 pub use planned::Planned;
 pub use prepare::{Prepared, View};

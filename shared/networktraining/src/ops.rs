@@ -86,7 +86,7 @@ pub trait Ops {
     /// the second, and so on.
     fn look(&mut self, map: &Self::Value, weights: &Self::Value) -> Self::Value;
     /// The means of places with the weights of maps: a list of x, y and x² + y² by the first map, by the second, and so on; x
-    /// and y as [`grid`] says.
+    /// and y as `grid` says.
     fn place(&mut self, weights: &Self::Value) -> Self::Value;
     /// Concatenates lists.
     fn join(&mut self, lists: &[&Self::Value]) -> Self::Value;

@@ -103,6 +103,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         pictures: Vec::new(),
         without_foxglove: arguments.without.contains(&Bulk::Foxglove),
     };
+    launch::check_name(&loaded.deployment)?;
     launch::make_way(&loaded.deployment.output, arguments.force)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let chosen = (arguments.host.as_deref(), false);

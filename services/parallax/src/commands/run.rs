@@ -85,6 +85,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         loaded.deployment.output = std::path::absolute(out).or_fail(ExitKind::Usage)?;
     }
     if !arguments.dry_run {
+        launch::check_name(&loaded.deployment)?;
         launch::make_way(&loaded.deployment.output, arguments.force)?;
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
