@@ -6,7 +6,7 @@ use std::path::Path;
 use failure::{ExitKind, Failure};
 use geometry::files::RigFileError;
 
-/// What all cameras gave, or the first failure with what the other cameras fail at.
+/// Returns the outcomes of all cameras, or the first failure with what the other cameras fail at.
 ///
 /// * `cameras`: names and outcomes.
 ///
