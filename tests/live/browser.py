@@ -135,14 +135,14 @@ N_DRAWN = 60
 def footage(parallax, folder, seconds, rate):
     """Four cameras around a synthetic person, whose keypoints are known: light enough for a busy machine. The pictures
     are shown to and fro, as often as is needed."""
-    subprocess.run([parallax, "synth", f"{folder}.rig", "--rig", "ring:4", "--live", "--quiet"], check=True)
+    subprocess.run([f"{parallax}-lab", "synth", f"{folder}.rig", "--rig", "ring:4", "--live", "--quiet"], check=True)
     rig = open(f"{folder}.rig/rig.toml").read()
     for name, by in [("size_px", lambda it: it // 2), ("focal_px", lambda it: it / 2), ("principal_point_px", lambda it: (it - 0.5) / 2)]:
         halve = lambda found: f"{name} = {[by(it) for it in json.loads(found[1])]}"
         rig = re.sub(name + r" = (\[.*\])", halve, rig)
     with open(f"{folder}.toml", "w") as out:
         out.write(rig)
-    subprocess.run([parallax, "synth", folder, "--rig", out.name, "--frames", str(N_DRAWN), "--rate", str(rate), "--no-masks",
+    subprocess.run([f"{parallax}-lab", "synth", folder, "--rig", out.name, "--frames", str(N_DRAWN), "--rate", str(rate), "--no-masks",
                     "--format", "jpg", "--quiet"], check=True)
     people = {}
     for line in map(json.loads, open(f"{folder}/people.jsonl")):

@@ -27,7 +27,7 @@ def say(part, **values):
 
 def write(folder, keys):
     """A deployment of synthetic cameras: half of them at the host that fuses, the others at two more."""
-    sh(parallax, "synth", folder, "--live", "--frames", str(n_frames), "--rig", f"ring:{n_cameras}",
+    sh(f"{parallax}-lab", "synth", folder, "--live", "--frames", str(n_frames), "--rig", f"ring:{n_cameras}",
        "--actions", "walking", "--rate", str(rate))
     text = open(f"{folder}/deployment.toml").read()
     names = re.findall(r'^name = "(c\d+)"', text, re.M)
