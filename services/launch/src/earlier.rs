@@ -30,7 +30,7 @@ const MANIFEST: &str = ".export.json";
 
 /// Refuses a deployment whose name another one that runs has, before anything is looked at that takes time.
 ///
-/// Of several hosts each has a name of its own, which is known later: they are refused as their processes start.
+/// Deployments of several hosts have a name for each host, known later: they are refused as their processes start.
 ///
 /// # Errors
 ///
