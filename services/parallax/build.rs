@@ -1,9 +1,9 @@
-//! Tells the command its version, the commit that it is built from, and the features that not every build has.
+//! For both executables: tells the command its version, the commit that it is built from, and the features that not every build has.
 
 use std::process::Command;
 
 /// Features that a user notices.
-const FEATURES: [&str; 3] = ["hosts", "ort", "parquet"];
+const FEATURES: [&str; 4] = ["hosts", "libtorch", "ort", "parquet"];
 
 fn main() {
     for file in ["HEAD", "logs/HEAD"] {

@@ -107,7 +107,7 @@ impl Shipped {
             Self::PoseNetwork => ["pose.network", "train network"],
         };
         format!(
-            "`{key}` is a file that `parallax {made_by}` made, or \"{SHIPPED}\": the one that is built in"
+            "`{key}` is a file that `parallax-lab {made_by}` made, or \"{SHIPPED}\": the one that is built in"
         )
     }
 }

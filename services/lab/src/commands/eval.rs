@@ -45,7 +45,7 @@ without any, a tenth of the person's size.
 
 --fuse FILE is the [fuse] section of a deployment: energy, alpha, beta, compatibility, tau, facing ...
 
-Single pictures of people with 14 joints (the folders of PARSE and LSP, JSON lines) are judged as `model judge` \
+Single pictures of people with 14 joints (the folders of PARSE and LSP, JSON lines) are judged as `judge` \
 does, with the same numbers: PCP and PCK of the best detection of a picture, and of the best one on the person, with \
 intervals; --only and --without choose among them. They and sequences are not judged in one run.
 

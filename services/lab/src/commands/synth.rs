@@ -19,7 +19,7 @@ use parse::{actions, rig, subjects};
 const HELP: &str = "\
 OUT holds what a recording would, and more: deployment.toml (`parallax run OUT/deployment.toml`), rig.toml, the pictures \
 (cameras/NAME/000000.png), masks, and the truth: truth.jsonl (joints in 3D and in every picture, visibility, capture \
-times) and people.jsonl (the same as annotated people, for `train fmp` and `model judge`; people-as-seen.jsonl with left \
+times) and people.jsonl (the same as annotated people, for `train fmp` and `judge`; people-as-seen.jsonl with left \
 and right as published models define them). The format is in shared/scene/TRUTH.md. Several subjects or actions have a \
 folder each, OUT/s1-walking, and a people.jsonl of all.
 

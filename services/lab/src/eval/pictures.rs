@@ -94,7 +94,7 @@ pub fn write_report(
     Ok(numbers)
 }
 
-/// One data set for programs: as `model judge` has it, with intervals.
+/// One data set for programs: as `judge` has it, with intervals.
 fn numbers(set: &Pictures, bootstrap: &Bootstrap) -> Value {
     let of = |which: Judged| {
         let mut value = judged::numbers(&set.report(which));

@@ -44,7 +44,7 @@ impl Drawn {
         self.start(&[&words[..], more].concat()).wait()
     }
 
-    /// What `model judge` says of the mean offset of a joint along its bone, and of where joints lie.
+    /// What `judge` says of the mean offset of a joint along its bone, and of where joints lie.
     fn offset(&self, joint: &str, joint_map: &str) -> (f64, Value) {
         let words = ["judge", "m.fmp", "others-low.jsonl", "--json"];
         let more = ["--offsets", "--joint-map", joint_map];

@@ -53,7 +53,7 @@ with 0 none; others about three times as many. Of \
 another model it is the trained one, but at most -1.
 
 The filters find who is there, and the network that ships says where the joints are, better than their parts do \
-(`model judge` on PARSE 101-200: 80.6 % of the limbs, by the parts 73.9 %). It looks into every box of the filters, widened by 10 %, and then into the \
+(`judge` on PARSE 101-200: 80.6 % of the limbs, by the parts 73.9 %). It looks into every box of the filters, widened by 10 %, and then into the \
 box around who is seen there, as a deployment does; each person is told once, those who are seen best first. --network names a network of your own (docs/networks.md). \
 Into a box that --box gives, or those that --detector finds, it looks as they are, at most --max of them.
 With --network none the parts of the filters are told, as with --model, --joints and --joint-map.
