@@ -46,12 +46,6 @@ impl Contents {
         }
     }
 
-    /// The type of the messages of a channel, if it is known here.
-    pub(crate) fn kind(&self, channel: u16) -> Option<Kind> {
-        let name = self.channels.get(&channel)?.as_ref()?;
-        Kind::of_topic(name)
-    }
-
     /// Takes in a message.
     pub(crate) fn message(&mut self, message: &MessageHead) {
         let [due, n] = self.numbers.entry(message.channel).or_default();
@@ -91,6 +85,11 @@ impl Contents {
             let n = entries.len();
             entries.retain(|it| message::check_length(kind, it.len).is_ok());
             self.extent.n_malformed += (n - entries.len()) as u64;
+            if kind.status_at().is_none() {
+                for entry in &mut entries {
+                    entry.frame = None;
+                }
+            }
             let track = tracks.entry(name.clone()).or_insert(Track {
                 kind,
                 entries: Vec::new(),

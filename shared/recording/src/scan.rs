@@ -168,9 +168,8 @@ impl<R: Read + Seek> Scan<'_, R> {
                     message.entry.chunk = begin;
                     message.entry.offset = self.cursor.at();
                     message.entry.len = len - MESSAGE_HEAD_BYTES;
-                    let kind = self.found.kind(message.channel);
-                    let has_frame = kind.is_some_and(|kind| kind.status_at().is_some());
-                    if has_frame && message.entry.len >= FRAME_END as u64 {
+                    // Names of topics may follow at the end only: which messages have a frame is decided then.
+                    if message.entry.len >= FRAME_END as u64 {
                         let head = self.cursor.array::<FRAME_END>()?;
                         let frame = head.last_chunk().copied();
                         message.entry.frame = frame.map(u64::from_le_bytes);

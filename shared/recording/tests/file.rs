@@ -341,6 +341,24 @@ fn check_damaged(whole: &[u8], changed: &[u8]) -> Result<(), TestCaseError> {
 }
 
 #[test]
+fn frames_of_messages_are_known_where_the_names_of_topics_stand_only_at_the_end() {
+    let sent = [(1, 0, vec![]), (1, 0, vec![]), (0, 0, vec![])];
+    let whole = written(&sent, 1);
+    let mut file = whole.clone();
+    let first = scan(&mut Cursor::new(&whole)).unwrap().tracks[&topics()[1]].entries[0];
+    file.drain(9..first.chunk as usize);
+    let recording = scan(&mut Cursor::new(&file)).unwrap();
+    let topics = topics();
+    let frames = |nth: usize| {
+        let entries = recording.tracks[&topics[nth]].entries.iter();
+        entries.map(|entry| entry.frame).collect::<Vec<_>>()
+    };
+    assert_eq!(frames(0), [Some(0)]);
+    assert_eq!(frames(1), [Some(0); 2]);
+    check_damaged(&whole, &file).unwrap();
+}
+
+#[test]
 fn one_changed_byte_loses_only_its_chunk_whose_messages_are_named() {
     let sent: Vec<Sent> = (0..9).map(|nth| (0, nth, vec![nth as u8; 100])).collect();
     let mut file = written(&sent, 100);
