@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use multiview::ViewPlan;
-use pipeline::{Follow, FuseStep, SpaceStep, Views};
+use pipeline::{Follow, FuseStep, Views};
 
 /// What one worker's process has to do.
 #[derive(Debug)]
@@ -19,8 +19,6 @@ pub struct Job {
     pub pairs: Vec<(usize, [usize; 2])>,
     /// The fusion step.
     pub step: Arc<FuseStep>,
-    /// The fusion step in space; there where `views` says so.
-    pub space: Option<SpaceStep>,
     /// The views of the rig.
     pub plans: Vec<Arc<ViewPlan>>,
     /// Whether there are processes that send expected errors.
@@ -31,9 +29,6 @@ pub struct Job {
     pub quality_max_age: Duration,
     /// Distance between the frames used, at least 1.
     pub frame_step: u64,
-    /// Frames of the footage per second, if that is known: without it nothing is moved from the time of its picture to the instant
-    /// of its frame.
-    pub frame_rate_hz: Option<f64>,
     /// Processes that receive the poses of pairs.
     pub n_consumers: usize,
     /// How long a view may be silent.

@@ -7,7 +7,7 @@ use crate::job::Job;
 use crate::worker::Worker;
 use failure::Failure;
 use messages::{ViewPose, topic};
-use pipeline::{Following, Motion};
+use pipeline::Following;
 use runtime::Service;
 use stage::Stage;
 
@@ -50,11 +50,8 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         output: stage.output(&topic::pair_pose(job.worker), job.n_consumers)?,
     };
     // A pair may need one solution or many, but the work per pyramid level is always similar.
-    if job.space.is_none() {
-        let step = Arc::clone(&job.step);
-        service.progress().follow(move || step.n_sweeps());
-    }
+    let step = Arc::clone(&job.step);
+    service.progress().follow(move || step.n_sweeps());
     let mut following = Following::new(job.follow);
-    let mut motion = Motion::default();
-    stage.run(|frame| worker.fuse(frame, (&mut following, &mut motion)))
+    stage.run(|frame| worker.fuse(frame, &mut following))
 }

@@ -62,8 +62,7 @@ pub fn settings(
 pub fn views(from: Views) -> pipeline::Views {
     match from {
         Views::Pairs => pipeline::Views::Pairs,
-        Views::All => pipeline::Views::All,
-        Views::Space => pipeline::Views::Space,
+        Views::All | Views::Space => pipeline::Views::All,
     }
 }
 

@@ -5,7 +5,7 @@ use std::cell::Ref;
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use fmp::Responses;
 use messages::{EvidenceHeader, PairPose, Span, Status};
-use pipeline::{Following, Motion, Others, Support, ViewResult, Views};
+use pipeline::{Following, Others, Support, ViewResult, Views};
 use runtime::{Sample, Service};
 use stage::{Context, Frame, Held, Output, Turn};
 use wire::{EvidenceView, WireError};
@@ -44,11 +44,11 @@ pub(crate) struct Worker<'a> {
 impl Worker<'_> {
     /// Solves one frame.
     ///
-    /// * `following`: who was followed in the frames before; `motion`: how they moved.
+    /// * `following`: who was followed in the frames before.
     pub(crate) fn fuse(
         &self,
         frame: &mut Frame<'_, Input>,
-        (following, motion): (&mut Following, &mut Motion),
+        following: &mut Following,
     ) -> Result<(), Failure> {
         let (answers, sigma_ages) = self.answers(frame);
         let others = following.others(&self.job.plans, &answers);
@@ -69,11 +69,7 @@ impl Worker<'_> {
         };
         match self.job.views {
             Views::Pairs => self.pairs(&views),
-            Views::All | Views::Space => {
-                let rate = self.job.frame_rate_hz;
-                motion.begin(rate.map(|rate| frame.number() as f64 / rate));
-                self.all_views(views, motion)
-            }
+            Views::All => self.all_views(&views),
         }
     }
 
@@ -101,6 +97,7 @@ impl Worker<'_> {
             let mut answer = ViewResult {
                 candidates: found.poses,
                 front: found.front,
+                heats: Vec::new(),
                 sigma_px: None,
                 tau_px: None,
                 skew_s: found.skew_s,
@@ -167,30 +164,13 @@ impl Worker<'_> {
     }
 
     /// Solves all views at once.
-    fn all_views(&self, mut frame: FrameViews<'_>, motion: &mut Motion) -> Result<(), Failure> {
+    fn all_views(&self, frame: &FrameViews<'_>) -> Result<(), Failure> {
         frame.turn.restart(now_nanos());
         let evidence = frame.evidence.iter();
         let evidence = evidence.map(|view| view.as_ref().map(EvidenceView::responses));
         let evidence: Vec<Option<Responses<'_>>> = evidence.collect();
-        let answer = match &self.job.space {
-            None => {
-                let step = &self.job.step;
-                step.all_views(&frame.answers, &evidence, &frame.others, Support::Mean)
-            }
-            Some(step) => {
-                let found = step.run(&frame.answers, &evidence, &frame.others, motion);
-                found.map(|found| {
-                    let views = found.views.views.iter();
-                    for (view, sigma_px) in views.zip(found.sigma_px) {
-                        if let Some(answer) = &mut frame.answers[*view] {
-                            answer.sigma_px = Some(sigma_px);
-                        }
-                    }
-                    found.views
-                })
-            }
-        };
-        let frame = &frame;
+        let step = &self.job.step;
+        let answer = step.all_views(&frame.answers, &evidence, &frame.others, Support::Mean);
         let (n_views, present) = (frame.answers.len(), frame.present());
         let messages = wire::all_views_to_messages(n_views, answer.as_ref(), present);
         let messages = self.or_bad_input(messages, || {

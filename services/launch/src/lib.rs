@@ -20,6 +20,7 @@
 
 mod earlier;
 mod find_every;
+mod in_process;
 mod padding;
 mod planned;
 mod prepare;
@@ -48,6 +49,7 @@ pub mod summary;
 
 pub use earlier::{check_name, make_way};
 pub use find_every::FOLLOWED_S;
+pub use in_process::{InProcess, SentFrame};
 pub use planned::Planned;
 pub use prepare::{Prepared, View};
 pub use resolved::{Resolved, SERVICES};

@@ -8,7 +8,7 @@ use deployment::hosts::Host;
 use deployment::{Content, Deployment, Process, Room, Stage, Topology, ViewSize};
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use messages::{
-    EvidenceHeader, FrameHeader, PairPose, PictureHeader, Pose3d, ViewPose, ViewQuality,
+    EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Pose3d, ViewPose, ViewQuality,
 };
 use runtime::{Delivery, HEARTBEAT, Limits, MOST_GUESTS, Namespace, TopicPlan, process_topics};
 use supervise::{Plan, Policy, ProcessSpec, Role};
@@ -117,9 +117,9 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
         format!("{} frames", resolved.n_frames())
     };
     let pairs = match prepared.settings.views {
+        _ if deployment.has_maps() => "solved in space".to_owned(),
         pipeline::Views::Pairs => format!("{} pairs", prepared.pairs.len()),
         pipeline::Views::All => "solved at once".to_owned(),
-        pipeline::Views::Space => "solved in space".to_owned(),
     };
     let size = resolved.search_size.as_ref();
     let size = size.map_or_else(String::new, |it| format!("\n{}", it.text()));
@@ -205,6 +205,7 @@ fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
         Content::ViewPose => TopicPlan::messages::<ViewPose>(topic, delivery, limits),
         Content::ViewQuality => TopicPlan::messages::<ViewQuality>(topic, delivery, limits),
         Content::PairPose => TopicPlan::messages::<PairPose>(topic, delivery, limits),
+        Content::People => TopicPlan::messages::<People>(topic, delivery, limits),
         Content::Pose3d => TopicPlan::messages::<Pose3d>(topic, delivery, limits),
     };
     match room.usual {

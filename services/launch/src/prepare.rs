@@ -8,9 +8,11 @@ use deployment::Deployment;
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::{Framing, OutSize, Rig, upright_roll};
-use multiview::ViewPlan;
+use multiview::{SpaceSettings, ViewPlan};
 use nalgebra::UnitVector3;
-use pipeline::{BodySettings, EstimatorSettings, SkeletonSettings, ViewSettings};
+use pipeline::{
+    BodySettings, EstimatorSettings, SkeletonSettings, SpaceStepSettings, ViewSettings,
+};
 use posenetwork::MapSettings;
 use skeleton::JointSet;
 use viewquality::Predictor;
@@ -81,8 +83,7 @@ impl Prepared {
                 plan,
             });
         }
-        let mut settings = settings(deployment, &model, &views)?;
-        settings.skeleton.facing |= deployment.fuse.facing && resolved.sides_as_seen;
+        let settings = settings(deployment, &model, &views)?;
         let named = views.iter().map(|it| it.name.as_str()).zip(sizes);
         let named: Vec<_> = named.collect();
         let size = deployment.capture.size;
@@ -261,9 +262,6 @@ fn settings(
     })
 }
 
-/// Standard deviation of what is rounded to a cell, cells.
-const ROUNDING_CELLS: f64 = 0.29;
-
 fn skeleton_settings(
     deployment: &Deployment,
     learned: Option<&Learned>,
@@ -277,17 +275,9 @@ fn skeleton_settings(
     } else {
         inputs::Joints::of(&config.joint_map, deployment.model.as_deref())?.map(learned, joints)
     };
-    let in_space = deployment.views() == deployment::fuse::Views::Space;
     Ok(SkeletonSettings {
         joints,
         joint_map,
-        in_space,
-        least_score: least_score(deployment),
-        sigma_cells: if in_space {
-            ROUNDING_CELLS
-        } else {
-            defaults.sigma_cells
-        },
         triangulation: geometry::Settings {
             loss_px: config.loss_px,
             ..defaults.triangulation
@@ -299,10 +289,30 @@ fn skeleton_settings(
         } else {
             BodySettings::NONE
         },
-        // Networks name the sides of the body; where they do not, see `Prepared::new`.
-        facing: deployment.fuse.facing && !deployment.has_maps(),
+        facing: deployment.fuse.facing,
         ..defaults
     })
+}
+
+/// The settings of the step in space.
+pub(crate) fn space_settings(resolved: &Resolved, prepared: &Prepared) -> SpaceStepSettings {
+    let deployment = &resolved.deployment;
+    let skeleton = &prepared.settings.skeleton;
+    // Networks name the sides of the body.
+    let decides_sides = resolved.sides_as_seen && deployment.fuse.facing;
+    SpaceStepSettings {
+        space: SpaceSettings {
+            as_seen: resolved.sides_as_seen,
+            ..SpaceSettings::default()
+        },
+        // In space the views have to agree: what is seen badly in one is nobody there.
+        least_heat: 2.0 * deployment.pose.least_heat,
+        least_score: least_score(deployment),
+        joints: skeleton.joints,
+        body: skeleton.body,
+        sides: decides_sides.then_some(skeleton.sides),
+        ..SpaceStepSettings::default()
+    }
 }
 
 /// The scale of the frames: pixels of the frame per pixel of the footage.

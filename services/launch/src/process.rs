@@ -2,7 +2,7 @@
 
 mod boxes;
 mod live;
-mod view_step;
+pub(crate) mod view_step;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -11,16 +11,14 @@ use std::time::Duration;
 use deployment::Stage;
 use failure::{ExitKind, Failure, OrFail as _};
 use messages::topic;
-use multiview::SpaceSettings;
-use pipeline::{ExtrasStep, FuseStep, SkeletonStep, SpaceStep, Views};
-use posenetwork::MapSettings;
+use pipeline::{ExtrasStep, FuseStep, SkeletonStep, SpaceStep};
 use rayon::ThreadPoolBuilder;
 use runtime::Service;
 use viewquality::Forecaster;
 
 use crate::find_every::{self, FOLLOWED_S};
 use crate::hosts;
-use crate::prepare::{Prepared, frame_scale, framing, least_score};
+use crate::prepare::{Prepared, frame_scale, framing, least_score, space_settings};
 use crate::recorded;
 use crate::resolved::Resolved;
 
@@ -196,15 +194,19 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         start_frame: resolved.deployment.capture.start_frame,
         frame_step: resolved.deployment.capture.frame_step,
         frame_rate_hz: resolved.frame_rate_hz(),
-        // Nobody is lost from one frame to the next, however rarely the deployment has people looked for.
-        most_apart: resolved.frame_rate_hz().map(|it| {
-            let step = resolved.deployment.capture.frame_step as f64;
-            (it * FOLLOWED_S).max(step / pipeline::LOST)
-        }),
+        most_apart: most_apart(resolved),
         search_share: find_every::search_share(&resolved.deployment),
         patience: resolved.patience(),
     };
     pose::run(service, &job)
+}
+
+/// Most frames from one in which people are seen to the next one in which they can be followed. Nobody is lost from one frame to the
+/// next, however rarely the deployment has people looked for.
+pub(crate) fn most_apart(resolved: &Resolved) -> Option<f64> {
+    let step = resolved.deployment.capture.frame_step as f64;
+    let rate_hz = resolved.frame_rate_hz()?;
+    Some((rate_hz * FOLLOWED_S).max(step / pipeline::LOST))
 }
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
@@ -238,6 +240,17 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
     let prepared = Prepared::new(resolved)?;
     let topology = resolved.topology();
     let plans = prepared.plans();
+    if topology.has_maps() {
+        let job = fuse::WhoJob {
+            plans,
+            follow: prepared.settings.follow,
+            as_seen: resolved.sides_as_seen,
+            frame_step: resolved.deployment.capture.frame_step.max(1),
+            n_consumers: topology.receivers_of(&topic::people()),
+            patience: resolved.patience(),
+        };
+        return fuse::run_who(service, &job);
+    }
     let job = fuse::Job {
         worker,
         views: prepared.settings.views,
@@ -249,24 +262,11 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
             plans.clone(),
             prepared.settings.tables,
         )),
-        space: (prepared.settings.views == Views::Space).then(|| {
-            SpaceStep::new(
-                plans.clone(),
-                SpaceSettings {
-                    as_seen: resolved.sides_as_seen,
-                    ..SpaceSettings::default()
-                },
-                MapSettings::default(),
-                // In space the views have to agree: what is seen badly in one is nobody there.
-                2.0 * resolved.deployment.pose.least_heat,
-            )
-        }),
         plans,
         has_quality: resolved.deployment.has_quality(),
         quality_deadline: Duration::from_millis(resolved.deployment.quality.deadline_ms),
         quality_max_age: Duration::from_millis(resolved.deployment.quality.max_age_ms),
         frame_step: resolved.deployment.capture.frame_step.max(1),
-        frame_rate_hz: resolved.frame_rate_hz(),
         n_consumers: topology.receivers_of(&topic::pair_pose(worker)),
         patience: resolved.patience(),
     };
@@ -282,6 +282,22 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         plans.clone(),
         prepared.settings.skeleton.triangulation,
     );
+    // Twice the patience of the process before, which waits for late views itself.
+    let patience = 2 * resolved.patience();
+    let n_consumers = topology.receivers_of(&topic::pose3d());
+    if topology.has_maps() {
+        let settings = space_settings(resolved, &prepared);
+        let step = SpaceStep::new(plans.clone(), prepared.up_in_world, settings);
+        let job = triangulate::SpaceJob {
+            plans,
+            extras,
+            frame_rate_hz: resolved.frame_rate_hz(),
+            frame_step: resolved.deployment.capture.frame_step.max(1),
+            n_consumers,
+            patience,
+        };
+        return triangulate::run_in_space(service, &job, step);
+    }
     let step = SkeletonStep::new(
         plans.clone(),
         prepared.up_in_world,
@@ -293,10 +309,9 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         frame_rate_hz: resolved.frame_rate_hz(),
         views: prepared.settings.views,
         n_workers: topology.n_workers(),
-        n_consumers: topology.receivers_of(&topic::pose3d()),
+        n_consumers,
         pairs: prepared.pairs,
-        // Twice the patience of a pair, which waits for late views itself.
-        patience: 2 * resolved.patience(),
+        patience,
     };
     triangulate::run(service, &job, step)
 }
@@ -346,7 +361,7 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         about: recorded::about(resolved, plan)?,
         topics: record::Topics {
             n_views: prepared.views.len(),
-            n_workers: topology.n_workers(),
+            fused: topology.fused(),
             has_quality: resolved.deployment.has_quality(),
             pictures: plan.pictures.clone(),
             processes: topology

@@ -154,13 +154,15 @@ pub fn damaged(
     resolved: &Resolved,
     from: Stage,
 ) -> Result<Vec<Damaged>, Failure> {
-    let has_frames = resolved.topology().receivers_of(&topic::frame(0)) > 0;
+    let topology = resolved.topology();
+    let has_frames = topology.receivers_of(&topic::frame(0)) > 0;
+    let has_evidence = from <= Stage::Fuse || topology.has_maps();
     let is_replayed = |topic: &str| match Kind::of_topic(topic) {
         Some(Kind::Frame) => from > Stage::Capture && has_frames,
         Some(Kind::ViewPose) => from > Stage::Pose,
-        Some(Kind::Evidence) => (Stage::Quality..=Stage::Fuse).contains(&from),
+        Some(Kind::Evidence) => from > Stage::Pose && has_evidence,
         Some(Kind::ViewQuality) => from > Stage::Quality,
-        Some(Kind::PairPose) => from > Stage::Fuse,
+        Some(Kind::PairPose | Kind::People) => from > Stage::Fuse,
         // Pictures of cameras are checked as they are read.
         Some(Kind::Pose3d | Kind::Health | Kind::Picture) | None => false,
     };

@@ -4,12 +4,14 @@
 
 use crate::common;
 use crate::common::networks::{DETECTOR as DETECTOR_CARD, detector_of};
+use crate::common::same_bits::assert_same_skeleton;
 
 use core::fmt::Write as _;
 
 use common::{Case, Ended};
 use footage::{Canvas, Size};
 use geometry::{Camera, Intrinsics, Lens, LensModel, Rig};
+use kernels::Rgb8View;
 use keypoints::{HALPE_26, LSP_14};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use onnx::{Attribute, Network, Side};
@@ -235,6 +237,79 @@ fn a_network_and_a_detector_are_all_that_a_deployment_needs() {
     // views in turn: in frames 10, 8, 5 and 3 for the second time.
     assert_eq!(searched(&[]), [160, 0]);
     assert_eq!(searched(&["--set", "capture.frame_rate_hz=20"]), [19, 141]);
+}
+
+/// Settings with which every picture is a frame of the pipeline, unchanged.
+const AS_THEY_ARE: [&str; 2] = ["capture.mode=lossless", "capture.scale=1.0"];
+
+/// Runs a case with [`AS_THEY_ARE`].
+fn run_as_they_are(case: &Case) {
+    let [mode, scale] = AS_THEY_ARE;
+    let ended = run(case, &["--set", mode, "--set", scale]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+}
+
+/// Compares the results of a run with those of its steps in one process, bit for bit.
+///
+/// * `pictures`: by view and frame; the frames of the pipeline, which are the pictures themselves.
+fn assert_one_process_gives_the_same(case: &Case, pictures: &[Vec<Canvas>; 4]) {
+    let file = case.path("deployment.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let set = AS_THEY_ARE.map(str::to_owned);
+    let loaded = deployment::Loaded::parse(&text, &file, &set, &deployment::AnyMachine).unwrap();
+    let resolved = launch::plan::resolve(&loaded.deployment).unwrap();
+    let mut one = launch::InProcess::new(&resolved).unwrap();
+    let lines = case.lines("pose3d.jsonl");
+    assert_eq!(lines.len(), N_FRAMES);
+    let mut n_joints = 0;
+    for (frame, line) in lines.iter().enumerate() {
+        let [width, height] = SIZE.map(|side| side as usize);
+        let images = pictures.iter().map(|view| view[frame].rgb());
+        let images = images.map(|rgb| Rgb8View::new(width, height, rgb).unwrap());
+        let sent: Vec<Option<launch::SentFrame<'_>>> = images
+            .map(|image| {
+                Some(launch::SentFrame {
+                    image,
+                    skew_nanos: 0,
+                })
+            })
+            .collect();
+        let estimate = one.estimate(&sent).unwrap();
+        assert_same_skeleton(line, frame, &estimate);
+        n_joints += estimate.skeleton.joints.iter().flatten().count();
+    }
+    assert!(
+        n_joints > 12 * N_FRAMES,
+        "little to compare: {n_joints} joints"
+    );
+}
+
+/// The pictures of a case whose views call the joints as they are.
+fn pictures(named: [Named; 4]) -> [Vec<Canvas>; 4] {
+    let rig = rig();
+    core::array::from_fn(|view| {
+        let camera = &rig.cameras()[view];
+        let frames = 0..N_FRAMES;
+        frames
+            .map(|frame| picture(camera, frame, named[view]))
+            .collect()
+    })
+}
+
+#[test]
+fn many_processes_give_the_bits_of_one() {
+    let named: [Named; 4] = [as_it_is, exchanged, as_it_is, without_a_wrist];
+    let case = case("one-process", named.map(Some));
+    run_as_they_are(&case);
+    assert_one_process_gives_the_same(&case, &pictures(named));
+}
+
+#[test]
+fn many_processes_give_the_bits_of_one_from_keypoints_of_another_program() {
+    let case = case("one-process-of-keypoints", [Some(as_it_is); 4]);
+    with_keypoints(&case, "halpe-26", |_| HALPE_26.map(str::to_owned).to_vec());
+    run_as_they_are(&case);
+    assert_one_process_gives_the_same(&case, &pictures([as_it_is; 4]));
 }
 
 #[test]
@@ -493,8 +568,10 @@ fn pictures_of_other_moments_are_moved_to_the_instants_of_their_frames() {
     run(&case, &[]);
     errors.push(errors_mm(&case));
     let (without, told, untold) = (errors[0], errors[1], errors[2]);
-    for which in 0..2 {
+    // Joints and extra keypoints: most that is left of what was told, and how much more is left of what was not. Joints stand by evidence
+    // whose places are rounded to cells, and so do their velocities.
+    for (which, most, more) in [(0, 2.5, 1.5), (1, 2.5, 2.0)] {
         let [told, untold] = [told, untold].map(|it| it[which] - without[which]);
-        assert!(told < 5.0 && untold > 2.0 * told, "{errors:?}");
+        assert!(told < most && untold > more * told, "{errors:?}");
     }
 }

@@ -45,7 +45,7 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     let recording = &report["recording"];
     assert_eq!(recording["complete"], json!(true), "{recording:#}");
     assert_eq!(recording["lost"], json!(0), "{recording:#}");
-    for topic in ["frame/v1/0", "view-pose/v6/1", "evidence/v3/2", "pose3d/v3"] {
+    for topic in ["frame/v1/0", "view-pose/v7/1", "evidence/v3/2", "pose3d/v3"] {
         let n = recording["topics"][topic]["messages"].as_u64().unwrap();
         assert!(n >= N_FRAMES as u64, "{topic}: {n}");
     }
@@ -147,7 +147,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     recorded(&case, &["--without", "evidence", "--without", "pixels"]);
     let mut file = fs::read(case.path("run.mcap")).unwrap();
     let recording = recording::scan(&mut std::io::Cursor::new(&file)).unwrap();
-    let poses = &recording.tracks["view-pose/v6/1"].entries;
+    let poses = &recording.tracks["view-pose/v7/1"].entries;
     let entry = poses.iter().find(|it| it.frame == Some(3)).unwrap();
     // Behind stamp and times, in the content. Six bytes of a pose move a joint.
     let at = (entry.offset + entry.len / 2) as usize;
@@ -157,11 +157,11 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     let ended = replayed(&case, &["--from", "triangulate", "--out", "less", "--json"]);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let Entry { offset, chunk, .. } = entry;
-    let named = format!("view-pose/v6/1, frame 3, at byte {offset}, in the chunk at byte {chunk}");
+    let named = format!("view-pose/v7/1, frame 3, at byte {offset}, in the chunk at byte {chunk}");
     assert!(ended.stderr.contains(&named), "{}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let expected =
-        json!({ "topic": "view-pose/v6/1", "frame": 3, "offset": offset, "chunk": chunk });
+        json!({ "topic": "view-pose/v7/1", "frame": 3, "offset": offset, "chunk": chunk });
     let damaged = report["recording"]["damaged"].as_array().unwrap();
     assert!(damaged.contains(&expected), "{damaged:?}");
     assert!(

@@ -1,7 +1,6 @@
 //! Takes what another program found in a frame.
 
 use failure::Failure;
-use keypoints::Keypoint;
 use messages::{Searched, Stamp, Status};
 
 use crate::job::Keypoints;
@@ -23,9 +22,7 @@ impl View<'_> {
             responses,
             has_failed,
         } = state;
-        let timeline = keypoints.timeline.as_ref();
-        let frame = timeline.map_or(stamp.frame, |it| it.frame(stamp.frame));
-        if let Err(error) = keypoints.source.of_frame(frame, people) {
+        if let Err(error) = keypoints.source.read(stamp.frame, people) {
             if !*has_failed {
                 let error = wording::in_one_line(&error);
                 tracing::warn!(
@@ -37,9 +34,6 @@ impl View<'_> {
             }
             return Ok(Err(Status::BAD_INPUT));
         }
-        for it in people.iter_mut().flat_map(|it| &mut it.keypoints).flatten() {
-            it.at = in_frame(&keypoints.frame_from_source, it);
-        }
         let seen = people.iter().map(|it| &it.keypoints[..]);
         let Some(scope) = keypoints.step.take(seen, memory) else {
             return Ok(Err(Status::NO_DETECTION));
@@ -47,9 +41,4 @@ impl View<'_> {
         let fill = |responses: &mut [f32]| keypoints.step.fill(scope, responses, memory);
         self.fill(&scope, Searched::FULL, responses, fill).map(Ok)
     }
-}
-
-fn in_frame([[a, b, c], [d, e, f]]: &[[f64; 3]; 2], it: &Keypoint) -> [f64; 2] {
-    let [x, y] = it.at;
-    [a * x + b * y + c, d * x + e * y + f]
 }

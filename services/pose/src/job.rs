@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use deployment::Timeline;
 use fmp::Layout;
-use keypoints::keypointfiles::KeypointSource;
+use keypoints::files::SeenKeypoints;
+use keypoints::keypointfiles::{KeypointFileError, KeypointSource};
 use pipeline::{NetworkStep, ViewStep};
 
 /// Keypoints that another program found in the footage of a view.
@@ -15,11 +16,44 @@ pub struct Keypoints {
     /// What makes evidence of them.
     pub step: NetworkStep,
     /// Where they are.
-    pub source: KeypointSource,
+    pub source: Source,
+}
+
+/// Files of keypoints, as frames of the pipeline.
+#[derive(Debug)]
+pub struct Source {
+    /// The files.
+    pub files: KeypointSource,
     /// Which frame of them belongs to each common instant, where cameras have clocks of their own.
     pub timeline: Option<Timeline>,
     /// From pixels of the footage to pixels of the frame: `[[a, b, c], [d, e, f]]`.
     pub frame_from_source: [[f64; 3]; 2],
+}
+
+impl Source {
+    /// Reads the people of a frame, pixels of the frame; nobody where no file tells of it.
+    ///
+    /// * `people`: replaced by them.
+    ///
+    /// # Errors
+    ///
+    /// A file cannot be read; `people` is empty then.
+    pub fn read(
+        &self,
+        frame: u64,
+        people: &mut Vec<SeenKeypoints>,
+    ) -> Result<(), KeypointFileError> {
+        let timeline = self.timeline.as_ref();
+        let frame = timeline.map_or(frame, |timeline| timeline.frame(frame));
+        self.files.of_frame(frame, people)?;
+        let [[a, b, c], [d, e, f]] = self.frame_from_source;
+        let found = people.iter_mut().flat_map(|person| &mut person.keypoints);
+        for keypoint in found.flatten() {
+            let [x, y] = keypoint.at;
+            keypoint.at = [a * x + b * y + c, d * x + e * y + f];
+        }
+        Ok(())
+    }
 }
 
 /// The single-view step.

@@ -102,6 +102,7 @@ impl View<'_> {
         let mut message = message.or_fail(ExitKind::Run)?;
         wire::local_to_message(&mut message, &estimate.local).or_fail(ExitKind::Run)?;
         wire::front_to_message(&mut message, &estimate.front).or_fail(ExitKind::Run)?;
+        wire::heats_to_message(&mut message, &estimate.heats).or_fail(ExitKind::Run)?;
         wire::extras_to_message(&mut message, self.job.n_extras, &estimate.extras)
             .or_fail(ExitKind::Run)?;
         let n_values = evidence

@@ -8,8 +8,8 @@ use recording::{Kind, Without};
 pub struct Topics {
     /// Number of views.
     pub n_views: usize,
-    /// Number of fusion workers.
-    pub n_workers: usize,
+    /// Topics of the fusion processes, by process.
+    pub fused: Vec<String>,
     /// Whether there are processes that send expected errors.
     pub has_quality: bool,
     /// Views whose live cameras' pictures are kept as they came.
@@ -62,9 +62,10 @@ impl Topics {
                 );
             }
         }
-        for worker in 0..self.n_workers {
-            let sender = Some(format!("fuse-{worker}"));
-            add(Kind::PairPose, topic::pair_pose(worker), sender);
+        for (worker, name) in self.fused.iter().enumerate() {
+            if let Some(kind) = Kind::of_topic(name) {
+                add(kind, name.clone(), Some(format!("fuse-{worker}")));
+            }
         }
         add(
             Kind::Pose3d,
@@ -103,7 +104,7 @@ mod tests {
     fn channels(without: Without) -> Vec<Channel> {
         let topics = Topics {
             n_views: 2,
-            n_workers: 1,
+            fused: vec![topic::pair_pose(0)],
             has_quality: true,
             pictures: vec![1],
             processes: ["results", "pose-1", "fuse-0"].map(str::to_owned).into(),
@@ -116,7 +117,7 @@ mod tests {
     fn what_no_process_of_this_host_publishes_is_not_recorded_nor_counted_by_one() {
         let topics = Topics {
             n_views: 2,
-            n_workers: 0,
+            fused: Vec::new(),
             has_quality: false,
             pictures: Vec::new(),
             processes: ["bridge", "pose-0"].map(str::to_owned).into(),

@@ -1,7 +1,7 @@
 //! All messages about one frame.
 
 use fmp::Pose;
-use messages::{FrameHeader, PairPose, Pose3d, Status, ViewPose, ViewQuality};
+use messages::{FrameHeader, PairPose, People, Pose3d, Status, Timing, ViewPose, ViewQuality};
 
 use crate::{Missing, Scene};
 
@@ -40,6 +40,43 @@ pub struct Absent {
     pub views: Vec<Missing>,
 }
 
+/// A message of a fusion process, without what it found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FusedRecord {
+    /// Index of the pair; 0 for all views at once in space.
+    pub index: usize,
+    /// Whether there is a result.
+    pub status: Status,
+    /// When it was received and sent.
+    pub timing: Timing,
+    /// The views whose expected errors were used, each with their age in frames plus 1; 0 without any.
+    pub sigma_ages: [(usize, u16); 2],
+}
+
+impl From<&PairPose> for FusedRecord {
+    fn from(message: &PairPose) -> Self {
+        let [first, second] = message.views.map(|view| view as usize);
+        let [age_first, age_second] = message.sigma_age;
+        Self {
+            index: message.stamp.view as usize,
+            status: message.status,
+            timing: message.timing,
+            sigma_ages: [(first, age_first), (second, age_second)],
+        }
+    }
+}
+
+impl From<&People> for FusedRecord {
+    fn from(message: &People) -> Self {
+        Self {
+            index: 0,
+            status: message.status,
+            timing: message.timing,
+            sigma_ages: [(0, 0); 2],
+        }
+    }
+}
+
 /// All messages about one frame.
 #[derive(Debug, Clone)]
 pub struct FrameRecord {
@@ -47,8 +84,8 @@ pub struct FrameRecord {
     pub pose3d: Pose3d,
     /// The views.
     pub views: Vec<ViewRecord>,
-    /// The pairs that sent a pose, in order of arrival.
-    pub pairs: Vec<PairPose>,
+    /// The messages of fusion processes, in order of arrival.
+    pub fused: Vec<FusedRecord>,
 }
 
 impl FrameRecord {
@@ -101,11 +138,9 @@ impl FrameRecord {
     /// How many frames ago the expected errors were predicted that fusion used for a view, at least: the
     /// workers may differ. `None` if no pair of the view used any.
     pub(crate) fn sigma_used(&self, view: usize) -> Option<u16> {
-        let ages = self.pairs.iter().flat_map(|pair| {
-            let views = pair.views.iter().zip(pair.sigma_age);
-            views.filter(|it| *it.0 as usize == view).map(|it| it.1)
-        });
-        ages.filter(|it| *it > 0).map(|it| it - 1).max()
+        let ages = self.fused.iter().flat_map(|fused| fused.sigma_ages);
+        let ages = ages.filter(|(other, _)| *other == view);
+        ages.filter_map(|(_, age)| age.checked_sub(1)).max()
     }
 
     /// The expected errors of a view's parts, pixels of the frame.

@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use messages::{FrameHeader, MAX_VIEWS, PairPose, Pose3d, Status, ViewPose, ViewQuality};
+use messages::{FrameHeader, MAX_VIEWS, Pose3d, Status, ViewPose, ViewQuality};
 
 use crate::missing::ViewHistory;
-use crate::{Absent, FrameRecord, Missing, Picture, ViewRecord};
+use crate::{Absent, FrameRecord, FusedRecord, Missing, Picture, ViewRecord};
 
 /// Most frames that wait for their results; the oldest are discarded first.
 const MAX_FRAMES: usize = 512;
@@ -42,7 +42,7 @@ pub(crate) struct Settled {
 #[derive(Debug)]
 struct Parts {
     views: Vec<ViewRecord>,
-    pairs: Vec<PairPose>,
+    fused: Vec<FusedRecord>,
 }
 
 impl Gather {
@@ -98,10 +98,10 @@ impl Gather {
         }
     }
 
-    pub(crate) fn pair(&mut self, pair: &PairPose) {
-        let pairs = &mut self.parts(pair.stamp.frame).pairs;
-        if pairs.len() < MAX_PAIRS {
-            pairs.push(*pair);
+    pub(crate) fn fused(&mut self, frame: u64, message: FusedRecord) {
+        let fused = &mut self.parts(frame).fused;
+        if fused.len() < MAX_PAIRS {
+            fused.push(message);
         }
     }
 
@@ -111,15 +111,13 @@ impl Gather {
         let Some(parts) = self.frames.get(&frame) else {
             return false;
         };
-        let is_absent = |view: u32| {
-            let record = parts.views.get(view as usize);
-            record.is_some_and(|it| it.quality.is_none())
+        let is_absent = |view: usize| {
+            let record = parts.views.get(view);
+            record.is_some_and(|record| record.quality.is_none())
         };
-        parts.pairs.iter().any(|pair| {
-            // An age of 1: predicted in this frame.
-            let mut used = pair.views.iter().zip(pair.sigma_age);
-            used.any(|(view, age)| age == 1 && is_absent(*view))
-        })
+        // An age of 1: predicted in this frame.
+        let mut used = parts.fused.iter().flat_map(|fused| fused.sigma_ages);
+        used.any(|(view, age)| age == 1 && is_absent(view))
     }
 
     /// The record of a frame whose result has been received; earlier frames get no result any more. `None` if the frame has
@@ -135,7 +133,7 @@ impl Gather {
         let later = self.frames.split_off(&(frame.saturating_add(1)));
         let mut past = std::mem::replace(&mut self.frames, later);
         let parts = past.remove(&frame);
-        let Parts { mut views, pairs } = parts.unwrap_or_else(|| self.empty());
+        let Parts { mut views, fused } = parts.unwrap_or_else(|| self.empty());
         self.next = frame.saturating_add(self.frame_step);
         self.epoch = self.epoch.max(pose3d.stamp.epoch);
         for (view, (it, history)) in views.iter_mut().zip(&mut self.histories).enumerate() {
@@ -145,7 +143,7 @@ impl Gather {
         let record = FrameRecord {
             pose3d: *pose3d,
             views,
-            pairs,
+            fused,
         };
         Some(Settled { absent, record })
     }
@@ -205,7 +203,7 @@ impl Gather {
     fn empty(&self) -> Parts {
         Parts {
             views: vec![ViewRecord::default(); self.histories.len()],
-            pairs: Vec::new(),
+            fused: Vec::new(),
         }
     }
 }
@@ -218,7 +216,7 @@ fn summary(views: &[Missing]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use messages::Stamp;
+    use messages::{PairPose, Stamp};
 
     use super::*;
     use crate::testing::pose3d;
@@ -252,19 +250,21 @@ mod tests {
     fn expected_errors_that_fusion_used_are_awaited_and_no_others() {
         let mut gather = Gather::new(2, 0, 1, false);
         let stamp = pose(3).stamp;
-        let pair = |sigma_age: [u16; 2]| PairPose {
-            stamp,
-            views: [0, 1],
-            sigma_age,
-            ..PairPose::default()
+        let pair = |sigma_age: [u16; 2]| {
+            FusedRecord::from(&PairPose {
+                stamp,
+                views: [0, 1],
+                sigma_age,
+                ..PairPose::default()
+            })
         };
         assert!(!gather.awaits_quality(3), "nothing is known of the frame");
-        gather.pair(&pair([0, 4]));
+        gather.fused(3, pair([0, 4]));
         assert!(
             !gather.awaits_quality(3),
             "none were used, or those of an earlier frame"
         );
-        gather.pair(&pair([0, 1]));
+        gather.fused(3, pair([0, 1]));
         assert!(gather.awaits_quality(3));
         let quality = ViewQuality {
             stamp,
@@ -300,9 +300,9 @@ mod tests {
     fn the_number_of_pairs_of_a_frame_is_bounded() {
         let mut gather = Gather::new(1, 0, 1, false);
         for _ in 0..1000 {
-            gather.pair(&PairPose::default());
+            gather.fused(0, FusedRecord::from(&PairPose::default()));
         }
-        assert_eq!(gather.result(&pose3d(0)).unwrap().record.pairs.len(), 120);
+        assert_eq!(gather.result(&pose3d(0)).unwrap().record.fused.len(), 120);
     }
 
     #[test]

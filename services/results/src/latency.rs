@@ -97,7 +97,7 @@ impl Latency {
                 }
             }
         }
-        for pair in record.pairs.iter().filter(|it| it.status == Status::OK) {
+        for pair in record.fused.iter().filter(|it| it.status == Status::OK) {
             self.note(Kind::Stage, "fuse", computation(pair.timing));
         }
         if record.pose3d.status == Status::OK {
@@ -112,7 +112,7 @@ impl Latency {
     fn walk(&mut self, record: &FrameRecord) -> Option<()> {
         let result = record.pose3d.timing;
         let pair = record
-            .pairs
+            .fused
             .iter()
             .max_by_key(|it| it.timing.sent_at_nanos)?;
         let view = (0..record.views.len())
@@ -120,10 +120,10 @@ impl Latency {
             .max_by_key(|it| record.views[*it].pose.map(|it| it.timing.sent_at_nanos))?;
         let pose = record.views[view].pose?.timing;
         let frame = record.views[view].frame?.timing;
-        let worker = pair.stamp.view as usize % self.n_workers;
+        let worker = pair.index % self.n_workers;
         // The same worker may have sent another pair of this frame just before.
-        let same_worker = record.pairs.iter().filter(|it| {
-            it.stamp.view as usize % self.n_workers == worker
+        let same_worker = record.fused.iter().filter(|it| {
+            it.index % self.n_workers == worker
                 && it.timing.sent_at_nanos <= pair.timing.received_at_nanos
         });
         let busy = same_worker.map(|it| it.timing.sent_at_nanos).max();
@@ -172,8 +172,8 @@ impl Latency {
                 self.sent.insert(("pose", view), pose.timing.sent_at_nanos);
             }
         }
-        for pair in &record.pairs {
-            let worker = pair.stamp.view as usize % self.n_workers;
+        for pair in &record.fused {
+            let worker = pair.index % self.n_workers;
             let last = self.sent.entry(("fuse", worker)).or_default();
             *last = pair.timing.sent_at_nanos.max(*last);
         }
@@ -232,6 +232,7 @@ mod tests {
     use messages::{FrameHeader, PairPose};
 
     use super::*;
+    use crate::FusedRecord;
     use crate::testing::record;
 
     const MS: u64 = 1_000_000;
@@ -255,10 +256,10 @@ mod tests {
                 pose.timing = timing(start_ms + 22, start_ms + 52);
             }
         }
-        it.pairs = vec![PairPose {
+        it.fused = vec![FusedRecord::from(&PairPose {
             timing: timing(start_ms + 53, start_ms + 73),
             ..PairPose::default()
-        }];
+        })];
         it.pose3d.stamp.captured_at_nanos = (start_ms + 10) * MS;
         it.pose3d.timing = timing(start_ms + 75, start_ms + 80);
         it

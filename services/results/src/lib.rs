@@ -36,7 +36,7 @@ mod service;
 mod writer;
 
 pub use folder::{Folder, FolderError, remove_pictures};
-pub use frame::{Absent, FrameRecord, Picture, ViewRecord};
+pub use frame::{Absent, FrameRecord, FusedRecord, Picture, ViewRecord};
 pub use job::Job;
 pub use latency::Latency;
 pub use missing::Missing;

@@ -7,7 +7,9 @@ use core::time::Duration;
 use std::time::Instant;
 
 use failure::{Failure, now_nanos};
-use messages::{Cause, FrameHeader, PairPose, Pose3d, Span, Status, ViewPose, ViewQuality, topic};
+use messages::{
+    Cause, FrameHeader, PairPose, People, Pose3d, Span, Status, ViewPose, ViewQuality, topic,
+};
 use runtime::{Service, SliceSubscriber, Subscriber, Waiter, Woken};
 use stage::{Context, Port, Sender};
 
@@ -114,6 +116,7 @@ struct Ports {
     poses: Vec<Port<Subscriber<ViewPose>>>,
     qualities: Vec<Port<Subscriber<ViewQuality>>>,
     pairs: Vec<Port<Subscriber<PairPose>>>,
+    people: Option<Port<Subscriber<People>>>,
     pose3d: Port<Subscriber<Pose3d>>,
 }
 
@@ -125,6 +128,7 @@ impl Ports {
             poses: Vec::new(),
             qualities: Vec::new(),
             pairs: Vec::new(),
+            people: None,
             pose3d: Port::open(service, waiter, &topic::pose3d(), Sender::All)?,
         };
         for view in 0..job.scene.views.len() {
@@ -140,6 +144,11 @@ impl Ports {
                 let errors = Port::open(service, waiter, &topic::view_quality(view), sender)?;
                 ports.qualities.push(errors);
             }
+        }
+        if job.scene.has_maps {
+            let people = Port::open(service, waiter, &topic::people(), Sender::All)?;
+            ports.people = Some(people);
+            return Ok(ports);
         }
         for worker in 0..n_workers {
             let (pairs, sender) = (
@@ -191,7 +200,14 @@ impl Ports {
         for pairs in &self.pairs {
             while let Some(pair) = pairs.receive::<PairPose>(context)? {
                 if pair.status != Status::END {
-                    gather.pair(&pair);
+                    gather.fused(pair.stamp.frame, (&pair).into());
+                }
+            }
+        }
+        if let Some(port) = &self.people {
+            while let Some(people) = port.receive::<People>(context)? {
+                if people.status != Status::END {
+                    gather.fused(people.stamp.frame, (&people).into());
                 }
             }
         }
@@ -211,6 +227,7 @@ impl Ports {
                 .iter()
                 .try_for_each(Port::drain::<ViewQuality>)?;
             self.pairs.iter().try_for_each(Port::drain::<PairPose>)?;
+            self.people.iter().try_for_each(Port::drain::<People>)?;
             self.pose3d.drain::<Pose3d>()?;
         }
         Ok(())

@@ -133,6 +133,6 @@ pub(crate) fn record(frame: u64) -> FrameRecord {
     FrameRecord {
         pose3d: pose3d(frame),
         views: vec![view; 2],
-        pairs: Vec::new(),
+        fused: Vec::new(),
     }
 }

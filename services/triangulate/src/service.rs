@@ -8,12 +8,13 @@ use fmp::Pose;
 use messages::{PairPose, ViewPose, topic};
 use multiview::{FrontEvidence, ViewPlan};
 use pipeline::{
-    ExtraKeypoint, ExtrasStep, FoundExtras, Motion, PairResult, Skeleton, SkeletonStep, ViewResult,
-    Views,
+    ExtraKeypoint, ExtrasStep, Motion, PairResult, Skeleton, SkeletonStep, ViewResult, Views,
 };
 use runtime::Service;
 use stage::{Frame, Item, Stage};
 use wire::WireError;
+
+use crate::in_space::found_extras;
 
 /// What the process has to do.
 #[derive(Debug)]
@@ -81,7 +82,7 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         let rate = job.frame_rate_hz;
         step.begin(rate.map(|rate| frame.number() as f64 / rate));
         let skeleton = skeleton(job.views, &views, pairs, &mut step);
-        let n_people = skeleton.people.len() as u32;
+        let n_people = skeleton.n_people as u32;
         service.health().counted_people(n_people);
         let mut message =
             wire::skeleton_to_message(&skeleton, views_present).or_fail(ExitKind::Run)?;
@@ -124,7 +125,7 @@ struct PairInput {
 fn decode_pair(job: &Job, message: &PairPose) -> Result<PairInput, WireError> {
     match job.views {
         Views::Pairs => wire::check_views(message, &job.pairs)?,
-        Views::All | Views::Space => wire::check_all_views(message, job.plans.len())?,
+        Views::All => wire::check_all_views(message, job.plans.len())?,
     }
     let n_parts = job.plans.first().map_or(0, |plan| plan.model().n_parts());
     let sigma_px = |side| wire::sigma_from_pair(message, side, n_parts);
@@ -158,6 +159,7 @@ fn view_answers(
         let result = (!found.candidates.is_empty()).then(|| ViewResult {
             candidates: found.candidates,
             front: found.front,
+            heats: Vec::new(),
             sigma_px: latest.map(|(_, sigma_px)| sigma_px.clone()),
             tau_px: None,
             skew_s: found.skew_s,
@@ -165,21 +167,6 @@ fn view_answers(
         (result, found.extras)
     };
     (0..n_views).map(&mut answer).unzip()
-}
-
-/// The candidates of every view with their extra keypoints.
-fn found_extras<'a>(
-    views: &'a [Option<ViewResult>],
-    extras: &'a [Vec<ExtraKeypoint>],
-) -> Vec<Option<FoundExtras<'a>>> {
-    let found = |(view, extras): (&'a Option<ViewResult>, &'a Vec<ExtraKeypoint>)| {
-        Some(FoundExtras {
-            candidates: &view.as_ref()?.candidates,
-            extras,
-            skew_s: view.as_ref()?.skew_s,
-        })
-    };
-    views.iter().zip(extras).map(found).collect()
 }
 
 /// The skeleton from the fused and the single-view poses. A pair is used only if the single-view poses of both views were

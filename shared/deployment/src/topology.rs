@@ -151,6 +151,8 @@ pub struct Topology {
     pairs: Vec<[usize; 2]>,
     n_workers: usize,
     n_views: usize,
+    /// Whether people are found by networks or keypoints, and solved in space.
+    has_maps: bool,
 }
 
 impl Topology {
@@ -168,6 +170,7 @@ impl Topology {
             processes: Vec::new(),
             n_workers: deployment.most_workers().min(pairs.len()),
             n_views: deployment.cameras.len(),
+            has_maps: deployment.has_maps(),
             pairs,
         };
         let is_replayed = |service: &str| {
@@ -229,6 +232,11 @@ impl Topology {
         self.n_workers
     }
 
+    /// Whether people are found by networks or keypoints: `fuse` sends who is who, and `triangulate` reads the evidence.
+    pub fn has_maps(&self) -> bool {
+        self.has_maps
+    }
+
     /// Pairs of views, ascending. Where all views are solved at once: every view but the first with the one before it,
     /// as many as there are messages, and together all views.
     pub fn pairs(&self) -> &[[usize; 2]] {
@@ -252,6 +260,14 @@ impl Topology {
     fn reads(&self, worker: usize, view: usize) -> bool {
         let pairs = self.pairs_of(worker);
         pairs.iter().any(|(_, pair)| pair.contains(&view))
+    }
+
+    /// Topics of the fusion processes, by process.
+    pub fn fused(&self) -> Vec<String> {
+        if self.has_maps {
+            return vec![topic::people()];
+        }
+        (0..self.n_workers).map(topic::pair_pose).collect()
     }
 
     fn count(&self, is_meant: impl Fn(&Process) -> bool) -> usize {
@@ -293,16 +309,7 @@ impl Builder<'_> {
             self.everything(),
             vec![],
         ));
-        let inputs = views().map(topic::view_pose);
-        let inputs = inputs.chain((0..self.topology.n_workers).map(topic::pair_pose));
-        let outputs = vec![topic::pose3d()];
-        processes.push(process(
-            Stage::Triangulate.name(),
-            None,
-            Role::Essential,
-            inputs.collect(),
-            outputs,
-        ));
+        processes.push(self.triangulate());
         processes.extend((0..self.topology.n_workers).map(|worker| self.fuse(worker)));
         if self.has_quality {
             processes.extend(views().map(|view| self.quality(view)));
@@ -336,20 +343,41 @@ impl Builder<'_> {
             inputs.extend([topic::frame(view), topic::view_pose(view)]);
             inputs.extend(self.has_quality.then(|| topic::view_quality(view)));
         }
-        inputs.extend((0..self.topology.n_workers).map(topic::pair_pose));
+        inputs.extend(self.topology.fused());
         inputs.push(topic::pose3d());
         inputs
+    }
+
+    fn triangulate(&self) -> Process {
+        let views = || 0..self.topology.n_views;
+        let mut inputs: Vec<String> = views().map(topic::view_pose).collect();
+        inputs.extend(self.topology.fused());
+        if self.topology.has_maps {
+            inputs.extend(views().map(topic::evidence));
+        }
+        let service = Stage::Triangulate.name();
+        process(
+            service,
+            None,
+            Role::Essential,
+            inputs,
+            vec![topic::pose3d()],
+        )
     }
 
     fn fuse(&self, worker: usize) -> Process {
         let mut inputs = Vec::new();
         for view in 0..self.topology.n_views {
             inputs.push(topic::view_pose(view));
-            let reads = self.topology.reads(worker, view);
+            let reads = !self.topology.has_maps && self.topology.reads(worker, view);
             inputs.extend(reads.then(|| topic::evidence(view)));
             inputs.extend(self.has_quality.then(|| topic::view_quality(view)));
         }
-        let outputs = vec![topic::pair_pose(worker)];
+        let outputs = if self.topology.has_maps {
+            vec![topic::people()]
+        } else {
+            vec![topic::pair_pose(worker)]
+        };
         let service = Stage::Fuse.name();
         process(service, Some(worker), Role::Redundant, inputs, outputs)
     }

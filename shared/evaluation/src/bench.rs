@@ -208,6 +208,7 @@ impl Bench {
             };
             let expected = expected(&single);
             Some(ViewResult {
+                heats: Vec::new(),
                 candidates: it.candidates.clone(),
                 front: it.front.clone(),
                 tau_px: expected.as_ref().and_then(|it| it.tau.clone()),

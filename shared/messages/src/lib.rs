@@ -11,6 +11,7 @@ mod evidence;
 mod frame;
 mod health;
 mod metrics;
+mod people;
 mod picture;
 mod pose;
 mod pose3d;
@@ -26,6 +27,7 @@ pub use metrics::{
     CameraCounts, Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE,
     NO_VIEW, Span, TimedBy, UNMEASURED,
 };
+pub use people::{NO_CANDIDATE, People, PersonMessage};
 pub use picture::{NO_SEQUENCE, PictureHeader};
 pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
 pub use pose3d::{FusedView, Joint3d, Kept, Pose3d, Sides};
@@ -39,6 +41,8 @@ pub const MAX_PARTS: usize = 32;
 pub const MAX_VIEWS: usize = 16;
 /// Largest number of candidates of a view.
 pub const MAX_CANDIDATES: usize = 8;
+/// Largest number of people of a frame.
+pub const MAX_PEOPLE: usize = 8;
 /// Largest number of joints of a joint set.
 pub const MAX_JOINTS: usize = 32;
 /// Largest number of extra keypoints of a person: those of networks beside the joints.
@@ -56,7 +60,11 @@ const _: () = {
     assert!(size_of::<EvidenceHeader>() == 1088);
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<LocalMessage>() == 12);
-    assert!(size_of::<ViewPose>() == 1880 + MAX_VIEW_KEYPOINTS * 12);
+    assert!(
+        size_of::<ViewPose>() == 1880 + MAX_CANDIDATES * MAX_JOINTS * 4 + MAX_VIEW_KEYPOINTS * 12
+    );
+    assert!(size_of::<PersonMessage>() == 24);
+    assert!(size_of::<People>() == 64 + MAX_PEOPLE * 24);
     assert!(size_of::<ViewQuality>() == 344);
     assert!(size_of::<PairPose>() == 1064);
     assert!(size_of::<Joint3d>() == 88);

@@ -4,7 +4,7 @@ use bytemuck::Zeroable as _;
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{MAX_CANDIDATES, MAX_PARTS, MAX_VIEW_KEYPOINTS, Stamp, Status, Timing};
+use crate::{MAX_CANDIDATES, MAX_JOINTS, MAX_PARTS, MAX_VIEW_KEYPOINTS, Stamp, Status, Timing};
 
 /// One pose: `fmp::Pose`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
@@ -65,7 +65,7 @@ impl Searched {
 
 /// The single-view result: distinct candidates, best first.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("ViewPose.v6")]
+#[type_name("ViewPose.v7")]
 #[repr(C)]
 pub struct ViewPose {
     /// The frame and the view.
@@ -96,6 +96,8 @@ pub struct ViewPose {
     /// `multiview::FrontEvidence`, `[towards the right of the picture, towards the camera]`; zeros where
     /// there is no evidence.
     pub front: [[f32; 2]; MAX_CANDIDATES],
+    /// How sure the network is of every joint of every candidate, 0 to 1; zeros of filters.
+    pub heats: [[f32; MAX_JOINTS]; MAX_CANDIDATES],
     /// The extra keypoints of one candidate after the other, for as many candidates as there is room: `[column, row, standard
     /// deviation along one axis]`, pixels of the frame; a deviation of 0 for one that was not found.
     pub keypoints: [[f32; 3]; MAX_VIEW_KEYPOINTS],

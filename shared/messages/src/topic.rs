@@ -18,7 +18,7 @@ pub fn picture(view: usize) -> String {
 /// Single-view candidates of a view: [`ViewPose`](crate::ViewPose).
 #[must_use]
 pub fn view_pose(view: usize) -> String {
-    format!("view-pose/v6/{view}")
+    format!("view-pose/v7/{view}")
 }
 
 /// Response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).
@@ -37,6 +37,12 @@ pub fn view_quality(view: usize) -> String {
 #[must_use]
 pub fn pair_pose(worker: usize) -> String {
     format!("pair-pose/v3/{worker}")
+}
+
+/// Who is in a frame: [`People`](crate::People).
+#[must_use]
+pub fn people() -> String {
+    "people/v1".to_owned()
 }
 
 /// The result: [`Pose3d`](crate::Pose3d).

@@ -217,7 +217,7 @@ fn nearest(a: &Ray, b: &Ray) -> Option<Point3<f64>> {
 }
 
 /// The evidence of all views for a joint at a place.
-fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
+pub(crate) fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
     views
         .iter()
         .map(|view| view.at(view.named(joint), at))

@@ -1,14 +1,14 @@
 //! How far what every view found by itself lies from the result.
 
+use std::sync::Arc;
+
 use geometry::Triangulated;
-use multiview::Exchanges;
+use multiview::ViewPlan;
 use nalgebra::{Matrix3, Point2};
 use skeleton::JointSet;
 
 use crate::bodies::NoJoint;
-use crate::fused_view::FusedView;
 use crate::motion::Motion;
-use crate::space::Space;
 use crate::view_result::ViewResult;
 
 /// Farthest that the median joint of a view lies from the result where the view shows the same person, metres.
@@ -20,40 +20,41 @@ const DEFINITION_M: f64 = 0.02;
 /// Share of the covariance from the noise of the pictures that is left where views disagree.
 const NOISE_SHARE: f64 = 0.5;
 
+/// The views of a frame, and what they found by themselves.
+#[derive(Clone, Copy)]
+pub(crate) struct FoundByViews<'a> {
+    pub(crate) plans: &'a [Arc<ViewPlan>],
+    pub(crate) answers: &'a [Option<ViewResult>],
+    /// Whether a view has a part in the result.
+    pub(crate) takes_part: &'a [bool],
+    /// Least score of a candidate of a view without a part in the result, for which the view counts as one that sees the person
+    /// elsewhere.
+    pub(crate) least_score: f32,
+    pub(crate) joints: &'static JointSet,
+}
+
 /// Measures the joints of a result that was solved in space against the poses that the views found by themselves.
 ///
-/// The poses that come from such a solution are its own projections: they agree with it whatever the views show. What a view found is the
-/// candidate that lies nearest, with its sides as they are or exchanged; of a view that was left out as well, if it sees somebody there
-/// ([`SkeletonSettings::least_score`](crate::SkeletonSettings::least_score)). A view that shows somebody else does not count, where two
-/// others agree. The residuals of every joint are replaced, and with them their root mean square; and to its covariance the disagreement
-/// is added of the two views that agree best on it (docs/method/three-d.md).
+/// A view found the candidate that lies nearest, with its sides as they are or exchanged; so did a view that was left out, if it sees
+/// somebody there. A view that shows somebody else does not count, where two others agree. The residuals of every joint are set, and their
+/// root mean square; and to its covariance the disagreement is added of the two views that agree best on it (docs/method/three-d.md).
 ///
-/// * `views`: the poses of the views that have a part in the result.
-/// * `motion`: of what the views show, as the solution has it.
+/// * `motion`: of the solution, as the views would show it.
 pub(crate) fn measure(
-    space: &Space,
+    found_by: &FoundByViews<'_>,
     motion: &mut Motion,
-    answers: &[Option<ViewResult>],
-    (views, joints): (&[Option<FusedView>], &mut [Result<Triangulated, NoJoint>]),
+    joints: &mut [Result<Triangulated, NoJoint>],
 ) {
     for it in joints.iter_mut().flatten() {
         it.residuals_px.fill(f64::NAN);
     }
     let mut disagreements_m: Vec<Vec<f64>> = vec![Vec::new(); joints.len()];
     let mut found = Vec::new();
-    for (view, answer) in answers.iter().enumerate() {
-        let Some(answer) = answer else {
+    for view in 0..found_by.plans.len() {
+        let Some(distances_px) = nearest(found_by, motion, view, joints) else {
             continue;
         };
-        let least_score = match views.get(view) {
-            Some(Some(_)) => f32::NEG_INFINITY,
-            _ => space.settings.least_score,
-        };
-        let Some(distances_px) = nearest(space, motion, (view, least_score), (answer, joints))
-        else {
-            continue;
-        };
-        let metres = in_metres(space, view, joints, &distances_px);
+        let metres = in_metres(&found_by.plans[view], joints, &distances_px);
         for (all, metres) in disagreements_m.iter_mut().zip(&metres) {
             all.extend(Some(*metres).filter(|it| it.is_finite()));
         }
@@ -84,12 +85,13 @@ pub(crate) fn measure(
 
 /// Distances of the joints from where a view found them, pixels, by the candidate that lies nearest; NaN where it does not see them.
 fn nearest(
-    space: &Space,
+    found_by: &FoundByViews<'_>,
     motion: &mut Motion,
-    (view, least_score): (usize, f32),
-    (answer, joints): (&ViewResult, &[Result<Triangulated, NoJoint>]),
+    view: usize,
+    joints: &[Result<Triangulated, NoJoint>],
 ) -> Option<Vec<f64>> {
-    let camera = space.plans[view].camera();
+    let answer = found_by.answers.get(view)?.as_ref()?;
+    let camera = found_by.plans[view].camera();
     let [width, height] = camera.intrinsics.size.map(f64::from);
     let inside = |at: &Point2<f64>| (0.0..width).contains(&at.x) && (0.0..height).contains(&at.y);
     let mut projected: Vec<Option<Point2<f64>>> = joints
@@ -102,7 +104,7 @@ fn nearest(
             *at = at.map(|at| at + by);
         }
     }
-    readings(space, (view, least_score), answer, space.settings.joints)
+    readings(found_by, view, answer)
         .map(|points| {
             let both = projected.iter().zip(&points);
             let distance = |(at, point): (&Option<Point2<f64>>, &[f64; 2])| {
@@ -115,12 +117,11 @@ fn nearest(
 
 /// Distances in a picture as metres at the depth of the joints.
 fn in_metres(
-    space: &Space,
-    view: usize,
+    plan: &ViewPlan,
     joints: &[Result<Triangulated, NoJoint>],
     distances_px: &[f64],
 ) -> Vec<f64> {
-    let camera = space.plans[view].camera();
+    let camera = plan.camera();
     let metres = |(joint, px): (&Result<Triangulated, NoJoint>, &f64)| {
         let joint = joint.as_ref().ok()?;
         let depth_m = (camera.camera_from_world * joint.in_world).z;
@@ -149,24 +150,31 @@ fn median(values: &[f64]) -> Option<f64> {
 }
 
 /// The joints of all candidates of a view, with their sides as they are and exchanged.
-///
-/// * `least_score`: of a candidate.
 fn readings<'a>(
-    space: &'a Space,
-    (view, least_score): (usize, f32),
+    found_by: &FoundByViews<'a>,
+    view: usize,
     answer: &'a ViewResult,
-    set: &'a JointSet,
 ) -> impl Iterator<Item = Vec<[f64; 2]>> + 'a {
+    let FoundByViews {
+        plans,
+        takes_part,
+        joints,
+        ..
+    } = *found_by;
+    let least_score = if takes_part.get(view) == Some(&true) {
+        f32::NEG_INFINITY
+    } else {
+        found_by.least_score
+    };
+    let plan = &plans[view];
+    let mirror = plan.model().spec().mirror.as_deref();
     let seen = answer.candidates.iter();
     let seen = seen.filter(move |pose| pose.score >= least_score);
-    let each = seen.flat_map(move |pose| {
-        [0, Exchanges::MAX].map(|exchanges| (pose, space.mirror(view, exchanges)))
-    });
+    let each = seen.flat_map(move |pose| [(pose, None), (pose, mirror)]);
     each.map(move |(pose, mirror)| {
-        let plan = &space.plans[view];
-        let centre = |part: usize| plan.centre(pose, mirror.map_or(part, |it| it[part]));
+        let centre = |part: usize| plan.centre(pose, mirror.map_or(part, |mirror| mirror[part]));
         let centres: Vec<[f64; 2]> = (0..pose.parts.len()).map(centre).collect();
-        set.from_parts(&centres)
+        joints.from_parts(&centres)
     })
 }
 

@@ -1,4 +1,4 @@
-//! The whole pipeline in one process: one synchronised set of images in, one skeleton out.
+//! The paper's method in one process: one synchronised set of images in, one skeleton out.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use nalgebra::UnitVector3;
 use rayon::prelude::*;
 
 use crate::{
-    AllViewsResult, Follow, Following, FuseStep, PairResult, PairTables, Skeleton,
+    AllViewsResult, Follow, Following, FramePeople, FuseStep, PairResult, PairTables, Skeleton,
     SkeletonSettings, SkeletonStep, Support, ViewEstimate, ViewResult, ViewSettings, ViewStep,
     Views, all_pairs,
 };
@@ -33,6 +33,8 @@ pub enum EstimatorError {
 pub struct Estimate {
     /// The result of every single view.
     pub answers: Vec<Option<ViewResult>>,
+    /// Who is in the frame; by the paper's method nobody is named.
+    pub people: FramePeople,
     /// The joint start: candidate and exchange of every view.
     pub start: Vec<Option<(usize, bool)>>,
     /// The part of every view's image that was searched.
@@ -45,7 +47,7 @@ pub struct Estimate {
     pub skeleton: Skeleton,
 }
 
-/// The whole pipeline in one process.
+/// The paper's method in one process.
 #[derive(Debug)]
 pub struct Estimator {
     views: Vec<ViewStep>,
@@ -142,6 +144,7 @@ impl Estimator {
                 let answer = (!estimate.candidates.is_empty()).then(|| ViewResult {
                     candidates: estimate.candidates.clone(),
                     front: estimate.front.clone(),
+                    heats: Vec::new(),
                     sigma_px: sigma_px.get(view).cloned().flatten(),
                     tau_px: None,
                     skew_s: 0.0,
@@ -167,7 +170,7 @@ impl Estimator {
             .flatten();
         let pairs = match self.solved_in {
             Views::Pairs => self.pairs(&answers, &evidence, &start),
-            Views::All | Views::Space => Vec::new(),
+            Views::All => Vec::new(),
         };
         let skeleton = match &all_views {
             Some(result) => self.skeleton.run_all_views(&answers, result),
@@ -175,6 +178,7 @@ impl Estimator {
         };
         Estimate {
             answers,
+            people: FramePeople::default(),
             start,
             scopes: estimates
                 .iter()

@@ -35,6 +35,19 @@ pub struct Following {
     /// Frames without the person that are left.
     patience: u32,
     n_without: u32,
+    /// Identity of the person, from 1; 0 before the first.
+    id: u64,
+}
+
+/// The person who is followed in a frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Followed {
+    /// The candidates that are other people.
+    pub(crate) others: Others,
+    /// Number of people that several views agree on.
+    pub(crate) n_seen: usize,
+    /// Identity of the person, from 1.
+    pub(crate) id: u64,
 }
 
 /// The candidates of a frame that are other people than the one who is followed.
@@ -83,22 +96,44 @@ impl Following {
 
     /// Chooses the person of the next frame, and says which candidates are others.
     pub fn others(&mut self, plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Others {
+        self.next(plans, answers).others
+    }
+
+    /// Chooses the person of the next frame.
+    pub(crate) fn next(
+        &mut self,
+        plans: &[Arc<ViewPlan>],
+        answers: &[Option<ViewResult>],
+    ) -> Followed {
         let found = find(plans, answers);
         let followed = self.choose(&found);
-        Others::of(&found, followed)
+        Followed {
+            others: Others::of(&found, followed),
+            n_seen: found.people.len(),
+            id: self.id.max(1),
+        }
     }
 
     /// The one who is followed; `None` if that is none of those who were found.
     fn choose(&mut self, found: &Found) -> Option<usize> {
         let people = || found.people.iter().enumerate();
         let first = people().next().map(|it| it.0);
-        match self.follow {
+        let chosen = match self.follow {
             Follow::Clearest => first,
             Follow::Largest => people()
                 .max_by(|a, b| a.1.size_px.total_cmp(&b.1.size_px))
                 .map(|it| it.0),
-            Follow::Last => self.nearest(&found.people),
+            Follow::Last => return self.nearest(&found.people),
+        };
+        if let Some(chosen) = chosen {
+            let place = found.people[chosen].place;
+            let is_same = self
+                .last
+                .is_some_and(|last| (place - last).norm() <= REACH_M);
+            self.id += u64::from(!is_same);
+            self.last = Some(place);
         }
+        chosen
     }
 
     /// The one nearest to the last; the first once the last has been away for too long.
@@ -123,6 +158,7 @@ impl Following {
         // Somebody new.
         let first = people.first()?;
         (self.last, self.patience, self.n_without) = (Some(first.place), 1, 0);
+        self.id += 1;
         Some(0)
     }
 }
@@ -184,6 +220,26 @@ mod tests {
         // The other one, two metres away, is out of reach for ten frames.
         assert!(got[n + 10..n + 20].iter().all(Option::is_none));
         assert_eq!(got.last(), Some(&Some(1.0)), "the new one is kept");
+    }
+
+    #[test]
+    fn an_identity_stays_while_the_person_is_followed_and_is_never_given_to_another() {
+        let both: &[([f64; 2], f64)] = &[([-1.0, 0.0], 1.0), ([1.0, 0.0], 0.6)];
+        let one: &[([f64; 2], f64)] = &[([1.0, 0.0], 0.6)];
+        let cameras: Vec<_> = (0..4).map(camera).collect();
+        let ids = |follow: Follow| {
+            let mut following = Following::new(follow);
+            let frames = [vec![both; 3], vec![one; 10], vec![both; 3]].concat();
+            let each = frames.into_iter().map(|people| {
+                following.choose(&found(&cameras, people));
+                following.id
+            });
+            let mut ids: Vec<u64> = each.collect();
+            ids.dedup();
+            ids
+        };
+        assert_eq!(ids(Follow::Last), [1, 2]);
+        assert_eq!(ids(Follow::Clearest), [1, 2, 3]);
     }
 
     #[test]

@@ -59,9 +59,6 @@ pub enum Views {
     /// All at once; each view is supported by the mean of the terms of all others.
     #[default]
     All,
-    /// All at once, in space, over the maps of networks ([`SpaceStep`](crate::SpaceStep)). The [`Estimator`](crate::Estimator), which
-    /// has filters alone, takes it for [`Self::All`].
-    Space,
 }
 
 /// Weight of the terms of a pair where all views are solved at once.

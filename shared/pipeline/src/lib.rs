@@ -1,10 +1,11 @@
 //! The pure processing steps, and all of them in one process.
 //!
-//! The services call the steps one by one. [`Estimator`] runs them in sequence; the system tests
-//! compare the processes with it: the same input gives the same bits.
+//! The services call the steps one by one. [`NetworkEstimator`] and [`Estimator`] run those of either method in sequence; the system
+//! tests compare the processes with them: the same input gives the same bits.
 #![forbid(unsafe_code)]
 
 mod bodies;
+mod by_network;
 mod disagreement;
 mod extras;
 mod following;
@@ -16,6 +17,7 @@ mod network_memory;
 mod network_step;
 mod people;
 mod person_evidence;
+mod placed;
 mod sightings;
 mod skeleton_settings;
 mod skeleton_step;
@@ -24,10 +26,12 @@ mod space_step;
 mod tracks;
 mod view_result;
 mod view_step;
+mod who;
 
 mod estimate;
 
 pub use bodies::{Body, NoJoint};
+pub use by_network::{NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame};
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
 pub use extras::{ExtrasStep, FoundExtras};
 pub use following::{Follow, Following, Others};
@@ -41,6 +45,7 @@ pub use network_step::{Boxes, Eyes, NetworkSettings, NetworkStep, most_values};
 pub use people::{Person, people};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
-pub use space_step::{SpaceResult, SpaceStep};
+pub use space_step::{SpaceStep, SpaceStepSettings};
 pub use view_result::{ExtraKeypoint, ViewResult};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};
+pub use who::{FramePeople, KnownPerson, WhoStep};

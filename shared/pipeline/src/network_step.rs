@@ -16,6 +16,8 @@ use posenetwork::{
     outline_of_pose,
 };
 
+use skeleton::PARSE14;
+
 use crate::network_memory::{NetworkMemory, Seen};
 use crate::sightings::Sightings;
 use crate::space::trunk_upward;
@@ -362,14 +364,14 @@ impl NetworkStep {
             .map(|(pose, nth)| self.front_of(pose, &memory.seen[*nth]));
         let front: Option<Vec<FrontEvidence>> = fronts.collect();
         let candidates: Vec<Pose> = found.into_iter().map(|it| it.0).collect();
+        let levels = [level];
+        let evidence = Responses::within(&self.layout, responses, &levels, scope);
         let best = candidates.first();
-        let local = best.map(|pose| {
-            let levels = [level];
-            let evidence = Responses::within(&self.layout, responses, &levels, scope);
-            local_scores(self.springs.model(), &evidence, pose)
-        });
+        let local = best.map(|pose| local_scores(self.springs.model(), &evidence, pose));
+        let heats = candidates.iter().map(|pose| self.heats(pose, &evidence));
         ViewEstimate {
             local: local.unwrap_or_default(),
+            heats: heats.collect(),
             candidates,
             front: front.unwrap_or_default(),
             extras,
@@ -377,6 +379,21 @@ impl NetworkStep {
             bounds: Bounds::new(vec![Bound::UNKNOWN; self.layout.levels.len()]),
             scope,
         }
+    }
+
+    /// How sure the network is of every joint of a pose, 0 to 1.
+    fn heats(&self, pose: &Pose, evidence: &Responses<'_>) -> Vec<f32> {
+        let level = usize::from(pose.level);
+        let window = evidence.window(level);
+        let heat = |(joint, it): (usize, &skeleton::Joint)| {
+            let at = pose.parts[it.parts[0]];
+            let row = usize::from(at.y).checked_sub(window.top)?;
+            let column = usize::from(at.x).checked_sub(window.left)?;
+            let value = evidence.map(level, joint).get(row * window.cols + column)?;
+            Some(self.settings.maps.heat(*value) as f32)
+        };
+        let joints = PARSE14.joints.iter().enumerate();
+        joints.map(|it| heat(it).unwrap_or(0.0)).collect()
     }
 
     /// In which direction a person faces; nothing of one who is seen head down in a picture that was not turned.

@@ -69,12 +69,6 @@ pub struct SkeletonSettings {
     /// How the views agree on a part. The decision about facing always uses the consensus: a mean
     /// of poses with different limbs is consistent under no assumption about left and right.
     pub consensus: ConsensusSettings,
-    /// Whether fusion solved in space: then a view that it left out has no pose, and a part whose expected error is the diagonal of the
-    /// frame or more was not seen by the view.
-    pub in_space: bool,
-    /// `in_space`: least score of a candidate of a view that fusion left out, for which the view counts as one that sees the person
-    /// elsewhere; with a lower one it sees nobody.
-    pub least_score: f32,
     /// What bodies are like.
     pub body: BodySettings,
     /// Decide which views see the person from behind.
@@ -103,8 +97,6 @@ impl Default for SkeletonSettings {
             error_weight: 1.0,
             combine: Combine::default(),
             consensus: ConsensusSettings::default(),
-            in_space: false,
-            least_score: f32::NEG_INFINITY,
             body: BodySettings::default(),
             facing: true,
             facing_filter: FacingSettings::default(),

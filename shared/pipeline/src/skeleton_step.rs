@@ -14,11 +14,10 @@ use nalgebra::UnitVector3;
 use skeleton::{JointSet, PARSE14};
 
 use crate::bodies::{Bodies, Body, NoJoint};
-use crate::disagreement;
 use crate::fused::Fused;
 use crate::fused_view::{Candidate, Candidates, FusedView, fuse};
 use crate::motion::Motion;
-use crate::people::{Person, people};
+use crate::people::people;
 use crate::skeleton_settings::{Combine, SkeletonSettings};
 use crate::space::{Seen, Space};
 use crate::{AllViewsResult, PairResult, ViewResult};
@@ -42,8 +41,8 @@ pub struct Skeleton {
     pub body: Option<Body>,
     /// The views of the rig; `None` for a view without a result.
     pub views: Vec<Option<FusedView>>,
-    /// The people that the views could mean, the clearest first.
-    pub people: Vec<Person>,
+    /// Number of people that the views could mean.
+    pub n_people: usize,
     /// How many pairs were averaged.
     pub n_pairs: usize,
     /// Energy of the chosen assumption about which views see the person from the same side minus that of
@@ -124,11 +123,11 @@ impl SkeletonStep {
     }
 
     fn settle(&mut self, answers: &[Option<ViewResult>], fused: &Fused<'_>) -> Skeleton {
-        let people = people(&self.space.plans, answers);
+        let n_people = people(&self.space.plans, answers).len();
         let frame = Frame {
             answers,
             fused,
-            is_alone: people.len() < 2,
+            is_alone: n_people < 2,
         };
         let (exchanged, facing_margin, sides) =
             if self.space.settings.facing && self.space.can_exchange() {
@@ -149,12 +148,8 @@ impl SkeletonStep {
         let (at_instant, more_px) = self.at_instant(answers, &views);
         let mut expected_px = self.expected_errors(answers, exchanged, self.space.settings.joints);
         add(&mut expected_px, &more_px, self.space.settings.joints);
-        // The check of the body knows nothing of expected errors, but of what was not seen.
-        let mut of_body_px = if self.space.settings.in_space && self.space.can_exchange() {
-            self.expected_errors(answers, exchanged, &PARSE14)
-        } else {
-            Vec::new()
-        };
+        // The check of the body knows nothing of expected errors.
+        let mut of_body_px = Vec::new();
         add(&mut of_body_px, &more_px, &PARSE14);
         let points = |centres: &[[f64; 2]]| match &self.space.settings.joint_map {
             Some(map) => Cow::from(map.from_parts(centres)),
@@ -163,16 +158,12 @@ impl SkeletonStep {
         let joints = self
             .space
             .triangulate(&at_instant, n_joints, points, &expected_px);
-        let (mut joints, body) = self.as_body(joints, &at_instant, &of_body_px);
-        if self.space.settings.in_space {
-            let of_result = (&views[..], &mut joints[..]);
-            disagreement::measure(&self.space, &mut self.motion, answers, of_result);
-        }
+        let (joints, body) = self.as_body(joints, &at_instant, &of_body_px);
         Skeleton {
             joints,
             body,
             views,
-            people,
+            n_people,
             n_pairs: fused.n_pairs(),
             facing_margin,
             sides,
@@ -180,18 +171,14 @@ impl SkeletonStep {
         }
     }
 
-    /// The poses of the views at the instant of the frame, and what is to be added to the deviations of their parts, pixels. What was
-    /// solved in space is there already.
+    /// The poses of the views at the instant of the frame, and what is to be added to the deviations of their parts, pixels.
     fn at_instant<'a>(
         &mut self,
         answers: &[Option<ViewResult>],
         views: &'a [Option<FusedView>],
     ) -> (Cow<'a, [Option<FusedView>]>, Vec<Vec<f64>>) {
-        let settings = &self.space.settings;
-        if settings.in_space {
-            return (views.into(), Vec::new());
-        }
-        let moved = self.motion.at_instant(answers, views, settings.sigma_cells);
+        let sigma_cells = self.space.settings.sigma_cells;
+        let moved = self.motion.at_instant(answers, views, sigma_cells);
         moved.map_or_else(
             || (views.into(), Vec::new()),
             |it| (it.views.into(), it.more_px),
@@ -303,7 +290,7 @@ impl SkeletonStep {
         mut solved: Vec<Option<FusedView>>,
         start: Vec<Option<FusedView>>,
     ) -> (Vec<Option<FusedView>>, Kept) {
-        if self.space.settings.in_space || start.iter().flatten().count() < 2 {
+        if start.iter().flatten().count() < 2 {
             return (solved, Kept::Solved);
         }
         let agreement = |views: &[Option<FusedView>]| {
@@ -369,7 +356,7 @@ impl SkeletonStep {
                 .collect();
             let (n_pairs, single_score) = (poses.len(), f64::from(best.score));
             if poses.is_empty() {
-                if !frame.is_alone || self.space.settings.in_space {
+                if !frame.is_alone {
                     return None;
                 }
                 poses.push(candidate(single_score, best));

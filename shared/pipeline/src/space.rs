@@ -171,15 +171,7 @@ impl Space {
         let mut observations: Vec<Observation<'_>> = Vec::with_capacity(present.len());
         let triangulate = |point: usize| {
             observations.clear();
-            let is_seen = |view: usize| {
-                let [width, height] = self.plans[view].camera().intrinsics.size.map(f64::from);
-                let far = self.settings.error_weight * width.hypot(height);
-                // Rounded to single precision on its way.
-                let expected = expected_px(view, point).unwrap_or(0.0);
-                !self.settings.in_space || far == 0.0 || expected < 0.999 * far
-            };
-            let observed = present.iter().filter(|it| is_seen(it.0));
-            observations.extend(observed.map(|(view, fused, points)| {
+            observations.extend(present.iter().map(|(view, fused, points)| {
                 Observation {
                     camera: self.plans[*view].camera(),
                     point_px: Point2::from(points[point]),
@@ -188,8 +180,7 @@ impl Space {
                 }
             }));
             let found = geometry::triangulate(&observations, &self.settings.triangulation)?;
-            let views = present.iter().map(|it| it.0).filter(|it| is_seen(*it));
-            Ok(by_view(found, views))
+            Ok(by_view(found, present.iter().map(|it| it.0)))
         };
         (0..n_points).map(triangulate).collect()
     }

@@ -1,353 +1,356 @@
-//! The fusion step over the maps of networks: one person in space, over the evidence of all views in place.
+//! The step in space: where the joints of a person are, over the maps of networks of all views in place.
 
 use std::sync::Arc;
 
-use fmp::{Placement, Pose, Responses};
+use fmp::{Pose, Responses};
+use geometry::Triangulated;
 use multiview::{
-    AllViewsEstimate, FrontEvidence, SeenPerson, SolvedPerson, SpaceSettings, SpaceView, ViewPlan,
-    same_person, solve_person,
+    FrontEvidence, Sides, SidesFilter, SidesSettings, SolvedPerson, SpaceSettings, SpaceView,
+    ViewPlan, anatomical_evidence, front, front_log_ratio_of, solve_person,
 };
-use nalgebra::{Point2, Point3};
-use posenetwork::springs::joint_of;
-use posenetwork::{MapSettings, expected_error};
-use skeleton::{N_PARTS, PARENT, PARSE14};
+use nalgebra::{Point2, UnitVector3};
+use posenetwork::MapSettings;
+use skeleton::{JointSet, PARSE14, SIDES};
 
-use crate::following::Others;
-use crate::fuse_step::{AllViewsHypothesis, AllViewsResult};
+use crate::bodies::{Bodies, Body, NoJoint};
+use crate::disagreement::{self, FoundByViews};
+use crate::fused_view::FusedView;
 use crate::motion::Motion;
-use crate::network_step::cell_at;
 use crate::person_evidence::PersonEvidence;
+use crate::placed::{N, PartView, Places, joints_at, of_set, shown_in};
+use crate::skeleton_settings::BodySettings;
+use crate::skeleton_step::{Kept, Skeleton};
 use crate::space::trunk_upward;
 use crate::view_result::ViewResult;
+use crate::who::FramePeople;
 
-/// Number of joints.
-const N: usize = PARSE14.joints.len();
 /// Least number of joints that two views see well of a person: half of it is often hidden. Of what was seen in six empty rooms the
 /// seventh best joint had a heat of 0.41 in two views at most, of people who stood, sat or ran before three cameras or four 0.58 at least.
 const WELL_SEEN: usize = 7;
 /// Least number of joints that a view sees of a person in which it has a part.
 const SEEN: usize = 3;
-/// The person of a frame in space.
+
+/// Settings of the step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SpaceResult {
-    /// The poses of the views that show the person: where the solution is projected.
-    pub views: AllViewsResult,
-    /// Expected error of every part, pixels of the frame; of the views of the result, in their order.
-    pub sigma_px: Vec<Vec<f32>>,
+pub struct SpaceStepSettings {
+    /// The energy in space, and its solution.
+    pub space: SpaceSettings,
+    /// How the maps became evidence.
+    pub maps: MapSettings,
+    /// Heat that half of a person's joints have in two views each, 0 to 1.
+    pub least_heat: f64,
+    /// Least score of a candidate of a view that has no part in a solution, for which the view counts as one that sees the person
+    /// elsewhere.
+    pub least_score: f32,
+    /// Joints of the result.
+    pub joints: &'static JointSet,
+    /// Knowledge about bodies.
+    pub body: BodySettings,
+    /// How left and right of the whole body are decided, where those of the views follow the picture; `None` where the views name the
+    /// sides of the body.
+    pub sides: Option<SidesSettings>,
 }
 
-/// The fusion step in space, for a rig whose views have the maps of networks.
+impl Default for SpaceStepSettings {
+    fn default() -> Self {
+        Self {
+            space: SpaceSettings::default(),
+            maps: MapSettings::default(),
+            least_heat: 0.4,
+            least_score: f32::NEG_INFINITY,
+            joints: &PARSE14,
+            body: BodySettings::default(),
+            sides: None,
+        }
+    }
+}
+
+/// The step in space, for a rig whose views have the maps of networks; keeps sides, bone lengths and motion of the frames before.
 #[derive(Debug)]
 pub struct SpaceStep {
     plans: Vec<Arc<ViewPlan>>,
-    settings: SpaceSettings,
-    maps: MapSettings,
-    least_heat: f64,
-    between: Between,
+    up_in_world: Option<UnitVector3<f64>>,
+    settings: SpaceStepSettings,
+    bodies: Bodies,
+    sides: SidesFilter,
+    /// Motion of the candidates in the pictures.
+    seen: Motion,
+    /// Motion of the solution in the pictures.
+    solved: Motion,
+}
+
+/// A person in the views of a frame.
+struct Shown<'a> {
+    view: usize,
+    front: FrontEvidence,
+    evidence: PersonEvidence<'a>,
+}
+
+/// A solution with its sides.
+struct Solution<'a> {
+    places: Places,
+    energy: f64,
+    views: Vec<PartView<'a>>,
+    sides: Option<Sides>,
 }
 
 impl SpaceStep {
     /// Prepares the step.
     ///
     /// * `plans`: the views of the rig, in the rig's order, with a tree of [`posenetwork::springs`].
-    /// * `maps`: how the maps became evidence.
-    /// * `least_heat`: that half of a person's joints have in two views each, 0 to 1.
     pub fn new(
         plans: Vec<Arc<ViewPlan>>,
-        settings: SpaceSettings,
-        maps: MapSettings,
-        least_heat: f64,
+        up_in_world: Option<UnitVector3<f64>>,
+        settings: SpaceStepSettings,
     ) -> Self {
         Self {
             plans,
+            up_in_world,
             settings,
-            maps,
-            least_heat,
-            between: between(),
+            bodies: Bodies::default(),
+            sides: SidesFilter::default(),
+            seen: Motion::default(),
+            solved: Motion::default(),
         }
     }
 
-    /// Solves a frame.
+    /// Begins a frame whose pictures may have been taken at other times than its instant ([`ViewResult::skew_s`]): what the views
+    /// show is then moved there. Without it, or with all pictures of the instant, nothing is moved.
     ///
-    /// * `answers`, `evidence`: of the views that have both.
-    /// * `others`: candidates that are somebody else ([`Following::others`](crate::Following::others)).
-    /// * `motion`: of what the views found, after [`Motion::begin`]; brings pictures to the instant of the frame.
-    /// * Returns `None` if fewer than two views show the person: what networks see in an empty room is nowhere the same in two.
+    /// * `instant_s`: of the frame, seconds; `None` where the rate of the frames is not known.
+    pub fn begin(&mut self, instant_s: Option<f64>) {
+        self.seen.begin(instant_s);
+        self.solved.begin(instant_s);
+    }
+
+    /// Solves for the first person of a frame.
+    ///
+    /// * `answers`, `evidence`: by view; a view without either has no part.
+    /// * Returns a skeleton without joints if fewer than two views show the person: what networks see in an empty room is nowhere the
+    ///   same in two.
     pub fn run(
-        &self,
+        &mut self,
         answers: &[Option<ViewResult>],
         evidence: &[Option<Responses<'_>>],
-        others: &Others,
-        motion: &mut Motion,
-    ) -> Option<SpaceResult> {
-        let floor = self.maps.floor();
-        let chosen = self.candidates(answers, evidence, others);
-        let mut views: Vec<(usize, usize, PersonEvidence<'_>)> = Vec::new();
-        for (view, candidate) in chosen.into_iter().enumerate() {
-            let (Some(candidate), Some(answer), Some(responses)) =
-                (candidate, &answers[view], &evidence[view])
+        people: &FramePeople,
+    ) -> Skeleton {
+        let candidates = people.people.first().map(|person| &person.candidates[..]);
+        let shown = self.shown(answers, evidence, candidates.unwrap_or_default());
+        let plans = self.plans.clone();
+        let solution = self.solve(&plans, &shown);
+        let solution = solution.as_ref();
+        let joints = match solution {
+            Some(it) => joints_at(&it.places, &it.views, &self.settings.maps),
+            None => joints_at(&[None; N], &[], &self.settings.maps),
+        };
+        let of_set = of_set(self.settings.joints, &joints);
+        let settings = self.settings.body;
+        let settled = self
+            .bodies
+            .settle(&settings, &joints, (self.settings.joints, of_set));
+        let (mut settled, body): (Vec<Result<Triangulated, NoJoint>>, Option<Body>) = settled;
+        let takes_part =
+            |view: usize| solution.is_some_and(|it| it.views.iter().any(|part| part.view == view));
+        let takes_part: Vec<bool> = (0..self.plans.len()).map(takes_part).collect();
+        let found_by = FoundByViews {
+            plans: &self.plans,
+            answers,
+            takes_part: &takes_part,
+            least_score: self.settings.least_score,
+            joints: self.settings.joints,
+        };
+        disagreement::measure(&found_by, &mut self.solved, &mut settled);
+        Skeleton {
+            joints: settled,
+            body,
+            views: self.views(answers, solution),
+            n_people: people.n_seen,
+            n_pairs: pairs_of(takes_part.iter().filter(|takes_part| **takes_part).count()),
+            facing_margin: f64::INFINITY,
+            sides: solution.and_then(|it| it.sides),
+            kept: Kept::Solved,
+        }
+    }
+
+    /// The views that show the person by a candidate, at the instant of the frame.
+    fn shown<'a>(
+        &mut self,
+        answers: &[Option<ViewResult>],
+        evidence: &[Option<Responses<'a>>],
+        candidates: &[Option<usize>],
+    ) -> Vec<Shown<'a>> {
+        let floor = self.settings.maps.floor();
+        let mut shown = Vec::new();
+        for (view, candidate) in candidates.iter().enumerate() {
+            let (Some(candidate), Some(Some(answer)), Some(Some(responses))) =
+                (*candidate, answers.get(view), evidence.get(view))
             else {
                 continue;
             };
-            let pose = &answer.candidates[candidate];
-            let mut it = PersonEvidence::new(&self.plans[view], responses, pose, floor);
-            let found = self.joints(view, pose);
-            if let Some(by) = motion.since_instant(view, [answer.skew_s; 2], found) {
-                it.move_to_instant(by);
+            let Some(pose) = answer.candidates.get(candidate) else {
+                continue;
+            };
+            if !answer.is_within(responses) {
+                continue;
             }
-            views.push((view, candidate, it));
-        }
-        let each: Vec<SpaceView<'_>> = views
-            .iter()
-            .map(|(view, candidate, evidence)| SpaceView {
-                camera: self.plans[*view].camera(),
+            let mut evidence = PersonEvidence::new(&self.plans[view], responses, pose, floor);
+            let found = self.joints(view, pose);
+            if let Some(by) = self.seen.since_instant(view, [answer.skew_s; 2], found) {
+                evidence.move_to_instant(by);
+            }
+            shown.push(Shown {
+                view,
+                front: self.front(view, candidate, answer),
                 evidence,
-                exchanged: [false; 2],
-                front: self.front(*view, *candidate, answers),
+            });
+        }
+        shown
+    }
+
+    /// Solves for the person; `None` if fewer than two views show the person well.
+    fn solve<'a>(
+        &mut self,
+        plans: &'a [Arc<ViewPlan>],
+        shown: &'a [Shown<'_>],
+    ) -> Option<Solution<'a>> {
+        let views = shown.iter().map(|it| SpaceView {
+            camera: plans[it.view].camera(),
+            evidence: &it.evidence,
+            exchanged: [false; 2],
+            front: it.front,
+        });
+        let views: Vec<SpaceView<'a>> = views.collect();
+        if views.len() < 2 {
+            return None;
+        }
+        let found = solve_person(&views, &self.settings.space)?;
+        let used = found.views.iter().zip(&views).zip(shown);
+        let used = used.filter_map(|((exchanged, view), it)| {
+            Some(PartView {
+                view: it.view,
+                shown: SpaceView {
+                    exchanged: (*exchanged)?,
+                    ..*view
+                },
+                window_px: it.evidence.window_px,
             })
-            .collect();
-        if each.len() < 2 {
+        });
+        let mut used: Vec<PartView<'a>> = used.collect();
+        if !self.is_well_seen(&found, &used) {
             return None;
         }
-        let found = solve_person(&each, &self.settings)?;
-        if !self.is_well_seen(&found, &each) {
+        used.retain(|part| self.shows(&found, part));
+        if used.len() < 2 {
             return None;
         }
-        self.result(&found, &views, &each)
+        Some(self.with_sides(&found, used))
+    }
+
+    /// Decides left and right of the whole body where those of the views follow the picture.
+    fn with_sides<'a>(
+        &mut self,
+        found: &SolvedPerson,
+        mut views: Vec<PartView<'a>>,
+    ) -> Solution<'a> {
+        let mut places = found.pose.joints;
+        let sides = self.settings.sides.as_ref().map(|settings| {
+            let said = views.iter().map(|it| (it.shown.camera, it.shown.front));
+            let said: Vec<_> = said.collect();
+            let evidence = settings.anatomy_weight * anatomical_evidence(&places, self.up_in_world)
+                + settings.front_weight * front_log_ratio_of(&places, &said);
+            self.sides.decide(settings, front(&places), evidence)
+        });
+        if sides.is_some_and(|sides| sides.exchange) {
+            for [right, left] in SIDES {
+                places.swap(right, left);
+            }
+            for part in &mut views {
+                part.shown.exchanged = part.shown.exchanged.map(|exchanged| !exchanged);
+            }
+        }
+        Solution {
+            places,
+            energy: found.pose.energy,
+            views,
+            sides,
+        }
     }
 
     /// Whether enough joints of a solution are seen well by two views.
-    fn is_well_seen(&self, found: &SolvedPerson, each: &[SpaceView<'_>]) -> bool {
-        let used = found.views.iter().zip(each).filter_map(|(used, view)| {
-            let exchanged = (*used)?;
-            Some(SpaceView { exchanged, ..*view })
-        });
-        let used: Vec<SpaceView<'_>> = used.collect();
-        let is_seen = |joint: usize| {
-            let heats = used.iter().map(|it| self.heat_of(joint, found, it));
-            heats.filter(|it| *it >= self.least_heat).count() >= 2
+    fn is_well_seen(&self, found: &SolvedPerson, views: &[PartView<'_>]) -> bool {
+        let is_seen = |joint: &usize| {
+            let heats = views.iter().map(|view| self.heat_of(*joint, found, view));
+            let well = heats.filter(|heat| *heat >= self.settings.least_heat);
+            well.count() >= 2
         };
-        (0..N).filter(|it| is_seen(*it)).count() >= WELL_SEEN
+        (0..N).filter(is_seen).count() >= WELL_SEEN
     }
 
     /// The heat of a joint of a solution in a view, 0 to 1.
-    fn heat_of(&self, joint: usize, found: &SolvedPerson, view: &SpaceView<'_>) -> f64 {
+    fn heat_of(&self, joint: usize, found: &SolvedPerson, view: &PartView<'_>) -> f64 {
         let at = found.pose.joints[joint];
-        at.map_or(0.0, |at| self.maps.heat(view.evidence_at(joint, &at)))
+        at.map_or(0.0, |at| {
+            self.settings.maps.heat(view.shown.evidence_at(joint, &at))
+        })
     }
 
     /// Whether a view shows the person of a solution at all. One that looks at something else had nothing to say of it, and its pixels
     /// are not those of the person.
-    fn shows(&self, found: &SolvedPerson, view: &SpaceView<'_>) -> bool {
-        let heats = (0..N).map(|it| self.heat_of(it, found, view));
-        heats.filter(|it| *it >= self.least_heat / 2.0).count() >= SEEN
+    fn shows(&self, found: &SolvedPerson, view: &PartView<'_>) -> bool {
+        let heats = (0..N).map(|joint| self.heat_of(joint, found, view));
+        let seen = heats.filter(|heat| *heat >= self.settings.least_heat / 2.0);
+        seen.count() >= SEEN
     }
 
     /// What a view says of the direction in which the person of a candidate faces.
-    fn front(
-        &self,
-        view: usize,
-        candidate: usize,
-        answers: &[Option<ViewResult>],
-    ) -> FrontEvidence {
-        let told = answers[view].as_ref().and_then(|answer| {
-            let centres = self.plans[view].centres(answer.candidates.get(candidate)?);
+    fn front(&self, view: usize, candidate: usize, answer: &ViewResult) -> FrontEvidence {
+        let told = answer.front.get(candidate).map(|told| {
+            let centres = self.plans[view].centres(&answer.candidates[candidate]);
             // Who stands on the hands was upright for the network. Of who lies it tells nothing of up and down in the picture.
             let weight = trunk_upward(&centres).powi(2) as f32;
-            let told = answer.front.get(candidate)?.map(|it| weight * it);
-            told.iter().all(|it| it.is_finite()).then_some(told)
+            told.map(|told| weight * told)
         });
+        let told = told.filter(|told| told.iter().all(|number| number.is_finite()));
         told.unwrap_or_default()
     }
 
     /// Where a pose has the joints, by what the view calls them.
     fn joints(&self, view: usize, pose: &Pose) -> Vec<Option<Point2<f64>>> {
-        let centre = |joint: usize| self.plans[view].centre(pose, PARSE14.joints[joint].parts[0]);
-        (0..N)
-            .map(|joint| Some(Point2::from(centre(joint))))
-            .collect()
+        let joints = PARSE14.joints.iter();
+        let centre = |part: usize| Point2::from(self.plans[view].centre(pose, part));
+        joints.map(|joint| Some(centre(joint.parts[0]))).collect()
     }
 
-    /// The candidate of every view that is the same person: the one who is followed where the view sees it, else among those who are
-    /// nobody else.
-    fn candidates(
+    /// Where the views that have a part in a solution show it.
+    fn views(
         &self,
         answers: &[Option<ViewResult>],
-        evidence: &[Option<Responses<'_>>],
-        others: &Others,
-    ) -> Vec<Option<usize>> {
-        let mut indices: Vec<Vec<usize>> = vec![Vec::new(); answers.len()];
-        let mut people: Vec<Vec<SeenPerson>> = vec![Vec::new(); answers.len()];
-        for (view, (answer, evidence)) in answers.iter().zip(evidence).enumerate() {
-            let (Some(answer), Some(evidence)) = (answer, evidence) else {
-                continue;
-            };
-            if others.only(view) || !answer.is_within(evidence) {
-                continue;
-            }
-            for (index, pose) in answer.candidates.iter().enumerate() {
-                let is_own = others.own(view).is_none_or(|own| own == index);
-                if is_own && others.of_view(view) >> index & 1 == 0 {
-                    indices[view].push(index);
-                    people[view].push(self.seen(view, pose, evidence));
-                }
-            }
-        }
-        let views = self.plans.iter().zip(&people);
-        let views: Vec<_> = views.map(|(plan, it)| (plan.camera(), &it[..])).collect();
-        let chosen = same_person(&views, self.settings.as_seen)
-            .into_iter()
-            .zip(indices);
-        chosen.map(|(it, of)| of.get(it?).copied()).collect()
-    }
-
-    /// The person of a candidate.
-    fn seen(&self, view: usize, pose: &Pose, evidence: &Responses<'_>) -> SeenPerson {
-        let plan = &self.plans[view];
-        let level = usize::from(pose.level);
-        let window = evidence.window(level);
-        let joint = |joint: usize| {
-            let part = PARSE14.joints[joint].parts[0];
-            let at = pose.parts[part];
-            let row = usize::from(at.y).checked_sub(window.top)?;
-            let column = usize::from(at.x).checked_sub(window.left)?;
-            let value = evidence.map(level, joint).get(row * window.cols + column)?;
-            Some((plan.centre(pose, part), self.maps.heat(*value)))
+        solution: Option<&Solution<'_>>,
+    ) -> Vec<Option<FusedView>> {
+        let mut views = vec![None; self.plans.len()];
+        let Some(solution) = solution else {
+            return views;
         };
-        let [_, height] = plan.layout().image_size;
-        SeenPerson {
-            joints: (0..N).map(joint).collect(),
-            height: plan.size(pose) / height as f64,
-        }
-    }
-
-    /// The solution as poses of the views.
-    fn result(
-        &self,
-        found: &SolvedPerson,
-        views: &[(usize, usize, PersonEvidence<'_>)],
-        each: &[SpaceView<'_>],
-    ) -> Option<SpaceResult> {
-        let mut result = SpaceResult {
-            views: AllViewsResult {
-                views: Vec::new(),
-                hypotheses: Vec::new(),
-            },
-            sigma_px: Vec::new(),
-        };
-        let mut hypothesis = AllViewsHypothesis {
-            exchanged: Vec::new(),
-            candidates: Vec::new(),
-            estimate: AllViewsEstimate {
-                energy: found.pose.energy,
-                iterations: Vec::new(),
-                converged: true,
-                active: 1.0,
-                poses: Vec::new(),
-            },
-        };
-        for ((used, (view, candidate, evidence)), space) in found.views.iter().zip(views).zip(each)
-        {
-            let Some(exchanged) = used else {
-                continue;
-            };
-            let space = SpaceView {
-                exchanged: *exchanged,
-                ..*space
-            };
-            if !self.shows(found, &space) {
-                continue;
-            }
-            let (pose, sigma_px) = self.projected(found, *view, evidence, &space);
-            result.views.views.push(*view);
-            result.sigma_px.push(sigma_px);
-            hypothesis.exchanged.push(false);
-            hypothesis.candidates.push(*candidate);
-            hypothesis.estimate.poses.push(pose);
-        }
-        result.views.hypotheses.push(hypothesis);
-        (result.views.views.len() >= 2).then_some(result)
-    }
-
-    /// Where a view shows the parts, on the finest level, and how far off each may be.
-    fn projected(
-        &self,
-        found: &SolvedPerson,
-        view: usize,
-        evidence: &PersonEvidence<'_>,
-        space: &SpaceView<'_>,
-    ) -> (Pose, Vec<f32>) {
-        let plan = &self.plans[view];
-        let finest = &plan.layout().levels[0];
-        let [width, height] = plan.layout().image_size.map(|it| it as f64);
-        let far = width.hypot(height);
-        let mut parts = Vec::with_capacity(N_PARTS);
-        let mut sigma_px = Vec::with_capacity(N_PARTS);
-        for (joints, weight) in &self.between {
-            let ends = joints.map(|it| found.pose.joints[it]);
-            let place = |[a, b]: [Point3<f64>; 2]| a + (b - a) * *weight;
-            let seen = match ends {
-                [Some(a), Some(b)] => plan.camera().project(&place([a, b])),
-                _ => None,
-            };
-            let at = seen.map_or([width / 2.0, height / 2.0], |it| [it.x, it.y]);
-            let cell = cell_at(plan.layout(), 0, at);
-            let inside = |axis: usize, n: usize| {
-                cell[axis].round() >= 0.0 && cell[axis].round() <= (n - 1) as f64
-            };
-            let is_there = seen.is_some() && inside(0, finest.cols) && inside(1, finest.rows);
-            let held = |axis: usize, n: usize| cell[axis].round().clamp(0.0, (n - 1) as f64) as u16;
-            parts.push(Placement {
-                x: held(0, finest.cols),
-                y: held(1, finest.rows),
-                mixture: 0,
+        for part in &solution.views {
+            let best = answers[part.view].as_ref();
+            let best = best.and_then(|answer| answer.candidates.first());
+            let score = best.map_or(0.0, |pose| f64::from(pose.score));
+            let exchanged = solution.sides.is_some_and(|sides| sides.exchange);
+            views[part.view] = Some(FusedView {
+                exchanged,
+                ..shown_in(
+                    &self.plans[part.view],
+                    &solution.places,
+                    solution.energy,
+                    score,
+                )
             });
-            let of_joint = |it: usize| {
-                let heat = ends[0]
-                    .filter(|_| is_there)
-                    .and(found.pose.joints[it])
-                    .map_or(0.0, |at| self.maps.heat(space.evidence_at(it, &at)));
-                expected_error(heat) * evidence.window_px
-            };
-            let sigma = (1.0 - weight) * of_joint(joints[0]) + weight * of_joint(joints[1]);
-            sigma_px.push(if is_there { sigma.min(far) } else { far } as f32);
         }
-        let pose = Pose {
-            score: found.pose.energy as f32,
-            level: 0,
-            parts,
-        };
-        (pose, sigma_px)
+        views
     }
 }
 
-/// Between which joints every part lies, and how far along.
-type Between = [([usize; 2], f64); N_PARTS];
-
-fn between() -> Between {
-    core::array::from_fn(|part| {
-        if let Some(joint) = joint_of(part) {
-            return ([joint, joint], 0.0);
-        }
-        // Up to the next joint, and down to the next.
-        let (mut up, mut n_up) = (part, 0);
-        let above = loop {
-            if let Some(joint) = joint_of(up) {
-                break joint;
-            }
-            let Some(parent) = PARENT[up] else { break 0 };
-            (up, n_up) = (parent, n_up + 1);
-        };
-        let (mut down, mut n_down) = (part, 0);
-        let below = loop {
-            if let Some(joint) = joint_of(down) {
-                break joint;
-            }
-            let child = (0..N_PARTS).find(|it| PARENT[*it] == Some(down));
-            let Some(child) = child else { break above };
-            (down, n_down) = (child, n_down + 1);
-        };
-        let n = f64::from(n_up + n_down);
-        ([above, below], f64::from(n_up) / n.max(1.0))
-    })
+/// Number of pairs of views.
+fn pairs_of(n_views: usize) -> usize {
+    n_views * n_views.saturating_sub(1) / 2
 }

@@ -72,6 +72,8 @@ pub struct ViewEstimate {
     /// What the picture says about the direction in which the person of every candidate faces; empty: nothing was
     /// asked.
     pub front: Vec<FrontEvidence>,
+    /// How sure the network is of every joint of every candidate, 0 to 1; empty with the filters.
+    pub heats: Vec<Vec<f32>>,
     /// Keypoints that no joint follows from, of one candidate after the other: of each as many as were asked for.
     pub extras: Vec<ExtraKeypoint>,
     /// Levels whose responses are offered as evidence, ascending.
@@ -146,6 +148,7 @@ impl ViewStep {
         let levels = self.settings.window.levels(scope.levels(), &candidates);
         ViewEstimate {
             front: self.front(image, &candidates),
+            heats: Vec::new(),
             extras: Vec::new(),
             candidates,
             local: local.unwrap_or_default(),

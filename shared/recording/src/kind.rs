@@ -1,8 +1,8 @@
 //! The message types of topics: their sizes and schemas.
 
 use messages::{
-    EvidenceHeader, FrameHeader, Health, PairPose, PictureHeader, Pose3d, ViewPose, ViewQuality,
-    topic,
+    EvidenceHeader, FrameHeader, Health, PairPose, People, PictureHeader, Pose3d, ViewPose,
+    ViewQuality, topic,
 };
 
 /// A type of message.
@@ -18,6 +18,8 @@ pub enum Kind {
     ViewQuality,
     /// Results of a fusion worker.
     PairPose,
+    /// Who is in a frame.
+    People,
     /// The result.
     Pose3d,
     /// Heartbeats of a process.
@@ -27,24 +29,26 @@ pub enum Kind {
 }
 
 /// The types that a schema may refer to.
-const PARTS: [(&str, &str); 7] = [
+const PARTS: [(&str, &str); 8] = [
     ("Stamp", include_str!("../msg/Stamp.msg")),
     ("Timing", include_str!("../msg/Timing.msg")),
     ("Pose", include_str!("../msg/Pose.msg")),
     ("Local", include_str!("../msg/Local.msg")),
     ("PairHypothesis", include_str!("../msg/PairHypothesis.msg")),
+    ("Person", include_str!("../msg/Person.msg")),
     ("Joint3d", include_str!("../msg/Joint3d.msg")),
     ("FusedView", include_str!("../msg/FusedView.msg")),
 ];
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Frame,
         Self::Evidence,
         Self::ViewPose,
         Self::ViewQuality,
         Self::PairPose,
+        Self::People,
         Self::Pose3d,
         Self::Health,
         Self::Picture,
@@ -54,7 +58,7 @@ impl Kind {
     pub fn of_topic(name: &str) -> Option<Self> {
         let family = |name: &str| name.rsplit_once('/').map(|it| it.0.to_owned());
         Self::ALL.into_iter().find(|kind| match kind {
-            Self::Pose3d => name == kind.example(),
+            Self::People | Self::Pose3d => name == kind.example(),
             _ => family(name).is_some_and(|it| Some(it) == family(&kind.example())),
         })
     }
@@ -73,6 +77,7 @@ impl Kind {
             Self::ViewPose => topic::view_pose(0),
             Self::ViewQuality => topic::view_quality(0),
             Self::PairPose => topic::pair_pose(0),
+            Self::People => topic::people(),
             Self::Pose3d => topic::pose3d(),
             Self::Health => topic::health("any"),
             Self::Picture => topic::picture(0),
@@ -87,6 +92,7 @@ impl Kind {
             Self::ViewPose => size_of::<ViewPose>(),
             Self::ViewQuality => size_of::<ViewQuality>(),
             Self::PairPose => size_of::<PairPose>(),
+            Self::People => size_of::<People>(),
             Self::Pose3d => size_of::<Pose3d>(),
             Self::Health => size_of::<Health>(),
             Self::Picture => size_of::<PictureHeader>(),
@@ -110,6 +116,7 @@ impl Kind {
             Self::ViewPose => Some(core::mem::offset_of!(ViewPose, status)),
             Self::ViewQuality => Some(core::mem::offset_of!(ViewQuality, status)),
             Self::PairPose => Some(core::mem::offset_of!(PairPose, status)),
+            Self::People => Some(core::mem::offset_of!(People, status)),
             Self::Pose3d => Some(core::mem::offset_of!(Pose3d, status)),
             Self::Picture => Some(core::mem::offset_of!(PictureHeader, status)),
             Self::Health => None,
@@ -124,6 +131,7 @@ impl Kind {
             Self::ViewPose => "parallax/msg/ViewPose",
             Self::ViewQuality => "parallax/msg/ViewQuality",
             Self::PairPose => "parallax/msg/PairPose",
+            Self::People => "parallax/msg/People",
             Self::Pose3d => "parallax/msg/Pose3d",
             Self::Health => "parallax/msg/Health",
             Self::Picture => "parallax/msg/Picture",
@@ -137,6 +145,7 @@ impl Kind {
             Self::ViewPose => include_str!("../msg/ViewPose.msg"),
             Self::ViewQuality => include_str!("../msg/ViewQuality.msg"),
             Self::PairPose => include_str!("../msg/PairPose.msg"),
+            Self::People => include_str!("../msg/People.msg"),
             Self::Pose3d => include_str!("../msg/Pose3d.msg"),
             Self::Health => include_str!("../msg/Health.msg"),
             Self::Picture => include_str!("../msg/Picture.msg"),
@@ -230,7 +239,7 @@ mod tests {
     fn a_topic_of_another_version_is_told_from_a_foreign_one() {
         assert!(Kind::ViewPose.is_of_another_version("view-pose/v5/0"));
         assert!(Kind::Pose3d.is_of_another_version("pose3d/v2"));
-        for other in ["view-pose/v6/0", "pose3d/v2", "metrics/v0/a", "camera"] {
+        for other in ["view-pose/v7/0", "pose3d/v2", "metrics/v0/a", "camera"] {
             assert!(!Kind::ViewPose.is_of_another_version(other), "{other}");
         }
     }

@@ -150,7 +150,7 @@ impl Envelope {
 mod tests {
     use bytemuck::{Zeroable as _, cast_slice};
     use messages::{
-        EvidenceHeader, FrameHeader, PairPose, PictureHeader, Pose3d, ViewPose, ViewQuality,
+        EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Pose3d, ViewPose, ViewQuality,
     };
     use proptest::prelude::*;
 
@@ -178,7 +178,8 @@ mod tests {
         let (mut frame, mut evidence) = (FrameHeader::default(), EvidenceHeader::default());
         let (mut pose, mut quality) = (ViewPose::default(), ViewQuality::default());
         let (mut pair, mut pose3d) = (PairPose::default(), Pose3d::zeroed());
-        let mut picture = PictureHeader::default();
+        let (mut people, mut picture) = (People::default(), PictureHeader::default());
+        (people.stamp, people.timing, people.status) = (it.stamp, it.timing, it.status);
         (picture.stamp, picture.timing, picture.status) = (it.stamp, it.timing, it.status);
         (frame.stamp, frame.timing, frame.status) = (it.stamp, it.timing, it.status);
         (evidence.stamp, evidence.timing, evidence.status) = (it.stamp, it.timing, it.status);
@@ -192,6 +193,7 @@ mod tests {
             (Kind::ViewPose, bytes_of(&pose)),
             (Kind::ViewQuality, bytes_of(&quality)),
             (Kind::PairPose, bytes_of(&pair)),
+            (Kind::People, bytes_of(&people)),
             (Kind::Pose3d, bytes_of(&pose3d)),
             (Kind::Picture, bytes_of(&picture)),
         ];

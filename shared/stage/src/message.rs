@@ -1,7 +1,8 @@
 //! The fields that all messages share.
 
 use messages::{
-    EvidenceHeader, FrameHeader, PairPose, Pose3d, Stamp, Status, Timing, ViewPose, ViewQuality,
+    EvidenceHeader, FrameHeader, PairPose, People, Pose3d, Stamp, Status, Timing, ViewPose,
+    ViewQuality,
 };
 
 /// A message with a stamp, a timing and a status.
@@ -55,6 +56,7 @@ stamped! {
     ViewPose => "view-pose", Self::default();
     ViewQuality => "view-quality", Self::default();
     PairPose => "pair-pose", Self::default();
+    People => "people", Self::default();
     Pose3d => "pose3d", wire::end_of_results(0);
 }
 

@@ -7,7 +7,7 @@ use std::rc::Rc;
 
 use crate::join::Joined;
 use failure::{Failure, now_nanos};
-use messages::{EvidenceHeader, FrameHeader, PairPose, Stamp, topic};
+use messages::{EvidenceHeader, FrameHeader, PairPose, People, Stamp, topic};
 use runtime::{
     Delivery, Element, Message, Service, SlicePublisher, Subscriber, WaitError, Waiter, Woken,
 };
@@ -144,6 +144,20 @@ impl<'a, T: 'a> Stage<'a, T> {
             self.add(&topic::pair_pose(worker), sender, slots, decode.clone())?;
         }
         Ok(base)
+    }
+
+    /// Adds the topic of who is in a frame; every frame waits for it. Returns its slot.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports.
+    pub fn people_input(
+        &mut self,
+        decode: impl FnMut(&People) -> Result<T, WireError> + 'a,
+    ) -> Result<usize, Failure> {
+        let slot = self.slots(1);
+        self.add(&topic::people(), Sender::All, Slots::one(slot), decode)?;
+        Ok(slot)
     }
 
     fn slots(&mut self, n: usize) -> usize {

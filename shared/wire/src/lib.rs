@@ -9,6 +9,7 @@ mod all_views;
 mod error;
 mod evidence;
 mod pair;
+mod people;
 mod pose;
 mod quality;
 mod skeleton;
@@ -18,10 +19,11 @@ pub use all_views::{all_views_from_pairs, all_views_to_messages, check_all_views
 pub use error::WireError;
 pub use evidence::{EvidenceView, evidence_from_message, evidence_to_message};
 pub use pair::{check_views, pair_from_message, pair_to_message};
+pub use people::{people_from_message, people_to_message};
 pub use pose::{
     candidates_from_message, candidates_to_message, extras_from_message, extras_to_message,
-    front_from_message, front_to_message, local_from_message, local_to_message, pose_from_message,
-    pose_to_message, skew_from_message,
+    front_from_message, front_to_message, heats_from_message, heats_to_message, local_from_message,
+    local_to_message, pose_from_message, pose_to_message, seen_from_message, skew_from_message,
 };
 pub use quality::{
     sigma_from_message, sigma_from_pair, sigma_to_message, sigma_to_pair, tau_from_message,

@@ -25,7 +25,7 @@ pub fn skeleton_to_message(skeleton: &Skeleton, views_present: u32) -> Result<Po
     message.n_joints = n_joints as u32;
     message.n_views = n_views as u32;
     message.n_pairs = skeleton.n_pairs as u32;
-    message.n_people = skeleton.people.len() as u32;
+    message.n_people = skeleton.n_people as u32;
     message.facing_margin = skeleton.facing_margin;
     (message.sides, message.sides_margin) = match skeleton.sides {
         None => (Sides::AS_SEEN, 0.0),
@@ -221,7 +221,7 @@ mod tests {
             single_score: -0.5,
         };
         Skeleton {
-            people: Vec::new(),
+            n_people: 0,
             joints: vec![
                 Ok(found),
                 Err(NoJoint::Triangulation(

@@ -416,6 +416,7 @@ pub fn wire_fusion(input: &[u8]) {
     let changed = ViewResult {
         candidates,
         front: front.unwrap_or_default(),
+        heats: Vec::new(),
         sigma_px: sigma.ok().flatten(),
         tau_px: None,
         skew_s: 0.0,
@@ -424,6 +425,7 @@ pub fn wire_fusion(input: &[u8]) {
     let whole = ViewResult {
         candidates: vec![pose()],
         front: vec![[0.5, -2.0]],
+        heats: Vec::new(),
         sigma_px: expected.ok().flatten().map(|(_, sigma)| sigma),
         tau_px: None,
         skew_s: 0.0,

@@ -28,7 +28,7 @@ pub fn network_step(resolved: &Resolved, view: usize) -> Result<Option<NetworkSt
 }
 
 /// The single-view step: by the network of the deployment, or by the filters.
-pub(super) fn of_view(
+pub(crate) fn of_view(
     resolved: &Resolved,
     prepared: Prepared,
     view: usize,
@@ -57,9 +57,11 @@ pub(super) fn of_view(
         let springs = TurnedSprings::new(&prepared.model);
         return Ok(pose::Step::Keypoints(Box::new(pose::Keypoints {
             step: NetworkStep::new(eyes, springs, layout, settings).with_extras(extras),
-            source,
-            timeline: resolved.footage[view].timeline,
-            frame_from_source,
+            source: pose::Source {
+                files: source,
+                timeline: resolved.footage[view].timeline,
+                frame_from_source,
+            },
         })));
     }
     let network = inputs::pose_network(deployment, view)?

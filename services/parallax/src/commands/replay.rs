@@ -211,7 +211,12 @@ fn check(
     let n_pairs = resolved.deployment.cameras.len().saturating_sub(1);
     let needs_pixels =
         from == Stage::Pose || (from == Stage::Quality && resolved.deployment.has_network());
-    let needs_evidence = (Stage::Quality..=Stage::Fuse).contains(&from) && n_pairs > 0;
+    let reads_evidence = if resolved.deployment.has_maps() {
+        Stage::Quality..=Stage::Triangulate
+    } else {
+        Stage::Quality..=Stage::Fuse
+    };
+    let needs_evidence = reads_evidence.contains(&from) && n_pairs > 0;
     let missing = if needs_pixels && without.pixels {
         Some((Kind::Frame, "the pixels of its frames"))
     } else if needs_evidence && without.evidence {
@@ -291,11 +296,20 @@ fn check_views(
 
 /// The kinds of messages that the stages before `from` send, with their names for the user.
 fn needed(resolved: &Resolved, from: Stage) -> impl Iterator<Item = (Kind, &'static str)> {
+    let has_maps = resolved.deployment.has_maps();
     let all = [
         (Stage::Capture, Kind::Frame, "frames"),
         (Stage::Pose, Kind::ViewPose, "single-view poses"),
         (Stage::Quality, Kind::ViewQuality, "expected errors"),
-        (Stage::Fuse, Kind::PairPose, "pair poses"),
+        (
+            Stage::Fuse,
+            if has_maps {
+                Kind::People
+            } else {
+                Kind::PairPose
+            },
+            if has_maps { "people" } else { "pair poses" },
+        ),
     ];
     let has_quality = resolved.deployment.has_quality();
     let n_cameras = resolved.deployment.cameras.len();

@@ -150,7 +150,8 @@ impl View {
     }
 }
 
-fn assert_same_skeleton(line: &Value, frame: usize, estimate: &Estimate) {
+/// Compares a line of `pose3d.jsonl` with an estimate.
+pub(crate) fn assert_same_skeleton(line: &Value, frame: usize, estimate: &Estimate) {
     assert_eq!(line["frame"], json!(frame));
     assert_eq!(line["pairs"], json!(estimate.skeleton.n_pairs));
     assert_eq!(

@@ -54,7 +54,7 @@ impl Tape {
             about: recorded::about(resolved, &plan)?,
             topics: Topics {
                 n_views: topology.n_views(),
-                n_workers: topology.n_workers(),
+                fused: topology.fused(),
                 has_quality: resolved.deployment.has_quality(),
                 pictures: Vec::new(),
                 processes: processes.collect(),

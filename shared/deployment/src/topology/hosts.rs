@@ -68,6 +68,7 @@ impl Topology {
             small.into_iter().chain(large)
         });
         let fused = (0..self.n_workers).map(topic::pair_pose);
+        let fused = fused.chain([topic::people()]);
         let is_published = |it: &String| {
             let mut processes = self.processes.iter();
             processes.any(|process| process.outputs.contains(it))
@@ -159,7 +160,7 @@ mod tests {
             ("", vec!["frame/v1/0", "frame/v1/2"]),
             (
                 "carry = 'poses'\n",
-                vec!["view-pose/v6/0", "view-pose/v6/2"],
+                vec!["view-pose/v7/0", "view-pose/v7/2"],
             ),
         ] {
             let it = deployment(more);

@@ -38,6 +38,8 @@ pub enum Content {
     ViewQuality,
     /// Results of one fusion worker.
     PairPose,
+    /// Who is in a frame.
+    People,
     /// The result.
     Pose3d,
 }
@@ -120,7 +122,10 @@ impl Topology {
             let quality = topic::view_quality(view);
             rooms.push(small(quality, Content::ViewQuality, receivers));
         }
-        for worker in 0..self.n_workers {
+        if self.has_maps {
+            rooms.push(small(topic::people(), Content::People, 1 + n_recorders));
+        }
+        for worker in (0..self.n_workers).filter(|_| !self.has_maps) {
             let room = small(topic::pair_pose(worker), Content::PairPose, 1 + n_recorders);
             rooms.push(Room {
                 // Fusion of all views at once sends a message for every view but one at a time.

@@ -154,7 +154,7 @@ fn topics_have_this_room() {
     let of_last_view_and_later: [Numbers<'_>; 7] = [
         ("frame/v1/2", 3, 1, 4, 391_680, None),
         ("evidence/v3/2", 2, 1, 1, 10_000_000, Some(2)),
-        ("view-pose/v6/2", 5, 4, 2, 1, None),
+        ("view-pose/v7/2", 5, 4, 2, 1, None),
         ("view-quality/v2/2", 5, 4, 2, 1, None),
         ("pair-pose/v3/0", 2, 4, 2, 1, None),
         ("pair-pose/v3/1", 2, 4, 2, 1, None),
@@ -169,7 +169,7 @@ fn topics_have_this_room() {
     let of_last_view_and_later: [Numbers<'_>; 7] = [
         ("frame/v1/2", 4, 1, 1, 391_680, None),
         ("evidence/v3/2", 3, 1, 1, 10_000_000, Some(2)),
-        ("view-pose/v6/2", 6, 16, 2, 1, None),
+        ("view-pose/v7/2", 6, 16, 2, 1, None),
         ("view-quality/v2/2", 6, 16, 2, 1, None),
         ("pair-pose/v3/0", 3, 16, 2, 1, None),
         ("pair-pose/v3/1", 3, 16, 2, 1, None),

@@ -152,7 +152,7 @@ fn skeleton() -> Skeleton {
         joints: JOINTS.iter().map(joint).collect(),
         body: None,
         views: Vec::new(),
-        people: Vec::new(),
+        n_people: 0,
         n_pairs: 0,
         facing_margin: 0.0,
         sides: None,

@@ -2,7 +2,7 @@
 
 use bytemuck::{bytes_of, cast_slice};
 use messages::{
-    EvidenceHeader, FrameHeader, Health, PairPose, PictureHeader, Pose3d, Status, ViewPose,
+    EvidenceHeader, FrameHeader, Health, PairPose, People, PictureHeader, Pose3d, Status, ViewPose,
     ViewQuality,
 };
 use recording::{Envelope, Kind, encode};
@@ -44,6 +44,7 @@ enum Port {
     ViewPose(Subscriber<ViewPose>),
     ViewQuality(Subscriber<ViewQuality>),
     PairPose(Subscriber<PairPose>),
+    People(Subscriber<People>),
     Pose3d(Subscriber<Pose3d>),
     Health(Subscriber<Health>),
     Picture(SliceSubscriber<u8, PictureHeader>),
@@ -70,6 +71,7 @@ impl Receiver {
             Kind::ViewPose => Port::ViewPose(bus.subscriber(topic, waiter)?),
             Kind::ViewQuality => Port::ViewQuality(bus.subscriber(topic, waiter)?),
             Kind::PairPose => Port::PairPose(bus.subscriber(topic, waiter)?),
+            Kind::People => Port::People(bus.subscriber(topic, waiter)?),
             Kind::Pose3d => Port::Pose3d(bus.subscriber(topic, waiter)?),
             Kind::Health => Port::Health(bus.subscriber(topic, waiter)?),
             Kind::Picture => Port::Picture(bus.slice_subscriber(topic, waiter)?),
@@ -116,6 +118,9 @@ impl Receiver {
                 .receive()?
                 .and_then(|message| of(bytes_of(&message), &[])),
             Port::PairPose(port) => port
+                .receive()?
+                .and_then(|message| of(bytes_of(&message), &[])),
+            Port::People(port) => port
                 .receive()?
                 .and_then(|message| of(bytes_of(&message), &[])),
             Port::Pose3d(port) => port

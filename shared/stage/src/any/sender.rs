@@ -2,7 +2,8 @@
 
 use bytemuck::{Pod, cast_slice_mut, pod_read_unaligned};
 use messages::{
-    EvidenceHeader, FrameHeader, PairPose, PictureHeader, Pose3d, Status, ViewPose, ViewQuality,
+    EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Pose3d, Status, ViewPose,
+    ViewQuality,
 };
 use recording::{Envelope, Kind, Message};
 use runtime::{
@@ -26,6 +27,7 @@ enum Port {
     ViewPose(Publisher<ViewPose>),
     ViewQuality(Publisher<ViewQuality>),
     PairPose(Publisher<PairPose>),
+    People(Publisher<People>),
     Pose3d(Publisher<Pose3d>),
     Picture(SlicePublisher<u8, PictureHeader>),
     /// Every process sends its own heartbeats.
@@ -45,6 +47,7 @@ impl Sender {
             Kind::ViewPose => Port::ViewPose(bus.publisher(topic)?),
             Kind::ViewQuality => Port::ViewQuality(bus.publisher(topic)?),
             Kind::PairPose => Port::PairPose(bus.publisher(topic)?),
+            Kind::People => Port::People(bus.publisher(topic)?),
             Kind::Pose3d => Port::Pose3d(bus.publisher(topic)?),
             Kind::Picture => Port::Picture(bus.slice_publisher(topic)?),
             Kind::Health => Port::Health,
@@ -69,6 +72,7 @@ impl Sender {
             Port::ViewPose(port) => Some(port),
             Port::ViewQuality(port) => Some(port),
             Port::PairPose(port) => Some(port),
+            Port::People(port) => Some(port),
             Port::Pose3d(port) => Some(port),
             Port::Picture(port) => Some(port),
             Port::Health => None,
@@ -89,6 +93,7 @@ impl Sender {
             Port::ViewPose(port) => plain(port, &head),
             Port::ViewQuality(port) => plain(port, &head),
             Port::PairPose(port) => plain(port, &head),
+            Port::People(port) => plain(port, &head),
             Port::Pose3d(port) => plain(port, &head),
             Port::Picture(port) => array(port, &head, message.elements),
             Port::Health => Ok(()),

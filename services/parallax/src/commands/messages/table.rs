@@ -4,8 +4,9 @@ use core::mem::offset_of;
 
 use messages::{
     CameraCounts, EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, Kept, LocalMessage,
-    Metrics, MetricsRow, PairHypothesis, PairPose, PictureHeader, Pose3d, PoseMessage, Searched,
-    Sides, Span, Stamp, Status, TimedBy, Timing, ViewPose, ViewQuality, topic,
+    Metrics, MetricsRow, PairHypothesis, PairPose, People, PersonMessage, PictureHeader, Pose3d,
+    PoseMessage, Searched, Sides, Span, Stamp, Status, TimedBy, Timing, ViewPose, ViewQuality,
+    topic,
 };
 
 /// The type of a field.
@@ -159,9 +160,9 @@ structs! {
         connection name reserved;
     PoseMessage, "PoseMessage.v1": score level n_parts x y mixture;
     LocalMessage, "LocalMessage.v1": response contrast margin;
-    ViewPose, "ViewPose.v6":
+    ViewPose, "ViewPose.v7":
         stamp timing status n_candidates width height evidence_bytes skew_nanos searched n_keypoints candidates local
-        front keypoints;
+        front heats keypoints;
     EvidenceHeader, "EvidenceHeader.v3":
         stamp timing width height status n_levels x y scope_levels levels best size reserved;
     ViewQuality, "ViewQuality.v2":
@@ -170,6 +171,8 @@ structs! {
         energy n_iterations converged exchanged start reserved active_parts poses;
     PairPose, "PairPose.v3":
         stamp timing status n_hypotheses views hypotheses views_present sigma_age sigma_px;
+    PersonMessage, "PersonMessage.v1": id candidates;
+    People, "People.v1": stamp timing status n_people n_seen views_present people;
     Joint3d, "Joint3d.v1": in_world covariance reprojection_px views_used status;
     FusedView, "FusedView.v1": energy n_pairs status exchanged n_parts centres_px single_score;
     Pose3d, "Pose3d.v3":
@@ -201,6 +204,7 @@ pub(super) fn topics() -> Vec<Topic> {
         (topic::evidence(ANY), "EvidenceHeader", number(f32::shape())),
         (topic::view_quality(ANY), "ViewQuality", None),
         (topic::pair_pose(ANY), "PairPose", None),
+        (topic::people(), "People", None),
         (topic::pose3d(), "Pose3d", None),
         (topic::health(&any), "Health", None),
         (topic::metrics(&any), "Metrics", None),
@@ -236,11 +240,12 @@ mod tests {
     }
 
     /// The sources that define the structs.
-    const SOURCES: [&str; 9] = [
+    const SOURCES: [&str; 10] = [
         include_str!("../../../../../shared/messages/src/evidence.rs"),
         include_str!("../../../../../shared/messages/src/frame.rs"),
         include_str!("../../../../../shared/messages/src/health.rs"),
         include_str!("../../../../../shared/messages/src/metrics.rs"),
+        include_str!("../../../../../shared/messages/src/people.rs"),
         include_str!("../../../../../shared/messages/src/picture.rs"),
         include_str!("../../../../../shared/messages/src/pose.rs"),
         include_str!("../../../../../shared/messages/src/pose3d.rs"),

@@ -1,0 +1,71 @@
+//! Joins what the views found, says who is who, sends.
+
+use core::time::Duration;
+use std::sync::Arc;
+
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
+use messages::{Span, ViewPose, topic};
+use multiview::ViewPlan;
+use pipeline::{Follow, ViewResult, WhoStep};
+use runtime::Service;
+use stage::{Frame, Stage};
+
+/// The process's work by the method of networks.
+#[derive(Debug)]
+pub struct WhoJob {
+    /// The views of the rig.
+    pub plans: Vec<Arc<ViewPlan>>,
+    /// Which of several people is followed.
+    pub follow: Follow,
+    /// Whether left and right follow the picture.
+    pub as_seen: bool,
+    /// Distance between the frames used, at least 1.
+    pub frame_step: u64,
+    /// Processes that receive the people.
+    pub n_consumers: usize,
+    /// How long a view may be silent.
+    pub patience: Duration,
+}
+
+/// Says who is who in every frame, until the footage of all views ends or a stop is requested.
+///
+/// # Errors
+///
+/// What the transport reports.
+pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
+    let n_views = job.plans.len();
+    let mut stage = Stage::new(service, job.patience);
+    stage.skip_when_behind(job.frame_step);
+    for (view, plan) in job.plans.iter().enumerate() {
+        stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
+            wire::seen_from_message(pose, plan)
+        })?;
+    }
+    let people = stage.output(&topic::people(), job.n_consumers)?;
+    let mut step = WhoStep::new(job.plans.clone(), job.follow, job.as_seen);
+    stage.run(|frame| {
+        let answers: Vec<Option<ViewResult>> = (0..n_views)
+            .map(|view| answer(service, frame, view))
+            .collect();
+        let present = answers.iter().enumerate();
+        let present = present.filter(|(_, answer)| answer.is_some());
+        let present = present.fold(0, |mask, (view, _)| mask | 1_u32 << view);
+        frame.turn().restart(now_nanos());
+        let found = step.run(&answers);
+        let message = wire::people_to_message(&found, present).or_fail(ExitKind::Run)?;
+        people.send_and_account(frame.turn(), 0, message)
+    })
+}
+
+/// The candidates of a view; `None` if it has none.
+fn answer(
+    service: &Service,
+    frame: &mut Frame<'_, Option<ViewResult>>,
+    view: usize,
+) -> Option<ViewResult> {
+    let item = frame.take(view)?;
+    let now = frame.turn().received_at();
+    let waited = now.saturating_sub(item.timing.sent_at_nanos);
+    service.health().spent(Span::WAITING, Some(view), waited);
+    item.value
+}

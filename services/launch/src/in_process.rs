@@ -1,0 +1,115 @@
+//! The pipeline of a deployment in one process, by the method of networks: the same steps as its processes, the same bits.
+
+use std::sync::Arc;
+
+use failure::{ExitKind, Failure, OrFail as _};
+use kernels::Rgb8View;
+use keypoints::files::SeenKeypoints;
+use pipeline::{Estimate, NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame};
+
+use crate::prepare::{Prepared, space_settings};
+use crate::process::{most_apart, view_step};
+use crate::resolved::Resolved;
+
+/// A frame of a view.
+#[derive(Debug, Clone, Copy)]
+pub struct SentFrame<'a> {
+    /// Its picture.
+    pub image: Rgb8View<'a>,
+    /// How long after the instant of the frame it was taken, nanoseconds.
+    pub skew_nanos: i64,
+}
+
+/// The pipeline of a deployment in one process.
+#[derive(Debug)]
+pub struct InProcess {
+    estimator: NetworkEstimator,
+    /// By view; `None` where a network looks at pictures.
+    keypoints: Vec<Option<pose::Source>>,
+    start_frame: u64,
+    frame_step: u64,
+    n_frames: u64,
+}
+
+impl InProcess {
+    /// Prepares the pipeline of a deployment whose people are found by networks or keypoints.
+    ///
+    /// # Errors
+    ///
+    /// An input cannot be read, or the filters find people in the deployment.
+    pub fn new(resolved: &Resolved) -> Result<Self, Failure> {
+        let deployment = &resolved.deployment;
+        let prepared = Prepared::new(resolved)?;
+        let plans = prepared.plans();
+        let (mut steps, mut keypoints) = (Vec::new(), Vec::new());
+        for view in 0..plans.len() {
+            let prepared = Prepared::new(resolved)?;
+            let layout = Arc::new(plans[view].layout().clone());
+            match view_step::of_view(resolved, prepared, view, layout)? {
+                pose::Step::Network(step) => {
+                    steps.push(*step);
+                    keypoints.push(None);
+                }
+                pose::Step::Keypoints(it) => {
+                    let pose::Keypoints { step, source } = *it;
+                    steps.push(step);
+                    keypoints.push(Some(source));
+                }
+                pose::Step::Filters(_) => {
+                    let message = "the filters find people in this deployment, not a network";
+                    return Err(Failure::new(ExitKind::Config, message));
+                }
+            }
+        }
+        let settings = NetworkEstimatorSettings {
+            follow: prepared.settings.follow,
+            space: space_settings(resolved, &prepared),
+            start_frame: deployment.capture.start_frame,
+            frame_step: deployment.capture.frame_step.max(1),
+            frame_rate_hz: resolved.frame_rate_hz(),
+            most_apart: most_apart(resolved),
+        };
+        Ok(Self {
+            start_frame: settings.start_frame,
+            frame_step: settings.frame_step,
+            n_frames: 0,
+            estimator: NetworkEstimator::new(&plans, steps, prepared.up_in_world, settings),
+            keypoints,
+        })
+    }
+
+    /// Estimates the next frame.
+    ///
+    /// * `frames`: of the views, as their capture processes send them; `None` for a view that is missing.
+    ///
+    /// # Errors
+    ///
+    /// A network fails.
+    pub fn estimate(&mut self, frames: &[Option<SentFrame<'_>>]) -> Result<Estimate, Failure> {
+        let frame = self.start_frame + self.n_frames * self.frame_step;
+        self.n_frames += 1;
+        let mut people: Vec<Vec<SeenKeypoints>> = Vec::new();
+        for source in &self.keypoints {
+            let mut found = Vec::new();
+            if let Some(source) = source {
+                source.read(frame, &mut found).or_fail(ExitKind::Input)?;
+            }
+            people.push(found);
+        }
+        let people: Vec<Vec<_>> = people
+            .into_iter()
+            .map(|found| found.into_iter().map(|person| person.keypoints).collect())
+            .collect();
+        let mut seen: Vec<Option<ViewFrame<'_>>> = Vec::new();
+        for (view, sent) in frames.iter().enumerate() {
+            seen.push(sent.as_ref().map(|sent| ViewFrame {
+                content: match &self.keypoints[view] {
+                    Some(_) => ViewContent::Keypoints(&people[view]),
+                    None => ViewContent::Picture(sent.image),
+                },
+                skew_s: sent.skew_nanos as f64 * 1e-9,
+            }));
+        }
+        self.estimator.estimate(&seen).or_fail(ExitKind::Run)
+    }
+}

@@ -1,0 +1,49 @@
+//! Who is in a frame: which candidate of every view is which person.
+
+use bytemuck::Zeroable as _;
+use bytemuck_derive::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::{MAX_PEOPLE, MAX_VIEWS, Stamp, Status, Timing};
+
+/// In [`PersonMessage::candidates`]: the view does not show the person.
+pub const NO_CANDIDATE: u8 = u8::MAX;
+
+/// One person.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
+#[type_name("PersonMessage.v1")]
+#[repr(C)]
+pub struct PersonMessage {
+    /// Identity within the run, from 1; never used for somebody else.
+    pub id: u64,
+    /// Index of the person among the candidates of every view; [`NO_CANDIDATE`] where the view does not show the person, and beyond the
+    /// last view.
+    pub candidates: [u8; MAX_VIEWS],
+}
+
+/// The people of one frame, the one who is followed first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
+#[type_name("People.v1")]
+#[repr(C)]
+pub struct People {
+    /// The frame; `view` is 0.
+    pub stamp: Stamp,
+    /// When it was received and sent.
+    pub timing: Timing,
+    /// Whether there is anybody.
+    pub status: Status,
+    /// Number of valid people.
+    pub n_people: u32,
+    /// Number of people that several views agree on, whether or not they are in the list.
+    pub n_seen: u32,
+    /// Bit `v` is set if the candidates of view `v` arrived in time.
+    pub views_present: u32,
+    /// The people.
+    pub people: [PersonMessage; MAX_PEOPLE],
+}
+
+impl Default for People {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}

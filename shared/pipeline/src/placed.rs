@@ -1,0 +1,183 @@
+//! A person in space as the joints and views of a result.
+
+use geometry::{MAX_VIEWS, TriangulateError, Triangulated};
+use multiview::{FusedPose, SpaceView, ViewPlan};
+use nalgebra::{Matrix3, Point3};
+use posenetwork::springs::joint_of;
+use posenetwork::{MapSettings, expected_error};
+use skeleton::{Joint, JointSet, N_PARTS, PARENT, PARSE14};
+
+use crate::fused_view::FusedView;
+
+/// Number of joints.
+pub(crate) const N: usize = PARSE14.joints.len();
+
+/// The joints of `skeleton::PARSE14`, metres in the world; `None` for one that no two views show.
+pub(crate) type Places = [Option<Point3<f64>>; N];
+
+/// A view with a part in a solution.
+#[derive(Clone, Copy)]
+pub(crate) struct PartView<'a> {
+    /// Its number in the rig.
+    pub(crate) view: usize,
+    /// What it shows, with the names of its sides as the solution has them.
+    pub(crate) shown: SpaceView<'a>,
+    /// Height of the window of a network about the person, pixels.
+    pub(crate) window_px: f64,
+}
+
+impl PartView<'_> {
+    /// How far off a joint may be in the view, pixels along one axis, by the heat at the solution; `None` where the view does not
+    /// show the place.
+    fn sigma_px(&self, maps: &MapSettings, joint: usize, at: &Point3<f64>) -> Option<f64> {
+        let pixel = self.shown.camera.project(at)?;
+        let [width, height] = self.shown.camera.intrinsics.size.map(f64::from);
+        let is_inside = (0.0..width).contains(&pixel.x) && (0.0..height).contains(&pixel.y);
+        let heat = maps.heat(self.shown.evidence_at(joint, at));
+        is_inside.then(|| expected_error(heat) * self.window_px)
+    }
+}
+
+/// The joints at the places of a solution, each with its covariance there: the inverse of the curvature `sum_v J_v^T J_v / s_v^2`, with
+/// `J_v` the derivative of the pixel of view `v` by the place, and `s_v` the error that a network expects of the heat at that pixel.
+///
+/// Residuals and root mean square are those of [`crate::disagreement`].
+pub(crate) fn joints_at(
+    places: &Places,
+    views: &[PartView<'_>],
+    maps: &MapSettings,
+) -> Vec<Result<Triangulated, TriangulateError>> {
+    let joint = |(joint, place): (usize, &Option<Point3<f64>>)| {
+        let too_few = |views| TriangulateError::TooFewViews { views, needed: 2 };
+        let at = place.ok_or(too_few(0))?;
+        let mut curvature = Matrix3::zeros();
+        let mut views_used = 0;
+        for part in views {
+            let derivative = part.shown.camera.project_with_jacobian(&at);
+            let sigma_px = part.sigma_px(maps, joint, &at);
+            if let (Some((_, derivative)), Some(sigma_px)) = (derivative, sigma_px) {
+                curvature += derivative.transpose() * derivative / sigma_px.powi(2);
+                views_used |= 1_u32 << part.view;
+            }
+        }
+        if views_used.count_ones() < 2 {
+            return Err(too_few(views_used.count_ones() as usize));
+        }
+        let covariance = curvature.cholesky().map(|factor| factor.inverse());
+        let covariance = covariance.filter(|it| it.iter().all(|entry| entry.is_finite()));
+        Ok(Triangulated {
+            in_world: at,
+            covariance: covariance.ok_or(TriangulateError::Diverged { iterations: 0 })?,
+            reprojection_px: 0.0,
+            views_used,
+            residuals_px: [f64::NAN; MAX_VIEWS],
+        })
+    };
+    places.iter().enumerate().map(joint).collect()
+}
+
+/// The joints of a set: each the mean of those of `skeleton::PARSE14` that have its parts.
+pub(crate) fn of_set(
+    set: &JointSet,
+    of_body: &[Result<Triangulated, TriangulateError>],
+) -> Vec<Result<Triangulated, TriangulateError>> {
+    let mean = |joint: &Joint| {
+        let of_part = |part: &usize| {
+            let own = |it: &&Joint| it.parts.contains(part);
+            let index = PARSE14.joints.iter().position(|it| own(&it));
+            let missing = TriangulateError::TooFewViews {
+                views: 0,
+                needed: 2,
+            };
+            index.map_or(Err(missing), |index| of_body[index])
+        };
+        let parts: Vec<Triangulated> = joint.parts.iter().map(of_part).collect::<Result<_, _>>()?;
+        let [first, rest @ ..] = &parts[..] else {
+            return Err(TriangulateError::TooFewViews {
+                views: 0,
+                needed: 2,
+            });
+        };
+        let n = parts.len() as f64;
+        let mut mean = *first;
+        for other in rest {
+            mean.in_world += other.in_world.coords;
+            mean.covariance += other.covariance;
+            mean.views_used &= other.views_used;
+        }
+        mean.in_world /= n;
+        mean.covariance /= n * n;
+        Ok(mean)
+    };
+    set.joints.iter().map(mean).collect()
+}
+
+/// Where a view shows the parts of a person.
+///
+/// * `places`: of the joints of `skeleton::PARSE14`.
+/// * `energy`: of the solution.
+/// * `single_score`: of the best candidate of the view.
+pub(crate) fn shown_in(
+    plan: &ViewPlan,
+    places: &Places,
+    energy: f64,
+    single_score: f64,
+) -> FusedView {
+    let [width, height] = plan.layout().image_size.map(|side| side as f64);
+    let centre = |between: &Between| {
+        let [above, below] = between.joints.map(|joint| places[joint]);
+        let at = match (above, below) {
+            (Some(above), Some(below)) => Some(above + (below - above) * between.share),
+            (one, other) => one.or(other),
+        };
+        let pixel = at.and_then(|at| plan.camera().project(&at));
+        pixel.map_or([width / 2.0, height / 2.0], |pixel| [pixel.x, pixel.y])
+    };
+    FusedView {
+        pose: FusedPose {
+            centres_px: (0..N_PARTS).map(|part| centre(&between(part))).collect(),
+            n_pairs: 1,
+            energy,
+        },
+        exchanged: false,
+        cell_px: 1.0,
+        single_score,
+    }
+}
+
+/// Where a part lies between two joints.
+struct Between {
+    /// The next joint towards the head, and the next one away from it.
+    joints: [usize; 2],
+    /// How far along, 0 to 1.
+    share: f64,
+}
+
+fn between(part: usize) -> Between {
+    if let Some(joint) = joint_of(part) {
+        return Between {
+            joints: [joint; 2],
+            share: 0.0,
+        };
+    }
+    let parent = |part: usize| PARENT[part];
+    let child = |part: usize| (0..N_PARTS).find(|it| PARENT[*it] == Some(part));
+    let (above, n_above) = next_joint(part, parent).unwrap_or((0, 1));
+    let (below, n_below) = next_joint(part, child).unwrap_or((above, 1));
+    Between {
+        joints: [above, below],
+        share: f64::from(n_above) / f64::from(n_above + n_below),
+    }
+}
+
+/// The first joint among the parts after one, and how many steps away it is.
+fn next_joint(mut part: usize, next: impl Fn(usize) -> Option<usize>) -> Option<(usize, u32)> {
+    let mut n = 0;
+    loop {
+        if let Some(joint) = joint_of(part) {
+            return Some((joint, n));
+        }
+        part = next(part)?;
+        n += 1;
+    }
+}
