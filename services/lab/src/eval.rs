@@ -1,5 +1,6 @@
 //! The evaluation on sequences or pictures whose joints are known: solved, kept, scored, reported.
 
+pub mod as_run;
 pub mod evidence;
 pub mod pictures;
 

@@ -19,6 +19,8 @@ use posenetwork::{
 use score::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
 use skeleton::PARSE14;
 
+use super::as_run::{self, AsRun};
+
 /// Least share of a segment's length at which it is not found (eq. 13 of the paper).
 const GAMMA: f64 = 0.5;
 /// Largest error of a joint that counts, metres: a joint that is not there counts as this.
@@ -27,6 +29,9 @@ const MOST_M: f64 = 2.0;
 const N_LIMB_JOINTS: usize = 12;
 /// Reprojection error above which cameras are left out, as a share of the picture's height (15 px of 1080 are Pose2Sim's default).
 const LIMIT: f64 = 15.0 / 1080.0;
+
+/// Name of the row of what `run` gives.
+const AS_RUN: &str = "as run";
 
 /// What is judged.
 #[derive(Debug)]
@@ -37,6 +42,8 @@ pub struct EvidenceJob<'a> {
     pub boxes: Boxes<'a>,
     /// Solve the tree of springs, which tells better boxes.
     pub springs: &'a TurnedSprings,
+    /// Solves the undisturbed sequences as `run` does, beside the methods that are compared.
+    pub as_run: &'a AsRun<'a>,
     /// What goes wrong.
     pub stress: &'a [Stress],
     /// How the frames are derived.
@@ -158,7 +165,36 @@ impl EvidenceJob<'_> {
             }
         }
         console.finish();
-        Ok(self.rows(&tallies))
+        let mut rows = self.rows(&tallies);
+        if let Some(undisturbed) = self.stress.iter().position(|it| *it == Stress::Clean) {
+            let tally = self.as_run(sequences, console)?;
+            let last = tallies[undisturbed].last().unwrap_or(&tally);
+            rows.push(self.row(&Stress::Clean, AS_RUN, &tally, last));
+        }
+        Ok(rows)
+    }
+
+    /// Solves all frames as `run` does.
+    fn as_run(&self, sequences: &[Sequence], console: &dyn Console) -> Result<Tally, Failure> {
+        let n_frames: usize = sequences.iter().map(|it| it.frames.len()).sum();
+        console.begin("frames as run", "");
+        let (mut tally, mut done) = (Tally::default(), 0);
+        for sequence in sequences {
+            let mut film = Film::open(sequence, &self.film).or_fail(ExitKind::Input)?;
+            let mut estimator = self.as_run.estimator(sequence, &film.cameras())?;
+            for frame in &sequence.frames {
+                if self.stop.is_requested() {
+                    return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
+                }
+                let joints = as_run::joints(&mut estimator, &mut film, frame.index)?;
+                tally.add(&joints, &truth(sequence, frame));
+                done += 1;
+                console.details(&sequence.name);
+                console.set(done, n_frames);
+            }
+        }
+        console.finish();
+        Ok(tally)
     }
 
     fn judge(&self, instant: &Instant<'_>, tallies: &mut [Vec<Tally>]) -> Result<(), Failure> {
@@ -248,33 +284,44 @@ impl EvidenceJob<'_> {
         for (stress, tallies) in self.stress.iter().zip(tallies) {
             let Some(last) = tallies.last() else { continue };
             for (method, tally) in Method::ALL.into_iter().zip(tallies) {
-                let mean = |of: &[Share]| Share::mean(of).unwrap_or(f64::NAN);
-                let interval = |of: &[Share]| self.bootstrap.interval(of).unwrap_or([f64::NAN; 2]);
-                let change = |a: &[Share], b: &[Share]| {
-                    let each = a.iter().zip(b);
-                    let each: Vec<Share> = each
-                        .map(|(a, b)| Share {
-                            sum: a.sum - b.sum,
-                            n: a.n,
-                        })
-                        .collect();
-                    let [from, to] = interval(&each);
-                    [mean(&each), from, to]
-                };
-                rows.push(EvidenceRow {
-                    stress: stress.to_string(),
-                    method: method.name(),
-                    n_frames: tally.found.len(),
-                    pcp3d: mean(&tally.found),
-                    pcp3d_interval: interval(&tally.found),
-                    limbs_mm: mean(&tally.errors),
-                    limbs_mm_interval: interval(&tally.errors),
-                    last_finds_more: change(&last.found, &tally.found),
-                    last_errs_less_mm: change(&tally.errors, &last.errors),
-                });
+                rows.push(self.row(stress, method.name(), tally, last));
             }
         }
         rows
+    }
+
+    /// * `last`: the method that others are compared with.
+    fn row(
+        &self,
+        stress: &Stress,
+        method: &'static str,
+        tally: &Tally,
+        last: &Tally,
+    ) -> EvidenceRow {
+        let mean = |of: &[Share]| Share::mean(of).unwrap_or(f64::NAN);
+        let interval = |of: &[Share]| self.bootstrap.interval(of).unwrap_or([f64::NAN; 2]);
+        let change = |a: &[Share], b: &[Share]| {
+            let each = a.iter().zip(b);
+            let each: Vec<Share> = each
+                .map(|(a, b)| Share {
+                    sum: a.sum - b.sum,
+                    n: a.n,
+                })
+                .collect();
+            let [from, to] = interval(&each);
+            [mean(&each), from, to]
+        };
+        EvidenceRow {
+            stress: stress.to_string(),
+            method,
+            n_frames: tally.found.len(),
+            pcp3d: mean(&tally.found),
+            pcp3d_interval: interval(&tally.found),
+            limbs_mm: mean(&tally.errors),
+            limbs_mm_interval: interval(&tally.errors),
+            last_finds_more: change(&last.found, &tally.found),
+            last_errs_less_mm: change(&tally.errors, &last.errors),
+        }
     }
 }
 

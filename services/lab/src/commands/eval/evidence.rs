@@ -8,8 +8,10 @@ use evaluation::{FilmSettings, Stress};
 use failure::{Claim, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use inputs::library::Library;
+use lab::eval::as_run::{AsRun, OpenView};
 use lab::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
 use posenetwork::springs::TurnedSprings;
+use posenetwork::{Detector, PoseNetwork};
 use score::Bootstrap;
 use terminal::{Globals, Terminal, output};
 
@@ -58,6 +60,26 @@ impl Options {
     }
 }
 
+/// The networks that are named.
+struct Files<'a> {
+    file: &'a Path,
+    options: &'a Options,
+}
+
+impl OpenView for Files<'_> {
+    fn network(&self) -> Result<PoseNetwork, Failure> {
+        let network = (self.file, self.options.card.as_deref());
+        inputs::open_network(network, &Library::BuiltIn)?.fitted()
+    }
+
+    fn detector(&self) -> Result<Option<Detector>, Failure> {
+        let detector = self.options.detector.as_deref();
+        let card = self.options.detector_card.as_deref();
+        let detector = detector.map(|file| inputs::detector::open(file, card));
+        detector.transpose()
+    }
+}
+
 /// Runs the evaluation.
 pub(super) fn run(
     arguments: &Arguments,
@@ -68,13 +90,16 @@ pub(super) fn run(
     let options = &arguments.evidence;
     let stress = options.stress()?;
     let sequences = super::sequences(arguments)?;
-    let network = (file, options.card.as_deref());
-    let network = inputs::open_network(network, &Library::BuiltIn)?.fitted()?;
-    let detector = options.detector.as_deref();
-    let detector = detector.map(|it| inputs::detector::open(it, options.detector_card.as_deref()));
-    let detector = detector.transpose()?;
+    let files = Files { file, options };
+    let (network, detector) = (files.network()?, files.detector()?);
     let filters = Search::new(inputs::model_or_shipped(None)?);
-    let springs = TurnedSprings::new(&inputs::springs(Path::new(deployment::SHIPPED))?);
+    let tree = inputs::springs(Path::new(deployment::SHIPPED))?;
+    let springs = TurnedSprings::new(&tree);
+    let as_run = AsRun {
+        open: &files,
+        springs: tree,
+        filters: inputs::model_or_shipped(None)?,
+    };
     let _claim = Claim::take(&arguments.out, "eval")?;
     let job = EvidenceJob {
         network: &network,
@@ -82,6 +107,7 @@ pub(super) fn run(
             .as_ref()
             .map_or(Boxes::Filters(&filters), Boxes::Detector),
         springs: &springs,
+        as_run: &as_run,
         stress: &stress,
         film: FilmSettings {
             size: arguments.size,

@@ -1,0 +1,120 @@
+//! Sequences judged as `parallax run` solves them: every step of the method of networks, from frame to frame.
+
+use std::sync::Arc;
+
+use datasets::sequences::Sequence;
+use evaluation::Film;
+use failure::{ExitKind, Failure, OrFail as _};
+use fmp::Model;
+use geometry::Camera;
+use pipeline::{
+    Boxes, Eyes, NetworkEstimator, NetworkEstimatorSettings, NetworkSettings, NetworkStep,
+    SpaceStepSettings, ViewContent, ViewFrame, ViewSettings, ViewStep,
+};
+use posenetwork::springs::TurnedSprings;
+use posenetwork::{Detector, PoseNetwork};
+use score::Point;
+
+/// Opens what every view has for itself.
+pub trait OpenView {
+    /// The network.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be read.
+    fn network(&self) -> Result<PoseNetwork, Failure>;
+
+    /// The detector; `None` where the filters find people.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be read.
+    fn detector(&self) -> Result<Option<Detector>, Failure>;
+}
+
+/// How sequences are solved.
+pub struct AsRun<'a> {
+    /// Opens the networks of a view.
+    pub open: &'a dyn OpenView,
+    /// The tree of springs.
+    pub springs: Arc<Model>,
+    /// The filters that find people without a detector.
+    pub filters: Arc<Model>,
+}
+
+impl core::fmt::Debug for AsRun<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("AsRun").finish_non_exhaustive()
+    }
+}
+
+impl AsRun<'_> {
+    /// The pipeline of a sequence. People are looked for in every frame: those of a sequence may be of any time.
+    ///
+    /// # Errors
+    ///
+    /// A network cannot be read, or frames are too small.
+    pub fn estimator(
+        &self,
+        sequence: &Sequence,
+        cameras: &[Camera],
+    ) -> Result<NetworkEstimator, Failure> {
+        let (mut plans, mut steps) = (Vec::new(), Vec::new());
+        for camera in cameras {
+            let plan = pipeline::plan(&self.springs, camera).or_fail(ExitKind::Input)?;
+            let boxes = match self.open.detector()? {
+                Some(detector) => Boxes::Detector(Box::new(detector)),
+                None => Boxes::Filters(Box::new(self.filters(camera)?)),
+            };
+            let eyes = Eyes::Network(Box::new(self.open.network()?), boxes);
+            let settings = NetworkSettings {
+                find_every: 1,
+                ..NetworkSettings::default()
+            };
+            let layout = Arc::new(plan.layout().clone());
+            let springs = TurnedSprings::new(&self.springs);
+            steps.push(NetworkStep::new(eyes, springs, layout, settings));
+            plans.push(plan);
+        }
+        let settings = NetworkEstimatorSettings {
+            space: SpaceStepSettings {
+                least_heat: 2.0 * NetworkSettings::default().least_heat,
+                ..SpaceStepSettings::default()
+            },
+            frame_step: 1,
+            ..NetworkEstimatorSettings::default()
+        };
+        let up = sequence.rig.up_in_world();
+        Ok(NetworkEstimator::new(&plans, steps, up, settings))
+    }
+
+    fn filters(&self, camera: &Camera) -> Result<ViewStep, Failure> {
+        let plan = pipeline::plan(&self.filters, camera).or_fail(ExitKind::Input)?;
+        let layout = Arc::new(plan.layout().clone());
+        let model = Arc::clone(&self.filters);
+        Ok(ViewStep::new(model, layout, ViewSettings::default()))
+    }
+}
+
+/// The joints of `skeleton::PARSE14` in the next frame of a film.
+///
+/// # Errors
+///
+/// Footage cannot be read, or the network fails.
+pub fn joints(
+    estimator: &mut NetworkEstimator,
+    film: &mut Film,
+    index: u64,
+) -> Result<Vec<Option<Point>>, Failure> {
+    let images = film.at(index).or_fail(ExitKind::Input)?;
+    let view = |image| ViewFrame {
+        content: ViewContent::Picture(image),
+        skew_s: 0.0,
+    };
+    let frames: Vec<_> = images.into_iter().map(|image| image.map(view)).collect();
+    let estimate = estimator.estimate(&frames).or_fail(ExitKind::Input)?;
+    let joints = estimate.skeleton.joints.iter();
+    Ok(joints
+        .map(|joint| Some(joint.as_ref().ok()?.in_world.coords.into()))
+        .collect())
+}
