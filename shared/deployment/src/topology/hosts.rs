@@ -67,8 +67,7 @@ impl Topology {
             ];
             small.into_iter().chain(large)
         });
-        let fused = (0..self.n_workers).map(topic::pair_pose);
-        let fused = fused.chain([topic::people()]);
+        let fused = self.fused().into_iter();
         let is_published = |it: &String| {
             let mut processes = self.processes.iter();
             processes.any(|process| process.outputs.contains(it))
