@@ -6,7 +6,6 @@ mod view_step;
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
 
 use deployment::Stage;
 use failure::{ExitKind, Failure, OrFail as _};
@@ -133,7 +132,7 @@ pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Resul
         service.health().spin_after(frame);
     }
     let n_threads = if name == Name::Pose {
-        resolved.deployment.pose.threads
+        resolved.deployment.runtime.threads
     } else {
         1
     };
@@ -176,7 +175,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         skew_nanos: live::skew_nanos(resolved, view),
         framing: framing(resolved, &rig, view)?,
         mode: deployment.capture.mode,
-        pace: deployment.capture.pace,
+        pace: deployment.capture.mode.pace(),
         n_consumers: resolved.topology().receivers_of(&topic::frame(view)),
         patience: resolved.patience(),
     };
@@ -209,7 +208,10 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let network = inputs::quality_network(&resolved.deployment.quality, prepared.model.n_parts())?;
+    let network = inputs::quality_network(
+        resolved.deployment.paper.errors.as_ref(),
+        prepared.model.n_parts(),
+    )?;
     let source = match network {
         Some(network) => quality::Source::Network(Box::new(quality::NetworkSource {
             forecaster: Forecaster::new(network),
@@ -219,7 +221,7 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         None => quality::Source::Table(
             prepared
                 .predictor(resolved, view)?
-                .ok_or("there is no quality.table and no quality.network")
+                .ok_or("there is no paper.errors")
                 .or_fail(ExitKind::Config)?,
         ),
     };
@@ -258,13 +260,13 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
                 },
                 MapSettings::default(),
                 // In space the views have to agree: what is seen badly in one is nobody there.
-                2.0 * resolved.deployment.pose.least_heat,
+                2.0 * resolved.deployment.network.least_heat,
             )
         }),
         plans,
         has_quality: resolved.deployment.has_quality(),
-        quality_deadline: Duration::from_millis(resolved.deployment.quality.deadline_ms),
-        quality_max_age: Duration::from_millis(resolved.deployment.quality.max_age_ms),
+        quality_deadline: deployment::paper::ERRORS_DEADLINE,
+        quality_max_age: deployment::paper::ERRORS_MAX_AGE,
         frame_step: resolved.deployment.capture.frame_step.max(1),
         frame_rate_hz: resolved.frame_rate_hz(),
         n_consumers: topology.receivers_of(&topic::pair_pose(worker)),
@@ -325,7 +327,6 @@ fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let job = results::Job {
         scene,
         config: deployment.results.clone(),
-        smooth: deployment.smooth.clone(),
         output: deployment.output.clone(),
         start_frame: deployment.capture.start_frame,
         n_workers: topology.n_workers(),
@@ -404,7 +405,7 @@ mod tests {
 
     #[test]
     fn every_process_of_a_deployment_has_a_name() {
-        let text = "name = 'a'\nrig = 'r'\noutput = 'o'\nmodel = 'm'\n[quality]\nnetwork = 'shipped'\n\
+        let text = "name = 'a'\nrig = 'r'\noutput = 'o'\nmethod = 'paper'\n[paper]\nerrors = 'shipped'\n\
             [[camera]]\nname = 'b'\nsource = 's'\n[[camera]]\nname = 'c'\nsource = 's'\n";
         let loaded = Loaded::parse(text, Path::new("d.toml"), &[], &AnyMachine).unwrap();
         let recording = RecordingPlan {
