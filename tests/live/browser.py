@@ -148,7 +148,7 @@ def footage(parallax, folder, seconds, rate):
     for line in map(json.loads, open(f"{folder}/people.jsonl")):
         people[line["image"]] = line["joints"]
     text = f'name = "view-{os.getpid()}"\nrig = "rig.toml"\noutput = "out"\n[capture]\nframe_rate_hz = {rate}\n' \
-        'pace = "realtime"\nmode = "realtime"\n'
+        'mode = "realtime"\n'
     for camera in sorted(os.listdir(f"{folder}/cameras")):
         shown, found = f"{folder}/shown/{camera}", f"{folder}/found/{camera}"
         os.makedirs(shown); os.makedirs(found)

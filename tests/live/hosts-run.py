@@ -8,9 +8,9 @@ n_frames = int(seconds * rate)
 SET = os.environ.get("SET", "").split()
 if os.environ.get("FILTERS"):
     # Light enough for a busy machine: small frames, the filters, tracked.
-    SET += ["pose.network=none", "pose.search=tracked", "capture.scale=0.4", "capture.upright=true"]
+    SET += ["method=paper", "paper.search=tracked", "capture.scale=0.4", "capture.upright=true"]
     if carry == "poses":
-        SET.append("fuse.views=pairs")
+        SET.append("paper.views=pairs")
 # By how much the hosts' monotonic clocks are ahead of the fusing one's, seconds.
 CLOCKS = {"left": 5000, "right": 900000}
 LIMBS = [("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist")]

@@ -161,7 +161,7 @@ impl<'a> Camera<'a> {
             }
         }
         let latest = self.pacer.latest_due(now_nanos()).unwrap_or(at);
-        if self.job.mode == Mode::Lossless || latest <= at {
+        if self.job.mode.is_lossless() || latest <= at {
             return Ok(0);
         }
         let n = supply.skip(latest - at);

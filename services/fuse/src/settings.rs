@@ -1,23 +1,18 @@
-//! From the section `[fuse]` of a deployment to the settings of the optimiser.
+//! From the section `[paper]` of a deployment to the settings of the optimiser.
 
 use consistency::Learned;
-use deployment::fuse::{Config, Energy, Switch, Tau, TauName, Views};
+use deployment::Views;
+use deployment::paper::{Config, Energy, Switch, Tau, TauName};
 use deployment::person::Follow;
 use multiview::{EnergyKind, Settings, SwitchBy};
 use viewquality::TrainingErrors;
 
 /// The settings of the optimiser.
 ///
-/// * `n_candidates`: most candidates that a view offers.
 /// * `frame_scale`: pixels of the frame per pixel of the footage, in which `tau` is given.
 /// * `learned`: the content of the file `consistency`; its weights are those of the paper's energy where this
 ///   says nothing else.
-pub fn settings(
-    config: &Config,
-    n_candidates: usize,
-    frame_scale: f32,
-    learned: Option<&Learned>,
-) -> Settings {
+pub fn settings(config: &Config, frame_scale: f32, learned: Option<&Learned>) -> Settings {
     let scaled = |px: Vec<f32>| px.into_iter().map(|it| it * frame_scale).collect();
     let (energy, defaults) = match config.energy {
         Energy::Paper => (EnergyKind::Paper, Settings::default()),
@@ -40,11 +35,6 @@ pub fn settings(
         energy,
         alpha: config.alpha.unwrap_or(defaults.alpha),
         beta: config.beta.unwrap_or(defaults.beta),
-        max_distance_cells: config
-            .max_distance_cells
-            .unwrap_or(defaults.max_distance_cells),
-        max_iterations: config.max_iterations,
-        epsilon_px: config.epsilon_px,
         tau_px: scaled(tau_px(&config.tau)),
         tau_tenths: tau_tenths.map_or_else(Vec::new, |it| it.tau_tenths.clone()),
         rescue_px: scaled(rescue_px(&config.tau)),
@@ -54,7 +44,8 @@ pub fn settings(
             Switch::Worse => SwitchBy::Worse,
         },
         facing: config.facing,
-        n_candidates,
+        n_candidates: config.candidates,
+        ..defaults
     }
 }
 
@@ -120,10 +111,7 @@ mod tests {
     #[test]
     fn the_defaults_are_those_of_the_optimiser() {
         let expected = Settings::default();
-        assert_eq!(
-            settings(&Config::default(), expected.n_candidates, 1.0, None),
-            expected
-        );
+        assert_eq!(settings(&Config::default(), 1.0, None), expected);
     }
 
     #[test]
@@ -150,7 +138,7 @@ mod tests {
             ..Config::default()
         };
         assert_eq!(
-            settings(&config, 1, 1.0, None).alpha,
+            settings(&config, 1.0, None).alpha,
             Settings::released().alpha
         );
     }

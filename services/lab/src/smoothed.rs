@@ -2,9 +2,8 @@
 
 use std::path::Path;
 
-use deployment::smooth::Config;
 use failure::{ExitKind, Failure, in_file};
-use motion::finished::Run;
+use motion::finished::{self, Run};
 use motion::judge::{self, Errors, Sum};
 use motion::live;
 use motion::{Joint, Motion, Recorded, Role, Settings, butterworth};
@@ -64,7 +63,11 @@ type Tried = (Errors, Sum);
 /// # Errors
 ///
 /// The truth cannot be read, is of several sequences, or of none of the frames or joints.
-pub fn against(run: &Run, settings: &Config, truth_file: &Path) -> Result<Comparison, Failure> {
+pub fn against(
+    run: &Run,
+    settings: &finished::Settings,
+    truth_file: &Path,
+) -> Result<Comparison, Failure> {
     let truth = truth(truth_file, &run.recorded, &run.frames)?;
     Ok(compare(&run.recorded, settings, &truth))
 }
@@ -123,7 +126,7 @@ fn truth(
 /// * `truth`: of every joint and instant.
 pub fn compare(
     recorded: &Recorded,
-    settings: &Config,
+    settings: &finished::Settings,
     truth: &[Vec<Option<Vector3<f64>>>],
 ) -> Comparison {
     let tried = tried(recorded, settings, truth);
@@ -146,7 +149,7 @@ pub fn compare(
 /// The errors of every method at every instant.
 fn tried(
     recorded: &Recorded,
-    settings: &Config,
+    settings: &finished::Settings,
     truth: &[Vec<Option<Vector3<f64>>>],
 ) -> Vec<Vec<Tried>> {
     let fill_s = settings.fill_s;

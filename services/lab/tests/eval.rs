@@ -208,9 +208,9 @@ fn impossible_evaluations_are_refused() {
         (&["--versions", "fnp"], 2, "fnp"),
         (&["--size", "12"], 2, "WIDTHxHEIGHT"),
         (&["--share", "1-0.5"], 2, "nothing lies between"),
-        (&["--fuse", "wrong.toml"], 3, "alhpa"),
-        (&["--fuse", "beyond.toml"], 3, "`fuse.alpha` is -1"),
-        (&["--fuse", "none.toml"], 4, "none.toml"),
+        (&["--paper", "wrong.toml"], 3, "alhpa"),
+        (&["--paper", "beyond.toml"], 3, "`paper.alpha` is -1"),
+        (&["--paper", "none.toml"], 4, "none.toml"),
         (&["walk.toml"], 2, "twice"),
         (&["nowhere"], 4, "nowhere"),
         (&["a"], 4, "neither a folder of HumanEva-I"),
@@ -254,7 +254,7 @@ fn an_unusable_consistency_file_is_refused() {
             4,
             "parallax-consistency",
         ),
-        (&["--fuse", "learned.toml"], 3, "--consistency"),
+        (&["--paper", "learned.toml"], 3, "--consistency"),
     ] {
         let ended = eval(&case, more);
         let (code_found, stderr) = (ended.status.code(), &ended.stderr);
@@ -300,10 +300,10 @@ mod long {
 
         case.write(
             "hall.toml",
-            "consistency = \"a.consistency\"\nconsistency_rig = \"hall\"\n",
+            "consistency = { file = \"a.consistency\", rig = \"hall\" }\n",
         );
         let used = ["eval", "people", "--scale", "0.4", "--out", "out", "--json"];
-        let versions = ["--versions", "appearance", "--fuse", "hall.toml"];
+        let versions = ["--versions", "appearance", "--paper", "hall.toml"];
         let used = case.start(&[&used[..], &versions].concat()).wait();
         assert_eq!(used.status.code(), Some(0), "{}", used.stderr);
     }

@@ -66,12 +66,7 @@ fn a_written_deployment_runs_and_a_live_scene_gives_the_same_bits() {
     assert!(!case.path("live/cameras").exists(), "no pictures");
     let truth = |folder: &str| fs::read_to_string(case.path(folder).join("truth.jsonl")).unwrap();
     assert_eq!(truth("live"), truth("files"));
-    let lossless = [
-        "--set",
-        "capture.mode=lossless",
-        "--set",
-        "capture.pace=fast",
-    ];
+    let lossless = ["--set", "capture.mode=lossless"];
     let (ended, live) = run(&case, "live", &lossless);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert_eq!(live, from_files);

@@ -2,7 +2,7 @@
 
 use deployment::Deployment;
 use deployment::capture::Mode;
-use deployment::pose::Config;
+use deployment::network::Config;
 
 /// Frames that are farther apart are not of a person whom a box could follow, seconds: boxes are looked for in every one.
 pub const FOLLOWED_S: f64 = 0.4;
@@ -10,9 +10,9 @@ pub const FOLLOWED_S: f64 = 0.4;
 /// In every n-th frame of a view boxes are looked for: as the deployment says, else by the rate.
 ///
 /// * `rate_hz`: of the frames that are looked at.
-pub(crate) fn find_every(pose: &Config, rate_hz: Option<f64>) -> u64 {
-    let by_rate = || find_every_at(rate_hz, pose.detector.is_some());
-    pose.find_every.unwrap_or_else(by_rate)
+pub(crate) fn find_every(config: &Config, rate_hz: Option<f64>) -> u64 {
+    let by_rate = || find_every_at(rate_hz, config.detector.is_some());
+    config.find_every.unwrap_or_else(by_rate)
 }
 
 /// In every n-th frame boxes are looked for.
@@ -33,7 +33,8 @@ fn find_every_at(rate_hz: Option<f64>, has_detector: bool) -> u64 {
 /// are made, and where no frame is left out, however long it takes.
 pub(crate) fn search_share(deployment: &Deployment) -> Option<f64> {
     const SHARE: f64 = 0.125;
-    let is_free = deployment.pose.find_every.is_none() && deployment.capture.mode == Mode::Realtime;
+    let is_free =
+        deployment.network.find_every.is_none() && deployment.capture.mode == Mode::Realtime;
     is_free.then_some(SHARE)
 }
 

@@ -4,14 +4,18 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use bridge::{Address, KeyFiles, NearHost, ViewMaps};
-use deployment::Deployment;
 use deployment::hosts::{Carry, Host};
+use deployment::paper::Errors;
+use deployment::{Deployment, network};
 use failure::{ExitKind, Failure, OrFail as _};
 use hosts::Fingerprint;
 use messages::topic;
 
 use crate::prepare::{Prepared, View};
 use crate::resolved::Resolved;
+
+/// Largest uncertainty of another host's clock without a warning, as a share of the time between two frames.
+const MAX_CLOCK_SHARE: f64 = 0.1;
 
 /// The host that this machine is: the one that is named, or the one with the name of the machine. None for a deployment without
 /// hosts.
@@ -96,41 +100,36 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     let mut all = Fingerprint::default();
     all.add_text("version of Parallax", env!("CARGO_PKG_VERSION"));
     all.add("rig", &read(&deployment.rig)?);
-    all.add("model", &inputs::model_bytes(deployment.model.as_deref())?);
-    let pose = &deployment.pose;
-    let springs = deployment.has_maps().then(|| pose.springs.clone());
-    let named = [
-        ("pose.network", &pose.network),
-        ("pose.network_card", &pose.network_card),
-        ("pose.detector", &pose.detector),
-        ("pose.detector_card", &pose.detector_card),
-        ("pose.springs", &springs),
-        ("quality.network", &deployment.quality.network),
-    ];
-    let mut files: Vec<(String, &Path)> = Vec::new();
-    for (what, file) in named {
-        files.extend(file.as_deref().map(|file| (what.to_owned(), file)));
-    }
-    for camera in &deployment.cameras {
-        let own = [
-            ("network", &camera.network),
-            ("network_card", &camera.network_card),
-        ];
-        for (what, file) in own {
-            let what = format!("{what} of camera {:?}", camera.name);
-            files.extend(file.as_deref().map(|file| (what, file)));
-        }
-    }
+    let config = &deployment.network;
+    let mut files: Vec<(&str, &Path)> = Vec::new();
+    let settings = if deployment.has_maps() {
+        files.push(("network.springs", &config.springs));
+        let networks = deployment.pose_networks().into_iter();
+        files.extend(networks.map(|file| ("network.file", file)));
+        let detector = config.detector.as_deref();
+        files.extend(detector.map(|file| ("network.detector", file)));
+        serde_json::to_vec(&without_files(config))
+    } else {
+        let paper = &deployment.paper;
+        all.add("paper.model", &inputs::model_bytes(paper.model.as_deref())?);
+        let errors = paper.errors.as_ref();
+        let network = errors.and_then(Errors::network);
+        files.extend(network.map(|file| ("paper.errors", file.as_path())));
+        serde_json::to_vec(&(paper.search, paper.candidates))
+    };
     for (what, file) in files {
         if deployment::is_shipped(file) {
-            all.add_text(&what, "shipped");
-        } else {
-            all.add(&what, &read(file)?);
+            all.add_text(what, "shipped");
+            continue;
+        }
+        all.add(what, &read(file)?);
+        if let Some(card) = inputs::card_beside(file) {
+            all.add(&format!("the card of {what}"), &read(&card)?);
         }
     }
+    all.add_text("method", deployment.method.name());
     if deployment.link.carry == Carry::Poses {
-        let settings = serde_json::to_vec(&results_settings(pose));
-        all.add("pose", &settings.or_fail(ExitKind::Run)?);
+        all.add(deployment.method.name(), &settings.or_fail(ExitKind::Run)?);
     }
     let hosts = deployment.hosts.iter();
     let views: Vec<String> = hosts
@@ -152,18 +151,14 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     Ok(all)
 }
 
-/// The settings of the search that its results depend on, without the names of files, which may lie elsewhere on every host.
-fn results_settings(pose: &deployment::pose::Config) -> deployment::pose::Config {
-    deployment::pose::Config {
-        orientation: PathBuf::new(),
-        network: None,
-        network_card: None,
+/// The settings that the joints of a view depend on, without the names of files, which may lie elsewhere on every host.
+fn without_files(config: &network::Config) -> network::Config {
+    network::Config {
+        file: PathBuf::new(),
         detector: None,
-        detector_card: None,
         springs: PathBuf::new(),
         onnx_runtime: None,
-        threads: 1,
-        ..pose.clone()
+        ..config.clone()
     }
 }
 
@@ -222,7 +217,7 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
                 .map(|view| topology.receivers_of(&topic(view)))
                 .collect(),
             patience: resolved.patience(),
-            max_clock_share: deployment.link.max_clock_share,
+            max_clock_share: MAX_CLOCK_SHARE,
             file: deployment.output.join("hosts.json"),
         })
     } else {
@@ -269,7 +264,7 @@ mod tests {
         let text = format!(
             "name = 'a'\nrig = 'r'\noutput = '/o'\n\
              [[camera]]\nname = 'c0'\nsource = 's'\n[[camera]]\nname = 'c1'\nsource = 's'\n\
-             [capture]\nmode = 'realtime'\npace = 'realtime'\nframe_rate_hz = 5.0\n{hosts}"
+             [capture]\nmode = 'realtime'\nframe_rate_hz = 5.0\n{hosts}"
         );
         let loaded = Loaded::parse(&text, Path::new("d.toml"), &[], &AnyMachine);
         loaded.unwrap().deployment

@@ -133,7 +133,7 @@ mod tests {
 
     fn parse(set: &str) -> Result<Loaded, ConfigError> {
         let file = Path::new("deployment.toml");
-        let set = ["pose.network=none".to_owned(), set.to_owned()];
+        let set = [set.to_owned()];
         Loaded::parse(SHORT, file, &set, &ThisMachine)
     }
 
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn paths_become_absolute() {
-        let deployment = parse("pose.threads=1").unwrap().deployment;
+        let deployment = parse("runtime.threads=1").unwrap().deployment;
         assert!(
             deployment.rig.is_absolute() && Path::new(&deployment.cameras[0].source).is_absolute()
         );

@@ -28,6 +28,8 @@ use crate::vertical;
 /// Where the iterations of a main loop are comparable (a frame, or a level of a pair): how many times the processor time
 /// of the longest iteration so far an iteration may take.
 const MAX_WORK_FACTOR: u32 = 3;
+/// The window in which restarts of a process are counted.
+const RESTART_WINDOW: Duration = Duration::from_mins(1);
 
 /// Resolves a deployment: gives cameras that have keypoints alone grey footage, reads the metadata of its footage, checks footage and calibration against each other, finds the
 /// vertical if it is not given, and logs warnings.
@@ -154,7 +156,7 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
             },
         });
     let delivery = resolved.delivery();
-    let held_frames = if resolved.deployment.has_network() && delivery == Delivery::Realtime {
+    let held_frames = if resolved.deployment.predicts_errors() && delivery == Delivery::Realtime {
         quality::HELD_REALTIME
     } else {
         1
@@ -293,7 +295,7 @@ pub(crate) fn plan(
         processes,
         policy: Policy {
             max_restarts: settings.max_restarts as usize,
-            restart_window: Duration::from_secs(settings.restart_window_s),
+            restart_window: RESTART_WINDOW,
             hang_limit: Duration::from_secs(resolved.deployment.hang_limit_s()),
             stopped_limit: HEARTBEAT * settings.missed_beats,
             ..Policy::default()

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use consistency::Learned;
 use deployment::Deployment;
+use deployment::paper::Errors;
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::{Framing, OutSize, Rig, upright_roll};
@@ -63,9 +64,9 @@ impl Prepared {
     fn read(resolved: &Resolved) -> Result<Self, Failure> {
         let deployment = &resolved.deployment;
         let model = if deployment.has_maps() {
-            inputs::springs(&deployment.pose.springs)?
+            inputs::springs(&deployment.network.springs)?
         } else {
-            inputs::model_or_shipped(deployment.model.as_deref())?
+            inputs::model_or_shipped(deployment.paper.model.as_deref())?
         };
         let rig = inputs::rig_of(deployment)?;
         let (mut views, mut sizes) = (Vec::new(), Vec::new());
@@ -108,12 +109,13 @@ impl Prepared {
         resolved: &Resolved,
         view: usize,
     ) -> Result<Option<Predictor>, Failure> {
-        let config = &resolved.deployment.quality;
-        let Some(file) = &config.table else {
+        let errors = resolved.deployment.paper.errors.as_ref();
+        let Some(config) = errors.and_then(Errors::table) else {
             return Ok(None);
         };
+        let file = &config.table;
         let table = inputs::quality_table(file, self.model.n_parts())?;
-        let name = config.name_in_table(&resolved.deployment.cameras[view].name);
+        let name = config.name_of(&resolved.deployment.cameras[view].name);
         let predictor = Predictor::from_table(&table, quality::selection(config), name);
         let predictor = predictor.map_err(|error| failure::in_file(file, &error))?;
         Ok(Some(predictor))
@@ -133,16 +135,18 @@ impl Prepared {
     fn check_quality(&self, resolved: &Resolved) -> Result<(), Failure> {
         let deployment = &resolved.deployment;
         inputs::check_maps(deployment)?;
+        let paper = &deployment.paper;
+        let errors = paper.errors.as_ref();
         let is_shipped =
-            |file: &Option<PathBuf>| file.as_deref().is_some_and(deployment::is_shipped);
-        let has_other_model = deployment.model.is_some() && !is_shipped(&deployment.model);
-        if has_other_model && is_shipped(&deployment.quality.network) {
+            |file: Option<&PathBuf>| file.is_some_and(|file| deployment::is_shipped(file));
+        let has_other_model = paper.model.is_some() && !is_shipped(paper.model.as_ref());
+        if has_other_model && is_shipped(errors.and_then(Errors::network)) {
             tracing::warn!(
-                "quality.network is the one that ships, which was trained on what the model that ships finds; \
+                "paper.errors is the one that ships, which was trained on what the model that ships finds; \
                  of another model's poses it knows nothing"
             );
         }
-        inputs::quality_network(&resolved.deployment.quality, self.model.n_parts())?;
+        inputs::quality_network(errors, self.model.n_parts())?;
         let capture = &resolved.deployment.capture;
         for (view, footage) in resolved.footage.iter().enumerate() {
             let Some(predictor) = self.predictor(resolved, view)? else {
@@ -152,8 +156,8 @@ impl Prepared {
             if !(0..footage.n_frames).any(|it| predictor.sigma_px(frame(it)).is_some()) {
                 tracing::warn!(
                     view = self.views[view].name,
-                    "quality.table has no row for any frame of this view: see quality.frame_offset \
-                     and quality.frame_step; every part counts as usable"
+                    "the table of paper.errors has no row for any frame of this view: see its frame_offset \
+                     and frame_step; every part counts as usable"
                 );
             }
         }
@@ -217,25 +221,18 @@ fn settings(
 ) -> Result<EstimatorSettings, Failure> {
     let scales = views.iter().map(|it| frame_scale(&it.framing));
     let frame_scale = scales.sum::<f64>() / views.len().max(1) as f64;
-    let learned = inputs::learned(deployment.fuse.consistency.as_deref(), model)?;
+    let consistency = deployment.paper.consistency.as_ref();
+    let learned = inputs::learned(consistency.map(|named| named.file().as_path()), model)?;
     let names: Vec<&str> = views.iter().map(|it| it.name.as_str()).collect();
-    let tables = inputs::pair_tables(&deployment.fuse, learned.as_ref(), model, &names)?;
-    let mut config = deployment.fuse.clone();
-    if let deployment::fuse::Tau::File(tau) = &config.tau {
-        config.tau = deployment::fuse::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
+    let tables = inputs::pair_tables(&deployment.paper, learned.as_ref(), model, &names)?;
+    let mut config = deployment.paper.clone();
+    if let deployment::paper::Tau::File(tau) = &config.tau {
+        config.tau = deployment::paper::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
     }
     let n_thresholds = fuse::tau_px(&config.tau).len();
     if ![0, model.n_parts()].contains(&n_thresholds) {
         let message = format!(
-            "`fuse.tau` has {n_thresholds} thresholds, the model has {} parts",
-            model.n_parts()
-        );
-        return Err(Failure::new(ExitKind::Config, message));
-    }
-    let part = deployment.results.epipolar_part;
-    if !(1..=model.n_parts()).contains(&part) {
-        let message = format!(
-            "`results.epipolar_part` is {part}, the model has parts 1 to {}",
+            "`paper.tau` has {n_thresholds} thresholds, the model has {} parts",
             model.n_parts()
         );
         return Err(Failure::new(ExitKind::Config, message));
@@ -245,16 +242,11 @@ fn settings(
             orientation: if deployment.has_maps() {
                 None
             } else {
-                inputs::orientation(&deployment.pose.orientation, model)?
+                inputs::orientation(&deployment.paper.orientation, model)?
             },
-            ..pose::settings(&deployment.pose)
+            ..pose::settings(&deployment.paper)
         },
-        fuse: fuse::settings(
-            &config,
-            deployment.pose.candidates,
-            frame_scale as f32,
-            learned.as_ref(),
-        ),
+        fuse: fuse::settings(&config, frame_scale as f32, learned.as_ref()),
         tables,
         views: fuse::views(deployment.views()),
         follow: fuse::follow(deployment.person.follow),
@@ -267,29 +259,24 @@ fn skeleton_settings(
     learned: Option<&Learned>,
 ) -> Result<SkeletonSettings, Failure> {
     let defaults = SkeletonSettings::default();
-    let config = &deployment.triangulate;
-    let joints = JointSet::by_name(&config.joints).unwrap_or(defaults.joints);
+    let config = &deployment.paper;
+    let joints = JointSet::by_name(&deployment.person.joints).unwrap_or(defaults.joints);
     let joint_map = if deployment.has_maps() {
         // The joints themselves are parts.
         None
     } else {
-        inputs::Joints::of(&config.joint_map, deployment.model.as_deref())?.map(learned, joints)
+        inputs::Joints::of(&config.joint_map, config.model.as_deref())?.map(learned, joints)
     };
     Ok(SkeletonSettings {
         joints,
         joint_map,
-        triangulation: geometry::Settings {
-            loss_px: config.loss_px,
-            ..defaults.triangulation
-        },
-        error_weight: config.error_weight,
         combine: triangulate::combine(config.combine),
         body: if config.bodies {
             defaults.body
         } else {
             BodySettings::NONE
         },
-        facing: deployment.fuse.facing,
+        facing: config.facing,
         ..defaults
     })
 }
@@ -298,19 +285,18 @@ fn skeleton_settings(
 pub(crate) fn space_settings(resolved: &Resolved, prepared: &Prepared) -> SpaceStepSettings {
     let deployment = &resolved.deployment;
     let skeleton = &prepared.settings.skeleton;
-    // Networks name the sides of the body.
-    let decides_sides = resolved.sides_as_seen && deployment.fuse.facing;
     SpaceStepSettings {
         space: SpaceSettings {
             as_seen: resolved.sides_as_seen,
             ..SpaceSettings::default()
         },
         // In space the views have to agree: what is seen badly in one is nobody there.
-        least_heat: 2.0 * deployment.pose.least_heat,
+        least_heat: 2.0 * deployment.network.least_heat,
         least_score: least_score(deployment),
         joints: skeleton.joints,
         body: skeleton.body,
-        sides: decides_sides.then_some(skeleton.sides),
+        // Others name the sides of the body.
+        sides: resolved.sides_as_seen.then_some(skeleton.sides),
         ..SpaceStepSettings::default()
     }
 }
@@ -324,7 +310,7 @@ pub(crate) fn frame_scale(framing: &Framing) -> f64 {
 /// Least score of somebody whom a view sees well; none with the filters, which have scores of their own.
 pub(crate) fn least_score(deployment: &Deployment) -> f32 {
     if deployment.has_maps() {
-        MapSettings::default().score_of_heat(deployment.pose.least_heat)
+        MapSettings::default().score_of_heat(deployment.network.least_heat)
     } else {
         f32::NEG_INFINITY
     }

@@ -6,7 +6,6 @@ pub(crate) mod view_step;
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
 
 use deployment::Stage;
 use failure::{ExitKind, Failure, OrFail as _};
@@ -131,7 +130,7 @@ pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Resul
         service.health().spin_after(frame);
     }
     let n_threads = if name == Name::Pose {
-        resolved.deployment.pose.threads
+        resolved.deployment.runtime.threads
     } else {
         1
     };
@@ -174,7 +173,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         skew_nanos: live::skew_nanos(resolved, view),
         framing: framing(resolved, &rig, view)?,
         mode: deployment.capture.mode,
-        pace: deployment.capture.pace,
+        pace: deployment.capture.mode.pace(),
         n_consumers: resolved.topology().receivers_of(&topic::frame(view)),
         patience: resolved.patience(),
     };
@@ -211,7 +210,10 @@ pub(crate) fn most_apart(resolved: &Resolved) -> Option<f64> {
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let network = inputs::quality_network(&resolved.deployment.quality, prepared.model.n_parts())?;
+    let network = inputs::quality_network(
+        resolved.deployment.paper.errors.as_ref(),
+        prepared.model.n_parts(),
+    )?;
     let source = match network {
         Some(network) => quality::Source::Network(Box::new(quality::NetworkSource {
             forecaster: Forecaster::new(network),
@@ -221,7 +223,7 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         None => quality::Source::Table(
             prepared
                 .predictor(resolved, view)?
-                .ok_or("there is no quality.table and no quality.network")
+                .ok_or("there is no paper.errors")
                 .or_fail(ExitKind::Config)?,
         ),
     };
@@ -264,8 +266,8 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
         )),
         plans,
         has_quality: resolved.deployment.has_quality(),
-        quality_deadline: Duration::from_millis(resolved.deployment.quality.deadline_ms),
-        quality_max_age: Duration::from_millis(resolved.deployment.quality.max_age_ms),
+        quality_deadline: deployment::paper::ERRORS_DEADLINE,
+        quality_max_age: deployment::paper::ERRORS_MAX_AGE,
         frame_step: resolved.deployment.capture.frame_step.max(1),
         n_consumers: topology.receivers_of(&topic::pair_pose(worker)),
         patience: resolved.patience(),
@@ -340,7 +342,6 @@ fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let job = results::Job {
         scene,
         config: deployment.results.clone(),
-        smooth: deployment.smooth.clone(),
         output: deployment.output.clone(),
         start_frame: deployment.capture.start_frame,
         n_workers: topology.n_workers(),
@@ -419,7 +420,7 @@ mod tests {
 
     #[test]
     fn every_process_of_a_deployment_has_a_name() {
-        let text = "name = 'a'\nrig = 'r'\noutput = 'o'\nmodel = 'm'\n[quality]\nnetwork = 'shipped'\n\
+        let text = "name = 'a'\nrig = 'r'\noutput = 'o'\nmethod = 'paper'\n[paper]\nerrors = 'shipped'\n\
             [[camera]]\nname = 'b'\nsource = 's'\n[[camera]]\nname = 'c'\nsource = 's'\n";
         let loaded = Loaded::parse(text, Path::new("d.toml"), &[], &AnyMachine).unwrap();
         let recording = RecordingPlan {

@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use deployment::{Deployment, RecordingPlan, Stage};
+use deployment::paper::{Consistency, Errors};
+use deployment::{Deployment, Method, RecordingPlan, Stage};
 use failure::{ExitKind, Failure, OrFail as _};
 use messages::topic;
 use recording::{About, Damaged, Kind, Recording, Without};
@@ -68,7 +69,10 @@ pub fn stage(prepared: &Prepared) -> record::Stage {
 /// Fingerprints (FNV-1a) of the input files of a deployment, without its footage.
 pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, u64>, Failure> {
     let mut files = BTreeMap::new();
-    for file in [Some(&deployment.rig), deployment.quality.table.as_ref()]
+    let paper = &deployment.paper;
+    let errors = paper.errors.as_ref();
+    let table = errors.and_then(Errors::table);
+    for file in [Some(&deployment.rig), table.map(|table| &table.table)]
         .into_iter()
         .flatten()
     {
@@ -76,24 +80,27 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
             files::read(file, files::MODEL).map_err(|error| failure::in_file(file, &error))?;
         files.insert(file.clone(), checksum::fnv1a(&bytes));
     }
-    let orientation = &deployment.pose.orientation;
-    let orientation = (!deployment::is_none(orientation)).then(|| orientation.clone());
-    let joint_map = &deployment.triangulate.joint_map;
-    let joint_map = (!deployment::is_none(joint_map)).then(|| joint_map.clone());
-    for (kind, file) in [
-        (Shipped::Model, &deployment.model),
-        (Shipped::Network, &deployment.quality.network),
-        (Shipped::Consistency, &deployment.fuse.consistency),
-        (Shipped::Orientation, &orientation),
-        (Shipped::Joints, &joint_map),
-        (Shipped::PoseNetwork, &deployment.pose.network),
-    ] {
-        let Some(file) = file else { continue };
+    let by_paper = deployment.method == Method::Paper;
+    let of_paper = [
+        (Shipped::Model, paper.model.as_ref()),
+        (Shipped::Network, errors.and_then(Errors::network)),
+        (
+            Shipped::Consistency,
+            paper.consistency.as_ref().map(Consistency::file),
+        ),
+        (Shipped::Orientation, Some(&paper.orientation)),
+        (Shipped::Joints, Some(&paper.joint_map)),
+    ];
+    let of_paper = of_paper.into_iter().filter(|_| by_paper);
+    let named = of_paper.filter_map(|(kind, file)| Some((kind, file?.as_path())));
+    let named = named.filter(|(_, file)| !deployment::is_none(file));
+    let networks = deployment.pose_networks().into_iter();
+    for (kind, file) in named.chain(networks.map(|file| (Shipped::PoseNetwork, file))) {
         // The deployment calls all shipped files "shipped".
         let name = if deployment::is_shipped(file) {
             kind.name()
         } else {
-            file.clone()
+            file.to_owned()
         };
         files.insert(name, checksum::fnv1a(&kind.read(file)?));
     }

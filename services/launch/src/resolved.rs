@@ -131,9 +131,10 @@ impl Resolved {
 
     /// The delivery of messages to receivers that are slower than their senders.
     pub fn delivery(&self) -> Delivery {
-        match self.deployment.capture.mode {
-            deployment::capture::Mode::Lossless => Delivery::Lossless,
-            deployment::capture::Mode::Realtime => Delivery::Realtime,
+        if self.deployment.capture.mode.is_lossless() {
+            Delivery::Lossless
+        } else {
+            Delivery::Realtime
         }
     }
 

@@ -1,6 +1,6 @@
 //! The scheduling that processes of a deployment request, without what the system denies.
 
-use deployment::{Policy, Runtime};
+use deployment::Runtime;
 use runtime::{Denied, RealTime, Scheduling};
 use supervise::ProcessSpec;
 
@@ -10,10 +10,7 @@ const POLLING: [&str; 4] = ["pose", "quality", "fuse", "triangulate"];
 
 /// The scheduling that a process requests. Settings of the process take precedence over those of its service.
 pub(crate) fn requested(settings: &Runtime, service: &str, process: &str) -> Scheduling {
-    let policy = match settings.policy {
-        Policy::Fifo => runtime::Policy::Fifo,
-        Policy::RoundRobin => runtime::Policy::RoundRobin,
-    };
+    let policy = runtime::Policy::Fifo;
     let cores = settings.cores.get(process).or(settings.cores.get(service));
     let priority = settings.priority.get(process);
     let priority = priority.or(settings.priority.get(service));
@@ -158,11 +155,11 @@ mod tests {
 
     #[test]
     fn capture_and_results_do_not_poll() {
-        let text = "spin = true\npolicy = \"round-robin\"\npriority = { capture = 2 }";
+        let text = "spin = true\npriority = { capture = 2 }";
         for process in ["pose-0", "quality-0", "fuse-1", "triangulate"] {
             assert_eq!(scheduling_of(text, process), "spin");
         }
-        assert_eq!(scheduling_of(text, "capture-0"), "round-robin=2");
+        assert_eq!(scheduling_of(text, "capture-0"), "fifo=2");
         assert_eq!(scheduling_of(text, "results"), "");
     }
 }

@@ -108,7 +108,7 @@ impl Report {
                 .filter(|it| it.counts.refused.iter().any(|n| *n > 0))
                 .map(|it| (it.name.clone(), it.counts.refused))
                 .collect(),
-            is_lossless: resolved.deployment.capture.mode == deployment::capture::Mode::Lossless,
+            is_lossless: resolved.deployment.capture.mode.is_lossless(),
             views: ViewReport::all(resolved, outcome, recorded.summary()),
             budget: resolved
                 .deployment

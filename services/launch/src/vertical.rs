@@ -253,7 +253,7 @@ struct View<'a> {
 
 impl<'a> Images<'a> {
     fn new(deployment: &Deployment, cameras: &'a [Camera]) -> Result<Self, Failure> {
-        let model = inputs::model_or_shipped(deployment.model.as_deref())?;
+        let model = inputs::model_or_shipped(deployment.paper.model.as_deref())?;
         // Nobody can be found in the grey pictures of cameras that have keypoints alone.
         let views = deployment.cameras.iter();
         let views = views

@@ -31,7 +31,7 @@ Examples:
     parallax publish my.toml udp://127.0.0.1:9000       its skeletons as datagrams, for programs of any language
     parallax top                                        where the time of a running deployment goes
     parallax record my.toml --out run.mcap              like run, and records every message
-    parallax replay run.mcap --from fuse --set fuse.alpha=2     runs the later stages again, with another value
+    parallax replay run.mcap --from fuse --set paper.alpha=2     runs the later stages again, with another value
     parallax export out/my --to c3d,glb,bvh             the run in the files of other tools
     parallax chaos                                      faults injected into a deployment, and what held
     parallax bench transport                            how long a message takes from process to process

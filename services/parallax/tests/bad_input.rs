@@ -57,7 +57,7 @@ fn deployment_files() {
             broken: |it| it.edit("deployment.toml", "workers", "wrokers"),
             arguments: DRY,
             code: 3,
-            words: &["deployment.toml:19", "wrokers", "did you mean `workers`"],
+            words: &["deployment.toml:21", "wrokers", "did you mean `workers`"],
         },
         Row {
             what: "unknown key, in a run",
@@ -273,9 +273,9 @@ fn tables_of_expected_errors() {
         Row {
             what: "expected errors with a NaN",
             broken: |it| {
-                let quality =
-                    "[quality]\ntable = \"q.csv\"\nsubject = \"s\"\naction = \"w\"\n[results]";
-                it.edit("deployment.toml", "[results]", quality);
+                let errors = "workers = 2\n\
+                    errors = { table = \"q.csv\", subject = \"s\", action = \"w\" }";
+                it.edit("deployment.toml", "workers = 2", errors);
                 let row = |view, third| format!("s,w,0,{view},1,2,{third}{}\n", ",4".repeat(23));
                 it.write("q.csv", row('a', "3") + &row('b', "nan"));
             },
@@ -288,8 +288,8 @@ fn tables_of_expected_errors() {
             broken: |it| {
                 it.edit(
                     "deployment.toml",
-                    "[results]",
-                    "[quality]\ntable = \"q.csv\"\n[results]",
+                    "workers = 2",
+                    "workers = 2\nerrors = { table = \"q.csv\" }",
                 );
                 let parts: Vec<String> = (1..27).map(|part| format!("part_{part}")).collect();
                 let (parts, row) = (parts.join(","), ",1".repeat(26));
@@ -305,12 +305,13 @@ fn tables_of_expected_errors() {
         Row {
             what: "a name for a camera that is not there",
             broken: |it| {
-                let quality = "[quality]\nviews = { z = \"C1\" }\n[results]";
-                it.edit("deployment.toml", "[results]", quality);
+                let errors = "workers = 2\n\
+                    errors = { table = \"q.csv\", views = { z = \"C1\" } }";
+                it.edit("deployment.toml", "workers = 2", errors);
             },
             arguments: DRY,
             code: 3,
-            words: &["quality.views", "\"z\"", "[[camera]]"],
+            words: &["paper.errors.views", "\"z\"", "[[camera]]"],
         },
     ]);
 }
@@ -340,7 +341,7 @@ fn thresholds() {
             },
             arguments: DRY,
             code: 3,
-            words: &["`fuse.tau` has 2 thresholds", "26 parts"],
+            words: &["`paper.tau` has 2 thresholds", "26 parts"],
         },
     ]);
 }
@@ -350,7 +351,7 @@ fn part_type_tables() {
     check(&[Row {
         what: "part-type table with a NaN",
         broken: |it| {
-            let tables = "workers = 2\n[[fuse.compatibility]]\nviews = [\"a\", \"b\"]\n\
+            let tables = "workers = 2\n[[paper.compatibility]]\nviews = [\"a\", \"b\"]\n\
                               files = [\"ab.csv\", \"ba.csv\"]";
             it.edit("deployment.toml", "workers = 2", tables);
             let rows: Vec<String> = (2..54)

@@ -185,7 +185,7 @@ fn parts_of_deployment_files_are_accepted() {
         );
     }
     assert!(n > 3, "only {n} blocks are marked");
-    let refused = show("[fuse]\nalfa = 1\n");
+    let refused = show("[paper]\nalfa = 1\n");
     assert_eq!(refused.status.code(), Some(3), "an unknown key is accepted");
 }
 
@@ -258,7 +258,18 @@ fn show(text: &str) -> Output {
     let is_whole =
         text.lines().any(|line| line.starts_with("name = ")) && !text.trim_start().starts_with('[');
     let base = if is_whole { "" } else { BASE };
-    fs::write(folder.path().join("my.toml"), format!("{base}\n{text}")).unwrap();
+    // Keys of no section stand before the first camera.
+    let sections = if text.starts_with('[') {
+        0
+    } else {
+        text.find("\n[").unwrap_or(text.len())
+    };
+    let (top, sections) = text.split_at(sections);
+    fs::write(
+        folder.path().join("my.toml"),
+        format!("{top}\n{base}\n{sections}"),
+    )
+    .unwrap();
     let arguments = ["config", "show", "my.toml"].map(str::to_owned);
     run(Program::Parallax, folder.path(), &arguments)
 }

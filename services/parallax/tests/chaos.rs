@@ -74,7 +74,7 @@ mod long {
     #[test]
     fn in_a_realtime_run_a_hung_process_is_detected_by_its_missing_progress() {
         // The time limit alone would detect it after ten minutes.
-        let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+        let live = PACED.replace("\"paced\"", "\"realtime\"");
         let patient = format!("{live}[supervise]\nhang_limit_s = 600\n");
         let case = Case::new("chaos-spin", &[240; 3], &patient);
         let (ended, report) = chaos(&case, "spin-pose,spin-fuse,spin-triangulate", &PATIENT);
@@ -141,7 +141,7 @@ mod long {
 
     #[test]
     fn a_failing_camera_is_reported_and_recovers_and_a_stalled_results_process_delays_no_other() {
-        let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+        let live = PACED.replace("\"paced\"", "\"realtime\"");
         let case = Case::new("chaos-camera", &[160; 3], &live);
         let (ended, report) = chaos(&case, "camera-unplug,camera-clock,stall-results", &PATIENT);
         let [unplug, clock, stall] = &report["scenarios"].as_array().unwrap()[..] else {

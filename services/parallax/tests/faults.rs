@@ -115,7 +115,7 @@ fn a_terminated_pose_process_is_restarted() {
 
 #[test]
 fn a_terminated_quality_process_is_restarted() {
-    let more = PACED.to_owned() + "[quality]\ntable = \"q.csv\"\n";
+    let more = PACED.to_owned() + "errors = { table = \"q.csv\" }\n";
     let run = Signalled::new(&more, "INT", "quality --index 1");
     run.assert_every_frame();
     assert_eq!(run.incomplete(), Vec::<&Value>::new());
@@ -188,7 +188,7 @@ fn a_killed_triangulation_process_loses_few_frames_and_they_are_counted() {
 
 #[test]
 fn every_frame_of_a_live_run_has_one_line_after_triangulation_is_killed() {
-    let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+    let live = PACED.replace("\"paced\"", "\"realtime\"");
     let run = Signalled::new(&live, "KILL", "triangulate");
     let frames = run.frames();
     let expected: Vec<u64> = (0..frames.len() as u64).collect();
@@ -218,7 +218,7 @@ fn a_suspended_pose_process_is_detected_and_no_frame_is_lost() {
 
 #[test]
 fn a_live_run_continues_without_a_suspended_view_until_it_is_back() {
-    let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+    let live = PACED.replace("\"paced\"", "\"realtime\"");
     // Long enough for results without the view before the suspended process is restarted.
     let more = live + "[supervise]\nmissed_beats = 12\nmax_restarts = 9\n";
     let case = Case::new("pose-1", &[240; 3], &more);

@@ -159,7 +159,7 @@ mod long {
     #[test]
     fn who_runs_is_followed_over_half_a_second_without_a_search() {
         let case = case("apart", "jogging", 2);
-        run(&case, &["--set", "pose.find_every=1000"]);
+        run(&case, &["--set", "network.find_every=1000"]);
         let (error, share) = judged(&case, &Isometry3::identity());
         // Measured: 0.016 m, all; a search of every frame gives 0.017 m.
         assert!(error < 0.03 && share > 0.95, "{error} m, {share}");

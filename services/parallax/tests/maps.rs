@@ -182,11 +182,7 @@ fn case(name: &str, views: [Option<Named>; 4]) -> Case {
         }
     }
     // The shipped model is not needed: the detector says where to look.
-    case.edit(
-        "deployment.toml",
-        "model = \"model.plx\"\n",
-        "pose = { network = \"net.onnx\", detector = \"det.onnx\" }\n",
-    );
+    case.set_network("file = \"net.onnx\"\ndetector = \"det.onnx\"");
     case
 }
 
@@ -395,22 +391,20 @@ fn a_detector_that_finds_nobody_leaves_no_result_and_says_so() {
 }
 
 #[test]
-fn what_belongs_to_filters_is_refused_beside_a_network() {
+fn what_belongs_to_the_papers_method_is_refused_beside_a_network() {
     let case = case("beside", [Some(as_it_is as Named); 4]);
     for (set, words) in [
-        ("quality.network=shipped", "quality.network"),
-        ("fuse.consistency=shipped", "fuse.consistency"),
-        ("pose.network_card=nowhere.toml", "nowhere.toml"),
+        ("paper.errors=shipped", "set `method = \"paper\"`"),
+        ("paper.consistency=shipped", "set `method = \"paper\"`"),
+        (
+            "paper.views=all",
+            "`paper.views` belongs to the paper's method",
+        ),
     ] {
         let ended = run(&case, &["--set", set]);
         assert_ne!(ended.status.code(), Some(0), "{set}");
         assert!(ended.stderr.contains(words), "{set}: {}", ended.stderr);
     }
-    let ended = case
-        .start(&["run", "deployment.toml", "--set", "fuse.views=all"])
-        .wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    all_are_near(&case, 0.15);
 }
 
 /// Where a keypoint is in a frame: a joint of that name, or something at its ankle, between the hips, or at the head.

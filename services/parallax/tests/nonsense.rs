@@ -123,19 +123,6 @@ const CALIBRATIONS: &[Row] = &[
 /// Wrong numbers in deployment files.
 const SETTINGS: &[Row] = &[
     (
-        "a part that the model has not",
-        |it| {
-            it.edit(
-                "deployment.toml",
-                "[results]",
-                "[results]\nepipolar_part = 99",
-            );
-        },
-        CHECK,
-        3,
-        &["`results.epipolar_part` is 99", "parts 1 to 26"],
-    ),
-    (
         "no deadline",
         |it| {
             it.edit(

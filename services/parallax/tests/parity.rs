@@ -28,7 +28,7 @@ fn turned_resized_and_distorted_frames() {
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let one = OneProcess {
         upright_size: Some([120, 140]),
-        ..OneProcess::default()
+        ..in_pairs()
     };
     one.assert_same(&case, 3, 20);
 }
@@ -39,14 +39,13 @@ fn the_released_energy() {
     let case = Case::new("released", &[20; 3], &more);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let config = deployment::fuse::Config {
-        energy: deployment::fuse::Energy::Released,
-        ..deployment::fuse::Config::default()
+    let config = deployment::paper::Config {
+        energy: deployment::paper::Energy::Released,
+        ..deployment::paper::Config::default()
     };
-    let n_candidates = deployment::pose::Config::default().candidates;
     let one = OneProcess {
         settings: EstimatorSettings {
-            fuse: fuse::settings(&config, n_candidates, 1.0, None),
+            fuse: fuse::settings(&config, 1.0, None),
             views: Views::Pairs,
             ..EstimatorSettings::default()
         },
@@ -71,11 +70,11 @@ fn parts_switched_off_with_all_views_at_once() {
     switched_off("expected-at-once", AT_ONCE, Views::All);
 }
 
-/// * `fuse`: further lines of the section `[fuse]`.
+/// * `fuse`: further lines of the section `[paper]`.
 fn switched_off(name: &str, fuse: &str, views: Views) {
     let more = PLAIN.to_owned()
         + fuse
-        + "tau = { file = \"tau.txt\" }\n[quality]\ntable = \"q.csv\"\nframe_offset = 100\n\
+        + "tau = { file = \"tau.txt\" }\n[paper.errors]\ntable = \"q.csv\"\nframe_offset = 100\n\
            frame_step = 2\nviews = { a = \"C1\", b = \"C2\" }\n";
     let case = Case::new(name, &[10; 3], &more);
     case.write("tau.txt", format!("# all alike\n{}", "5\n".repeat(26)));
@@ -90,15 +89,14 @@ fn switched_off(name: &str, fuse: &str, views: Views) {
     case.write("q.csv", table);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let config = deployment::fuse::Config {
-        tau: deployment::fuse::Tau::Given(vec![5.0; 26]),
-        ..deployment::fuse::Config::default()
+    let config = deployment::paper::Config {
+        tau: deployment::paper::Tau::Given(vec![5.0; 26]),
+        ..deployment::paper::Config::default()
     };
-    let n_candidates = deployment::pose::Config::default().candidates;
     let one = OneProcess {
         settings: EstimatorSettings {
             views,
-            fuse: fuse::settings(&config, n_candidates, 1.0, None),
+            fuse: fuse::settings(&config, 1.0, None),
             ..EstimatorSettings::default()
         },
         sigma_px: Some(sigma_px),
@@ -154,34 +152,32 @@ fn all_views_at_once_after_the_end_of_the_first_views_footage() {
 
 #[test]
 fn tracked_poses() {
-    let tracked = "[pose]\nsearch = \"tracked\"\ntracked_full_every = 6\n\
-                   tracked_margin = 0.1\ntracked_levels = 1\n";
-    for (name, window) in [("all", "\"all\""), ("window", "1")] {
-        let more = format!("{PLAIN}{tracked}evidence_window = {window}\n");
-        let case = Case::new(&format!("tracked-{name}"), &[20; 3], &more);
-        let ended = case.run();
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-        let pose: deployment::pose::Config = toml::from_str(&format!(
-            "{}evidence_window = {window}\n",
-            tracked.trim_start_matches("[pose]\n")
-        ))
-        .unwrap();
-        let one = OneProcess {
-            settings: EstimatorSettings {
-                view: pose::settings(&pose),
-                views: Views::Pairs,
-                ..EstimatorSettings::default()
-            },
-            ..OneProcess::default()
-        };
-        one.assert_same(&case, 3, 20);
-        let lines = case.lines("pose2d.jsonl");
-        let n_full = lines.iter().filter(|it| it["search"] == "full").count();
-        let n_tracked = lines.iter().filter(|it| it["search"] == "tracked").count();
-        // Frames 0, 6, 12 and 18 at least.
-        assert!(n_full >= 12 && n_tracked > 0, "{n_full} {n_tracked}");
-        assert_eq!(n_full + n_tracked, 60);
-    }
+    let case = Case::new(
+        "tracked",
+        &[20; 3],
+        &format!("{PLAIN}search = \"tracked\"\n"),
+    );
+    let ended = case.run();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let config: deployment::paper::Config = toml::from_str("search = \"tracked\"").unwrap();
+    let one = OneProcess {
+        settings: EstimatorSettings {
+            view: pose::settings(&config),
+            views: Views::Pairs,
+            ..EstimatorSettings::default()
+        },
+        ..OneProcess::default()
+    };
+    one.assert_same(&case, 3, 20);
+    let lines = case.lines("pose2d.jsonl");
+    let n_full = lines.iter().filter(|line| line["search"] == "full").count();
+    let n_tracked = lines
+        .iter()
+        .filter(|line| line["search"] == "tracked")
+        .count();
+    // Frames 0 and 10 at least.
+    assert!(n_full >= 6 && n_tracked > 0, "{n_full} {n_tracked}");
+    assert_eq!(n_full + n_tracked, 60);
 }
 
 #[test]

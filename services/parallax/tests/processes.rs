@@ -183,7 +183,7 @@ fn an_output_folder_belongs_to_one_run_at_a_time() {
     // A dead run does not block a new one, and its lines are complete.
     signal("KILL", started.id());
     assert_eq!(started.wait_among_others().status.code(), None);
-    let more = ["--set", "capture.pace=\"fast\""];
+    let more = ["--set", "capture.mode=lossless"];
     let ended = second.start(&[&["run", "deployment.toml"][..], &into, &more].concat());
     let ended = ended.wait_among_others();
     assert_ne!(ended.status.code(), Some(1), "{}", ended.stderr);

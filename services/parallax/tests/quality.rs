@@ -68,7 +68,7 @@ fn step_of(plan: &ViewPlan) -> (ViewStep, Arc<Layout>) {
 
 #[test]
 fn the_service_and_the_library_predict_the_same() {
-    let more = PLAIN.to_owned() + "[quality]\nnetwork = \"q.onnx\"\n";
+    let more = PLAIN.to_owned() + "errors = \"q.onnx\"\n";
     let case = Case::new("network", &[8; 2], &more);
     let file = network(0.02).file();
     case.write("q.onnx", &file);
@@ -167,7 +167,7 @@ fn a_joint_follows_the_views_with_small_expected_errors() {
 
 #[test]
 fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
-    let more = PLAIN.to_owned() + "[quality]\nnetwork = \"q.onnx\"\n";
+    let more = PLAIN.to_owned() + "errors = \"q.onnx\"\n";
     let case = Case::new("unfit", &[2; 2], &more);
     let said = |file: &[u8]| {
         case.write("q.onnx", file);
@@ -188,35 +188,11 @@ fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
 }
 
 #[test]
-fn missing_parts_of_onnx_runtime_are_reported_before_anything_starts() {
-    let said = |name: &str, more: &str, status: i32| {
-        let section = format!("[quality]\nnetwork = \"q.onnx\"\n{more}\n");
-        let case = Case::new(name, &[2; 2], &(PLAIN.to_owned() + &section));
-        case.write("q.onnx", network(0.02).file());
-        let ended = case.start(&["config", "check", "deployment.toml"]).wait();
-        assert_eq!(ended.status.code(), Some(status), "{}", ended.stderr);
-        ended.stderr
-    };
-    let (status, missing) = if cfg!(feature = "ort") {
-        (4, "nowhere.so: ONNX Runtime cannot be used")
-    } else {
-        (3, "build it with --features ort")
-    };
-    let stderr = said("no-library", "onnx_runtime = \"nowhere.so\"", status);
-    assert!(
-        stderr.contains(missing) && stderr.contains("nowhere.so"),
-        "{stderr}"
-    );
-    let stderr = said("no-gpu", "device = \"cuda\"", 3);
-    assert!(stderr.contains("`quality.device`"), "{stderr}");
-}
-
-#[test]
 fn a_prediction_that_never_ends_is_detected_by_its_missing_progress() {
     // The time limit alone would detect it after ten minutes.
-    let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
+    let more = "[capture]\nupright = false\nmode = \"realtime\"\n\
                 frame_rate_hz = 20\n[results]\noverlay_every = 0\n\
-                [quality]\nnetwork = \"q.onnx\"\n[supervise]\nhang_limit_s = 600\n";
+                [paper]\nerrors = \"q.onnx\"\n[supervise]\nhang_limit_s = 600\n";
     let case = Case::new("endless", &[240; 2], more);
     case.write("q.onnx", network(0.02).file());
     let chaos = ["chaos", "deployment.toml", "--scenario", "spin-quality"];
@@ -246,9 +222,9 @@ mod long {
 
     #[test]
     fn no_frame_waits_for_a_suspended_network() {
-        let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
+        let more = "[capture]\nupright = false\nmode = \"realtime\"\n\
                     frame_rate_hz = 5\n[results]\noverlay_every = 0\n\
-                    [quality]\nnetwork = \"q.onnx\"\ndeadline_ms = 200\nmax_age_ms = 1500\n\
+                    [paper]\nerrors = \"q.onnx\"\n\
                     [supervise]\nmissed_beats = 1000\n";
         let case = Case::new("stopped", &[100; 2], more);
         case.write("q.onnx", network(0.02).file());

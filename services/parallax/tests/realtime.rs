@@ -7,9 +7,9 @@ use common::started::signal;
 use common::{Case, Ended, last_taken};
 use serde_json::{Value, json};
 
-const LIVE: &str = "[results]\noverlay_every = 0\n[fuse]\nworkers = 2\n\
+const LIVE: &str = "[results]\noverlay_every = 0\n[paper]\nworkers = 2\n\
                     [capture]\nupright = false\nmode = \"realtime\"\n";
-const PACED: &str = "pace = \"realtime\"\nframe_rate_hz = 20\n";
+const PACED: &str = "frame_rate_hz = 20\n";
 
 /// The report and the results of a run.
 struct Finished {

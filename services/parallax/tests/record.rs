@@ -64,11 +64,11 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     }
     // Another setting gives another result, so results are computed and not copied from the recording.
     let other = ["--from", "fuse", "--out", "other", "--set"];
-    let ended = replayed(&case, &[&other[..], &["triangulate.loss_px=0.01"]].concat());
+    let ended = replayed(&case, &[&other[..], &["paper.alpha=0.2"]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let [before, after] = ["out", "other"].map(|it| text(&case.path(it), "pose3d.jsonl"));
     assert!(before != after);
-    let ended = replayed(&case, &[&other[..], &["pose.candidates=1"]].concat());
+    let ended = replayed(&case, &[&other[..], &["paper.candidates=1"]].concat());
     assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
     assert!(
         ended.stderr.contains("given by the recording"),

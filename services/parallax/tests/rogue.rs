@@ -246,7 +246,7 @@ fn a_foreign_process_cannot_publish_another_type_or_beside_the_right_sender() {
 #[test]
 fn invalid_poses_and_evidence_are_refused() {
     // With lossless delivery the run would wait for the frames that the killed process had received.
-    let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+    let live = PACED.replace("\"paced\"", "\"realtime\"");
     let (case, mut started, rogue) = start("poses", &live);
     let poses: Publisher<ViewPose> = rogue.replace(&mut started, "pose --index 1", |bus| {
         bus.publisher(&topic::view_pose(1))

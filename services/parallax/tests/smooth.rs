@@ -31,7 +31,7 @@ fn case() -> Case {
     let case = Case::with_rig(scene.rig(), "smooth", &[0; 3], "");
     let mut text = format!(
         "name = {:?}\nrig = \"rig.toml\"\noutput = \"out\"\n[capture]\nframe_rate_hz = {RATE_HZ:?}\n\
-         [smooth]\nlive = \"kalman\"\n[results]\noverlay_every = 0\n",
+         [results]\noverlay_every = 0\nsmooth = true\n",
         case.name
     );
     let mut random = fastrand::Rng::with_seed(3);
@@ -142,12 +142,12 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
             > 10
     );
     assert_angles(&case);
-    // Without `live` the next run has nothing smoothed, not what an earlier one has left.
+    // Without `smooth` the next run has nothing smoothed, not what an earlier one has left.
     let off = [
         "run",
         "deployment.toml",
         "--set",
-        "smooth.live=off",
+        "results.smooth=false",
         "--set",
         "capture.n_frames=3",
     ];

@@ -1,29 +1,15 @@
-//! From the section `[pose]` of a deployment to the settings of the single-view step.
+//! From the section `[paper]` of a deployment to the settings of the single-view step.
 
-use deployment::pose::{All, Config, Search, Window};
+use deployment::paper::{Config, Search};
 use fmp::TrackSettings;
-use pipeline::{EvidenceWindow, ViewSettings};
+use pipeline::ViewSettings;
 
 /// The settings of the single-view step, without what is read of files.
 pub fn settings(config: &Config) -> ViewSettings {
     ViewSettings {
-        window: match config.evidence_window {
-            Window::All(All::All) => EvidenceWindow::All,
-            Window::Levels(reach) => EvidenceWindow::Around(reach),
-        },
         n_candidates: config.candidates,
-        min_separation: config.min_separation,
-        track: (config.search == Search::Tracked).then_some(TrackSettings {
-            levels: config.tracked_levels,
-            margin: config.tracked_margin,
-            full_every: config.tracked_full_every,
-            max_gap: config.tracked_max_gap,
-            max_drop: config.tracked_max_drop,
-            speed: config.tracked_speed,
-            max_gap_s: config.tracked_max_gap_ms / 1000.0,
-            full_every_s: config.tracked_full_every_ms / 1000.0,
-        }),
-        orientation: None,
+        track: (config.search == Search::Tracked).then(TrackSettings::default),
+        ..ViewSettings::default()
     }
 }
 
@@ -37,7 +23,7 @@ mod tests {
     }
 
     #[test]
-    fn who_asks_for_tracking_by_name_gets_its_defaults() {
+    fn the_tracked_search_is_that_of_the_filters() {
         let config: Config = toml::from_str("search = \"tracked\"").unwrap();
         assert_eq!(settings(&config).track, Some(TrackSettings::default()));
     }

@@ -1,15 +1,15 @@
-//! From the section `[quality]` of a deployment to the rows of its table.
+//! From `paper.errors` of a deployment to the rows of its table.
 
-use deployment::quality::Config;
+use deployment::paper::ErrorTable;
 use viewquality::Selection;
 
-/// Which rows of the table are meant.
-pub fn selection(config: &Config) -> Selection {
+/// The rows of the table that are of the footage.
+pub fn selection(table: &ErrorTable) -> Selection {
     Selection {
-        subject: config.subject.clone().unwrap_or_default(),
-        action: config.action.clone().unwrap_or_default(),
-        frame_offset: config.frame_offset,
-        frame_step: config.frame_step,
+        subject: table.subject.clone().unwrap_or_default(),
+        action: table.action.clone().unwrap_or_default(),
+        frame_offset: table.frame_offset,
+        frame_step: table.frame_step,
     }
 }
 
@@ -19,12 +19,14 @@ mod tests {
 
     #[test]
     fn frames_are_counted_as_the_file_says() {
-        let config = Config {
+        let table = ErrorTable {
+            table: "t.csv".into(),
+            subject: None,
+            action: None,
+            views: [].into(),
             frame_offset: 80,
             frame_step: 4,
-            ..Config::default()
         };
-        assert_eq!(selection(&config).table_frame(3), Some(92));
-        assert_eq!(selection(&Config::default()), Selection::default());
+        assert_eq!(selection(&table).table_frame(3), Some(92));
     }
 }

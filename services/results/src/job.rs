@@ -13,8 +13,6 @@ pub struct Job {
     pub scene: Scene,
     /// Which files to write.
     pub config: Config,
-    /// What is smoothed while the run lasts.
-    pub smooth: deployment::smooth::Config,
     /// The output folder.
     pub output: PathBuf,
     /// First frame of the footage that is used.

@@ -19,6 +19,8 @@ use crate::{
     Absent, Folder, FolderError, FrameRecord, Latency, Scene, overlay, pose2d, pose3d, times, trc,
 };
 
+/// Part whose epipolar lines are drawn.
+const EPIPOLAR_PART: usize = 6;
 const TRC: &str = "pose3d.trc";
 /// Bytes reserved for the files written at the end: several times what sixteen views need.
 const RESERVED_BYTES: usize = 32 << 10;
@@ -80,8 +82,11 @@ impl Output {
         }
         let (pose3d_jsonl, pose2d_jsonl) = (lines(FrameLine::FILE)?, lines(ViewLine::FILE)?);
         let times_jsonl = lines(TimesLine::FILE)?;
-        let has_trc = config.trc && scene.frame_rate_hz.is_some();
-        let trc_rows = if has_trc { Some(lines(TRC)?) } else { None };
+        let trc_rows = if scene.frame_rate_hz.is_some() {
+            Some(lines(TRC)?)
+        } else {
+            None
+        };
         let overlays = if config.overlay_every > 0 {
             Some(folder.folder("overlays")?)
         } else {
@@ -94,7 +99,7 @@ impl Output {
             pose3d_csv,
             trc_rows,
             overlays,
-            epipolar_part: config.epipolar_part.saturating_sub(1),
+            epipolar_part: EPIPOLAR_PART.min(scene.model.n_parts().saturating_sub(1)),
             latency: Latency::new(n_workers)?,
             tally: Tally::resume(&scene, &folder.part(FrameLine::FILE)),
             scene,
@@ -103,18 +108,15 @@ impl Output {
         })
     }
 
-    /// Also writes smoothed joints, if the settings ask for them.
+    /// Also writes smoothed joints.
     ///
     /// # Errors
     ///
     /// [`OutputError`].
-    pub fn smooth(&mut self, settings: &deployment::smooth::Config) -> Result<(), OutputError> {
-        let (scene, folder) = (&self.scene, &mut self.folder);
-        let file = || folder.file(SmoothLine::FILE).map_err(io::Error::other);
-        self.smoothing = Smoothing::begin(scene, settings, file)?;
-        if self.smoothing.is_some() {
-            self.folder.reserve(SmoothReport::FILE, RESERVED_BYTES)?;
-        }
+    pub fn smooth(&mut self) -> Result<(), OutputError> {
+        let file = self.folder.file(SmoothLine::FILE)?;
+        self.smoothing = Some(Smoothing::begin(&self.scene, file)?);
+        self.folder.reserve(SmoothReport::FILE, RESERVED_BYTES)?;
         Ok(())
     }
 

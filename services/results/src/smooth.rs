@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io;
 
-use deployment::smooth::{Config, Live};
-use motion::live::Smoother;
+use motion::live::{FILL_S, Smoother};
 use motion::{Measured, Smoothed, State, lines};
 use runfiles::{FrameLine, JointLine, SmoothReport, SmoothedJoint};
 
@@ -22,39 +21,29 @@ pub(crate) struct Smoothing {
     counts: Vec<SmoothedJoint>,
     n_frames: u64,
     n_unsure: usize,
-    settings: Config,
     rate_hz: Option<f64>,
     file: Lines,
 }
 
 impl Smoothing {
-    /// * Returns none if nothing is to be smoothed.
-    pub(crate) fn begin(
-        scene: &Scene,
-        settings: &Config,
-        file: impl FnOnce() -> io::Result<File>,
-    ) -> io::Result<Option<Self>> {
-        if settings.live == Live::Off {
-            return Ok(None);
-        }
+    pub(crate) fn begin(scene: &Scene, file: File) -> io::Result<Self> {
         let joints = scene.joints.joints.iter().map(|it| it.name.to_owned());
         let names: Vec<String> = joints
             .chain(scene.extra_keypoints.iter().cloned())
             .collect();
         let known: Vec<&str> = names.iter().map(String::as_str).collect();
-        Ok(Some(Self {
-            smoother: Smoother::new(&known, settings.fill_s),
+        Ok(Self {
+            smoother: Smoother::new(&known, FILL_S),
             n_joints: scene.joints.joints.len(),
             counts: vec![SmoothedJoint::default(); names.len()],
             n_frames: 0,
             n_unsure: 0,
-            settings: settings.clone(),
             rate_hz: scene
                 .frame_rate_hz
                 .map(|it| it / scene.frame_step.max(1) as f64),
-            file: Lines::new(file()?)?,
+            file: Lines::new(file)?,
             names,
-        }))
+        })
     }
 
     /// Smooths the joints of a frame, and writes its line. A frame without a time is taken for one of a run at 30 Hz: the delay
@@ -88,9 +77,9 @@ impl Smoothing {
         let joints = self.names.iter().cloned().zip(self.counts.iter().copied());
         SmoothReport {
             delay_ms: self.smoother.delay_s().unwrap_or(0.0) * 1000.0,
-            fill_s: self.settings.fill_s,
+            fill_s: FILL_S,
             joints: joints.collect(),
-            method: self.settings.live.name().to_owned(),
+            method: "kalman".to_owned(),
             n_frames: self.n_frames,
             rate_hz: self.rate_hz,
             schema_version: runfiles::VERSION,

@@ -49,7 +49,9 @@ impl Writer {
         let (overlay_every, frame_step) = (job.config.overlay_every, job.scene.frame_step);
         let output = Output::begin(job.scene, &job.config, job.n_workers, folder);
         let mut output = output.or_fail(kind)?;
-        output.smooth(&job.smooth).or_fail(kind)?;
+        if job.config.smooth {
+            output.smooth().or_fail(kind)?;
+        }
         let next = output.next_frame().unwrap_or(job.start_frame);
         let (queue, batches) = bounded(QUEUE);
         let n_missed = Arc::new(AtomicU64::new(0));

@@ -1,6 +1,6 @@
-//! From the section `[triangulate]` of a deployment to the settings of the skeleton step.
+//! From the section `[paper]` of a deployment to the settings of the skeleton step.
 
-use deployment::triangulate::Combine;
+use deployment::paper::Combine;
 
 /// How a view's pose is made of those of its pairs.
 pub fn combine(from: Combine) -> pipeline::Combine {
@@ -12,17 +12,15 @@ pub fn combine(from: Combine) -> pipeline::Combine {
 
 #[cfg(test)]
 mod tests {
-    use deployment::triangulate::Config;
+    use deployment::{paper, person};
     use pipeline::SkeletonSettings;
 
     use super::*;
 
     #[test]
     fn the_defaults_are_those_of_the_step() {
-        let (config, step) = (Config::default(), SkeletonSettings::default());
-        assert_eq!(config.loss_px, step.triangulation.loss_px);
-        assert_eq!(config.error_weight, step.error_weight);
-        assert_eq!(combine(config.combine), step.combine);
-        assert_eq!(config.joints, step.joints.name);
+        let step = SkeletonSettings::default();
+        assert_eq!(combine(paper::Config::default().combine), step.combine);
+        assert_eq!(person::Config::default().joints, step.joints.name);
     }
 }

@@ -81,8 +81,7 @@ impl Scene {
             Self {
                 name: resolved.deployment.name.clone(),
                 views: views.collect(),
-                joints: JointSet::by_name(&resolved.deployment.triangulate.joints)
-                    .unwrap_or(&PARSE14),
+                joints: JointSet::by_name(&resolved.deployment.person.joints).unwrap_or(&PARSE14),
                 up: resolved.deployment.up.unwrap_or([0.0, 0.0, 1.0]),
                 frame_rate_hz: resolved.frame_rate_hz(),
                 tells_facing: !resolved.deployment.has_maps(),

@@ -5,23 +5,23 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::capture::{Mode, Pace};
-use crate::complaint::{Complaint, between, demand, whole};
-use crate::{Deployment, fuse};
+use crate::capture::Mode;
+use crate::complaint::{Complaint, demand, whole};
+use crate::{Deployment, Views};
 
 /// A machine of the deployment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Host {
-    /// Its name, for `--host`, in keys and reports; `parallax run` takes the host with the name of the machine.
+    /// Name of the host, for `--host` and reports; a machine of that name takes it by itself.
     pub name: String,
-    /// The cameras that are connected to it, by name.
+    /// The cameras that are connected to the host, by name.
     #[serde(default)]
     pub views: Vec<String>,
-    /// Whether the views are fused here; of exactly one host.
+    /// Whether the views are fused here, as on exactly one host.
     #[serde(default)]
     pub fuses: bool,
-    /// Where the host that fuses listens, `"192.168.1.5:7447"` or a name with a port; the others connect to it.
+    /// Where the host that fuses listens, and the others connect to: `"192.168.1.5:7447"`, or a name with a port.
     pub address: Option<String>,
 }
 
@@ -41,17 +41,14 @@ pub enum Carry {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Link {
-    /// What crosses: `frames` (JPEG, poses are found on the host that fuses) or `poses` (found where the camera is: less data, and
-    /// less work for the host that fuses; with filters in place of a network less accurate).
+    /// What crosses to the host that fuses: `frames` as JPEG, or `poses` that were found where the camera is, which is less data.
     pub carry: Carry,
     /// Quality of the JPEG, 1 to 100.
     pub jpeg_quality: u8,
     /// Folder with `ca.pem`, and `HOST.pem` and `HOST.key` of this host, as `parallax hosts keys` makes them.
     pub keys: Option<PathBuf>,
-    /// Connect without keys: anybody on the network can read the pictures and send others.
+    /// Connect without keys, so that anybody on the network can read the pictures and send others.
     pub insecure: bool,
-    /// Largest uncertainty of another host's clock, as a share of the time between two frames, without a warning.
-    pub max_clock_share: f64,
 }
 
 impl Default for Link {
@@ -61,7 +58,6 @@ impl Default for Link {
             jpeg_quality: 90,
             keys: None,
             insecure: false,
-            max_clock_share: 0.1,
         }
     }
 }
@@ -101,7 +97,7 @@ impl Deployment {
 
     /// Whether the maps of networks cross between hosts with the poses, as Gaussians.
     pub fn maps_cross(&self) -> bool {
-        self.link.carry == Carry::Poses && self.views() == fuse::Views::Space
+        self.link.carry == Carry::Poses && self.has_maps()
     }
 
     /// The name of the part of a deployment that runs on a host: its processes share memory under it.
@@ -113,7 +109,6 @@ impl Deployment {
 /// Checks the hosts of a deployment; without any, only the numbers of the link.
 pub(crate) fn check(it: &Deployment) -> Result<(), Complaint> {
     whole("link.jpeg_quality", it.link.jpeg_quality)?;
-    between("link.max_clock_share", it.link.max_clock_share)?;
     if it.hosts.is_empty() {
         return Ok(());
     }
@@ -224,10 +219,10 @@ fn address(host: &Host) -> Result<(), Complaint> {
 /// Hosts do not wait for one another.
 fn real_time(it: &Deployment) -> Result<(), Complaint> {
     demand(
-        it.capture.mode == Mode::Realtime && it.capture.pace == Pace::Realtime,
+        it.capture.mode == Mode::Realtime,
         "capture.mode",
-        "not \"realtime\" with capture.pace = \"realtime\"",
-        "both, where there are hosts: frames of several machines belong together by their times",
+        "not \"realtime\"",
+        "\"realtime\" where there are hosts: frames of several machines belong together by their times",
     )?;
     demand(
         it.capture.frame_rate_hz.is_some(),
@@ -243,11 +238,11 @@ fn real_time(it: &Deployment) -> Result<(), Complaint> {
         "none: the clocks of hosts are compared while they run",
     )?;
     demand(
-        it.link.carry == Carry::Frames || it.views() != fuse::Views::All,
+        it.link.carry == Carry::Frames || it.views() != Views::All,
         "link.carry",
-        "\"poses\", where `fuse.views` is \"all\"",
-        "\"frames\"; or a network (`fuse.views` = \"space\"), or `fuse.views` = \"pairs\": the evidence of filters, on which all views at \
-         once are solved, does not cross",
+        "\"poses\", where `paper.views` is \"all\"",
+        "\"frames\", or `method = \"network\"`, or `paper.views = \"pairs\"`: the evidence of filters, on which all views at once are solved, \
+         does not cross",
     )
 }
 

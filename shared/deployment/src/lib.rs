@@ -7,21 +7,17 @@
 #![forbid(unsafe_code)]
 
 pub mod capture;
-pub mod fuse;
 pub mod hosts;
+pub mod network;
+pub mod paper;
 pub mod person;
-pub mod pose;
-pub mod quality;
 pub mod results;
-pub mod smooth;
-pub mod triangulate;
 
 mod fault;
 mod processes;
 
 mod clocks;
 mod complaint;
-mod default_network;
 mod entries;
 mod error;
 mod fields;
@@ -31,6 +27,7 @@ mod lists;
 mod live;
 mod load;
 mod machine;
+mod method;
 mod places;
 mod ranges;
 mod reference;
@@ -53,10 +50,11 @@ pub use error::ConfigError;
 pub use keys::keys;
 pub use load::Loaded;
 pub use machine::{AnyMachine, Machine};
-pub use processes::{Policy, Runtime};
+pub use method::{Method, Views};
+pub use processes::Runtime;
 pub use ranges::MAX_CORES;
 pub use reference::reference;
-pub use rules::fuse_numbers;
+pub use rules::energy_numbers;
 pub use schema::{Key, schema};
 pub use shipped::{NONE, SHIPPED, is_none, is_shipped, relative_to};
 pub use timeline::{OwnClock, Timeline};
@@ -68,52 +66,42 @@ pub use topology::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deployment {
-    /// Name of the deployment: its processes share memory under it.
+    /// Name of the deployment, under which its processes share memory.
     pub name: String,
     /// Calibration of the cameras.
     pub rig: PathBuf,
-    /// Unit of the lengths in the calibration, where it is not what its format tells: `"m"`, `"cm"`, `"mm"`, `"ft"`, `"in"`, or a length
-    /// such as `"30mm"`, of a calibration in squares of the board.
+    /// Unit of the lengths in the calibration, where its format tells another: `"m"`, `"cm"`, `"mm"`, `"ft"`, `"in"`, or the side of a square such as `"30mm"`.
     pub unit: Option<String>,
-    /// Direction against gravity in the world of the calibration, `[x, y, z]`; replaces what the file has; found from
-    /// cameras and people where neither gives it.
+    /// Direction against gravity in the world of the calibration, `[x, y, z]`; without it that of the file, else it is found in the pictures.
     pub up: Option<[f64; 3]>,
-    /// Trained model; the one that ships with Parallax without it, or with the word `"shipped"`.
-    pub model: Option<PathBuf>,
+    /// How skeletons are found: by a `network`, or by the filters and the energy of the `paper`.
+    #[serde(default)]
+    pub method: Method,
     /// Folder for the results.
     pub output: PathBuf,
-    /// Where the footage comes from, and how to get it: shown where a file that is named here is missing.
+    /// Where the footage comes from, which is shown where a file is missing.
     pub data: Option<String>,
     /// The cameras, each a `[[camera]]` of its own, in the order in which views are numbered.
     #[serde(rename = "camera")]
     pub cameras: Vec<capture::Camera>,
-    /// The machines, each a `[[host]]` of its own, where one is not enough; none means this machine alone.
+    /// The machines, each a `[[host]]` of its own, where one is not enough.
     #[serde(rename = "host", default, skip_serializing_if = "Vec::is_empty")]
     pub hosts: Vec<hosts::Host>,
     /// How pixels get in.
     #[serde(default)]
     pub capture: capture::Config,
-    /// Who is followed.
+    /// The person who is followed, and the joints.
     #[serde(default)]
     pub person: person::Config,
-    /// The single-view solver.
+    /// Keys of the network's method.
     #[serde(default)]
-    pub pose: pose::Config,
-    /// Expected errors.
+    pub network: network::Config,
+    /// Keys of the paper's method.
     #[serde(default)]
-    pub quality: quality::Config,
-    /// The energy over pairs of views.
-    #[serde(default)]
-    pub fuse: fuse::Config,
-    /// Joints in the world.
-    #[serde(default)]
-    pub triangulate: triangulate::Config,
-    /// What is left behind.
+    pub paper: paper::Config,
+    /// The files of a run.
     #[serde(default)]
     pub results: results::Config,
-    /// Smoothed trajectories.
-    #[serde(default)]
-    pub smooth: smooth::Config,
     /// The connection between hosts.
     #[serde(default)]
     pub link: hosts::Link,
@@ -129,18 +117,15 @@ pub struct Deployment {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Supervision {
-    /// How long a stage waits for a late view; 10000 lossless, 200 realtime.
+    /// How long a stage waits for a late view, milliseconds; without it 10000, or 200 in realtime.
     pub deadline_ms: Option<u64>,
-    /// How long a process may stand still before it is killed, seconds; 120 lossless, 10 realtime.
+    /// How long a process may stand still before it is killed, seconds; without it 120, or 10 in realtime.
     pub hang_limit_s: Option<u64>,
-    /// Signs of life, one every 150 ms, that a stopped process (SIGSTOP) may miss before it is killed; realtime: and
-    /// for how many of them a turn of any but `results` and `record` may compute, however short those before it were.
+    /// Signs of life, one every 150 ms, that a process may miss before it is killed.
     pub missed_beats: u32,
-    /// Restarts of one process within the window before it is given up.
+    /// Restarts of one process within a minute before it is given up.
     pub max_restarts: u32,
-    /// The window in which restarts are counted, seconds.
-    pub restart_window_s: u64,
-    /// A run fails if 1 frame in 100 takes longer from capture to result; none without it.
+    /// Time from capture to result, milliseconds, that at most 1 frame in 100 may exceed, else the run fails.
     pub latency_budget_ms: Option<f64>,
 }
 
@@ -151,37 +136,45 @@ impl Default for Supervision {
             hang_limit_s: None,
             missed_beats: 3,
             max_restarts: 5,
-            restart_window_s: 60,
             latency_budget_ms: None,
         }
     }
 }
 
 impl Deployment {
-    /// Whether networks that find keypoints, or keypoints that other programs found, take the place of the filters.
+    /// Whether the method is the network's, which works on maps of the joints.
     pub fn has_maps(&self) -> bool {
-        let has_own = |it: &capture::Camera| it.network.is_some() || it.keypoints.is_some();
-        self.pose.network.is_some() || self.cameras.iter().any(has_own)
+        self.method == Method::Network
     }
 
-    /// The network of a camera and its card: its own, or that of all; none if it has keypoints.
-    pub fn pose_network(&self, camera: usize) -> Option<(&Path, Option<&Path>)> {
-        let it = &self.cameras[camera];
-        let own = (&it.network, &it.network_card);
-        let of_all = (&self.pose.network, &self.pose.network_card);
-        let (network, card) = if it.network.is_some() { own } else { of_all };
-        let network = network.as_deref().filter(|_| it.keypoints.is_none())?;
-        Some((network, card.as_deref()))
+    /// The network of a camera: its own, or that of all; none if it has keypoints, and by the paper's method.
+    pub fn pose_network(&self, camera: usize) -> Option<&Path> {
+        let camera = &self.cameras[camera];
+        let network = camera.network.as_ref().unwrap_or(&self.network.file);
+        let has_one = self.has_maps() && camera.keypoints.is_none();
+        has_one.then_some(network.as_path())
+    }
+
+    /// The networks of all cameras, each once.
+    pub fn pose_networks(&self) -> Vec<&Path> {
+        let mut networks: Vec<&Path> = Vec::new();
+        for network in (0..self.cameras.len()).filter_map(|camera| self.pose_network(camera)) {
+            if !networks.contains(&network) {
+                networks.push(network);
+            }
+        }
+        networks
     }
 
     /// Whether expected errors are predicted from the frames.
-    pub fn has_network(&self) -> bool {
-        self.quality.network.is_some()
+    pub fn predicts_errors(&self) -> bool {
+        let errors = self.paper.errors.as_ref();
+        errors.is_some_and(|errors| errors.network().is_some())
     }
 
     /// Whether there are processes that send expected errors.
     pub fn has_quality(&self) -> bool {
-        self.quality.table.is_some() || self.has_network()
+        self.paper.errors.is_some()
     }
 
     /// How long a stage waits for a view that is late, milliseconds.
@@ -189,7 +182,7 @@ impl Deployment {
         self.supervise
             .deadline_ms
             .unwrap_or(match self.capture.mode {
-                capture::Mode::Lossless => 10_000,
+                capture::Mode::Lossless | capture::Mode::Paced => 10_000,
                 capture::Mode::Realtime => 200,
             })
     }
@@ -199,7 +192,7 @@ impl Deployment {
         self.supervise
             .hang_limit_s
             .unwrap_or(match self.capture.mode {
-                capture::Mode::Lossless => 120,
+                capture::Mode::Lossless | capture::Mode::Paced => 120,
                 capture::Mode::Realtime => 10,
             })
     }
@@ -209,60 +202,19 @@ impl Deployment {
         for path in [&mut self.rig, &mut self.output] {
             *path = base.join(&path);
         }
-        if let Some(model) = &mut self.model {
-            *model = relative_to(model, base);
-        }
         for camera in &mut self.cameras {
             if !camera.source.is_empty() {
                 camera.source = machine.footage(&camera.source, base);
             }
-            let files = [&mut camera.keypoints, &mut camera.network_card];
-            for file in files.into_iter().flatten() {
-                *file = base.join(&file);
+            if let Some(keypoints) = &mut camera.keypoints {
+                *keypoints = base.join(&keypoints);
             }
             if let Some(network) = &mut camera.network {
                 *network = relative_to(network, base);
             }
         }
         self.link.resolve(base);
-        let quality = &mut self.quality;
-        let files = [&mut quality.table, &mut quality.onnx_runtime];
-        for file in files.into_iter().flatten() {
-            *file = base.join(&file);
-        }
-        let may_ship = [&mut quality.network, &mut self.fuse.consistency];
-        for file in may_ship.into_iter().flatten() {
-            *file = relative_to(file, base);
-        }
-        let pose = &mut self.pose;
-        pose.network = pose.network.take().filter(|it| !is_none(it));
-        if let Some(network) = &mut pose.network {
-            *network = relative_to(network, base);
-        }
-        let files = [
-            &mut pose.network_card,
-            &mut pose.detector,
-            &mut pose.detector_card,
-            &mut pose.onnx_runtime,
-        ];
-        for file in files.into_iter().flatten() {
-            *file = base.join(&file);
-        }
-        pose.springs = relative_to(&pose.springs, base);
-        if !is_none(&self.pose.orientation) {
-            self.pose.orientation = relative_to(&self.pose.orientation, base);
-        }
-        let joint_map = &mut self.triangulate.joint_map;
-        if !is_none(joint_map) {
-            *joint_map = relative_to(joint_map, base);
-        }
-        if let fuse::Tau::File(tau) = &mut self.fuse.tau {
-            tau.file = base.join(&tau.file);
-        }
-        for tables in &mut self.fuse.compatibility {
-            for file in &mut tables.files {
-                *file = base.join(&file);
-            }
-        }
+        self.network.resolve(base);
+        self.paper.resolve(base);
     }
 }

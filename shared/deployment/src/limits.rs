@@ -1,7 +1,7 @@
 //! Sees that every number of a deployment file is in its range, and names those that are doubtful.
 
 use crate::complaint::{Complaint, between, demand, whole};
-use crate::{Deployment, Runtime, capture, fuse, pose};
+use crate::{Deployment, Runtime, capture, paper};
 
 /// Checks every number against the least and the most that it can mean.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
@@ -19,32 +19,16 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
         between("camera.drift_ppm", camera.drift_ppm.unwrap_or(0.0))?;
     }
     capture(&it.capture)?;
-    pose(&it.pose)?;
-    let quality = &it.quality;
-    whole("quality.deadline_ms", quality.deadline_ms)?;
-    whole("quality.max_age_ms", quality.max_age_ms)?;
-    whole("quality.frame_offset", quality.frame_offset)?;
-    whole("quality.frame_step", quality.frame_step)?;
-    let triangulate = &it.triangulate;
-    between("triangulate.loss_px", triangulate.loss_px)?;
-    between("triangulate.error_weight", triangulate.error_weight)?;
-    whole("results.epipolar_part", it.results.epipolar_part)?;
-    let smooth = &it.smooth;
-    between("smooth.cutoff_hz", smooth.cutoff_hz)?;
-    between("smooth.fill_s", smooth.fill_s)?;
+    between("network.least_heat", it.network.least_heat)?;
     supervise(it)
 }
 
-/// Checks the numbers of the section `[fuse]`.
-pub(super) fn fuse(it: &fuse::Config) -> Result<(), Complaint> {
-    between("fuse.alpha", it.alpha.unwrap_or(0.0))?;
-    between("fuse.beta", it.beta.unwrap_or(0.0))?;
-    between("fuse.epsilon_px", it.epsilon_px)?;
-    if let Some(cells) = it.max_distance_cells {
-        between("fuse.max_distance_cells", cells)?;
-    }
-    for &tau in it.tau.given() {
-        between("fuse.tau", f64::from(tau))?;
+/// Checks the numbers of the energy between views.
+pub(super) fn energy(config: &paper::Config) -> Result<(), Complaint> {
+    between("paper.alpha", config.alpha.unwrap_or(0.0))?;
+    between("paper.beta", config.beta.unwrap_or(0.0))?;
+    for &tau in config.tau.given() {
+        between("paper.tau", f64::from(tau))?;
     }
     Ok(())
 }
@@ -56,29 +40,10 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
     if let Some(rate) = it.frame_rate_hz {
         between("capture.frame_rate_hz", rate)?;
     }
-    if let Some(skew) = it.max_skew_ms {
-        between("capture.max_skew_ms", skew)?;
-    }
     whole("capture.start_frame", it.start_frame)?;
     whole("capture.frame_step", it.frame_step)?;
     let n_frames = it.n_frames.unwrap_or(1);
     whole("capture.n_frames", n_frames)
-}
-
-fn pose(it: &pose::Config) -> Result<(), Complaint> {
-    between("pose.min_separation", it.min_separation)?;
-    between("pose.least_heat", it.least_heat)?;
-    between("pose.keypoint_sigma", it.keypoint_sigma)?;
-    between("pose.tracked_margin", it.tracked_margin)?;
-    let drop = f64::from(it.tracked_max_drop);
-    between("pose.tracked_max_drop", drop)?;
-    between("pose.tracked_speed", it.tracked_speed)?;
-    let (gap, every) = (it.tracked_max_gap_ms, it.tracked_full_every_ms);
-    between("pose.tracked_max_gap_ms", gap)?;
-    between("pose.tracked_full_every_ms", every)?;
-    let every = it.tracked_full_every;
-    whole("pose.tracked_full_every", every)?;
-    whole("pose.tracked_max_gap", it.tracked_max_gap)
 }
 
 fn supervise(deployment: &Deployment) -> Result<(), Complaint> {
@@ -87,8 +52,6 @@ fn supervise(deployment: &Deployment) -> Result<(), Complaint> {
     whole("supervise.deadline_ms", deadline)?;
     let hang = it.hang_limit_s.unwrap_or(1);
     whole("supervise.hang_limit_s", hang)?;
-    let window = it.restart_window_s;
-    whole("supervise.restart_window_s", window)?;
     whole("supervise.max_restarts", it.max_restarts)?;
     if let Some(budget) = it.latency_budget_ms {
         between("supervise.latency_budget_ms", budget)?;
@@ -102,7 +65,7 @@ impl Deployment {
     /// * `n_cores`: of the machine, where that is known.
     pub fn doubts(&self, n_cores: Option<usize>) -> Vec<String> {
         let mut doubts = Vec::new();
-        let is_lossless = self.capture.mode == capture::Mode::Lossless;
+        let is_lossless = self.capture.mode.is_lossless();
         let deadline_ms = self.deadline_ms();
         if is_lossless && deadline_ms < 1000 {
             doubts.push(format!(
@@ -126,17 +89,11 @@ impl Deployment {
                 "`capture.frame_rate_hz` is {rate} frames per second: cameras have 1 to 1000"
             ));
         }
-        let loss_px = self.triangulate.loss_px;
-        if !(0.2..=200.0).contains(&loss_px) {
-            doubts.push(format!(
-                "`triangulate.loss_px` is {loss_px}: errors of one pixel and of a hundred then count alike; 10 is usual"
-            ));
-        }
-        let threads = self.pose.threads;
+        let threads = self.runtime.threads;
         let cores = n_cores.unwrap_or(usize::MAX);
         if threads > cores.saturating_mul(4) {
             doubts.push(format!(
-                "`pose.threads` is {threads} in every pose process, of a machine of {cores} cores"
+                "`runtime.threads` is {threads} in every pose process, of a machine of {cores} cores"
             ));
         }
         doubts.extend(self.runtime.doubts());

@@ -1,8 +1,8 @@
 //! What a live camera means for a deployment: nothing waits, and nothing is read again.
 
-use toml::{Table, Value};
+use toml::Table;
 
-use crate::capture::{Camera, Mode, Pace};
+use crate::capture::{Camera, Mode};
 use crate::complaint::demand;
 use crate::{Complaint, Deployment, Machine};
 
@@ -36,28 +36,14 @@ pub(crate) fn settle(
         "given, or `drift_ppm`, for footage",
         &format!("neither: camera {name:?} is live, and footage beside it begins with the run"),
     )?;
-    let said = |key: &str| {
-        given
-            .get("capture")
-            .and_then(|it| it.get(key))
-            .and_then(Value::as_str)
-    };
-    let why = |word: &str| {
-        format!(
-            "\"realtime\", or nothing: camera {name:?} is live, and does not wait, so that a run of it is never {word}"
-        )
-    };
+    let mode = given.get("capture").and_then(|section| section.get("mode"));
     demand(
-        said("mode") != Some("lossless"),
+        mode.is_none() || it.capture.mode == Mode::Realtime,
         "capture.mode",
-        "\"lossless\"",
-        &why("lossless"),
-    )?;
-    demand(
-        said("pace") != Some("fast"),
-        "capture.pace",
-        "\"fast\"",
-        &why("faster than the camera"),
+        &mode.map_or_else(String::new, ToString::to_string),
+        &format!(
+            "\"realtime\", or nothing: camera {name:?} is live, and does not wait, so that a run of it is never lossless"
+        ),
     )?;
     demand(
         it.capture.start_frame == 0,
@@ -65,7 +51,7 @@ pub(crate) fn settle(
         &it.capture.start_frame.to_string(),
         &format!("0: camera {name:?} is live, and has no frames of the past"),
     )?;
-    (it.capture.mode, it.capture.pace) = (Mode::Realtime, Pace::Realtime);
+    it.capture.mode = Mode::Realtime;
     Ok(())
 }
 
@@ -201,10 +187,7 @@ mod tests {
     #[test]
     fn a_live_camera_makes_a_run_one_in_real_time() {
         let it = read(["", "", ""]).unwrap();
-        assert_eq!(
-            (it.capture.mode, it.capture.pace),
-            (Mode::Realtime, Pace::Realtime)
-        );
+        assert_eq!(it.capture.mode, Mode::Realtime);
         assert_eq!(it.deadline_ms(), 200);
         read(["[capture]\nmode = 'realtime'", "", ""]).unwrap();
     }
@@ -213,7 +196,7 @@ mod tests {
     fn what_a_live_camera_cannot_do_is_refused_with_the_reason() {
         for (text, words) in [
             (["[capture]\nmode = 'lossless'", "", ""], "never lossless"),
-            (["[capture]\npace = 'fast'", "", ""], "\"b\" is live"),
+            (["[capture]\nmode = 'paced'", "", ""], "\"b\" is live"),
             (
                 ["[capture]\nstart_frame = 3", "", ""],
                 "`capture.start_frame` is 3",

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use crate::lists::fits;
 use crate::places::{malformed, of_set, place, span_of};
-use crate::{Complaint, ConfigError, Deployment, Machine, default_network, live, rules};
+use crate::{Complaint, ConfigError, Deployment, Machine, live, method, rules};
 
 /// A deployment, and what of it was said by whom.
 #[derive(Debug)]
@@ -49,9 +49,17 @@ impl Loaded {
             let at = place(file, text, span_of(text, &it.key));
             it.at(at)
         };
+        if let Some(stranger) = method::stranger(deployment.method, &given) {
+            let place = if method::stranger(deployment.method, &in_file).is_some() {
+                place(file, text, span_of(text, &stranger.key))
+            } else {
+                format!("--set {}", stranger.key)
+            };
+            let message = stranger.message;
+            return Err(ConfigError::Malformed { place, message });
+        }
         fits(&deployment, &given).map_err(placed)?;
         deployment.resolve(&machine.folder_of(file), machine);
-        default_network::settle(&mut deployment, &given).map_err(placed)?;
         let checked =
             live::settle(&mut deployment, &given, machine).and_then(|()| rules::check(&deployment));
         checked.map_err(placed)?;
@@ -93,6 +101,11 @@ impl Loaded {
         merge(&mut table, on_command_line.clone());
         let read: Result<Deployment, toml::de::Error> = table.try_into();
         let mut deployment = read.map_err(|error| of_set(&error))?;
+        if let Some(stranger) = method::stranger(deployment.method, &on_command_line) {
+            let place = format!("--set {}", stranger.key);
+            let message = stranger.message;
+            return Err(ConfigError::Malformed { place, message });
+        }
         fits(&deployment, &on_command_line).map_err(|it| it.at("--set".to_owned()))?;
         deployment.resolve(&machine.folder_of(Path::new("")), machine);
         rules::check(&deployment).map_err(|it| it.at("--set".to_owned()))?;
@@ -129,7 +142,7 @@ impl Loaded {
 
 /// What `--set section.key=value` says, as a table.
 ///
-/// A value that is not TOML is taken as text, so that `--set fuse.energy=released` needs no quotes.
+/// A value that is not TOML is taken as text, so that `--set paper.energy=released` needs no quotes.
 fn overrides(set: &[String]) -> Result<Table, ConfigError> {
     let mut table = Table::new();
     for argument in set {
@@ -139,7 +152,7 @@ fn overrides(set: &[String]) -> Result<Table, ConfigError> {
         };
         let (key, value) = argument
             .split_once('=')
-            .ok_or_else(|| malformed("expected key=value, for example fuse.workers=2"))?;
+            .ok_or_else(|| malformed("expected key=value, for example capture.scale=0.5"))?;
         let value = format!("it = {value}")
             .parse::<Table>()
             .ok()

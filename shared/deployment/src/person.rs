@@ -3,15 +3,24 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Whose skeleton comes out.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+/// The person whose skeleton comes out, and the joints that it has.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Person")]
 pub struct Config {
-    /// Which of several people: `last`, the one nearest to where the person was in the frame before, at first the one that
-    /// most views see most clearly; `largest` in the pictures; `clearest`, in every frame anew. Every frame says how many
-    /// people there are.
+    /// Which of several people: `last`, the one who is nearest to the person of the frame before; `largest` or `clearest` in every frame anew.
     pub follow: Follow,
+    /// The set of joints: `parse14`, `umpm15` or `humaneva20`.
+    pub joints: String,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            follow: Follow::Last,
+            joints: "parse14".to_owned(),
+        }
+    }
 }
 
 /// Which of several people is followed.

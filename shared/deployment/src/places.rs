@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     const TEXT: &str = "name = 'a'\nsize = { w = 1 }\n[[camera]]\nname = 'x'\n[[camera]]\nname = 'y'\n\n\
-                        [capture]\nscale = 5\nof = [1, 22]\n[fuse.tau]\nfile = 3\n";
+                        [capture]\nscale = 5\nof = [1, 22]\n[paper.tau]\nfile = 3\n";
 
     #[test]
     fn a_value_is_called_by_its_whole_key_wherever_it_stands() {
@@ -104,7 +104,7 @@ mod tests {
             ("'y'", "camera.name"),
             ("5", "capture.scale"),
             ("22", "capture.of"),
-            ("3", "fuse.tau.file"),
+            ("3", "paper.tau.file"),
         ] {
             let start = TEXT.find(value).unwrap();
             assert_eq!(key_at(TEXT, &(start..start + 1)).as_deref(), Some(key));

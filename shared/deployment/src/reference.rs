@@ -10,10 +10,11 @@ use crate::{ConfigError, Entry, Key, Loaded, keys};
 const INTRODUCTION: &str = "\
 # Settings
 
-Every key of a deployment file, as `parallax config keys --markdown` prints it. A file needs `name`, `rig`, `output` and
+Every key of a deployment file, each in a sentence, as `parallax config keys --markdown` prints it. A file needs `name`, `rig`, `output` and
 a `[[camera]]` for each camera; everything else has a default. `--set section.key=value` replaces a value for one run,
 `parallax config show FILE` prints all values and where each comes from, and `parallax config schema` prints a JSON schema
-for editors. Relative paths are relative to the file.
+for editors. Relative paths are relative to the file. `[network]` has the keys that only `method = \"network\"` has, `[paper]` those of
+`method = \"paper\"`: a key of the other method is refused.
 ";
 
 /// Every key with what it takes, its default and its meaning.
@@ -25,39 +26,40 @@ pub fn reference() -> Result<String, ConfigError> {
     let defaults = Loaded::defaults(&[])?;
     let entries = defaults.entries().unwrap_or_default();
     let mut text = INTRODUCTION.to_owned();
-    let mut section = None;
-    for key in keys() {
-        let (of, name) = key.name.split_once('.').unwrap_or(("", &key.name));
-        if section != Some(of.to_owned()) {
-            begin(&mut text, if of.is_empty() { None } else { Some(of) });
-            section = Some(of.to_owned());
-        }
-        let entry = entries.iter().find(|it| it.key == key.name);
-        row(&mut text, name, &key, entry.and_then(default));
-        let list = match key.name.as_str() {
-            "camera" => camera_keys(),
-            "host" => host_keys(),
-            _ => continue,
-        };
-        begin_list(&mut text, &key.name);
-        for key in list {
+    let keys = keys();
+    let (top, in_sections): (Vec<&Key>, Vec<&Key>) =
+        keys.iter().partition(|key| !key.name.contains('.'));
+    let default_of = |key: &Key| {
+        let entry = entries.iter().find(|entry| entry.key == key.name);
+        entry.and_then(default)
+    };
+    begin(&mut text, "At the top");
+    for key in top {
+        row(&mut text, &key.name, key, default_of(key));
+    }
+    for (list, keys) in [("camera", camera_keys()), ("host", host_keys())] {
+        begin(&mut text, &format!("`[[{list}]]`"));
+        for key in keys {
             row(&mut text, &key.name, &key, None);
         }
+    }
+    let mut last = "";
+    for key in in_sections {
+        let (section, name) = key.name.split_once('.').unwrap_or(("", &key.name));
+        if section != last {
+            begin(&mut text, &format!("`[{section}]`"));
+            last = section;
+        }
+        row(&mut text, name, key, default_of(key));
     }
     Ok(text)
 }
 
 const HEAD: &str = "| key | takes | default | meaning |\n|---|---|---|---|\n";
 
-fn begin(text: &mut String, section: Option<&str>) {
-    let title = section.map_or("At the top".to_owned(), |it| format!("`[{it}]`"));
+fn begin(text: &mut String, title: &str) {
     // Writing to a string cannot fail.
     let _infallible = write!(text, "\n## {title}\n\n{HEAD}");
-}
-
-fn begin_list(text: &mut String, name: &str) {
-    // Writing to a string cannot fail.
-    let _infallible = write!(text, "\n## `[[{name}]]`\n\n{HEAD}");
 }
 
 fn row(text: &mut String, name: &str, key: &Key, default: Option<String>) {

@@ -1,10 +1,9 @@
 //! What must hold of a deployment before anything is started.
 
 use crate::complaint::{Complaint, demand, not_negative, positive, whole};
+use crate::method::MOST_AT_ONCE;
 use crate::topology::{process_name, services};
-use crate::{
-    Deployment, capture, fuse, hosts, is_shipped, limits, pose, quality, slips, triangulate,
-};
+use crate::{Deployment, Views, capture, hosts, limits, network, paper, slips};
 
 /// Checks the values that the types alone do not.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
@@ -22,33 +21,24 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     }
     cameras(it)?;
     capture(&it.capture)?;
-    pose(&it.pose)?;
-    maps(it)?;
-    quality(it)?;
-    fuse(it)?;
+    network(&it.network)?;
+    paper(it)?;
+    let joints = &it.person.joints;
+    let known = skeleton::JointSet::ALL.map(|set| set.name).join(", ");
+    demand(
+        skeleton::JointSet::by_name(joints).is_some(),
+        "person.joints",
+        joints,
+        &format!("one of {known}"),
+    )?;
     if let Some(budget) = it.supervise.latency_budget_ms {
         positive("supervise.latency_budget_ms", budget)?;
     }
     whole("supervise.missed_beats", it.supervise.missed_beats)?;
+    whole("runtime.threads", it.runtime.threads)?;
     runtime(it)?;
     hosts::check(it)?;
-    limits::check(it)?;
-    let joints = &it.triangulate.joints;
-    let known = skeleton::JointSet::ALL.map(|it| it.name).join(", ");
-    demand(
-        skeleton::JointSet::by_name(joints).is_some(),
-        "triangulate.joints",
-        joints,
-        &format!("one of {known}"),
-    )?;
-    positive("triangulate.loss_px", it.triangulate.loss_px)?;
-    let weight = it.triangulate.error_weight;
-    demand(
-        weight.is_finite() && weight >= 0.0,
-        "triangulate.error_weight",
-        &weight.to_string(),
-        "a number of at least 0",
-    )
+    limits::check(it)
 }
 
 fn name(name: &str) -> Result<(), Complaint> {
@@ -81,6 +71,7 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
             geometry::PLAIN_NAME,
         )?;
         pictures(camera)?;
+        eyes(camera)?;
         let skew_ms = camera.skew_ms.unwrap_or(0.0);
         demand(
             (-1000.0..=1000.0).contains(&skew_ms),
@@ -167,178 +158,57 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
     demand(it.frame_step > 0, "capture.frame_step", "0", "at least 1")
 }
 
-fn pose(it: &pose::Config) -> Result<(), Complaint> {
-    whole("pose.candidates", it.candidates)?;
-    if let Some(n) = it.find_every {
-        whole("pose.find_every", n)?;
+fn network(config: &network::Config) -> Result<(), Complaint> {
+    if let Some(n) = config.find_every {
+        whole("network.find_every", n)?;
     }
-    whole("pose.people", it.people)?;
-    whole("pose.threads", it.threads)?;
-    not_negative("pose.tracked_margin", it.tracked_margin)?;
-    not_negative("pose.tracked_max_drop", f64::from(it.tracked_max_drop))?;
-    not_negative("pose.tracked_speed", it.tracked_speed)?;
-    not_negative("pose.tracked_max_gap_ms", it.tracked_max_gap_ms)?;
-    not_negative("pose.tracked_full_every_ms", it.tracked_full_every_ms)?;
-    not_negative("pose.min_separation", it.min_separation)
+    whole("network.people", config.people)
 }
 
-/// Checks what goes with a network that finds keypoints, and what does not.
-fn maps(deployment: &Deployment) -> Result<(), Complaint> {
-    let it = &deployment.pose;
-    let mut cameras = 0..deployment.cameras.len();
-    let has_network = cameras.any(|it| deployment.pose_network(it).is_some());
-    let beside = [
-        (
-            "pose.network_card",
-            it.network_card.is_some(),
-            it.network.is_some(),
-        ),
-        ("pose.detector", it.detector.is_some(), has_network),
-        ("pose.mirror", it.mirror, has_network),
-        ("pose.onnx_runtime", it.onnx_runtime.is_some(), has_network),
-    ];
-    for (key, is_given, has_network) in beside {
-        demand(
-            !is_given || has_network,
-            key,
-            "given",
-            "none without `pose.network`",
-        )?;
-    }
+/// A camera has a network of its own, or keypoints.
+fn eyes(camera: &capture::Camera) -> Result<(), Complaint> {
     demand(
-        it.network_card.is_none() || !it.network.as_deref().is_some_and(is_shipped),
-        "pose.network_card",
-        "given",
-        "none with the network that ships, whose card is built in",
-    )?;
-    demand(
-        it.detector_card.is_none() || it.detector.is_some(),
-        "pose.detector_card",
-        "given",
-        "none without `pose.detector`",
-    )?;
-    maps_of_cameras(deployment)?;
-    let of_filters = [
-        ("quality.network", deployment.quality.network.is_some()),
-        ("quality.table", deployment.quality.table.is_some()),
-        ("fuse.consistency", deployment.fuse.consistency.is_some()),
-        (
-            "fuse.compatibility",
-            !deployment.fuse.compatibility.is_empty(),
-        ),
-    ];
-    for (key, is_given) in of_filters {
-        demand(
-            !is_given || !deployment.has_maps(),
-            key,
-            "given",
-            "none with networks or keypoints: it is about poses that the filters find",
-        )?;
-    }
-    Ok(())
-}
-
-/// Every camera has maps, or none has.
-fn maps_of_cameras(deployment: &Deployment) -> Result<(), Complaint> {
-    for (nth, camera) in deployment.cameras.iter().enumerate() {
-        demand(
-            camera.network_card.is_none() || camera.network.is_some(),
-            "camera.network_card",
-            &format!("given for {:?}", camera.name),
-            "none without `network` of this camera",
-        )?;
-        demand(
-            camera.network.is_none() || camera.keypoints.is_none(),
-            "camera.network",
-            &format!("given for {:?}, besides `keypoints`", camera.name),
-            "one of the two",
-        )?;
-        let has_maps = camera.keypoints.is_some() || deployment.pose_network(nth).is_some();
-        demand(
-            has_maps || !deployment.has_maps(),
-            "camera.network",
-            &format!("not given for {:?}", camera.name),
-            "`pose.network`, or a network or keypoints for every camera: maps and filters do not go together",
-        )?;
-    }
-    Ok(())
-}
-
-fn quality(deployment: &Deployment) -> Result<(), Complaint> {
-    let it = &deployment.quality;
-    for name in it.views.keys() {
-        demand(
-            deployment.cameras.iter().any(|it| it.name == *name),
-            "quality.views",
-            &format!("{name:?}"),
-            "the name of a [[camera]] of this file",
-        )?;
-    }
-    demand(
-        it.table.is_none() || it.network.is_none(),
-        "quality.network",
-        "given besides `quality.table`",
+        camera.network.is_none() || camera.keypoints.is_none(),
+        "camera.network",
+        &format!("given for {:?}, besides `keypoints`", camera.name),
         "one of the two",
-    )?;
-    demand(
-        it.onnx_runtime.is_none() || it.network.is_some(),
-        "quality.onnx_runtime",
-        "given",
-        "none without `quality.network`",
-    )?;
-    demand(
-        it.device == quality::Device::Cpu || it.onnx_runtime.is_some(),
-        "quality.device",
-        "\"cuda\"",
-        "\"cpu\" without `quality.onnx_runtime`",
-    )?;
-    demand(it.frame_step > 0, "quality.frame_step", "0", "at least 1")
+    )
 }
 
-/// Checks the numbers of a section `[fuse]`, which stands in files of its own, too.
+/// Checks the numbers of the energy between views, which an evaluation reads from a file of its own, too.
 ///
 /// # Errors
 ///
 /// The first number that cannot be.
-pub fn fuse_numbers(it: &fuse::Config) -> Result<(), Complaint> {
-    whole("fuse.workers", it.workers)?;
-    whole("fuse.max_iterations", it.max_iterations)?;
-    not_negative("fuse.alpha", it.alpha.unwrap_or(0.0))?;
-    not_negative("fuse.beta", it.beta.unwrap_or(0.0))?;
-    not_negative("fuse.epsilon_px", it.epsilon_px)?;
-    if let Some(cells) = it.max_distance_cells {
-        positive("fuse.max_distance_cells", cells)?;
+pub fn energy_numbers(config: &paper::Config) -> Result<(), Complaint> {
+    whole("paper.workers", config.workers)?;
+    not_negative("paper.alpha", config.alpha.unwrap_or(0.0))?;
+    not_negative("paper.beta", config.beta.unwrap_or(0.0))?;
+    for &tau in config.tau.given() {
+        not_negative("paper.tau", f64::from(tau))?;
     }
-    for &tau in it.tau.given() {
-        not_negative("fuse.tau", f64::from(tau))?;
-    }
-    limits::fuse(it)
+    limits::energy(config)
 }
 
-fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
-    let it = &deployment.fuse;
-    fuse_numbers(it)?;
+fn paper(deployment: &Deployment) -> Result<(), Complaint> {
+    let config = &deployment.paper;
+    whole("paper.candidates", config.candidates)?;
+    energy_numbers(config)?;
+    errors(deployment)?;
     all_views(deployment)?;
-    let needs_file = it.tau == fuse::Tau::Named(fuse::TauName::Learned);
+    let needs_file = config.tau == paper::Tau::Named(paper::TauName::Learned);
     demand(
-        !needs_file || it.consistency.is_some(),
-        "fuse.tau",
+        !needs_file || config.consistency.is_some(),
+        "paper.tau",
         "\"learned\"",
-        "thresholds, or `fuse.consistency` to name the file that has them",
+        "thresholds, or `paper.consistency` to name the file that has them",
     )?;
-    let tables = it
-        .compatibility
-        .iter()
-        .map(|it| ("fuse.compatibility", &it.views));
-    let pairs = it.pairs.iter().map(|it| ("fuse.pairs", it));
+    let tables = config.compatibility.iter();
+    let tables = tables.map(|tables| ("paper.compatibility", &tables.views));
+    let pairs = config.pairs.iter().map(|pair| ("paper.pairs", pair));
     for (key, names) in tables.chain(pairs) {
         for name in names {
-            demand(
-                deployment.cameras.iter().any(|it| it.name == *name),
-                key,
-                &format!("{name:?}"),
-                "the name of a [[camera]] of this file",
-            )?;
+            camera_named(deployment, key, name)?;
         }
         demand(
             names[0] != names[1],
@@ -350,46 +220,68 @@ fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// What has no meaning where all views are solved at once.
+fn camera_named(deployment: &Deployment, key: &str, name: &str) -> Result<(), Complaint> {
+    demand(
+        deployment.cameras.iter().any(|camera| camera.name == name),
+        key,
+        &format!("{name:?}"),
+        "the name of a [[camera]] of this file",
+    )
+}
+
+fn errors(deployment: &Deployment) -> Result<(), Complaint> {
+    const MOST_FRAMES: i64 = 1_000_000_000_000;
+    let errors = deployment.paper.errors.as_ref();
+    let Some(table) = errors.and_then(paper::Errors::table) else {
+        return Ok(());
+    };
+    for name in table.views.keys() {
+        camera_named(deployment, "paper.errors.views", name)?;
+    }
+    demand(
+        (-MOST_FRAMES..=MOST_FRAMES).contains(&table.frame_offset),
+        "paper.errors.frame_offset",
+        &table.frame_offset.to_string(),
+        &format!("-{MOST_FRAMES} to {MOST_FRAMES}"),
+    )?;
+    demand(
+        (1..=1_000_000).contains(&table.frame_step),
+        "paper.errors.frame_step",
+        &table.frame_step.to_string(),
+        "1 to 1000000",
+    )
+}
+
+/// Refuses what has no meaning where all views are solved at once.
 fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
-    let it = &deployment.fuse;
-    if deployment.views() == fuse::Views::Pairs {
+    let config = &deployment.paper;
+    if deployment.views() != Views::All {
         return Ok(());
     }
     let n_views = deployment.cameras.len();
-    let in_space = deployment.views() == fuse::Views::Space;
     demand(
-        !in_space || deployment.has_maps(),
-        "fuse.views",
-        "\"space\"",
-        "\"all\" or \"pairs\" without `pose.network` or keypoints: filters give no maps of joints",
-    )?;
-    demand(
-        in_space || n_views <= fuse::MOST_AT_ONCE,
-        "fuse.views",
+        n_views <= MOST_AT_ONCE,
+        "paper.views",
         &format!("\"all\" of {n_views} cameras"),
-        &format!(
-            "at most {} cameras at once, or \"pairs\"",
-            fuse::MOST_AT_ONCE
-        ),
+        &format!("at most {MOST_AT_ONCE} cameras at once, or \"pairs\""),
     )?;
     demand(
-        it.energy == fuse::Energy::Paper,
-        "fuse.energy",
+        config.energy == paper::Energy::Paper,
+        "paper.energy",
         "\"released\"",
         "\"paper\", the only one that all views at once have",
     )?;
     demand(
-        it.pairs.is_empty(),
-        "fuse.pairs",
+        config.pairs.is_empty(),
+        "paper.pairs",
         "given",
-        "none, as `fuse.views` is \"all\"",
+        "none, as `paper.views` is \"all\"",
     )?;
     demand(
-        deployment.triangulate.combine == triangulate::Combine::Mean,
-        "triangulate.combine",
+        config.combine == paper::Combine::Mean,
+        "paper.combine",
         "\"consensus\"",
-        "\"mean\": where `fuse.views` is \"all\", there is nothing to combine",
+        "\"mean\": where `paper.views` is \"all\", there is nothing to combine",
     )
 }
 

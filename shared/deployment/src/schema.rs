@@ -77,7 +77,7 @@ fn as_written(number: f64) -> Value {
 /// A key of a deployment file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Key {
-    /// Its name with its section: `fuse.workers`.
+    /// Its name with its section: `paper.workers`.
     pub name: String,
     /// What it means: the documentation of its field.
     pub meaning: String,
@@ -185,13 +185,7 @@ mod tests {
     }
 
     /// Numbers that their type or their meaning bounds, and no range.
-    const WITHOUT_RANGE: [&str; 5] = [
-        "up",
-        "capture.frozen_after",
-        "pose.evidence_window",
-        "pose.tracked_levels",
-        "results.overlay_every",
-    ];
+    const WITHOUT_RANGE: [&str; 3] = ["up", "capture.frozen_after", "results.overlay_every"];
 
     #[test]
     fn every_number_has_the_range_that_the_rules_have() {
@@ -214,8 +208,8 @@ mod tests {
             assert!(has_range != needs_none, "{}: what may it be?", key.name);
         }
         assert_eq!(
-            schema["$defs"]["Quality"]["properties"]["frame_step"]["maximum"],
-            1_000_000
+            schema["$defs"]["Paper"]["properties"]["workers"]["maximum"],
+            16
         );
     }
 
@@ -227,7 +221,7 @@ mod tests {
                 .to_owned();
             let value = match key {
                 "capture.size" => format!("[{value}, {value}]"),
-                "fuse.tau" => format!("[{value:?}]"),
+                "paper.tau" => format!("[{value:?}]"),
                 "runtime.cores" => format!("{{ pose = [{value}] }}"),
                 "runtime.priority" => format!("{{ pose = {value} }}"),
                 _ => value.to_string(),
@@ -241,8 +235,8 @@ mod tests {
                 None => vec![format!("{key}={value}")],
             };
             let mut set = set;
-            if key.starts_with("fuse.") {
-                set.push("pose.network=none".to_owned());
+            if key.starts_with("paper.") {
+                set.push("method=paper".to_owned());
             }
             crate::Loaded::parse(&text, file, &set, &crate::AnyMachine)
         };
@@ -270,9 +264,9 @@ mod tests {
                 .takes
                 .clone()
         };
-        assert_eq!(takes("fuse.workers"), "whole number");
-        assert_eq!(takes("fuse.energy"), "\"paper\" or \"released\"");
-        assert_eq!(takes("pose.evidence_window"), "whole number or \"all\"");
+        assert_eq!(takes("paper.workers"), "whole number");
+        assert_eq!(takes("paper.energy"), "\"paper\" or \"released\"");
+        assert_eq!(takes("paper.errors"), "text or table");
         assert_eq!(takes("capture.size"), "list of 2, each: whole number");
         assert_eq!(takes("up"), "list of 3, each: number");
         assert_eq!(takes("unit"), "text");

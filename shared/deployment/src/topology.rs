@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use messages::topic;
 use serde::{Deserialize, Serialize};
 
-use crate::{Deployment, fuse};
+use crate::{Deployment, Views};
 
 pub use rooms::{Content, Room, ViewSize};
 
@@ -42,7 +42,7 @@ impl Stage {
         Self::Triangulate,
     ];
 
-    /// The service, and the section of its settings.
+    /// The service.
     pub fn name(self) -> &'static str {
         match self {
             Self::Capture => "capture",
@@ -181,7 +181,7 @@ impl Topology {
         let builder = Builder {
             topology: &topology,
             has_quality: deployment.has_quality(),
-            has_network: deployment.has_network(),
+            has_network: deployment.predicts_errors(),
             with_evidence: recording.is_some_and(|it| !it.without_evidence),
             pictures: recording.map_or(&[], |it| &it.pictures),
         };
@@ -412,14 +412,14 @@ fn process(
 /// The pairs of views that are fused, ascending.
 fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
     let n_views = deployment.cameras.len();
-    if deployment.views() != fuse::Views::Pairs {
+    if deployment.views() != Views::Pairs {
         return (1..n_views).map(|view| [view - 1, view]).collect();
     }
-    let mut pairs: Vec<[usize; 2]> = if deployment.fuse.pairs.is_empty() {
+    let mut pairs: Vec<[usize; 2]> = if deployment.paper.pairs.is_empty() {
         let with_first = |first| (first + 1..n_views).map(move |second| [first, second]);
         (0..n_views).flat_map(with_first).collect()
     } else {
-        let named = deployment.fuse.pairs.iter();
+        let named = deployment.paper.pairs.iter();
         named
             .filter_map(|names| indices(deployment, names))
             .collect()

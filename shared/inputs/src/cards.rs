@@ -81,17 +81,15 @@ impl OnnxFile {
 impl CardText {
     /// The card of a network in a file: the given one, or one beside it.
     fn beside(network: &Path, given: Option<&Path>) -> Result<Option<Self>, Failure> {
-        let instead = network.with_extension("toml");
-        let mut after = network.as_os_str().to_owned();
-        after.push(".toml");
-        let beside = [instead, PathBuf::from(after)];
-        let beside = beside.iter().find(|it| it.is_file()).map(PathBuf::as_path);
-        let Some(file) = given.or(beside) else {
+        let Some(file) = given
+            .map(Path::to_path_buf)
+            .or_else(|| card_beside(network))
+        else {
             return Ok(None);
         };
         Ok(Some(Self {
-            text: read_text(file)?,
-            place: CardPlace::File(file.to_path_buf()),
+            text: read_text(&file)?,
+            place: CardPlace::File(file),
         }))
     }
 
@@ -128,6 +126,14 @@ impl CardText {
         })?;
         Ok((card, place))
     }
+}
+
+/// The card file beside a network: `pose.toml` or `pose.onnx.toml` of `pose.onnx`.
+pub fn card_beside(network: &Path) -> Option<PathBuf> {
+    let mut after = network.as_os_str().to_owned();
+    after.push(".toml");
+    let places = [network.with_extension("toml"), PathBuf::from(after)];
+    places.into_iter().find(|place| place.is_file())
 }
 
 /// What is said of a network that does not fit its card.

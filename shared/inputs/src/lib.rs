@@ -35,6 +35,7 @@ use orientation::Detector;
 use pipeline::PairTables;
 use viewquality::{Network, NetworkError, Table, Tau};
 
+pub use cards::card_beside;
 pub use failure::{in_file, read_text as text};
 pub use joints::Joints;
 pub use maps::{check_maps, detector, mirrored, network_card, open_network, pose_network, springs};
@@ -232,9 +233,9 @@ pub fn orientation(file: &Path, model: &Model) -> Result<Option<Arc<Detector>>, 
 ///
 /// # Errors
 ///
-/// A table cannot be read, or there are no learned tables for the rig that `fuse.consistency_rig` names.
+/// A table cannot be read, or there are no learned tables for the rig that `paper.consistency` names.
 pub fn pair_tables(
-    config: &deployment::fuse::Config,
+    config: &deployment::paper::Config,
     learned: Option<&Learned>,
     model: &Model,
     cameras: &[&str],
@@ -260,12 +261,16 @@ pub fn pair_tables(
         return Ok(PairTables { of_pairs, by_angle });
     };
     let appearance = match config.energy {
-        deployment::fuse::Energy::Paper => learned.weights.appearance,
-        deployment::fuse::Energy::Released => Appearance::Joint,
+        deployment::paper::Energy::Paper => learned.weights.appearance,
+        deployment::paper::Energy::Released => Appearance::Joint,
     };
-    if let Some(rig) = &config.consistency_rig {
+    let rig = config
+        .consistency
+        .as_ref()
+        .and_then(deployment::paper::Consistency::rig);
+    if let Some(rig) = rig {
         let Some(own) = learned.of_rig(rig, cameras, appearance) else {
-            let message = format!("`fuse.consistency_rig`: no rig {rig:?} was learned");
+            let message = format!("`paper.consistency`: no rig {rig:?} was learned");
             return Err(Failure::new(ExitKind::Config, message));
         };
         of_pairs.extend(own);
@@ -295,55 +300,17 @@ pub fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
     Network::parse(bytes, n_parts).map_err(|error| unusable(file, &error))
 }
 
-/// Reads the network of the `[quality]` section, if it names one.
+/// Reads the network that predicts expected errors, if there is one.
 ///
 /// # Errors
 ///
-/// The file cannot be read or is not a network for this number of parts, or the requested ONNX Runtime cannot be
-/// loaded.
+/// The file cannot be read or is not a network for this number of parts.
 pub fn quality_network(
-    config: &deployment::quality::Config,
+    errors: Option<&deployment::paper::Errors>,
     n_parts: usize,
 ) -> Result<Option<Network>, Failure> {
-    let Some(file) = &config.network else {
-        return Ok(None);
-    };
-    let network = match &config.onnx_runtime {
-        None => network(file, n_parts),
-        Some(library) => by_onnx_runtime(library, config.device, file, n_parts),
-    };
-    network.map(Some)
-}
-
-#[cfg(feature = "ort")]
-fn by_onnx_runtime(
-    library: &Path,
-    device: deployment::quality::Device,
-    file: &Path,
-    n_parts: usize,
-) -> Result<Network, Failure> {
-    let runtime = viewquality::OnnxRuntime::load(library);
-    let runtime = runtime.map_err(|error| unusable(library, &NetworkError::Load(error)))?;
-    let runtime = match device {
-        deployment::quality::Device::Cpu => runtime,
-        deployment::quality::Device::Cuda => runtime.on_cuda(),
-    };
-    let bytes = Shipped::Network.read(file)?;
-    Network::parse_with(&runtime, &bytes, n_parts).map_err(|error| unusable(file, &error))
-}
-
-#[cfg(not(feature = "ort"))]
-fn by_onnx_runtime(
-    library: &Path,
-    _device: deployment::quality::Device,
-    _file: &Path,
-    _n_parts: usize,
-) -> Result<Network, Failure> {
-    let message = format!(
-        "`quality.onnx_runtime` names {}, but this Parallax was built without it: build it with --features ort",
-        library.display()
-    );
-    Err(Failure::new(ExitKind::Config, message))
+    let file = errors.and_then(deployment::paper::Errors::network);
+    file.map(|file| network(file, n_parts)).transpose()
 }
 
 /// The failure for a network that cannot be used, with the cause that the library reports.

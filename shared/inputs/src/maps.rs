@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::library::Library;
 use crate::network::NetworkFile;
-use deployment::pose::Config;
+use deployment::network::Config;
 use deployment::{Deployment, is_shipped};
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use fmp::Model;
@@ -41,13 +41,13 @@ pub fn pose_network(
     deployment: &Deployment,
     camera: usize,
 ) -> Result<Option<PoseNetwork>, Failure> {
-    let Some((file, card)) = deployment.pose_network(camera) else {
+    let Some(file) = deployment.pose_network(camera) else {
         return Ok(None);
     };
-    let library = library(&deployment.pose)?;
-    let network = open_network((file, card), &library)?.fitted()?;
-    if deployment.pose.mirror {
-        return mirrored(network, "pose.mirror").map(Some);
+    let library = library(&deployment.network)?;
+    let network = open_network((file, None), &library)?.fitted()?;
+    if deployment.network.mirror {
+        return mirrored(network, "network.mirror").map(Some);
     }
     Ok(Some(network))
 }
@@ -91,10 +91,10 @@ pub fn open_network(
 ///
 /// The network or its card cannot be read.
 pub fn network_card(deployment: &Deployment, camera: usize) -> Result<Option<Card>, Failure> {
-    let Some((file, card)) = deployment.pose_network(camera) else {
+    let Some(file) = deployment.pose_network(camera) else {
         return Ok(None);
     };
-    let network = open_network((file, card), &library(&deployment.pose)?)?;
+    let network = open_network((file, None), &library(&deployment.network)?)?;
     Ok(network.card().map(|it| it.0.clone()))
 }
 
@@ -108,7 +108,7 @@ pub fn detector(config: &Config) -> Result<Option<Detector>, Failure> {
         return Ok(None);
     };
     let library = library(config)?;
-    crate::detector::open_with(file, config.detector_card.as_deref(), &library).map(Some)
+    crate::detector::open_with(file, None, &library).map(Some)
 }
 
 /// Loads every network of a deployment once, to see that each fits its card.
@@ -126,7 +126,7 @@ pub fn check_maps(deployment: &Deployment) -> Result<(), Failure> {
         }
     }
     if !known.is_empty() {
-        detector(&deployment.pose)?;
+        detector(&deployment.network)?;
     }
     Ok(())
 }

@@ -98,13 +98,13 @@ impl Shipped {
     /// The hint for a missing file.
     fn hint(self) -> String {
         let [key, made_by] = match self {
-            Self::Model => ["model", "train fmp"],
-            Self::Network => ["quality.network", "train quality"],
-            Self::Consistency => ["fuse.consistency", "train consistency"],
-            Self::Orientation => ["pose.orientation", "train orientation"],
-            Self::Joints => ["triangulate.joint_map", "train joints"],
-            Self::Springs => ["pose.springs", "train springs"],
-            Self::PoseNetwork => ["pose.network", "train network"],
+            Self::Model => ["paper.model", "train fmp"],
+            Self::Network => ["paper.errors", "train quality"],
+            Self::Consistency => ["paper.consistency", "train consistency"],
+            Self::Orientation => ["paper.orientation", "train orientation"],
+            Self::Joints => ["paper.joint_map", "train joints"],
+            Self::Springs => ["network.springs", "train springs"],
+            Self::PoseNetwork => ["network.file", "train network"],
         };
         format!(
             "`{key}` is a file that `parallax-lab {made_by}` made, or \"{SHIPPED}\": the one that is built in"

@@ -4,6 +4,7 @@
 //! does not grow with what else stands in a line.
 
 mod folder;
+mod settings;
 mod write;
 
 use std::collections::BTreeMap;
@@ -11,12 +12,12 @@ use std::path::PathBuf;
 
 use crate::live;
 use crate::{Motion, Recorded, Report, butterworth};
-use deployment::smooth::{Config, Method};
 use failure::{Console, ExitKind, Failure};
 use nalgebra::UnitVector3;
 use runfiles::{SmoothReport, SmoothedJoint, Unsure};
 
-pub use folder::{Run, read, read_lines, settings};
+pub use folder::{Run, read, read_lines};
+pub use settings::{Method, Settings};
 
 /// The files that are written beside the results.
 pub const FILES: [&str; 3] = ["pose3d-smooth.jsonl", "angles.csv", "smooth.json"];
@@ -27,7 +28,7 @@ pub struct Request {
     /// The results of a run.
     pub folder: PathBuf,
     /// How to smooth.
-    pub settings: Config,
+    pub settings: Settings,
     /// Frames per second, in place of the times in the file.
     pub rate_hz: Option<f64>,
     /// Against gravity, in place of what the calibration says.
@@ -81,7 +82,7 @@ pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure>
 /// # Errors
 ///
 /// A cutoff above what the rate allows.
-pub fn smoothed(recorded: &Recorded, settings: &Config) -> Result<Motion, Failure> {
+pub fn smoothed(recorded: &Recorded, settings: &Settings) -> Result<Motion, Failure> {
     let of_rts = crate::Settings {
         fill_s: settings.fill_s,
         constant_bones: settings.constant_bones,
@@ -101,7 +102,12 @@ pub fn smoothed(recorded: &Recorded, settings: &Config) -> Result<Motion, Failur
     }
 }
 
-fn report(recorded: &Recorded, frames: &[u64], found: &Report, settings: &Config) -> SmoothReport {
+fn report(
+    recorded: &Recorded,
+    frames: &[u64],
+    found: &Report,
+    settings: &Settings,
+) -> SmoothReport {
     let name = |joint: usize| recorded.joints[joint].name.clone();
     let joint = |nth: usize| {
         let counts = found.counts[nth];

@@ -8,6 +8,9 @@ use crate::role::Role;
 use crate::track::{Absent, Measured, Smoothed};
 use kalman::Models;
 
+/// The longest time between two measurements of a joint that is filled where nothing else is asked for, seconds.
+pub const FILL_S: f64 = 0.25;
+
 /// Smooths the joints of a person as they come: by several Kalman filters of different restlessness for each joint, weighted by
 /// how well they predict.
 #[derive(Debug)]

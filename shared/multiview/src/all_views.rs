@@ -67,7 +67,7 @@ pub struct AllViewsEstimate {
 /// by geometry), but neither on all 70 frames (78.3 with types against 80.0) nor with the network
 /// (81.3 against 84.3).
 ///
-/// A deployment selects this by `views = "all"` in its section `[fuse]`, with the mean of the terms
+/// A deployment selects this by `views = "all"` in its section `[paper]`, with the mean of the terms
 /// and two starts.
 ///
 /// There is no such form of [`EnergyKind::Released`](crate::EnergyKind::Released); the terms are

@@ -21,8 +21,6 @@ pub use evidence::{
     evidence_name, n_evidence,
 };
 pub use forecast::{Forecast, ForecastError, ForecastInput, Forecaster};
-#[cfg(feature = "ort")]
-pub use inference::OnnxRuntime;
 pub use network::{Network, NetworkError};
 pub use predictor::{NoPredictions, Predictor, Selection};
 pub use table::{Table, TableError};

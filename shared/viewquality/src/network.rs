@@ -1,8 +1,6 @@
 //! A network that predicts errors, read from an ONNX file and run by the `rten` library or by ONNX
 //! Runtime.
 
-#[cfg(feature = "ort")]
-use inference::OnnxRuntime;
 use inference::{Input, LoadError, RunError, Session, Side, Values, written};
 
 use crate::{Card, CardError, TileShape, n_evidence};
@@ -78,20 +76,6 @@ impl Network {
     /// [`NetworkError`], with the names and shapes found and expected.
     pub fn parse(file: Vec<u8>, n_parts: usize) -> Result<Self, NetworkError> {
         Self::new(Session::parse(file)?, n_parts)
-    }
-
-    /// As [`Self::parse`], run by ONNX Runtime.
-    ///
-    /// # Errors
-    ///
-    /// [`NetworkError`], with the names and shapes found and expected.
-    #[cfg(feature = "ort")]
-    pub fn parse_with(
-        runtime: &OnnxRuntime,
-        file: &[u8],
-        n_parts: usize,
-    ) -> Result<Self, NetworkError> {
-        Self::new(Session::parse_with(runtime, file)?, n_parts)
     }
 
     fn new(session: Session, n_parts: usize) -> Result<Self, NetworkError> {

@@ -13,8 +13,8 @@ use clap::Args;
 use consistency::Learned;
 use datasets::Selection;
 use datasets::sequences::{Alignment, Sequence};
-use deployment::fuse::Config;
-use deployment::fuse_numbers;
+use deployment::energy_numbers;
+use deployment::paper::{Config, Consistency};
 use evaluation::{FilmSettings, Version};
 use failure::{Claim, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
@@ -40,10 +40,10 @@ once, geometry+all-views-mean by the mean of their terms. Without --versions: al
 they need (tables of part types, or --consistency, for appearance; --network, --sigma or --oracle for adaptive), pairs and all views.
 
 --network FILE predicts the errors of the same single views as the service does; the report then says how \
-well: area under the ROC and rank correlation, part by part. Its thresholds count where --fuse sets no tau; \
+well: area under the ROC and rank correlation, part by part. Its thresholds count where --paper sets no tau; \
 without any, a tenth of the person's size.
 
---fuse FILE is the [fuse] section of a deployment: energy, alpha, beta, compatibility, tau, facing ...
+--paper FILE is the [paper] section of a deployment: energy, alpha, beta, compatibility, tau, facing ...
 
 Single pictures of people with 14 joints (the folders of PARSE and LSP, JSON lines) are judged as `judge` \
 does, with the same numbers: PCP and PCK of the best detection of a picture, and of the best one on the person, with \
@@ -63,7 +63,7 @@ Exit codes: 0 done; 2 the command line, 3 a setting is wrong; 4 a sequence or a 
 Examples:
     parallax-lab eval configs/sequences/pose2sim-balancing.toml --model parse.mat --size 272x480 --every 5 --out out/eval
     parallax-lab eval PARSE --only 101-200 --model parse.mat --out out/parse
-    parallax-lab eval HumanEva_I --model he.txt --fuse he.toml --sigma errors.csv --out out/humaneva --resume";
+    parallax-lab eval HumanEva_I --model he.txt --paper he.toml --sigma errors.csv --out out/humaneva --resume";
 
 /// Options of `parallax-lab eval`.
 #[derive(Debug, Args)]
@@ -87,8 +87,8 @@ pub(crate) struct Arguments {
     versions: Vec<Version>,
     /// File with settings of fusion.
     #[arg(long, value_name = "FILE")]
-    fuse: Option<PathBuf>,
-    /// Learned consistency (`train consistency`), instead of that of --fuse; "shipped": the one that ships.
+    paper: Option<PathBuf>,
+    /// Learned consistency (`train consistency`), instead of that of --paper; "shipped": the one that ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
     /// What tells in which direction a person faces, for left and right (`train orientation`); "shipped": the one that
@@ -195,7 +195,7 @@ fn run_versions(arguments: &Arguments, globals: Globals, stop: Stop) -> Result<E
     let sequences = sequences(arguments)?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let config = config(arguments)?;
-    let learned = inputs::learned(config.consistency.as_deref(), &model)?;
+    let learned = inputs::learned(consistency_file(&config).map(PathBuf::as_path), &model)?;
     let (sigma, network) = expected(arguments, model.n_parts())?;
     let _claim = Claim::take(&arguments.out, "eval")?;
     let poses = arguments.out.join("poses");
@@ -205,12 +205,7 @@ fn run_versions(arguments: &Arguments, globals: Globals, stop: Stop) -> Result<E
         .build()
         .or_fail(ExitKind::Run)?;
     let fusion = |sequence: &Sequence, scale: f32| {
-        fusion(
-            (&config, learned.as_ref(), &model),
-            arguments.candidates,
-            sequence,
-            scale,
-        )
+        fusion((&config, learned.as_ref(), &model), sequence, scale)
     };
     let joints = inputs::Joints::of(&arguments.joint_map, arguments.model.as_deref())?;
     let joint_map = |set: &JointSet| joints.map(learned.as_ref(), set);
@@ -231,7 +226,7 @@ fn run_versions(arguments: &Arguments, globals: Globals, stop: Stop) -> Result<E
         facing: config.facing,
         learned: learned.as_ref(),
         tau_px: match &config.tau {
-            deployment::fuse::Tau::File(it) => inputs::tau(&it.file, model.n_parts())?,
+            deployment::paper::Tau::File(it) => inputs::tau(&it.file, model.n_parts())?,
             it => fuse::tau_px(it),
         },
         model: Arc::clone(&model),
@@ -271,15 +266,14 @@ fn expected(
 /// * `scale`: pixels of the frame per pixel of the footage.
 fn fusion(
     (config, learned, model): (&Config, Option<&Learned>, &Model),
-    n_candidates: usize,
     sequence: &Sequence,
     scale: f32,
 ) -> Result<Fusion, Failure> {
     let mut config = config.clone();
-    if let deployment::fuse::Tau::File(tau) = &config.tau {
-        config.tau = deployment::fuse::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
+    if let deployment::paper::Tau::File(tau) = &config.tau {
+        config.tau = deployment::paper::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
     }
-    let settings = fuse::settings(&config, n_candidates, scale, learned);
+    let settings = fuse::settings(&config, scale, learned);
     let cameras: Vec<&str> = sequence.views.iter().map(|it| it.camera.as_str()).collect();
     let tables = inputs::pair_tables(&config, learned, model, &cameras)?;
     Ok((settings, tables))
@@ -357,11 +351,13 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
 }
 
 fn config(arguments: &Arguments) -> Result<Config, Failure> {
-    let mut config = fuse_section(arguments.fuse.as_deref())?;
+    let mut config = paper_section(arguments.paper.as_deref())?;
+    config.candidates = arguments.candidates;
     if let Some(file) = &arguments.consistency {
-        config.consistency = Some(file.clone());
+        config.consistency = Some(Consistency::File(file.clone()));
     }
-    let needs_file = config.tau == deployment::fuse::Tau::Named(deployment::fuse::TauName::Learned);
+    let needs_file =
+        config.tau == deployment::paper::Tau::Named(deployment::paper::TauName::Learned);
     if needs_file && config.consistency.is_none() {
         let message = "`tau = \"learned\"` needs `consistency`, or --consistency";
         return Err(Failure::new(ExitKind::Config, message));
@@ -369,8 +365,12 @@ fn config(arguments: &Arguments) -> Result<Config, Failure> {
     Ok(config)
 }
 
-/// Reads the `[fuse]` settings from a file; the defaults if there is none.
-fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
+fn consistency_file(config: &Config) -> Option<&PathBuf> {
+    config.consistency.as_ref().map(Consistency::file)
+}
+
+/// Reads a section `[paper]` from a file; the defaults if there is none.
+fn paper_section(file: Option<&Path>) -> Result<Config, Failure> {
     let Some(file) = file else {
         return Ok(Config::default());
     };
@@ -379,16 +379,11 @@ fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
         let message = format!("{}: {error}", file.display());
         Failure::new(ExitKind::Config, message)
     })?;
-    fuse_numbers(&config)
+    energy_numbers(&config)
         .map_err(|it| it.at(file.display().to_string()))
         .or_fail(ExitKind::Config)?;
     let folder = file.parent().map_or_else(PathBuf::new, PathBuf::from);
-    if let Some(file) = &mut config.consistency {
-        *file = deployment::relative_to(file, &folder);
-    }
-    for table in &mut config.compatibility {
-        table.files = table.files.each_ref().map(|it| folder.join(it));
-    }
+    config.resolve(&folder);
     Ok(config)
 }
 
@@ -451,7 +446,7 @@ fn settings_text(
     for file in files {
         tables.push(digest(file)?);
     }
-    if let Some(file) = &config.consistency {
+    if let Some(file) = consistency_file(config) {
         tables.push(of(Shipped::Consistency, file)?);
     }
     let fuse = toml::to_string(config).or_fail(ExitKind::Run)?;

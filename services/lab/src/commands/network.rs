@@ -218,7 +218,7 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
     let mut entries = description.metadata.iter();
     if entries.any(|it| it.0 == viewquality::key::VERSION) {
         return output::line(
-            "  it predicts the errors of single views (`[quality]` of a deployment), and finds no keypoints",
+            "  it predicts the errors of single views (`errors` in [paper] of a deployment), and finds no keypoints",
         );
     }
     output::line("  no card: none beside it, none in it, none given")?;

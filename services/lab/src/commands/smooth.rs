@@ -14,8 +14,8 @@ use terminal::output;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 All methods of `parallax smooth` are compared with the true joints, at the instants that all of them have; nothing is written. What
-`parallax-lab eval` takes is a TRUTH: a folder of `parallax-lab synth`, or a file as configs/sequences/pose2sim-balancing.toml. The settings
-are those of the section [smooth] of the deployment that the run is of. docs/guide/smooth.md explains.
+`parallax-lab eval` takes is a TRUTH: a folder of `parallax-lab synth`, or a file as configs/sequences/pose2sim-balancing.toml.
+docs/guide/smooth.md explains.
 
 Exit codes: 0 done; 4 the folder or the truth cannot be read, or the truth is of none of the frames or joints of the run.
 
@@ -39,7 +39,7 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let run = finished::read(&arguments.folder, None)?;
-    let settings = finished::settings(&arguments.folder);
+    let settings = finished::Settings::default();
     let comparison = smoothed::against(&run, &settings, &arguments.truth)?;
     if arguments.json {
         let methods: Vec<Value> = comparison.rows.iter().map(Row::to_json).collect();

@@ -107,7 +107,7 @@ pub(super) fn deployment(
     let quoted = |it: &str| toml::Value::from(it).to_string();
     let model = job.model.as_deref().map_or(String::new(), |it| {
         let file = absolute_path(it).display().to_string();
-        format!("model = {}\n", quoted(&file))
+        format!("method = \"paper\"\npaper.model = {}\n", quoted(&file))
     });
     let (rate, seed) = (settings.rate_hz, settings.seed);
     let mut text = format!(
@@ -140,7 +140,7 @@ pub(super) fn deployment(
         }
     }
     text += if job.live {
-        "\n[capture]\nmode = \"realtime\"\npace = \"realtime\"\n"
+        "\n[capture]\nmode = \"realtime\"\n"
     } else {
         "\n[capture]\n"
     };

@@ -292,7 +292,7 @@ fn messages(
     if !recorded::is_undamaged(recording) {
         flaws.push(recorded::text(file, recording));
     }
-    let name = &resolved.deployment.triangulate.joints;
+    let name = &resolved.deployment.person.joints;
     let joints = JointSet::by_name(name);
     let joints = joints.ok_or_else(|| {
         let message = format!("{}: no joint set is called {name:?}", file.display());

@@ -45,15 +45,15 @@ impl Eyes {
         let network = match inputs::pose_network(deployment, camera)? {
             Some(joints) => Some(Network {
                 joints,
-                detector: inputs::detector(&deployment.pose)?,
-                springs: inputs::springs(&deployment.pose.springs)?,
+                detector: inputs::detector(&deployment.network)?,
+                springs: inputs::springs(&deployment.network.springs)?,
             }),
             None => None,
         };
         let search = if network.as_ref().is_some_and(|it| it.detector.is_some()) {
             None
         } else {
-            let model = inputs::model_or_shipped(deployment.model.as_deref())?;
+            let model = inputs::model_or_shipped(deployment.paper.model.as_deref())?;
             if network.is_none() && model.n_parts() != skeleton::N_PARTS {
                 let message = format!(
                     "the model has {} parts: only of {} is it known where the joints are",
@@ -67,7 +67,7 @@ impl Eyes {
         Ok(Self {
             network,
             search,
-            n_people: deployment.pose.people.max(4),
+            n_people: deployment.network.people.max(4),
         })
     }
 
@@ -127,8 +127,8 @@ impl Eyes {
         };
         let settings = NetworkSettings {
             n_people,
-            find_every: find_every(&deployment.pose, Some(rate_hz)),
-            least_heat: deployment.pose.least_heat,
+            find_every: find_every(&deployment.network, Some(rate_hz)),
+            least_heat: deployment.network.least_heat,
             ..NetworkSettings::default()
         };
         let eyes = pipeline::Eyes::Network(Box::new(network.joints), boxes);

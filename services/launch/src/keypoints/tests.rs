@@ -31,7 +31,7 @@ fn folder() -> TempDir {
 fn deployment(folder: &Path, more: &str, set: &[&str]) -> Deployment {
     let text = format!(
         "name = 'one'\nrig = 'rig.toml'\noutput = 'out'\n[[camera]]\nname = 'a'\nsource = 'a.mp4'\n\
-         [[camera]]\nname = 'b'\nkeypoints = 'b_json'\n{more}\n[pose]\nnetwork = 'n.onnx'\n"
+         [[camera]]\nname = 'b'\nkeypoints = 'b_json'\n{more}\n[network]\nfile = 'n.onnx'\n"
     );
     let set: Vec<String> = set.iter().map(|it| (*it).to_owned()).collect();
     let file = folder.join("deployment.toml");

@@ -29,12 +29,11 @@ pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> 
     })
 }
 
-/// How far pictures may be from the instants of the frames before a warning, nanoseconds.
+/// How far pictures may be from the instants of the frames before a warning, nanoseconds: half of the time between two.
 fn max_skew_nanos(resolved: &Resolved) -> u64 {
     let capture = &resolved.deployment.capture;
     let period_ms = 1e3 * capture.frame_step as f64 / resolved.instants_hz();
-    let max_ms = capture.max_skew_ms.unwrap_or(0.5 * period_ms);
-    (max_ms * 1e6).round() as u64
+    (0.5 * period_ms * 1e6).round() as u64
 }
 
 /// How long after the instants of the frames the pictures of footage were taken, nanoseconds: as the deployment says, or as the

@@ -39,7 +39,7 @@ pub(crate) fn of_view(
         let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
         return Ok(pose::Step::Filters(Box::new(step)));
     }
-    let config = &deployment.pose;
+    let config = &deployment.network;
     let step = deployment.capture.frame_step.max(1) as f64;
     let find_every = find_every(config, resolved.frame_rate_hz().map(|it| it / step));
     let settings = NetworkSettings {
@@ -47,7 +47,6 @@ pub(crate) fn of_view(
         find_every,
         find_phase: view as u64 * find_every / deployment.cameras.len().max(1) as u64,
         least_heat: config.least_heat,
-        keypoint_sigma: config.keypoint_sigma,
         ..NetworkSettings::default()
     };
     if let Some(source) = keypoints::of_camera(&deployment.cameras[view])? {
@@ -69,7 +68,7 @@ pub(crate) fn of_view(
         .or_fail(ExitKind::Config)?;
     let boxes = match inputs::detector(config)? {
         Some(detector) => Boxes::Detector(Box::new(detector)),
-        None => Boxes::Filters(Box::new(super::boxes::filters(resolved, &prepared, view)?)),
+        None => Boxes::Filters(Box::new(super::boxes::filters(&prepared, view)?)),
     };
     let extras = extras(resolved, network.names());
     let eyes = Eyes::Network(Box::new(network), boxes);

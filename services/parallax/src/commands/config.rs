@@ -89,6 +89,8 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
         None => load::defaults(&arguments.set)?,
     };
     let mut entries = loaded.entries().or_fail(ExitKind::Run)?;
+    let method = loaded.deployment.method;
+    entries.retain(|entry| method.has(&entry.key));
     for entry in &mut entries {
         entry.change_texts(footage::without_passwords);
     }

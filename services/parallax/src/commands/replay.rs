@@ -32,7 +32,7 @@ stages that run always are.
 
 Examples:
     parallax replay run.mcap                                         from pose on, with the recorded frames
-    parallax replay run.mcap --from fuse --set fuse.alpha=2          without the frames
+    parallax replay run.mcap --from fuse --set paper.alpha=2          without the frames
     parallax replay run.mcap --speed 2 --set capture.mode=realtime   twice as fast, with realtime delivery")]
 pub(crate) struct Arguments {
     /// The recording.
@@ -154,7 +154,7 @@ fn resolve(
     let speed = match (arguments.speed, mode) {
         (Some(Speed::Times(it)), _) => Some(it),
         (None, deployment::capture::Mode::Realtime) => Some(1.0),
-        (Some(Speed::Max), _) | (None, deployment::capture::Mode::Lossless) => None,
+        (Some(Speed::Max) | None, _) => None,
     };
     Ok(Resolved {
         host: None,
@@ -174,13 +174,24 @@ fn resolve(
 
 /// Why a value may not be replaced: its stage is replaced by the recording. None if it may.
 fn refused(key: &str, from: Stage) -> Option<String> {
-    let section = key.split('.').next().unwrap_or_default();
-    let is_given = match Stage::of_name(section) {
-        Some(stage) => stage < from && key != "capture.mode",
-        None => from > Stage::Capture && section == "camera",
-    };
+    let is_given = stage_of(key).is_some_and(|stage| stage < from);
     let from = from.name();
     is_given.then(|| format!("this is given by the recording with --from {from}"))
+}
+
+/// The first stage that a setting is for; none if the recording says nothing about it.
+fn stage_of(key: &str) -> Option<Stage> {
+    let (section, name) = key.split_once('.').unwrap_or((key, ""));
+    match (section, name) {
+        ("capture", "mode") => None,
+        ("capture" | "camera", _) => Some(Stage::Capture),
+        ("method" | "network", _)
+        | ("paper", "" | "model" | "search" | "candidates" | "orientation") => Some(Stage::Pose),
+        ("paper", "errors") => Some(Stage::Quality),
+        ("paper", "combine" | "joint_map" | "bodies") => Some(Stage::Triangulate),
+        ("paper", _) => Some(Stage::Fuse),
+        _ => None,
+    }
 }
 
 /// Warns of input files that have changed since the recorded run.
@@ -210,7 +221,7 @@ fn check(
     let without = without.unwrap_or_default();
     let n_pairs = resolved.deployment.cameras.len().saturating_sub(1);
     let needs_pixels =
-        from == Stage::Pose || (from == Stage::Quality && resolved.deployment.has_network());
+        from == Stage::Pose || (from == Stage::Quality && resolved.deployment.predicts_errors());
     let reads_evidence = if resolved.deployment.has_maps() {
         Stage::Quality..=Stage::Triangulate
     } else {
@@ -340,9 +351,11 @@ mod tests {
     #[test]
     fn settings_of_recorded_stages_may_not_be_replaced() {
         let may = |key, from| refused(key, from).is_none();
-        assert!(may("fuse.alpha", Stage::Fuse) && may("rig", Stage::Fuse));
-        assert!(!may("fuse.workers", Stage::Triangulate));
-        assert!(!may("pose.search", Stage::Fuse) && may("pose.search", Stage::Pose));
+        assert!(may("paper.alpha", Stage::Fuse) && may("rig", Stage::Fuse));
+        assert!(!may("paper.workers", Stage::Triangulate));
+        assert!(!may("paper.search", Stage::Fuse) && may("paper.search", Stage::Pose));
+        assert!(!may("network.people", Stage::Fuse) && !may("method", Stage::Fuse));
+        assert!(may("paper.bodies", Stage::Triangulate));
         assert!(!may("capture.size", Stage::Pose) && may("capture.mode", Stage::Pose));
         assert!(!may("camera", Stage::Pose) && may("camera", Stage::Capture));
     }

@@ -4,9 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use deployment::smooth::{Config, Method};
 use failure::{ExitKind, Failure};
-use motion::finished::{self, Outcome, Request};
+use motion::finished::{self, Method, Outcome, Request, Settings};
 use nalgebra::{UnitVector3, Vector3};
 use serde_json::{Value, json};
 use terminal::{Globals, Terminal, output};
@@ -23,7 +22,7 @@ FOLDER holds the results of a run; nothing in it is changed. Beside them are wri
     smooth.json           the method and its numbers, and what became of how many measurements
 
 Everything has a default: how restless each joint is, and how far its covariances can be believed, is found from the measurements.
-Defaults of the options are those of the section [smooth] of the deployment that the run is of. docs/guide/smooth.md explains.
+docs/guide/smooth.md explains.
 
 How far the result is from the truth, where that is known: `parallax-lab smooth`.
 
@@ -105,7 +104,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let folder = &arguments.folder;
     let request = Request {
         folder: folder.clone(),
-        settings: settings(arguments, &finished::settings(folder)),
+        settings: settings(arguments),
         rate_hz: arguments.rate_hz,
         up: arguments.up,
     };
@@ -125,14 +124,14 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
 }
 
-/// What the deployment says, replaced by what the command line says.
-fn settings(arguments: &Arguments, of_run: &Config) -> Config {
-    Config {
-        method: arguments.method.unwrap_or(of_run.method),
-        cutoff_hz: arguments.cutoff_hz.unwrap_or(of_run.cutoff_hz),
-        fill_s: arguments.fill_s.unwrap_or(of_run.fill_s),
-        constant_bones: arguments.constant_bones || of_run.constant_bones,
-        ..of_run.clone()
+/// The defaults, replaced by what the command line says.
+fn settings(arguments: &Arguments) -> Settings {
+    let defaults = Settings::default();
+    Settings {
+        method: arguments.method.unwrap_or(defaults.method),
+        cutoff_hz: arguments.cutoff_hz.unwrap_or(defaults.cutoff_hz),
+        fill_s: arguments.fill_s.unwrap_or(defaults.fill_s),
+        constant_bones: arguments.constant_bones,
     }
 }
 

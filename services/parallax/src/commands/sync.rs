@@ -79,7 +79,7 @@ pub(crate) struct Arguments {
     /// Write `offset_ms` and `drift_ppm` into the deployment file, and leave everything else there as it is.
     #[arg(long)]
     write: bool,
-    /// Replace a value of the deployment, for example `--set pose.network=other.onnx`; may be given several times.
+    /// Replace a value of the deployment, for example `--set network.file=other.onnx`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Print JSON.

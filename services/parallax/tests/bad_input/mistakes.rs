@@ -52,14 +52,6 @@ pub(crate) fn capture(case: &Case, line: &str) {
     );
 }
 
-pub(crate) fn section(case: &Case, text: &str) {
-    case.edit(
-        "deployment.toml",
-        "[results]",
-        &format!("{text}\n[results]"),
-    );
-}
-
 fn forbid(case: &Case, name: &str) {
     fs::set_permissions(case.path(name), fs::Permissions::from_mode(0o0)).unwrap();
 }

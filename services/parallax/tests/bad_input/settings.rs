@@ -4,7 +4,7 @@ use std::fs;
 
 use crate::common::Case;
 
-use super::mistakes::{CHECK, DRY, Mistake, NOTHING, capture, check, section};
+use super::mistakes::{CHECK, DRY, Mistake, NOTHING, capture, check};
 
 const fn config(
     what: &'static str,
@@ -79,7 +79,7 @@ const FILES: &[Mistake] = &[
         "unknown mode",
         |it| capture(it, "mode = \"live\""),
         &["`live`"],
-        &["`lossless` or `realtime`"],
+        &["one of `lossless`, `paced`, `realtime`"],
     ),
     config(
         "key twice",
@@ -120,6 +120,7 @@ const FILES: &[Mistake] = &[
     config(
         "names of keypoints that no set has",
         |it| {
+            it.set_network("");
             it.edit(
                 "deployment.toml",
                 "source = \"b\"",
@@ -231,23 +232,23 @@ const LINES: &[Mistake] = &[
     Mistake {
         what: "--set without a value",
         made: NOTHING,
-        command: "config check deployment.toml --set fuse.workers",
+        command: "config check deployment.toml --set paper.workers",
         code: 3,
-        says: &["--set fuse.workers"],
+        says: &["--set paper.workers"],
         tries: &["expected key=value"],
     },
     Mistake {
         what: "--set of another kind",
         made: NOTHING,
-        command: "config check deployment.toml --set fuse.workers=two",
+        command: "config check deployment.toml --set paper.workers=two",
         code: 3,
-        says: &["--set", "`fuse.workers`", "found the text \"two\""],
+        says: &["--set", "`paper.workers`", "found the text \"two\""],
         tries: &["a whole number"],
     },
     Mistake {
         what: "--set of a slip",
         made: NOTHING,
-        command: "config check deployment.toml --set fuse.wrokers=2",
+        command: "config check deployment.toml --set paper.wrokers=2",
         code: 3,
         says: &["--set", "`wrokers`"],
         tries: &["did you mean `workers`"],
@@ -323,6 +324,12 @@ const fn rig(
     }
 }
 
+/// Names a network that predicts errors.
+fn errors(case: &Case, file: &str) {
+    let named = format!("workers = 2\nerrors = {file:?}");
+    case.edit("deployment.toml", "workers = 2", &named);
+}
+
 /// Names a file of joints.
 fn joints(case: &Case, file: &str) {
     let named = format!("bodies = false\njoint_map = {file:?}");
@@ -353,13 +360,13 @@ const INPUTS: &[Mistake] = &[
     ),
     input(
         "absent network",
-        |it| section(it, "[quality]\nnetwork = \"person.quality.onnx\""),
+        |it| errors(it, "person.quality.onnx"),
         &["person.quality.onnx"],
-        &["`quality.network`", "\"shipped\""],
+        &["`paper.errors`", "\"shipped\""],
     ),
     input(
         "model for a network",
-        |it| section(it, "[quality]\nnetwork = \"model.plx\""),
+        |it| errors(it, "model.plx"),
         &["model.plx"],
         &["not an ONNX file"],
     ),
@@ -373,7 +380,7 @@ const INPUTS: &[Mistake] = &[
             );
         },
         &["person.consistency"],
-        &["`fuse.consistency`", "\"shipped\""],
+        &["`paper.consistency`", "\"shipped\""],
     ),
     input(
         "rig for consistency",
@@ -391,7 +398,7 @@ const INPUTS: &[Mistake] = &[
         "absent joints",
         |it| joints(it, "person.joints"),
         &["person.joints"],
-        &["`triangulate.joint_map`", "\"shipped\""],
+        &["`paper.joint_map`", "\"shipped\""],
     ),
     input(
         "joints of another model",

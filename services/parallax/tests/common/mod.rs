@@ -22,11 +22,11 @@ pub(crate) use started::{Ended, Started};
 
 /// No overlays and no rotation, so that frames equal the generated pictures.
 pub(crate) const PLAIN: &str =
-    "[capture]\nupright = false\n[results]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
+    "[capture]\nupright = false\n[results]\noverlay_every = 0\n[paper]\nworkers = 2\n";
 
 /// The same at 20 frames per second, which leaves time to interfere.
-pub(crate) const PACED: &str = "[capture]\nupright = false\npace = \"realtime\"\n\
-     frame_rate_hz = 20\n[results]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
+pub(crate) const PACED: &str = "[capture]\nupright = false\nmode = \"paced\"\n\
+     frame_rate_hz = 20\n[results]\noverlay_every = 0\n[paper]\nworkers = 2\n";
 
 /// The last line of a frame that every view took: on a loaded machine a view takes every second frame, or fourth, and drops the
 /// others.
@@ -68,7 +68,7 @@ impl Case {
         geometry::files::write(&case.path("rig.toml"), Format::Own, rig).unwrap();
         fmp::files::write(&case.path("model.plx"), &planted::model()).unwrap();
         let mut text = format!(
-            "name = \"{}\"\nrig = \"rig.toml\"\nmodel = \"model.plx\"\noutput = \"out\"\n",
+            "name = \"{}\"\nrig = \"rig.toml\"\nmethod = \"paper\"\noutput = \"out\"\n",
             case.name
         );
         for (camera, n_frames) in rig.cameras().iter().zip(n_frames) {
@@ -82,9 +82,9 @@ impl Case {
             writeln!(text, "\n[[camera]]\nname = {name:?}\nsource = {name:?}").unwrap();
         }
         // The planted figure has the bones of nobody.
-        let own = "[triangulate]\nbodies = false";
-        let more = if more.contains("[triangulate]") {
-            more.replace("[triangulate]", own)
+        let own = "[paper]\nmodel = \"model.plx\"\nbodies = false";
+        let more = if more.contains("[paper]") {
+            more.replace("[paper]", own)
         } else {
             format!("{more}\n{own}")
         };
@@ -115,6 +115,17 @@ impl Case {
             "{name} does not contain {from}:\n{text}"
         );
         self.write(name, text.replace(from, to));
+    }
+
+    /// Sets the network's method, with these keys of its section, in place of the paper's.
+    pub(crate) fn set_network(&self, keys: &str) {
+        let text = fs::read_to_string(self.path("deployment.toml")).unwrap();
+        let mut table: toml::Table = toml::from_str(&text).unwrap();
+        table.remove("paper");
+        table.insert("method".to_owned(), "network".into());
+        let keys: toml::Table = toml::from_str(keys).unwrap();
+        table.insert("network".to_owned(), keys.into());
+        self.write("deployment.toml", toml::to_string(&table).unwrap());
     }
 
     /// Starts `parallax` with arguments, in the folder.

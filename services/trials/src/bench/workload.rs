@@ -5,6 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use deployment::Deployment;
+use deployment::paper::Errors;
 use failure::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use launch::{Planned, Report, load};
 use runfiles::Percentiles;
@@ -58,9 +59,9 @@ impl Case {
     /// The `key=value` pairs that replace values of the deployment.
     fn set(self) -> Vec<&'static str> {
         let mut set = if self.is_lossless {
-            vec!["capture.mode=lossless", "capture.pace=fast"]
+            vec!["capture.mode=lossless"]
         } else {
-            vec!["capture.mode=realtime", "capture.pace=realtime"]
+            vec!["capture.mode=realtime"]
         };
         if self.has_dead {
             set.push("supervise.max_restarts=0");
@@ -321,14 +322,16 @@ fn keep_views(deployment: &mut Deployment, n_views: usize) {
         .collect();
     let is_kept = |name: &String| names.contains(name);
     deployment
-        .fuse
+        .paper
         .pairs
         .retain(|pair| pair.iter().all(is_kept));
     deployment
-        .fuse
+        .paper
         .compatibility
         .retain(|it| it.views.iter().all(is_kept));
-    deployment.quality.views.retain(|name, _| is_kept(name));
+    if let Some(Errors::Table(table)) = &mut deployment.paper.errors {
+        table.views.retain(|name, _| is_kept(name));
+    }
 }
 
 /// Processor time of all child processes that have ended, seconds.

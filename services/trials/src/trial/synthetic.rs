@@ -30,12 +30,20 @@ pub(crate) enum Finder {
 }
 
 impl Finder {
+    /// Its line at the top of the deployment file.
+    fn method(self) -> &'static str {
+        match self {
+            Self::Default => "",
+            Self::TrackingFilters => "method = \"paper\"\n",
+        }
+    }
+
     /// Its part of the deployment file.
     fn section(self) -> &'static str {
         match self {
             Self::Default => "",
             Self::TrackingFilters => {
-                "[pose]\nnetwork = \"none\"        # the filters find people\nsearch = \"tracked\"       # near the last pose, and everywhere now and then\n\n"
+                "[paper]\nsearch = \"tracked\"       # near the last pose, and everywhere now and then\nviews = \"all\"\n\n"
             }
         }
     }
@@ -133,9 +141,9 @@ impl SyntheticDeployment {
         format!(
             "# Written by `parallax {}`: subject {}, {}, before cameras that make their pictures while they run.\n\
              # The same without a killed camera and without the truth: parallax run deployment.toml\n\n\
-             name = {}\nrig = \"rig.toml\"\noutput = \"run\"\n{}\n\
+             name = {}\nrig = \"rig.toml\"\n{}output = \"run\"\n{}\n\
              [capture]\nmode = \"realtime\"       # keep up with the clock; what there is no time for is dropped and counted\n\
-             pace = \"realtime\"\nframe_rate_hz = {:?}\n\n\
+             frame_rate_hz = {:?}\n\n\
              {}[results]\noverlay_every = {OVERLAY_EVERY}\n\n\
              [supervise]\ndeadline_ms = {}        # how long a stage waits for a view that is late\n\
              hang_limit_s = 60        # a machine that is busy is slow, not hung\n",
@@ -143,6 +151,7 @@ impl SyntheticDeployment {
             self.settings.subject,
             self.settings.action.name(),
             quoted(setup.name),
+            setup.finder.method(),
             cameras.concat(),
             self.settings.rate_hz,
             setup.finder.section(),

@@ -6,7 +6,7 @@ use crate::{AnyMachine, Deployment, Loaded};
 
 const GOOD: &str = "name = 'a'\nrig = 'r'\noutput = 'o'\n\
     [[camera]]\nname = 'c0'\nsource = 's'\n[[camera]]\nname = 'c1'\nsource = 's'\n\
-    [capture]\nmode = 'realtime'\npace = 'realtime'\nframe_rate_hz = 5.0\n\
+    [capture]\nmode = 'realtime'\nframe_rate_hz = 5.0\n\
     [link]\nkeys = 'keys'\n\
     [[host]]\nname = 'desk'\nfuses = true\naddress = '10.0.0.1:7447'\nviews = ['c0']\n\
     [[host]]\nname = 'far'\nviews = ['c1']\n";
@@ -63,16 +63,14 @@ fn what_cannot_be_is_refused_with_its_key() {
         ),
         (
             "keys = 'keys'",
-            "keys = 'keys'\nmax_clock_share = 2.0",
-            "link.max_clock_share",
-        ),
-        (
-            "keys = 'keys'",
-            "keys = 'keys'\ncarry = 'poses'\n[fuse]\nviews = 'all'\n[pose]\nnetwork = 'none'",
+            "keys = 'keys'\ncarry = 'poses'\n[paper]\nviews = 'all'",
             "link.carry",
         ),
     ] {
-        let text = GOOD.replacen(from, to, 1);
+        let mut text = GOOD.replacen(from, to, 1);
+        if to.contains("[paper]") {
+            text = text.replacen("output = 'o'", "output = 'o'\nmethod = 'paper'", 1);
+        }
         assert_ne!(text, GOOD, "{from}");
         let error = parse(&text).unwrap_err();
         assert!(

@@ -13,8 +13,8 @@ const SHORT: &str = "name = 'two'\nrig = 'rig.toml'\noutput = 'out'\n\
 fn read(set: &str) -> Result<Loaded, ConfigError> {
     let file = Path::new("deployment.toml");
     let mut set = vec![set.to_owned()];
-    if set[0].starts_with("fuse.workers") {
-        set.push("pose.network=none".to_owned());
+    if set[0].starts_with("paper.") {
+        set.push("method=paper".to_owned());
     }
     Loaded::parse(SHORT, file, &set, &AnyMachine)
 }
@@ -36,9 +36,6 @@ const ROWS: &[Row] = &[
         ],
         &["[0, -1, 0]"],
     ),
-    ("capture.max_skew_ms", &[("0", "is 0")], &["20"]),
-    ("smooth.cutoff_hz", &[("0", "is 0")], &["6"]),
-    ("smooth.fill_s", &[("-1", "is -1")], &["0", "0.5"]),
     (
         "capture.size",
         &[
@@ -101,136 +98,32 @@ const ROWS: &[Row] = &[
         &["0", "10"],
     ),
     (
-        "pose.evidence_window",
-        &[("-1", "levels"), ("70000", "levels")],
-        &["0", "2", "'all'"],
-    ),
-    (
-        "pose.candidates",
+        "paper.candidates",
         &[("0", "is 0, expected 1 to"), ("100000", "is 100000")],
         &["1"],
     ),
     (
-        "pose.min_separation",
-        &[
-            ("-0.1", "is -0.1"),
-            ("nan", "is NaN"),
-            ("1e308", "expected 0 to 1000"),
-        ],
-        &["0.0", "1.5"],
-    ),
-    (
-        "pose.find_every",
+        "network.find_every",
         &[("0", "is 0, expected 1 to 1000000"), ("-1", "find_every")],
         &["1", "30"],
     ),
     (
-        "pose.least_heat",
+        "network.least_heat",
         &[("-0.1", "is -0.1"), ("1.1", "expected 0 to 1")],
         &["0.0", "0.5"],
     ),
     (
-        "pose.keypoint_sigma",
-        &[("0", "expected 0.001 to 0.5"), ("nan", "is NaN")],
-        &["0.05"],
-    ),
-    (
-        "pose.people",
+        "network.people",
         &[("0", "is 0, expected 1 to 8"), ("9", "is 9")],
         &["1"],
     ),
     (
-        "pose.threads",
+        "runtime.threads",
         &[("0", "is 0, expected 1 to 256"), ("257", "is 257")],
         &["1"],
     ),
     (
-        "pose.tracked_levels",
-        &[
-            ("-1", "expected a whole number"),
-            ("65536", "expected a whole number"),
-        ],
-        &["2"],
-    ),
-    (
-        "pose.tracked_margin",
-        &[
-            ("-1", "is -1"),
-            ("nan", "is NaN"),
-            ("1e308", "expected 0 to 100"),
-        ],
-        &["0.3"],
-    ),
-    (
-        "pose.tracked_full_every",
-        &[("0", "is 0, expected 1 to")],
-        &["1", "10"],
-    ),
-    (
-        "pose.tracked_max_gap",
-        &[("0", "is 0, expected 1 to")],
-        &["1"],
-    ),
-    (
-        "pose.tracked_max_drop",
-        &[("-1", "is -1"), ("1e308", "is inf"), ("nan", "is NaN")],
-        &["0.5"],
-    ),
-    (
-        "pose.tracked_speed",
-        &[
-            ("-1", "is -1"),
-            ("1e308", "expected 0 to 1000"),
-            ("nan", "is NaN"),
-        ],
-        &["0", "3"],
-    ),
-    (
-        "pose.tracked_max_gap_ms",
-        &[
-            ("-1", "is -1"),
-            ("1e308", "expected 0 to 3600000"),
-            ("nan", "is NaN"),
-        ],
-        &["0", "250"],
-    ),
-    (
-        "pose.tracked_full_every_ms",
-        &[
-            ("-1", "is -1"),
-            ("1e308", "expected 0 to 3600000"),
-            ("nan", "is NaN"),
-        ],
-        &["0", "500"],
-    ),
-    (
-        "quality.deadline_ms",
-        &[
-            ("-1", "expected a whole number"),
-            ("9223372036854775807", "expected 0 to 3600000"),
-        ],
-        &["0", "50"],
-    ),
-    (
-        "quality.max_age_ms",
-        &[("9223372036854775807", "expected 0 to 86400000")],
-        &["0", "500"],
-    ),
-    (
-        "quality.frame_offset",
-        &[
-            ("-9223372036854775808", "expected -1000000000000 to"),
-            ("9223372036854775807", "1000000000000"),
-        ],
-        &["-5", "80"],
-    ),
-    (
-        "quality.frame_step",
-        &[("0", "is 0"), ("4294967295", "expected 1 to 1000000")],
-        &["4"],
-    ),
-    (
-        "fuse.alpha",
+        "paper.alpha",
         &[
             ("-1", "is -1"),
             ("nan", "is NaN"),
@@ -239,7 +132,7 @@ const ROWS: &[Row] = &[
         &["0.0", "0.002"],
     ),
     (
-        "fuse.beta",
+        "paper.beta",
         &[
             ("-1", "is -1"),
             ("inf", "is inf"),
@@ -248,16 +141,7 @@ const ROWS: &[Row] = &[
         &["0.03"],
     ),
     (
-        "fuse.max_distance_cells",
-        &[
-            ("0", "is 0"),
-            ("1e-300", "expected 0.001 to"),
-            ("nan", "is NaN"),
-        ],
-        &["10"],
-    ),
-    (
-        "fuse.tau",
+        "paper.tau",
         &[
             ("[-1.0]", "is -1"),
             ("[nan]", "is NaN"),
@@ -266,50 +150,14 @@ const ROWS: &[Row] = &[
         &["[5.0, 6.0]"],
     ),
     (
-        "fuse.workers",
+        "paper.workers",
         &[("0", "is 0, expected 1 to 16"), ("17", "is 17")],
         &["2"],
-    ),
-    (
-        "fuse.max_iterations",
-        &[("0", "is 0"), ("1001", "is 1001, expected 1 to 1000")],
-        &["12"],
-    ),
-    (
-        "fuse.epsilon_px",
-        &[
-            ("-1", "is -1"),
-            ("1e308", "expected 0 to 10000"),
-            ("nan", "is NaN"),
-        ],
-        &["0.1"],
-    ),
-    (
-        "triangulate.loss_px",
-        &[
-            ("0", "is 0"),
-            ("1e-300", "expected 0.01 to 10000"),
-            ("1e300", "expected 0.01 to 10000"),
-        ],
-        &["10"],
-    ),
-    (
-        "triangulate.error_weight",
-        &[("-1", "is -1"), ("1e300", "expected 0 to 1000")],
-        &["0.0", "1.0"],
     ),
     (
         "results.overlay_every",
         &[("-1", "expected a whole number")],
         &["0", "10"],
-    ),
-    (
-        "results.epipolar_part",
-        &[
-            ("0", "is 0, expected 1 to 1000"),
-            ("9223372036854775807", "expected 1 to 1000"),
-        ],
-        &["1", "26"],
     ),
     (
         "supervise.deadline_ms",
@@ -336,14 +184,6 @@ const ROWS: &[Row] = &[
         "supervise.max_restarts",
         &[("4294967295", "expected 0 to 1000000")],
         &["0"],
-    ),
-    (
-        "supervise.restart_window_s",
-        &[
-            ("0", "is 0, expected 1 to"),
-            ("9223372036854775807", "expected 1 to"),
-        ],
-        &["60"],
     ),
     (
         "supervise.latency_budget_ms",
@@ -410,7 +250,6 @@ fn what_is_hardly_meant_is_named_with_its_number() {
             "capture.frame_rate_hz=0.01",
             "`capture.frame_rate_hz` is 0.01",
         ),
-        ("triangulate.loss_px=0.02", "`triangulate.loss_px` is 0.02"),
         (
             "runtime.priority={ pose = 99 }",
             "`runtime.priority` of pose is 99",
@@ -427,8 +266,7 @@ fn what_is_hardly_meant_is_named_with_its_number() {
 #[test]
 fn a_camera_has_footage_or_keypoints_and_names_of_these_that_are_known() {
     let of_camera = |lines: &str| {
-        let network = "[pose]\nnetwork = 'n.onnx'\n";
-        let text = format!("{SHORT}[[camera]]\nname = 'c'\n{lines}\n{network}");
+        let text = format!("{SHORT}[[camera]]\nname = 'c'\n{lines}\n");
         let read = Loaded::parse(&text, Path::new("/room/deployment.toml"), &[], &AnyMachine);
         read.map_err(|it| it.to_string())
     };

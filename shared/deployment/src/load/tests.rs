@@ -3,12 +3,12 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::{AnyMachine, fuse, keys, pose};
+use crate::{AnyMachine, keys, paper};
 
 const SHORT: &str = r#"
 name = "two"
 rig = "rig.toml"
-model = "/models/m.mat"
+method = "paper"
 output = "out"
 
 [[camera]]
@@ -19,7 +19,8 @@ source = "videos/a.mp4"
 name = "b"
 source = "/videos/b.mp4"
 
-[fuse]
+[paper]
+model = "/models/m.mat"
 workers = 2
 "#;
 
@@ -53,8 +54,8 @@ fn a_slip_of_the_pen_is_told_with_its_line() {
 #[test]
 fn a_short_file_is_enough() {
     let got = read(SHORT, &[]).unwrap().deployment;
-    assert_eq!(got.fuse.workers, 2);
-    assert_eq!(got.pose, pose::Config::default());
+    assert_eq!(got.paper.workers, 2);
+    assert_eq!(got.capture, crate::capture::Config::default());
     assert_eq!(got.cameras.len(), 2);
 }
 
@@ -64,7 +65,7 @@ fn relative_paths_are_relative_to_the_file() {
     let folder = loaded.deployment.rig.parent().unwrap();
     assert!(folder.is_absolute() && loaded.deployment.rig.ends_with("rig.toml"));
     assert_eq!(
-        loaded.deployment.model.as_deref(),
+        loaded.deployment.paper.model.as_deref(),
         Some(Path::new("/models/m.mat"))
     );
     assert!(Path::new(&loaded.deployment.cameras[0].source).starts_with(folder));
@@ -74,25 +75,25 @@ fn relative_paths_are_relative_to_the_file() {
 #[test]
 fn the_command_line_wins_over_the_file() {
     let set = [
-        "fuse.workers=3",
-        "fuse.energy=released",
+        "paper.workers=3",
+        "paper.energy=released",
         "capture.n_frames=7",
     ];
     let got = read(SHORT, &set).unwrap().deployment;
-    assert_eq!(got.fuse.workers, 3);
-    assert_eq!(got.fuse.energy, fuse::Energy::Released);
+    assert_eq!(got.paper.workers, 3);
+    assert_eq!(got.paper.energy, paper::Energy::Released);
     assert_eq!(got.capture.n_frames, Some(7));
 }
 
 #[test]
 fn a_list_that_is_too_long_is_refused_and_a_shorter_one_may_replace_a_longer() {
     let text = SHORT.replace("workers = 2", "pairs = [['a', 'b'], ['b', 'a']]");
-    let one = read(&text, &["fuse.pairs=[['a', 'b']]"]).unwrap();
-    assert_eq!(one.deployment.fuse.pairs.len(), 1);
+    let one = read(&text, &["paper.pairs=[['a', 'b']]"]).unwrap();
+    assert_eq!(one.deployment.paper.pairs.len(), 1);
     let pairs = text.replace("['b', 'a']", "['b', 'a', 'c']");
     let got = refused(&pairs, &[]);
     assert!(
-        got.ends_with("`fuse.pairs` is a list of 3 values, expected 2"),
+        got.ends_with("`paper.pairs` is a list of 3 values, expected 2"),
         "{got}"
     );
     let size = format!("{SHORT}\n[capture]\nsize = [64, 48, 3]\n");
@@ -108,14 +109,14 @@ fn an_unknown_key_is_named_with_its_line_and_a_suggestion() {
     let text = SHORT.replace("workers", "wrokers");
     assert_eq!(
         refused(&text, &[]),
-        "deployment.toml:16: unknown key `wrokers`, did you mean `workers`?"
+        "deployment.toml:17: unknown key `wrokers`, did you mean `workers`?"
     );
 }
 
 #[test]
 fn an_unknown_key_of_the_command_line_is_named_too() {
     assert_eq!(
-        refused(SHORT, &["fuse.wrokers=3"]),
+        refused(SHORT, &["paper.wrokers=3"]),
         "--set: unknown key `wrokers`, did you mean `workers`?"
     );
 }
@@ -130,7 +131,7 @@ fn a_missing_key_is_named() {
 fn a_value_of_another_kind_is_refused_with_its_line() {
     let text = SHORT.replace("workers = 2", "workers = \"two\"");
     let got = refused(&text, &[]);
-    assert!(got.starts_with("deployment.toml:16: "), "{got}");
+    assert!(got.starts_with("deployment.toml:17: "), "{got}");
 }
 
 #[test]
@@ -138,7 +139,7 @@ fn a_value_that_cannot_be_is_refused_with_its_line() {
     let text = SHORT.replace("workers = 2", "workers = 0");
     assert_eq!(
         refused(&text, &[]),
-        "deployment.toml:16: `fuse.workers` is 0, expected 1 to 16"
+        "deployment.toml:17: `paper.workers` is 0, expected 1 to 16"
     );
 }
 
@@ -147,22 +148,22 @@ fn what_has_no_meaning_for_all_views_at_once_is_refused() {
     let text = SHORT.replace("workers = 2", "views = \"all\"");
     read(&text, &[]).unwrap();
     for (set, expected) in [
-        ("fuse.energy=released", "`fuse.energy` is \"released\""),
-        ("fuse.pairs=[['a', 'b']]", "`fuse.pairs` is given"),
+        ("paper.energy=released", "`paper.energy` is \"released\""),
+        ("paper.pairs=[['a', 'b']]", "`paper.pairs` is given"),
         (
-            "triangulate.combine=consensus",
-            "`triangulate.combine` is \"consensus\"",
+            "paper.combine=consensus",
+            "`paper.combine` is \"consensus\"",
         ),
     ] {
         let got = refused(&text, &[set]);
         assert!(got.contains(expected), "{got}");
-        read(&text, &["fuse.views=pairs", set]).unwrap();
+        read(&text, &["paper.views=pairs", set]).unwrap();
     }
 }
 
 #[test]
 fn text_that_is_not_toml_is_refused_with_its_line() {
-    let got = refused(&SHORT.replace("[fuse]", "[fuse"), &[]);
+    let got = refused(&SHORT.replace("[paper]", "[paper"), &[]);
     assert!(got.starts_with("deployment.toml:15: "), "{got}");
 }
 
@@ -198,7 +199,7 @@ proptest! {
     ) {
         let mut text = SHORT.to_owned();
         text.replace_range(at..(at + n).min(SHORT.len()), &to);
-        is_taken(&text, "fuse.workers=3");
+        is_taken(&text, "paper.workers=3");
     }
 
     #[test]
@@ -215,26 +216,26 @@ proptest! {
 
 #[test]
 fn an_override_without_a_value_is_refused() {
-    assert!(refused(SHORT, &["fuse.workers"]).contains("expected key=value"));
+    assert!(refused(SHORT, &["paper.workers"]).contains("expected key=value"));
 }
 
 #[test]
 fn a_wrong_value_is_refused_with_its_line() {
-    let text = format!("{SHORT}\n[results]\nepipolar_part = 0\n");
+    let text = format!("{SHORT}\n[capture]\nframe_step = 0\n");
     assert_eq!(
         refused(&text, &[]),
-        "deployment.toml:19: `results.epipolar_part` is 0, expected 1 to 1000"
+        "deployment.toml:20: `capture.frame_step` is 0, expected at least 1"
     );
-    let text = format!("{SHORT}\n[results]\ntcr = true\n");
+    let text = format!("{SHORT}\n[results]\nsmoth = true\n");
     assert_eq!(
         refused(&text, &[]),
-        "deployment.toml:19: unknown key `tcr`, did you mean `trc`?"
+        "deployment.toml:20: unknown key `smoth`, did you mean `smooth`?"
     );
 }
 
 #[test]
 fn whatever_runs_by_the_file_alone_may_be_given_cores_and_nothing_else() {
-    let loaded = read(SHORT, &["quality.network=shipped"]).unwrap();
+    let loaded = read(SHORT, &["paper.errors=shipped"]).unwrap();
     let topology = crate::Topology::new(&loaded.deployment, None, None);
     for process in topology.processes() {
         for name in [&process.name, process.service] {
@@ -257,7 +258,7 @@ fn a_number_larger_than_any_is_refused_as_its_key_asks() {
     let text = SHORT.replace("workers = 2", "workers = 99999999999999999999");
     let got = refused(&text, &[]);
     assert!(
-        got.contains("`fuse.workers`: expected a whole number"),
+        got.contains("`paper.workers`: expected a whole number"),
         "{got}"
     );
 }

@@ -110,18 +110,18 @@ mod tests {
     }
 
     fn solved(views: &str, more: &str) -> Deployment {
-        let model = if views == "space" {
-            ""
+        let method = if views == "space" {
+            "method = 'network'\n".to_owned()
         } else {
-            "model = 'm'\n"
+            format!("method = 'paper'\npaper.views = '{views}'\n")
         };
         let text = format!(
-            "name = 'a'\nrig = 'r'\noutput = 'o'\n{model}\
+            "name = 'a'\nrig = 'r'\noutput = 'o'\n{method}\
              [[camera]]\nname = 'c0'\nsource = 's'\n[[camera]]\nname = 'c1'\nsource = 's'\n\
              [[camera]]\nname = 'c2'\nsource = 's'\n\
-             [capture]\nmode = 'realtime'\npace = 'realtime'\nframe_rate_hz = 5.0\n\
+             [capture]\nmode = 'realtime'\nframe_rate_hz = 5.0\n\
              [[host]]\nname = 'desk'\nfuses = true\naddress = 'x:1'\nviews = ['c1']\n\
-             [[host]]\nname = 'far'\nviews = ['c0', 'c2']\n[fuse]\nviews = '{views}'\n[link]\ninsecure = true\n{more}"
+             [[host]]\nname = 'far'\nviews = ['c0', 'c2']\n[link]\ninsecure = true\n{more}"
         );
         let loaded = Loaded::parse(&text, Path::new("d.toml"), &[], &AnyMachine);
         loaded.unwrap().deployment
@@ -133,11 +133,7 @@ mod tests {
 
     #[test]
     fn every_process_of_the_whole_runs_on_exactly_one_host() {
-        for more in [
-            "",
-            "carry = 'poses'\n",
-            "carry = 'poses'\n[quality]\nnetwork = 'shipped'\n",
-        ] {
+        for more in ["", "carry = 'poses'\n"] {
             let it = deployment(more);
             let whole = Topology::new(&it, None, None);
             let mut all = Vec::new();
@@ -189,7 +185,7 @@ mod tests {
 
     #[test]
     fn the_maps_of_a_network_cross_with_its_poses() {
-        let it = solved("space", "carry = 'poses'\n[pose]\nnetwork = 'shipped'\n");
+        let it = solved("space", "carry = 'poses'\n");
         let whole = Topology::new(&it, None, None);
         let [desk, far] = [0, 1].map(|host| whole.clone().on_host(&it, &it.hosts[host]));
         let crosses = [0, 2].map(|view| [topic::view_pose(view), topic::evidence(view)]);

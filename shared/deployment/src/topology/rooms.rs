@@ -92,7 +92,7 @@ impl Topology {
             onlookers: ONLOOKERS,
             queued: match mode {
                 Mode::Realtime => SMALL_QUEUE_REALTIME,
-                Mode::Lossless => SMALL_QUEUE_LOSSLESS,
+                Mode::Lossless | Mode::Paced => SMALL_QUEUE_LOSSLESS,
             },
             borrowed: SMALL_BORROWED,
             longest: 1,

@@ -12,12 +12,8 @@ use crate::{AnyMachine, Loaded};
 /// A deployment of so many cameras.
 fn deployment(n_views: usize, settings: &str) -> Deployment {
     let mut text = "name = 'a'\nrig = 'r'\noutput = 'o'\n".to_owned();
-    // What is of the filters has to be said.
-    if ["[fuse]", "[quality]", "[triangulate]"]
-        .iter()
-        .any(|it| settings.contains(it))
-    {
-        text.push_str("model = 'm'\n");
+    if settings.contains("[paper]") {
+        text.push_str("method = 'paper'\n");
     }
     for view in 0..n_views {
         write!(text, "[[camera]]\nname = 'c{view}'\nsource = 's'\n").unwrap();
@@ -54,7 +50,7 @@ fn of_service<'a>(topology: &'a Topology, service: &str) -> Vec<&'a Process> {
 #[test]
 fn all_views_at_once_have_one_worker_for_every_process_however_many_are_allowed() {
     for n_views in 3..=6 {
-        let deployment = deployment(n_views, "[fuse]\nviews = 'all'\nworkers = 3\n");
+        let deployment = deployment(n_views, "[paper]\nviews = 'all'\nworkers = 3\n");
         let recording = recording(false);
         let recorded = Topology::new(&deployment, Some(&recording), None);
         let replay = replay(Stage::Triangulate);
@@ -87,7 +83,7 @@ fn all_views_at_once_have_one_worker_for_every_process_however_many_are_allowed(
 
 #[test]
 fn the_receivers_of_a_recorded_deployment_with_a_network_are_these() {
-    let deployment = deployment(3, "[quality]\nnetwork = 'n'\n[fuse]\nworkers = 2\n");
+    let deployment = deployment(3, "[paper]\nerrors = 'n'\nworkers = 2\n");
     let recording = recording(false);
     let topology = Topology::new(&deployment, Some(&recording), None);
     let n = |topic: String| topology.receivers_of(&topic);
@@ -147,7 +143,7 @@ fn numbers(rooms: &[Room]) -> Vec<Numbers<'_>> {
 
 #[test]
 fn topics_have_this_room() {
-    let settings = "[quality]\nnetwork = 'n'\n[fuse]\nworkers = 2\n";
+    let settings = "[paper]\nerrors = 'n'\nworkers = 2\n";
     let topology = Topology::new(&deployment(3, settings), None, None);
     let rooms = topology.rooms(Mode::Realtime, &[SIZE; 3], 4);
     assert_eq!(rooms.len(), 4 * 3 + 2 + 1);
@@ -180,7 +176,7 @@ fn topics_have_this_room() {
 
 #[test]
 fn the_answers_about_one_frame_of_many_views_find_room() {
-    let all = deployment(7, "[fuse]\nviews = 'all'\n");
+    let all = deployment(7, "[paper]\nviews = 'all'\n");
     let rooms = Topology::new(&all, None, None).rooms(Mode::Realtime, &[SIZE; 7], 1);
     let answers = rooms.iter().find(|it| it.content == Content::PairPose);
     assert_eq!(answers.map(|it| it.queued), Some(7));
@@ -189,7 +185,7 @@ fn the_answers_about_one_frame_of_many_views_find_room() {
 #[test]
 fn every_pair_has_one_worker() {
     for most in 1..12 {
-        let deployment = deployment(5, &format!("[fuse]\nviews = 'pairs'\nworkers = {most}\n"));
+        let deployment = deployment(5, &format!("[paper]\nviews = 'pairs'\nworkers = {most}\n"));
         let topology = Topology::new(&deployment, None, None);
         let mut dealt: Vec<usize> = (0..topology.n_workers())
             .flat_map(|worker| topology.pairs_of(worker))
@@ -206,14 +202,14 @@ fn a_view_is_read_by_the_workers_of_its_pairs() {
         let topology = Topology::new(&deployment(n_views, settings), None, None);
         [0, 1, 2].map(|view| topology.workers_on(view))
     };
-    assert_eq!(on(3, "[fuse]\nworkers = 3\n"), [2, 2, 2]);
-    let one = "[fuse]\nworkers = 4\npairs = [['c1', 'c0'], ['c0', 'c1']]\n";
+    assert_eq!(on(3, "[paper]\nworkers = 3\n"), [2, 2, 2]);
+    let one = "[paper]\nworkers = 4\npairs = [['c1', 'c0'], ['c0', 'c1']]\n";
     assert_eq!(on(3, one), [1, 1, 0]);
 }
 
 #[test]
 fn one_camera_has_no_worker() {
-    let topology = Topology::new(&deployment(1, "[fuse]\nworkers = 4\n"), None, None);
+    let topology = Topology::new(&deployment(1, "[paper]\nworkers = 4\n"), None, None);
     assert_eq!(topology.n_workers(), 0);
     assert_eq!(topology.workers_on(0), 0);
     assert_eq!(of_service(&topology, "fuse").len(), 0);
@@ -224,7 +220,7 @@ prop_compose! {
         n_views in 1_usize..=6,
         views in prop::sample::select(vec!["pairs", "all"]),
         workers in 1_usize..=8,
-        quality in prop::sample::select(vec!["", "table = 't'", "network = 'n'"]),
+        quality in prop::sample::select(vec!["", "errors = { table = 't' }", "errors = 'n'"]),
         some in prop::option::of(prop::collection::vec((0_usize..6, 1_usize..6), 1..4)),
     ) -> (usize, String) {
         let mut pairs = String::new();
@@ -237,7 +233,7 @@ prop_compose! {
             let all: Vec<String> = some.into_iter().map(pair).collect();
             pairs = format!("pairs = [{}]\n", all.join(", "));
         }
-        (n_views, format!("[quality]\n{quality}\n[fuse]\nviews = '{views}'\nworkers = {workers}\n{pairs}"))
+        (n_views, format!("[paper]\n{quality}\nviews = '{views}'\nworkers = {workers}\n{pairs}"))
     }
 }
 

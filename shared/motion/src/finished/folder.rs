@@ -4,7 +4,6 @@ use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
 use crate::{Joint, Recorded, Role, lines};
-use deployment::smooth::Config;
 use failure::{ExitKind, Failure, in_file};
 use geometry::files::ReadOptions;
 use nalgebra::UnitVector3;
@@ -165,13 +164,6 @@ fn deployment_of(folder: &Path) -> Option<Value> {
     let text = files::read_text(&folder.join("deployment.json"), files::SETTINGS).ok()?;
     let value: Value = serde_json::from_str(&text).ok()?;
     value.get("deployment").cloned()
-}
-
-/// Section `[smooth]` of the deployment that a run is of; the defaults where it says nothing.
-pub fn settings(folder: &Path) -> Config {
-    let section = deployment_of(folder).and_then(|it| it.get("smooth").cloned());
-    let read = section.and_then(|it| serde_json::from_value(it).ok());
-    read.unwrap_or_default()
 }
 
 /// Against gravity in the world of a run: from its deployment, else from its calibration if that is still there.

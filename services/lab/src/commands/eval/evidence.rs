@@ -24,7 +24,7 @@ pub(super) struct Options {
     #[arg(
         long,
         value_name = "FILE",
-        conflicts_with_all = ["model", "versions", "fuse", "consistency", "sigma", "network", "oracle", "resume", "only", "without"]
+        conflicts_with_all = ["model", "versions", "paper", "consistency", "sigma", "network", "oracle", "resume", "only", "without"]
     )]
     pub(super) network_evidence: Option<PathBuf>,
     /// The card of the network; if not given, the one beside it, or in its metadata.

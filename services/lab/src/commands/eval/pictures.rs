@@ -65,7 +65,7 @@ pub(super) fn run(
 fn refuse_sequence_options(arguments: &Arguments) -> Result<(), Failure> {
     let given = [
         ("--versions", !arguments.versions.is_empty()),
-        ("--fuse", arguments.fuse.is_some()),
+        ("--paper", arguments.paper.is_some()),
         ("--consistency", arguments.consistency.is_some()),
         ("--sigma", arguments.sigma.is_some()),
         ("--network", arguments.network.is_some()),

@@ -1,6 +1,6 @@
 //! Writes the report of an evaluation.
 
-use deployment::fuse::Config;
+use deployment::paper::Config;
 use failure::Failure;
 use lab::eval::{self, Done, Job};
 use score::Bootstrap;
@@ -50,7 +50,7 @@ fn about(
         |[width, height]| format!("{width}x{height}"),
     );
     let frames = format!("{n_frames} instants; sequences: {}", done.sequences.len());
-    let settings = fuse::settings(config, job.n_candidates, 1.0, job.learned);
+    let settings = fuse::settings(config, 1.0, job.learned);
     let model = arguments.model.as_ref();
     let model = model.map_or("the one that ships".to_owned(), |it| {
         it.display().to_string()
@@ -65,8 +65,8 @@ fn about(
             format!(
                 "{}, alpha {}, beta {}, distances {}",
                 match config.energy {
-                    deployment::fuse::Energy::Paper => "the paper's",
-                    deployment::fuse::Energy::Released => "that of the released program",
+                    deployment::paper::Energy::Paper => "the paper's",
+                    deployment::paper::Energy::Released => "that of the released program",
                 },
                 settings.alpha,
                 settings.beta,

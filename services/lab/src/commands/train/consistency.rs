@@ -20,7 +20,7 @@ that rig by the cameras' names too. The median error of every part is its thresh
 map of the parts by least squares. Then alpha, the cap on distances and beta are chosen on subjects that \
 were held out: those of the largest area under the curve of PCP3D.
 
-The file belongs beside the model it was learned with: `consistency = \"person.consistency\"` in the [fuse] section \
+The file belongs beside the model it was learned with: `consistency = \"person.consistency\"` in the [paper] section \
 of a deployment, or --consistency of `eval`. Its format: cargo doc -p consistency, `Learned`.
 
 With --json one object: the weights, every choice that was tried and how it did, tau, what the tables know of held-out \

@@ -20,7 +20,7 @@ person's size from their mark count nothing: there the limb was not found. Every
 people it has. How many parts count and how freely is chosen by the error on people who are left out in turn.
 
 DATASETs are those of `train fmp`, of people with 14 joints: usually the same as for the model, with the same --only, --sides \
-and --without. The file is used with this model alone, where it is named: `triangulate.joint_map` of a deployment, --joint-map of \
+and --without. The file is used with this model alone, where it is named: `paper.joint_map` of a deployment, --joint-map of \
 `detect`, `eval` and `judge`. The model that ships has one that ships.
 
 The file is the same on any number of threads.

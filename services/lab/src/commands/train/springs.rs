@@ -16,7 +16,7 @@ A network that finds keypoints says where every joint may be, and nothing about 
 where a joint lies from the next one, as a mixture of Gaussians (its types), learned by maximum likelihood from the marks alone \
 and their mirror images; no picture is read. `--sides seen` suits networks whose left and right are those of the picture, and was no \
 worse for others. The file is a model of 26 parts, of which 14 have evidence, the maps of the joints; it is used with any \
-network (`[pose] springs` of a deployment), and one ships.
+network (`[network] springs` of a deployment), and one ships.
 
 DATASETs are those of `train fmp`, of people with 14 joints.
 

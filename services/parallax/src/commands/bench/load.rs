@@ -13,7 +13,7 @@ const HELP: &str = "\
 Every run is a deployment of real processes, as `parallax run` starts it. Without a deployment file its cameras are \
 synthetic, 320x240 pixels, `--rate` frames a second; their pictures are rendered in advance, into OUT/pictures \
 (with --live by the capture processes during the run, which then compete with the others for the cores). They are \
-searched near the last pose, as the demo's are (`--set pose.search=full`: everywhere).
+searched near the last pose, as the demo's are (`--set paper.search=full`: everywhere).
 
 latency     --views cameras in real time; then the same with the process of the last camera killed
 throughput  --views cameras, every frame, as fast as possible

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use capture::Recorded;
 use deployment::Stage;
-use deployment::capture::{Mode, Pace};
+use deployment::capture::Mode;
 use failure::{ExitKind, Failure};
 use launch::Resolved;
 use messages::topic;
@@ -54,7 +54,7 @@ pub(super) fn settle(
     }
     let capture = &mut recorded.deployment.capture;
     if from == Stage::Capture && !set.iter().any(|it| it.starts_with("capture.mode=")) {
-        (capture.mode, capture.pace) = (Mode::Lossless, Pace::Fast);
+        capture.mode = Mode::Lossless;
     }
     Ok(())
 }

@@ -14,7 +14,7 @@ const HELP: &str = "\
 The samples are made by `parallax-lab train quality-samples`; a share of their groups (subjects, images) is validated on, \
 never a part of a group. After every pass the state is in OUT.checkpoint: --resume goes on, and on the CPU the \
 network is the same, bit for bit, whatever the interruptions. OUT.svg shows how the training went. The best pass is \
-written as ONNX, with what `[quality]` needs to know of it inside: preprocessing, unit, thresholds.
+written as ONNX, with what `errors` in [paper] needs to know of it inside: preprocessing, unit, thresholds.
 
 VGG-16 (--network vgg16) begins with torchvision's weights, --weights vgg16.safetensors (of a .pth make one \
 with safetensors.torch.save_file), and samples made with --tile vgg16.

@@ -1,0 +1,61 @@
+//! Section `[network]` of a deployment file: the keys that only the network's method has.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::shipped::{SHIPPED, relative_to};
+
+/// The network that finds the joints of people, and where it looks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(rename = "Network")]
+pub struct Config {
+    /// The network that finds joints: an ONNX file with its card beside it (`.toml` for `.onnx`) or in its metadata, or `"shipped"`.
+    pub file: PathBuf,
+    /// The detector of people that says where the network looks, an ONNX file with its card beside it; without it filters say so.
+    pub detector: Option<PathBuf>,
+    /// What holds the maps of the joints together: a file of `parallax-lab train springs`, or `"shipped"`.
+    pub springs: PathBuf,
+    /// People are looked for in every n-th frame; without it twice a second with a `detector`, once without.
+    pub find_every: Option<u64>,
+    /// Least mean heat of the joints of a person who is seen, 0 to 1.
+    pub least_heat: f64,
+    /// Most people of a view that the network looks at.
+    pub people: usize,
+    /// Look at the mirror image of every person as well and use the mean, which is more exact and takes twice the time.
+    pub mirror: bool,
+    /// The library of ONNX Runtime (`libonnxruntime.so`) that runs network and detector in place of `rten`, which is built in.
+    pub onnx_runtime: Option<PathBuf>,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            file: PathBuf::from(SHIPPED),
+            detector: None,
+            springs: PathBuf::from(SHIPPED),
+            find_every: None,
+            least_heat: 0.2,
+            people: 3,
+            mirror: false,
+            onnx_runtime: None,
+        }
+    }
+}
+
+impl Config {
+    /// Takes every relative path as relative to `base`.
+    pub(crate) fn resolve(&mut self, base: &Path) {
+        for file in [&mut self.file, &mut self.springs] {
+            *file = relative_to(file, base);
+        }
+        for file in [&mut self.detector, &mut self.onnx_runtime]
+            .into_iter()
+            .flatten()
+        {
+            *file = base.join(&file);
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Where the expected errors of the parts come from.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Expected errors of the parts of every view.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected \"shipped\", an ONNX file, or { table = \"...\", subject = \"...\", action = \"...\", \
+                 views = { CAMERA = \"...\" }, frame_offset = 0, frame_step = 1 }"
+)]
+pub enum Errors {
+    /// A network predicts them from the frames.
+    Network(PathBuf),
+    /// A table has them.
+    Table(ErrorTable),
+}
+
+/// A table of expected errors: subject, action, frame, camera, then one error for each part, pixels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ErrorTable {
+    /// The file.
+    pub table: PathBuf,
+    /// Subject in the table; not set where it names none.
+    pub subject: Option<String>,
+    /// Action in the table; not set where it names none.
+    pub action: Option<String>,
+    /// Names of cameras in the table, by their names in the deployment; those that are left out have the same.
+    #[serde(default)]
+    pub views: BTreeMap<String, String>,
+    /// Number of the footage's frame 0 in the table.
+    #[serde(default)]
+    pub frame_offset: i64,
+    /// Frames of the table per frame of the footage.
+    #[serde(default = "one")]
+    pub frame_step: u32,
+}
+
+fn one() -> u32 {
+    1
+}
+
+impl Errors {
+    /// The network, unless a table has them.
+    pub fn network(&self) -> Option<&PathBuf> {
+        match self {
+            Self::Network(file) => Some(file),
+            Self::Table(_) => None,
+        }
+    }
+
+    /// The table, unless a network predicts them.
+    pub fn table(&self) -> Option<&ErrorTable> {
+        match self {
+            Self::Table(table) => Some(table),
+            Self::Network(_) => None,
+        }
+    }
+}
+
+impl ErrorTable {
+    /// The name of a camera in the table.
+    pub fn name_of<'a>(&'a self, camera: &'a str) -> &'a str {
+        self.views.get(camera).map_or(camera, String::as_str)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_has_its_own_name_in_the_table_unless_another_is_set() {
+        let text = "table = 't.csv'\nviews = { left = 'C1' }";
+        let table: ErrorTable = toml::from_str(text).unwrap();
+        assert_eq!(table.name_of("left"), "C1");
+        assert_eq!(table.name_of("right"), "right");
+        assert_eq!((table.frame_offset, table.frame_step), (0, 1));
+    }
+}
