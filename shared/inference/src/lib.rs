@@ -1,18 +1,25 @@
-//! Networks from ONNX files, run by the `rten` library, which is built in, or by ONNX Runtime, which the user provides.
+//! Networks from ONNX files, run by Parallax itself with the `rten` library, which are built in, or by ONNX Runtime, which the user provides.
 //!
 //! A [`Session`] is a network that is loaded: what it takes and gives ([`Description`]), and how it is run
 //! ([`Session::run`]), on one thread. What its numbers mean is for others to say.
 #![forbid(unsafe_code)]
 
+mod direct;
 mod engine;
+mod front;
 mod nesting;
 #[cfg(feature = "ort")]
 mod onnx_runtime;
+mod plan;
+mod rest;
 mod rten_engine;
 mod session;
 mod sizes;
+mod source;
+#[cfg(test)]
+mod tests;
 
 pub use engine::{Description, Input, LoadError, Output, Port, RunError, Side, Values, written};
 #[cfg(feature = "ort")]
 pub use onnx_runtime::OnnxRuntime;
-pub use session::Session;
+pub use session::{RunBy, Session};

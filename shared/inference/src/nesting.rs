@@ -87,7 +87,7 @@ fn walk(kind: Kind, bytes: &[u8], base: usize, depth: usize) -> Result<(), Malfo
 }
 
 /// Reads a number of seven bits per byte, lowest first; `None` if it does not end.
-fn varint(bytes: &[u8], at: &mut usize) -> Option<u64> {
+pub(crate) fn varint(bytes: &[u8], at: &mut usize) -> Option<u64> {
     let mut value = 0;
     for shift in (0..64).step_by(7) {
         let byte = *bytes.get(*at)?;

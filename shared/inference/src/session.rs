@@ -1,5 +1,8 @@
 //! A network that is loaded.
 
+use core::fmt;
+
+use crate::direct::{Direct, Parts};
 use crate::engine::Engine;
 #[cfg(feature = "ort")]
 use crate::onnx_runtime::OnnxRuntime;
@@ -12,6 +15,28 @@ pub struct Session {
     engine: Box<dyn Engine>,
     description: Description,
     fingerprint: u32,
+    by: RunBy,
+}
+
+/// A library that runs networks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RunBy {
+    /// Convolutions by Parallax itself, what follows them by `rten`.
+    Parallax,
+    /// All of it by `rten`; why Parallax itself does not.
+    Rten(String),
+    /// ONNX Runtime.
+    OnnxRuntime,
+}
+
+impl fmt::Display for RunBy {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Parallax => to.write_str("Parallax"),
+            Self::Rten(why) => write!(to, "rten, since {why}"),
+            Self::OnnxRuntime => to.write_str("ONNX Runtime"),
+        }
+    }
 }
 
 impl Session {
@@ -26,11 +51,33 @@ impl Session {
     /// [`LoadError::File`].
     pub fn parse(file: Vec<u8>) -> Result<Self, LoadError> {
         let fingerprint = check(&file)?;
+        let parts = Parts::find(&file);
+        let (whole, description) = Rten::load(file)?;
+        let (engine, by): (Box<dyn Engine>, _) = match parts {
+            Ok(parts) => (Box::new(Direct { parts, whole }), RunBy::Parallax),
+            Err(why) => (Box::new(whole), RunBy::Rten(why.to_string())),
+        };
+        Ok(Self {
+            engine,
+            description,
+            fingerprint,
+            by,
+        })
+    }
+
+    /// As [`Self::parse`], but run by `rten` whatever it holds: for comparisons.
+    ///
+    /// # Errors
+    ///
+    /// [`LoadError::File`].
+    pub fn parse_by_rten(file: Vec<u8>) -> Result<Self, LoadError> {
+        let fingerprint = check(&file)?;
         let (engine, description) = Rten::load(file)?;
         Ok(Self {
             engine: Box::new(engine),
             description,
             fingerprint,
+            by: RunBy::Rten("it was asked for".to_owned()),
         })
     }
 
@@ -47,7 +94,13 @@ impl Session {
             engine: Box::new(engine),
             description,
             fingerprint,
+            by: RunBy::OnnxRuntime,
         })
+    }
+
+    /// The library that runs it.
+    pub fn run_by(&self) -> &RunBy {
+        &self.by
     }
 
     /// What it takes and gives.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use fmp::Layout;
 use footage::Size;
-use inference::{Description, Session};
+use inference::{Description, RunBy, Session};
 use kernels::Rgb8View;
 use keypoints::Card;
 use posenetwork::springs::TurnedSprings;
@@ -83,6 +83,11 @@ impl NetworkFile {
     /// What it takes and gives.
     pub fn description(&self) -> &Description {
         self.session.description()
+    }
+
+    /// The library that runs it.
+    pub fn run_by(&self) -> &RunBy {
+        self.session.run_by()
     }
 
     /// Its card, and where that was found.

@@ -38,6 +38,11 @@ impl Isa {
         Self(Kind::Portable)
     }
 
+    /// Says whether it is the baseline of the target, that every machine has.
+    pub fn is_portable(self) -> bool {
+        self.0 == Kind::Portable
+    }
+
     /// What it is called.
     pub fn name(self) -> &'static str {
         match self.0 {

@@ -11,6 +11,7 @@
     reason = "a body takes on the instruction set of the function that it is inlined into"
 )]
 
+mod conv;
 mod correlate;
 mod dispatch;
 mod distance;
@@ -31,6 +32,7 @@ const fn sized(usual: usize, interpreted: usize) -> usize {
     if cfg!(miri) { interpreted } else { usual }
 }
 
+pub use conv::{Blocked, BlockedShape, Conv, ConvSize, ConvSizeError, Outputs, add_repeated};
 pub use correlate::{CorrelateWorkspace, FeatureMap, FilterBank, Level, Template, correlate_f64};
 pub use dispatch::{Body, dispatch};
 pub use distance::{LengthSpring, ScoredPoints};

@@ -19,6 +19,20 @@ impl Row {
     pub(crate) const ZERO: Self = Self([0.0; ROW]);
 }
 
+/// The floats of all rows.
+#[inline(always)]
+pub(crate) fn flat(rows: &[Row]) -> &[f32] {
+    // SAFETY: a `Row` is its floats and nothing else, as its size says: 128 bytes, a multiple of its alignment.
+    unsafe { std::slice::from_raw_parts(rows.as_ptr().cast(), rows.len() * ROW) }
+}
+
+/// As [`flat`].
+#[inline(always)]
+pub(crate) fn flat_mut(rows: &mut [Row]) -> &mut [f32] {
+    // SAFETY: as in `flat`; the rows are borrowed for as long as their floats.
+    unsafe { std::slice::from_raw_parts_mut(rows.as_mut_ptr().cast(), rows.len() * ROW) }
+}
+
 impl std::borrow::Borrow<[f32; ROW]> for Row {
     #[inline(always)]
     fn borrow(&self) -> &[f32; ROW] {
@@ -73,6 +87,8 @@ pub(crate) trait Simd: Copy {
     fn first(self, n: usize, a: Self::V, b: Self::V) -> Self::V;
     /// Register `i` holds value `lane + i` of each of the first `LANES` rows.
     fn transposed(self, rows: &[Row], lane: usize) -> Self::Square;
+    /// Runs a kernel in a function of its own, where no other values take registers from its loop.
+    fn apart(self, kernel: impl Kernel);
 }
 
 /// A computation for the instructions of the machine.

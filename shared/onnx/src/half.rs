@@ -24,15 +24,15 @@ pub(crate) fn bits_of(value: f32) -> u16 {
 
 /// The value of bits of half precision.
 pub fn value_of(bits: u16) -> f32 {
-    let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
-    let exponent = i32::from(bits >> 10 & 31);
-    let fraction = f32::from(bits & 0x3ff) / 1024.0;
-    sign * match exponent {
-        0 => fraction * 2.0_f32.powi(-14),
-        31 if fraction == 0.0 => f32::INFINITY,
-        31 => f32::NAN,
-        _ => (1.0 + fraction) * 2.0_f32.powi(exponent - 15),
-    }
+    let sign = u32::from(bits & 0x8000) << 16;
+    let magnitude = u32::from(bits & 0x7fff) << 13;
+    // Exponents count from 15 in place of 127; this is exact, below the smallest normal number too.
+    let scale = f32::from_bits((127 + 112) << 23);
+    let magnitude = match bits >> 10 & 31 {
+        31 => magnitude | 0x7f80_0000,
+        _ => (f32::from_bits(magnitude) * scale).to_bits(),
+    };
+    f32::from_bits(sign | magnitude)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ mod half;
 mod message;
 
 pub use half::value_of as value_of_half;
-use message::Message;
+pub use message::Message;
 
 const IR_VERSION: i64 = 8;
 const FLOAT: i64 = 1;

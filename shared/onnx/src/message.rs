@@ -1,8 +1,9 @@
 //! The wire format of protocol buffers, as much of it as an ONNX file needs: fields of numbers, texts, bytes and messages.
 
-/// A message that is being written.
+/// A message in the wire format of protocol buffers that is being written: for parts of files that [`Network`](crate::Network) does not write.
+#[must_use]
 #[derive(Debug, Default, Clone)]
-pub(crate) struct Message(Vec<u8>);
+pub struct Message(Vec<u8>);
 
 /// Wire types.
 const VARINT: u64 = 0;
@@ -10,14 +11,14 @@ const BYTES: u64 = 2;
 
 impl Message {
     /// A whole number.
-    pub(crate) fn number(mut self, field: u64, value: i64) -> Self {
+    pub fn number(mut self, field: u64, value: i64) -> Self {
         self.key(field, VARINT);
         self.varint(value as u64);
         self
     }
 
     /// Bytes.
-    pub(crate) fn bytes(mut self, field: u64, value: &[u8]) -> Self {
+    pub fn bytes(mut self, field: u64, value: &[u8]) -> Self {
         self.key(field, BYTES);
         self.varint(value.len() as u64);
         self.0.extend(value);
@@ -25,17 +26,17 @@ impl Message {
     }
 
     /// A text.
-    pub(crate) fn text(self, field: u64, value: &str) -> Self {
+    pub fn text(self, field: u64, value: &str) -> Self {
         self.bytes(field, value.as_bytes())
     }
 
     /// Another message.
-    pub(crate) fn message(self, field: u64, value: &Self) -> Self {
+    pub fn message(self, field: u64, value: &Self) -> Self {
         self.bytes(field, &value.0)
     }
 
     /// One field for every item.
-    pub(crate) fn each<T>(
+    pub fn each<T>(
         self,
         items: impl IntoIterator<Item = T>,
         put: impl Fn(Self, T) -> Self,
@@ -44,7 +45,7 @@ impl Message {
     }
 
     /// The bytes of the message.
-    pub(crate) fn finish(self) -> Vec<u8> {
+    pub fn finish(self) -> Vec<u8> {
         self.0
     }
 

@@ -64,6 +64,7 @@ fn show_network(
 ) -> Result<ExitCode, Failure> {
     let description = read.description().clone();
     let card = read.card().cloned();
+    let run_by = read.run_by().to_string();
     let fitted = card.is_some().then(|| read.fitted()).transpose();
     let found = match (&fitted, &arguments.image) {
         (Ok(Some(network)), Some(image)) => Some(look(network, image, arguments)?),
@@ -75,6 +76,7 @@ fn show_network(
             "file": file,
             "inputs": ports(&description.inputs),
             "outputs": ports(&description.outputs),
+            "run_by": run_by,
             "card": card.as_ref().map(|(card, place)| card_json(card, place)),
             "misfit": fitted.as_ref().err().map(ToString::to_string),
         });
@@ -88,6 +90,7 @@ fn show_network(
         output::json(&value)?;
     } else {
         in_words(file, &description, card.as_ref())?;
+        output::line(format_args!("  run by {run_by}"))?;
         if fitted.is_ok() && card.is_some() {
             output::line("  the network fits its card")?;
         }

@@ -1,6 +1,6 @@
 //! Whatever the target guarantees, four lanes at a time: what SSE2 and NEON hold in a register.
 
-use super::{Row, Simd};
+use super::{Kernel, Row, Simd};
 
 /// Needs nothing, so anyone may make one.
 #[derive(Debug, Clone, Copy)]
@@ -89,6 +89,11 @@ impl Simd for Portable {
     fn transposed(self, rows: &[Row], lane: usize) -> [Four; 4] {
         let rows = &rows[..4];
         std::array::from_fn(|i| std::array::from_fn(|row| rows[row].0[lane + i]))
+    }
+
+    #[inline(never)]
+    fn apart(self, kernel: impl Kernel) {
+        kernel.run(self);
     }
 }
 

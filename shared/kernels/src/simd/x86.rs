@@ -23,11 +23,13 @@ pub(super) struct Avx2(());
 pub(super) struct Avx512(());
 
 #[target_feature(enable = "avx2,fma")]
+#[inline(never)]
 pub(super) fn run_avx2<K: Kernel>(kernel: K) {
     kernel.run(Avx2(()));
 }
 
 #[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
+#[inline(never)]
 pub(super) fn run_avx512<K: Kernel>(kernel: K) {
     kernel.run(Avx512(()));
 }
@@ -132,6 +134,12 @@ impl Simd for Avx2 {
         // SAFETY: `self` only exists where AVX2 was detected.
         unsafe { transpose8(&square) }
     }
+
+    #[inline(always)]
+    fn apart(self, kernel: impl Kernel) {
+        // SAFETY: `self` only exists where AVX2 and FMA were detected.
+        unsafe { run_avx2(kernel) }
+    }
 }
 
 impl Simd for Avx512 {
@@ -231,6 +239,12 @@ impl Simd for Avx512 {
         }
         // SAFETY: `self` only exists where AVX-512 F was detected.
         unsafe { transpose16(&square) }
+    }
+
+    #[inline(always)]
+    fn apart(self, kernel: impl Kernel) {
+        // SAFETY: `self` only exists where AVX-512 F and VL were detected.
+        unsafe { run_avx512(kernel) }
     }
 }
 

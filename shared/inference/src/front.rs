@@ -1,0 +1,388 @@
+//! The front of a network, from its input on: convolutions, sums and what lies between them, found in its file.
+//!
+//! The rest, and every network with a convolution that is not known here, is for another library.
+
+use std::collections::{HashMap, HashSet};
+
+use kernels::{Conv, ConvSize};
+use rten_onnx::onnx::NodeProto;
+
+use crate::source::{Source, int, ints, op, text};
+
+/// Most values of a stack of channels, filled up and padded.
+const MOST_VALUES: usize = 1 << 26;
+/// Widest padding.
+const MOST_PADDING: usize = 8;
+/// Largest side of a kernel.
+const MOST_TAPS: usize = 2 * MOST_PADDING + 1;
+
+/// Why a network has no front.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum NoFront {
+    #[error("the machine has neither AVX2 nor AVX-512")]
+    Machine,
+    #[error("it does not take one picture of a fixed size")]
+    Input,
+    #[error("it has no convolution")]
+    Nothing,
+    #[error("node {name:?} ({op}): {what}")]
+    Node {
+        name: String,
+        op: String,
+        what: &'static str,
+    },
+    #[error("what follows the convolutions cannot be run: {0}")]
+    Rest(String),
+}
+
+/// A value of the front.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct Value {
+    /// A stack of channels: the number of the operation that gives it; 0 is the input.
+    pub(crate) stack: usize,
+    /// Negative values count as zero.
+    pub(crate) is_relu: bool,
+    /// Pixels that each pixel is repeated over, down and across.
+    repeat: usize,
+}
+
+/// An operation; it gives a stack of channels.
+#[derive(Debug)]
+pub(crate) enum Operation {
+    /// The input.
+    Input,
+    /// Part of a later one.
+    Nothing,
+    /// A convolution, and what is added to it.
+    Conv {
+        conv: Conv,
+        input: Value,
+        residual: Option<Value>,
+    },
+    /// A sum; the second one's pixels are repeated.
+    Sum { of: [Value; 2], repeat: usize },
+}
+
+impl Operation {
+    pub(crate) fn takes(&self) -> Vec<Value> {
+        match self {
+            Self::Input | Self::Nothing => Vec::new(),
+            Self::Conv {
+                input, residual, ..
+            } => [*input].into_iter().chain(*residual).collect(),
+            Self::Sum { of, .. } => of.to_vec(),
+        }
+    }
+}
+
+/// A value that is needed behind the front, by its name.
+#[derive(Debug)]
+pub(crate) struct Exit {
+    pub(crate) name: String,
+    pub(crate) value: Value,
+}
+
+/// The operations of a front, and what they lead to.
+#[derive(Debug)]
+pub(crate) struct Front {
+    pub(crate) operations: Vec<Operation>,
+    /// Channels, rows and columns of what the operations give.
+    pub(crate) sides: Vec<[usize; 3]>,
+    pub(crate) exits: Vec<Exit>,
+    /// Nodes behind the front.
+    pub(crate) behind: HashSet<usize>,
+    /// Most rows or columns that are padded.
+    pub(crate) border: usize,
+}
+
+/// While a front is being found.
+struct Finding<'a> {
+    source: &'a Source,
+    front: Front,
+    values: HashMap<&'a str, Value>,
+    /// Why nodes are not part of the front.
+    refused: HashMap<usize, &'static str>,
+}
+
+impl Front {
+    /// Finds the front of a network.
+    pub(crate) fn find(source: &Source) -> Result<Self, NoFront> {
+        let (name, sides) = source
+            .input()
+            .filter(|input| fits(input.1))
+            .ok_or(NoFront::Input)?;
+        let input = Value {
+            stack: 0,
+            is_relu: false,
+            repeat: 1,
+        };
+        let mut finding = Finding {
+            source,
+            front: Self {
+                operations: vec![Operation::Input],
+                sides: vec![sides],
+                exits: Vec::new(),
+                behind: HashSet::new(),
+                border: 0,
+            },
+            values: HashMap::from([(name, input)]),
+            refused: HashMap::new(),
+        };
+        for (at, node) in source.graph.node.iter().enumerate() {
+            match finding.read(node) {
+                Ok(value) => {
+                    if let (Some(value), Some(name)) = (value, node.output.first()) {
+                        finding.values.insert(name, value);
+                    }
+                }
+                Err(what) => {
+                    finding.refused.insert(at, what);
+                }
+            }
+        }
+        finding.look_behind()?;
+        let mut front = finding.front;
+        front.fuse();
+        let is_conv = |operation: &Operation| matches!(operation, Operation::Conv { .. });
+        if front.operations.iter().any(is_conv) {
+            Ok(front)
+        } else {
+            Err(NoFront::Nothing)
+        }
+    }
+
+    /// Adds where the convolution writes, where nothing else needs what it gives.
+    fn fuse(&mut self) {
+        let mut uses = vec![0_usize; self.operations.len()];
+        let taken = self.operations.iter().flat_map(Operation::takes);
+        for value in taken.chain(self.exits.iter().map(|exit| exit.value)) {
+            uses[value.stack] += 1;
+        }
+        for at in 0..self.operations.len() {
+            let Operation::Sum { of, repeat: 1 } = self.operations[at] else {
+                continue;
+            };
+            for [value, other] in [[of[1], of[0]], of] {
+                let conv = &mut self.operations[value.stack];
+                let is_free = matches!(conv, Operation::Conv { residual: None, .. });
+                if is_free && !value.is_relu && uses[value.stack] == 1 {
+                    let mut fused = core::mem::replace(conv, Operation::Nothing);
+                    if let Operation::Conv { residual, .. } = &mut fused {
+                        *residual = Some(other);
+                    }
+                    self.operations[at] = fused;
+                    break;
+                }
+            }
+        }
+    }
+}
+
+impl<'a> Finding<'a> {
+    /// The value that a node gives, `None` if nothing of the front leads to it, or why it is not part of the front.
+    fn read(&mut self, node: &'a NodeProto) -> Result<Option<Value>, &'static str> {
+        let taken = |at: usize| node.input.get(at).map_or("", String::as_str);
+        let Some(&first) = self.values.get(taken(0)) else {
+            return Ok(None);
+        };
+        let is_standard = node.domain.as_deref().is_none_or(str::is_empty);
+        match op(node) {
+            _ if !is_standard || node.output.len() != 1 => Err("the operation is not known"),
+            "Conv" if first.repeat == 1 => self.conv(node, first).map(Some),
+            "Relu" if first.stack > 0 && first.repeat == 1 => Ok(Some(Value {
+                is_relu: true,
+                ..first
+            })),
+            "Resize" if first.stack > 0 && first.repeat == 1 => {
+                let repeat = self.repeat(node, taken(2))?;
+                Ok(Some(Value { repeat, ..first }))
+            }
+            "Add" => match self.values.get(taken(1)) {
+                Some(&second) => self.sum([first, second]).map(Some),
+                None => Err("its second input is not known"),
+            },
+            _ => Err("the operation is not known"),
+        }
+    }
+
+    fn give(&mut self, operation: Operation, sides: [usize; 3]) -> Result<Value, &'static str> {
+        if !fits(sides) {
+            return Err("its output is empty or too large");
+        }
+        self.front.operations.push(operation);
+        self.front.sides.push(sides);
+        Ok(Value {
+            stack: self.front.sides.len() - 1,
+            is_relu: false,
+            repeat: 1,
+        })
+    }
+
+    fn conv(&mut self, node: &NodeProto, input: Value) -> Result<Value, &'static str> {
+        let name = node.input.get(1).map_or("", String::as_str);
+        let weights = self.source.constant(name);
+        let weights = weights.ok_or("its weights are not constants of single or half precision")?;
+        let &[outputs, inputs, down, across] = &weights.shape[..] else {
+            return Err("it is not over rows and columns");
+        };
+        let bias = match node.input.get(2).filter(|name| !name.is_empty()) {
+            Some(name) => self.source.constant(name).map(|bias| bias.values),
+            None => Some(vec![0.0; outputs]),
+        };
+        let kernel = ints(node, "kernel_shape").is_none_or(|sides| {
+            sides
+                .iter()
+                .map(|side| usize::try_from(*side))
+                .eq([Ok(down), Ok(across)])
+        });
+        let is_dilated = ints(node, "dilations").is_some_and(|all| all.iter().any(|n| *n != 1));
+        if int(node, "group").unwrap_or(1) != 1 {
+            return Err("it is in groups");
+        }
+        if text(node, "auto_pad", "NOTSET") != "NOTSET" || is_dilated || !kernel {
+            return Err("its padding, dilation or kernel is not known");
+        }
+        let stride = sides(ints(node, "strides").unwrap_or(&[1, 1]));
+        let pads = sides(ints(node, "pads").unwrap_or(&[0; 4]));
+        let (Some(stride), Some([top, left, bottom, right])) = (stride, pads) else {
+            return Err("its strides or paddings are not known");
+        };
+        let most = top.max(left).max(bottom).max(right);
+        let [channels, rows, cols] = self.front.sides[input.stack];
+        let reach = [rows + top + bottom, cols + left + right];
+        let most_taps = down.max(across);
+        if most > MOST_PADDING || most_taps > MOST_TAPS {
+            return Err("its padding or kernel is too large");
+        }
+        if channels != inputs || reach[0] < down || reach[1] < across {
+            return Err("its sides do not fit its input");
+        }
+        let size = ConvSize {
+            inputs,
+            outputs,
+            kernel: [down, across],
+            stride,
+            pad: [top, left],
+        };
+        let bias = bias.ok_or("its bias is not a constant")?;
+        let conv = Conv::new(size, &weights.values, &bias, input.stack == 0);
+        let conv = conv.map_err(|_error| "its weights do not fit its sides")?;
+        self.front.border = self.front.border.max(most);
+        let operation = Operation::Conv {
+            conv,
+            input,
+            residual: None,
+        };
+        let rows = (reach[0] - down) / stride[0] + 1;
+        self.give(
+            operation,
+            [outputs, rows, (reach[1] - across) / stride[1] + 1],
+        )
+    }
+
+    /// The number of times that a `Resize` repeats pixels, down and across.
+    fn repeat(&self, node: &NodeProto, scales: &str) -> Result<usize, &'static str> {
+        let place = text(node, "coordinate_transformation_mode", "half_pixel");
+        let nearest = text(node, "nearest_mode", "round_prefer_floor");
+        let is_known = matches!(
+            (place, nearest),
+            ("half_pixel", "round_prefer_floor") | ("asymmetric", "floor")
+        );
+        let scales = self.source.constant(scales);
+        let scales = scales.ok_or("its scales are not constants")?.values;
+        let [1.0, 1.0, down, across] = scales[..] else {
+            return Err("its scales are not those of rows and columns");
+        };
+        let is_whole = down == across && down.fract() == 0.0 && (1.0..=64.0).contains(&down);
+        let has_sizes = node.input.get(3).is_some_and(|name| !name.is_empty());
+        let has_axes = ints(node, "axes").is_some();
+        let is_nearest = text(node, "mode", "nearest") == "nearest" && is_known;
+        if is_whole && is_nearest && !has_sizes && !has_axes {
+            Ok(down as usize)
+        } else {
+            Err("it does not repeat pixels")
+        }
+    }
+
+    fn sum(&mut self, of: [Value; 2]) -> Result<Value, &'static str> {
+        let of = if of[0].repeat == 1 {
+            of
+        } else {
+            [of[1], of[0]]
+        };
+        let repeat = of[1].repeat;
+        let [sides, [channels, rows, cols]] = of.map(|value| self.front.sides[value.stack]);
+        let fits = of[0].repeat == 1 && sides == [channels, rows * repeat, cols * repeat];
+        if of[0].stack == 0 || of[1].stack == 0 || !fits {
+            return Err("it does not add stacks of the same sides");
+        }
+        self.give(Operation::Sum { of, repeat }, sides)
+    }
+
+    /// Follows what the outputs need back to the front.
+    fn look_behind(&mut self) -> Result<(), NoFront> {
+        let nodes = &self.source.graph.node;
+        let mut makers: HashMap<&str, usize> = HashMap::new();
+        for (at, node) in nodes.iter().enumerate() {
+            makers.extend(node.output.iter().map(|name| (name.as_str(), at)));
+        }
+        let outputs = self.source.graph.output.iter();
+        let mut open: Vec<&str> = outputs
+            .filter_map(|output| output.name.as_deref())
+            .collect();
+        let mut seen = HashSet::new();
+        while let Some(name) = open.pop() {
+            if !seen.insert(name) {
+                continue;
+            }
+            let value = self.values.get(name);
+            if let Some(&value) = value.filter(|value| value.stack > 0 && value.repeat == 1) {
+                let name = name.to_owned();
+                self.front.exits.push(Exit { name, value });
+                continue;
+            }
+            let Some(&at) = makers.get(name) else {
+                continue;
+            };
+            let node = &nodes[at];
+            let has_graph = node.attribute.iter().any(|attribute| attribute.g.is_some());
+            if op(node) == "Conv" || has_graph {
+                return Err(self.refused(at, node));
+            }
+            self.front.behind.insert(at);
+            open.extend(node.input.iter().map(String::as_str));
+        }
+        self.front.exits.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(())
+    }
+
+    /// Names the node, or the one before it that is not known.
+    fn refused(&self, at: usize, node: &NodeProto) -> NoFront {
+        let first = self.refused.iter().filter(|(refused, _)| **refused <= at);
+        let first = first.min_by_key(|(refused, _)| **refused);
+        let nodes = &self.source.graph.node;
+        let (node, what) = first
+            .map_or((node, "it does not follow from the input"), |(at, what)| {
+                (&nodes[*at], *what)
+            });
+        NoFront::Node {
+            name: node.output.first().cloned().unwrap_or_default(),
+            op: op(node).to_owned(),
+            what,
+        }
+    }
+}
+
+/// Says whether memory is enough for a stack of channels.
+fn fits([channels, rows, cols]: [usize; 3]) -> bool {
+    let padded = [channels.div_ceil(16), rows, cols].map(|side| side.saturating_add(16));
+    let n = padded.into_iter().fold(1_usize, usize::saturating_mul);
+    n <= MOST_VALUES / 16 && ![channels, rows, cols].contains(&0)
+}
+
+/// Whole numbers that are not negative, as many as wanted.
+fn sides<const N: usize>(values: &[i64]) -> Option<[usize; N]> {
+    let values = values.iter().map(|value| usize::try_from(*value));
+    let values: Vec<usize> = values.collect::<Result<_, _>>().ok()?;
+    values.try_into().ok()
+}

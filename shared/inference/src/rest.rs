@@ -1,0 +1,108 @@
+//! The file of what lies behind the front of a network.
+
+use std::collections::HashSet;
+
+use onnx::Message;
+
+use crate::front::Front;
+use crate::nesting::varint;
+use crate::source::Source;
+
+/// Numbers of fields of a file, and of its graph.
+const GRAPH: u64 = 7;
+const NODE: u64 = 1;
+const CONSTANT: u64 = 5;
+const INPUT: u64 = 11;
+const VALUE_INFO: u64 = 13;
+/// Single precision.
+const FLOAT: i64 = 1;
+
+/// A field of a message.
+struct Field<'a> {
+    number: u64,
+    /// With its number and length.
+    whole: &'a [u8],
+    content: &'a [u8],
+}
+
+/// The file without the front: what the front gives becomes inputs, beside the network's own. `None` if nothing lies behind it.
+///
+/// * `file`: nested as in an ONNX file.
+pub(crate) fn rest(file: &[u8], source: &Source, front: &Front) -> Option<Vec<u8>> {
+    if front.behind.is_empty() {
+        return None;
+    }
+    let mut rest = Vec::new();
+    for field in fields(file)? {
+        if field.number == GRAPH {
+            let graph = graph(field.content, source, front)?;
+            rest.extend(Message::default().bytes(GRAPH, &graph).finish());
+        } else {
+            rest.extend(field.whole);
+        }
+    }
+    Some(rest)
+}
+
+fn graph(bytes: &[u8], source: &Source, front: &Front) -> Option<Vec<u8>> {
+    let nodes = source.graph.node.iter().enumerate();
+    let kept = nodes.filter(|(at, _)| front.behind.contains(at));
+    let taken: HashSet<&str> = kept
+        .flat_map(|(_, node)| node.input.iter().map(String::as_str))
+        .collect();
+    let (mut n_nodes, mut n_constants) = (0, 0);
+    let mut graph = Vec::new();
+    for field in fields(bytes)? {
+        let is_kept = match field.number {
+            NODE => {
+                n_nodes += 1;
+                front.behind.contains(&(n_nodes - 1))
+            }
+            CONSTANT => {
+                n_constants += 1;
+                let constant = source.graph.initializer.get(n_constants - 1)?;
+                taken.contains(constant.name.as_deref()?)
+            }
+            // They may describe values that are gone.
+            VALUE_INFO => false,
+            _ => true,
+        };
+        if is_kept {
+            graph.extend(field.whole);
+        }
+    }
+    for exit in &front.exits {
+        let side = |side: usize| Message::default().number(1, side as i64);
+        let sides = [1].into_iter().chain(front.sides[exit.value.stack]);
+        let shape = Message::default().each(sides, |shape, it| shape.message(1, &side(it)));
+        let tensor = Message::default().number(1, FLOAT).message(2, &shape);
+        let kind = Message::default().message(1, &tensor);
+        let input = Message::default().text(1, &exit.name).message(2, &kind);
+        graph.extend(Message::default().message(INPUT, &input).finish());
+    }
+    Some(graph)
+}
+
+fn fields(bytes: &[u8]) -> Option<Vec<Field<'_>>> {
+    let mut all = Vec::new();
+    let mut at = 0;
+    while at < bytes.len() {
+        let begin = at;
+        let tag = varint(bytes, &mut at)?;
+        let length = match tag & 7 {
+            0 => varint(bytes, &mut at).map(|_| 0)?,
+            1 => 8,
+            2 => usize::try_from(varint(bytes, &mut at)?).ok()?,
+            5 => 4,
+            _ => return None,
+        };
+        let end = at.checked_add(length)?;
+        all.push(Field {
+            number: tag >> 3,
+            whole: bytes.get(begin..end)?,
+            content: &bytes[at..end],
+        });
+        at = end;
+    }
+    Some(all)
+}

@@ -1,0 +1,134 @@
+//! A network as its file describes it: operations by the names of what they take, and constants.
+
+use std::collections::HashMap;
+
+use rten_onnx::onnx::{GraphProto, ModelProto, NodeProto, TensorProto};
+
+const FLOAT: i32 = 1;
+const FLOAT16: i32 = 10;
+/// Constants that are cast, one from another, at most.
+const MOST_CASTS: usize = 4;
+
+/// The graph of a file.
+#[derive(Debug)]
+pub(crate) struct Source {
+    pub(crate) graph: GraphProto,
+    /// The nodes that cast a constant, and the constants, by the names of what they give.
+    casts: HashMap<String, String>,
+    constants: HashMap<String, usize>,
+}
+
+/// A constant of single precision.
+#[derive(Debug)]
+pub(crate) struct Constant {
+    pub(crate) shape: Vec<usize>,
+    pub(crate) values: Vec<f32>,
+}
+
+impl Source {
+    /// `None` if the file cannot be read.
+    pub(crate) fn read(file: &[u8]) -> Option<Self> {
+        let graph = ModelProto::parse_buf(file).ok()?.graph?;
+        let named = graph.initializer.iter().enumerate();
+        let constants = named.filter_map(|(at, tensor)| Some((tensor.name.clone()?, at)));
+        let casts = graph.node.iter().filter(|node| op(node) == "Cast");
+        let casts = casts
+            .filter_map(|node| Some((node.output.first()?.clone(), node.input.first()?.clone())));
+        Some(Self {
+            casts: casts.collect(),
+            constants: constants.collect(),
+            graph,
+        })
+    }
+
+    /// A constant of single or half precision.
+    pub(crate) fn constant(&self, name: &str) -> Option<Constant> {
+        let mut name = name;
+        for _ in 0..MOST_CASTS {
+            if let Some(at) = self.constants.get(name) {
+                return constant(&self.graph.initializer[*at]);
+            }
+            name = self.casts.get(name)?;
+        }
+        None
+    }
+
+    /// The name and the sides of the only input, channels, rows and columns of one picture; `None` if it is another.
+    pub(crate) fn input(&self) -> Option<(&str, [usize; 3])> {
+        let mut inputs = self.graph.input.iter().filter(|input| {
+            let name = input.name.as_deref().unwrap_or_default();
+            !self.constants.contains_key(name)
+        });
+        let (Some(input), None) = (inputs.next(), inputs.next()) else {
+            return None;
+        };
+        let tensor = input.r#type.as_ref()?.tensor_type.as_ref()?;
+        if tensor.elem_type?.0 != FLOAT {
+            return None;
+        }
+        let sides = tensor.shape.as_ref()?.dim.iter();
+        let sides: Vec<Option<i64>> = sides.map(|side| side.dim_value).collect();
+        let [None | Some(1), Some(channels), Some(rows), Some(cols)] = sides[..] else {
+            return None;
+        };
+        let sides = [channels, rows, cols].map(|side| usize::try_from(side).unwrap_or_default());
+        let holds = sides.iter().all(|side| *side > 0);
+        holds.then_some((input.name.as_deref()?, sides))
+    }
+}
+
+/// The operator of a node.
+pub(crate) fn op(node: &NodeProto) -> &str {
+    node.op_type.as_deref().unwrap_or_default()
+}
+
+/// Whole numbers of an attribute; `None` if the node does not have it.
+pub(crate) fn ints<'a>(node: &'a NodeProto, name: &str) -> Option<&'a [i64]> {
+    let mut all = node.attribute.iter();
+    let found = all.find(|attribute| attribute.name.as_deref() == Some(name))?;
+    Some(&found.ints)
+}
+
+/// A whole number of an attribute.
+pub(crate) fn int(node: &NodeProto, name: &str) -> Option<i64> {
+    let mut all = node.attribute.iter();
+    all.find(|attribute| attribute.name.as_deref() == Some(name))?
+        .i
+}
+
+/// A text of an attribute, or what holds without it.
+pub(crate) fn text<'a>(node: &'a NodeProto, name: &str, without: &'a str) -> &'a str {
+    let mut all = node.attribute.iter();
+    let found = all.find(|attribute| attribute.name.as_deref() == Some(name));
+    found
+        .and_then(|found| found.s.as_deref())
+        .unwrap_or(without)
+}
+
+fn constant(tensor: &TensorProto) -> Option<Constant> {
+    let sides = tensor.dims.iter().map(|side| usize::try_from(*side).ok());
+    let shape: Vec<usize> = sides.collect::<Option<_>>()?;
+    let raw = tensor.raw_data.as_ref().map(|raw| raw.borrow());
+    let raw = raw.as_deref().map_or(&[][..], Vec::as_slice);
+    let kind = tensor.data_type?.0;
+    let values: Vec<f32> = match kind {
+        FLOAT if raw.is_empty() => tensor.float_data.clone(),
+        FLOAT => raw
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .map(|bytes| f32::from_le_bytes(*bytes))
+            .collect(),
+        FLOAT16 => raw
+            .as_chunks::<2>()
+            .0
+            .iter()
+            .map(|bytes| onnx::value_of_half(u16::from_le_bytes(*bytes)))
+            .collect(),
+        _ => return None,
+    };
+    let n = shape
+        .iter()
+        .try_fold(1_usize, |n, side| n.checked_mul(*side))?;
+    (n == values.len()).then_some(Constant { shape, values })
+}

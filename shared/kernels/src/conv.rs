@@ -1,0 +1,211 @@
+//! Convolutions and sums of stacks of channels: what networks that find joints are made of.
+//!
+//! Weights are packed once. The sum of an output begins with its bias, and adds block by block of the
+//! input's channels, tap by tap along rows, channel by channel, each product rounded once with its sum.
+
+mod blocked;
+mod fast;
+mod reference;
+mod sum;
+
+pub use blocked::{Blocked, BlockedShape};
+pub use sum::add_repeated;
+
+use crate::isa::Isa;
+use crate::simd::{ROW, Row, flat};
+use blocked::BLOCK;
+
+/// The sides of a convolution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ConvSize {
+    /// Channels that it reads.
+    pub inputs: usize,
+    /// Channels that it writes.
+    pub outputs: usize,
+    /// Rows and columns of the kernel.
+    pub kernel: [usize; 2],
+    /// Rows and columns of the input from one output to the next.
+    pub stride: [usize; 2],
+    /// Rows of zeros above and columns of zeros to the left of the input.
+    pub pad: [usize; 2],
+}
+
+/// The numbers of weights do not fit the sides of the convolution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "a convolution from {} to {} channels by {:?} has {weights} weights and {bias} biases",
+    size.inputs, size.outputs, size.kernel
+)]
+pub struct ConvSizeError {
+    /// The sides.
+    pub size: ConvSize,
+    /// Weights that there are.
+    pub weights: usize,
+    /// Biases that there are.
+    pub bias: usize,
+}
+
+/// A convolution with its weights.
+#[derive(Debug, Clone)]
+pub struct Conv {
+    size: ConvSize,
+    /// Channels in a block of the input.
+    width: usize,
+    /// For each block of outputs: blocks of inputs, rows, columns, channels of the block, outputs.
+    weights: Vec<Row>,
+    /// Filled up with zeros, as the outputs in the weights are: to pairs of blocks.
+    bias: Vec<Row>,
+}
+
+/// Stacks that a convolution or a sum writes: its values as they are, with zeros in place of negative ones, or both.
+#[derive(Debug)]
+pub struct Outputs<'a> {
+    /// The values.
+    pub raw: Option<&'a mut Blocked>,
+    /// The values, negative ones replaced with zero; those that are not numbers stay.
+    pub relu: Option<&'a mut Blocked>,
+}
+
+impl Outputs<'_> {
+    fn sides(&self) -> [[usize; 3]; 2] {
+        let given = [&self.raw, &self.relu].map(|out| out.as_ref().map(|out| out.shape().sides()));
+        let any = given[0].or(given[1]).unwrap_or_default();
+        given.map(|sides| sides.unwrap_or(any))
+    }
+
+    fn set(&mut self, channel: usize, [row, col]: [usize; 2], value: f32) {
+        if let Some(out) = &mut self.raw {
+            out.set(channel, row, col, value);
+        }
+        if let Some(out) = &mut self.relu {
+            out.set(channel, row, col, relu(value));
+        }
+    }
+}
+
+#[inline(always)]
+fn relu(value: f32) -> f32 {
+    if 0.0 > value { 0.0 } else { value }
+}
+
+impl Conv {
+    /// Packs weights.
+    ///
+    /// * `weights`: `outputs x inputs x kernel rows x kernel columns`.
+    /// * `packed`: for an input in one block of all channels, as [`BlockedShape::packed`].
+    ///
+    /// # Errors
+    ///
+    /// [`ConvSizeError`]; also for a kernel, a stride or channels of zero.
+    pub fn new(
+        size: ConvSize,
+        weights: &[f32],
+        bias: &[f32],
+        packed: bool,
+    ) -> Result<Self, ConvSizeError> {
+        let [kernel_rows, kernel_cols] = size.kernel;
+        let sides = [size.outputs, size.inputs, kernel_rows, kernel_cols];
+        let n = sides
+            .iter()
+            .try_fold(1_usize, |n, side| n.checked_mul(*side));
+        let is_empty = n == Some(0) || size.stride.contains(&0);
+        if n != Some(weights.len()) || bias.len() != size.outputs || is_empty {
+            return Err(ConvSizeError {
+                size,
+                weights: weights.len(),
+                bias: bias.len(),
+            });
+        }
+        let width = if packed { size.inputs } else { BLOCK };
+        let taps = kernel_rows * kernel_cols;
+        let per_block = size.inputs.div_ceil(width) * taps * width * BLOCK;
+        let n_outputs = size.outputs.next_multiple_of(ROW);
+        let mut conv = Self {
+            size,
+            width,
+            weights: vec![Row::ZERO; (n_outputs / BLOCK * per_block).div_ceil(ROW)],
+            bias: vec![Row::ZERO; n_outputs / ROW],
+        };
+        let packed = crate::simd::flat_mut(&mut conv.weights);
+        for (output, weights) in weights.chunks_exact(size.inputs * taps).enumerate() {
+            for (input, weights) in weights.chunks_exact(taps).enumerate() {
+                let row = input / width * taps * width + input % width;
+                let first = output / BLOCK * per_block + row * BLOCK + output % BLOCK;
+                for (tap, weight) in weights.iter().enumerate() {
+                    packed[first + tap * width * BLOCK] = *weight;
+                }
+            }
+        }
+        crate::simd::flat_mut(&mut conv.bias)[..bias.len()].copy_from_slice(bias);
+        Ok(conv)
+    }
+
+    /// Its sides.
+    pub fn size(&self) -> ConvSize {
+        self.size
+    }
+
+    /// Convolves, and adds `residual`.
+    ///
+    /// # Panics
+    ///
+    /// If the sides of the stacks do not fit: the channels, a border of the input below what the kernel reaches over, a
+    /// residual unlike the outputs, also in its border.
+    pub fn run(&self, isa: Isa, input: &Blocked, residual: Option<&Blocked>, outputs: Outputs<'_>) {
+        self.check(input, residual, &outputs);
+        fast::run(isa, self, (input, residual), outputs);
+    }
+
+    /// As [`Self::run`], in plain loops.
+    ///
+    /// # Panics
+    ///
+    /// As [`Self::run`].
+    pub fn run_plain(&self, input: &Blocked, residual: Option<&Blocked>, outputs: Outputs<'_>) {
+        self.check(input, residual, &outputs);
+        reference::run(self, input, residual, outputs);
+    }
+
+    fn check(&self, input: &Blocked, residual: Option<&Blocked>, outputs: &Outputs<'_>) {
+        let shape = input.shape();
+        assert_eq!(shape.channels, self.size.inputs, "channels of the input");
+        assert_eq!(shape.width, self.width, "channels of a block");
+        let stacks = [outputs.raw.as_deref(), outputs.relu.as_deref(), residual];
+        let mut stacks = stacks.into_iter().flatten().map(Blocked::shape);
+        let Some(out) = stacks.next() else {
+            return;
+        };
+        assert_eq!(out.channels, self.size.outputs, "channels of the outputs");
+        assert_eq!(out.width, BLOCK, "channels of a block");
+        assert!(
+            stacks.all(|stack| stack == out),
+            "outputs and residual unlike each other"
+        );
+        let sides = out.sides();
+        for (axis, size) in [shape.rows, shape.cols].into_iter().enumerate() {
+            let pad = self.size.pad[axis];
+            let last = sides[axis + 1].saturating_sub(1) * self.size.stride[axis];
+            let end = last + self.size.kernel[axis];
+            let has = size + shape.border;
+            assert!(
+                pad <= shape.border && end <= has + pad,
+                "a border of {} for a kernel of {} at a padding of {pad}",
+                shape.border,
+                self.size.kernel[axis]
+            );
+        }
+    }
+
+    #[inline(always)]
+    fn packed_weights(&self) -> &[f32] {
+        flat(&self.weights)
+    }
+
+    #[inline(always)]
+    fn packed_bias(&self) -> &[f32] {
+        flat(&self.bias)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,297 @@
+//! Convolutions a few neighbouring pixels and two registers of outputs at a time.
+#![expect(
+    clippy::needless_range_loop,
+    reason = "only ranges are unrolled surely, and that keeps sums in registers"
+)]
+
+use super::blocked::BLOCK;
+use super::{Blocked, BlockedShape, Conv, Outputs};
+use crate::isa::Isa;
+use crate::simd::{Kernel, Row, Simd};
+
+/// Most pixels whose sums are under way at once.
+const MOST_PIXELS: usize = 8;
+/// Weights that stay in the first cache while the pixels pass by: floats for a block of outputs.
+const CHUNK: usize = 4608;
+
+/// The sides of the stacks have been checked by the caller.
+pub(super) fn run(
+    isa: Isa,
+    conv: &Conv,
+    (input, residual): (&Blocked, Option<&Blocked>),
+    outputs: Outputs<'_>,
+) {
+    let Outputs { raw, relu } = outputs;
+    let part = |stack: &Blocked| stack.shape();
+    let shapes = [raw.as_deref(), relu.as_deref()].map(|stack| stack.map(part));
+    let ([Some(shape), _] | [None, Some(shape)]) = shapes else {
+        return;
+    };
+    isa.run(Layer {
+        conv,
+        from: input.shape(),
+        input: input.values(),
+        residual: residual.map(Blocked::values),
+        shape,
+        raw: raw.map(Blocked::values_mut),
+        relu: relu.map(Blocked::values_mut),
+    });
+}
+
+struct Layer<'a> {
+    conv: &'a Conv,
+    from: BlockedShape,
+    input: &'a [f32],
+    residual: Option<&'a [f32]>,
+    /// The shape of the outputs and the residual.
+    shape: BlockedShape,
+    raw: Option<&'a mut [f32]>,
+    relu: Option<&'a mut [f32]>,
+}
+
+/// Consecutive pixels, row by row, and what is added to their sums.
+struct Tile<const N: usize> {
+    /// The first output in the registers.
+    lane: usize,
+    /// Indices of the pixels in the first block of the outputs.
+    pixels: [usize; N],
+    is_first: bool,
+    is_last: bool,
+}
+
+/// The place of a tile.
+#[derive(Clone, Copy)]
+struct Place {
+    lane: usize,
+    row: usize,
+    col: usize,
+    /// The first block of the input, and how many.
+    block: usize,
+    n_blocks: usize,
+}
+
+impl Kernel for Layer<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(mut self, simd: S) {
+        let n_blocks = self.from.n_blocks();
+        let at_once = (CHUNK / self.per_block()).max(1);
+        let most = MOST_PIXELS.min(S::BLOCK);
+        let mut sums = [Row::ZERO; MOST_PIXELS];
+        for lane in (0..self.shape.n_blocks() * BLOCK).step_by(2 * S::LANES) {
+            for block in (0..n_blocks).step_by(at_once) {
+                let mut left = self.shape.rows * self.shape.cols;
+                let mut place = Place {
+                    lane,
+                    row: 0,
+                    col: 0,
+                    block,
+                    n_blocks: at_once.min(n_blocks - block),
+                };
+                while left > 0 {
+                    let n = left.div_ceil(left.div_ceil(most));
+                    self.pixels(simd, n, &mut place, &mut sums);
+                    left -= n;
+                }
+            }
+        }
+    }
+}
+
+impl Layer<'_> {
+    /// Weights of a block of outputs for a block of the input.
+    #[inline(always)]
+    fn per_block(&self) -> usize {
+        let [rows, cols] = self.conv.size.kernel;
+        rows * cols * self.from.width * BLOCK
+    }
+
+    #[inline(always)]
+    fn pixels<S: Simd>(&mut self, simd: S, n: usize, place: &mut Place, sums: &mut [Row]) {
+        match n {
+            1 => self.tile::<S, 1>(simd, place, sums),
+            2 => self.tile::<S, 2>(simd, place, sums),
+            3 => self.tile::<S, 3>(simd, place, sums),
+            4 => self.tile::<S, 4>(simd, place, sums),
+            5 => self.tile::<S, 5>(simd, place, sums),
+            6 => self.tile::<S, 6>(simd, place, sums),
+            7 if S::BLOCK >= 7 => self.tile::<S, 7>(simd, place, sums),
+            8 if S::BLOCK >= 8 => self.tile::<S, 8>(simd, place, sums),
+            _ => unreachable!("at most {MOST_PIXELS} pixels, got {n}"),
+        }
+    }
+
+    /// Sums at `N` pixels; moves the place behind them.
+    #[inline(always)]
+    fn tile<S: Simd, const N: usize>(&mut self, simd: S, place: &mut Place, sums: &mut [Row]) {
+        let (size, from) = (&self.conv.size, self.from);
+        let corner = (from.border - size.pad[0]) * from.row()
+            + (from.border - size.pad[1]) * from.width
+            + place.block * from.plane();
+        let down = size.stride[0] * from.row();
+        let across = size.stride[1] * from.width;
+        let mut inputs = [self.input; N];
+        let mut pixels = [0; N];
+        let (block, lane, n_blocks) = (place.block, place.lane, place.n_blocks);
+        for at in 0..N {
+            inputs[at] = &self.input[corner + place.row * down + place.col * across..];
+            pixels[at] = self.shape.at(0, place.row, place.col);
+            place.col += 1;
+            if place.col == self.shape.cols {
+                (place.row, place.col) = (place.row + 1, 0);
+            }
+        }
+        let tile = Tile {
+            lane,
+            pixels,
+            is_first: block == 0,
+            is_last: block + n_blocks == from.n_blocks(),
+        };
+        self.begin(simd, &tile, 0, sums);
+        self.begin(simd, &tile, S::LANES, sums);
+        let rows = [size.kernel[0], size.kernel[1] * from.width];
+        // Two registers lie in one block of outputs, or in two.
+        let weights = [
+            self.weights(lane, block, n_blocks),
+            self.weights(lane + S::LANES, block, n_blocks),
+        ];
+        simd.apart(Products {
+            inputs,
+            weights,
+            n_blocks,
+            plane: from.plane(),
+            n_rows: rows[0],
+            row: from.row(),
+            run: rows[1],
+            sums,
+        });
+        self.end(simd, &tile, 0, sums);
+        self.end(simd, &tile, S::LANES, sums);
+    }
+
+    /// The weights of the outputs in a register for blocks of the input.
+    #[inline(always)]
+    fn weights(&self, lane: usize, block: usize, n: usize) -> &[f32] {
+        let begin = lane / BLOCK * self.from.n_blocks() + block;
+        let per_block = self.per_block();
+        let weights = &self.conv.packed_weights()[begin * per_block..];
+        &weights[..n * per_block][lane % BLOCK..]
+    }
+
+    /// Biases, or what earlier blocks of the input gave.
+    ///
+    /// * `from`: the first of a register of sums.
+    #[inline(always)]
+    fn begin<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        tile: &Tile<N>,
+        from: usize,
+        sums: &mut [Row],
+    ) {
+        let lane = tile.lane + from;
+        let part = self.raw.as_deref().or(self.relu.as_deref());
+        if let (false, Some(values)) = (tile.is_first, part)
+            && lane / BLOCK < self.shape.n_blocks()
+        {
+            let part = &values[lane / BLOCK * self.shape.plane() + lane % BLOCK..];
+            for at in 0..N {
+                simd.store(simd.load(&part[tile.pixels[at]..]), &mut sums[at].0[from..]);
+            }
+        } else {
+            let bias = simd.load(&self.conv.packed_bias()[lane..]);
+            for at in 0..N {
+                simd.store(bias, &mut sums[at].0[from..]);
+            }
+        }
+    }
+
+    /// Writes sums, or the parts that they have so far.
+    ///
+    /// * `from`: the first of a register of sums.
+    #[inline(always)]
+    fn end<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        tile: &Tile<N>,
+        from: usize,
+        sums: &mut [Row],
+    ) {
+        let (block, lane) = ((tile.lane + from) / BLOCK, (tile.lane + from) % BLOCK);
+        if block >= self.shape.n_blocks() {
+            return;
+        }
+        let begin = block * self.shape.plane() + lane;
+        if let (true, Some(residual)) = (tile.is_last, self.residual) {
+            for at in 0..N {
+                let sum = simd.load(&sums[at].0[from..]);
+                let sum = simd.add(sum, simd.load(&residual[begin + tile.pixels[at]..]));
+                simd.store(sum, &mut sums[at].0[from..]);
+            }
+        }
+        let is_part = !tile.is_last && self.raw.is_none();
+        if let Some(raw) = &mut self.raw {
+            for at in 0..N {
+                let sum = simd.load(&sums[at].0[from..]);
+                simd.store(sum, &mut raw[begin + tile.pixels[at]..]);
+            }
+        }
+        if let Some(relu) = self.relu.as_mut().filter(|_| is_part || tile.is_last) {
+            let least = simd.splat(if is_part { f32::NEG_INFINITY } else { 0.0 });
+            for at in 0..N {
+                let sum = simd.max(least, simd.load(&sums[at].0[from..]));
+                simd.store(sum, &mut relu[begin + tile.pixels[at]..]);
+            }
+        }
+    }
+}
+
+/// Products that are added to sums at a few pixels, two registers of outputs each.
+struct Products<'a, const N: usize> {
+    /// For each pixel, from the first value under the kernel on.
+    inputs: [&'a [f32]; N],
+    /// Weights of the outputs in each register, [`BLOCK`] floats for each value under the kernel.
+    weights: [&'a [f32]; 2],
+    n_blocks: usize,
+    plane: usize,
+    n_rows: usize,
+    row: usize,
+    /// Neighbouring values in a row of the kernel and a block of channels.
+    run: usize,
+    sums: &'a mut [Row],
+}
+
+impl<const N: usize> Kernel for Products<'_, N> {
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let mut sums = [[simd.splat(0.0); 2]; N];
+        for pixel in 0..N {
+            sums[pixel][0] = simd.load(&self.sums[pixel].0);
+            sums[pixel][1] = simd.load(&self.sums[pixel].0[S::LANES..]);
+        }
+        let mut at = 0_usize;
+        for block in 0..self.n_blocks {
+            for row in 0..self.n_rows {
+                let begin = block * self.plane + row * self.row;
+                for tap in begin..begin + self.run {
+                    // SAFETY: there are as many weights as the loops have turns, each of a block that a register fits in.
+                    let low = unsafe { simd.load_at(self.weights[0], at) };
+                    // SAFETY: as above.
+                    let high = unsafe { simd.load_at(self.weights[1], at) };
+                    at = at.wrapping_add(BLOCK);
+                    for pixel in 0..N {
+                        // SAFETY: `Conv::check` has made sure that the input and its border hold all that the kernel
+                        // reaches over.
+                        let value = unsafe { self.inputs[pixel].get_unchecked(tap) };
+                        let value = simd.splat(*value);
+                        sums[pixel][0] = simd.mul_add(value, low, sums[pixel][0]);
+                        sums[pixel][1] = simd.mul_add(value, high, sums[pixel][1]);
+                    }
+                }
+            }
+        }
+        for pixel in 0..N {
+            simd.store(sums[pixel][0], &mut self.sums[pixel].0);
+            simd.store(sums[pixel][1], &mut self.sums[pixel].0[S::LANES..]);
+        }
+    }
+}
