@@ -72,7 +72,6 @@ impl Shot {
             plan: &self.plan,
             candidates: &self.candidates,
             others: 0,
-            heats: Vec::new(),
             sigma_px: None,
             tau_px: None,
         }

@@ -79,7 +79,8 @@ fn every_stress_has_a_row_for_every_way_of_solving() {
     let ended = eval(&case, &["--stress", "all", "--json"]);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let rows: Vec<Value> = serde_json::from_str(ended.stdout.trim()).unwrap();
-    assert_eq!(rows.len(), 7 * 4);
+    assert_eq!(rows.len(), 7 * 4 + 1, "and one of what run gives");
+    assert_eq!(rows[28]["method"], "as run");
     for row in &rows {
         assert_eq!(row["n_frames"], 2, "{row}");
         let [from, to] = [0, 1].map(|it| row["limbs_mm_interval"][it].as_f64().unwrap());
@@ -97,7 +98,7 @@ fn every_stress_has_a_row_for_every_way_of_solving() {
     let again = eval(&case, &["--stress", "covered:1,exchanged", "--json"]);
     let again: Vec<Value> = serde_json::from_str(again.stdout.trim()).unwrap();
     assert_eq!(again[..4], rows[4..8]);
-    assert_eq!(again[4..], rows[24..]);
+    assert_eq!(again[4..], rows[24..28]);
 }
 
 #[test]

@@ -42,9 +42,9 @@ impl InProcess {
         let prepared = Prepared::new(resolved)?;
         let plans = prepared.plans();
         let (mut steps, mut keypoints) = (Vec::new(), Vec::new());
-        for view in 0..plans.len() {
+        for (view, plan) in plans.iter().enumerate() {
             let prepared = Prepared::new(resolved)?;
-            let layout = Arc::new(plans[view].layout().clone());
+            let layout = Arc::new(plan.layout().clone());
             match view_step::of_view(resolved, prepared, view, layout)? {
                 pose::Step::Network(step) => {
                     steps.push(*step);

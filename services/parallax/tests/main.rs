@@ -21,6 +21,7 @@ mod maps;
 mod memory;
 mod networks;
 mod nonsense;
+mod one_process;
 mod parity;
 mod processes;
 mod programs;

@@ -4,22 +4,20 @@
 
 use crate::common;
 use crate::common::networks::{DETECTOR as DETECTOR_CARD, detector_of};
-use crate::common::same_bits::assert_same_skeleton;
 
 use core::fmt::Write as _;
 
 use common::{Case, Ended};
 use footage::{Canvas, Size};
 use geometry::{Camera, Intrinsics, Lens, LensModel, Rig};
-use kernels::Rgb8View;
 use keypoints::{HALPE_26, LSP_14};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use onnx::{Attribute, Network, Side};
 use serde_json::Value;
 
-const SIZE: [u32; 2] = [200, 240];
+pub(crate) const SIZE: [u32; 2] = [200, 240];
 const N: usize = 14;
-const N_FRAMES: usize = 40;
+pub(crate) const N_FRAMES: usize = 40;
 const RIGHT_WRIST: usize = 6;
 /// The box of the detector, pixels of its input.
 const BOX: [f32; 4] = [8.0, 6.0, 46.0, 58.0];
@@ -93,7 +91,7 @@ fn network(bias: f32) -> Network {
 }
 
 /// Four cameras around the person.
-fn rig() -> Rig {
+pub(crate) fn rig() -> Rig {
     let cameras = (0..4).map(|view| {
         let angle = 0.4 + 1.4 * f64::from(view);
         let eye = Point3::new(4.5 * angle.cos(), 4.5 * angle.sin(), 1.6);
@@ -128,24 +126,24 @@ fn joints_at(frame: f64) -> [Point3<f64>; N] {
 }
 
 /// The joint whose name a view gives to a joint; 14: it is not seen.
-type Named = fn(usize) -> usize;
+pub(crate) type Named = fn(usize) -> usize;
 
-fn as_it_is(joint: usize) -> usize {
+pub(crate) fn as_it_is(joint: usize) -> usize {
     joint
 }
 
 /// Left is called right.
-fn exchanged(joint: usize) -> usize {
+pub(crate) fn exchanged(joint: usize) -> usize {
     let pair = skeleton::SIDES.iter().find(|it| it.contains(&joint));
     pair.map_or(joint, |[a, b]| a + b - joint)
 }
 
-fn without_a_wrist(joint: usize) -> usize {
+pub(crate) fn without_a_wrist(joint: usize) -> usize {
     if joint == RIGHT_WRIST { N } else { joint }
 }
 
 /// The picture of a camera in a frame: dots on grey; the joints of the last of which are in front.
-fn picture(camera: &Camera, frame: usize, named: Named) -> Canvas {
+pub(crate) fn picture(camera: &Camera, frame: usize, named: Named) -> Canvas {
     let [width, height] = SIZE.map(|it| it as usize);
     let mut canvas = Canvas::new(Size::new(width, height), [128; 3]);
     for (joint, place) in joints(frame).iter().enumerate() {
@@ -162,7 +160,7 @@ fn picture(camera: &Camera, frame: usize, named: Named) -> Canvas {
 /// A deployment with these pictures.
 ///
 /// * `view`: what each view calls the joints; `None` for one that sees nothing.
-fn case(name: &str, views: [Option<Named>; 4]) -> Case {
+pub(crate) fn case(name: &str, views: [Option<Named>; 4]) -> Case {
     let rig = rig();
     let case = Case::with_rig(&rig, name, &[0; 4], "");
     case.write("net.onnx", network(-3.0).file());
@@ -186,7 +184,7 @@ fn case(name: &str, views: [Option<Named>; 4]) -> Case {
     case
 }
 
-fn run(case: &Case, more: &[&str]) -> Ended {
+pub(crate) fn run(case: &Case, more: &[&str]) -> Ended {
     case.start(&[&["run", "deployment.toml"], more].concat())
         .wait()
 }
@@ -233,79 +231,6 @@ fn a_network_and_a_detector_are_all_that_a_deployment_needs() {
     // views in turn: in frames 10, 8, 5 and 3 for the second time.
     assert_eq!(searched(&[]), [160, 0]);
     assert_eq!(searched(&["--set", "capture.frame_rate_hz=20"]), [19, 141]);
-}
-
-/// Settings with which every picture is a frame of the pipeline, unchanged.
-const AS_THEY_ARE: [&str; 2] = ["capture.mode=lossless", "capture.scale=1.0"];
-
-/// Runs a case with [`AS_THEY_ARE`].
-fn run_as_they_are(case: &Case) {
-    let [mode, scale] = AS_THEY_ARE;
-    let ended = run(case, &["--set", mode, "--set", scale]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-}
-
-/// Compares the results of a run with those of its steps in one process, bit for bit.
-///
-/// * `pictures`: by view and frame; the frames of the pipeline, which are the pictures themselves.
-fn assert_one_process_gives_the_same(case: &Case, pictures: &[Vec<Canvas>; 4]) {
-    let file = case.path("deployment.toml");
-    let text = std::fs::read_to_string(&file).unwrap();
-    let set = AS_THEY_ARE.map(str::to_owned);
-    let loaded = deployment::Loaded::parse(&text, &file, &set, &deployment::AnyMachine).unwrap();
-    let resolved = launch::plan::resolve(&loaded.deployment).unwrap();
-    let mut one = launch::InProcess::new(&resolved).unwrap();
-    let lines = case.lines("pose3d.jsonl");
-    assert_eq!(lines.len(), N_FRAMES);
-    let mut n_joints = 0;
-    for (frame, line) in lines.iter().enumerate() {
-        let [width, height] = SIZE.map(|side| side as usize);
-        let images = pictures.iter().map(|view| view[frame].rgb());
-        let images = images.map(|rgb| Rgb8View::new(width, height, rgb).unwrap());
-        let sent: Vec<Option<launch::SentFrame<'_>>> = images
-            .map(|image| {
-                Some(launch::SentFrame {
-                    image,
-                    skew_nanos: 0,
-                })
-            })
-            .collect();
-        let estimate = one.estimate(&sent).unwrap();
-        assert_same_skeleton(line, frame, &estimate);
-        n_joints += estimate.skeleton.joints.iter().flatten().count();
-    }
-    assert!(
-        n_joints > 12 * N_FRAMES,
-        "little to compare: {n_joints} joints"
-    );
-}
-
-/// The pictures of a case whose views call the joints as they are.
-fn pictures(named: [Named; 4]) -> [Vec<Canvas>; 4] {
-    let rig = rig();
-    core::array::from_fn(|view| {
-        let camera = &rig.cameras()[view];
-        let frames = 0..N_FRAMES;
-        frames
-            .map(|frame| picture(camera, frame, named[view]))
-            .collect()
-    })
-}
-
-#[test]
-fn many_processes_give_the_bits_of_one() {
-    let named: [Named; 4] = [as_it_is, exchanged, as_it_is, without_a_wrist];
-    let case = case("one-process", named.map(Some));
-    run_as_they_are(&case);
-    assert_one_process_gives_the_same(&case, &pictures(named));
-}
-
-#[test]
-fn many_processes_give_the_bits_of_one_from_keypoints_of_another_program() {
-    let case = case("one-process-of-keypoints", [Some(as_it_is); 4]);
-    with_keypoints(&case, "halpe-26", |_| HALPE_26.map(str::to_owned).to_vec());
-    run_as_they_are(&case);
-    assert_one_process_gives_the_same(&case, &pictures([as_it_is; 4]));
 }
 
 #[test]
@@ -432,7 +357,7 @@ fn place(name: &str, frame: f64) -> Point3<f64> {
 /// Keypoints in the layout of OpenPose, in place of the pictures.
 ///
 /// * `names`: of a set, as the view calls them.
-fn with_keypoints(case: &Case, set: &str, names: impl Fn(usize) -> Vec<String>) {
+pub(crate) fn with_keypoints(case: &Case, set: &str, names: impl Fn(usize) -> Vec<String>) {
     with_skewed_keypoints(case, set, names, [0.0; 4]);
 }
 

@@ -54,7 +54,7 @@ fn mapped_file(bytes: &[u8]) -> String {
 
 #[test]
 fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending() {
-    let live = PACED.replace("[capture]", "[capture]\nmode = \"realtime\"");
+    let live = PACED.replace("\"paced\"", "\"realtime\"");
     let case = Case::new("client", &[160; 2], &live);
     let wish = Wish::skeletons()
         .with_poses()

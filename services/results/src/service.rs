@@ -19,7 +19,7 @@ use crate::writer::Writer;
 use crate::{Folder, FrameRecord, Picture};
 
 /// How long expected errors that were used are waited for, and the pause between two looks.
-const AWAITED: Duration = Duration::from_millis(200);
+const AWAITED: Duration = Duration::from_secs(2);
 const AWAIT_PAUSE: Duration = Duration::from_micros(500);
 
 /// Writes what is published, until the footage ends or a stop is requested.

@@ -116,16 +116,9 @@ impl NetworkEstimator {
             .collect();
         let viewed = viewed?;
         let answers = viewed.iter().zip(frames).map(|(found, frame)| {
-            let found = found
-                .as_ref()
-                .filter(|found| !found.candidates.is_empty())?;
             Some(ViewResult {
-                candidates: found.candidates.clone(),
-                front: found.front.clone(),
-                heats: found.heats.clone(),
-                sigma_px: None,
-                tau_px: None,
                 skew_s: frame.as_ref()?.skew_s,
+                ..found.as_ref()?.result(None)?
             })
         });
         let answers: Vec<Option<ViewResult>> = answers.collect();

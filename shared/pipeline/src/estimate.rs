@@ -141,14 +141,8 @@ impl Estimator {
                     return (None, None);
                 };
                 let estimate = search(step, tracker, (frame, image), responses);
-                let answer = (!estimate.candidates.is_empty()).then(|| ViewResult {
-                    candidates: estimate.candidates.clone(),
-                    front: estimate.front.clone(),
-                    heats: Vec::new(),
-                    sigma_px: sigma_px.get(view).cloned().flatten(),
-                    tau_px: None,
-                    skew_s: 0.0,
-                });
+                let sigma_px = sigma_px.get(view).cloned().flatten();
+                let answer = estimate.result(sigma_px);
                 (answer, Some(estimate))
             })
             .collect();

@@ -11,7 +11,7 @@ use kernels::Rgb8View;
 use multiview::FrontEvidence;
 use orientation::Detector;
 
-use crate::view_result::ExtraKeypoint;
+use crate::view_result::{ExtraKeypoint, ViewResult};
 
 /// Which levels of the pyramid a view offers as evidence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -84,6 +84,20 @@ pub struct ViewEstimate {
     pub bounds: Bounds,
     /// The part of the image that was searched and that the responses cover.
     pub scope: Scope,
+}
+
+impl ViewEstimate {
+    /// The result of a picture that was taken at the instant of its frame; `None` if nobody was found.
+    pub(crate) fn result(&self, sigma_px: Option<Vec<f32>>) -> Option<ViewResult> {
+        (!self.candidates.is_empty()).then(|| ViewResult {
+            candidates: self.candidates.clone(),
+            front: self.front.clone(),
+            heats: self.heats.clone(),
+            sigma_px,
+            tau_px: None,
+            skew_s: 0.0,
+        })
+    }
 }
 
 /// The single-view step for frames of one size.

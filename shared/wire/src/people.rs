@@ -136,16 +136,11 @@ mod tests {
         assert_eq!(got, "people of an identity is 2, expected 1");
         let got = refused(|message| message.people[0].candidates[3] = 0);
         assert_eq!(got, "view of a candidate of entry 0 is 3, the limit is 3");
-        assert!(
-            people_to_message(
-                &FramePeople {
-                    people: vec![person(1, &[Some(8)])],
-                    n_seen: 1
-                },
-                0
-            )
-            .is_err()
-        );
+        let ninth = FramePeople {
+            people: vec![person(1, &[Some(8)])],
+            n_seen: 1,
+        };
+        people_to_message(&ninth, 0).unwrap_err();
     }
 
     proptest! {

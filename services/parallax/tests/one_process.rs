@@ -1,0 +1,86 @@
+//! Processes give the bits of one process by the method of networks, from pictures and from keypoints of another program.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use footage::Canvas;
+use kernels::Rgb8View;
+use keypoints::HALPE_26;
+
+use crate::common::Case;
+use crate::common::same_bits::assert_same_skeleton;
+use crate::maps::{
+    N_FRAMES, Named, SIZE, as_it_is, case, exchanged, picture, rig, run, with_keypoints,
+    without_a_wrist,
+};
+
+/// Settings with which every picture is a frame of the pipeline, unchanged.
+const AS_THEY_ARE: [&str; 2] = ["capture.mode=lossless", "capture.scale=1.0"];
+
+/// Runs a case with [`AS_THEY_ARE`].
+fn run_as_they_are(case: &Case) {
+    let [mode, scale] = AS_THEY_ARE;
+    let ended = run(case, &["--set", mode, "--set", scale]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+}
+
+/// Compares the results of a run with those of its steps in one process, bit for bit.
+///
+/// * `pictures`: by view and frame; the frames of the pipeline, which are the pictures themselves.
+fn assert_one_process_gives_the_same(case: &Case, pictures: &[Vec<Canvas>; 4]) {
+    let file = case.path("deployment.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let set = AS_THEY_ARE.map(str::to_owned);
+    let loaded = deployment::Loaded::parse(&text, &file, &set, &deployment::AnyMachine).unwrap();
+    let resolved = launch::plan::resolve(&loaded.deployment).unwrap();
+    let mut one = launch::InProcess::new(&resolved).unwrap();
+    let lines = case.lines("pose3d.jsonl");
+    assert_eq!(lines.len(), N_FRAMES);
+    let mut n_joints = 0;
+    for (frame, line) in lines.iter().enumerate() {
+        let [width, height] = SIZE.map(|side| side as usize);
+        let images = pictures.iter().map(|view| view[frame].rgb());
+        let images = images.map(|rgb| Rgb8View::new(width, height, rgb).unwrap());
+        let sent: Vec<Option<launch::SentFrame<'_>>> = images
+            .map(|image| {
+                Some(launch::SentFrame {
+                    image,
+                    skew_nanos: 0,
+                })
+            })
+            .collect();
+        let estimate = one.estimate(&sent).unwrap();
+        assert_same_skeleton(line, frame, &estimate);
+        n_joints += estimate.skeleton.joints.iter().flatten().count();
+    }
+    assert!(
+        n_joints > 12 * N_FRAMES,
+        "little to compare: {n_joints} joints"
+    );
+}
+
+/// The pictures of a case whose views call the joints as they are.
+fn pictures(named: [Named; 4]) -> [Vec<Canvas>; 4] {
+    let rig = rig();
+    core::array::from_fn(|view| {
+        let camera = &rig.cameras()[view];
+        let frames = 0..N_FRAMES;
+        frames
+            .map(|frame| picture(camera, frame, named[view]))
+            .collect()
+    })
+}
+
+#[test]
+fn many_processes_give_the_bits_of_one() {
+    let named: [Named; 4] = [as_it_is, exchanged, as_it_is, without_a_wrist];
+    let case = case("one-process", named.map(Some));
+    run_as_they_are(&case);
+    assert_one_process_gives_the_same(&case, &pictures(named));
+}
+
+#[test]
+fn many_processes_give_the_bits_of_one_from_keypoints_of_another_program() {
+    let case = case("one-by-keypoints", [Some(as_it_is); 4]);
+    with_keypoints(&case, "halpe-26", |_| HALPE_26.map(str::to_owned).to_vec());
+    run_as_they_are(&case);
+    assert_one_process_gives_the_same(&case, &pictures([as_it_is; 4]));
+}
