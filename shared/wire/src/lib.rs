@@ -12,6 +12,7 @@ mod pair;
 mod people;
 mod pose;
 mod quality;
+mod seen;
 mod skeleton;
 mod stamp;
 
@@ -22,13 +23,14 @@ pub use pair::{check_views, pair_from_message, pair_to_message};
 pub use people::{people_from_message, people_to_message};
 pub use pose::{
     candidates_from_message, candidates_to_message, extras_from_message, extras_to_message,
-    front_from_message, front_to_message, heats_from_message, heats_to_message, local_from_message,
-    local_to_message, pose_from_message, pose_to_message, seen_from_message, skew_from_message,
+    front_from_message, front_to_message, local_from_message, local_to_message, pose_from_message,
+    pose_to_message, skew_from_message,
 };
 pub use quality::{
     sigma_from_message, sigma_from_pair, sigma_to_message, sigma_to_pair, tau_from_message,
     tau_to_message,
 };
+pub use seen::{heats_from_message, heats_to_message, seen_from_message};
 pub use skeleton::{check_pose3d, end_of_results, keypoints_to_message, skeleton_to_message};
 pub use stamp::{Expected, check_frame};
 
