@@ -7,6 +7,8 @@ use evaluation::Film;
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::Camera;
+use keypoints::Sides;
+use multiview::{SidesSettings, SpaceSettings};
 use pipeline::{
     Boxes, Eyes, NetworkEstimator, NetworkEstimatorSettings, NetworkSettings, NetworkStep,
     SpaceStepSettings, ViewContent, ViewFrame, ViewSettings, ViewStep,
@@ -59,14 +61,16 @@ impl AsRun<'_> {
         sequence: &Sequence,
         cameras: &[Camera],
     ) -> Result<NetworkEstimator, Failure> {
-        let (mut plans, mut steps) = (Vec::new(), Vec::new());
+        let (mut plans, mut steps, mut as_seen) = (Vec::new(), Vec::new(), false);
         for camera in cameras {
             let plan = pipeline::plan(&self.springs, camera).or_fail(ExitKind::Input)?;
             let boxes = match self.open.detector()? {
                 Some(detector) => Boxes::Detector(Box::new(detector)),
                 None => Boxes::Filters(Box::new(self.filters(camera)?)),
             };
-            let eyes = Eyes::Network(Box::new(self.open.network()?), boxes);
+            let network = self.open.network()?;
+            as_seen |= network.card().keypoints.sides == Sides::Seen;
+            let eyes = Eyes::Network(Box::new(network), boxes);
             let settings = NetworkSettings {
                 find_every: 1,
                 ..NetworkSettings::default()
@@ -78,7 +82,12 @@ impl AsRun<'_> {
         }
         let settings = NetworkEstimatorSettings {
             space: SpaceStepSettings {
+                space: SpaceSettings {
+                    as_seen,
+                    ..SpaceSettings::default()
+                },
                 least_heat: 2.0 * NetworkSettings::default().least_heat,
+                sides: as_seen.then(SidesSettings::default),
                 ..SpaceStepSettings::default()
             },
             frame_step: 1,
