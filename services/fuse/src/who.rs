@@ -17,7 +17,7 @@ pub struct WhoJob {
     pub plans: Vec<Arc<ViewPlan>>,
     /// Which of several people is followed.
     pub follow: Follow,
-    /// Whether left and right follow the picture.
+    /// Left and right follow the picture, not the body.
     pub as_seen: bool,
     /// Distance between the frames used, at least 1.
     pub frame_step: u64,
