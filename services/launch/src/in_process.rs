@@ -43,9 +43,8 @@ impl InProcess {
         let plans = prepared.plans();
         let (mut steps, mut keypoints) = (Vec::new(), Vec::new());
         for (view, plan) in plans.iter().enumerate() {
-            let prepared = Prepared::new(resolved)?;
             let layout = Arc::new(plan.layout().clone());
-            match view_step::of_view(resolved, prepared, view, layout)? {
+            match view_step::of_view(resolved, &prepared, view, layout)? {
                 pose::Step::Network(step) => {
                     steps.push(*step);
                     keypoints.push(None);

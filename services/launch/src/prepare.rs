@@ -9,7 +9,7 @@ use deployment::paper::Errors;
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::{Framing, OutSize, Rig, upright_roll};
-use multiview::{SpaceSettings, ViewPlan};
+use multiview::ViewPlan;
 use nalgebra::UnitVector3;
 use pipeline::{
     BodySettings, EstimatorSettings, SkeletonSettings, SpaceStepSettings, ViewSettings,
@@ -283,21 +283,12 @@ fn skeleton_settings(
 
 /// The settings of the step in space.
 pub(crate) fn space_settings(resolved: &Resolved, prepared: &Prepared) -> SpaceStepSettings {
-    let deployment = &resolved.deployment;
     let skeleton = &prepared.settings.skeleton;
+    let least_heat = resolved.deployment.network.least_heat;
     SpaceStepSettings {
-        space: SpaceSettings {
-            as_seen: resolved.sides_as_seen,
-            ..SpaceSettings::default()
-        },
-        // In space the views have to agree: what is seen badly in one is nobody there.
-        least_heat: 2.0 * deployment.network.least_heat,
-        least_score: least_score(deployment),
         joints: skeleton.joints,
         body: skeleton.body,
-        // Others name the sides of the body.
-        sides: resolved.sides_as_seen.then_some(skeleton.sides),
-        ..SpaceStepSettings::default()
+        ..SpaceStepSettings::for_views(least_heat, resolved.sides_as_seen)
     }
 }
 

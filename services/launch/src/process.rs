@@ -186,7 +186,7 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
     let layout = Arc::new(prepared.views[view].plan.layout().clone());
     let job = pose::Job {
         view,
-        step: view_step::of_view(resolved, prepared, view, layout)?,
+        step: view_step::of_view(resolved, &prepared, view, layout)?,
         n_extras: resolved.extra_keypoints.len(),
         n_pose_consumers: topology.receivers_of(&topic::view_pose(view)),
         n_evidence_consumers: topology.receivers_of(&topic::evidence(view)),

@@ -37,8 +37,7 @@ impl NetworkState {
             self.nobody = None;
         } else if now.saturating_sub(since) >= LONG_NANOS {
             tracing::warn!(
-                "nobody was seen in the last {} frames ({} s): is somebody there, and does the detector fit (pose.detector, \
-                 pose.detector_card)?",
+                "nobody was seen in the last {} frames ({} s): is somebody there, and does the detector fit (network.detector)?",
                 n + 1,
                 now.saturating_sub(since) / 1_000_000_000
             );

@@ -127,7 +127,6 @@ impl Solver<'_> {
             .health()
             .counted_people(skeleton.n_people as u32);
         let message = wire::skeleton_to_message(&skeleton, present);
-        // Evidence that is not a number gives no joints.
         let mut message = message.or_fail(ExitKind::Run)?;
         motion.begin(instant_s);
         let found = found_extras(&answers, &extras);
@@ -142,7 +141,9 @@ impl Solver<'_> {
         sample: &'a Sample<f32, EvidenceHeader>,
         plan: &'a ViewPlan,
     ) -> Option<EvidenceView<'a>> {
-        let read = wire::evidence_from_message(sample.header(), sample.payload(), plan.layout());
+        let values = sample.payload();
+        let read = wire::evidence_from_message(sample.header(), values, plan.layout());
+        let read = read.and_then(|view| wire::check_maps(values).map(|()| view));
         let context = Context::of(self.service);
         read.inspect_err(|error| context.count_refused("evidence", error))
             .ok()

@@ -26,7 +26,7 @@ pub struct Config {
     pub people: usize,
     /// Look at the mirror image of every person as well and use the mean, which is more exact and takes twice the time.
     pub mirror: bool,
-    /// The library of ONNX Runtime (`libonnxruntime.so`) that runs network and detector in place of `rten`, which is built in.
+    /// The library of ONNX Runtime (`libonnxruntime.so`) that runs network and detector in place of what is built in.
     pub onnx_runtime: Option<PathBuf>,
 }
 

@@ -42,7 +42,6 @@ pub use fused_view::FusedView;
 pub use motion::Motion;
 pub use network_memory::{LOST, NetworkMemory};
 pub use network_step::{Boxes, Eyes, NetworkSettings, NetworkStep, most_values};
-pub use people::{Person, people};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
 pub use space_step::{SpaceStep, SpaceStepSettings};

@@ -41,7 +41,7 @@ const MIN_STRENGTH: f64 = 0.28;
 
 /// A person that several views could mean.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Person {
+pub(crate) struct Person {
     /// The candidate of every view; `None` for a view without one.
     pub candidates: Vec<Option<usize>>,
     /// The middle line of the body in every picture that shows all of it, head, neck, hips, knees and ankles, pixels of the
@@ -59,7 +59,7 @@ pub struct Person {
 
 impl Person {
     /// Number of views that see the person.
-    pub fn n_views(&self) -> usize {
+    pub(crate) fn n_views(&self) -> usize {
         self.candidates.iter().flatten().count()
     }
 }
@@ -153,7 +153,7 @@ impl Found {
 /// the first. People whose trunks are less than half a metre apart count as one. The paper knows one person; this is our own.
 ///
 /// * `plans`: of the views; nothing is found with models that do not have the 26 parts of the published ones.
-pub fn people(plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Vec<Person> {
+pub(crate) fn people(plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Vec<Person> {
     find(plans, answers).people
 }
 

@@ -16,6 +16,7 @@ use crate::bodies::{Bodies, Body, NoJoint};
 use crate::disagreement::{self, FoundByViews};
 use crate::fused_view::FusedView;
 use crate::motion::Motion;
+use crate::network_step::NetworkSettings;
 use crate::person_evidence::PersonEvidence;
 use crate::placed::{N, PartView, Places, joints_at, of_set, shown_in};
 use crate::skeleton_settings::BodySettings;
@@ -51,17 +52,32 @@ pub struct SpaceStepSettings {
     pub sides: Option<SidesSettings>,
 }
 
-impl Default for SpaceStepSettings {
-    fn default() -> Self {
+impl SpaceStepSettings {
+    /// The settings for what views find.
+    ///
+    /// * `least_heat`: mean heat of the joints of a person who is seen in a view, 0 to 1. In space the views have to agree: what is seen
+    ///   badly in one is nobody there, and half of the joints need twice as much.
+    /// * `as_seen`: left and right follow the picture, so that those of the whole body are to be decided.
+    pub fn for_views(least_heat: f64, as_seen: bool) -> Self {
+        let maps = MapSettings::default();
         Self {
-            space: SpaceSettings::default(),
-            maps: MapSettings::default(),
-            least_heat: 0.4,
-            least_score: f32::NEG_INFINITY,
+            space: SpaceSettings {
+                as_seen,
+                ..SpaceSettings::default()
+            },
+            maps,
+            least_heat: 2.0 * least_heat,
+            least_score: maps.score_of_heat(least_heat),
             joints: &PARSE14,
             body: BodySettings::default(),
-            sides: None,
+            sides: as_seen.then(SidesSettings::default),
         }
+    }
+}
+
+impl Default for SpaceStepSettings {
+    fn default() -> Self {
+        Self::for_views(NetworkSettings::default().least_heat, false)
     }
 }
 

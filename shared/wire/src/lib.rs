@@ -18,7 +18,7 @@ mod stamp;
 
 pub use all_views::{all_views_from_pairs, all_views_to_messages, check_all_views};
 pub use error::WireError;
-pub use evidence::{EvidenceView, evidence_from_message, evidence_to_message};
+pub use evidence::{EvidenceView, check_maps, evidence_from_message, evidence_to_message};
 pub use pair::{check_views, pair_from_message, pair_to_message};
 pub use people::{people_from_message, people_to_message};
 pub use pose::{

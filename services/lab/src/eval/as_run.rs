@@ -8,7 +8,6 @@ use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::Camera;
 use keypoints::Sides;
-use multiview::{SidesSettings, SpaceSettings};
 use pipeline::{
     Boxes, Eyes, NetworkEstimator, NetworkEstimatorSettings, NetworkSettings, NetworkStep,
     SpaceStepSettings, ViewContent, ViewFrame, ViewSettings, ViewStep,
@@ -81,15 +80,7 @@ impl AsRun<'_> {
             plans.push(plan);
         }
         let settings = NetworkEstimatorSettings {
-            space: SpaceStepSettings {
-                space: SpaceSettings {
-                    as_seen,
-                    ..SpaceSettings::default()
-                },
-                least_heat: 2.0 * NetworkSettings::default().least_heat,
-                sides: as_seen.then(SidesSettings::default),
-                ..SpaceStepSettings::default()
-            },
+            space: SpaceStepSettings::for_views(NetworkSettings::default().least_heat, as_seen),
             frame_step: 1,
             ..NetworkEstimatorSettings::default()
         };

@@ -21,7 +21,7 @@ use crate::resolved::Resolved;
 pub fn network_step(resolved: &Resolved, view: usize) -> Result<Option<NetworkStep>, Failure> {
     let prepared = Prepared::new(resolved)?;
     let layout = Arc::new(prepared.views[view].plan.layout().clone());
-    Ok(match of_view(resolved, prepared, view, layout)? {
+    Ok(match of_view(resolved, &prepared, view, layout)? {
         pose::Step::Network(step) => Some(*step),
         pose::Step::Filters(_) | pose::Step::Keypoints(_) => None,
     })
@@ -30,13 +30,17 @@ pub fn network_step(resolved: &Resolved, view: usize) -> Result<Option<NetworkSt
 /// The single-view step: by the network of the deployment, or by the filters.
 pub(crate) fn of_view(
     resolved: &Resolved,
-    prepared: Prepared,
+    prepared: &Prepared,
     view: usize,
     layout: Arc<Layout>,
 ) -> Result<pose::Step, Failure> {
     let deployment = &resolved.deployment;
     if !deployment.has_maps() {
-        let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
+        let step = ViewStep::new(
+            Arc::clone(&prepared.model),
+            layout,
+            prepared.settings.view.clone(),
+        );
         return Ok(pose::Step::Filters(Box::new(step)));
     }
     let config = &deployment.network;
@@ -68,7 +72,7 @@ pub(crate) fn of_view(
         .or_fail(ExitKind::Config)?;
     let boxes = match inputs::detector(config)? {
         Some(detector) => Boxes::Detector(Box::new(detector)),
-        None => Boxes::Filters(Box::new(super::boxes::filters(&prepared, view)?)),
+        None => Boxes::Filters(Box::new(super::boxes::filters(prepared, view)?)),
     };
     let extras = extras(resolved, network.names());
     let eyes = Eyes::Network(Box::new(network), boxes);
