@@ -123,6 +123,7 @@ mod facing;
 mod optimise;
 mod space_apart;
 mod space_person;
+mod space_places;
 mod space_solve;
 mod space_tree;
 mod start;
@@ -150,9 +151,8 @@ pub use pair::PairInput;
 pub use settings::{EnergyKind, Settings, SwitchBy, TypeTables};
 pub use sides::{Sides, SidesFilter, SidesSettings};
 pub use space_person::{SolvedPerson, solve_person};
-pub use space_solve::solve_in_space;
 pub use space_tree::{
-    BoneLength, JointEvidence, SpacePose, SpaceSettings, SpaceView, TREE, lengths_of, places,
+    BoneLength, JointEvidence, SpacePose, SpaceSettings, SpaceView, TREE, lengths_of,
 };
 pub use start::{Start, choose_start, rank_starts};
 pub use term::Epipolar;

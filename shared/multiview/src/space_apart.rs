@@ -8,9 +8,9 @@
 //! with `d` the least distance of a pair. It closes loops, so that the tree alone is not exact any more: one side is kept away from where
 //! the other one is, the tree solved again, and the better one of both sides chosen.
 
+use crate::space_places::Choices;
 use crate::space_tree::{
-    BoneLength, LIMBS, N, Occupied, Places, SpacePose, SpaceSettings, SpaceView, TREE,
-    best_on_tree, cost,
+    BoneLength, LIMBS, N, Occupied, SpacePose, SpaceSettings, TREE, best_on_tree, cost,
 };
 
 /// What it costs that the pairs of a limb lie near each other.
@@ -28,8 +28,7 @@ fn crowding(joints: &Occupied, pairs: &[[usize; 2]], settings: &SpaceSettings) -
 /// * `first`: the best on the tree.
 /// * Returns the solution, and what its joints are kept away from.
 pub(crate) fn kept_apart(
-    views: &[SpaceView<'_>],
-    places: &Places,
+    choices: &Choices,
     lengths: &[BoneLength; TREE.len()],
     settings: &SpaceSettings,
     first: SpacePose,
@@ -48,7 +47,7 @@ pub(crate) fn kept_apart(
             for pair in pairs {
                 kept[pair[side]] = from[pair[1 - side]];
             }
-            let Some(found) = best_on_tree(views, places, (lengths, &kept), settings) else {
+            let Some(found) = best_on_tree(choices, (lengths, &kept), settings) else {
                 continue;
             };
             // The other side may have moved as well: judged by where both are now.

@@ -5,9 +5,10 @@ use geometry::Camera;
 use nalgebra::Point3;
 
 use crate::front::{FrontEvidence, front_log_ratio_of};
+use crate::space_places::{Choices, Crossings, Used};
 use crate::space_solve::solve_in_space;
 use crate::space_tree::{
-    LIMBS, N, SpacePose, SpaceSettings, SpaceView, best_on_tree, lengths_of, places,
+    BoneLength, LIMBS, N, SpacePose, SpaceSettings, SpaceView, TREE, best_on_tree, lengths_of,
 };
 
 /// A person in space, and what was decided about the views.
@@ -33,33 +34,43 @@ pub struct SolvedPerson {
 ///
 /// * Returns `None` if no joint is seen by two views.
 pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SolvedPerson> {
-    let mut used: Vec<usize> = (0..views.len()).collect();
-    let mut views = views.to_vec();
-    let n_views = views.len();
-    let mut first = coarse(&views, settings)?;
-    let fits_view = |it: &SpaceView<'_>| shortfall(it, &first, MOST) <= settings.good_fit;
-    let fits = views.iter().all(fits_view);
+    let mut solver = FirstSolver {
+        views,
+        crossings: Crossings::new(views),
+        lengths: lengths_of(None),
+        settings,
+    };
+    let given = views.iter().enumerate();
+    let given = given.map(|(view, shown)| Used {
+        view,
+        exchanged: shown.exchanged,
+    });
+    let mut used: Vec<Used> = given.collect();
+    let mut first = solver.solve(&used)?;
+    let fits = used
+        .iter()
+        .all(|view| shortfall(&solver.shown(*view), &first, MOST) <= settings.good_fit);
     if settings.as_seen {
-        first = first_as_seen(&mut views, first, settings)?;
+        first = solver.as_seen(&mut used, first)?;
     } else if !fits {
-        first = first_of(&mut views, first, settings)?;
+        first = solver.with_one_exchanged(&mut used, first)?;
     }
-    let mut changed = views.iter().any(|it| it.exchanged != [false; 2]);
-    changed |= exchange(&mut views, &first, settings.margin);
-    while !fits && let Some(worst) = contradicts(&views, settings) {
-        views.remove(worst);
+    let mut changed = used.iter().any(|view| view.exchanged != [false; 2]);
+    changed |= solver.exchange(&mut used, &first);
+    while !fits && let Some(worst) = solver.contradicts(&used) {
         used.remove(worst);
         changed = true;
     }
     if changed {
-        first = coarse(&views, settings)?;
+        first = solver.solve(&used)?;
     }
-    let all = places(&views, settings.n_places);
     let lengths = lengths_of(Some(&first.joints));
-    let pose = solve_in_space(&views, &all, &lengths, settings)?;
-    let mut of_views = vec![None; n_views];
-    for (view, it) in used.into_iter().zip(&views) {
-        of_views[view] = Some(it.exchanged);
+    let shown: Vec<SpaceView<'_>> = used.iter().map(|view| solver.shown(*view)).collect();
+    let choices = solver.choices(&used);
+    let pose = solve_in_space(&shown, &choices, &lengths, settings)?;
+    let mut of_views = vec![None; views.len()];
+    for view in used {
+        of_views[view.view] = Some(view.exchanged);
     }
     Some(SolvedPerson {
         pose,
@@ -67,91 +78,167 @@ pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option
     })
 }
 
-/// The best choice among the places of the joints, for a person of any stature.
-fn coarse(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SpacePose> {
-    let all = places(views, settings.n_places);
-    let lengths = lengths_of(None);
-    best_on_tree(views, &all, (&lengths, &[None; N]), settings)
-}
-
-/// The best first solution with no view, or one view, exchanged.
-///
-/// * `best`: the one with none.
-fn first_of(
-    views: &mut [SpaceView<'_>],
-    mut best: SpacePose,
-    settings: &SpaceSettings,
-) -> Option<SpacePose> {
-    if views.len() < 3 {
-        // Which one of two is exchanged cannot be told.
-        return Some(best);
-    }
-    let mut exchanged = None;
-    let mut most = best.energy + settings.margin;
-    for nth in 0..views.len() {
-        views[nth].exchanged = [true; 2];
-        let found = coarse(views, settings)?;
-        views[nth].exchanged = [false; 2];
-        if found.energy > most {
-            (most, exchanged, best) = (found.energy, Some(nth), found);
-        }
-    }
-    if let Some(nth) = exchanged {
-        views[nth].exchanged = [true; 2];
-    }
-    Some(best)
-}
-
 /// Most views of which every combination is tried.
 const MOST_COMBINED: usize = 5;
 
-/// The best first solution with any of the views but the first exchanged: of all combinations for a few views, else by exchanging one
-/// after the other as long as that helps.
-///
-/// * `best`: the one with none.
-fn first_as_seen(
-    views: &mut [SpaceView<'_>],
-    mut best: SpacePose,
-    settings: &SpaceSettings,
-) -> Option<SpacePose> {
-    let mut chosen = 0usize;
-    let n = views.len().min(usize::BITS as usize);
-    if n <= MOST_COMBINED {
-        for combination in (2..1usize << n).step_by(2) {
-            if improves(views, combination, (&mut best, settings))? {
-                chosen = combination;
+/// Makes first solutions: for a person of any stature, among the places to which pairs of views put the joints.
+struct FirstSolver<'a> {
+    views: &'a [SpaceView<'a>],
+    crossings: Crossings<'a>,
+    lengths: [BoneLength; TREE.len()],
+    settings: &'a SpaceSettings,
+}
+
+impl<'a> FirstSolver<'a> {
+    fn choices(&mut self, used: &[Used]) -> Choices {
+        self.crossings.choices(used, self.settings.n_places)
+    }
+
+    fn solve(&mut self, used: &[Used]) -> Option<SpacePose> {
+        let choices = self.choices(used);
+        best_on_tree(&choices, (&self.lengths, &[None; N]), self.settings)
+    }
+
+    fn shown(&self, used: Used) -> SpaceView<'a> {
+        SpaceView {
+            exchanged: used.exchanged,
+            ..self.views[used.view]
+        }
+    }
+
+    /// The best first solution with no view, or one view, exchanged.
+    ///
+    /// * `best`: the one with none.
+    fn with_one_exchanged(&mut self, used: &mut [Used], mut best: SpacePose) -> Option<SpacePose> {
+        if used.len() < 3 {
+            // Which one of two is exchanged cannot be told.
+            return Some(best);
+        }
+        let mut exchanged = None;
+        let mut most = best.energy + self.settings.margin;
+        for nth in 0..used.len() {
+            used[nth].exchanged = [true; 2];
+            let found = self.solve(used)?;
+            used[nth].exchanged = [false; 2];
+            if found.energy > most {
+                (most, exchanged, best) = (found.energy, Some(nth), found);
             }
         }
-    } else {
-        let mut any = true;
-        while any {
-            any = false;
-            for nth in 1..n {
-                let combination = chosen ^ 1 << nth;
-                if improves(views, combination, (&mut best, settings))? {
-                    (chosen, any) = (combination, true);
+        if let Some(nth) = exchanged {
+            used[nth].exchanged = [true; 2];
+        }
+        Some(best)
+    }
+
+    /// The best first solution with any of the views but the first exchanged: of all combinations for a few views, else by exchanging
+    /// one after the other as long as that helps.
+    ///
+    /// * `best`: the one with none.
+    fn as_seen(&mut self, used: &mut [Used], mut best: SpacePose) -> Option<SpacePose> {
+        let mut chosen = 0usize;
+        let n = used.len().min(usize::BITS as usize);
+        if n <= MOST_COMBINED {
+            for combination in (2..1usize << n).step_by(2) {
+                if self.improves(used, combination, &mut best)? {
+                    chosen = combination;
+                }
+            }
+        } else {
+            let mut any = true;
+            while any {
+                any = false;
+                for nth in 1..n {
+                    let combination = chosen ^ 1 << nth;
+                    if self.improves(used, combination, &mut best)? {
+                        (chosen, any) = (combination, true);
+                    }
                 }
             }
         }
+        set_exchanged(used, chosen);
+        Some(best)
     }
-    set_exchanged(views, chosen);
-    Some(best)
+
+    /// Exchanges the views whose bits are set; whether the first solution is better than the best one, which it then becomes.
+    fn improves(
+        &mut self,
+        used: &mut [Used],
+        combination: usize,
+        best: &mut SpacePose,
+    ) -> Option<bool> {
+        set_exchanged(used, combination);
+        let found = self.solve(used)?;
+        let with_front = |pose: &SpacePose| pose.energy + front_agreement(self.views, pose);
+        let is_better = with_front(&found) > with_front(best);
+        if is_better {
+            *best = found;
+        }
+        Some(is_better)
+    }
+
+    /// The view without which the others agree best, if most of its joints lie elsewhere than in their solution; `None` if there is
+    /// none, or for fewer than four views, of which it cannot be told.
+    ///
+    /// A view of which half is covered fits with the other half; one whose camera was turned fits with nothing.
+    fn contradicts(&mut self, used: &[Used]) -> Option<usize> {
+        const LEAST: usize = 4;
+        if used.len() < LEAST {
+            return None;
+        }
+        let mut worst: Option<(usize, f64)> = None;
+        for nth in 0..used.len() {
+            let mut others = used.to_vec();
+            let own = self.shown(others.remove(nth));
+            let Some(found) = self.solve(&others) else {
+                continue;
+            };
+            if shortfall(&own, &found, QUARTER) <= self.settings.most_misfit {
+                continue;
+            }
+            let misfits = others.iter().map(|view| self.shown(*view));
+            let misfit = misfits.map(|view| shortfall(&view, &found, QUARTER)).sum();
+            if worst.is_none_or(|(_, least)| misfit < least) {
+                worst = Some((nth, misfit));
+            }
+        }
+        worst.map(|(nth, _)| nth)
+    }
+
+    /// Exchanges left and right in views that then fit better; returns whether there were any.
+    fn exchange(&self, used: &mut [Used], found: &SpacePose) -> bool {
+        let mut any = false;
+        for used in used {
+            let view = self.shown(*used);
+            for (limb, pairs) in LIMBS.iter().enumerate() {
+                let sum = |exchanged: bool| -> f64 {
+                    let pair = |[right, left]: &[usize; 2]| {
+                        let names = if exchanged {
+                            [left, right]
+                        } else {
+                            [right, left]
+                        };
+                        let at = |name: usize, joint: usize| {
+                            found.joints[joint].map_or(0.0, |place| view.at(name, &place))
+                        };
+                        at(*names[0], *right) + at(*names[1], *left)
+                    };
+                    pairs.iter().map(pair).sum()
+                };
+                let own = used.exchanged[limb];
+                if sum(!own) > sum(own) + self.settings.margin {
+                    used.exchanged[limb] = !own;
+                    any = true;
+                }
+            }
+        }
+        any
+    }
 }
 
-/// Exchanges the views whose bits are set; whether the first solution is better than the best one, which it then becomes.
-fn improves(
-    views: &mut [SpaceView<'_>],
-    combination: usize,
-    (best, settings): (&mut SpacePose, &SpaceSettings),
-) -> Option<bool> {
-    set_exchanged(views, combination);
-    let found = coarse(views, settings)?;
-    let with_front = |it: &SpacePose| it.energy + front_agreement(views, it);
-    let is_better = with_front(&found) > with_front(best);
-    if is_better {
-        *best = found;
+fn set_exchanged(used: &mut [Used], combination: usize) {
+    for (nth, view) in used.iter_mut().enumerate() {
+        view.exchanged = [combination >> nth & 1 == 1; 2];
     }
-    Some(is_better)
 }
 
 /// How well the direction in which a solution faces, or the opposite one, agrees with what the views say of it, nats: whether the names
@@ -163,36 +250,6 @@ fn front_agreement(views: &[SpaceView<'_>], found: &SpacePose) -> f64 {
     let said = views.iter().map(|it| (it.camera, it.front));
     let said: Vec<(&Camera, FrontEvidence)> = said.collect();
     front_log_ratio_of(&found.joints, &said).abs() / 2.0
-}
-
-fn set_exchanged(views: &mut [SpaceView<'_>], combination: usize) {
-    for (nth, view) in views.iter_mut().enumerate() {
-        view.exchanged = [combination >> nth & 1 == 1; 2];
-    }
-}
-
-/// The view without which the others agree best, if most of its joints lie elsewhere than in their solution; `None` if there is
-/// none, or for fewer than four views, of which it cannot be told.
-///
-/// A view of which half is covered fits with the other half; one whose camera was turned fits with nothing.
-fn contradicts(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<usize> {
-    const LEAST: usize = 4;
-    if views.len() < LEAST {
-        return None;
-    }
-    let judged = |nth: usize| -> Option<(usize, f64, f64)> {
-        let others: Vec<SpaceView<'_>> = (0..views.len())
-            .filter(|it| *it != nth)
-            .map(|it| views[it])
-            .collect();
-        let found = coarse(&others, settings)?;
-        let misfits = others.iter().map(|it| shortfall(it, &found, QUARTER));
-        Some((nth, shortfall(&views[nth], &found, QUARTER), misfits.sum()))
-    };
-    let all = (0..views.len()).filter_map(judged);
-    let contradicting = all.filter(|it| it.1 > settings.most_misfit);
-    let worst = contradicting.min_by(|a, b| a.2.total_cmp(&b.2))?;
-    Some(worst.0)
 }
 
 /// Share of the joints that fall short by at most the [`shortfall`] of a view: one that holds for a quarter only is exceeded by three
@@ -218,33 +275,4 @@ fn shortfall(view: &SpaceView<'_>, found: &SpacePose, share: f64) -> f64 {
     short.sort_by(f64::total_cmp);
     let nth = (short.len() as f64 * share) as usize;
     short.get(nth).copied().unwrap_or(0.0)
-}
-
-/// Exchanges left and right in views that then fit better; returns whether there were any.
-fn exchange(views: &mut [SpaceView<'_>], found: &SpacePose, margin: f64) -> bool {
-    let mut any = false;
-    for view in views {
-        for (limb, pairs) in LIMBS.iter().enumerate() {
-            let sum = |exchanged: bool| -> f64 {
-                let of = |[right, left]: &[usize; 2]| {
-                    let names = if exchanged {
-                        [left, right]
-                    } else {
-                        [right, left]
-                    };
-                    let at = |name: usize, joint: usize| {
-                        found.joints[joint].map_or(0.0, |it| view.at(name, &it))
-                    };
-                    at(*names[0], *right) + at(*names[1], *left)
-                };
-                pairs.iter().map(of).sum()
-            };
-            let own = view.exchanged[limb];
-            if sum(!own) > sum(own) + margin {
-                view.exchanged[limb] = !own;
-                any = true;
-            }
-        }
-    }
-    any
 }

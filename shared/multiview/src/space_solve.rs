@@ -1,34 +1,38 @@
 //! The joints of a person in space: the best on the tree, with the limbs apart, then on finer and finer grids about it.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use crate::space_apart::kept_apart;
+use crate::space_places::Choices;
 use crate::space_tree::{
-    BoneLength, N, Occupied, Places, SpacePose, SpaceSettings, SpaceView, TREE, best_on_tree, cost,
-    unary,
+    BoneLength, N, Occupied, SpacePose, SpaceSettings, SpaceView, TREE, best_on_tree, cost, unary,
 };
+
+/// Places along each axis of the coarsest grid, and of the finer ones.
+const COARSEST: usize = 5;
+const FINER: usize = 3;
+/// Times that a grid is laid about the solution, at most.
+const N_GRIDS: usize = 2;
 
 /// Solves for all joints at once.
 ///
-/// * `places`: of every joint, for example of [`places`](crate::places); a joint without one is left out.
+/// * `choices`: places of every joint; one without any is left out.
 /// * `lengths`: of the bones of [`TREE`](crate::TREE).
 /// * Returns `None` if no joint has a place.
-pub fn solve_in_space(
+pub(crate) fn solve_in_space(
     views: &[SpaceView<'_>],
-    places: &Places,
+    choices: &Choices,
     lengths: &[BoneLength; N - 1],
     settings: &SpaceSettings,
 ) -> Option<SpacePose> {
-    let first = best_on_tree(views, places, (lengths, &[None; N]), settings)?;
-    let (mut best, occupied) = kept_apart(views, places, lengths, settings, first);
+    let first = best_on_tree(choices, (lengths, &[None; N]), settings)?;
+    let (mut best, occupied) = kept_apart(choices, lengths, settings, first);
     let mut step = settings.coarsest_m;
+    let mut n_along = COARSEST;
     while step >= settings.finest_m {
-        for _ in 0..2 {
-            let about: Places = core::array::from_fn(|joint| match &best.joints[joint] {
-                Some(at) => grid(at, step),
-                None => Vec::new(),
-            });
-            let found = best_on_tree(views, &about, (lengths, &occupied), settings)?;
+        for _ in 0..N_GRIDS {
+            let about = grids(views, &best, &Grid { n_along, step });
+            let found = best_on_tree(&about, (lengths, &occupied), settings)?;
             let has_moved = found.joints != best.joints;
             best = found;
             if !has_moved {
@@ -36,6 +40,7 @@ pub fn solve_in_space(
             }
         }
         step /= 2.0;
+        n_along = FINER;
     }
     Some(between_places(
         best,
@@ -121,13 +126,49 @@ fn between_places(mut best: SpacePose, views: &[SpaceView<'_>], held: &Held<'_>)
     best
 }
 
-/// The 125 places of a grid about a place, that one in the middle.
-fn grid(about: &Point3<f64>, step: f64) -> Vec<Point3<f64>> {
-    let along = |nth: usize| (nth as f64 - 2.0) * step;
-    (0..125)
-        .map(|nth| {
-            let by = [along(nth % 5), along(nth / 5 % 5), along(nth / 25)];
-            about + nalgebra::Vector3::from(by)
-        })
-        .collect()
+/// A grid of places about one.
+struct Grid {
+    /// Places along each axis, odd.
+    n_along: usize,
+    /// Distance between two of them, metres.
+    step: f64,
+}
+
+impl Grid {
+    /// From the place in the middle to each place, metres.
+    fn steps(&self) -> impl Iterator<Item = Vector3<f64>> {
+        let (n, step) = (self.n_along, self.step);
+        let along = move |nth: usize| (nth as f64 - (n / 2) as f64) * step;
+        (0..n * n * n)
+            .map(move |nth| Vector3::new(along(nth % n), along(nth / n % n), along(nth / n / n)))
+    }
+}
+
+/// Grids about the joints, with the evidence of all views.
+///
+/// The projection into a view is taken as linear about each joint: 8 cm beside a joint that is 3 m away this is off by 3 % of the way.
+fn grids(views: &[SpaceView<'_>], about: &SpacePose, grid: &Grid) -> Choices {
+    let mut choices = Choices {
+        places: core::array::from_fn(|_| Vec::new()),
+        scores: core::array::from_fn(|_| Vec::new()),
+    };
+    for (joint, at) in about.joints.iter().enumerate() {
+        let Some(at) = at else {
+            continue;
+        };
+        let places: Vec<Point3<f64>> = grid.steps().map(|by| at + by).collect();
+        let mut scores = vec![0.0; places.len()];
+        for view in views {
+            let named = view.named(joint);
+            let linear = view.camera.project_with_jacobian(at);
+            for (score, by) in scores.iter_mut().zip(grid.steps()) {
+                *score += f64::from(linear.map_or(view.evidence.floor(), |(pixel, by_place)| {
+                    let pixel = pixel + by_place * by;
+                    view.evidence.at(named, [pixel.x, pixel.y])
+                }));
+            }
+        }
+        (choices.places[joint], choices.scores[joint]) = (places, scores);
+    }
+    choices
 }

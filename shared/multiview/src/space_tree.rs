@@ -15,6 +15,7 @@ use geometry::{Camera, Ray};
 use kernels::{Isa, LengthSpring, ScoredPoints};
 
 use crate::front::FrontEvidence;
+use crate::space_places::{Choices, name};
 
 /// Number of joints: those of `skeleton::PARSE14`.
 pub(crate) const N: usize = 14;
@@ -171,51 +172,6 @@ pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N -
     })
 }
 
-/// Where pairs of views put every joint, the best first.
-///
-/// * Returns an empty list for a joint that no two views show.
-pub fn places(views: &[SpaceView<'_>], n: usize) -> Places {
-    core::array::from_fn(|joint| {
-        // A lens is inverted step by step, which takes long: once for each maximum, not for each pair.
-        let rays: Vec<Vec<Ray>> = views.iter().map(|it| it.rays(joint)).collect();
-        let mut found: Vec<(f64, Point3<f64>)> = Vec::new();
-        for (nth, of_a) in rays.iter().enumerate() {
-            for of_b in &rays[nth + 1..] {
-                for a in of_a {
-                    for b in of_b {
-                        if let Some(at) = nearest(a, b) {
-                            found.push((unary(views, joint, &at), at));
-                        }
-                    }
-                }
-            }
-        }
-        found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        found.truncate(n);
-        found.into_iter().map(|it| it.1).collect()
-    })
-}
-
-/// The point nearest to two rays; `None` behind a camera, or for rays that are parallel.
-fn nearest(a: &Ray, b: &Ray) -> Option<Point3<f64>> {
-    let (u, v) = (a.direction.into_inner(), b.direction.into_inner());
-    let between = b.origin - a.origin;
-    let cosine = u.dot(&v);
-    let sine2 = 1.0 - cosine * cosine;
-    if sine2 < 1e-6 {
-        return None;
-    }
-    let along_a = (between.dot(&u) - cosine * between.dot(&v)) / sine2;
-    let along_b = (cosine * between.dot(&u) - between.dot(&v)) / sine2;
-    if along_a <= 0.0 || along_b <= 0.0 {
-        return None;
-    }
-    Some(nalgebra::center(
-        &(a.origin + u * along_a),
-        &(b.origin + v * along_b),
-    ))
-}
-
 /// The evidence of all views for a joint at a place.
 pub(crate) fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
     views
@@ -231,8 +187,10 @@ impl SpaceView<'_> {
     }
 
     /// The rays of the places in the picture where a joint may be; not of those for which the lens has none.
-    fn rays(&self, joint: usize) -> Vec<Ray> {
-        let maxima = self.evidence.maxima(self.named(joint)).iter();
+    ///
+    /// * `named`: what the view calls the joint.
+    pub(crate) fn rays(&self, named: usize) -> Vec<Ray> {
+        let maxima = self.evidence.maxima(named).iter();
         maxima
             .filter_map(|(at, _)| self.camera.ray(&(*at).into()))
             .collect()
@@ -240,9 +198,17 @@ impl SpaceView<'_> {
 
     /// What the view calls a joint.
     pub(crate) fn named(&self, joint: usize) -> usize {
-        let limb = LIMBS.iter().zip(self.exchanged).filter(|it| it.1);
-        let pair = limb.flat_map(|it| it.0).find(|pair| pair.contains(&joint));
-        pair.map_or(joint, |[right, left]| right + left - joint)
+        name(joint, self.exchanged)
+    }
+
+    /// The evidence for two names that the view has for joints, at a place.
+    pub(crate) fn evidence_of(&self, named: [usize; 2], at: &Point3<f64>) -> [f64; 2] {
+        let pixel = self.camera.project(at);
+        named.map(|named| {
+            f64::from(pixel.map_or(self.evidence.floor(), |pixel| {
+                self.evidence.at(named, [pixel.x, pixel.y])
+            }))
+        })
     }
 
     /// The evidence for what the view calls a joint, at a place.
@@ -269,10 +235,11 @@ pub(crate) fn cost(at: &Point3<f64>, other: &Point3<f64>, settings: &SpaceSettin
 
 /// The best of all choices of one place for each joint: messages from the leaves to the root, then back.
 ///
+/// * `choices`: a joint may have no place.
 /// * `occupied`: places that joints are kept away from.
+/// * Returns `None` if no joint has a place.
 pub(crate) fn best_on_tree(
-    views: &[SpaceView<'_>],
-    places: &Places,
+    Choices { places, scores }: &Choices,
     (lengths, occupied): (&[BoneLength; N - 1], &Occupied),
     settings: &SpaceSettings,
 ) -> Option<SpacePose> {
@@ -290,12 +257,12 @@ pub(crate) fn best_on_tree(
         }
     };
     let mut scores: [Vec<f64>; N] = core::array::from_fn(|joint| {
-        let of_place = |at: &Point3<f64>| {
-            let crowded = occupied[joint].map_or(0.0, |it| cost(at, &it, settings));
-            unary(views, joint, at) - crowded
-        };
+        let crowded =
+            |at: &Point3<f64>| occupied[joint].map_or(0.0, |other| cost(at, &other, settings));
+        let each = places[joint].iter().zip(&scores[joint]);
+        let each = each.map(|(at, score)| score - crowded(at));
         if is_there(joint) {
-            places[joint].iter().map(of_place).collect()
+            each.collect()
         } else {
             vec![0.0]
         }

@@ -1,0 +1,162 @@
+//! Where pairs of views put the joints, with the evidence of every view there: computed once, whatever names the views exchange and
+//! whichever of them are left out.
+
+use nalgebra::Point3;
+
+use geometry::Ray;
+
+use crate::space_tree::{LIMBS, N, Places, SpaceView};
+
+/// Places of every joint, and the evidence of all views for the joint at each of them.
+pub(crate) struct Choices {
+    /// Metres in the world.
+    pub(crate) places: Places,
+    /// As many for every joint as it has places.
+    pub(crate) scores: [Vec<f64>; N],
+}
+
+/// A view that is used, and whether left and right are exchanged in its evidence, of the arms and of the legs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Used {
+    /// Index of the view among those of [`Crossings::new`].
+    pub(crate) view: usize,
+    pub(crate) exchanged: [bool; 2],
+}
+
+/// The points at which rays of two views come nearest to each other.
+#[derive(Default)]
+struct Points {
+    at: Vec<Point3<f64>>,
+    /// Of every point the evidence of every view, for the name of the first view's joint and for that of its other side.
+    evidence: Vec<[f64; 2]>,
+}
+
+/// The points at which the rays of maxima of two views come nearest to each other.
+pub(crate) struct Crossings<'a> {
+    views: &'a [SpaceView<'a>],
+    /// By view and name; a lens is inverted step by step, which takes long: once for each maximum.
+    rays: Vec<[Vec<Ray>; N]>,
+    /// By pair of views, name in the first one, and whether the second one has the other side of that name; made when asked for.
+    points: Vec<Option<Points>>,
+}
+
+/// The other side's joint of the pair; the joint itself of the middle of the body.
+pub(crate) fn other_side(joint: usize) -> usize {
+    let pair = LIMBS.iter().flatten().find(|pair| pair.contains(&joint));
+    pair.map_or(joint, |[right, left]| right + left - joint)
+}
+
+/// What a view calls a joint of the body.
+pub(crate) fn name(joint: usize, exchanged: [bool; 2]) -> usize {
+    let limb = LIMBS
+        .iter()
+        .zip(exchanged)
+        .filter(|(_, exchanged)| *exchanged);
+    let pair = limb
+        .flat_map(|(pairs, _)| pairs)
+        .find(|pair| pair.contains(&joint));
+    pair.map_or(joint, |[right, left]| right + left - joint)
+}
+
+impl<'a> Crossings<'a> {
+    /// Prepares for views whose [`SpaceView::exchanged`] is not looked at.
+    pub(crate) fn new(views: &'a [SpaceView<'a>]) -> Self {
+        let rays = views
+            .iter()
+            .map(|view| core::array::from_fn(|name| view.rays(name)));
+        let n_pairs = views.len() * views.len();
+        Self {
+            views,
+            rays: rays.collect(),
+            points: (0..n_pairs * N * 2).map(|_| None).collect(),
+        }
+    }
+
+    /// The places of every joint, the best first.
+    ///
+    /// * `n`: most places of a joint.
+    /// * A joint that no two of the views show has none.
+    pub(crate) fn choices(&mut self, used: &[Used], n: usize) -> Choices {
+        let mut choices = Choices {
+            places: core::array::from_fn(|_| Vec::new()),
+            scores: core::array::from_fn(|_| Vec::new()),
+        };
+        for joint in 0..N {
+            let mut found: Vec<(f64, Point3<f64>)> = Vec::new();
+            for (nth, first) in used.iter().enumerate() {
+                for second in &used[nth + 1..] {
+                    self.add(joint, [*first, *second], used, &mut found);
+                }
+            }
+            found.sort_by(|a, b| b.0.total_cmp(&a.0));
+            found.truncate(n);
+            choices.scores[joint] = found.iter().map(|(score, _)| *score).collect();
+            choices.places[joint] = found.into_iter().map(|(_, at)| at).collect();
+        }
+        choices
+    }
+
+    /// Adds the places to which two views put a joint, with the evidence of all that are used.
+    fn add(
+        &mut self,
+        joint: usize,
+        [first, second]: [Used; 2],
+        used: &[Used],
+        found: &mut Vec<(f64, Point3<f64>)>,
+    ) {
+        let names = [first, second].map(|view| name(joint, view.exchanged));
+        let n_views = self.views.len();
+        let pair = first.view * n_views + second.view;
+        let index = (pair * N + names[0]) * 2 + usize::from(names[0] != names[1]);
+        if self.points[index].is_none() {
+            self.points[index] = Some(self.cross([first.view, second.view], names));
+        }
+        let Some(points) = &self.points[index] else {
+            return;
+        };
+        for (at, evidence) in points.at.iter().zip(points.evidence.chunks_exact(n_views)) {
+            let score = used.iter().map(|view| {
+                let side = usize::from(name(joint, view.exchanged) != names[0]);
+                evidence[view.view][side]
+            });
+            found.push((score.sum(), *at));
+        }
+    }
+
+    /// Crosses the rays of two views.
+    fn cross(&self, [first, second]: [usize; 2], names: [usize; 2]) -> Points {
+        let mut points = Points::default();
+        let sides = [names[0], other_side(names[0])];
+        for a in &self.rays[first][names[0]] {
+            for b in &self.rays[second][names[1]] {
+                let Some(at) = nearest(a, b) else {
+                    continue;
+                };
+                points.at.push(at);
+                let evidence = self.views.iter().map(|view| view.evidence_of(sides, &at));
+                points.evidence.extend(evidence);
+            }
+        }
+        points
+    }
+}
+
+/// The point nearest to two rays; `None` behind a camera, or for rays that are parallel.
+fn nearest(a: &Ray, b: &Ray) -> Option<Point3<f64>> {
+    let (u, v) = (a.direction.into_inner(), b.direction.into_inner());
+    let between = b.origin - a.origin;
+    let cosine = u.dot(&v);
+    let sine2 = 1.0 - cosine * cosine;
+    if sine2 < 1e-6 {
+        return None;
+    }
+    let along_a = (between.dot(&u) - cosine * between.dot(&v)) / sine2;
+    let along_b = (cosine * between.dot(&u) - between.dot(&v)) / sine2;
+    if along_a <= 0.0 || along_b <= 0.0 {
+        return None;
+    }
+    Some(nalgebra::center(
+        &(a.origin + u * along_a),
+        &(b.origin + v * along_b),
+    ))
+}
