@@ -1,6 +1,6 @@
 //! What the step with a network keeps from frame to frame.
 
-use fmp::Layout;
+use fmp::{Layout, Pose};
 use multiview::FrontEvidence;
 use posenetwork::{JointMaps, LookMemory, Turn};
 
@@ -11,6 +11,8 @@ const TWIN: f64 = 0.05;
 /// Nobody leaves the box of the last frame within this share of the time for which people can be followed without a frame: a person
 /// who runs moves 0.2 m in 0.07 s.
 const SOON: f64 = 1.0 / 6.0;
+/// For so long a person who stands still need not be looked at, share of that time: who begins to walk moves 0.1 m in 0.13 s.
+const HELD: f64 = 1.0 / 3.0;
 /// After so many times that time (2 s) a person may be anywhere.
 pub const LOST: f64 = 5.0;
 
@@ -24,8 +26,13 @@ pub struct NetworkMemory {
     /// The people of this frame; those beyond `n_seen` are memory for more.
     pub(crate) seen: Vec<Seen>,
     pub(crate) n_seen: usize,
+    /// The people of the frame before.
+    pub(crate) before: Vec<Seen>,
     /// Boxes that showed somebody who is known.
     pub(crate) shown: Vec<[f64; 4]>,
+    /// Boxes of the last search, and how many of them have been looked into.
+    pub(crate) found: Vec<[f64; 4]>,
+    pub(crate) n_looked_into: usize,
     /// Frames until boxes are looked for; none before the first frame.
     pub(crate) until: Option<u64>,
     /// The number of the last frame, where it is told ([`Self::begin`]).
@@ -36,6 +43,9 @@ pub struct NetworkMemory {
     due_from: Option<u64>,
     /// Whether the last frame is so short a time ago that nobody has left their box.
     pub(crate) is_soon: bool,
+    /// Frames from the last one to this one, and most frames for which a person who stands still is not looked at; `None` where the
+    /// frames' rate is not known.
+    pub(crate) hold: Option<Hold>,
     /// How many times the longest time for which people are followed without a frame has passed since the last frame, where it is more
     /// than once: people are looked for around their boxes first.
     pub(crate) apart: Option<f64>,
@@ -43,9 +53,26 @@ pub struct NetworkMemory {
     pub(crate) has_searched: bool,
 }
 
+/// For how long a person who stands still need not be looked at.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Hold {
+    /// Frames from the last one to this one.
+    pub(crate) gap: u64,
+    /// Most frames from one look to the next.
+    pub(crate) most: u64,
+}
+
 /// A person in a frame.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
+    /// Where the person is looked for next, of one who was not looked at in this frame.
+    pub(crate) held: Option<Track>,
+    /// The best pose of the tree on the maps, on the person's own level.
+    pub(crate) pose: Option<Pose>,
+    /// As in [`Track`].
+    pub(crate) is_to_widen: bool,
+    /// As in [`Track`].
+    pub(crate) speed: Option<f64>,
     pub(crate) maps: JointMaps,
     pub(crate) outline: [f64; 4],
     /// How the picture was turned for the network.
@@ -90,6 +117,10 @@ impl NetworkMemory {
         let share = apart.zip(most_apart);
         let share = share.map(|(it, most)| it as f64 / most);
         self.is_soon = share.is_some_and(|it| it <= SOON);
+        self.hold = apart.zip(most_apart).map(|(gap, most)| Hold {
+            gap,
+            most: (HELD * most) as u64,
+        });
         self.apart = share.filter(|it| *it > 1.0);
         if share.is_some_and(|it| it > LOST) && !self.has_searched {
             // The first frame is searched anyway, and sets its own phase.
@@ -141,17 +172,40 @@ impl Seen {
 /// Whether the person after the first `n` is one of these: two boxes can be of one person.
 pub(crate) fn is_known(seen: &[Seen], n: usize) -> bool {
     let (before, last) = seen[..=n].split_at(n);
-    before.iter().any(|it| {
-        let [_, top, _, bottom] = it.maps.extent();
-        let both = it.maps.peaks().iter().zip(last[0].maps.peaks());
-        let both = both.filter_map(|(a, b)| Some((a.as_ref()?.at, b.as_ref()?.at)));
-        let mut distances: Vec<f64> = both
-            .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
-            .collect();
-        distances.sort_by(f64::total_cmp);
-        let middle = distances.get(distances.len() / 2);
-        middle.is_some_and(|it| *it < TWIN * (bottom - top))
+    before
+        .iter()
+        .any(|known| distance(&known.maps, &last[0].maps).is_some_and(|apart| apart < TWIN))
+}
+
+/// Steps from the joints of one sight to those of another.
+fn steps(first: &JointMaps, second: &JointMaps) -> impl Iterator<Item = [f64; 2]> {
+    let both = first.peaks().iter().zip(second.peaks());
+    both.filter_map(|(a, b)| {
+        let [a, b] = [a.as_ref()?.at, b.as_ref()?.at];
+        Some([b[0] - a[0], b[1] - a[1]])
     })
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// How far the joints of two sights lie from each other, their median, share of the height of the first one's window; `None` if no joint is
+/// seen in both.
+fn distance(first: &JointMaps, second: &JointMaps) -> Option<f64> {
+    let [_, top, _, bottom] = first.extent();
+    let distances = steps(first, second).map(|[x, y]| x.hypot(y));
+    median(distances).map(|middle| middle / (bottom - top))
+}
+
+/// How far a whole person has moved from one sight to another: the median over the joints along each axis, which the errors of single
+/// joints hardly change; share of the height of the first one's window.
+pub(crate) fn shift(first: &JointMaps, second: &JointMaps) -> Option<f64> {
+    let [_, top, _, bottom] = first.extent();
+    let along = |axis: usize| median(steps(first, second).map(|step| step[axis]));
+    Some(along(0)?.hypot(along(1)?) / (bottom - top))
 }
 
 #[cfg(test)]
@@ -222,6 +276,21 @@ mod tests {
             memory.rests()
         };
         assert!(rests(4) && rests(6) && !rests(7));
+    }
+
+    #[test]
+    fn a_person_who_stands_still_is_looked_at_by_time_and_in_every_frame_without_a_rate() {
+        let hold = |most_apart: Option<f64>, frames: [u64; 2]| {
+            let mut memory = NetworkMemory::default();
+            for frame in frames {
+                memory.begin(frame, most_apart);
+            }
+            memory.hold.map(|hold| (hold.gap, hold.most))
+        };
+        assert_eq!(hold(Some(24.0), [3, 4]), Some((1, 8)), "60 Hz");
+        assert_eq!(hold(Some(12.0), [3, 5]), Some((2, 4)), "30 Hz");
+        assert_eq!(hold(Some(2.0), [3, 4]), Some((1, 0)), "5 Hz");
+        assert_eq!(hold(None, [3, 4]), None);
     }
 
     #[test]

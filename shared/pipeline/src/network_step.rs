@@ -175,7 +175,9 @@ impl NetworkStep {
         let (rests, is_due) = (memory.rests(), memory.is_due());
         memory.has_searched = is_due;
         memory.n_seen = 0;
-        let tracks = core::mem::take(&mut memory.tracks);
+        let mut tracks = core::mem::take(&mut memory.tracks);
+        let mut before = core::mem::take(&mut memory.before);
+        core::mem::swap(&mut memory.seen, &mut before);
         let sightings = Sightings {
             looker: Looker {
                 network,
@@ -187,29 +189,31 @@ impl NetworkStep {
             n_most: 2 * self.settings.n_people,
             least_heat: self.settings.least_heat,
         };
-        let found = if is_due {
-            find(&mut memory.values)?
-        } else {
-            Vec::new()
-        };
+        if is_due {
+            memory.found = find(&mut memory.values)?;
+            memory.n_looked_into = 0;
+        }
         if is_due && matches!(boxes, Boxes::Detector(_)) {
-            sightings.see_all(&found, memory)?;
+            let found = core::mem::take(&mut memory.found);
+            sightings.see_all(&found, usize::MAX, memory)?;
             for track in &tracks {
-                sightings.see_again(track, memory)?;
+                sightings.see_again(track, before.get(track.index), memory)?;
             }
         } else {
-            let found = (is_due, &found[..]);
-            for track in &tracks {
-                self.see_once_more(&sightings, track, found, memory)?;
+            let mut n_more = 1;
+            for (nth, track) in tracks.iter_mut().enumerate() {
+                track.is_to_widen |= is_due;
+                self.see_once_more(&sightings, (nth, track), &mut n_more, &mut before, memory)?;
             }
-            let (_, found) = found;
-            sightings.see_all(found, memory)?;
+            self.look_into_found(&sightings, n_more, memory)?;
             if memory.n_seen == 0 && !is_due && !rests {
                 memory.has_searched = true;
-                let found = find(&mut memory.values)?;
-                sightings.see_all(&found, memory)?;
+                memory.found = find(&mut memory.values)?;
+                memory.n_looked_into = 0;
+                self.look_into_found(&sightings, n_more, memory)?;
             }
         }
+        memory.before = before;
         let until = if memory.has_searched {
             Some(next)
         } else {
@@ -227,24 +231,60 @@ impl NetworkStep {
     }
 
     /// Looks at a person of the frame before: around the box of then if that is long ago, in a wider box where boxes were looked for or the
-    /// last pose was doubtful, else in the same.
+    /// last pose was doubtful, else in the same. All but the first are looked at in a wider box when their turn comes, and need no look
+    /// while they stand still.
     ///
-    /// * `found`: whether boxes were looked for in this frame, and those that were found.
+    /// * `n_more`: how many people may be looked at in a wider box, or boxes looked into, in this frame.
+    /// * `before`: the people of the frame before.
     fn see_once_more(
         &self,
         sightings: &Sightings<'_>,
-        track: &Track,
-        (is_due, found): (bool, &[[f64; 4]]),
+        (nth, track): (usize, &Track),
+        n_more: &mut usize,
+        before: &mut [Seen],
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
-        if let Some(apart) = memory.apart.filter(|_| !is_due) {
+        if let Some(apart) = memory.apart.filter(|_| !memory.has_searched) {
             let around = (moved(track.outline, apart), self.most_lost());
-            sightings.see_later(track, around, memory)
-        } else if is_due || track.is_doubtful {
-            sightings.see(track, wider(track.outline, found), memory)
-        } else {
-            sightings.see_again(track, memory)
+            return sightings.see_later(track, around, memory);
         }
+        if track.is_to_widen || track.is_doubtful {
+            if nth == 0 || *n_more > 0 {
+                *n_more -= usize::from(nth > 0);
+                let wider = wider(track.outline, &memory.found);
+                return sightings.see(track, wider, memory);
+            }
+        } else if nth > 0
+            && let Some(hold) = memory.hold
+            && let Some(before) = before.get_mut(track.index)
+        {
+            let n_frames = track.n_held + hold.gap;
+            // One frame further, the person would have moved too far by the next.
+            if n_frames < hold.most && track.is_still(n_frames + 1) {
+                sightings.hold(track, n_frames, before, memory);
+                return Ok(());
+            }
+        }
+        sightings.see_again(track, before.get(track.index), memory)
+    }
+
+    /// Looks into boxes of the last search: into all where nobody is known yet, else into few in each frame.
+    fn look_into_found(
+        &self,
+        sightings: &Sightings<'_>,
+        n_more: usize,
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        let n_most = if memory.n_seen == 0 {
+            usize::MAX
+        } else {
+            n_more
+        };
+        let found = core::mem::take(&mut memory.found);
+        let left = &found[memory.n_looked_into.min(found.len())..];
+        memory.n_looked_into += sightings.see_all(left, n_most, memory)?;
+        memory.found = found;
+        Ok(())
     }
 
     /// Takes the people of a frame whose keypoints another program found; returns what of the frame the responses will cover, or
@@ -332,6 +372,14 @@ impl NetworkStep {
                 seen.maps.raise(&self.layout, &scope, responses);
             }
             let (looked_at, usual_score) = ((seen.outline, seen.turn), seen.usual_score);
+            if let (Some(track), Some(pose)) = (seen.held, &seen.pose) {
+                memory.tracks.push(Track {
+                    index: nth,
+                    ..track
+                });
+                found.push((self.at_level(pose.clone(), &scope), nth));
+                continue;
+            }
             let pose = if n_seen == 1 && seen.level == level {
                 self.best(responses, scope, seen.turn)
             } else {
@@ -348,8 +396,14 @@ impl NetworkStep {
                 let tree = (&**self.springs.model(), &*self.layout);
                 let around = outline_of_pose(&pose, tree);
                 let before = (looked_at, usual_score);
-                let next = around.map(|it| Track::next(before, (it, pose.score), most_lost));
+                let next = around.map(|it| Track {
+                    is_to_widen: seen.is_to_widen,
+                    index: nth,
+                    speed: seen.speed,
+                    ..Track::next(before, (it, pose.score), most_lost)
+                });
                 memory.tracks.extend(next);
+                seen.pose = Some(pose.clone());
                 found.push((self.at_level(pose, &scope), nth));
             }
         }

@@ -3,11 +3,13 @@
 use kernels::Rgb8View;
 use posenetwork::{JointMaps, Look, LookError, Looker, outline_of, overlap};
 
-use crate::network_memory::{NetworkMemory, Seen, is_known};
+use crate::network_memory::{NetworkMemory, Seen, is_known, shift};
 use crate::tracks::{Track, wider};
 
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
+/// Somebody new who is seen so much worse than the best one of the frame, as a share of the heat, is a chair or a poster.
+const FAINT: f64 = 0.6;
 /// Least heat of a joint that says where its person is, 0 to 1.
 const SURE: f64 = 0.2;
 
@@ -33,22 +35,51 @@ fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
 impl Sightings<'_> {
     /// Looks for people in boxes that were found. One that is much the same as a box that showed somebody known is passed over, and
     /// one whose first sight is of somebody known gets no closer look: the filters find several boxes around one person.
+    ///
+    /// * `n_most`: most boxes that are looked into.
+    /// * Returns how many of the boxes are done with.
     pub(crate) fn see_all(
         &self,
         outlines: &[[f64; 4]],
+        n_most: usize,
         memory: &mut NetworkMemory,
-    ) -> Result<(), LookError> {
+    ) -> Result<usize, LookError> {
         memory.shown.clear();
-        for outline in outlines {
+        let mut n_left = n_most;
+        for (nth, outline) in outlines.iter().enumerate() {
             let is_same = |it: &[f64; 4]| overlap(*it, *outline) > SAME;
             if !self.is_unknown(*outline, memory) || memory.shown.iter().any(is_same) {
                 continue;
             }
+            if n_left == 0 {
+                return Ok(nth);
+            }
+            n_left -= 1;
             if self.see_new(*outline, memory)? {
                 memory.shown.push(*outline);
             }
         }
-        Ok(())
+        Ok(outlines.len())
+    }
+
+    /// Takes a person of the frame before who has hardly moved as the last look saw them, where nobody is known yet.
+    ///
+    /// * `n_held`: frames since that look.
+    /// * `before`: the sight of the person in the frame before; other memory afterwards.
+    pub(crate) fn hold(
+        &self,
+        track: &Track,
+        n_held: u64,
+        before: &mut Seen,
+        memory: &mut NetworkMemory,
+    ) {
+        if !self.is_unknown(track.outline, memory) {
+            return;
+        }
+        let (_, seen) = memory.next();
+        core::mem::swap(seen, before);
+        seen.held = Some(Track { n_held, ..*track });
+        memory.n_seen += usize::from(!is_known(&memory.seen, memory.n_seen));
     }
 
     /// Looks into a box, and closer if somebody new is seen; returns whether it shows somebody known, or now known.
@@ -117,15 +148,19 @@ impl Sightings<'_> {
 
     /// Looks at a person of the frame before, where nobody is known yet, and closer if the person has moved far since, which takes
     /// some time, or with the picture turned if the person lies or gets up; keeps what is seen well.
+    ///
+    /// * `before`: the sight of the person in the frame before.
     pub(crate) fn see_again(
         &self,
         track: &Track,
+        before: Option<&Seen>,
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
         if !self.is_unknown(track.outline, memory) {
             return Ok(());
         }
         let is_soon = memory.is_soon;
+        let n_frames = memory.hold.map(|hold| track.n_held + hold.gap);
         let (look, seen) = memory.next();
         let network = self.looker.network;
         let boxed = (track.outline, track.turn);
@@ -137,6 +172,10 @@ impl Sightings<'_> {
         seen.turn = track.turn;
         seen.front = sight.front();
         seen.usual_score = Some(track.usual_score);
+        seen.is_to_widen = track.is_to_widen;
+        let moved = before.and_then(|before| shift(&before.maps, &seen.maps));
+        let per_frame = moved.zip(n_frames);
+        seen.speed = per_frame.map(|(moved, n_frames)| moved / n_frames.max(1) as f64);
         let has_moved = !is_soon && has_moved(&seen.maps, track.outline);
         if has_moved || seen.maps.turn(track.turn) != track.turn {
             let first = (track.outline, track.turn, seen.front);
@@ -168,13 +207,20 @@ impl Sightings<'_> {
         seen.turn = look.turn;
         seen.front = look.front;
         seen.usual_score = usual_score;
+        (seen.is_to_widen, seen.speed) = (false, None);
         self.keep(memory)
     }
 
     /// Keeps the next person if it is seen well and not known yet; returns whether somebody known, or now known, is seen.
     fn keep(&self, memory: &mut NetworkMemory) -> bool {
         let (_, seen) = memory.next();
+        (seen.held, seen.pose) = (None, None);
         if !seen.judge(self.looker.layout, self.least_heat) {
+            return false;
+        }
+        let (known, last) = memory.seen.split_at(memory.n_seen);
+        let best = known.iter().map(|known| known.heat).fold(0.0, f64::max);
+        if last[0].usual_score.is_none() && last[0].heat < FAINT * best {
             return false;
         }
         let is_new = !is_known(&memory.seen, memory.n_seen);

@@ -14,6 +14,9 @@ const WIDER: f64 = 0.25;
 /// without a frame (0.4 s, in which who runs gets half of the own height on); and by how much at most.
 const MOVED: f64 = 0.5;
 const MOST_MOVED: f64 = 1.0;
+/// A person who has moved by less is where the last look saw them, share of the height of the network's window: less than the
+/// network is off by.
+const STILL: f64 = 0.01;
 /// Most of a box.
 const MOST: f64 = 0.5;
 
@@ -28,6 +31,15 @@ pub(crate) struct Track {
     pub(crate) usual_score: f32,
     /// Whether this frame's is so much lower that the box may not fit.
     pub(crate) is_doubtful: bool,
+    /// Whether the person is still to be looked at in a wider box, since boxes were looked for.
+    pub(crate) is_to_widen: bool,
+    /// Index of the person among those of the frame.
+    pub(crate) index: usize,
+    /// Frames since the person was last looked at.
+    pub(crate) n_held: u64,
+    /// How fast the person moved in the picture between the last two looks, share of the window's height for each frame; `None`
+    /// after one look.
+    pub(crate) speed: Option<f64>,
 }
 
 impl Track {
@@ -61,7 +73,22 @@ impl Track {
             turn,
             usual_score: usual_score + NEW_SCORE * (score - usual_score),
             is_doubtful,
+            is_to_widen: false,
+            index: 0,
+            n_held: 0,
+            speed: None,
         }
+    }
+
+    /// Whether the person has hardly moved since the last look.
+    ///
+    /// * `n_frames`: from the last look to this frame.
+    pub(crate) fn is_still(&self, n_frames: u64) -> bool {
+        !self.is_doubtful
+            && !self.is_to_widen
+            && self
+                .speed
+                .is_some_and(|speed| speed * n_frames as f64 <= STILL)
     }
 }
 
@@ -121,6 +148,27 @@ mod tests {
         assert_eq!(next.outline, BOX);
         assert!(next.is_doubtful);
         assert!(!Track::next(((BOX, Turn::Up), Some(-18.0)), (legs, -23.0), 6.0).is_doubtful);
+    }
+
+    #[test]
+    fn who_stands_still_is_where_the_last_look_was_for_as_long_as_the_speed_allows() {
+        let track = Track::next(((BOX, Turn::Up), Some(-18.0)), (BOX, -18.0), 6.0);
+        assert!(!track.is_still(1), "one look tells no speed");
+        let with = |speed: f64| Track {
+            speed: Some(speed),
+            ..track
+        };
+        let longest = |speed: f64| (1..=8).filter(|n| with(speed).is_still(*n)).count();
+        assert_eq!([0.0, 0.002, 0.009, 0.02].map(longest), [8, 5, 1, 0]);
+        let doubtful = Track {
+            is_doubtful: true,
+            ..with(0.0)
+        };
+        let to_widen = Track {
+            is_to_widen: true,
+            ..with(0.0)
+        };
+        assert!(!doubtful.is_still(1) && !to_widen.is_still(1));
     }
 
     #[test]
