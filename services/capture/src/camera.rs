@@ -4,12 +4,13 @@ use core::time::Duration;
 use std::rc::Rc;
 
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
-use footage::{Fill, Pacer, Size, Warp};
+use footage::{Affine, Fill, Pacer, Size, Warp};
 use messages::{CameraCounts, Cause, FrameHeader, Stamp, Status, Timing, topic};
 use metrics::Passage;
 use runtime::{Place, Service, SlicePublisher, Woken};
 use stage::Stage;
 
+use crate::info::FeedInfo;
 use crate::job::Job;
 use crate::supply::{Step, Supply};
 use deployment::capture::{Mode, Pace};
@@ -21,6 +22,12 @@ pub(crate) struct Shot {
     pub(crate) asked_at: u64,
     /// How long after the instant of its frame it was taken.
     pub(crate) skew: i64,
+}
+
+/// The map from the output to pictures that were shrunk, of that to pictures as they were.
+fn shrunk(source_from_output: Affine, by: usize) -> Affine {
+    let by = by as f64;
+    source_from_output.map(|[x, y, shift]| [x / by, y / by, (shift + 0.5) / by - 0.5])
 }
 
 /// One camera, and the topic of its frames.
@@ -52,17 +59,24 @@ impl<'a> Camera<'a> {
             }
             _ => Pacer::as_fast_as_possible(),
         };
-        Self::new(service, job, supply.info().size, pacer)
+        let FeedInfo { size, shrink, .. } = supply.info();
+        Self::new(service, job, (size, shrink), pacer)
     }
 
     /// A live camera, which has a pace of its own.
     ///
     /// * `size`: of its pictures.
     pub(crate) fn live(service: &'a Service, job: &'a Job, size: Size) -> Result<Self, Failure> {
-        Self::new(service, job, size, Pacer::as_fast_as_possible())
+        Self::new(service, job, (size, 1), Pacer::as_fast_as_possible())
     }
 
-    fn new(service: &'a Service, job: &'a Job, size: Size, pacer: Pacer) -> Result<Self, Failure> {
+    /// * `size`: of the pictures, and by how much they were shrunk.
+    fn new(
+        service: &'a Service,
+        job: &'a Job,
+        (size, shrink): (Size, usize),
+        pacer: Pacer,
+    ) -> Result<Self, Failure> {
         let mut stage = Stage::new(service, job.patience);
         let publisher = stage.bulk_output(&topic::frame(job.view), job.n_consumers)?;
         let [width, height] = job.framing.out_size().map(|side| side as usize);
@@ -72,7 +86,7 @@ impl<'a> Camera<'a> {
         } else {
             Fill::Black
         };
-        let map = job.framing.source_from_output();
+        let map = shrunk(job.framing.source_from_output(), shrink);
         let output = Size::new(width, height);
         let warp = Warp::new(size, output, &map, fill).or_fail(ExitKind::Input)?;
         Ok(Self {

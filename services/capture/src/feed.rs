@@ -147,6 +147,7 @@ impl Feed {
         match self {
             Self::Footage(source) => FeedInfo {
                 size: source.info().size,
+                shrink: source.info().shrink,
                 n_frames: source.info().n_frames,
                 frame_rate_hz: source.info().frame_rate_hz,
                 tag: source.info().tag,

@@ -5,8 +5,10 @@ use footage::{Depth, Size, Turn};
 /// The properties of a camera's pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeedInfo {
-    /// Size of every picture.
+    /// Size of every picture, as it is handed out.
     pub size: Size,
+    /// By how much it was shrunk ([`footage::SourceSpec::most_shrink`]).
+    pub shrink: usize,
     /// Number of frames.
     pub n_frames: u64,
     /// Frames per second of the scene, where it is known.
@@ -24,6 +26,7 @@ impl FeedInfo {
     pub(crate) fn plain(size: Size, n_frames: u64, frame_rate_hz: f64) -> Self {
         Self {
             size,
+            shrink: 1,
             n_frames,
             frame_rate_hz: Some(frame_rate_hz),
             tag: Turn::default(),

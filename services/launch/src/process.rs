@@ -9,6 +9,8 @@ use std::sync::Arc;
 
 use deployment::Stage;
 use failure::{ExitKind, Failure, OrFail as _};
+use footage::SourceSpec;
+use geometry::Framing;
 use messages::topic;
 use pipeline::{ExtrasStep, FuseStep, SkeletonStep, SpaceStep};
 use rayon::ThreadPoolBuilder;
@@ -162,22 +164,32 @@ fn pool(n_threads: usize) -> ThreadPoolBuilder {
 fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let deployment = &resolved.deployment;
     let rig = inputs::rig_of(deployment)?;
+    let framing = framing(resolved, &rig, view)?;
     let job = capture::Job {
         view,
-        source: crate::cameras::source(&deployment.cameras[view], &deployment.capture),
+        source: SourceSpec {
+            most_shrink: most_shrink(&framing),
+            ..crate::cameras::source(&deployment.cameras[view], &deployment.capture)
+        },
         timeline: resolved.footage[view].timeline,
         live: live::job(resolved, view),
         lead_nanos: crate::cameras::lead_nanos(deployment),
         faults: deployment.cameras[view].fault.clone(),
         frozen_after: deployment.capture.frozen_after,
         skew_nanos: live::skew_nanos(resolved, view),
-        framing: framing(resolved, &rig, view)?,
+        framing,
         mode: deployment.capture.mode,
         pace: deployment.capture.mode.pace(),
         n_consumers: resolved.topology().receivers_of(&topic::frame(view)),
         patience: resolved.patience(),
     };
     capture::run(service, &job)
+}
+
+/// By how much a decoder may shrink pictures of which smaller frames are made.
+fn most_shrink(framing: &Framing) -> usize {
+    let [[a, _, _], [c, _, _]] = framing.source_from_output();
+    (a.hypot(c) + 1e-9) as usize
 }
 
 fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {

@@ -8,6 +8,7 @@ use failure::{ExitKind, Failure};
 use footage::{LiveAddress, SourceSpec};
 use geometry::Rig;
 use geometry::files::{Finding, Severity, check as check_rig};
+use rayon::prelude::*;
 use scene::Address;
 
 use crate::keypoints;
@@ -259,8 +260,8 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
     let deployment = &resolved.deployment;
     let first = deployment
         .cameras
-        .iter()
-        .map(|it| FirstImages::of(it, &deployment.capture));
+        .par_iter()
+        .map(|camera| FirstImages::of(camera, &deployment.capture));
     let first: Vec<Option<FirstImages>> = first.collect();
     let cameras = deployment.cameras.iter().zip(&first);
     let mut warnings: Vec<String> = cameras
@@ -327,6 +328,7 @@ impl FirstImages {
         let spec = SourceSpec {
             step: 5,
             count: Some(2),
+            most_shrink: 4,
             ..crate::cameras::source(camera, capture)
         };
         // Unreadable footage is reported where it is read.

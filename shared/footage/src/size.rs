@@ -19,6 +19,11 @@ impl Size {
     pub const fn rgb_bytes(self) -> usize {
         self.width * self.height * 3
     }
+
+    /// The size of an image that is smaller by a factor of at least 1.
+    pub const fn shrunk(self, by: usize) -> Self {
+        Self::new(self.width / by, self.height / by)
+    }
 }
 
 impl std::fmt::Display for Size {

@@ -44,6 +44,8 @@ pub enum SourceKind {
 pub struct SourceInfo {
     /// Size of every frame, as it is handed out.
     pub size: Size,
+    /// By how much it was shrunk ([`SourceSpec::most_shrink`]).
+    pub shrink: usize,
     /// Number of frames to be read. A damaged video may have fewer; that is an error while reading.
     pub n_frames: u64,
     /// Frames read per second of the scene (the footage's rate over `step`), where it is known.
@@ -130,7 +132,9 @@ impl Source {
         };
         let clock = Clock::of(&reader, spec);
         let info = reader.info(clock.rate_hz.map(|rate_hz| rate_hz / spec.step as f64));
-        check_min_side(&path, info.size, spec.min_side)?;
+        let Size { width, height } = info.size;
+        let as_stored = Size::new(width * info.shrink, height * info.shrink);
+        check_min_side(&path, as_stored, spec.min_side)?;
         Ok(Self {
             info,
             clock,
@@ -249,6 +253,10 @@ impl Reader {
         };
         SourceInfo {
             size,
+            shrink: match self {
+                Self::Video(video) => video.shrink,
+                Self::Still(_) | Self::Images(_) => 1,
+            },
             n_frames,
             frame_rate_hz,
             kind,

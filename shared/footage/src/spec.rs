@@ -35,7 +35,10 @@ pub struct SourceSpec {
     pub numbers: Option<PictureNumbers>,
     /// How pictures are turned.
     pub rotation: Rotation,
-    /// Smallest width and height accepted, pixels.
+    /// By how much the pictures of a video may be shrunk as they are decoded: they are handed out smaller by the largest whole number up
+    /// to this that divides both of their sides, each pixel the mean of those that it covers. 1: as they are.
+    pub most_shrink: usize,
+    /// Smallest width and height accepted of pictures that are not shrunk, pixels.
     pub min_side: usize,
     /// The `ffmpeg` executable, a name on the search path or a path. Needed for videos only.
     pub ffmpeg: PathBuf,
@@ -54,6 +57,7 @@ impl SourceSpec {
             frame_rate_hz: None,
             numbers: None,
             rotation: Rotation::Stored,
+            most_shrink: 1,
             min_side: 1,
             ffmpeg: "ffmpeg".into(),
             ffprobe: "ffprobe".into(),

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use footage::{PictureNumbers, Rotation, Size, Source, SourceInfo, SourceKind, SourceSpec, Turn};
 use image::codecs::jpeg::JpegEncoder;
@@ -110,6 +111,53 @@ fn every_photograph_of_a_folder_is_turned_as_its_own_tag_asks() {
 }
 
 #[test]
+fn films_are_shrunk_by_what_divides_their_sides_to_the_means_of_their_pixels() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("film.nut");
+    let made = Command::new("ffmpeg")
+        .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i"])
+        .args(["testsrc=size=72x60:duration=0.2", "-c:v", "ffv1"])
+        .args(["-pix_fmt", "gbrp"])
+        .arg(&path)
+        .status();
+    assert!(made.unwrap().success());
+    let (whole, full) = frames(&spec(&path));
+    assert_eq!((whole.size, whole.shrink), (Size::new(72, 60), 1));
+    // 5 divides 60 but not 72.
+    let (info, small) = frames(&SourceSpec {
+        most_shrink: 5,
+        min_side: 60,
+        ..spec(&path)
+    });
+    assert_eq!((info.size, info.shrink), (Size::new(18, 15), 4));
+    assert_eq!((small.len(), small.len()), (full.len(), 5));
+    for ((_, full), (_, small)) in full.iter().zip(&small) {
+        let mean = |x: usize, y: usize, channel: usize| {
+            let cells = (0..16).map(|nth| (4 * x + nth % 4, 4 * y + nth / 4));
+            let values = cells.map(|(x, y)| u32::from(full[(72 * y + x) * 3 + channel]));
+            f64::from(values.sum::<u32>()) / 16.0
+        };
+        for (nth, value) in small.iter().enumerate() {
+            let due = mean(nth / 3 % 18, nth / 54, nth % 3);
+            assert!(
+                (f64::from(*value) - due).abs() <= 2.0,
+                "{nth}: {value}, {due}"
+            );
+        }
+    }
+    // A film that is turned is shrunk as it is stored.
+    let (info, _) = frames(&SourceSpec {
+        most_shrink: 3,
+        rotation: Rotation::By(Turn::clockwise(90).unwrap()),
+        ..spec(&path)
+    });
+    assert_eq!((info.size, info.shrink), (Size::new(20, 24), 3));
+}
+
+#[test]
 fn frames_that_an_edit_list_cuts_off_are_none() {
     if !has_ffmpeg() {
         return;
@@ -184,7 +232,7 @@ fn the_film_is_read_and_not_the_cover_in_front_of_it() {
         ("single.mkv", &[]),
     ] {
         let with_cover = folder.path().join(name);
-        let made = std::process::Command::new("ffmpeg")
+        let made = Command::new("ffmpeg")
             .args(["-nostdin", "-v", "error", "-i"])
             .arg(&cover)
             .arg("-i")
@@ -220,7 +268,7 @@ fn cut(folder: &Path, name: &str, is_cut: impl Fn(usize) -> bool) -> PathBuf {
     let raw = folder.join("raw.mjpeg");
     fs::write(&raw, stream).unwrap();
     let film = folder.join(name);
-    let made = std::process::Command::new("ffmpeg")
+    let made = Command::new("ffmpeg")
         .args([
             "-nostdin",
             "-v",

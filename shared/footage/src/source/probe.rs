@@ -1,8 +1,12 @@
 //! The properties of a video, from `ffprobe`.
 
+use std::collections::BTreeMap;
+use std::fs::Metadata;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
 
 use serde_json::Value;
 
@@ -107,7 +111,8 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
 
 /// The size of the pictures of a video as they are stored, and what its display matrix asks.
 pub(super) fn stored(path: &Path, spec: &SourceSpec) -> Result<(Size, Turn), FootageError> {
-    let output = run_ffprobe(path, spec, "v", &["-show_entries", ENTRIES])?;
+    let wanted = ["-show_program_version", "-show_entries", ENTRIES];
+    let output = run_ffprobe(path, spec, "v", &wanted)?;
     let stream = film(&output);
     let side = |key: &str| stream[key].as_u64().unwrap_or(0) as usize;
     Ok((Size::new(side("width"), side("height")), tag(stream)))
@@ -276,7 +281,62 @@ pub(super) fn key_frames(
 }
 
 /// Asks `ffprobe` about a stream of a file.
+/// Asks `ffprobe` about a stream of a file; once, as long as the file stays as it is: a start of it takes longer than its answer.
 pub(super) fn run_ffprobe(
+    path: &Path,
+    spec: &SourceSpec,
+    stream: &str,
+    wanted: &[&str],
+) -> Result<Value, FootageError> {
+    let question = Question::about(path, spec, stream, wanted);
+    let answers = || ANSWERS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = question
+        .as_ref()
+        .and_then(|question| answers().get(question).cloned())
+    {
+        return Ok(known);
+    }
+    let answer = ask_ffprobe(path, spec, stream, wanted)?;
+    if let Some(question) = question {
+        let mut answers = answers();
+        if answers.len() == MOST_ANSWERS {
+            answers.clear();
+        }
+        answers.insert(question, answer.clone());
+    }
+    Ok(answer)
+}
+
+/// Most answers that are kept.
+const MOST_ANSWERS: usize = 64;
+static ANSWERS: Mutex<BTreeMap<Question, Value>> = Mutex::new(BTreeMap::new());
+
+/// A question to `ffprobe` about a file as it is.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Question {
+    program: PathBuf,
+    path: PathBuf,
+    n_bytes: u64,
+    changed_at: SystemTime,
+    words: Vec<String>,
+}
+
+impl Question {
+    /// None about what is no regular file.
+    fn about(path: &Path, spec: &SourceSpec, stream: &str, wanted: &[&str]) -> Option<Self> {
+        let metadata = path.metadata().ok().filter(Metadata::is_file)?;
+        let words = [stream].into_iter().chain(wanted.iter().copied());
+        Some(Self {
+            program: spec.ffprobe.clone(),
+            path: path.to_path_buf(),
+            n_bytes: metadata.len(),
+            changed_at: metadata.modified().ok()?,
+            words: words.map(str::to_owned).collect(),
+        })
+    }
+}
+
+fn ask_ffprobe(
     path: &Path,
     spec: &SourceSpec,
     stream: &str,

@@ -14,8 +14,10 @@ use crate::{FootageError, Size, SourceSpec};
 pub(super) struct Video {
     path: PathBuf,
     pub(super) probe: Probe,
-    /// Size of the turned pictures.
+    /// Size of the pictures, turned and shrunk.
     pub(super) size: Size,
+    /// By how much they are shrunk.
+    pub(super) shrink: usize,
     spec: SourceSpec,
     /// Expected frames, from the index of the container.
     pub(super) n_frames: u64,
@@ -61,7 +63,8 @@ impl Video {
         let stderr = child.stderr.take().ok_or_else(no_pipe)?;
         Ok(Self {
             path: path.to_path_buf(),
-            size: spec.rotation.turn(probe.tag).size(probe.stored),
+            size: turned_size(&probe, spec).shrunk(shrink(&probe, spec)),
+            shrink: shrink(&probe, spec),
             probe,
             spec: spec.clone(),
             n_frames,
@@ -236,6 +239,26 @@ impl Drop for Video {
     }
 }
 
+/// Size of the turned pictures.
+fn turned_size(probe: &Probe, spec: &SourceSpec) -> Size {
+    spec.rotation.turn(probe.tag).size(probe.stored)
+}
+
+/// By how much the pictures are shrunk.
+fn shrink(probe: &Probe, spec: &SourceSpec) -> usize {
+    let Size { width, height } = probe.stored;
+    let divides = |by: &usize| width.is_multiple_of(*by) && height.is_multiple_of(*by);
+    (1..=spec.most_shrink).rev().find(divides).unwrap_or(1)
+}
+
+/// The filter that shrinks the pictures, if there is one.
+fn shrinking(probe: &Probe, spec: &SourceSpec) -> Option<String> {
+    let by = shrink(probe, spec);
+    let Size { width, height } = probe.stored.shrunk(by);
+    let filter = format!("scale={width}:{height}:flags=area+accurate_rnd+full_chroma_int");
+    (by > 1).then_some(filter)
+}
+
 /// Whether the decoder is asked for the times of frames.
 fn has_times(probe: &Probe) -> bool {
     probe.regular_hz().is_some() || probe.listed_s().is_some()
@@ -246,7 +269,8 @@ fn has_times(probe: &Probe) -> bool {
 fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
     let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
     let turn = spec.rotation.turn(probe.tag).filters();
-    let mut arguments = output(probe, spec, turn, &pixels);
+    let filters = shrinking(probe, spec).into_iter().chain(turn);
+    let mut arguments = output(probe, spec, filters, &pixels);
     if has_times(probe) {
         let times = [
             "-enc_time_base",
@@ -266,12 +290,17 @@ fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
             ..spec.clone()
         };
         let small = "crop=2:2:0:0:exact=1".to_owned();
-        arguments.extend(output(probe, &all, Some(small), &times));
+        arguments.extend(output(probe, &all, [small], &times));
     }
     arguments
 }
 
-fn output(probe: &Probe, spec: &SourceSpec, more: Option<String>, format: &[&str]) -> Vec<String> {
+fn output(
+    probe: &Probe,
+    spec: &SourceSpec,
+    more: impl IntoIterator<Item = String>,
+    format: &[&str],
+) -> Vec<String> {
     let mut filters = frame_choice(probe, spec);
     filters.extend(more);
     let mut arguments = vec!["-map".to_owned(), format!("0:{}", probe.stream)];
