@@ -21,6 +21,7 @@ impl Size {
     }
 
     /// The size of an image that is smaller by a factor of at least 1.
+    #[must_use]
     pub const fn shrunk(self, by: usize) -> Self {
         Self::new(self.width / by, self.height / by)
     }

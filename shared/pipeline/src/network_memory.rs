@@ -65,8 +65,8 @@ pub(crate) struct Hold {
 /// A person in a frame.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
-    /// Where the person is looked for next, of one who was not looked at in this frame.
-    pub(crate) held: Option<Track>,
+    /// Where the person is looked for next; none of one who was looked at before the tree is solved.
+    pub(crate) next: Option<Track>,
     /// The best pose of the tree on the maps, on the person's own level.
     pub(crate) pose: Option<Pose>,
     /// As in [`Track`].
@@ -104,6 +104,13 @@ impl NetworkMemory {
             self.seen.push(Seen::default());
         }
         (&mut self.look, &mut self.seen[self.n_seen])
+    }
+
+    /// Keeps the people of this frame who are seen largest and best.
+    pub(crate) fn keep_largest(&mut self, n_most: usize) {
+        let size = |seen: &Seen| seen.heat * (seen.outline[3] - seen.outline[1]);
+        self.seen[..self.n_seen].sort_by(|a, b| size(b).total_cmp(&size(a)));
+        self.n_seen = self.n_seen.min(n_most);
     }
 
     /// Begins with a frame. If it is long after the last one, frames between were dropped or lost: people are then looked for around
@@ -159,10 +166,11 @@ impl NetworkMemory {
 }
 
 impl Seen {
-    /// Judges what is seen of a person; returns whether the person is seen well, and in the frame.
+    /// Judges what is seen of a person who was looked at; returns whether the person is seen well, and in the frame.
     ///
     /// * `layout`: of the frame; `least_heat`: mean heat of the joints of somebody who is seen well, 0 to 1.
     pub(crate) fn judge(&mut self, layout: &Layout, least_heat: f64) -> bool {
+        (self.next, self.pose) = (None, None);
         self.heat = self.maps.heat();
         self.level = self.maps.level(layout);
         self.heat >= least_heat && self.maps.region(layout).is_some()

@@ -21,7 +21,7 @@ use skeleton::PARSE14;
 use crate::network_memory::{NetworkMemory, Seen};
 use crate::sightings::Sightings;
 use crate::space::trunk_upward;
-use crate::tracks::{MUCH_WORSE, Track, moved, wider};
+use crate::tracks::{MUCH_WORSE, Track};
 use crate::view_result::ExtraKeypoint;
 use crate::view_step::{ViewEstimate, ViewStep};
 
@@ -188,6 +188,7 @@ impl NetworkStep {
             image,
             n_most: 2 * self.settings.n_people,
             least_heat: self.settings.least_heat,
+            most_lost: self.most_lost(),
         };
         if is_due {
             memory.found = find(&mut memory.values)?;
@@ -200,17 +201,18 @@ impl NetworkStep {
                 sightings.see_again(track, before.get(track.index), memory)?;
             }
         } else {
-            let mut n_more = 1;
+            // Frames that are farther apart show people elsewhere: nothing can wait for the next.
+            let mut n_more = if memory.is_soon { 1 } else { usize::MAX };
             for (nth, track) in tracks.iter_mut().enumerate() {
                 track.is_to_widen |= is_due;
-                self.see_once_more(&sightings, (nth, track), &mut n_more, &mut before, memory)?;
+                sightings.see_once_more((nth, track), &mut n_more, &mut before, memory)?;
             }
-            self.look_into_found(&sightings, n_more, memory)?;
+            sightings.see_found(n_more, memory)?;
             if memory.n_seen == 0 && !is_due && !rests {
                 memory.has_searched = true;
                 memory.found = find(&mut memory.values)?;
                 memory.n_looked_into = 0;
-                self.look_into_found(&sightings, n_more, memory)?;
+                sightings.see_found(n_more, memory)?;
             }
         }
         memory.before = before;
@@ -220,71 +222,11 @@ impl NetworkStep {
             memory.until
         };
         memory.until = until.map(|it| it.saturating_sub(1));
-        let size = |it: &Seen| it.heat * (it.outline[3] - it.outline[1]);
-        let n_seen = memory.n_seen;
-        memory.seen[..n_seen].sort_by(|a, b| size(b).total_cmp(&size(a)));
-        memory.n_seen = n_seen.min(self.settings.n_people);
+        memory.keep_largest(self.settings.n_people);
         // The memory of the list is kept.
         memory.tracks = tracks;
         memory.tracks.clear();
         Ok(self.scope(memory))
-    }
-
-    /// Looks at a person of the frame before: around the box of then if that is long ago, in a wider box where boxes were looked for or the
-    /// last pose was doubtful, else in the same. All but the first are looked at in a wider box when their turn comes, and need no look
-    /// while they stand still.
-    ///
-    /// * `n_more`: how many people may be looked at in a wider box, or boxes looked into, in this frame.
-    /// * `before`: the people of the frame before.
-    fn see_once_more(
-        &self,
-        sightings: &Sightings<'_>,
-        (nth, track): (usize, &Track),
-        n_more: &mut usize,
-        before: &mut [Seen],
-        memory: &mut NetworkMemory,
-    ) -> Result<(), LookError> {
-        if let Some(apart) = memory.apart.filter(|_| !memory.has_searched) {
-            let around = (moved(track.outline, apart), self.most_lost());
-            return sightings.see_later(track, around, memory);
-        }
-        if track.is_to_widen || track.is_doubtful {
-            if nth == 0 || *n_more > 0 {
-                *n_more -= usize::from(nth > 0);
-                let wider = wider(track.outline, &memory.found);
-                return sightings.see(track, wider, memory);
-            }
-        } else if nth > 0
-            && let Some(hold) = memory.hold
-            && let Some(before) = before.get_mut(track.index)
-        {
-            let n_frames = track.n_held + hold.gap;
-            // One frame further, the person would have moved too far by the next.
-            if n_frames < hold.most && track.is_still(n_frames + 1) {
-                sightings.hold(track, n_frames, before, memory);
-                return Ok(());
-            }
-        }
-        sightings.see_again(track, before.get(track.index), memory)
-    }
-
-    /// Looks into boxes of the last search: into all where nobody is known yet, else into few in each frame.
-    fn look_into_found(
-        &self,
-        sightings: &Sightings<'_>,
-        n_more: usize,
-        memory: &mut NetworkMemory,
-    ) -> Result<(), LookError> {
-        let n_most = if memory.n_seen == 0 {
-            usize::MAX
-        } else {
-            n_more
-        };
-        let found = core::mem::take(&mut memory.found);
-        let left = &found[memory.n_looked_into.min(found.len())..];
-        memory.n_looked_into += sightings.see_all(left, n_most, memory)?;
-        memory.found = found;
-        Ok(())
     }
 
     /// Takes the people of a frame whose keypoints another program found; returns what of the frame the responses will cover, or
@@ -363,7 +305,6 @@ impl NetworkStep {
     ) -> ViewEstimate {
         let level = scope.levels().start;
         let n_seen = memory.n_seen;
-        let most_lost = self.most_lost();
         let mut found: Vec<(Pose, usize)> = Vec::with_capacity(n_seen);
         for (nth, seen) in memory.seen[..n_seen].iter_mut().enumerate() {
             if nth == 0 {
@@ -371,40 +312,17 @@ impl NetworkStep {
             } else {
                 seen.maps.raise(&self.layout, &scope, responses);
             }
-            let (looked_at, usual_score) = ((seen.outline, seen.turn), seen.usual_score);
-            if let (Some(track), Some(pose)) = (seen.held, &seen.pose) {
-                memory.tracks.push(Track {
-                    index: nth,
-                    ..track
-                });
-                found.push((self.at_level(pose.clone(), &scope), nth));
-                continue;
+            // Who was not looked at has a pose and a track already.
+            if seen.next.is_none() {
+                let is_alone = n_seen == 1 && seen.level == level;
+                self.solve(seen, is_alone.then_some((&*responses, scope)));
             }
-            let pose = if n_seen == 1 && seen.level == level {
-                self.best(responses, scope, seen.turn)
-            } else {
-                let Seen {
-                    maps,
-                    responses,
-                    turn,
-                    ..
-                } = seen;
-                let solver = self.springs.of(*turn);
-                maps.pose(solver, &self.layout, responses)
-            };
-            if let Some(pose) = pose {
-                let tree = (&**self.springs.model(), &*self.layout);
-                let around = outline_of_pose(&pose, tree);
-                let before = (looked_at, usual_score);
-                let next = around.map(|it| Track {
-                    is_to_widen: seen.is_to_widen,
-                    index: nth,
-                    speed: seen.speed,
-                    ..Track::next(before, (it, pose.score), most_lost)
-                });
-                memory.tracks.extend(next);
-                seen.pose = Some(pose.clone());
-                found.push((self.at_level(pose, &scope), nth));
+            memory.tracks.extend(seen.next.map(|track| Track {
+                index: nth,
+                ..track
+            }));
+            if let Some(pose) = &seen.pose {
+                found.push((self.at_level(pose.clone(), &scope), nth));
             }
         }
         found.sort_by(|a, b| b.0.score.total_cmp(&a.0.score));
@@ -433,6 +351,30 @@ impl NetworkStep {
             bounds: Bounds::new(vec![Bound::UNKNOWN; self.layout.levels.len()]),
             scope,
         }
+    }
+
+    /// Solves the tree of a person who was looked at, and says where the person is looked for next.
+    ///
+    /// * `alone`: responses of nobody else, of the person's own level.
+    fn solve(&self, seen: &mut Seen, alone: Option<(&[f32], Scope)>) {
+        let solver = self.springs.of(seen.turn);
+        seen.pose = match alone {
+            Some((responses, scope)) => {
+                let levels: Vec<u16> = scope.levels().collect();
+                let evidence = Responses::within(&self.layout, responses, &levels, scope);
+                solver.best(&evidence, None)
+            }
+            None => seen.maps.pose(solver, &self.layout, &mut seen.responses),
+        };
+        let tree = (&**self.springs.model(), &*self.layout);
+        let pose = seen.pose.as_ref();
+        let around = pose.and_then(|pose| Some((outline_of_pose(pose, tree)?, pose.score)));
+        let before = ((seen.outline, seen.turn), seen.usual_score);
+        seen.next = around.map(|around| Track {
+            is_to_widen: seen.is_to_widen,
+            speed: seen.speed,
+            ..Track::next(before, around, self.most_lost())
+        });
     }
 
     /// How sure the network is of every joint of a pose, 0 to 1.
@@ -471,12 +413,6 @@ impl NetworkStep {
             let is_seen = found.score >= LEAST_SCORE;
             is_seen.then_some((found.at, sigma_px))
         })
-    }
-
-    fn best(&self, responses: &[f32], scope: Scope, turn: Turn) -> Option<Pose> {
-        let levels: Vec<u16> = scope.levels().collect();
-        let evidence = Responses::within(&self.layout, responses, &levels, scope);
-        self.springs.of(turn).best(&evidence, None)
     }
 
     /// The same pose on the level of a scope.

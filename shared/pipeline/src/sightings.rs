@@ -4,7 +4,7 @@ use kernels::Rgb8View;
 use posenetwork::{JointMaps, Look, LookError, Looker, outline_of, overlap};
 
 use crate::network_memory::{NetworkMemory, Seen, is_known, shift};
-use crate::tracks::{Track, wider};
+use crate::tracks::{Track, moved, wider};
 
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
@@ -22,6 +22,8 @@ pub(crate) struct Sightings<'a> {
     pub(crate) n_most: usize,
     /// Least mean heat of the joints of a person who is seen well, 0 to 1.
     pub(crate) least_heat: f64,
+    /// By how much the score of a pose may be lower than those of its person usually are.
+    pub(crate) most_lost: f32,
 }
 
 /// Whether the joints that are seen in a box lie in quite another one: that of a person who moved fast, or of whom the last frame is long
@@ -33,6 +35,61 @@ fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
 }
 
 impl Sightings<'_> {
+    /// Looks at a person of the frame before: around the box of then if that is long ago, in a wider box where boxes were looked for or the
+    /// last pose was doubtful, else in the same. All but the first are looked at in a wider box when their turn comes, and need no look
+    /// while they stand still.
+    ///
+    /// * `n_more`: how many people may be looked at in a wider box, or boxes looked into, in this frame.
+    /// * `before`: the people of the frame before.
+    pub(crate) fn see_once_more(
+        &self,
+        (nth, track): (usize, &Track),
+        n_more: &mut usize,
+        before: &mut [Seen],
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        if let Some(apart) = memory.apart.filter(|_| !memory.has_searched) {
+            let around = moved(track.outline, apart);
+            return self.see_later(track, around, memory);
+        }
+        if track.is_to_widen || track.is_doubtful {
+            if nth == 0 || *n_more > 0 {
+                *n_more -= usize::from(nth > 0);
+                let wider = wider(track.outline, &memory.found);
+                return self.see(track, wider, memory);
+            }
+        } else if nth > 0
+            && let Some(hold) = memory.hold
+            && let Some(before) = before.get_mut(track.index)
+        {
+            let n_frames = track.n_held + hold.gap;
+            // One frame further, the person would have moved too far by the next.
+            if n_frames < hold.most && track.is_still(n_frames + 1) {
+                self.hold(track, n_frames, before, memory);
+                return Ok(());
+            }
+        }
+        self.see_again(track, before.get(track.index), memory)
+    }
+
+    /// Looks into boxes of the last search: into all where nobody is known yet, else into few in each frame.
+    pub(crate) fn see_found(
+        &self,
+        n_more: usize,
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        let n_most = if memory.n_seen == 0 {
+            usize::MAX
+        } else {
+            n_more
+        };
+        let found = core::mem::take(&mut memory.found);
+        let left = &found[memory.n_looked_into.min(found.len())..];
+        memory.n_looked_into += self.see_all(left, n_most, memory)?;
+        memory.found = found;
+        Ok(())
+    }
+
     /// Looks for people in boxes that were found. One that is much the same as a box that showed somebody known is passed over, and
     /// one whose first sight is of somebody known gets no closer look: the filters find several boxes around one person.
     ///
@@ -66,19 +123,13 @@ impl Sightings<'_> {
     ///
     /// * `n_held`: frames since that look.
     /// * `before`: the sight of the person in the frame before; other memory afterwards.
-    pub(crate) fn hold(
-        &self,
-        track: &Track,
-        n_held: u64,
-        before: &mut Seen,
-        memory: &mut NetworkMemory,
-    ) {
+    fn hold(&self, track: &Track, n_held: u64, before: &mut Seen, memory: &mut NetworkMemory) {
         if !self.is_unknown(track.outline, memory) {
             return;
         }
         let (_, seen) = memory.next();
         core::mem::swap(seen, before);
-        seen.held = Some(Track { n_held, ..*track });
+        seen.next = Some(Track { n_held, ..*track });
         memory.n_seen += usize::from(!is_known(&memory.seen, memory.n_seen));
     }
 
@@ -100,7 +151,7 @@ impl Sightings<'_> {
 
     /// Looks at a person of the frame before, where nobody is known yet, in a wider box as well and around what is seen there, and keeps
     /// the best sight if it is good.
-    pub(crate) fn see(
+    fn see(
         &self,
         track: &Track,
         wider: [f64; 4],
@@ -124,11 +175,10 @@ impl Sightings<'_> {
     /// worse than the person usually is.
     ///
     /// * `around`: the box, enlarged for the time that has passed.
-    /// * `most_lost`: by how much a score may be lower than usual.
-    pub(crate) fn see_later(
+    fn see_later(
         &self,
         track: &Track,
-        (around, most_lost): ([f64; 4], f32),
+        around: [f64; 4],
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
         if !self.is_unknown(track.outline, memory) {
@@ -140,7 +190,7 @@ impl Sightings<'_> {
         let best = self
             .looker
             .best_of(what, track.turn, look, &mut seen.maps)?;
-        if let Some(best) = best.filter(|it| it.score >= track.usual_score - most_lost) {
+        if let Some(best) = best.filter(|it| it.score >= track.usual_score - self.most_lost) {
             self.keep_look(&best, Some(track.usual_score), memory);
         }
         Ok(())
@@ -214,7 +264,6 @@ impl Sightings<'_> {
     /// Keeps the next person if it is seen well and not known yet; returns whether somebody known, or now known, is seen.
     fn keep(&self, memory: &mut NetworkMemory) -> bool {
         let (_, seen) = memory.next();
-        (seen.held, seen.pose) = (None, None);
         if !seen.judge(self.looker.layout, self.least_heat) {
             return false;
         }
