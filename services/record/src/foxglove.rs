@@ -2,13 +2,15 @@
 //!
 //! The schemas (`foxglove/`) are those of Foxglove, of `@foxglove/schemas` 2.1.0 without descriptions (MIT licence).
 
+use std::collections::BTreeSet;
+
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use bytemuck::pod_read_unaligned;
 use geometry::{Camera, LensModel};
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
-use messages::{FrameHeader, Joint3d, MAX_JOINTS, Pose3d, Status};
+use messages::{FrameHeader, Joint3d, SkeletonMessage, Skeletons, Status};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use recording::{Foreign, Kind, Message};
 use serde_json::{Value, json};
@@ -42,6 +44,8 @@ pub(crate) struct Foxglove {
     stage: Stage,
     /// Whether it has been said where the cameras are.
     is_begun: bool,
+    /// The people that were there in the frame before.
+    shown: BTreeSet<u64>,
 }
 
 /// Numbers of its topics; a calibration and a picture of every view follow.
@@ -54,6 +58,7 @@ impl Foxglove {
         Self {
             stage,
             is_begun: false,
+            shown: BTreeSet::new(),
         }
     }
 
@@ -100,10 +105,13 @@ impl Foxglove {
             return Vec::new();
         };
         let (time, made) = match kind {
-            Kind::Pose3d => {
-                let pose: Pose3d = pod_read_unaligned(message.head);
-                let time = timestamp(pose.stamp.captured_at_nanos);
-                let made = (pose.status != Status::END).then(|| (SCENE, self.scene(&pose, &time)));
+            Kind::Skeletons => {
+                let Some(frame) = message.skeletons() else {
+                    return Vec::new();
+                };
+                let time = timestamp(frame.stamp.captured_at_nanos);
+                let is_frame = frame.status != Status::END;
+                let made = is_frame.then(|| (SCENE, self.scene(&frame, &time)));
                 (time, made)
             }
             Kind::Frame => {
@@ -162,8 +170,24 @@ impl Foxglove {
         Some((VIEWS + 2 * view + 1, message))
     }
 
-    fn scene(&self, pose: &Pose3d, time: &Value) -> Value {
-        let n_joints = (pose.n_joints as usize).min(MAX_JOINTS);
+    /// Everybody in a frame, each an entity of the person's number; who is no longer there is taken away.
+    fn scene(&mut self, frame: &Skeletons, time: &Value) -> Value {
+        let people = frame.listed().iter();
+        let people = people.filter(|person| person.status == Status::OK);
+        let people: Vec<&SkeletonMessage> = people.collect();
+        let entities: Vec<Value> = people
+            .iter()
+            .map(|person| self.entity(person, frame.stamp.frame, time))
+            .collect();
+        let now: BTreeSet<u64> = people.iter().map(|person| person.id).collect();
+        let gone = self.shown.difference(&now);
+        let gone = gone.map(|id| json!({ "timestamp": time, "type": 0, "id": entity_id(*id) }));
+        let gone: Vec<Value> = gone.collect();
+        self.shown = now;
+        json!({ "deletions": gone, "entities": entities })
+    }
+
+    fn entity(&self, person: &SkeletonMessage, frame: u64, time: &Value) -> Value {
         let found = |it: &Joint3d| {
             let is_finite = it
                 .in_world
@@ -172,14 +196,9 @@ impl Foxglove {
                 .all(|it| it.is_finite());
             it.status == Status::OK && is_finite
         };
-        let joints: Vec<Option<&Joint3d>> = pose.joints[..n_joints]
-            .iter()
-            .map(|it| Some(it).filter(|it| found(it)))
-            .collect();
-        if pose.status != Status::OK {
-            let deletion = json!({ "timestamp": time, "type": 0, "id": "skeleton" });
-            return json!({ "deletions": [deletion], "entities": [] });
-        }
+        let joints = person.listed_joints().iter();
+        let joints: Vec<Option<&Joint3d>> =
+            joints.map(|it| Some(it).filter(|it| found(it))).collect();
         let names = self.stage.joints.joints.iter().map(|it| it.name);
         let named = joints.iter().zip(names);
         let named = named.filter_map(|(joint, name)| Some(((*joint)?, name)));
@@ -207,14 +226,18 @@ impl Foxglove {
             "type": 2, "pose": origin, "thickness": LINE_M, "scale_invariant": false, "points": points,
             "color": colour("", 1.0), "colors": colours, "indices": [],
         });
-        json!({ "deletions": [], "entities": [{
-            "timestamp": time, "frame_id": WORLD, "id": "skeleton", "lifetime": { "sec": 0, "nsec": 0 },
+        json!({
+            "timestamp": time, "frame_id": WORLD, "id": entity_id(person.id), "lifetime": { "sec": 0, "nsec": 0 },
             "frame_locked": true,
-            "metadata": [{ "key": "frame", "value": pose.stamp.frame.to_string() }],
+            "metadata": [{ "key": "frame", "value": frame.to_string() }],
             "arrows": [], "cubes": [], "spheres": spheres, "cylinders": [], "lines": [lines],
             "triangles": [], "texts": [], "models": [],
-        }] })
+        })
     }
+}
+
+fn entity_id(person: u64) -> String {
+    format!("person {person}")
 }
 
 fn calibration(camera: &Camera, time: &Value) -> Value {
@@ -305,7 +328,7 @@ fn timestamp(nanos: u64) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use bytemuck::{Zeroable as _, bytes_of};
+    use bytemuck::bytes_of;
     use geometry::{Intrinsics, Lens};
     use nalgebra::{Isometry3, Vector3};
     use recording::encode;
@@ -338,8 +361,12 @@ mod tests {
         })
     }
 
-    fn pose() -> Pose3d {
-        let mut pose = Pose3d::zeroed();
+    /// A frame with one person.
+    fn one(id: u64) -> Box<Skeletons> {
+        let mut frame = Box::<Skeletons>::default();
+        frame.n_people = 1;
+        let pose = &mut frame.people[0];
+        pose.id = id;
         pose.n_joints = PARSE14.joints.len() as u32;
         for (nth, joint) in pose.joints[..PARSE14.joints.len()].iter_mut().enumerate() {
             joint.in_world = [0.1 * nth as f64, 1.0, 2.0];
@@ -347,7 +374,13 @@ mod tests {
         }
         pose.joints[2].status = Status::IMPLAUSIBLE;
         pose.joints[3].covariance[0] = f64::NAN;
-        pose
+        frame
+    }
+
+    /// What a frame becomes.
+    fn shown(foxglove: &mut Foxglove, frame: &Skeletons) -> Vec<(usize, Value)> {
+        let [head, people] = recording::split(frame);
+        made(foxglove, Kind::Skeletons, head, people)
     }
 
     /// What a message of ours becomes.
@@ -409,7 +442,9 @@ mod tests {
     fn messages_are_as_the_schemas_of_foxglove_say_and_the_cameras_come_first() {
         let mut foxglove = foxglove();
         let topics = foxglove.topics();
-        let mut all = made(&mut foxglove, Kind::Pose3d, bytes_of(&pose()), &[]);
+        let mut two = one(1);
+        (two.n_people, two.people[1]) = (2, one(7).people[0]);
+        let mut all = shown(&mut foxglove, &two);
         let order: Vec<usize> = all.iter().map(|it| it.0).collect();
         assert_eq!(order, [1, 2, 4, 0]);
         let head = FrameHeader {
@@ -427,11 +462,9 @@ mod tests {
             bytes_of(&head),
             &[7; 8 * 6 * 3],
         ));
-        let lost = Pose3d {
-            status: Status::TOO_FEW_VIEWS,
-            ..pose()
-        };
-        all.extend(made(&mut foxglove, Kind::Pose3d, bytes_of(&lost), &[]));
+        let mut lost = one(7);
+        (lost.n_people, lost.status) = (0, Status::TOO_FEW_VIEWS);
+        all.extend(shown(&mut foxglove, &lost));
         assert_eq!(all.len(), 6);
         for (topic, value) in &all {
             let schema = serde_json::from_str(topics[*topic].schema).unwrap();
@@ -439,14 +472,16 @@ mod tests {
         }
         let (image, deleted) = (&all[4], &all[5].1);
         assert_eq!((image.0, image.1["format"].as_str()), (5, Some("jpeg")));
-        assert_eq!(deleted["deletions"][0]["id"], "skeleton");
+        assert_eq!(all[3].1["entities"][1]["id"], "person 7");
+        let gone = [0, 1].map(|nth| deleted["deletions"][nth]["id"].clone());
+        assert_eq!(gone, ["person 1", "person 7"]);
         assert_eq!(deleted["entities"], json!([]));
     }
 
     #[test]
     fn a_skeleton_is_its_joints_with_a_place_their_spread_and_the_lines_between_them() {
         let mut foxglove = foxglove();
-        let all = made(&mut foxglove, Kind::Pose3d, bytes_of(&pose()), &[]);
+        let all = shown(&mut foxglove, &one(1));
         let entity = &all[3].1["entities"][0];
         // Two of the joints have no place or spread that is a number.
         let n = PARSE14.joints.len() - 2;
@@ -470,12 +505,10 @@ mod tests {
             ..FrameHeader::default()
         };
         assert_eq!(made(&mut foxglove, Kind::Frame, bytes_of(&head), &[]), []);
-        let end = Pose3d {
-            status: Status::END,
-            ..pose()
-        };
-        assert_eq!(made(&mut foxglove, Kind::Pose3d, bytes_of(&end), &[]), []);
-        assert_eq!(foxglove.messages(Kind::Pose3d, &[1, 2, 3]), []);
+        let mut end = one(1);
+        end.status = Status::END;
+        assert_eq!(shown(&mut foxglove, &end), []);
+        assert_eq!(foxglove.messages(Kind::Skeletons, &[1, 2, 3]), []);
         assert!(!foxglove.is_begun);
     }
 }

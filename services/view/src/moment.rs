@@ -1,6 +1,6 @@
-//! One frame as the page draws it.
+//! One frame as the page draws it: of several people the one who is followed.
 
-use messages::{Joint3d, MAX_JOINTS, MAX_PARTS, Pose3d, Status};
+use messages::{Joint3d, MAX_PARTS, SkeletonMessage, Skeletons, Status};
 use serde::Serialize;
 
 use crate::scene::Scene;
@@ -49,10 +49,11 @@ impl Moment {
     /// The name of its type.
     pub(crate) const KIND: &'static str = "moment";
 
-    /// The frame that a message speaks of. Check the message first.
-    pub(crate) fn of_message(scene: &Scene, message: &Pose3d) -> Self {
-        let n_joints = (message.n_joints as usize).min(MAX_JOINTS);
-        let joints = &message.joints[..n_joints];
+    /// The frame that a message speaks of, with the person who is followed. Check the message first.
+    pub(crate) fn of_message(scene: &Scene, message: &Skeletons) -> Self {
+        let person = message.followed();
+        let joints = person.map_or(&[][..], SkeletonMessage::listed_joints);
+        let stature_m = person.map_or(0.0, |person| person.stature_m);
         let found = |it: &&Joint3d| it.status == Status::OK;
         let views = scene.views.iter().enumerate();
         let latency = message.timing.sent_at_nanos;
@@ -74,8 +75,8 @@ impl Moment {
                 .map(|it| Some(it).filter(found).and_then(|it| spread(it.covariance)))
                 .collect(),
             views: views.map(|(view, _)| seen(scene, message, view)).collect(),
-            people: Some(message.n_people).filter(|it| *it > 0),
-            stature: Some(rounded(message.stature_m, 1e3)).filter(|it| *it > 0.0),
+            people: Some(message.n_seen).filter(|n_seen| *n_seen > 0),
+            stature: Some(rounded(stature_m, 1e3)).filter(|metres| *metres > 0.0),
             latency_ms: latency.map(|nanos| rounded(nanos as f64 / 1e6, 10.0)),
         }
     }
@@ -87,14 +88,14 @@ impl Moment {
     }
 }
 
-fn seen(scene: &Scene, message: &Pose3d, view: usize) -> Seen {
-    let Some(fused) = message.views.get(view) else {
-        return Seen::default();
-    };
-    if fused.status != Status::OK {
+fn seen(scene: &Scene, message: &Skeletons, view: usize) -> Seen {
+    let views = message.followed().map(SkeletonMessage::listed_views);
+    let fused = views.and_then(|views| views.get(view));
+    let status = fused.map_or(Status::NO_DETECTION, |fused| fused.status);
+    let Some(fused) = fused.filter(|_| status == Status::OK) else {
         let is_there = message.views_present >> view & 1 == 1;
-        let why = if is_there || fused.status != Status::NO_DETECTION {
-            fused.status.reason()
+        let why = if is_there || status != Status::NO_DETECTION {
+            status.reason()
         } else {
             "nothing in time"
         };
@@ -102,7 +103,7 @@ fn seen(scene: &Scene, message: &Pose3d, view: usize) -> Seen {
             why: Some(why.to_owned()),
             ..Seen::default()
         };
-    }
+    };
     let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
     let joints = scene.joints_of(&fused.centres_px[..n_parts]);
     Seen {

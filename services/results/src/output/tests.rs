@@ -65,7 +65,7 @@ fn a_file_that_must_say_the_rate_is_not_written_where_nothing_tells_it() {
 #[test]
 fn skipped_frames_and_missing_views_are_counted() {
     let mut last = record(8);
-    last.pose3d.views_present = 0b01;
+    last.skeletons.views_present = 0b01;
     last.views[1].missing = Some(Missing::Late);
     // Every second frame is used: 0, 2, (4, 6), 8.
     let (_, summary) = written(vec![record(0), record(2), last]);

@@ -267,10 +267,11 @@ fn pictures(folder: &Path, camera: &str) -> (PathBuf, Vec<u64>) {
     (folder, frames)
 }
 
-/// A frame by its line, without the poses of its views.
+/// A frame by its line, with the person who is followed, without the poses of its views.
 fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
+    let person = line.followed();
     let placed = scene.joints.joints.iter().map(|it| {
-        let joint = line.joints.get(it.name);
+        let joint = person.and_then(|person| person.joints.get(it.name));
         joint.and_then(|it| it.placed())
     });
     let placed: Vec<_> = placed.collect();
@@ -297,8 +298,8 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
             .map(|it| it.and_then(|it| spread(it.covariance_m2)))
             .collect(),
         views: views.collect(),
-        people: line.people,
-        stature: line.stature_m,
+        people: line.seen,
+        stature: person.and_then(|person| person.stature_m),
         latency_ms: None,
     }
 }

@@ -41,7 +41,7 @@ pub enum Content {
     /// Who is in a frame.
     People,
     /// The result.
-    Pose3d,
+    Skeletons,
 }
 
 /// The room of one topic, which has one sender.
@@ -133,7 +133,7 @@ impl Topology {
                 ..room
             });
         }
-        rooms.push(small(topic::pose3d(), Content::Pose3d, n_recorders));
+        rooms.push(small(topic::skeletons(), Content::Skeletons, n_recorders));
         rooms
     }
 

@@ -42,7 +42,7 @@ impl PerFrame {
                     sum.pixels += bytes;
                     sum.foxglove += if has_foxglove { bytes / 2 } else { 0 };
                 }
-                Some(Kind::Pose3d) if has_foxglove => sum.rest += bytes + SCENE_BYTES,
+                Some(Kind::Skeletons) if has_foxglove => sum.rest += bytes + SCENE_BYTES,
                 Some(Kind::Evidence) => sum.evidence += bytes,
                 Some(Kind::Picture) => sum.camera += bytes,
                 // Health messages are few and small.
