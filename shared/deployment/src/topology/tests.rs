@@ -169,7 +169,7 @@ fn topics_have_this_room() {
         ("view-quality/v2/2", 6, 16, 2, 1, None),
         ("pair-pose/v3/0", 3, 16, 2, 1, None),
         ("pair-pose/v3/1", 3, 16, 2, 1, None),
-        ("skeletons/v1", 2, 16, 2, 1, None),
+        ("skeletons/v1", 2, 4, 2, 1, None),
     ];
     assert_eq!(numbers(&rooms[8..]), of_last_view_and_later);
 }
