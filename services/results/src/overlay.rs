@@ -202,6 +202,23 @@ mod tests {
     }
 
     #[test]
+    fn everybody_is_drawn() {
+        let scene = scene();
+        let mut record = with_picture();
+        let one = draw(&scene, &record, 0, 0).unwrap();
+        let frame = &mut record.skeletons;
+        (frame.n_people, frame.people[1]) = (2, frame.people[0]);
+        frame.people[1].views[0].centres_px[0] = [60.0, 45.0];
+        let both = draw(&scene, &record, 0, 0).unwrap();
+        let colour = |canvas: &Canvas| {
+            let pixels = canvas.rgb().as_chunks::<3>().0;
+            let near = (40..50).flat_map(|y| (55..66).map(move |x| pixels[80 * y + x]));
+            near.filter(|rgb| *rgb != [0; 3]).count()
+        };
+        assert!(colour(&both) > colour(&one), "the ring of the second");
+    }
+
+    #[test]
     fn limbs_are_coloured_by_the_side_of_the_body() {
         let limbs = limbs(&scene());
         // Right ankle to right knee; left hip to neck; neck to head.

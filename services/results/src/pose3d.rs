@@ -162,7 +162,7 @@ fn joint(scene: &Scene, it: &Joint3d) -> JointLine {
 
 /// The rows of one frame in `pose3d.csv`, each with its end.
 pub(crate) fn csv_rows(scene: &Scene, frame: &Skeletons) -> String {
-    if let [] = frame.listed() {
+    if frame.listed().is_empty() {
         return rows_of(scene, frame.stamp.frame, &nobody(scene, frame.status));
     }
     let people = frame.listed().iter();

@@ -52,9 +52,11 @@ impl Moment {
     /// The frame that a message speaks of, with the person who is followed. Check the message first.
     pub(crate) fn of_message(scene: &Scene, message: &Skeletons) -> Self {
         let person = message.followed();
-        let joints = person.map_or(&[][..], SkeletonMessage::listed_joints);
+        // Of nobody no joint is anywhere.
+        let nowhere = vec![Joint3d::default(); scene.joints.joints.len()];
+        let joints = person.map_or(&nowhere[..], SkeletonMessage::listed_joints);
         let stature_m = person.map_or(0.0, |person| person.stature_m);
-        let found = |it: &&Joint3d| it.status == Status::OK;
+        let found = |it: &&Joint3d| person.is_some() && it.status == Status::OK;
         let views = scene.views.iter().enumerate();
         let latency = message.timing.sent_at_nanos;
         let latency = latency.checked_sub(message.stamp.captured_at_nanos);
@@ -132,4 +134,51 @@ pub(crate) fn in_view(point: [f64; 2]) -> [f64; 2] {
 pub(crate) fn spread(covariance: [f64; 6]) -> Option<[f64; 6]> {
     let is_known = covariance.iter().all(|it| it.is_finite());
     is_known.then(|| covariance.map(|it| rounded(it, 1e8)))
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use skeleton::PARSE14;
+
+    use super::*;
+    use crate::scene::View;
+
+    /// A run of one view.
+    pub(crate) fn scene() -> Scene {
+        Scene {
+            name: "test".to_owned(),
+            views: vec![View {
+                name: "a".to_owned(),
+                size: [640, 480],
+                camera: None,
+            }],
+            joints: &PARSE14,
+            up: [0.0, 0.0, 1.0],
+            frame_rate_hz: None,
+            tells_facing: true,
+            problem: None,
+        }
+    }
+
+    #[test]
+    fn of_several_people_the_one_who_is_followed_is_shown() {
+        let mut message = Box::<Skeletons>::default();
+        (message.n_people, message.n_seen) = (2, 3);
+        for (nth, person) in message.people[..2].iter_mut().enumerate() {
+            (person.id, person.n_joints, person.n_views) = (5 - nth as u64, 14, 1);
+            (person.joints[0].in_world[0], person.stature_m) = (1.0 + nth as f64, 1.7);
+        }
+        let moment = Moment::of_message(&scene(), &message);
+        assert_eq!(moment.joints.len(), 14);
+        assert_eq!(moment.joints[0], Some([1.0, 0.0, 0.0]));
+        assert_eq!(
+            (moment.people, moment.stature, moment.why),
+            (Some(3), Some(1.7), None)
+        );
+        (message.n_people, message.status) = (0, Status::TOO_FEW_VIEWS);
+        let moment = Moment::of_message(&scene(), &message);
+        assert_eq!((moment.joints, moment.stature), (vec![None; 14], None));
+        assert_eq!(moment.why.as_deref(), Some("too few views"));
+        assert_eq!(moment.views[0].why.as_deref(), Some("nothing in time"));
+    }
 }

@@ -153,6 +153,24 @@ mod tests {
     }
 
     #[test]
+    fn everybody_is_drawn_and_the_status_is_that_of_whoever_is_there() {
+        let mut pair = [walker(2), walker(2)];
+        pair[1].person = 7;
+        for point in pair[1].slots[0].points.iter_mut().flatten() {
+            point.in_world.x += 0.6;
+        }
+        pair[0].slots[1] = crate::Slot::default();
+        let lit = |trials: &[Trial], slot: usize| {
+            let mut canvas = Canvas::new(Size::new(320, 240), [0; 3]);
+            draw(&mut canvas, trials, slot, &camera());
+            canvas.rgb().iter().filter(|it| **it > 60).count()
+        };
+        assert!(lit(&pair, 0) > lit(&pair[..1], 0) + 500);
+        assert!(lit(&pair, 1) > lit(&pair[..1], 1) + 500);
+        assert_eq!(best(&pair, 1).map(|trial| trial.person), Some(7));
+    }
+
+    #[test]
     fn an_unknown_covariance_has_no_ellipse_and_an_endless_one_does_no_harm() {
         let mut trial = walker(1);
         let with = drawn(&trial, 0);

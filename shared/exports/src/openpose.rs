@@ -112,6 +112,29 @@ mod tests {
     }
 
     #[test]
+    fn of_several_people_each_who_is_seen_has_the_own_number() {
+        let view = camera();
+        let [one, mut other] = [walker(3), walker(3)];
+        other.person = 7;
+        for point in other.slots.iter_mut().flat_map(|slot| &mut slot.points) {
+            point.as_mut().unwrap().in_world.x += 0.3;
+        }
+        other.slots[2].points.clear();
+        let alone: Value =
+            serde_json::from_str(&frame(core::slice::from_ref(&one), 1, &view)).unwrap();
+        assert_eq!(alone["people"][0]["person_id"], json!([-1]));
+        let both = [one, other];
+        let read = |slot| serde_json::from_str::<Value>(&frame(&both, slot, &view)).unwrap();
+        let people = read(1)["people"].as_array().unwrap().clone();
+        let ids: Vec<&Value> = people.iter().map(|person| &person["person_id"]).collect();
+        assert_eq!(ids, [&json!([1]), &json!([7])]);
+        let place = &alone["people"][0]["pose_keypoints_2d"];
+        assert_eq!(people[0]["pose_keypoints_2d"], *place);
+        assert_ne!(people[1]["pose_keypoints_2d"], *place);
+        assert_eq!(read(2)["people"].as_array().map(Vec::len), Some(1));
+    }
+
+    #[test]
     fn a_gap_is_nobody_and_a_missing_joint_zeros() {
         let (mut trial, view) = (walker(3), camera());
         trial.slots[0].points.clear();

@@ -99,7 +99,7 @@ fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<
 mod tests {
     use super::*;
 
-    const POSES: &str = r#"{"frame":4,"people":[{"facing_margin":null,"id":1,"joints":{"head":{"covariance_m2":[1,0,0,1,0,1],"position_m":[1.0,2.0,3.0],"reprojection_px":1.5,"views":["c1"]},"neck":{"status":"too few views"}},"pairs":1,"status":"ok","views_used":["c1"]}],"status":"ok","time_s":null,"views_missing":{"c2":"late"},"views_present":["c1"]}
+    const POSES: &str = r#"{"frame":4,"people":[{"facing_margin":null,"id":1,"joints":{"head":{"covariance_m2":[1,0,0,1,0,1],"position_m":[1.0,2.0,3.0],"reprojection_px":1.5,"views":["c1"]},"neck":{"status":"too few views"}},"pairs":1,"status":"ok","views_used":["c1"]},{"facing_margin":null,"id":9,"joints":{"head":{"covariance_m2":[1,0,0,1,0,1],"position_m":[9.0,9.0,9.0],"reprojection_px":1.5,"views":["c1"]}},"pairs":1,"status":"ok","views_used":["c1"]}],"status":"ok","time_s":null,"views_missing":{"c2":"late"},"views_present":["c1"]}
 {"frame":5,"people":[],"reason":"late","status":"no result","time_s":null,"views_missing":{},"views_present":[]}
 "#;
     const TIMES: &str = r#"{"frame":4,"sent_ms":50.5,"epoch":3,"views":{"c1":{"camera":{"epoch":1,"captured_ms":10.0,"sent_ms":12.0},"pose":{"epoch":2,"sent_ms":20.0}},"c2":{"camera":null,"pose":null}}}

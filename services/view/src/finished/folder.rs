@@ -317,3 +317,28 @@ fn see(scene: &Scene, moment: &mut Moment, line: &ViewLine) {
         seen.behind = line.facing == Some(runfiles::Facing::Behind);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::moment::tests::scene;
+
+    #[test]
+    fn of_several_people_the_one_who_is_followed_is_shown() {
+        let person = |id: u64| {
+            format!(
+                r#"{{"facing_margin":null,"id":{id},"joints":{{"head":{{"covariance_m2":[1,0,0,1,0,1],"position_m":[{id},2,3],"reprojection_px":1,"views":["a"]}}}},"pairs":1,"stature_m":1.7,"status":"ok","views_used":["a"]}}"#
+            )
+        };
+        let text = format!(
+            r#"{{"frame":4,"people":[{},{}],"seen":2,"status":"ok","time_s":null,"views_missing":{{}},"views_present":["a"]}}"#,
+            person(7),
+            person(2)
+        );
+        let line = runfiles::lines::<FrameLine>(&text).next().unwrap().unwrap();
+        let moment = of_line(&scene(), &line);
+        assert_eq!(moment.joints[13], Some([7.0, 2.0, 3.0]));
+        assert_eq!(moment.joints.iter().flatten().count(), 1);
+        assert_eq!((moment.people, moment.stature), (Some(2), Some(1.7)));
+    }
+}
