@@ -42,7 +42,7 @@ pub struct Place {
 impl<'a> Frame<'a> {
     /// The people of a moment, the one who is followed first; one frame with nobody if there is nobody. Empty if skeletons were not asked
     /// for.
-    pub fn of(moment: &'a Moment) -> Vec<Self> {
+    pub fn people(moment: &'a Moment) -> Vec<Self> {
         let Some(skeletons) = &moment.skeletons else {
             return Vec::new();
         };

@@ -70,7 +70,7 @@ pub fn run(
         if let Some(moment) = &moment {
             counts.frames += 1;
             counts.missed += moment.n_missed;
-            for person in Frame::of(moment) {
+            for person in Frame::people(moment) {
                 for outlet in &mut outlets {
                     outlet.send(&person, &mut counts);
                 }
