@@ -43,9 +43,9 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     while !is_over && waiter.wait(Duration::from_millis(50))? != Woken::Stop {
         ports.receive_inputs(&context, &mut gather, &writer)?;
         while let Some(skeletons) = ports.skeletons.receive::<Skeletons>(&context)? {
+            let skeletons = Box::new(skeletons);
             // The inputs of a result were sent before it, so they can all be received now; but for expected errors that fusion
             // was given first.
-            let skeletons = Box::new(skeletons);
             ports.receive_inputs(&context, &mut gather, &writer)?;
             let begin = Instant::now();
             while may_await && gather.awaits_quality(skeletons.stamp.frame) {

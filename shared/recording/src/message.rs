@@ -46,7 +46,7 @@ pub fn encode(kind: Kind, head: &[u8], elements: &[u8], out: &mut Vec<u8>) {
 }
 
 /// Skeletons as a struct and its array: the fields before the count, and the people.
-pub fn split(skeletons: &Skeletons) -> [&[u8]; 2] {
+pub fn split_skeletons(skeletons: &Skeletons) -> [&[u8]; 2] {
     let head = &bytes_of(skeletons)[..Kind::Skeletons.head_bytes()];
     [head, cast_slice(skeletons.listed())]
 }
@@ -218,7 +218,7 @@ mod tests {
             (Kind::ViewQuality, bytes_of(&quality)),
             (Kind::PairPose, bytes_of(&pair)),
             (Kind::People, bytes_of(&people)),
-            (Kind::Skeletons, split(&skeletons)[0]),
+            (Kind::Skeletons, split_skeletons(&skeletons)[0]),
             (Kind::Picture, bytes_of(&picture)),
         ];
         heads.map(|(kind, bytes)| (kind, bytes.to_vec())).into()
@@ -256,7 +256,7 @@ mod tests {
         }
         for n_people in [0, 2, 8] {
             skeletons.n_people = n_people as u32;
-            let [head, elements] = split(&skeletons);
+            let [head, elements] = split_skeletons(&skeletons);
             let mut data = Vec::new();
             encode(Kind::Skeletons, head, elements, &mut data);
             // As memory holds them: the count right before the list.

@@ -51,7 +51,7 @@ fn one(id: u64) -> Box<Skeletons> {
 
 /// What a frame becomes.
 fn shown(foxglove: &mut Foxglove, frame: &Skeletons) -> Vec<(usize, Value)> {
-    let [head, people] = recording::split(frame);
+    let [head, people] = recording::split_skeletons(frame);
     made(foxglove, Kind::Skeletons, head, people)
 }
 

@@ -5,7 +5,7 @@ use messages::{
     EvidenceHeader, FrameHeader, Health, PairPose, People, PictureHeader, Skeletons, Status,
     ViewPose, ViewQuality,
 };
-use recording::{Envelope, Kind, encode, split};
+use recording::{Envelope, Kind, encode, split_skeletons};
 use runtime::{Bus, PortError, ReceiveError, SliceSubscriber, Subscriber, Waiter};
 
 /// A message as bytes, and the fields of its envelope.
@@ -124,7 +124,7 @@ impl Receiver {
                 .receive()?
                 .and_then(|message| of(bytes_of(&message), &[])),
             Port::Skeletons(port) => port.receive()?.and_then(|skeletons| {
-                let [head, people] = split(&skeletons);
+                let [head, people] = split_skeletons(&skeletons);
                 of(head, people)
             }),
             Port::Picture(port) => port.receive()?.and_then(|sample| {
