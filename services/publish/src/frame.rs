@@ -76,7 +76,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-fn placed<'a>(joint: Joint<'a>) -> (&'a str, Result<Place, &'a str>) {
+fn placed(joint: Joint<'_>) -> (&str, Result<Place, &str>) {
     let found = joint.found.map(|place| Place {
         in_world: place.in_world,
         deviation_m: place.deviation_m,

@@ -42,8 +42,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let (mut is_over, mut may_await) = (false, true);
     while !is_over && waiter.wait(Duration::from_millis(50))? != Woken::Stop {
         ports.receive_inputs(&context, &mut gather, &writer)?;
-        while let Some(skeletons) = ports.skeletons.receive::<Skeletons>(&context)? {
-            let skeletons = Box::new(skeletons);
+        while let Some(skeletons) = ports.skeletons.receive_boxed(&context)? {
             // The inputs of a result were sent before it, so they can all be received now; but for expected errors that fusion
             // was given first.
             ports.receive_inputs(&context, &mut gather, &writer)?;

@@ -208,14 +208,16 @@ mod tests {
     use super::*;
 
     fn result(sides: Sides) -> SkeletonMessage {
-        let mut pose = SkeletonMessage::default();
-        pose.status = Status::OK;
-        pose.n_joints = 2;
-        pose.n_views = 1;
-        pose.views_used = 1;
-        pose.sides = sides;
-        pose.stature_m = 1.7;
-        pose.body_deviation = 0.8;
+        let mut pose = SkeletonMessage {
+            status: Status::OK,
+            n_joints: 2,
+            n_views: 1,
+            views_used: 1,
+            sides,
+            stature_m: 1.7,
+            body_deviation: 0.8,
+            ..SkeletonMessage::default()
+        };
         pose.views[0].status = Status::OK;
         pose.views[0].n_parts = 2;
         pose.views[0].centres_px[1] = [0.0, 200.0];

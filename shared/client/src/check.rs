@@ -134,8 +134,10 @@ pub(crate) mod tests {
     fn counts_and_numbers_that_cannot_be_are_refused() {
         let running = running();
         assert!(super::skeletons(&skeletons(0), &running));
-        let mut none = Skeletons::default();
-        none.status = Status::TOO_FEW_VIEWS;
+        let none = Skeletons {
+            status: Status::TOO_FEW_VIEWS,
+            ..Skeletons::default()
+        };
         assert!(super::skeletons(&none, &running));
         let changes: [fn(&mut Skeletons); 8] = [
             |frame| frame.n_people = 9,

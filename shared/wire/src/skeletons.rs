@@ -268,7 +268,7 @@ mod tests {
         }
     }
 
-    fn person<'a>(id: u64, skeleton: &'a Skeleton) -> SolvedPerson<'a> {
+    fn person(id: u64, skeleton: &Skeleton) -> SolvedPerson<'_> {
         SolvedPerson {
             id,
             skeleton,
@@ -433,7 +433,8 @@ mod tests {
             ids in prop::array::uniform8(0_u64..40),
         ) {
             let mut message = one(&skeleton());
-            message.people = [message.people[0]; MAX_PEOPLE];
+            let (first, others) = message.people.split_at_mut(1);
+            others.fill(first[0]);
             message.n_people = n_people;
             for (person, (id, counts)) in message.people.iter_mut().zip(ids.into_iter().zip(counts)) {
                 person.id = id;

@@ -153,7 +153,7 @@ impl Session {
 
     /// Whether a result has come.
     fn look_at_poses(&mut self, board: &Board) -> Result<bool, Failure> {
-        let Some(message) = self.poses.latest()? else {
+        let Some(message) = self.poses.latest_boxed()? else {
             return Ok(false);
         };
         let scene = &self.scene;

@@ -123,10 +123,13 @@ impl Receiver {
             Port::People(port) => port
                 .receive()?
                 .and_then(|message| of(bytes_of(&message), &[])),
-            Port::Skeletons(port) => port.receive()?.and_then(|skeletons| {
-                let [head, people] = split_skeletons(&skeletons);
-                of(head, people)
-            }),
+            Port::Skeletons(port) => {
+                let received = port.receive_by(|skeletons| {
+                    let [head, people] = split_skeletons(skeletons);
+                    of(head, people)
+                })?;
+                received.flatten()
+            }
             Port::Picture(port) => port.receive()?.and_then(|sample| {
                 let head = sample.header();
                 let received = of(bytes_of(head), sample.payload())?;
