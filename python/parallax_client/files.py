@@ -69,10 +69,11 @@ class Run:
     reason      why there is no result, [frame]
     joints      names of the joints
     people      every `Person` by identity
+    followed    a `Person` made of whoever is followed in each frame, who may be one after the other
     summary     the contents of summary.json
 
-    Of a run with one person or none, `positions`, `covariance`, `reprojection_px`, `n_views`, `deviation`, `sides` and `joint()` are
-    those of that person.
+    Of a run in which never two people are in a frame, `positions`, `covariance`, `reprojection_px`, `n_views`, `deviation`, `sides` and
+    `joint()` are those of `followed`.
     """
 
     def __init__(self, folder):
@@ -91,17 +92,21 @@ class Run:
         self.reason = np.array([it.get("reason") for it in lines], dtype=object)
         identities = sorted({person["id"] for line in lines for person in line["people"]})
         self.people = {it: Person(it, self.joints, len(lines)) for it in identities}
+        self.followed = Person(None, self.joints, len(lines))
         for row, line in enumerate(lines):
             for person in line["people"]:
                 self.people[person["id"]]._put(row, person)
+            for person in line["people"][:1]:
+                self.followed._put(row, person)
+        self._is_one = all(len(line["people"]) < 2 for line in lines)
 
     @property
     def only(self):
-        """The only person; one who is nowhere if there is nobody. Several are an error."""
-        if len(self.people) > 1:
+        """`followed`, of a run in which never two people are in a frame. Several are an error."""
+        if not self._is_one:
             identities = ", ".join(str(it) for it in self.people)
             raise ClientError(f"{self.folder} has {len(self.people)} people: take one of `people`: {identities}")
-        return next(iter(self.people.values()), Person(None, self.joints, len(self.frames)))
+        return self.followed
 
     positions = property(lambda self: self.only.positions)
     covariance = property(lambda self: self.only.covariance)
@@ -131,7 +136,7 @@ class Run:
                 "reprojection_px": person.reprojection_px.ravel(), "n_views": person.n_views.ravel(),
             })
 
-        people = list(self.people.values()) or [self.only]
+        people = list(self.people.values()) or [self.followed]
         return pandas.concat([rows(it) for it in people], ignore_index=True)
 
     def _summary(self):

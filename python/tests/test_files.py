@@ -76,5 +76,6 @@ def test_each_of_several_people_has_arrays_of_its_own(tmp_path):
     assert one.joint("head")[:, 0].tolist()[::2] == [1, 1] and np.isnan(one.joint("head")[1]).all()
     assert other.joint("head")[2].tolist() == [4, 2, 3] and np.isnan(other.positions[:2]).all()
     assert other.status.tolist() == [None, None, "ok"] and one.sides.tolist() == ["sure", None, "sure"]
+    assert run.followed.joint("head")[2].tolist() == [4, 2, 3] and run.followed.id is None
     with pytest.raises(ClientError, match="2 people: take one of `people`: 1, 4"):
         run.positions

@@ -181,7 +181,7 @@ pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
     };
     let person = |trial: &Trial| {
         json!({
-            "id": trial.person,
+            "ids": trial.ids,
             "frames_with_points": trial.n_with_points(),
             "gaps": by_label(&|nth| trial.gaps(nth)),
             "filled": by_label(&|nth| trial.filled(nth)),
@@ -235,7 +235,7 @@ fn paths(format: Format, job: &Job, trials: &[Trial], pictures: &[Pictures]) -> 
         Format::File(format) if trials.len() == 1 => vec![name(format.suffix)],
         Format::File(format) => trials
             .iter()
-            .map(|trial| name(&format!("-person{}{}", trial.person, format.suffix)))
+            .map(|trial| name(&format!("-person{}{}", trial.id(), format.suffix)))
             .collect(),
         Format::OpenPose => vec![name("-openpose")],
         Format::Mp4 => {

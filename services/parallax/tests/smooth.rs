@@ -229,7 +229,7 @@ fn each_of_several_people_is_smoothed_alone() {
     let counts = |nth: usize| {
         let person = &report.people[nth];
         let joint = person.joints["right wrist"];
-        (person.id, joint.measured, joint.filled)
+        (person.ids[0], joint.measured, joint.filled)
     };
     assert_eq!([counts(0), counts(1)], [(1, 49, 1), (7, 46, 4)]);
     assert!(
@@ -238,6 +238,32 @@ fn each_of_several_people_is_smoothed_alone() {
             .iter()
             .all(|person| person.frames_of_breaks.is_empty())
     );
+}
+
+#[test]
+fn whoever_was_followed_one_after_the_other_is_smoothed_as_one() {
+    let case = Case::new("smooth-one-after", &[0], "");
+    fs::create_dir(case.path("run")).unwrap();
+    let lines_of_one = (0..50).map(|frame| {
+        let x = 0.01 * frame as f64;
+        let mut line = line(frame, Some(frame as f64 / 60.0), placed(x, 1e-4));
+        line.people[0].id = 1 + u64::from(frame > 25);
+        if frame == 25 {
+            line.people.clear();
+        }
+        line
+    });
+    case.write("run/pose3d.jsonl", text(lines_of_one));
+    let ended = smooth(&case, &["run"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let smoothed = lines(&case, "run/pose3d-smooth.jsonl");
+    let ids = smoothed.iter().map(|line| line.people[0].id);
+    assert!(ids.eq((0..50).map(|frame| 1 + u64::from(frame > 25))));
+    assert_eq!(smoothed[25].people[0].states["right wrist"], "filled");
+    let report = fs::read_to_string(case.path("run/smooth.json")).unwrap();
+    let report = SmoothReport::parse(&report).unwrap();
+    let people = report.people.iter().map(|person| person.ids.clone());
+    assert_eq!(people.collect::<Vec<_>>(), [vec![1, 2]]);
 }
 
 fn placed(x: f64, covariance: f64) -> JointLine {

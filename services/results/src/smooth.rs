@@ -136,7 +136,7 @@ impl Smoothing {
     fn person_report(&self, id: u64, person: &Person) -> SmoothedPerson {
         let joints = self.names.iter().cloned();
         SmoothedPerson {
-            id,
+            ids: vec![id],
             joints: joints.zip(person.counts.iter().copied()).collect(),
             unsure: runfiles::Unsure {
                 left_out: person.n_unsure,

@@ -16,7 +16,7 @@ pub fn draw(canvas: &mut Canvas, trials: &[Trial], slot: usize, view: &ViewCamer
     for trial in trials {
         let at = person(canvas, trial, slot, view);
         if let Some([x, y]) = at.filter(|_| trials.len() > 1) {
-            canvas.label([x, y], &trial.person.to_string(), CENTRE);
+            canvas.label([x, y], &trial.id().to_string(), CENTRE);
         }
     }
     let Some(trial) = best(trials, slot) else {
@@ -155,7 +155,7 @@ mod tests {
     #[test]
     fn everybody_is_drawn_and_the_status_is_that_of_whoever_is_there() {
         let mut pair = [walker(2), walker(2)];
-        pair[1].person = 7;
+        pair[1].ids = vec![7];
         for point in pair[1].slots[0].points.iter_mut().flatten() {
             point.in_world.x += 0.6;
         }
@@ -167,7 +167,7 @@ mod tests {
         };
         assert!(lit(&pair, 0) > lit(&pair[..1], 0) + 500);
         assert!(lit(&pair, 1) > lit(&pair[..1], 1) + 500);
-        assert_eq!(best(&pair, 1).map(|trial| trial.person), Some(7));
+        assert_eq!(best(&pair, 1).map(Trial::id), Some(7));
     }
 
     #[test]

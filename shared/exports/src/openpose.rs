@@ -15,7 +15,7 @@ pub const SUFFIX: &str = "_keypoints.json";
 
 /// The file of a view and a frame; whoever was not found is not in it. `person_id` is -1 in a run of one person.
 pub fn frame(trials: &[Trial], slot: usize, view: &ViewCamera) -> String {
-    let id = |trial: &Trial| (trials.len() > 1).then_some(trial.person);
+    let id = |trial: &Trial| (trials.len() > 1).then_some(trial.id());
     let people = trials
         .iter()
         .filter_map(|trial| person(trial, id(trial), slot, view));
@@ -115,7 +115,7 @@ mod tests {
     fn of_several_people_each_who_is_seen_has_the_own_number() {
         let view = camera();
         let [one, mut other] = [walker(3), walker(3)];
-        other.person = 7;
+        other.ids = vec![7];
         for point in other.slots.iter_mut().flat_map(|slot| &mut slot.points) {
             point.as_mut().unwrap().in_world.x += 0.3;
         }

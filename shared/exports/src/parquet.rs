@@ -17,7 +17,7 @@ use crate::{Point, Trial};
 const SCHEMA: &str = "message pose3d {
     REQUIRED INT64 frame;
     OPTIONAL DOUBLE time_s;
-    REQUIRED INT64 person;
+    OPTIONAL INT64 person;
     REQUIRED BYTE_ARRAY joint (UTF8);
     OPTIONAL DOUBLE x_m;
     OPTIONAL DOUBLE y_m;
@@ -64,8 +64,13 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
             .collect();
         column::<Int64Type, _>(&mut group, &frames, None)?;
         numbers(&mut group, places.iter().map(|it| trial.time_s(it.0)))?;
-        let person = i64::try_from(trial.person).unwrap_or(i64::MAX);
-        column::<Int64Type, _>(&mut group, &vec![person; places.len()], None)?;
+        let ids = || places.iter().map(|place| trial.id_at(place.0));
+        let known: Vec<i64> = ids()
+            .flatten()
+            .map(|id| i64::try_from(id).unwrap_or(i64::MAX))
+            .collect();
+        let levels: Vec<i16> = ids().map(|id| i16::from(id.is_some())).collect();
+        column::<Int64Type, _>(&mut group, &known, Some(&levels))?;
         texts(&mut group, places.iter().map(|it| names[it.1].clone()))?;
         let point = |it: &(usize, usize)| trial.point(it.0, it.1);
         for axis in 0..3 {

@@ -52,7 +52,7 @@ pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
         let mut row = vec![
             trial.frame(slot).to_string(),
             cell(trial.time_s(slot)),
-            trial.person.to_string(),
+            person(trial, slot),
             status(trial, slot).to_owned(),
         ];
         row.extend(trial.points(slot).flat_map(place));
@@ -66,9 +66,10 @@ pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
 pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut table = csv::Writer::from_writer(out);
     table.write_record(LONG)?;
-    let (names, person) = (trial.written_names(), trial.person.to_string());
+    let names = trial.written_names();
     for slot in 0..trial.slots.len() {
         let [frame, time_s] = [trial.frame(slot).to_string(), cell(trial.time_s(slot))];
+        let person = person(trial, slot);
         for (nth, name) in names.iter().enumerate() {
             let point = trial.point(slot, nth);
             let mut row = vec![frame.clone(), time_s.clone(), person.clone(), name.clone()];
@@ -82,6 +83,12 @@ pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     }
     table.flush()?;
     Ok(Notes::new())
+}
+
+/// Identity of the person; empty where it is not known.
+fn person(trial: &Trial, slot: usize) -> String {
+    let id = trial.id_at(slot);
+    id.map_or(String::new(), |id| id.to_string())
 }
 
 /// What became of a frame.

@@ -54,6 +54,8 @@ pub struct Gap(pub Box<str>);
 /// A place on the grid.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Slot {
+    /// Identity of whom the points are of; `None` where nobody is.
+    pub person: Option<u64>,
     /// `ok`, or why there is no skeleton; empty where the run left no line.
     pub status: Box<str>,
     /// Joints, then extra keypoints; empty where there is no result.
@@ -65,8 +67,9 @@ pub struct Slot {
 pub struct Trial {
     /// What the files call the run.
     pub name: String,
-    /// Identity of the person within the run.
-    pub person: u64,
+    /// Identities of the person within the run, ascending: more than one where never two people were there, and whoever was followed had
+    /// one after the other.
+    pub ids: Vec<u64>,
     /// What the files call the points.
     pub naming: Naming,
     /// The joints.
@@ -107,6 +110,17 @@ impl Trial {
     pub fn labels(&self) -> Vec<String> {
         let names = self.written_names().into_iter();
         names.map(|it| it.replace(' ', "_")).collect()
+    }
+
+    /// The lowest identity of the person.
+    pub fn id(&self) -> u64 {
+        self.ids.first().copied().unwrap_or(0)
+    }
+
+    /// Identity of the person at a place; `None` where that is not known.
+    pub fn id_at(&self, slot: usize) -> Option<u64> {
+        let only = self.ids.first().filter(|_| self.ids.len() == 1);
+        self.slots[slot].person.or(only.copied())
     }
 
     /// How many points a place has.
@@ -246,6 +260,7 @@ impl Gathering {
         for person in &line.people {
             self.know(person)?;
             let slot = Slot {
+                person: Some(person.id),
                 status: person.status.as_str().into(),
                 points: self.points(person),
             };
@@ -342,7 +357,8 @@ impl Gathering {
         self.frames.len()
     }
 
-    /// The trials, one for each person who has a point in any frame, by ascending identity.
+    /// The trials, one for each person who has a point in any frame, by ascending identity. Where never two people are in a frame, there is
+    /// one trial: the person who is followed gets another identity after a gap or a jump.
     ///
     /// * `rate_hz`: frames of the footage per second, where no line has a time.
     ///
@@ -369,7 +385,7 @@ impl Gathering {
         let n_irregular = footage_hz.map_or(0, |rate_hz| irregular(&self.frames, rate_hz, step));
         let empty = Trial {
             name: name.to_owned(),
-            person: 0,
+            ids: Vec::new(),
             naming: Naming::default(),
             joints,
             extras: core::mem::take(&mut self.extras),
@@ -389,20 +405,36 @@ impl Gathering {
         if people.is_empty() {
             return Err(TrialError::NoPoint { frames: n_lines });
         }
-        let people = people.into_iter();
-        Ok(people
-            .map(|person| self.trial(empty.clone(), person))
+        let people: Vec<u64> = people.into_iter().collect();
+        let is_one = self.frames.iter().all(|line| line.people.len() < 2);
+        let groups: Vec<Vec<u64>> = if is_one {
+            vec![people]
+        } else {
+            people.into_iter().map(|person| vec![person]).collect()
+        };
+        let groups = groups.into_iter();
+        Ok(groups
+            .map(|ids| {
+                let trial = Trial {
+                    ids,
+                    ..empty.clone()
+                };
+                self.trial(trial, is_one)
+            })
             .collect())
     }
 
-    /// The trial of a person.
-    fn trial(&mut self, mut trial: Trial, person: u64) -> Trial {
-        trial.person = person;
+    /// Puts a person in its places.
+    ///
+    /// * `is_one`: never two are there, so that whoever is there is the one.
+    fn trial(&mut self, mut trial: Trial, is_one: bool) -> Trial {
         let n_points = trial.n_points();
         for line in &mut self.frames {
-            let at = line.people.iter().position(|listed| listed.0 == person);
+            let mut people = line.people.iter();
+            let at = people.position(|(person, _)| is_one || *person == trial.id());
             let mut slot = at.map_or_else(
                 || Slot {
+                    person: None,
                     status: line.status.clone(),
                     points: Vec::new(),
                 },

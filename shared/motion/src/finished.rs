@@ -146,7 +146,7 @@ fn person_report(person: &Person, frames: &[u64], found: &Report) -> SmoothedPer
     SmoothedPerson {
         bones: bones.collect(),
         frames_of_breaks: found.breaks.iter().map(|&at| frames[at]).collect(),
-        id: person.id,
+        ids: person.ids.clone(),
         joints: (0..person.recorded.joints.len()).map(joint).collect(),
         unsure: Unsure {
             exchanged,
@@ -168,7 +168,7 @@ fn doubts(run: &Run, report: &SmoothReport) -> Vec<String> {
         if report.people.len() == 1 {
             doubts.extend(own);
         } else {
-            doubts.extend(own.map(|doubt| format!("person {}: {doubt}", person.id)));
+            doubts.extend(own.map(|doubt| format!("person {:?}: {doubt}", person.ids)));
         }
     }
     doubts

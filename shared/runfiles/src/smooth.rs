@@ -39,8 +39,8 @@ pub struct SmoothedPerson {
     pub bones: BTreeMap<String, f64>,
     /// Frames in which somebody else begins: nothing was smoothed across.
     pub frames_of_breaks: Vec<u64>,
-    /// Identity within the run.
-    pub id: u64,
+    /// Identities within the run: more than one where never two people were there, and whoever was followed had one after the other.
+    pub ids: Vec<u64>,
     /// Every joint and keypoint, by name.
     pub joints: BTreeMap<String, SmoothedJoint>,
     /// Frames whose sides were not certain.

@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         output::message(format_args!(
             "{} people are in the run, one in the truth: compared is person {}",
             run.people.len(),
-            first.id
+            first.ids[0]
         ));
     }
     let settings = finished::Settings::default();

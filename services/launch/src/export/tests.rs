@@ -164,12 +164,16 @@ fn each_of_several_people_has_a_file_and_one_alone_the_simple_name() {
     let people = manifest["people"].as_array().unwrap();
     let told = |person: &Value| {
         let frames = person["frames_with_points"].clone();
-        (person["id"].clone(), frames, person["gaps"]["head"].clone())
+        (
+            person["ids"].clone(),
+            frames,
+            person["gaps"]["head"].clone(),
+        )
     };
     let told: Vec<_> = people.iter().map(told).collect();
     let expected = [
-        (json!(1), json!(2), json!([[1, 1], [3, 3]])),
-        (json!(4), json!(3), json!([[3, 3]])),
+        (json!([1]), json!(2), json!([[1, 1], [3, 3]])),
+        (json!([4]), json!(3), json!([[3, 3]])),
     ];
     assert_eq!(told, expected);
     let alone = line(0, &[]) + &line(1, &[person(4, 4.0)]);

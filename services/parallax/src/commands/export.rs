@@ -34,10 +34,10 @@ holds. Frames stand on the grid of the frame rate; frames that were dropped are 
 of what was written, with the gaps of every joint. Files take their names when they are whole.
 
 A run of several people has a file for each in every format of one file: NAME-person2.trc for the person with id 2. Keypoints and videos \
-hold everybody.
+hold everybody. Where never two people are in a frame, the files have whoever was followed, and `ids` says who.
 
 With --json one object, that of NAME.export.json: {\"schema_version\", \"source\", \"trajectories\", \"frames\", \"first_frame\", \
-\"frame_step\", \"rate_hz\", \"irregular_times\", \"repeated_frames\", \"up_in_world\", \"points\", \"people\": [{\"id\", \
+\"frame_step\", \"rate_hz\", \"irregular_times\", \"repeated_frames\", \"up_in_world\", \"points\", \"people\": [{\"ids\", \
 \"frames_with_points\", \"gaps\", \"filled\"}], \"flaws\", \"files\": [{\"format\", \"path\", \"unit\", \"axes\", \"gaps\", \"uncertainty\", \"notes\"}]}.
 
 Exit codes: 0 done; 2 the command line is wrong, or a file exists; 4 the run cannot be read, does not have what a format needs, \
@@ -209,9 +209,13 @@ fn beside(source: &Path) -> PathBuf {
 /// Who has joints in how many frames.
 fn found(trials: &[Trial]) -> String {
     if let [only] = trials {
-        return format!("{} of them have joints", only.n_with_points());
+        let found = format!("{} of them have joints", only.n_with_points());
+        return match &only.ids[..] {
+            [_] => found,
+            ids => format!("{found}, of who was followed one after the other: people {ids:?}"),
+        };
     }
-    let one = |trial: &Trial| format!("person {} in {}", trial.person, trial.n_with_points());
+    let one = |trial: &Trial| format!("person {} in {}", trial.id(), trial.n_with_points());
     let people: Vec<String> = trials.iter().map(one).collect();
     format!("{} people have joints: {}", trials.len(), people.join(", "))
 }

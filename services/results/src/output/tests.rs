@@ -239,6 +239,6 @@ fn files_of_everybody_have_everybody_and_those_of_one_who_is_followed() {
     );
     let report = SmoothReport::parse(&text(&dir, SmoothReport::FILE)).unwrap();
     let people = report.people.iter();
-    let measured = people.map(|person| (person.id, person.joints["head"].measured));
+    let measured = people.map(|person| (person.ids[0], person.joints["head"].measured));
     assert_eq!(measured.collect::<Vec<_>>(), [(3, 3), (8, 3)]);
 }

@@ -37,7 +37,7 @@ fn every_person_has_a_trial_and_all_have_the_same_places() {
         line
     });
     let [one, other] = <[Trial; 2]>::try_from(people(&lines, None).unwrap()).unwrap();
-    assert_eq!((one.person, other.person), (1, 7));
+    assert_eq!((one.id(), other.id()), (1, 7));
     let found = |trial: &Trial| -> Vec<String> {
         let slots = trial.slots.iter();
         slots
@@ -56,6 +56,33 @@ fn every_person_has_a_trial_and_all_have_the_same_places() {
         (one.gaps(0), other.gaps(0)),
         (vec![[1, 1], [3, 3]], vec![[0, 0], [3, 3]])
     );
+}
+
+#[test]
+fn one_after_the_other_is_one_trial_with_both_identities() {
+    let lines = [0, 1, 2].map(|frame| {
+        let mut line = line(frame, Some(30.0));
+        match frame {
+            1 => line.people.clear(),
+            _ => line.people[0].id = 4 - frame,
+        }
+        line
+    });
+    let [trial] = <[Trial; 1]>::try_from(people(&lines, None).unwrap()).unwrap();
+    assert_eq!((trial.ids.as_slice(), trial.id()), (&[2, 4][..], 2));
+    assert_eq!(trial.n_with_points(), 2);
+    assert_eq!(
+        [0, 1, 2].map(|slot| trial.id_at(slot)),
+        [Some(4), None, Some(2)]
+    );
+    let mut table = Vec::new();
+    crate::tables::wide(&trial, &mut table).unwrap();
+    let table = String::from_utf8(table).unwrap();
+    let rows = table
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').nth(2).unwrap());
+    assert_eq!(rows.collect::<Vec<_>>(), ["4", "", "2"]);
 }
 
 #[test]

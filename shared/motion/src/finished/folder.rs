@@ -1,6 +1,6 @@
 //! What a run left, as people over time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
@@ -28,8 +28,11 @@ pub struct Run {
 /// A person of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
-    /// Identity within the run.
-    pub id: u64,
+    /// Identities within the run, ascending: more than one where never two people were there, and whoever was followed had one after the
+    /// other.
+    pub ids: Vec<u64>,
+    /// Identity at every instant; where the person is not there, the one before.
+    pub id_at: Vec<u64>,
     /// The measured joints.
     pub recorded: Recorded,
     /// The joints before this are joints, the others extra keypoints.
@@ -39,6 +42,8 @@ pub struct Person {
 /// A person on the way into a [`Person`].
 #[derive(Debug, Default)]
 struct Gathered {
+    ids: BTreeSet<u64>,
+    id_at: Vec<u64>,
     sides: Vec<Sides>,
     joints: Vec<Joint>,
     keypoints: Vec<Joint>,
@@ -47,13 +52,19 @@ struct Gathered {
 impl Gathered {
     /// Adds a line.
     fn add(&mut self, at: usize, person: &PersonLine) {
+        let before = self.id_at.last().copied();
+        self.id_at.resize(at, before.unwrap_or(person.id));
+        self.id_at.push(person.id);
+        self.ids.insert(person.id);
         self.sides.resize(at, Sides::default());
         self.sides.push(lines::sides(person));
         add(&mut self.joints, at, &person.joints);
         add(&mut self.keypoints, at, &person.keypoints);
     }
 
-    fn finish(mut self, id: u64, times: &[f64]) -> Person {
+    fn finish(mut self, times: &[f64]) -> Person {
+        let last = self.id_at.last().copied();
+        self.id_at.resize(times.len(), last.unwrap_or(0));
         let n_joints = self.joints.len();
         self.joints.append(&mut self.keypoints);
         for joint in &mut self.joints {
@@ -61,7 +72,8 @@ impl Gathered {
         }
         self.sides.resize(times.len(), Sides::default());
         Person {
-            id,
+            ids: self.ids.into_iter().collect(),
+            id_at: self.id_at,
             recorded: Recorded {
                 times: times.to_vec(),
                 sides: self.sides,
@@ -139,6 +151,8 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
 pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
     let (mut times, mut frames) = (Vec::new(), Vec::new());
     let mut people: BTreeMap<u64, Gathered> = BTreeMap::new();
+    // Whoever is followed: where never two people are there, it is one person, who gets another identity after a gap or a jump.
+    let (mut one, mut is_one) = (Gathered::default(), true);
     let path = folder.join(FrameLine::FILE);
     let cut = read_lines(folder, |nth, line| {
         let time_s = rate_hz.map_or(line.time_s, |rate| Some(line.frame as f64 / rate));
@@ -158,12 +172,14 @@ pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
             let hint = "lines must be in the order of their times; --rate-hz takes the times from the numbers of the frames";
             return Err(Failure::new(ExitKind::Input, what).with_hint(hint));
         }
-        for person in &line.people {
-            people
-                .entry(person.id)
-                .or_default()
-                .add(times.len(), person);
+        for (nth, person) in line.people.iter().enumerate() {
+            if nth == 0 {
+                one.add(times.len(), person);
+            }
+            let own = people.entry(person.id).or_default();
+            own.add(times.len(), person);
         }
+        is_one &= line.people.len() < 2;
         times.push(time_s);
         frames.push(line.frame);
         Ok(())
@@ -172,11 +188,14 @@ pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
         let what = format!("{} has no line", path.display());
         return Err(Failure::new(ExitKind::Input, what));
     }
+    let people: Vec<Gathered> = match is_one {
+        true if people.is_empty() => Vec::new(),
+        true => vec![one],
+        false => people.into_values().collect(),
+    };
     let people = people.into_iter();
     Ok(Run {
-        people: people
-            .map(|(id, gathered)| gathered.finish(id, &times))
-            .collect(),
+        people: people.map(|person| person.finish(&times)).collect(),
         times,
         frames,
         cut,

@@ -56,18 +56,22 @@ fn smoothed_line(mut line: FrameLine, at: usize, run: &Run, motions: &[Motion]) 
         let here = joints.enumerate().filter_map(|(nth, (joint, track))| {
             Some((joint.name.as_str(), nth >= person.n_joints, track.get(at)?))
         });
-        lines::smoothed(person.id, measured, here)
+        lines::smoothed(person.id_at[at], measured, here)
     };
     let measured = core::mem::take(&mut line.people);
     let ids: Vec<u64> = measured.iter().map(|person| person.id).collect();
-    let known = |id: u64| run.people.iter().position(|person| person.id == id);
+    let known = |id: u64| {
+        run.people
+            .iter()
+            .position(|person| person.ids.contains(&id))
+    };
     let there = measured.into_iter().filter_map(|person| {
         let nth = known(person.id)?;
         smoothed(&run.people[nth], &motions[nth], Some(person))
     });
     let everybody = run.people.iter().zip(motions);
     let filled = everybody
-        .filter(|(person, _)| !ids.contains(&person.id))
+        .filter(|(person, _)| !person.ids.iter().any(|id| ids.contains(id)))
         .filter_map(|(person, motion)| smoothed(person, motion, None));
     let people = there.chain(filled).take(MOST_PEOPLE).collect();
     lines::with_people(line, people)
@@ -101,7 +105,7 @@ fn write_angles_at(
         .filter_map(|(role, track)| Some((role?, track[at].ok()?)))
         .collect();
     let is_known = |role: &Role| roles().any(|known| known == Some(*role));
-    let (frame, time_s, id) = (run.frames[at], run.times[at], person.id);
+    let (frame, time_s, id) = (run.frames[at], run.times[at], person.id_at[at]);
     for (angle, value) in angles::angles(&joints, up) {
         if !angle.roles().iter().all(is_known) {
             continue;
