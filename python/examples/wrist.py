@@ -15,7 +15,10 @@ def main():
             now = time.monotonic()
             longest = max(longest, now - (last or now))
             n, missed, last = n + 1, missed + moment.n_missed, now
-            wrist = moment.skeleton.joint(joint)
+            if moment.followed is None:
+                print(f"{moment.frame:6d}  nobody: {moment.status}", flush=True)
+                continue
+            wrist = moment.followed.joint(joint)
             if wrist.position is None:
                 print(f"{moment.frame:6d}  {joint}: {wrist.reason}", flush=True)
                 continue

@@ -4,19 +4,21 @@
 
     with parallax_client.connect("demo") as client:
         for moment in client.moments(patience=5):
-            wrist = moment.skeleton.joint("right wrist")
-            print(moment.frame, wrist.position, wrist.deviation, wrist.reason)
+            for person in moment.people:
+                wrist = person.joint("right wrist")
+                print(moment.frame, person.id, wrist.position, wrist.deviation, wrist.reason)
 
 Live messages need the package `iceoryx2` of the version that the deployment was built with; folders do not.
 """
 
 from .errors import ClientError, Full, NotRunning, VersionMismatch
-from .files import Run, read_folder, read_recording
+from .files import Person, Run, read_folder, read_recording
 from .layout import LIMITS, STATUSES, TOPICS, dtype, reason
 from .live import Client, Joint, Moment, Picture, Skeleton, connect, running_deployments
 
 __all__ = [
-    "Client", "ClientError", "Full", "Joint", "LIMITS", "Moment", "NotRunning", "Picture", "Run", "STATUSES",
+    "Client", "ClientError", "Full", "Joint", "LIMITS", "Moment", "NotRunning", "Person", "Picture", "Run",
+    "STATUSES",
     "Skeleton", "TOPICS", "VersionMismatch", "connect", "dtype", "read_folder", "read_recording", "reason", "running_deployments",
 ]
 __version__ = "0.1.0"

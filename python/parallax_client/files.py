@@ -8,58 +8,45 @@ import numpy as np
 from . import layout
 from .errors import ClientError, VersionMismatch
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Version of the files of a run that this package reads."""
 
 
-class Run:
-    """A finished run.
+class Person:
+    """One person of a finished run.
 
-    frames      numbers of the frames, [frame]
-    time_s      their times in the footage, NaN where no frame rate is known, [frame]
-    status      "ok", or why there is no skeleton, or "no result", [frame]
+    id          identity within the run
+    status      "ok", or why there is no skeleton, None in frames without the person, [frame]
+    sides       "sure", "unsure" or "as-seen", None in frames without the person, [frame]
     joints      names of the joints
     positions   metres in the world of the calibration, NaN where there is none, [frame, joint, axis]
     covariance  square metres, NaN where there is no position, [frame, joint, axis, axis]
     reprojection_px  NaN where there is no position, [frame, joint]
     n_views     views that the joint was located with, [frame, joint]
-    summary     the contents of summary.json
     """
 
-    def __init__(self, folder):
-        folder = pathlib.Path(folder)
-        if not folder.is_dir():
-            raise ClientError(f"{folder} is no folder")
-        self.folder = folder
-        self.summary = self._summary()
-        lines = self._lines()
-        known = layout.JOINT_SETS.get(self.summary.get("joints"))
-        self.joints = list(known or _names(lines))
-        n, m = len(lines), len(self.joints)
-        self.frames = np.array([it["frame"] for it in lines], dtype=np.int64)
-        time = [it.get("time_s") for it in lines]
-        self.time_s = np.array([np.nan if it is None else it for it in time], dtype=float)
-        self.status = np.array([it["status"] for it in lines], dtype=object)
-        self.reason = np.array([it.get("reason") for it in lines], dtype=object)
-        self.sides = np.array([it.get("sides") for it in lines], dtype=object)
+    def __init__(self, identity, joints, n_frames):
+        n, m = n_frames, len(joints)
+        self.id, self.joints = identity, joints
+        self.status = np.full(n, None, dtype=object)
+        self.sides = np.full(n, None, dtype=object)
         self.positions = np.full((n, m, 3), np.nan)
         self.covariance = np.full((n, m, 3, 3), np.nan)
         self.reprojection_px = np.full((n, m), np.nan)
         self.n_views = np.zeros((n, m), dtype=int)
-        number = {name: at for at, name in enumerate(self.joints)}
-        for row, line in enumerate(lines):
-            for name, joint in line["joints"].items():
-                self._put(row, number.get(name), joint)
 
-    def _put(self, row, at, joint):
-        if at is None or "position_m" not in joint:
-            return
-        self.positions[row, at] = joint["position_m"]
-        xx, xy, xz, yy, yz, zz = joint["covariance_m2"]
-        self.covariance[row, at] = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
-        reprojection = joint.get("reprojection_px")
-        self.reprojection_px[row, at] = np.nan if reprojection is None else reprojection
-        self.n_views[row, at] = len(joint["views"])
+    def _put(self, row, line):
+        self.status[row], self.sides[row] = line["status"], line.get("sides")
+        for name, joint in line["joints"].items():
+            if name not in self.joints or "position_m" not in joint:
+                continue
+            at = self.joints.index(name)
+            self.positions[row, at] = joint["position_m"]
+            xx, xy, xz, yy, yz, zz = joint["covariance_m2"]
+            self.covariance[row, at] = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+            reprojection = joint.get("reprojection_px")
+            self.reprojection_px[row, at] = np.nan if reprojection is None else reprojection
+            self.n_views[row, at] = len(joint["views"])
 
     @property
     def deviation(self):
@@ -72,20 +59,85 @@ class Run:
             raise KeyError(f"no joint {name!r}, but {', '.join(self.joints)}")
         return self.positions[:, self.joints.index(name)]
 
+
+class Run:
+    """A finished run.
+
+    frames      numbers of the frames, [frame]
+    time_s      their times in the footage, NaN where no frame rate is known, [frame]
+    status      "ok" if anybody has a skeleton, or why nobody has, or "no result", [frame]
+    reason      why there is no result, [frame]
+    joints      names of the joints
+    people      every `Person` by identity
+    followed    a `Person` made of whoever is followed in each frame, who may be one after the other
+    summary     the contents of summary.json
+
+    Of a run in which never two people are in a frame, `positions`, `covariance`, `reprojection_px`, `n_views`, `deviation`, `sides` and
+    `joint()` are those of `followed`.
+    """
+
+    def __init__(self, folder):
+        folder = pathlib.Path(folder)
+        if not folder.is_dir():
+            raise ClientError(f"{folder} is no folder")
+        self.folder = folder
+        self.summary = self._summary()
+        lines = self._lines()
+        known = layout.JOINT_SETS.get(self.summary.get("joints"))
+        self.joints = list(known or _names(lines))
+        self.frames = np.array([it["frame"] for it in lines], dtype=np.int64)
+        time = [it.get("time_s") for it in lines]
+        self.time_s = np.array([np.nan if it is None else it for it in time], dtype=float)
+        self.status = np.array([it["status"] for it in lines], dtype=object)
+        self.reason = np.array([it.get("reason") for it in lines], dtype=object)
+        identities = sorted({person["id"] for line in lines for person in line["people"]})
+        self.people = {it: Person(it, self.joints, len(lines)) for it in identities}
+        self.followed = Person(None, self.joints, len(lines))
+        for row, line in enumerate(lines):
+            for person in line["people"]:
+                self.people[person["id"]]._put(row, person)
+            for person in line["people"][:1]:
+                self.followed._put(row, person)
+        self._is_one = all(len(line["people"]) < 2 for line in lines)
+
+    @property
+    def only(self):
+        """`followed`, of a run in which never two people are in a frame. Several are an error."""
+        if not self._is_one:
+            identities = ", ".join(str(it) for it in self.people)
+            raise ClientError(f"{self.folder} has {len(self.people)} people: take one of `people`: {identities}")
+        return self.followed
+
+    positions = property(lambda self: self.only.positions)
+    covariance = property(lambda self: self.only.covariance)
+    reprojection_px = property(lambda self: self.only.reprojection_px)
+    n_views = property(lambda self: self.only.n_views)
+    deviation = property(lambda self: self.only.deviation)
+    sides = property(lambda self: self.only.sides)
+
+    def joint(self, name):
+        """Positions of one joint of the only person, [frame, axis] in metres."""
+        return self.only.joint(name)
+
     def to_pandas(self):
-        """A table with one row for every frame and joint."""
+        """A table with one row for every person, frame and joint."""
         try:
             import pandas
         except ImportError:
             raise ClientError("tables need the package pandas: `pip install pandas`") from None
-        n, m = self.reprojection_px.shape
-        return pandas.DataFrame({
-            "frame": np.repeat(self.frames, m), "time_s": np.repeat(self.time_s, m),
-            "status": np.repeat(self.status, m), "joint": self.joints * n,
-            "x_m": self.positions[..., 0].ravel(), "y_m": self.positions[..., 1].ravel(),
-            "z_m": self.positions[..., 2].ravel(), "deviation_m": self.deviation.ravel(),
-            "reprojection_px": self.reprojection_px.ravel(), "n_views": self.n_views.ravel(),
-        })
+        n, m = len(self.frames), len(self.joints)
+
+        def rows(person):
+            return pandas.DataFrame({
+                "frame": np.repeat(self.frames, m), "time_s": np.repeat(self.time_s, m), "person": person.id,
+                "status": np.repeat(self.status, m), "joint": self.joints * n,
+                "x_m": person.positions[..., 0].ravel(), "y_m": person.positions[..., 1].ravel(),
+                "z_m": person.positions[..., 2].ravel(), "deviation_m": person.deviation.ravel(),
+                "reprojection_px": person.reprojection_px.ravel(), "n_views": person.n_views.ravel(),
+            })
+
+        people = list(self.people.values()) or [self.followed]
+        return pandas.concat([rows(it) for it in people], ignore_index=True)
 
     def _summary(self):
         path = self.folder / "summary.json"
@@ -107,9 +159,9 @@ class Run:
         with path.open(encoding="utf-8") as file:
             for nth, text in enumerate(file, 1):
                 line = _json(f"{path}, line {nth}", text)
-                missing = {"frame", "status", "joints"} - set(line if isinstance(line, dict) else ())
-                if missing:
-                    raise ClientError(f"{path}, line {nth}: no {', '.join(sorted(missing))}")
+                problem = _problem(line)
+                if problem:
+                    raise ClientError(f"{path}, line {nth}: {problem}")
                 lines.append(line)
         return lines
 
@@ -121,11 +173,28 @@ def _json(where, text):
         raise ClientError(f"{where}: {error}") from None
 
 
+def _problem(line):
+    """What is wrong with a line; None if nothing is."""
+    lacks = {"frame", "status", "people"} - set(line if isinstance(line, dict) else ())
+    if lacks:
+        return f"no {', '.join(sorted(lacks))}"
+    people = line["people"]
+    if len(people) > layout.LIMITS["MAX_PEOPLE"]:
+        return f"{len(people)} people, a frame has at most {layout.LIMITS['MAX_PEOPLE']}"
+    for nth, person in enumerate(people):
+        lacks = {"id", "status", "joints"} - set(person if isinstance(person, dict) else ())
+        if lacks:
+            return f"person {nth} of the line has no {', '.join(sorted(lacks))}"
+        if any(it["id"] == person["id"] for it in people[:nth]):
+            return f"two people with id {person['id']}, ids of a frame differ"
+    return None
+
+
 def _names(lines):
     """The names of joints, of a set that this package does not know."""
     names = []
-    for line in lines:
-        names.extend(it for it in line["joints"] if it not in names)
+    for person in (person for line in lines for person in line["people"]):
+        names.extend(it for it in person["joints"] if it not in names)
     return names
 
 
@@ -134,10 +203,10 @@ def read_folder(folder):
     return Run(folder)
 
 
-def read_recording(file, about="pose3d"):
+def read_recording(file, about="skeletons"):
     """The messages of one kind in a recording (MCAP), one after the other, as pairs of its topic and the message.
 
-    about: "pose3d", "view-pose", "pair-pose", "view-quality" or "health". Needs the package `mcap`.
+    about: "skeletons", "people", "view-pose", "pair-pose", "view-quality" or "health". Needs the package `mcap`.
     """
     try:
         from mcap.reader import make_reader
@@ -154,6 +223,9 @@ def read_recording(file, about="pose3d"):
                 continue
             # The head of CDR has four bytes; a struct without padding has the layout that CDR asks for.
             data = message.data[4:]
+            if about == "skeletons" and len(data) >= dtype.fields["people"][1]:
+                # A recording holds the people that there are and no more.
+                data = data.ljust(dtype.itemsize, b"\0")
             if len(data) < dtype.itemsize:
                 raise ClientError(f"{file}: a message of {channel.topic} has {len(data)} bytes, {dtype.itemsize} are meant")
             yield channel.topic, np.frombuffer(data, dtype, count=1)[0]

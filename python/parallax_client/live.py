@@ -32,10 +32,15 @@ class Joint(collections.namedtuple("Joint", "name position covariance deviation 
 
 
 class Skeleton:
-    """The skeleton of one frame: a copy of the message `Pose3d`, which is `message`."""
+    """One person of a frame: a copy of the struct `SkeletonMessage`, which is `message`."""
 
     def __init__(self, message, running):
         self.message, self._running = message, running
+
+    @property
+    def id(self):
+        """Identity within the run, from 1."""
+        return int(self.message["id"])
 
     @property
     def status(self):
@@ -110,15 +115,33 @@ class Picture:
 class Moment:
     """Everything about one frame that was asked for and is there.
 
-    `skeleton` is a `Skeleton`, `poses` and `pictures` are dictionaries by camera, `n_missed` is how many frames lie
-    between this one and the one given before.
+    `skeletons` is a copy of the message `Skeletons`, `people` are its people, each a `Skeleton`, the one who is followed first; `poses`
+    and `pictures` are dictionaries by camera, `n_missed` is how many frames lie between this one and the one given before.
     """
 
     def __init__(self, session, frame):
         self.session, self.frame, self.captured_at_nanos = session, frame, None
-        self.skeleton, self.poses, self.pictures = None, {}, {}
+        self.skeletons, self.people, self.poses, self.pictures = None, [], {}, {}
         self.n_missed, self.is_complete = 0, False
         self._since = time.monotonic()
+
+    @property
+    def status(self):
+        """"ok" if anybody has a skeleton, or why nobody has; None if skeletons were not asked for."""
+        return None if self.skeletons is None else layout.reason(self.skeletons["status"])
+
+    @property
+    def followed(self):
+        """The person who is followed; None if there is nobody."""
+        return self.people[0] if self.people else None
+
+    def person(self, identity):
+        """The person of an identity; None if it is not there."""
+        return next((it for it in self.people if it.id == identity), None)
+
+    def _set(self, skeletons, running):
+        self.skeletons = skeletons
+        self.people = [Skeleton(it, running) for it in skeletons["people"][: int(skeletons["n_people"])]]
 
 
 def connect(name, *, skeletons=True, poses=False, pictures=False, cameras=None, every=False, most=256, wait=False):
@@ -183,9 +206,9 @@ class Client:
         port = self._in_place("frame", camera)
         return self._newest(port, lambda it: Picture(it.message, it.array, it), patience)
 
-    def latest_skeleton(self, patience=1.0):
-        """The newest message `Pose3d` as a `Sample` in place, to be used in a `with` statement; None if none came in time."""
-        return self._newest(self._in_place("pose3d", None), lambda it: it, patience)
+    def latest_skeletons(self, patience=1.0):
+        """The newest message `Skeletons` as a `Sample` in place, to be used in a `with` statement; None if none came in time."""
+        return self._newest(self._in_place("skeletons", None), lambda it: it, patience)
 
     def _in_place(self, about, camera):
         run = self._run
@@ -307,18 +330,24 @@ def _is_ours(sample, run):
     if sample.array is not None:
         n = int(message["width"]) * int(message["height"]) * 3
         return int(message["status"]) != layout.OK or (n > 0 and n == len(sample.array))
-    if "n_joints" in message.dtype.names:
-        return _is_skeleton(message, run.guest.running)
+    if "n_people" in message.dtype.names:
+        return _are_skeletons(message, run.guest.running)
     return int(message["n_candidates"]) <= layout.LIMITS["MAX_CANDIDATES"]
 
 
-def _is_skeleton(message, running):
-    n_joints, n_views = int(message["n_joints"]), int(message["n_views"])
-    fits = n_joints == len(running["joints"]) and n_views == len(running["views"])
-    is_empty = n_joints == n_views == 0 and int(message["status"]) != layout.OK
-    if not (fits or is_empty):
+def _are_skeletons(message, running):
+    n_people = int(message["n_people"])
+    if n_people > layout.LIMITS["MAX_PEOPLE"]:
         return False
-    joints = message["joints"][:n_joints]
+    people = message["people"][:n_people]
+    return len(set(people["id"].tolist())) == n_people and all(_is_skeleton(it, running) for it in people)
+
+
+def _is_skeleton(person, running):
+    n_joints, n_views = int(person["n_joints"]), int(person["n_views"])
+    if n_joints != len(running["joints"]) or n_views != len(running["views"]):
+        return False
+    joints = person["joints"][:n_joints]
     found = joints[joints["status"] == layout.OK]
     return bool(np.isfinite(found["in_world"]).all() and np.isfinite(found["covariance"]).all())
 
@@ -331,7 +360,7 @@ class _Run:
         skeletons, poses, pictures = wish
         names = [it["name"] for it in guest.running["views"]] if cameras is None else list(cameras)
         views = {name: _number(guest, name) for name in names} if poses or pictures else {}
-        self._skeletons = guest.port("pose3d") if skeletons else None
+        self._skeletons = guest.port("skeletons") if skeletons else None
         self._poses = {name: guest.port("view-pose", view) for name, view in views.items()} if poses else {}
         self._pictures = {name: guest.port("frame", view) for name, view in views.items()} if pictures else {}
         self._pending, self._next = {}, 0
@@ -341,7 +370,7 @@ class _Run:
         self.guest.close()
 
     def turn(self):
-        """The moments that are whole, in order. A skeleton is the last that is sent about a frame."""
+        """The moments that are whole, in order. Skeletons are the last that is sent about a frame."""
         skeletons = list(self._drain(self._skeletons))
         for name, port in self._poses.items():
             for message, _ in self._drain(port):
@@ -351,8 +380,7 @@ class _Run:
                 picture = Picture(message, pixels)
                 self._put(message, lambda it, picture=picture, name=name: it.pictures.__setitem__(name, picture))
         for message, _ in skeletons:
-            skeleton = Skeleton(message, self.guest.running)
-            self._put(message, lambda it, skeleton=skeleton: setattr(it, "skeleton", skeleton))
+            self._put(message, lambda it, message=message: it._set(message, self.guest.running))
         return self._take()
 
     def _drain(self, port):
@@ -391,13 +419,13 @@ class _Run:
         for frame in sorted(it for it in self._pending if it < self._next):
             moment = self._pending.pop(frame)
             moment.is_complete = self._has_views(moment)
-            if moment.skeleton is not None or not self._wish[0]:
+            if moment.skeletons is not None or not self._wish[0]:
                 given.append(moment)
         return given
 
     def _is_over(self, moment):
         if self._wish[0]:
-            return moment.skeleton is not None
+            return moment.skeletons is not None
         return self._has_views(moment) or time.monotonic() - moment._since > 0.5
 
     def _has_views(self, moment):

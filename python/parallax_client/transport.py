@@ -137,7 +137,7 @@ class Guest:
         return place.supervisor(self._folder) != self.supervisor
 
     def port(self, about, whose=None):
-        """Subscribes to a topic: `port("frame", 0)`, `port("pose3d")`."""
+        """Subscribes to a topic: `port("frame", 0)`, `port("skeletons")`."""
         kind = layout.TOPICS[about]
         topic = kind["name"].replace("{}", str(whose))
         message, elements = kind["message"], kind["elements"]

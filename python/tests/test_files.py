@@ -8,11 +8,14 @@ import pytest
 from parallax_client import ClientError, VersionMismatch, read_folder
 
 
-def folder(path, version=1, joints="of-my-own"):
+def folder(path, version=2, joints="of-my-own", more=()):
     joint = {"position_m": [1, 2, 3], "covariance_m2": [1, 0, 0, 4, 0, 4], "reprojection_px": 1.5, "views": ["a", "b"]}
+    person = {"id": 1, "status": "ok", "sides": "sure", "joints": {"head": joint, "neck": {"status": "too few views"}}}
+    others = [{**person, "id": it, "joints": {"head": {**joint, "position_m": [it, 2, 3]}}} for it in more]
     lines = [
-        {"frame": 0, "time_s": 0.0, "status": "ok", "joints": {"head": joint, "neck": {"status": "too few views"}}},
-        {"frame": 1, "time_s": 0.5, "status": "no result", "reason": "dropped", "joints": {}},
+        {"frame": 0, "time_s": 0.0, "status": "ok", "people": [person]},
+        {"frame": 1, "time_s": 0.5, "status": "no result", "reason": "dropped", "people": []},
+        *({"frame": 2, "time_s": 1.0, "status": "ok", "people": [*others, person]} for _ in more[:1]),
     ]
     (path / "pose3d.jsonl").write_text("".join(json.dumps(it) + "\n" for it in lines))
     (path / "summary.json").write_text(json.dumps({"schema_version": version, "joints": joints}))
@@ -49,12 +52,30 @@ def test_what_is_wrong_with_a_folder_is_said(tmp_path):
     with pytest.raises(ClientError, match="no folder of a run"):
         read_folder(tmp_path)
     folder(tmp_path, version=7)
-    with pytest.raises(VersionMismatch, match="version 7.*version 1"):
+    with pytest.raises(VersionMismatch, match="version 7.*version 2"):
         read_folder(tmp_path)
     folder(tmp_path)
-    (tmp_path / "pose3d.jsonl").write_text('{"frame": 0, "status": "ok", "joints": {}}\n{"frame": 1, "sta')
+    (tmp_path / "pose3d.jsonl").write_text('{"frame": 0, "status": "ok", "people": []}\n{"frame": 1, "sta')
     with pytest.raises(ClientError, match="line 2"):
         read_folder(tmp_path)
     (tmp_path / "pose3d.jsonl").write_text('{"frame": 0}\n')
-    with pytest.raises(ClientError, match="no joints, status"):
+    with pytest.raises(ClientError, match="no people, status"):
         read_folder(tmp_path)
+    folder(tmp_path, more=range(2, 10))
+    with pytest.raises(ClientError, match="line 3: 9 people, a frame has at most 8"):
+        read_folder(tmp_path)
+    folder(tmp_path, more=[5, 5])
+    with pytest.raises(ClientError, match="line 3: two people with id 5"):
+        read_folder(tmp_path)
+
+
+def test_each_of_several_people_has_arrays_of_its_own(tmp_path):
+    run = read_folder(folder(tmp_path, more=[4]))
+    assert list(run.people) == [1, 4]
+    one, other = run.people.values()
+    assert one.joint("head")[:, 0].tolist()[::2] == [1, 1] and np.isnan(one.joint("head")[1]).all()
+    assert other.joint("head")[2].tolist() == [4, 2, 3] and np.isnan(other.positions[:2]).all()
+    assert other.status.tolist() == [None, None, "ok"] and one.sides.tolist() == ["sure", None, "sure"]
+    assert run.followed.joint("head")[2].tolist() == [4, 2, 3] and run.followed.id is None
+    with pytest.raises(ClientError, match="2 people: take one of `people`: 1, 4"):
+        run.positions

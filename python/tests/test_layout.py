@@ -57,15 +57,20 @@ def test_seats_are_limited_and_free_again(tmp_path, monkeypatch):
 
 
 def test_a_message_of_garbage_is_no_message():
-    from parallax_client.live import _is_skeleton
+    from parallax_client.live import _are_skeletons
 
     running = {"joints": ["a"] * 14, "views": [{"name": "x"}] * 4}
     random = np.random.default_rng(1)
     for _ in range(200):
-        message = random.integers(0, 256, dtype("Pose3d").itemsize, dtype=np.uint8).view(dtype("Pose3d"))[0]
-        assert not _is_skeleton(message, running)
-    message = np.zeros((), dtype("Pose3d"))
-    message["n_joints"], message["n_views"] = 14, 4
-    assert _is_skeleton(message, running)
-    message["joints"]["in_world"][3, 1] = np.nan
-    assert not _is_skeleton(message, running)
+        message = random.integers(0, 256, dtype("Skeletons").itemsize, dtype=np.uint8).view(dtype("Skeletons"))[0]
+        assert not _are_skeletons(message, running)
+    message = np.zeros((), dtype("Skeletons"))
+    assert _are_skeletons(message, running)
+    message["n_people"], message["people"]["n_joints"], message["people"]["n_views"] = 2, 14, 4
+    assert not _are_skeletons(message, running), "two people of one identity"
+    message["people"]["id"][:2] = 1, 2
+    assert _are_skeletons(message, running)
+    message["people"]["joints"]["in_world"][1, 3, 1] = np.nan
+    assert not _are_skeletons(message, running)
+    message["n_people"] = 9
+    assert not _are_skeletons(message, running)

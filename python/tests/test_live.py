@@ -34,12 +34,12 @@ def test_skeletons_poses_and_pictures_of_a_frame_come_together_and_a_process_tha
         parallax_client.connect("no-such-deployment")
     # Before it runs: the client joins it when it does.
     with parallax_client.connect(deployment.name, poses=True, pictures=True, every=True, wait=True) as client:
-        moment = next(it for it in client.moments(PATIENCE) if it.is_complete)
+        moment = next(it for it in client.moments(PATIENCE) if it.is_complete and it.people)
         assert set(moment.pictures) == set(moment.poses) == {it["name"] for it in client.running["views"]}
         for name, picture in moment.pictures.items():
             assert picture.frame == moment.frame and picture.pixels.shape == (240, 320, 3)
             assert int(moment.poses[name]["stamp"]["frame"]) == moment.frame
-        joints = moment.skeleton.joints()
+        joints = moment.followed.joints()
         assert len(joints) == 14
         for joint in joints.values():
             assert (joint.position is None) == (joint.reason is not None)
@@ -52,15 +52,15 @@ def test_skeletons_poses_and_pictures_of_a_frame_come_together_and_a_process_tha
             assert "shm" in mapping_of(picture.pixels) or ".data" in mapping_of(picture.pixels)
             kept = picture.pixels.copy()
         assert kept.mean() > 0
-        with client.latest_skeleton(PATIENCE) as sample:
-            assert np.isfinite(sample.message["joints"]["in_world"]).all()
+        with client.latest_skeletons(PATIENCE) as sample:
+            assert np.isfinite(sample.message["people"]["joints"]["in_world"]).all()
 
         # A process that is killed comes back without a word.
         pid = deployment.pids("triangulate")[0]
         os.kill(pid, signal.SIGKILL)
         killed = time.monotonic_ns()
         moment = next(it for it in client.moments(PATIENCE) if it.captured_at_nanos > killed)
-        assert int(moment.skeleton.message["stamp"]["epoch"]) == 1
+        assert int(moment.skeletons["stamp"]["epoch"]) == 1
         assert client.refused == 0
 
 

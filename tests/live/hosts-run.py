@@ -64,6 +64,11 @@ def lines(folder):
         return [json.loads(it) for it in file]
 
 
+def joints(line):
+    """Of the person who is followed; none in a frame with nobody."""
+    return line["people"][0]["joints"] if line["people"] else {}
+
+
 def position(joint):
     return joint.get("position_m")
 
@@ -74,7 +79,7 @@ def score(folder, truth):
     for line in lines(folder):
         true = truth[line["frame"]]
         for a, b in LIMBS:
-            got = [position(line["joints"].get(it, {})) for it in (a, b)]
+            got = [position(joints(line).get(it, {})) for it in (a, b)]
             if None in got:
                 continue
             limb = math.dist(true[a], true[b])

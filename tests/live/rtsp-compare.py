@@ -68,7 +68,8 @@ def skeletons(file):
     frames = {}
     for line in open(file):
         it = json.loads(line)
-        joints = it.get("joints") or {}
+        # Of the person who is followed.
+        joints = it["people"][0]["joints"] if it["people"] else {}
         frames[it["frame"]] = {n: joints[n]["position_m"] for n in LIMBS if (joints.get(n) or {}).get("position_m")}
     return frames
 

@@ -56,7 +56,8 @@ pub struct Comparison {
 /// The errors of a method at an instant, and the distances where it filled.
 type Tried = (Errors, Sum);
 
-/// Compares what a finished run measured, and every method, with the truth of a sequence.
+/// Compares what a finished run measured of the person with the lowest identity, and every method, with the truth of a sequence, which is of
+/// one person.
 ///
 /// * `truth`: what `parallax-lab eval` takes: a folder of `parallax-lab synth`, or a description.
 ///
@@ -68,8 +69,12 @@ pub fn against(
     settings: &finished::Settings,
     truth_file: &Path,
 ) -> Result<Comparison, Failure> {
-    let truth = truth(truth_file, &run.recorded, &run.frames)?;
-    Ok(compare(&run.recorded, settings, &truth))
+    let person = run
+        .people
+        .first()
+        .ok_or_else(|| Failure::new(ExitKind::Input, "the run has no person in any frame"))?;
+    let truth = truth(truth_file, &person.recorded, &run.frames)?;
+    Ok(compare(&person.recorded, settings, &truth))
 }
 
 /// The true joints of every instant, in the order of the joints; `None` where one is not known.

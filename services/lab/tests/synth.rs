@@ -131,8 +131,8 @@ fn a_run_among_others_follows_one_person_and_counts_all() {
     let mut n_with_others = 0;
     for line in text.lines() {
         let line: serde_json::Value = serde_json::from_str(line).unwrap();
-        n_with_others += usize::from(line["people"].as_u64() > Some(1));
-        let neck = &line["joints"]["neck"]["position_m"];
+        n_with_others += usize::from(line["seen"].as_u64() > Some(1));
+        let neck = &line["people"][0]["joints"]["neck"]["position_m"];
         let place = [0, 1, 2].map(|axis| neck[axis].as_f64().unwrap_or(f64::NAN));
         if let Some(before) = last.replace(place) {
             let moved: f64 = before.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum();

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use deployment::Deployment;
 use failure::{ExitKind, Failure, in_file};
-use runfiles::{FrameLine, LatencyReport, Line as _, RunSummary, SmoothLine, TimesLine, ViewLine};
+use runfiles::{FrameLine, LatencyReport, Line as _, RunSummary, TimesLine, ViewLine};
 use runtime::Namespace;
 use serde_json::Value;
 
@@ -19,7 +19,7 @@ const RESULTS: [&str; 10] = [
     TimesLine::FILE,
     LatencyReport::FILE,
     RunSummary::FILE,
-    SmoothLine::FILE,
+    FrameLine::SMOOTHED_FILE,
     "overlays",
     crate::summary::PAGE,
 ];

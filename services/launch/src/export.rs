@@ -9,8 +9,8 @@ mod pictures;
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use exports::Naming;
-use exports::{FILES, FileFormat, Notes, Trial, ViewCamera};
+use exports::{FILES, FileFormat, Notes, ViewCamera};
+pub use exports::{Naming, Trial};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use serde_json::{Value, json};
 
@@ -115,7 +115,7 @@ pub fn export(
     stop: &Stop,
     console: &dyn Console,
 ) -> Result<Vec<Written>, Failure> {
-    let trial = &origin.trial;
+    let trials = &origin.trials[..];
     check(origin, job)?;
     let cameras = if job.formats.iter().any(|it| it.needs_cameras()) {
         origin.cameras()?
@@ -130,7 +130,7 @@ pub fn export(
     let plan: Vec<(Format, Vec<PathBuf>)> = job
         .formats
         .iter()
-        .map(|it| (*it, paths(*it, job, &pictures)))
+        .map(|format| (*format, paths(*format, job, trials, &pictures)))
         .collect();
     for (format, paths) in &plan {
         for path in paths {
@@ -145,15 +145,19 @@ pub fn export(
         }
         console.begin(format.name(), "");
         match format {
-            Format::File(format) => written.push(file(trial, format, &paths[0])?),
+            Format::File(format) => {
+                for (path, trial) in paths.iter().zip(trials) {
+                    written.push(file(trial, format, path)?);
+                }
+            }
             Format::OpenPose => {
                 written.push(per_view::openpose(
-                    trial, &cameras, &paths[0], stop, console,
+                    trials, &cameras, &paths[0], stop, console,
                 )?);
             }
             Format::Mp4 => {
                 for (path, pictures) in paths.iter().zip(&mut pictures) {
-                    written.push(per_view::video(trial, pictures, path, stop, console)?);
+                    written.push(per_view::video(trials, pictures, path, stop, console)?);
                 }
             }
         }
@@ -168,19 +172,26 @@ pub fn export(
 
 /// What was exported, for programs.
 pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
-    let trial = &origin.trial;
+    let (trials, trial) = (&origin.trials, &origin.trials[0]);
     let labels = trial.labels();
     let by_label = |runs: &dyn Fn(usize) -> Vec<[u64; 2]>| {
         let all = labels.iter().enumerate();
-        let all = all.map(|(nth, it)| (it.clone(), json!(runs(nth))));
+        let all = all.map(|(nth, label)| (label.clone(), json!(runs(nth))));
         Value::Object(all.collect())
     };
+    let person = |trial: &Trial| {
+        json!({
+            "ids": trial.ids,
+            "frames_with_points": trial.n_with_points(),
+            "gaps": by_label(&|nth| trial.gaps(nth)),
+            "filled": by_label(&|nth| trial.filled(nth)),
+        })
+    };
     json!({
-        "schema_version": 1,
+        "schema_version": 2,
         "source": origin.source,
         "trajectories": origin.lines.file(),
         "frames": trial.slots.len(),
-        "frames_with_points": trial.n_with_points(),
         "first_frame": trial.first_frame,
         "frame_step": trial.frame_step,
         "rate_hz": trial.rate_hz,
@@ -188,8 +199,7 @@ pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
         "repeated_frames": trial.n_repeated,
         "up_in_world": trial.up_in_world.map(|it| [it.x, it.y, it.z]),
         "points": labels,
-        "gaps": by_label(&|nth| trial.gaps(nth)),
-        "filled": by_label(&|nth| trial.filled(nth)),
+        "people": trials.iter().map(person).collect::<Vec<Value>>(),
         "flaws": origin.flaws,
         "files": written.iter().map(Written::json).collect::<Vec<_>>(),
     })
@@ -202,7 +212,7 @@ fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
         let names: Vec<&str> = all.map(Format::name).collect();
         (!names.is_empty()).then(|| names.join(", "))
     };
-    if origin.trial.rate_hz.is_none()
+    if origin.trials[0].rate_hz.is_none()
         && let Some(formats) = lacks(Format::needs_rate)
     {
         let message = format!(
@@ -218,11 +228,15 @@ fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Where a format is written.
-fn paths(format: Format, job: &Job, pictures: &[Pictures]) -> Vec<PathBuf> {
+/// Where a format is written; one of a file for each person of several has the number of the person in the names.
+fn paths(format: Format, job: &Job, trials: &[Trial], pictures: &[Pictures]) -> Vec<PathBuf> {
     let name = |suffix: &str| job.out.join(format!("{}{suffix}", job.name));
     match format {
-        Format::File(format) => vec![name(format.suffix)],
+        Format::File(format) if trials.len() == 1 => vec![name(format.suffix)],
+        Format::File(format) => trials
+            .iter()
+            .map(|trial| name(&format!("-person{}{}", trial.id(), format.suffix)))
+            .collect(),
         Format::OpenPose => vec![name("-openpose")],
         Format::Mp4 => {
             let views = pictures.iter();

@@ -8,7 +8,7 @@ use deployment::hosts::Host;
 use deployment::{Content, Deployment, Process, Room, Stage, Topology, ViewSize};
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use messages::{
-    EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Pose3d, ViewPose, ViewQuality,
+    EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Skeletons, ViewPose, ViewQuality,
 };
 use runtime::{Delivery, HEARTBEAT, Limits, MOST_GUESTS, Namespace, TopicPlan, process_topics};
 use supervise::{Plan, Policy, ProcessSpec, Role};
@@ -208,7 +208,7 @@ fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
         Content::ViewQuality => TopicPlan::messages::<ViewQuality>(topic, delivery, limits),
         Content::PairPose => TopicPlan::messages::<PairPose>(topic, delivery, limits),
         Content::People => TopicPlan::messages::<People>(topic, delivery, limits),
-        Content::Pose3d => TopicPlan::messages::<Pose3d>(topic, delivery, limits),
+        Content::Skeletons => TopicPlan::messages::<Skeletons>(topic, delivery, limits),
     };
     match room.usual {
         Some(usual) => plan.with_few_chunks(usual),

@@ -298,7 +298,7 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     );
     // Twice the patience of the process before, which waits for late views itself.
     let patience = 2 * resolved.patience();
-    let n_consumers = topology.receivers_of(&topic::pose3d());
+    let n_consumers = topology.receivers_of(&topic::skeletons());
     if topology.has_maps() {
         let settings = space_settings(resolved, &prepared);
         let step = SpaceStep::new(plans.clone(), prepared.up_in_world, settings);

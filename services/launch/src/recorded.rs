@@ -171,7 +171,7 @@ pub fn damaged(
         Some(Kind::ViewQuality) => from > Stage::Quality,
         Some(Kind::PairPose | Kind::People) => from > Stage::Fuse,
         // Pictures of cameras are checked as they are read.
-        Some(Kind::Pose3d | Kind::Health | Kind::Picture) | None => false,
+        Some(Kind::Skeletons | Kind::Health | Kind::Picture) | None => false,
     };
     let mut input = files::open(file).map_err(|error| failure::in_file(file, &error))?;
     recording::check(&mut input, recording, is_replayed)

@@ -109,7 +109,7 @@ fn lines(case: &Case, name: &str) -> Vec<Value> {
 fn counts_are_those_of_the_results(case: &Case, report: &Value, page: &str) {
     let is_found = |joint: &Value| joint["position_m"].is_array();
     let is_posed = |it: &&Value| {
-        it["joints"]
+        it["people"][0]["joints"]
             .as_object()
             .is_some_and(|it| it.values().any(is_found))
     };

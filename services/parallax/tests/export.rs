@@ -39,7 +39,7 @@ fn found(case: &Case) -> Vec<Vec<Option<[f64; 3]>>> {
     let names = skeleton::PARSE14.joints.iter().map(|it| it.name);
     let of_line = |line: &Value| {
         let place = |name: &str| {
-            let at = line["joints"][name]["position_m"].as_array()?;
+            let at = line["people"][0]["joints"][name]["position_m"].as_array()?;
             Some([0, 1, 2].map(|axis| at[axis].as_f64().unwrap()))
         };
         names.clone().map(place).collect()
@@ -67,7 +67,12 @@ fn a_run_is_exported_from_its_folder_and_from_its_recording() {
     let told = ["--to", &all, "--rate", "20", "--up", "0,0,1"];
     let of_folder = done(&case, "out", &told);
     assert_eq!(of_folder["frames"], N_FRAMES);
-    assert!(of_folder["frames_with_points"].as_u64().unwrap() > 0);
+    assert!(
+        of_folder["people"][0]["frames_with_points"]
+            .as_u64()
+            .unwrap()
+            > 0
+    );
     done(&case, "run.mcap", &told);
     for name in FILES {
         let [a, b] = ["out/export", "run-export"].map(|it| fs::read(case.path(it).join(name)));

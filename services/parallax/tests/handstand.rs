@@ -76,8 +76,8 @@ mod long {
         let mut errors = Vec::new();
         for line in case.lines("pose3d.jsonl") {
             let frame = line["frame"].as_u64().unwrap();
-            let joints = line["joints"].as_object().unwrap();
-            for (name, joint) in joints {
+            let joints = line["people"][0]["joints"].as_object();
+            for (name, joint) in joints.into_iter().flatten() {
                 if let (Some(at), Some(truth)) = (
                     point(&joint["position_m"]),
                     places.get(&(frame, name.clone())),

@@ -197,7 +197,7 @@ fn found(case: &Case) -> Vec<(String, f64)> {
         let truth = joints(line["frame"].as_u64().unwrap() as usize);
         let names = skeleton::PARSE14.joints.iter().map(|it| it.name);
         let distance = |(name, truth): (&str, &Point3<f64>)| {
-            let at = &line["joints"][name]["position_m"];
+            let at = &line["people"][0]["joints"][name]["position_m"];
             let axis = |nth: usize| at[nth].as_f64();
             Some((Point3::new(axis(0)?, axis(1)?, axis(2)?) - truth).norm())
         };
@@ -268,7 +268,7 @@ fn a_joint_that_only_one_view_shows_is_missing_and_the_others_are_not() {
         let line: Value = serde_json::from_str(line).unwrap();
         let truth = joints(line["frame"].as_u64().unwrap() as usize);
         for (joint, truth) in skeleton::PARSE14.joints.iter().zip(truth) {
-            let at = &line["joints"][joint.name]["position_m"];
+            let at = &line["people"][0]["joints"][joint.name]["position_m"];
             let axis = |nth: usize| at[nth].as_f64();
             let error = (|| Some((Point3::new(axis(0)?, axis(1)?, axis(2)?) - truth).norm()))();
             let is_hidden = joint.name == "right wrist";
@@ -439,7 +439,7 @@ fn what_keypoints_have_beside_the_joints_is_written_by_name() {
     for line in read("pose3d.jsonl").lines() {
         let line: Value = serde_json::from_str(line).unwrap();
         let frame = line["frame"].as_u64().unwrap() as usize;
-        let extra = line["keypoints"].as_object().unwrap();
+        let extra = line["people"][0]["keypoints"].as_object().unwrap();
         assert_eq!(extra.len(), 12, "5 of the face, the pelvis, 6 of the feet");
         for (name, it) in extra {
             let at = &it["position_m"];
@@ -460,7 +460,7 @@ fn errors_mm(case: &Case) -> [f64; 2] {
     let joints: f64 = found[1..].iter().map(|it| it.1).sum();
     let (mut extras, mut n) = (0.0, 0.0);
     for line in &case.lines("pose3d.jsonl")[1..] {
-        for (name, it) in line["keypoints"].as_object().unwrap() {
+        for (name, it) in line["people"][0]["keypoints"].as_object().unwrap() {
             let at = [0, 1, 2].map(|axis| it["position_m"][axis].as_f64().unwrap());
             let frame = line["frame"].as_f64().unwrap();
             extras += (Point3::from(at) - place(name, frame)).norm();

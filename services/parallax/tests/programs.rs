@@ -91,8 +91,8 @@ fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending()
     until(|| {
         let moment = next(&mut client);
         moment
-            .skeleton
-            .is_some_and(|it| it.message().stamp.epoch == 1)
+            .skeletons
+            .is_some_and(|skeletons| skeletons.message().stamp.epoch == 1)
     });
     // The run ends, and its files are removed, while the client is there.
     let ended = started.wait();

@@ -45,7 +45,12 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     let recording = &report["recording"];
     assert_eq!(recording["complete"], json!(true), "{recording:#}");
     assert_eq!(recording["lost"], json!(0), "{recording:#}");
-    for topic in ["frame/v1/0", "view-pose/v7/1", "evidence/v3/2", "pose3d/v3"] {
+    for topic in [
+        "frame/v1/0",
+        "view-pose/v7/1",
+        "evidence/v3/2",
+        "skeletons/v1",
+    ] {
         let n = recording["topics"][topic]["messages"].as_u64().unwrap();
         assert!(n >= N_FRAMES as u64, "{topic}: {n}");
     }

@@ -13,8 +13,8 @@ use common::started::signal;
 use common::{Case, Ended, PACED, Started, last_taken, planted};
 use failure::{Stop, now_nanos};
 use messages::{
-    EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, MAX_JOINTS, MAX_KEYPOINTS, MAX_VIEWS,
-    PairPose, Pose3d, Searched, Stamp, Status, Timing, ViewPose, topic,
+    EvidenceHeader, FrameHeader, Health, MAX_KEYPOINTS, PairPose, Searched, SkeletonMessage,
+    Skeletons, Stamp, Timing, ViewPose, topic,
 };
 use runtime::{Bus, Namespace, PortError, Publisher, SlicePublisher, Waiter};
 use serde_json::Value;
@@ -376,35 +376,33 @@ fn invalid_pairs_are_refused() {
 }
 
 /// A result that is accepted, with numbers that no sender of ours writes.
-fn odd_result(stamp: Stamp, timing: Timing) -> Pose3d {
-    Pose3d {
-        stamp,
-        timing,
-        status: Status::OK,
+fn odd_result(stamp: Stamp, timing: Timing) -> Box<Skeletons> {
+    let mut result = Box::<Skeletons>::default();
+    (result.stamp, result.timing) = (stamp, timing);
+    (result.views_present, result.n_seen, result.n_people) = (u32::MAX, u32::MAX, 1);
+    result.people[0] = SkeletonMessage {
+        id: u64::MAX,
         n_joints: 14,
+        n_keypoints: MAX_KEYPOINTS as u32,
         n_views: 2,
-        views_present: u32::MAX,
         views_used: u32::MAX,
         n_pairs: u32::MAX,
+        sides: messages::Sides(9),
+        kept: messages::Kept(9),
         facing_margin: f64::NAN,
         sides_margin: f64::NAN,
         stature_m: f64::NAN,
         body_deviation: f64::NAN,
-        sides: messages::Sides(9),
-        kept: messages::Kept(9),
-        n_people: u32::MAX,
-        n_keypoints: MAX_KEYPOINTS as u32,
-        joints: [Joint3d::default(); MAX_JOINTS],
-        views: [FusedView::default(); MAX_VIEWS],
-        keypoints: [Joint3d::default(); MAX_KEYPOINTS],
-    }
+        ..SkeletonMessage::default()
+    };
+    result
 }
 
 #[test]
 fn invalid_results_and_heartbeats_are_refused() {
     let (case, mut started, rogue) = start("results", PACED);
-    let results: Publisher<Pose3d> = rogue.replace(&mut started, "triangulate", |bus| {
-        bus.publisher(&topic::pose3d())
+    let results: Publisher<Skeletons> = rogue.replace(&mut started, "triangulate", |bus| {
+        bus.publisher(&topic::skeletons())
     });
     let heartbeats: Option<Publisher<Health>> =
         rogue.bus.publisher(&topic::health("triangulate")).ok();
@@ -413,25 +411,27 @@ fn invalid_results_and_heartbeats_are_refused() {
     assert_eq!(results.wait_for_subscribers(1, WATCHDOG), 1);
     for (stamp, timing) in rogue.wrong_stamps(0) {
         results
-            .send(&Pose3d {
+            .send(&Skeletons {
                 stamp,
                 timing,
-                ..good
+                ..*good
             })
             .unwrap();
     }
-    for (n_views, n_joints) in [(u32::MAX, 14), (2, u32::MAX), (17, 33)] {
-        results
-            .send(&Pose3d {
-                n_views,
-                n_joints,
-                ..good
-            })
-            .unwrap();
+    let changes: [fn(&mut Skeletons); 7] = [
+        |frame| frame.people[0].n_views = u32::MAX,
+        |frame| frame.people[0].n_joints = u32::MAX,
+        |frame| (frame.people[0].n_views, frame.people[0].n_joints) = (17, 33),
+        |frame| frame.n_people = 9,
+        |frame| (frame.n_people, frame.people[1]) = (2, frame.people[0]),
+        |frame| frame.people[0].id = 0,
+        |frame| frame.people[0].joints[3].in_world[1] = f64::NAN,
+    ];
+    for change in changes {
+        let mut changed = good.clone();
+        change(&mut changed);
+        results.send(&changed).unwrap();
     }
-    let mut nowhere = good;
-    nowhere.joints[3].in_world[1] = f64::NAN;
-    results.send(&nowhere).unwrap();
     if let Some(heartbeats) = heartbeats {
         for session in [rogue.session, 1] {
             let wrong = Health {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fs;
 
 use nalgebra::Point3;
-use runfiles::{FrameLine, JointLine, PlacedJoint, SmoothLine, SmoothReport};
+use runfiles::{FrameLine, JointLine, PersonLine, PlacedJoint, SmoothReport};
 use scene::{RigChoice, Scene, Settings};
 use serde_json::Value;
 
@@ -70,7 +70,7 @@ fn smooth(case: &Case, arguments: &[&str]) -> Ended {
     case.start(&[&["smooth"], arguments].concat()).wait()
 }
 
-fn lines(case: &Case, name: &str) -> Vec<SmoothLine> {
+fn lines(case: &Case, name: &str) -> Vec<FrameLine> {
     let text = fs::read_to_string(case.path(name)).unwrap();
     runfiles::lines(&text).map(Result::unwrap).collect()
 }
@@ -86,7 +86,7 @@ fn assert_angles(case: &Case) {
         .find(|it| it.starts_with("40,") && it.contains("right knee flexion"));
     let cells: Vec<&str> = knee.unwrap().split(',').collect();
     assert!(
-        cells[3].parse::<f64>().is_ok() && cells[4].parse::<f64>().is_ok(),
+        cells[4].parse::<f64>().is_ok() && cells[5].parse::<f64>().is_ok(),
         "{cells:?}"
     );
     assert_eq!(
@@ -134,7 +134,7 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
     let smoothed = lines(&case, "out/pose3d-smooth.jsonl");
     assert_eq!(smoothed.len(), N_FRAMES);
     assert!(
-        smoothed[40]
+        smoothed[40].people[0]
             .states
             .values()
             .filter(|it| *it == "measured")
@@ -157,27 +157,113 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
     );
 }
 
-/// A line with one joint.
+/// A person with one joint.
+fn person(id: u64, joint: JointLine) -> PersonLine {
+    PersonLine {
+        id,
+        joints: BTreeMap::from([("right wrist".to_owned(), joint)]),
+        status: FrameLine::OK.to_owned(),
+        ..PersonLine::default()
+    }
+}
+
+/// A line with one joint of one person.
 fn line(frame: u64, time_s: Option<f64>, joint: JointLine) -> FrameLine {
     FrameLine {
-        body_deviation: None,
-        facing_margin: None,
         frame,
-        joints: BTreeMap::from([("right wrist".to_owned(), joint)]),
-        kept: None,
-        keypoints: BTreeMap::new(),
-        pairs: 0,
-        people: None,
+        people: vec![person(1, joint)],
         reason: None,
-        sides: None,
-        sides_margin: None,
-        stature_m: None,
+        seen: None,
         status: FrameLine::OK.to_owned(),
         time_s,
         views_missing: BTreeMap::new(),
         views_present: Vec::new(),
-        views_used: Vec::new(),
     }
+}
+
+#[test]
+fn each_of_several_people_is_smoothed_alone() {
+    let case = Case::new("smooth-two", &[0], "");
+    fs::create_dir(case.path("run")).unwrap();
+    let at = |frame: u64, id: u64| placed(10.0 * id as f64 + 0.01 * frame as f64, 1e-4);
+    // The other one is not there in frames 20 to 22; nobody is in frame 30; who is followed changes.
+    let lines_of_two = (0..50).map(|frame| {
+        let mut line = line(frame, Some(frame as f64 / 60.0), at(frame, 1));
+        match frame {
+            20..23 => {}
+            30 => {
+                line.people.clear();
+                line.status = FrameLine::NO_RESULT.to_owned();
+            }
+            _ => line
+                .people
+                .insert((frame % 2) as usize, person(7, at(frame, 7))),
+        }
+        line
+    });
+    case.write("run/pose3d.jsonl", text(lines_of_two));
+    let ended = smooth(&case, &["run"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(ended.stdout.contains("of 2 people"), "{}", ended.stdout);
+    let smoothed = lines(&case, "run/pose3d-smooth.jsonl");
+    for (frame, line) in smoothed.iter().enumerate() {
+        assert_eq!((line.people.len(), line.status.as_str()), (2, "ok"));
+        for person in &line.people {
+            let wrist = person.joints["right wrist"].placed().unwrap();
+            let due = 10.0 * person.id as f64 + 0.01 * frame as f64;
+            assert!(
+                (wrist.position_m[0] - due).abs() < 0.01,
+                "{frame}: {wrist:?}"
+            );
+            let is_there = frame != 30 && (person.id == 1 || !(20..23).contains(&frame));
+            let state = if is_there { "measured" } else { "filled" };
+            assert_eq!(
+                person.states["right wrist"], state,
+                "{frame}, {}",
+                person.id
+            );
+        }
+    }
+    let report = fs::read_to_string(case.path("run/smooth.json")).unwrap();
+    let report = SmoothReport::parse(&report).unwrap();
+    let counts = |nth: usize| {
+        let person = &report.people[nth];
+        let joint = person.joints["right wrist"];
+        (person.ids[0], joint.measured, joint.filled)
+    };
+    assert_eq!([counts(0), counts(1)], [(1, 49, 1), (7, 46, 4)]);
+    assert!(
+        report
+            .people
+            .iter()
+            .all(|person| person.frames_of_breaks.is_empty())
+    );
+}
+
+#[test]
+fn whoever_was_followed_one_after_the_other_is_smoothed_as_one() {
+    let case = Case::new("smooth-one-after", &[0], "");
+    fs::create_dir(case.path("run")).unwrap();
+    let lines_of_one = (0..50).map(|frame| {
+        let x = 0.01 * frame as f64;
+        let mut line = line(frame, Some(frame as f64 / 60.0), placed(x, 1e-4));
+        line.people[0].id = 1 + u64::from(frame > 25);
+        if frame == 25 {
+            line.people.clear();
+        }
+        line
+    });
+    case.write("run/pose3d.jsonl", text(lines_of_one));
+    let ended = smooth(&case, &["run"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let smoothed = lines(&case, "run/pose3d-smooth.jsonl");
+    let ids = smoothed.iter().map(|line| line.people[0].id);
+    assert!(ids.eq((0..50).map(|frame| 1 + u64::from(frame > 25))));
+    assert_eq!(smoothed[25].people[0].states["right wrist"], "filled");
+    let report = fs::read_to_string(case.path("run/smooth.json")).unwrap();
+    let report = SmoothReport::parse(&report).unwrap();
+    let people = report.people.iter().map(|person| person.ids.clone());
+    assert_eq!(people.collect::<Vec<_>>(), [vec![1, 2]]);
 }
 
 fn placed(x: f64, covariance: f64) -> JointLine {

@@ -116,7 +116,7 @@ fn clocks_are_found_written_and_used() {
         let instant = line["frame"].as_u64().unwrap() as f64;
         // Instant 0 is where the second camera begins: without its clock, people would be half a metre apart.
         let truth = scene.joints(BEGIN_S[1] + instant / RATE_HZ);
-        let head = &line["joints"]["head"]["position_m"];
+        let head = &line["people"][0]["joints"]["head"]["position_m"];
         let head = [0, 1, 2].map(|axis| head[axis].as_f64().unwrap_or(f64::NAN));
         let off = (Point3::from(head) - Point3::from(truth[13])).norm();
         assert!(off < 0.08, "instant {instant}: {off} m");

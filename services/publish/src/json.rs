@@ -1,4 +1,4 @@
-//! A frame as one line of JSON.
+//! A person of a frame as one line of JSON.
 
 use core::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::MOST_BYTES;
 use crate::frame::{Frame, Place};
 
-/// One line of JSON about a frame; none if it does not even fit without the names of the joints.
+/// One line of JSON about a person of a frame; none if it does not even fit without the names of the joints.
 ///
 /// `joints` is an object by name; or where that does not fit into [`MOST_BYTES`] an array in the order of [`json_names`]. A joint is
 /// `[x, y, z, deviation]` in metres, or in its place the reason why it is nowhere, as text: never zeros.
@@ -21,22 +21,24 @@ pub fn json_names(frame: &Frame<'_>) -> Option<String> {
     let names: Vec<&str> = frame.joints.iter().map(|it| it.0).collect();
     let names = Value::from(names);
     let deployment = Value::from(frame.deployment);
-    let text = format!("{{\"parallax\":1,\"deployment\":{deployment},\"names\":{names}}}\n");
+    let text = format!("{{\"parallax\":2,\"deployment\":{deployment},\"names\":{names}}}\n");
     (text.len() <= MOST_BYTES).then_some(text)
 }
 
 fn line(frame: &Frame<'_>, with_names: bool) -> String {
     let text_of = Value::from;
     let mut text = format!(
-        "{{\"parallax\":1,\"deployment\":{},\"session\":{},\"frame\":{},\"captured_at_nanos\":{},\"status\":{},\
-         \"sides\":{},\"people\":{},\"missed\":{},\"joints\":",
+        "{{\"parallax\":2,\"deployment\":{},\"session\":{},\"frame\":{},\"captured_at_nanos\":{},\
+         \"person\":{},\"people\":{},\"seen\":{},\"status\":{},\"sides\":{},\"missed\":{},\"joints\":",
         text_of(frame.deployment),
         frame.session,
         frame.frame,
         frame.captured_at_nanos,
+        frame.person,
+        frame.n_people,
+        frame.n_seen,
         text_of(frame.status),
         text_of(frame.sides),
-        frame.n_people,
         frame.n_missed,
     );
     text.push(if with_names { '{' } else { '[' });
@@ -88,9 +90,11 @@ pub(crate) mod tests {
             session: u64::MAX,
             frame: 12,
             captured_at_nanos: 34,
+            person: 3,
+            n_people: 2,
             status: "ok",
             sides: "unsure",
-            n_people: 1,
+            n_seen: 4,
             n_missed: 2,
             joints: names.iter().enumerate().map(joint).collect(),
         }
@@ -111,6 +115,8 @@ pub(crate) mod tests {
             (&12.into(), &"unsure".into())
         );
         assert_eq!(value["session"], u64::MAX);
+        let counts = ["parallax", "person", "people", "seen"].map(|key| value[key].as_u64());
+        assert_eq!(counts, [2, 3, 2, 4].map(Some));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! A frame as bundles of Open Sound Control 1.0.
+//! A person of a frame as bundles of Open Sound Control 1.0.
 
 use crate::MOST_BYTES;
 use crate::frame::Frame;
@@ -6,11 +6,11 @@ use crate::frame::Frame;
 /// The time tag that means at once.
 const AT_ONCE: u64 = 1;
 
-/// Bundles about a frame, each at most [`MOST_BYTES`] long, and each beginning with `/parallax/frame`.
+/// Bundles about a person of a frame, each at most [`MOST_BYTES`] long, and each beginning with `/parallax/frame`.
 ///
 /// | address | arguments | |
 /// |---|---|---|
-/// | `/parallax/frame` | `s h h s s i i` | deployment, session, frame, status, sides, people, missed |
+/// | `/parallax/frame` | `s h h i i i s s i` | deployment, session, frame, person, people, seen, status, sides, missed |
 /// | `/parallax/joint/right_wrist` | `f f f f` | x, y, z, standard deviation, metres |
 /// | `/parallax/absent` | `s s` | joint, and why it is nowhere |
 ///
@@ -56,6 +56,12 @@ impl Message {
         message
     }
 
+    /// A number of things; the largest that the format has if it is larger.
+    fn count(&mut self, n: u64) {
+        let n = i32::try_from(n).unwrap_or(i32::MAX);
+        self.0.extend(n.to_be_bytes());
+    }
+
     /// A text ends with zeros, up to a multiple of four bytes.
     fn text(&mut self, text: &str) {
         self.0.extend(text.bytes().filter(|it| *it != 0));
@@ -65,15 +71,16 @@ impl Message {
 }
 
 fn head(frame: &Frame<'_>) -> Message {
-    let mut message = Message::new("/parallax/frame", ",shhssii");
+    let mut message = Message::new("/parallax/frame", ",shhiiissi");
     message.text(frame.deployment);
     message.0.extend(frame.session.to_be_bytes());
     message.0.extend(frame.frame.to_be_bytes());
+    message.count(frame.person);
+    message.count(u64::from(frame.n_people));
+    message.count(u64::from(frame.n_seen));
     message.text(frame.status);
     message.text(frame.sides);
-    message.0.extend(frame.n_people.to_be_bytes());
-    let n_missed = u32::try_from(frame.n_missed).unwrap_or(u32::MAX);
-    message.0.extend((n_missed & 0x7FFF_FFFF).to_be_bytes());
+    message.count(frame.n_missed);
     message
 }
 

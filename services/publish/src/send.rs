@@ -67,13 +67,15 @@ pub fn run(
     let mut was_there = false;
     while !stop.is_requested() {
         let moment = client.next(PATIENCE).map_err(failed)?;
-        if let Some(frame) = moment.as_ref().and_then(Frame::of) {
+        if let Some(moment) = &moment {
             counts.frames += 1;
-            counts.missed += frame.n_missed;
-            for outlet in &mut outlets {
-                outlet.send(&frame, &mut counts);
+            counts.missed += moment.n_missed;
+            for person in Frame::people(moment) {
+                for outlet in &mut outlets {
+                    outlet.send(&person, &mut counts);
+                }
             }
-        } else if moment.is_none() {
+        } else {
             let is_there = client.state() == State::Connected;
             if until_end && was_there && !is_there {
                 break;

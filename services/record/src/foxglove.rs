@@ -2,13 +2,15 @@
 //!
 //! The schemas (`foxglove/`) are those of Foxglove, of `@foxglove/schemas` 2.1.0 without descriptions (MIT licence).
 
+use std::collections::BTreeSet;
+
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use bytemuck::pod_read_unaligned;
 use geometry::{Camera, LensModel};
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
-use messages::{FrameHeader, Joint3d, MAX_JOINTS, Pose3d, Status};
+use messages::{FrameHeader, Joint3d, SkeletonMessage, Skeletons, Status};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use recording::{Foreign, Kind, Message};
 use serde_json::{Value, json};
@@ -42,6 +44,8 @@ pub(crate) struct Foxglove {
     stage: Stage,
     /// Whether it has been said where the cameras are.
     is_begun: bool,
+    /// The people that were there in the frame before.
+    shown: BTreeSet<u64>,
 }
 
 /// Numbers of its topics; a calibration and a picture of every view follow.
@@ -54,6 +58,7 @@ impl Foxglove {
         Self {
             stage,
             is_begun: false,
+            shown: BTreeSet::new(),
         }
     }
 
@@ -100,10 +105,13 @@ impl Foxglove {
             return Vec::new();
         };
         let (time, made) = match kind {
-            Kind::Pose3d => {
-                let pose: Pose3d = pod_read_unaligned(message.head);
-                let time = timestamp(pose.stamp.captured_at_nanos);
-                let made = (pose.status != Status::END).then(|| (SCENE, self.scene(&pose, &time)));
+            Kind::Skeletons => {
+                let Some(frame) = message.skeletons() else {
+                    return Vec::new();
+                };
+                let time = timestamp(frame.stamp.captured_at_nanos);
+                let is_frame = frame.status != Status::END;
+                let made = is_frame.then(|| (SCENE, self.scene(&frame, &time)));
                 (time, made)
             }
             Kind::Frame => {
@@ -162,8 +170,24 @@ impl Foxglove {
         Some((VIEWS + 2 * view + 1, message))
     }
 
-    fn scene(&self, pose: &Pose3d, time: &Value) -> Value {
-        let n_joints = (pose.n_joints as usize).min(MAX_JOINTS);
+    /// Everybody in a frame, each an entity of the person's number; who is no longer there is taken away.
+    fn scene(&mut self, frame: &Skeletons, time: &Value) -> Value {
+        let people = frame.listed().iter();
+        let people = people.filter(|person| person.status == Status::OK);
+        let people: Vec<&SkeletonMessage> = people.collect();
+        let entities: Vec<Value> = people
+            .iter()
+            .map(|person| self.entity(person, frame.stamp.frame, time))
+            .collect();
+        let now: BTreeSet<u64> = people.iter().map(|person| person.id).collect();
+        let gone = self.shown.difference(&now);
+        let gone = gone.map(|id| json!({ "timestamp": time, "type": 0, "id": entity_id(*id) }));
+        let gone: Vec<Value> = gone.collect();
+        self.shown = now;
+        json!({ "deletions": gone, "entities": entities })
+    }
+
+    fn entity(&self, person: &SkeletonMessage, frame: u64, time: &Value) -> Value {
         let found = |it: &Joint3d| {
             let is_finite = it
                 .in_world
@@ -172,14 +196,9 @@ impl Foxglove {
                 .all(|it| it.is_finite());
             it.status == Status::OK && is_finite
         };
-        let joints: Vec<Option<&Joint3d>> = pose.joints[..n_joints]
-            .iter()
-            .map(|it| Some(it).filter(|it| found(it)))
-            .collect();
-        if pose.status != Status::OK {
-            let deletion = json!({ "timestamp": time, "type": 0, "id": "skeleton" });
-            return json!({ "deletions": [deletion], "entities": [] });
-        }
+        let joints = person.listed_joints().iter();
+        let joints: Vec<Option<&Joint3d>> =
+            joints.map(|it| Some(it).filter(|it| found(it))).collect();
         let names = self.stage.joints.joints.iter().map(|it| it.name);
         let named = joints.iter().zip(names);
         let named = named.filter_map(|(joint, name)| Some(((*joint)?, name)));
@@ -207,14 +226,18 @@ impl Foxglove {
             "type": 2, "pose": origin, "thickness": LINE_M, "scale_invariant": false, "points": points,
             "color": colour("", 1.0), "colors": colours, "indices": [],
         });
-        json!({ "deletions": [], "entities": [{
-            "timestamp": time, "frame_id": WORLD, "id": "skeleton", "lifetime": { "sec": 0, "nsec": 0 },
+        json!({
+            "timestamp": time, "frame_id": WORLD, "id": entity_id(person.id), "lifetime": { "sec": 0, "nsec": 0 },
             "frame_locked": true,
-            "metadata": [{ "key": "frame", "value": pose.stamp.frame.to_string() }],
+            "metadata": [{ "key": "frame", "value": frame.to_string() }],
             "arrows": [], "cubes": [], "spheres": spheres, "cylinders": [], "lines": [lines],
             "triangles": [], "texts": [], "models": [],
-        }] })
+        })
     }
+}
+
+fn entity_id(person: u64) -> String {
+    format!("person {person}")
 }
 
 fn calibration(camera: &Camera, time: &Value) -> Value {
@@ -304,178 +327,4 @@ fn timestamp(nanos: u64) -> Value {
 }
 
 #[cfg(test)]
-mod tests {
-    use bytemuck::{Zeroable as _, bytes_of};
-    use geometry::{Intrinsics, Lens};
-    use nalgebra::{Isometry3, Vector3};
-    use recording::encode;
-    use skeleton::PARSE14;
-
-    use super::*;
-
-    fn camera(model: LensModel) -> Camera {
-        Camera {
-            name: "left".to_owned(),
-            intrinsics: Intrinsics {
-                fx: 300.0,
-                fy: 310.0,
-                cx: 3.5,
-                cy: 2.5,
-                size: [8, 6],
-                lens: Lens::new(model),
-            },
-            camera_from_world: Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::x()),
-        }
-    }
-
-    fn foxglove() -> Foxglove {
-        Foxglove::new(Stage {
-            cameras: vec![
-                camera(LensModel::Pinhole),
-                camera(LensModel::KannalaBrandt { k: [0.1; 4] }),
-            ],
-            joints: &PARSE14,
-        })
-    }
-
-    fn pose() -> Pose3d {
-        let mut pose = Pose3d::zeroed();
-        pose.n_joints = PARSE14.joints.len() as u32;
-        for (nth, joint) in pose.joints[..PARSE14.joints.len()].iter_mut().enumerate() {
-            joint.in_world = [0.1 * nth as f64, 1.0, 2.0];
-            joint.covariance = [4e-4, 1e-4, 0.0, 2e-4, 0.0, 1e-4];
-        }
-        pose.joints[2].status = Status::IMPLAUSIBLE;
-        pose.joints[3].covariance[0] = f64::NAN;
-        pose
-    }
-
-    /// What a message of ours becomes.
-    fn made(
-        foxglove: &mut Foxglove,
-        kind: Kind,
-        head: &[u8],
-        elements: &[u8],
-    ) -> Vec<(usize, Value)> {
-        let mut data = Vec::new();
-        encode(kind, head, elements, &mut data);
-        let made = foxglove.messages(kind, &data).into_iter();
-        made.map(|(topic, text)| (topic, serde_json::from_str(&text).unwrap()))
-            .collect()
-    }
-
-    /// Why a value is not as a schema says: types, and what is required.
-    fn problem(schema: &Value, value: &Value) -> Option<String> {
-        let fits = match schema["type"].as_str() {
-            Some("object") => value.is_object(),
-            Some("array") => value.is_array(),
-            Some("string") => value.is_string(),
-            Some("number") => value.is_number(),
-            Some("integer") => value.is_u64() || value.is_i64(),
-            Some("boolean") => value.is_boolean(),
-            _ => true,
-        };
-        if !fits {
-            return Some(format!("{value} is no {}", schema["type"]));
-        }
-        for name in schema["required"].as_array().into_iter().flatten() {
-            if value.get(name.as_str()?).is_none() {
-                return Some(format!("{name} is missing in {value}"));
-            }
-        }
-        let limits = [("minItems", false), ("maxItems", true)];
-        let n = value.as_array().map_or(0, Vec::len) as u64;
-        for (name, is_most) in limits {
-            if let Some(limit) = schema[name].as_u64()
-                && (n < limit && !is_most || n > limit && is_most)
-            {
-                return Some(format!("{n} items, {name} {limit}"));
-            }
-        }
-        let fields = value.as_object().into_iter().flatten();
-        let mut inner = fields.map(|(name, value)| (&schema["properties"][name], value));
-        let items = value.as_array().into_iter().flatten();
-        let mut items = items.map(|value| (&schema["items"], value));
-        let found = inner.find_map(|(schema, value)| {
-            if schema.is_null() {
-                return Some(format!("{value} is no field"));
-            }
-            problem(schema, value)
-        });
-        found.or_else(|| items.find_map(|(schema, value)| problem(schema, value)))
-    }
-
-    #[test]
-    fn messages_are_as_the_schemas_of_foxglove_say_and_the_cameras_come_first() {
-        let mut foxglove = foxglove();
-        let topics = foxglove.topics();
-        let mut all = made(&mut foxglove, Kind::Pose3d, bytes_of(&pose()), &[]);
-        let order: Vec<usize> = all.iter().map(|it| it.0).collect();
-        assert_eq!(order, [1, 2, 4, 0]);
-        let head = FrameHeader {
-            width: 8,
-            height: 6,
-            stamp: messages::Stamp {
-                view: 1,
-                ..Default::default()
-            },
-            ..FrameHeader::default()
-        };
-        all.extend(made(
-            &mut foxglove,
-            Kind::Frame,
-            bytes_of(&head),
-            &[7; 8 * 6 * 3],
-        ));
-        let lost = Pose3d {
-            status: Status::TOO_FEW_VIEWS,
-            ..pose()
-        };
-        all.extend(made(&mut foxglove, Kind::Pose3d, bytes_of(&lost), &[]));
-        assert_eq!(all.len(), 6);
-        for (topic, value) in &all {
-            let schema = serde_json::from_str(topics[*topic].schema).unwrap();
-            assert_eq!(problem(&schema, value), None, "{}", topics[*topic].topic);
-        }
-        let (image, deleted) = (&all[4], &all[5].1);
-        assert_eq!((image.0, image.1["format"].as_str()), (5, Some("jpeg")));
-        assert_eq!(deleted["deletions"][0]["id"], "skeleton");
-        assert_eq!(deleted["entities"], json!([]));
-    }
-
-    #[test]
-    fn a_skeleton_is_its_joints_with_a_place_their_spread_and_the_lines_between_them() {
-        let mut foxglove = foxglove();
-        let all = made(&mut foxglove, Kind::Pose3d, bytes_of(&pose()), &[]);
-        let entity = &all[3].1["entities"][0];
-        // Two of the joints have no place or spread that is a number.
-        let n = PARSE14.joints.len() - 2;
-        assert_eq!(entity["spheres"].as_array().map(Vec::len), Some(2 * n));
-        let has_both = |it: &&(usize, usize)| [it.0, it.1].iter().all(|it| ![2, 3].contains(it));
-        let n_lines = PARSE14.limbs.iter().filter(has_both).count();
-        let points = entity["lines"][0]["points"].as_array().map(Vec::len);
-        assert_eq!(points, Some(2 * n_lines));
-        let transform = &all[0].1["transforms"][0];
-        let centre = camera(LensModel::Pinhole).centre_in_world();
-        let x = transform["translation"]["x"].as_f64().unwrap();
-        assert!((x - centre.x).abs() < 1e-12);
-    }
-
-    #[test]
-    fn what_has_no_picture_and_what_ends_makes_no_message() {
-        let mut foxglove = foxglove();
-        let head = FrameHeader {
-            width: 8,
-            height: 6,
-            ..FrameHeader::default()
-        };
-        assert_eq!(made(&mut foxglove, Kind::Frame, bytes_of(&head), &[]), []);
-        let end = Pose3d {
-            status: Status::END,
-            ..pose()
-        };
-        assert_eq!(made(&mut foxglove, Kind::Pose3d, bytes_of(&end), &[]), []);
-        assert_eq!(foxglove.messages(Kind::Pose3d, &[1, 2, 3]), []);
-        assert!(!foxglove.is_begun);
-    }
-}
+mod tests;

@@ -205,7 +205,7 @@ impl<'a> Recorder<'a> {
         if let Some(health) = health {
             health.received(1);
         }
-        self.is_over |= kind == Kind::Pose3d && message.status == Status::END;
+        self.is_over |= kind == Kind::Skeletons && message.status == Status::END;
         let log_time = now_nanos();
         // Some ends of streams have no send time.
         let sent_at = Some(message.sent_at).filter(|nanos| *nanos > 0);

@@ -68,8 +68,8 @@ impl Topics {
             }
         }
         add(
-            Kind::Pose3d,
-            topic::pose3d(),
+            Kind::Skeletons,
+            topic::skeletons(),
             Some("triangulate".to_owned()),
         );
         channels
@@ -121,7 +121,7 @@ mod tests {
             has_quality: false,
             pictures: Vec::new(),
             processes: ["bridge", "pose-0"].map(str::to_owned).into(),
-            elsewhere: vec![topic::frame(1), topic::evidence(1), topic::pose3d()],
+            elsewhere: vec![topic::frame(1), topic::evidence(1), topic::skeletons()],
         };
         let all = topics.channels(Without::default());
         let names: Vec<&str> = all.iter().map(|it| it.name.as_str()).collect();

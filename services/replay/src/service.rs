@@ -241,6 +241,6 @@ mod tests {
         assert_eq!(view_in(&topic::frame(0)), 0);
         assert_eq!(view_in(&topic::view_pose(13)), 13);
         assert_eq!(view_in(&topic::pair_pose(2)), 2);
-        assert_eq!(view_in(&topic::pose3d()), 0);
+        assert_eq!(view_in(&topic::skeletons()), 0);
     }
 }

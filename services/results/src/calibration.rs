@@ -4,7 +4,6 @@
 use std::collections::BTreeMap;
 
 use geometry::{Camera, RigWatch, StepWatch, SwapWatch};
-use messages::Status;
 use runfiles::{CameraFit, Contradicted, Exchanged};
 
 use crate::{FrameRecord, Scene, ViewRecord, own};
@@ -39,7 +38,7 @@ impl Calibration {
     /// Takes in what the views found in a frame, each on its own. Where there are several people, each view may have found
     /// another one: such a frame says nothing.
     pub(crate) fn add(&mut self, scene: &Scene, record: &FrameRecord) {
-        if record.pose3d.n_people > 1 {
+        if record.skeletons.n_seen > 1 {
             return;
         }
         let points: Vec<_> = (0..scene.views.len())
@@ -182,11 +181,7 @@ impl Calibration {
 
 /// The parts of a view's own best candidate, named after the side of the body, pixels of the frame; `None` where it sees nobody well.
 fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2]>> {
-    let pose = &record.pose3d;
-    let fused = pose
-        .views
-        .get(view)
-        .filter(|it| view < pose.n_views as usize && it.status == Status::OK);
+    let fused = record.fused(view);
     // Over the maps of networks, fusion leaves out a view that contradicts the others: that is what is looked for here.
     if fused.is_none() && !scene.has_maps {
         return None;
@@ -203,6 +198,8 @@ fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2
 
 #[cfg(test)]
 mod tests {
+    use messages::Status;
+
     use super::*;
     use crate::testing::{record, scene};
 
@@ -224,7 +221,7 @@ mod tests {
         let scene = scene();
         let mut record = record(0);
         assert_eq!(parts(&scene, &record, 0).unwrap().len(), 1);
-        record.pose3d.views[0].status = Status::NO_DETECTION;
+        record.skeletons.people[0].views[0].status = Status::NO_DETECTION;
         assert_eq!(parts(&scene, &record, 0), None);
         let strict = Scene {
             least_score: f32::INFINITY,
@@ -233,7 +230,7 @@ mod tests {
         assert_eq!(parts(&strict, &record, 1), None);
         record.views[1].pose = None;
         assert_eq!(parts(&scene, &record, 1), None);
-        record.pose3d.n_views = 0;
+        record.skeletons.people[0].n_views = 0;
         assert_eq!(parts(&scene, &record, 1), None);
     }
 }

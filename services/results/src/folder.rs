@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
-use runfiles::{Line as _, RunSummary, SmoothLine, SmoothReport};
+use runfiles::{FrameLine, RunSummary, SmoothReport};
 
 /// The file that says that a folder of pictures was made by a run.
 const MARK: &str = ".parallax";
@@ -117,7 +117,7 @@ impl Folder {
         if !self.dir.path().join(SmoothReport::FILE).exists() {
             return;
         }
-        for name in [SmoothLine::FILE, SmoothReport::FILE, "angles.csv"] {
+        for name in [FrameLine::SMOOTHED_FILE, SmoothReport::FILE, "angles.csv"] {
             if let Err(error) = self.dir.remove(name) {
                 tracing::debug!(%error, name, "an earlier run's file stays");
             }

@@ -1,7 +1,10 @@
 //! All messages about one frame.
 
 use fmp::Pose;
-use messages::{FrameHeader, PairPose, People, Pose3d, Status, Timing, ViewPose, ViewQuality};
+use messages::{
+    FrameHeader, FusedView, PairPose, People, SkeletonMessage, Skeletons, Status, Timing, ViewPose,
+    ViewQuality,
+};
 
 use crate::{Missing, Scene};
 
@@ -81,7 +84,7 @@ impl From<&People> for FusedRecord {
 #[derive(Debug, Clone)]
 pub struct FrameRecord {
     /// The result.
-    pub pose3d: Pose3d,
+    pub skeletons: Box<Skeletons>,
     /// The views.
     pub views: Vec<ViewRecord>,
     /// The messages of fusion processes, in order of arrival.
@@ -89,9 +92,21 @@ pub struct FrameRecord {
 }
 
 impl FrameRecord {
+    /// The person who is followed; `None` if there is nobody. What is compared with the best candidates of the views, which are not named,
+    /// is compared with this one.
+    pub fn followed(&self) -> Option<&SkeletonMessage> {
+        self.skeletons.followed()
+    }
+
+    /// What a view has of the person who is followed; `None` if it has no pose.
+    pub(crate) fn fused(&self, view: usize) -> Option<&FusedView> {
+        let fused = self.followed()?.listed_views().get(view)?;
+        (fused.status == Status::OK).then_some(fused)
+    }
+
     /// Index of the frame in the footage.
     pub fn frame(&self) -> u64 {
-        self.pose3d.stamp.frame
+        self.skeletons.stamp.frame
     }
 
     /// The candidates of a view, best first; none if it had none, or sent what cannot be read.
@@ -116,11 +131,7 @@ impl FrameRecord {
         if !scene.has_maps || candidates.len() < 2 {
             return candidates.into_iter().next();
         }
-        let pose = &self.pose3d;
-        let fused = pose
-            .views
-            .get(view)
-            .filter(|it| view < pose.n_views as usize && it.status == Status::OK && it.n_parts > 0);
+        let fused = self.fused(view).filter(|fused| fused.n_parts > 0);
         let layout = &scene.views[view].layout;
         let distance = |it: &Pose| -> f64 {
             let centres = it.centres(&scene.model, layout);

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use messages::{FrameHeader, MAX_VIEWS, Pose3d, Status, ViewPose, ViewQuality};
+use messages::{FrameHeader, MAX_VIEWS, Skeletons, Status, ViewPose, ViewQuality};
 
 use crate::missing::ViewHistory;
 use crate::{Absent, FrameRecord, FusedRecord, Missing, Picture, ViewRecord};
@@ -122,26 +122,26 @@ impl Gather {
 
     /// The record of a frame whose result has been received; earlier frames get no result any more. `None` if the frame has
     /// been settled already: a restarted sender may send a result again.
-    pub(crate) fn result(&mut self, pose3d: &Pose3d) -> Option<Settled> {
-        let frame = pose3d.stamp.frame;
+    pub(crate) fn result(&mut self, skeletons: Box<Skeletons>) -> Option<Settled> {
+        let frame = skeletons.stamp.frame;
         let n_before = frame.checked_sub(self.next)?;
         if n_before / self.frame_step > MAX_ABSENT {
             return None;
         }
-        let is_first = pose3d.stamp.epoch > self.epoch;
+        let is_first = skeletons.stamp.epoch > self.epoch;
         let absent = self.absent(frame, is_first);
         let later = self.frames.split_off(&(frame.saturating_add(1)));
         let mut past = std::mem::replace(&mut self.frames, later);
         let parts = past.remove(&frame);
         let Parts { mut views, fused } = parts.unwrap_or_else(|| self.empty());
         self.next = frame.saturating_add(self.frame_step);
-        self.epoch = self.epoch.max(pose3d.stamp.epoch);
+        self.epoch = self.epoch.max(skeletons.stamp.epoch);
         for (view, (it, history)) in views.iter_mut().zip(&mut self.histories).enumerate() {
             let missing = history.note_result(frame, it.pose.as_ref(), is_first);
-            it.missing = (pose3d.views_present >> view & 1 == 0).then_some(missing);
+            it.missing = (skeletons.views_present >> view & 1 == 0).then_some(missing);
         }
         let record = FrameRecord {
-            pose3d: *pose3d,
+            skeletons,
             views,
             fused,
         };
@@ -219,7 +219,7 @@ mod tests {
     use messages::{PairPose, Stamp};
 
     use super::*;
-    use crate::testing::pose3d;
+    use crate::testing::skeletons;
 
     fn pose(frame: u64) -> ViewPose {
         ViewPose {
@@ -236,12 +236,12 @@ mod tests {
         let mut gather = Gather::new(2, 0, 1, false);
         gather.pose(0, &pose(3));
         gather.pose(1, &pose(4));
-        let got = gather.result(&pose3d(3)).unwrap().record;
+        let got = gather.result(skeletons(3)).unwrap().record;
         assert_eq!(got.views[0].pose, Some(pose(3)));
         assert_eq!(got.views[1].pose, None);
         assert_eq!(got.views[0].missing, None, "it is present");
         assert_eq!(
-            gather.result(&pose3d(4)).unwrap().record.views[1].pose,
+            gather.result(skeletons(4)).unwrap().record.views[1].pose,
             Some(pose(4))
         );
     }
@@ -281,10 +281,10 @@ mod tests {
         let mut gather = Gather::new(2, 0, 1, false);
         gather.pose(0, &pose(3));
         gather.pose(1, &pose(4));
-        let mut result = pose3d(3);
+        let mut result = skeletons(3);
         result.views_present = 0b01;
         assert_eq!(
-            gather.result(&result).unwrap().record.views[1].missing,
+            gather.result(result).unwrap().record.views[1].missing,
             Some(Missing::Dropped)
         );
     }
@@ -293,7 +293,7 @@ mod tests {
     fn a_view_that_does_not_exist_is_ignored() {
         let mut gather = Gather::new(1, 0, 1, false);
         gather.pose(9, &pose(0));
-        assert_eq!(gather.result(&pose3d(0)).unwrap().record.views.len(), 1);
+        assert_eq!(gather.result(skeletons(0)).unwrap().record.views.len(), 1);
     }
 
     #[test]
@@ -302,7 +302,7 @@ mod tests {
         for _ in 0..1000 {
             gather.fused(0, FusedRecord::from(&PairPose::default()));
         }
-        assert_eq!(gather.result(&pose3d(0)).unwrap().record.fused.len(), 120);
+        assert_eq!(gather.result(skeletons(0)).unwrap().record.fused.len(), 120);
     }
 
     #[test]
@@ -329,18 +329,18 @@ mod tests {
         }
         gather.pose(1, &pose(8));
         // Frame 2 was dropped by both views, frame 4 by one.
-        let got = gather.result(&pose3d(6)).unwrap();
+        let got = gather.result(skeletons(6)).unwrap();
         let expected = [(0, "dropped, late"), (2, "dropped"), (4, "dropped, late")];
         assert_eq!(reasons(&got.absent), expected);
         assert_eq!(got.absent[2].views, [Missing::Late, Missing::Dropped]);
-        assert!(gather.result(&pose3d(6)).is_none(), "again");
-        assert!(gather.result(&pose3d(4)).is_none(), "earlier");
-        let mut again = pose3d(6);
+        assert!(gather.result(skeletons(6)).is_none(), "again");
+        assert!(gather.result(skeletons(4)).is_none(), "earlier");
+        let mut again = skeletons(6);
         again.stamp.epoch = 1;
-        assert!(gather.result(&again).is_none(), "again by the next epoch");
-        let mut next = pose3d(12);
+        assert!(gather.result(again).is_none(), "again by the next epoch");
+        let mut next = skeletons(12);
         next.stamp.epoch = 1;
-        let got = gather.result(&next).unwrap();
+        let got = gather.result(next).unwrap();
         let expected = [(8, "process lost"), (10, "process lost")];
         assert_eq!(reasons(&got.absent), expected);
         assert_eq!(got.record.frame(), 12);
@@ -349,7 +349,7 @@ mod tests {
     #[test]
     fn frames_after_the_last_result_are_listed_up_to_the_end_of_footage() {
         let mut gather = Gather::new(2, 0, 1, false);
-        gather.result(&pose3d(0)).unwrap();
+        gather.result(skeletons(0)).unwrap();
         // Its result came too late; there is none of frame 2, and none of the other view.
         gather.pose(0, &pose(1));
         for (view, end) in [(0, 3), (1, 2)] {
@@ -364,11 +364,11 @@ mod tests {
     #[test]
     fn a_restarted_process_lists_the_frames_it_missed_and_rejects_a_wrong_frame_number() {
         let mut gather = Gather::new(1, 38, 1, true);
-        assert!(gather.result(&pose3d(u64::MAX)).is_none());
-        let got = gather.result(&pose3d(40)).unwrap();
+        assert!(gather.result(skeletons(u64::MAX)).is_none());
+        let got = gather.result(skeletons(40)).unwrap();
         let expected = [(38, "recorder lost"), (39, "recorder lost")];
         assert_eq!(reasons(&got.absent), expected);
-        let got = gather.result(&pose3d(42)).unwrap();
+        let got = gather.result(skeletons(42)).unwrap();
         assert_eq!(reasons(&got.absent), [(41, "late")]);
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use geometry::search_size::USABLE_PX;
-use messages::{FusedView, MAX_PARTS, Pose3d, Status};
+use messages::{FusedView, MAX_PARTS, Skeletons, Status};
 
 use crate::Scene;
 
@@ -27,16 +27,15 @@ impl Heights {
     }
 
     /// Adds a result; warns once if people are smaller or larger than the search is good for.
-    pub(crate) fn add(&mut self, scene: &Scene, pose: &Pose3d) {
-        if pose.status != Status::OK {
-            return;
-        }
-        let n_views = pose.n_views as usize;
-        let views = pose.views.iter().take(n_views).zip(&mut self.counts);
-        for (view, (fused, counts)) in views.enumerate() {
-            let is_used = pose.views_used >> view & 1 == 1 && fused.status == Status::OK;
-            if let Some(px) = height_px(fused).filter(|_| is_used) {
-                *counts.entry(px.round() as u32).or_default() += 1;
+    pub(crate) fn add(&mut self, scene: &Scene, frame: &Skeletons) {
+        let people = frame.listed().iter();
+        for person in people.filter(|person| person.status == Status::OK) {
+            let views = person.listed_views().iter().zip(&mut self.counts);
+            for (view, (fused, counts)) in views.enumerate() {
+                let is_used = person.views_used >> view & 1 == 1 && fused.status == Status::OK;
+                if let Some(px) = height_px(fused).filter(|_| is_used) {
+                    *counts.entry(px.round() as u32).or_default() += 1;
+                }
             }
         }
         self.warn(scene);
@@ -94,11 +93,11 @@ fn median(counts: &BTreeMap<u32, u64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{pose3d, scene};
+    use crate::testing::{scene, skeletons};
 
-    fn of_height(px: f64) -> Pose3d {
-        let mut pose = pose3d(0);
-        for view in &mut pose.views[..2] {
+    fn of_height(px: f64) -> Box<Skeletons> {
+        let mut pose = skeletons(0);
+        for view in &mut pose.people[0].views[..2] {
             view.n_parts = 3;
             view.centres_px[..3].copy_from_slice(&[[40.0, 5.0], [60.0, 5.0 + px], [50.0, 9.0]]);
         }
@@ -113,10 +112,10 @@ mod tests {
             heights.add(&scene, &of_height(px));
         }
         let mut other = of_height(500.0);
-        other.views_used = 0b01;
-        other.views[0].status = Status::NO_DETECTION;
+        other.people[0].views_used = 0b01;
+        other.people[0].views[0].status = Status::NO_DETECTION;
         heights.add(&scene, &other);
-        other.status = Status::NO_DETECTION;
+        other.people[0].status = Status::NO_DETECTION;
         heights.add(&scene, &other);
         let names = || scene.views.iter().map(|it| it.name.clone());
         let both = heights.medians(names());

@@ -100,8 +100,8 @@ impl Latency {
         for pair in record.fused.iter().filter(|it| it.status == Status::OK) {
             self.note(Kind::Stage, "fuse", computation(pair.timing));
         }
-        if record.pose3d.status == Status::OK {
-            let timing = record.pose3d.timing;
+        if record.skeletons.status == Status::OK {
+            let timing = record.skeletons.timing;
             self.note(Kind::Stage, "triangulate", computation(timing));
             self.walk(record);
         }
@@ -110,7 +110,7 @@ impl Latency {
 
     /// The path of a frame, from the result back to its capture.
     fn walk(&mut self, record: &FrameRecord) -> Option<()> {
-        let result = record.pose3d.timing;
+        let result = record.skeletons.timing;
         let pair = record
             .fused
             .iter()
@@ -142,7 +142,7 @@ impl Latency {
             self.sent.get(&("pose", view)).copied(),
         );
         let captured = record
-            .pose3d
+            .skeletons
             .stamp
             .captured_at_nanos
             .min(frame.received_at_nanos);
@@ -177,7 +177,7 @@ impl Latency {
             let last = self.sent.entry(("fuse", worker)).or_default();
             *last = pair.timing.sent_at_nanos.max(*last);
         }
-        let sent = record.pose3d.timing.sent_at_nanos;
+        let sent = record.skeletons.timing.sent_at_nanos;
         self.sent.insert(("triangulate", 0), sent);
     }
 
@@ -260,8 +260,8 @@ mod tests {
             timing: timing(start_ms + 53, start_ms + 73),
             ..PairPose::default()
         })];
-        it.pose3d.stamp.captured_at_nanos = (start_ms + 10) * MS;
-        it.pose3d.timing = timing(start_ms + 75, start_ms + 80);
+        it.skeletons.stamp.captured_at_nanos = (start_ms + 10) * MS;
+        it.skeletons.timing = timing(start_ms + 75, start_ms + 80);
         it
     }
 
@@ -295,7 +295,7 @@ mod tests {
                 frame.timing = timing(25, 30);
             }
         }
-        second.pose3d.stamp.captured_at_nanos = 25 * MS;
+        second.skeletons.stamp.captured_at_nanos = 25 * MS;
         latency.add(&second);
         let got = latency.report();
         near(got.waiting["capture to pose"].max_ms, 22.0);
@@ -306,7 +306,7 @@ mod tests {
     fn a_frame_without_a_result_has_no_end_to_end_time() {
         let mut latency = Latency::new(1).unwrap();
         let mut it = timed(0, 0);
-        it.pose3d.status = Status::TOO_FEW_VIEWS;
+        it.skeletons.status = Status::TOO_FEW_VIEWS;
         latency.add(&it);
         let got = latency.report();
         assert_eq!(got.end_to_end.count, 0);

@@ -4,10 +4,10 @@ use std::fs;
 use std::io;
 use std::path::PathBuf;
 
-use messages::Pose3d;
+use messages::Skeletons;
 use runfiles::{
-    FrameLine, LatencyReport, Line, RunSummary, SmoothLine, SmoothReport, Summary, TimesLine,
-    VERSION, ViewLine, ViewSummary,
+    FrameLine, LatencyReport, Line, RunSummary, SmoothReport, Summary, TimesLine, VERSION,
+    ViewLine, ViewSummary,
 };
 
 use crate::lines::Lines;
@@ -114,7 +114,7 @@ impl Output {
     ///
     /// [`OutputError`].
     pub fn smooth(&mut self) -> Result<(), OutputError> {
-        let file = self.folder.file(SmoothLine::FILE)?;
+        let file = self.folder.file(FrameLine::SMOOTHED_FILE)?;
         self.smoothing = Some(Smoothing::begin(&self.scene, file)?);
         self.folder.reserve(SmoothReport::FILE, RESERVED_BYTES)?;
         Ok(())
@@ -148,7 +148,7 @@ impl Output {
 
     fn without(&mut self, absent: &Absent) {
         let scene = &self.scene;
-        let nothing = pose3d::nothing(scene, absent.frame);
+        let nothing = pose3d::nothing(absent.frame);
         let line = pose3d::absent_line(scene, absent);
         if self.begin_frame(line) {
             self.tally.without(absent.frame);
@@ -167,9 +167,11 @@ impl Output {
     }
 
     /// Writes the rows of a frame in the tables.
-    fn rows(&mut self, pose: &Pose3d) {
-        let row = trc::row(&self.scene, self.tally.n_lines(), pose);
-        let rows = self.pose3d_csv.append(&pose3d::csv_rows(&self.scene, pose));
+    fn rows(&mut self, frame: &Skeletons) {
+        let row = trc::row(&self.scene, self.tally.n_lines(), frame);
+        let rows = self
+            .pose3d_csv
+            .append(&pose3d::csv_rows(&self.scene, frame));
         let row = self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row));
         self.note(rows);
         self.note(row);
@@ -183,7 +185,7 @@ impl Output {
             return self.tally.missed(1);
         }
         self.tally.add(&self.scene, record);
-        self.rows(&record.pose3d);
+        self.rows(&record.skeletons);
         let outcomes = [
             append(&mut self.pose2d_jsonl, pose2d::lines(&self.scene, record)),
             append(&mut self.times_jsonl, [times::line(&self.scene, record)]),

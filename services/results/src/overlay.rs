@@ -1,4 +1,4 @@
-//! Pictures of a view: its single-view pose, the fused pose, the extra keypoints, and one part's epipolar lines.
+//! Pictures of a view: its single-view pose, and of everybody the fused pose, the extra keypoints, and one part's epipolar lines.
 
 use footage::{ACCENT, CENTRE, Canvas, FAINT, Limb, Side, Size, draw_limbs, line_width};
 use geometry::epipolar::epipolar_curve;
@@ -27,8 +27,7 @@ pub(crate) fn draw(
     let mut canvas = Canvas::from_rgb(size, &picture.rgb);
     draw_lines(&mut canvas, scene, record, view, part);
     draw_single(&mut canvas, scene, record, view);
-    let fused = fused(record, view);
-    if let Some(fused) = fused {
+    for fused in fused(record, view) {
         let parts = &fused.centres_px[..(fused.n_parts as usize).min(MAX_PARTS)];
         if let Some(joints) = joints_of(scene, parts) {
             draw_limbs(&mut canvas, &joints, &limbs(scene));
@@ -39,7 +38,8 @@ pub(crate) fn draw(
         }
     }
     draw_keypoints(&mut canvas, scene, record, view);
-    let facing = match fused.filter(|_| !scene.has_maps).map(|it| it.exchanged) {
+    let followed = record.fused(view).filter(|_| !scene.has_maps);
+    let facing = match followed.map(|fused| fused.exchanged) {
         Some(1) => ", from behind",
         _ => "",
     };
@@ -53,15 +53,15 @@ fn thin(canvas: &Canvas) -> f64 {
     line_width(canvas.size()) / 1.5
 }
 
-fn fused(record: &FrameRecord, view: usize) -> Option<&FusedView> {
-    let n_views = record.pose3d.n_views as usize;
-    let it = record.pose3d.views.get(view).filter(|_| view < n_views)?;
-    let n_parts = (it.n_parts as usize).min(MAX_PARTS);
-    let finite = it.centres_px[..n_parts]
-        .iter()
-        .flatten()
-        .all(|value| value.is_finite());
-    (it.status == Status::OK && finite).then_some(it)
+/// The poses of all people in a view.
+fn fused(record: &FrameRecord, view: usize) -> impl Iterator<Item = &FusedView> {
+    let people = record.skeletons.listed().iter();
+    let poses = people.filter_map(move |person| person.listed_views().get(view));
+    poses.filter(|fused| {
+        let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
+        let mut numbers = fused.centres_px[..n_parts].iter().flatten();
+        fused.status == Status::OK && numbers.all(|number| number.is_finite())
+    })
 }
 
 fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize) {
@@ -80,11 +80,12 @@ fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: u
     }
 }
 
-/// Where the extra keypoints of the result lie in the view.
+/// Where the extra keypoints of all people lie in the view.
 fn draw_keypoints(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize) {
     let camera = scene.views[view].framing.camera();
     let width = line_width(canvas.size());
-    for (name, it) in pose3d::keypoints(scene, &record.pose3d) {
+    let people = record.skeletons.listed().iter();
+    for (name, it) in people.flat_map(|person| pose3d::keypoints(scene, person)) {
         let place = pose3d::is_placed(it).then(|| Point3::from(it.in_world));
         if let Some(at) = place.and_then(|it| camera.project(&it)) {
             canvas.disc(at.into(), 1.5 * width, side_of(name).colour());
@@ -106,16 +107,13 @@ fn side_of(name: &str) -> Side {
 fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize, part: usize) {
     let to = scene.views[view].framing.camera();
     for other in (0..scene.views.len()).filter(|it| *it != view) {
-        let Some(fused) = fused(record, other) else {
-            continue;
-        };
-        if part >= fused.n_parts as usize {
-            continue;
+        let poses = fused(record, other).filter(|fused| part < fused.n_parts as usize);
+        for fused in poses {
+            let point = Point2::from(fused.centres_px[part]);
+            let curve = epipolar_curve(scene.views[other].framing.camera(), to, &point, N_POINTS);
+            let curve: Vec<[f64; 2]> = curve.iter().map(|it| [it.x, it.y]).collect();
+            canvas.polyline(&curve, thin(canvas), ACCENT);
         }
-        let point = Point2::from(fused.centres_px[part]);
-        let curve = epipolar_curve(scene.views[other].framing.camera(), to, &point, N_POINTS);
-        let curve: Vec<[f64; 2]> = curve.iter().map(|it| [it.x, it.y]).collect();
-        canvas.polyline(&curve, thin(canvas), ACCENT);
     }
 }
 
@@ -185,9 +183,9 @@ mod tests {
         let mut record = with_picture();
         let without = draw(&scene, &record, 0, 0).unwrap();
         scene.extra_keypoints = vec!["right heel".to_owned(), "nose".to_owned()];
-        record.pose3d.n_keypoints = 2;
-        record.pose3d.keypoints[0].in_world = [0.1, 0.1, 1.0];
-        record.pose3d.keypoints[1].status = Status::TOO_FEW_VIEWS;
+        record.skeletons.people[0].n_keypoints = 2;
+        record.skeletons.people[0].keypoints[0].in_world = [0.1, 0.1, 1.0];
+        record.skeletons.people[0].keypoints[1].status = Status::TOO_FEW_VIEWS;
         let with = draw(&scene, &record, 0, 0).unwrap();
         let pixels = |it: &Canvas| -> Vec<[u8; 3]> { it.rgb().as_chunks().0.to_vec() };
         let (with, without) = (pixels(&with), pixels(&without));
@@ -201,6 +199,23 @@ mod tests {
             let off = (x - 41.5).hypot(y - 31.5);
             assert!(off < 4.0, "({x}, {y})");
         }
+    }
+
+    #[test]
+    fn everybody_is_drawn() {
+        let scene = scene();
+        let mut record = with_picture();
+        let one = draw(&scene, &record, 0, 0).unwrap();
+        let frame = &mut record.skeletons;
+        (frame.n_people, frame.people[1]) = (2, frame.people[0]);
+        frame.people[1].views[0].centres_px[0] = [60.0, 45.0];
+        let both = draw(&scene, &record, 0, 0).unwrap();
+        let colour = |canvas: &Canvas| {
+            let pixels = canvas.rgb().as_chunks::<3>().0;
+            let near = (40..50).flat_map(|y| (55..66).map(move |x| pixels[80 * y + x]));
+            near.filter(|rgb| *rgb != [0; 3]).count()
+        };
+        assert!(colour(&both) > colour(&one), "the ring of the second");
     }
 
     #[test]

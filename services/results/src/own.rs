@@ -1,7 +1,7 @@
-//! What every view found by itself, beside the solution in space.
+//! What every view found by itself, beside the person who is followed in space.
 
 use geometry::Camera;
-use messages::Joint3d;
+use messages::{Joint3d, SkeletonMessage};
 
 use crate::overlay::joints_of;
 use crate::pose3d::is_placed;
@@ -69,9 +69,10 @@ fn distances(
     view: usize,
     parts: &[[f64; 2]],
 ) -> Vec<[f64; 2]> {
-    let pose = &record.pose3d;
     let camera = scene.views[view].framing.camera();
-    let joints = &pose.joints[..(pose.n_joints as usize).min(pose.joints.len())];
+    let joints = record
+        .followed()
+        .map_or(&[][..], SkeletonMessage::listed_joints);
     let seen = joints_of(scene, parts).unwrap_or_default();
     let both = joints.iter().zip(&seen);
     both.filter_map(|(joint, seen)| distance(camera, joint, *seen))

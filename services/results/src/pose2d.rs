@@ -1,4 +1,4 @@
-//! `pose2d.jsonl`: every view, before and after fusion, in pixels of the footage.
+//! `pose2d.jsonl`: the person who is followed in every view, before and after fusion, in pixels of the footage.
 
 use messages::{FusedView, MAX_PARTS, Status};
 use runfiles::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};
@@ -18,12 +18,8 @@ pub(crate) fn lines(scene: &Scene, record: &FrameRecord) -> impl Iterator<Item =
 }
 
 fn line(scene: &Scene, record: &FrameRecord, view: usize) -> ViewLine {
-    let pose = &record.pose3d;
     let it = &scene.views[view];
-    let fused = pose
-        .views
-        .get(view)
-        .filter(|fused| view < pose.n_views as usize && fused.status == Status::OK);
+    let fused = record.fused(view);
     let answer = record.views.get(view).and_then(|it| it.pose.as_ref());
     let status = answer.map_or("nothing came", |it| it.status.reason());
     let search = answer.filter(|it| it.status == Status::OK);
@@ -32,14 +28,14 @@ fn line(scene: &Scene, record: &FrameRecord, view: usize) -> ViewLine {
     ViewLine {
         // Poses from maps are those of the body: the sides of each view are not told.
         facing: fused.filter(|_| !scene.has_maps).map(facing),
-        frame: pose.stamp.frame,
+        frame: record.frame(),
         fused: fused.map(|fused| fused_pose(it, fused)),
         search: search.map(|it| it.searched.name().to_owned()),
         sigma_px: sigma.map(|sigma| sigma.iter().map(|px| f64::from(*px) * scale).collect()),
         sigma_used: record.sigma_used(view),
         single: single(scene, record, view),
         status: status.to_owned(),
-        time_s: scene.time_s(pose.stamp.frame),
+        time_s: scene.time_s(record.frame()),
         view: it.name.clone(),
     }
 }
@@ -129,7 +125,7 @@ mod tests {
     fn a_view_that_sent_nothing_says_so() {
         let mut record = record(0);
         record.views[1].pose = None;
-        record.pose3d.views[1].status = Status::NO_FRAME;
+        record.skeletons.people[0].views[1].status = Status::NO_FRAME;
         let got = lines(&record);
         assert_eq!(got[1]["status"], "nothing came");
         assert_eq!(got[1]["single"], Value::Null);

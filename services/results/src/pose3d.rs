@@ -2,38 +2,34 @@
 
 use std::collections::BTreeMap;
 
-use bytemuck::Zeroable as _;
-use messages::{Joint3d, Pose3d, Status};
-use runfiles::{FrameLine, JointLine, Kept, PlacedJoint, Sides};
+use messages::{Joint3d, SkeletonMessage, Skeletons, Status};
+use runfiles::{FrameLine, JointLine, Kept, PersonLine, PlacedJoint, Sides};
 
 use crate::{Absent, FrameRecord, Scene};
 
-/// First line of `pose3d.csv`; one row a joint follows, empty where there is no position.
-pub(crate) const CSV_HEADER: &str = "frame,time_s,joint,x_m,y_m,z_m,cov_xx_m2,cov_xy_m2,cov_xz_m2,\
+/// First line of `pose3d.csv`; one row a joint of a person follows, empty where there is no position, and in a frame with nobody one row a
+/// joint without a person.
+pub(crate) const CSV_HEADER: &str = "frame,time_s,person,joint,x_m,y_m,z_m,cov_xx_m2,cov_xy_m2,cov_xz_m2,\
 cov_yy_m2,cov_yz_m2,cov_zz_m2,reprojection_px,views,status";
 
-/// The joints of a message with their names, as many as both sides know.
+const _: () = assert!(runfiles::MOST_PEOPLE == messages::MAX_PEOPLE);
+
+/// The joints of a person with their names, as many as both sides know.
 pub(crate) fn joints<'a>(
     scene: &'a Scene,
-    pose: &'a Pose3d,
+    person: &'a SkeletonMessage,
 ) -> impl Iterator<Item = (&'a str, &'a Joint3d)> {
-    let n = pose.n_joints as usize;
-    scene
-        .joints
-        .joints
-        .iter()
-        .map(|it| it.name)
-        .zip(pose.joints.iter().take(n))
+    let names = scene.joints.joints.iter().map(|joint| joint.name);
+    names.zip(person.listed_joints())
 }
 
-/// The extra keypoints of a message with their names, as many as both sides know.
+/// The extra keypoints of a person with their names, as many as both sides know.
 pub(crate) fn keypoints<'a>(
     scene: &'a Scene,
-    pose: &'a Pose3d,
+    person: &'a SkeletonMessage,
 ) -> impl Iterator<Item = (&'a str, &'a Joint3d)> {
-    let n = pose.n_keypoints as usize;
     let names = scene.extra_keypoints.iter().map(String::as_str);
-    names.zip(pose.keypoints.iter().take(n))
+    names.zip(person.listed_keypoints())
 }
 
 /// Whether a joint has a position that can be written down.
@@ -43,41 +39,47 @@ pub(crate) fn is_placed(joint: &Joint3d) -> bool {
 
 /// The line of a result.
 pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> FrameLine {
-    let pose = &record.pose3d;
-    let joints = joints(scene, pose);
+    let frame = &record.skeletons;
     let missing = missing(scene, record).into_iter();
-    let has_body = pose.stature_m > 0.0;
+    let people = frame.listed().iter();
     FrameLine {
-        body_deviation: finite(pose.body_deviation).filter(|_| has_body),
-        facing_margin: finite(pose.facing_margin),
-        frame: pose.stamp.frame,
-        joints: joints
-            .map(|(name, it)| (name.to_owned(), joint(scene, it)))
+        frame: frame.stamp.frame,
+        people: people.map(|person| person_line(scene, person)).collect(),
+        reason: None,
+        seen: Some(frame.n_seen),
+        status: frame.status.reason().to_owned(),
+        time_s: scene.time_s(frame.stamp.frame),
+        views_missing: missing
+            .map(|(name, reason)| (name.to_owned(), reason.into()))
             .collect(),
-        keypoints: keypoints(scene, pose)
-            .map(|(name, it)| (name.to_owned(), joint(scene, it)))
-            .collect(),
-        kept: Some(match pose.kept {
+        views_present: owned(scene.names(frame.views_present)),
+    }
+}
+
+fn person_line(scene: &Scene, person: &SkeletonMessage) -> PersonLine {
+    let point = |(name, point): (&str, &Joint3d)| (name.to_owned(), joint(scene, point));
+    let has_body = person.stature_m > 0.0;
+    PersonLine {
+        body_deviation: finite(person.body_deviation).filter(|_| has_body),
+        facing_margin: finite(person.facing_margin),
+        id: person.id,
+        joints: joints(scene, person).map(point).collect(),
+        kept: Some(match person.kept {
             messages::Kept::START => Kept::Start,
             _ => Kept::Solved,
         }),
-        pairs: pose.n_pairs,
-        people: Some(pose.n_people),
-        reason: None,
-        sides: Some(match pose.sides {
+        keypoints: keypoints(scene, person).map(point).collect(),
+        pairs: person.n_pairs,
+        sides: Some(match person.sides {
             messages::Sides::SURE => Sides::Sure,
             messages::Sides::UNSURE => Sides::Unsure,
             _ => Sides::AsSeen,
         }),
-        sides_margin: finite(pose.sides_margin),
-        stature_m: finite(pose.stature_m).filter(|_| has_body),
-        status: pose.status.reason().to_owned(),
-        time_s: scene.time_s(pose.stamp.frame),
-        views_missing: missing
-            .map(|(name, reason)| (name.to_owned(), reason.into()))
-            .collect(),
-        views_present: owned(scene.names(pose.views_present)),
-        views_used: owned(scene.names(pose.views_used)),
+        sides_margin: finite(person.sides_margin),
+        states: BTreeMap::new(),
+        stature_m: finite(person.stature_m).filter(|_| has_body),
+        status: person.status.reason().to_owned(),
+        views_used: owned(scene.names(person.views_used)),
     }
 }
 
@@ -90,25 +92,16 @@ pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
             .map_or(it.reason.as_str(), |it| it.reason())
     };
     FrameLine {
-        body_deviation: None,
-        facing_margin: None,
         frame: it.frame,
-        joints: BTreeMap::new(),
-        keypoints: BTreeMap::new(),
-        kept: None,
-        pairs: 0,
-        people: None,
+        people: Vec::new(),
         reason: Some(it.reason.clone()),
-        sides: None,
-        sides_margin: None,
-        stature_m: None,
+        seen: None,
         status: FrameLine::NO_RESULT.to_owned(),
         time_s: scene.time_s(it.frame),
         views_missing: views
             .map(|(view, it)| (it.name.clone(), why(view).into()))
             .collect(),
         views_present: Vec::new(),
-        views_used: Vec::new(),
     }
 }
 
@@ -120,17 +113,27 @@ fn finite(number: f64) -> Option<f64> {
     Some(number).filter(|it| it.is_finite())
 }
 
-/// A result without any joint, for the files that have rows of numbers.
-pub(crate) fn nothing(scene: &Scene, frame: u64) -> Pose3d {
-    let mut pose = Pose3d::zeroed();
-    pose.stamp.frame = frame;
-    pose.status = Status::NO_FRAME;
-    pose.n_joints = scene.joints.joints.len() as u32;
-    pose.n_keypoints = scene.extra_keypoints.len() as u32;
-    for it in pose.joints.iter_mut().chain(&mut pose.keypoints) {
-        it.status = Status::NO_FRAME;
+/// A person without any joint, for the rows of a frame with nobody.
+///
+/// * `status`: of the frame.
+pub(crate) fn nobody(scene: &Scene, status: Status) -> SkeletonMessage {
+    let mut person = SkeletonMessage {
+        status,
+        n_joints: scene.joints.joints.len() as u32,
+        n_keypoints: scene.extra_keypoints.len() as u32,
+        ..SkeletonMessage::default()
+    };
+    for point in person.joints.iter_mut().chain(&mut person.keypoints) {
+        point.status = status;
     }
-    pose
+    person
+}
+
+/// A frame without a result.
+pub(crate) fn nothing(frame: u64) -> Box<Skeletons> {
+    let mut nothing = Box::<Skeletons>::default();
+    (nothing.stamp.frame, nothing.status) = (frame, Status::NO_FRAME);
+    nothing
 }
 
 /// The views that have no part in the result, and why.
@@ -158,13 +161,26 @@ fn joint(scene: &Scene, it: &Joint3d) -> JointLine {
 }
 
 /// The rows of one frame in `pose3d.csv`, each with its end.
-pub(crate) fn csv_rows(scene: &Scene, pose: &Pose3d) -> String {
-    let frame = pose.stamp.frame;
+pub(crate) fn csv_rows(scene: &Scene, frame: &Skeletons) -> String {
+    if frame.listed().is_empty() {
+        return rows_of(scene, frame.stamp.frame, &nobody(scene, frame.status));
+    }
+    let people = frame.listed().iter();
+    people
+        .map(|person| rows_of(scene, frame.stamp.frame, person))
+        .collect()
+}
+
+fn rows_of(scene: &Scene, frame: u64, person: &SkeletonMessage) -> String {
     let time = scene
         .time_s(frame)
         .map_or(String::new(), |it| format!("{it:.6}"));
-    joints(scene, pose)
-        .chain(keypoints(scene, pose))
+    let id = match person.id {
+        0 => String::new(),
+        id => id.to_string(),
+    };
+    joints(scene, person)
+        .chain(keypoints(scene, person))
         .map(|(name, it)| {
             let views = scene.names(it.views_used).join("+");
             let numbers = if is_placed(it) {
@@ -176,7 +192,7 @@ pub(crate) fn csv_rows(scene: &Scene, pose: &Pose3d) -> String {
                 ",".repeat(9)
             };
             format!(
-                "{frame},{time},{name},{numbers},{views},{}\n",
+                "{frame},{time},{id},{name},{numbers},{views},{}\n",
                 it.status.reason()
             )
         })
@@ -198,38 +214,49 @@ mod tests {
 
     use super::*;
     use crate::Missing;
-    use crate::testing::{pose3d, record, scene};
+    use crate::testing::{record, scene, skeletons};
 
     #[test]
     fn a_line_says_which_views_were_used() {
         let mut record = record(7);
-        record.pose3d.views_present = 0b10;
-        record.pose3d.views_used = 0b10;
+        record.skeletons.views_present = 0b10;
+        record.skeletons.people[0].views_used = 0b10;
         record.views[0].missing = Some(Missing::Lost);
         let line: Value = serde_json::to_value(line(&scene(), &record)).unwrap();
         assert_eq!(line["frame"], 7);
         assert_eq!(line["views_present"], json!(["right"]));
         assert_eq!(line["views_missing"], json!({ "left": "process lost" }));
-        assert_eq!(line["views_used"], json!(["right"]));
-        assert_eq!(line["joints"]["head"]["position_m"], json!([1.0, 2.0, 3.0]));
+        let person = &line["people"][0];
+        assert_eq!(
+            (&line["people"][1], &person["id"]),
+            (&Value::Null, &json!(1))
+        );
+        assert_eq!(person["views_used"], json!(["right"]));
+        assert_eq!(
+            person["joints"]["head"]["position_m"],
+            json!([1.0, 2.0, 3.0])
+        );
     }
 
     #[test]
     fn a_number_that_is_none_is_never_written_as_one() {
         let mut record = record(0);
-        let pose = &mut record.pose3d;
+        let pose = &mut record.skeletons.people[0];
         pose.facing_margin = f64::INFINITY;
         pose.joints[0].reprojection_px = f64::NAN;
         pose.joints[1].in_world[2] = f64::NAN;
         let text = runfiles::to_line(&line(&scene(), &record)).unwrap();
         let line: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(
-            line["joints"]["right ankle"]["reprojection_px"],
+            line["people"][0]["joints"]["right ankle"]["reprojection_px"],
             Value::Null
         );
-        assert_eq!(line["joints"]["right knee"].get("position_m"), None);
+        assert_eq!(
+            line["people"][0]["joints"]["right knee"].get("position_m"),
+            None
+        );
         assert!(
-            !csv_rows(&scene(), &record.pose3d)
+            !csv_rows(&scene(), &record.skeletons)
                 .to_lowercase()
                 .contains("nan")
         );
@@ -237,11 +264,25 @@ mod tests {
 
     #[test]
     fn every_row_has_as_many_cells_as_the_header() {
-        let mut pose = pose3d(3);
-        pose.joints[4].status = Status::TOO_FEW_VIEWS;
+        let mut pose = skeletons(3);
+        pose.people[0].joints[4].status = Status::TOO_FEW_VIEWS;
+        pose.people[1] = pose.people[0];
+        (pose.n_people, pose.people[1].id) = (2, 9);
         let columns = CSV_HEADER.split(',').count();
         let rows = csv_rows(&scene(), &pose);
-        assert_eq!(rows.lines().count(), 14);
+        assert_eq!(rows.lines().count(), 28);
+        assert!(
+            rows.lines()
+                .nth(13)
+                .unwrap()
+                .starts_with("3,0.050000,1,head,")
+        );
+        assert!(
+            rows.lines()
+                .nth(27)
+                .unwrap()
+                .starts_with("3,0.050000,9,head,")
+        );
         for row in rows.lines() {
             assert_eq!(row.split(',').count(), columns, "{row}");
         }
@@ -252,31 +293,32 @@ mod tests {
         let mut scene = scene();
         scene.extra_keypoints = vec!["nose".to_owned(), "left heel".to_owned()];
         let mut record = record(7);
-        record.pose3d.n_keypoints = 2;
-        record.pose3d.keypoints[1].status = Status::IMPLAUSIBLE;
+        record.skeletons.people[0].n_keypoints = 2;
+        record.skeletons.people[0].keypoints[1].status = Status::IMPLAUSIBLE;
         let text = runfiles::to_line(&line(&scene, &record)).unwrap();
         let line: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(
-            line["keypoints"]["nose"]["position_m"],
+            line["people"][0]["keypoints"]["nose"]["position_m"],
             json!([1.0, 2.0, 3.0])
         );
-        assert_eq!(line["joints"].get("nose"), None);
-        let heel = &line["keypoints"]["left heel"];
+        assert_eq!(line["people"][0]["joints"].get("nose"), None);
+        let heel = &line["people"][0]["keypoints"]["left heel"];
         assert_eq!(*heel, json!({ "status": Status::IMPLAUSIBLE.reason() }));
-        let rows = csv_rows(&scene, &record.pose3d);
+        let rows = csv_rows(&scene, &record.skeletons);
         assert_eq!(rows.lines().count(), 16);
         assert!(
             rows.lines().nth(14).unwrap().contains(",nose,1.0"),
             "{rows}"
         );
-        let rows = csv_rows(&scene, &nothing(&scene, 8));
+        let rows = csv_rows(&scene, &nothing(8));
         assert_eq!(rows.lines().count(), 16, "{rows}");
+        assert!(rows.contains("\n8,0.133333,,neck,,,,"), "{rows}");
     }
 
     #[test]
     fn a_count_beyond_the_joint_set_is_cut() {
-        let mut pose = pose3d(0);
-        pose.n_joints = u32::MAX;
-        assert_eq!(joints(&scene(), &pose).count(), 14);
+        let mut person = skeletons(0).people[0];
+        person.n_joints = u32::MAX;
+        assert_eq!(joints(&scene(), &person).count(), 14);
     }
 }

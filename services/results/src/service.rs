@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use failure::{Failure, now_nanos};
 use messages::{
-    Cause, FrameHeader, PairPose, People, Pose3d, Span, Status, ViewPose, ViewQuality, topic,
+    Cause, FrameHeader, PairPose, People, Skeletons, Span, Status, ViewPose, ViewQuality, topic,
 };
 use runtime::{Service, SliceSubscriber, Subscriber, Waiter, Woken};
 use stage::{Context, Port, Sender};
@@ -42,26 +42,26 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let (mut is_over, mut may_await) = (false, true);
     while !is_over && waiter.wait(Duration::from_millis(50))? != Woken::Stop {
         ports.receive_inputs(&context, &mut gather, &writer)?;
-        while let Some(pose3d) = ports.pose3d.receive::<Pose3d>(&context)? {
+        while let Some(skeletons) = ports.skeletons.receive_boxed(&context)? {
             // The inputs of a result were sent before it, so they can all be received now; but for expected errors that fusion
             // was given first.
             ports.receive_inputs(&context, &mut gather, &writer)?;
             let begin = Instant::now();
-            while may_await && gather.awaits_quality(pose3d.stamp.frame) {
+            while may_await && gather.awaits_quality(skeletons.stamp.frame) {
                 std::thread::sleep(AWAIT_PAUSE);
                 ports.receive_inputs(&context, &mut gather, &writer)?;
                 // They do not come: they were lost, and others may be.
                 may_await = begin.elapsed() < AWAITED;
             }
-            if pose3d.status == Status::END {
+            if skeletons.status == Status::END {
                 writer.rest(gather.rest());
                 is_over = true;
                 break;
             }
             service.health().received(1);
-            match wire::check_pose3d(&pose3d, n_views, n_joints) {
-                Ok(()) => take(service, &pose3d, &mut gather, &writer),
-                Err(error) => context.count_refused("pose3d", &error),
+            match wire::check_skeletons(&skeletons, n_views, n_joints) {
+                Ok(()) => take(service, skeletons, &mut gather, &writer),
+                Err(error) => context.count_refused("skeletons", &error),
             }
         }
     }
@@ -74,16 +74,17 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
 }
 
 /// Passes a result, and the frames before it without one, to the writing thread.
-fn take(service: &Service, pose3d: &Pose3d, gather: &mut Gather, writer: &Writer) {
+fn take(service: &Service, skeletons: Box<Skeletons>, gather: &mut Gather, writer: &Writer) {
     let health = service.health();
-    let Some(settled) = gather.result(pose3d) else {
+    let frame = skeletons.stamp.frame;
+    let Some(settled) = gather.result(skeletons) else {
         // The frame has its line already.
         health.dropped(Cause::Late, 1);
         return;
     };
     record_latency(service, &settled.record);
     if writer.write(settled) {
-        health.sent(pose3d.stamp.frame);
+        health.sent(frame);
     } else {
         health.dropped(Cause::QueueFull, 1);
     }
@@ -92,13 +93,13 @@ fn take(service: &Service, pose3d: &Pose3d, gather: &mut Gather, writer: &Writer
 
 /// Records the latency of a result, overall and for every view that was used, and how long it waited in this process.
 fn record_latency(service: &Service, record: &FrameRecord) {
-    let (health, pose3d) = (service.health(), &record.pose3d);
-    if pose3d.status != Status::OK {
+    let (health, skeletons) = (service.health(), &record.skeletons);
+    if skeletons.status != Status::OK {
         return;
     }
-    let sent_at = pose3d.timing.sent_at_nanos;
+    let sent_at = skeletons.timing.sent_at_nanos;
     let since = |captured_at: u64| sent_at.saturating_sub(captured_at);
-    let captured_at = pose3d.stamp.captured_at_nanos;
+    let captured_at = skeletons.stamp.captured_at_nanos;
     health.spent(Span::END_TO_END, None, since(captured_at));
     for (view, of_view) in record.views.iter().enumerate() {
         if let Some(frame) = of_view.frame.filter(|_| of_view.missing.is_none()) {
@@ -117,7 +118,7 @@ struct Ports {
     qualities: Vec<Port<Subscriber<ViewQuality>>>,
     pairs: Vec<Port<Subscriber<PairPose>>>,
     people: Option<Port<Subscriber<People>>>,
-    pose3d: Port<Subscriber<Pose3d>>,
+    skeletons: Port<Subscriber<Skeletons>>,
 }
 
 impl Ports {
@@ -129,7 +130,7 @@ impl Ports {
             qualities: Vec::new(),
             pairs: Vec::new(),
             people: None,
-            pose3d: Port::open(service, waiter, &topic::pose3d(), Sender::All)?,
+            skeletons: Port::open(service, waiter, &topic::skeletons(), Sender::All)?,
         };
         for view in 0..job.scene.views.len() {
             let frames = service
@@ -228,7 +229,7 @@ impl Ports {
                 .try_for_each(Port::drain::<ViewQuality>)?;
             self.pairs.iter().try_for_each(Port::drain::<PairPose>)?;
             self.people.iter().try_for_each(Port::drain::<People>)?;
-            self.pose3d.drain::<Pose3d>()?;
+            self.skeletons.drain::<Skeletons>()?;
         }
         Ok(())
     }

@@ -69,11 +69,13 @@ impl Tally {
         if !line.has_result() {
             return self.without(line.frame);
         }
-        let is_used = |name: &str| line.views_used.iter().any(|used| used == name);
+        let used = || line.people.iter().flat_map(|person| &person.views_used);
+        let is_used = |name: &str| used().any(|used| used == name);
         let why = |name: &str| line.views_missing.get(name).map(Missing::text);
         self.frame(scene, line.frame, line.has_pose());
         self.views(&is_used, &why);
-        let placed = line.joints.values().filter_map(|joint| joint.placed());
+        let joints = line.people.iter().flat_map(|person| person.joints.values());
+        let placed = joints.filter_map(|joint| joint.placed());
         for px in placed.filter_map(|joint| joint.reprojection_px) {
             self.pixels(px);
         }
@@ -81,27 +83,30 @@ impl Tally {
 
     /// Counts a frame.
     pub(crate) fn add(&mut self, scene: &Scene, record: &FrameRecord) {
-        let pose = &record.pose3d;
-        let used = scene.names(pose.views_used);
+        let frame = &record.skeletons;
+        let people = frame.listed();
+        let used = people.iter().fold(0, |all, person| all | person.views_used);
+        let used = scene.names(used);
         let missing = missing(scene, record);
-        self.frame(scene, record.frame(), pose.status == Status::OK);
+        self.frame(scene, record.frame(), frame.status == Status::OK);
         self.views(&|name| used.contains(&name), &|name| {
             missing.get(name).copied()
         });
-        for (_, joint) in joints(scene, pose) {
+        for (_, joint) in people.iter().flat_map(|person| joints(scene, person)) {
             if is_placed(joint) && joint.reprojection_px.is_finite() {
                 self.pixels(joint.reprojection_px);
             }
         }
         self.searches(scene, record);
         self.calibration.add(scene, record);
-        self.heights.add(scene, pose);
+        self.heights.add(scene, frame);
         let seen = (
             scene.time_s(record.frame()),
             &own::distances_m(scene, record)[..],
         );
-        self.trusted.add(pose, scene.joints.limbs, seen);
-        self.people.add(pose);
+        self.trusted
+            .add(record.followed(), scene.joints.limbs, seen);
+        self.people.add(frame);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
             *count = it.frame.as_ref().map_or(*count, |it| it.n_dropped);
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use fmp::{Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Placement, Pose};
 use geometry::{Camera, Framing, Intrinsics, Lens, OutSize};
 use messages::{
-    FusedView, Joint3d, MAX_JOINTS, MAX_KEYPOINTS, MAX_VIEWS, Pose3d, Stamp, Status, Timing,
+    FusedView, Joint3d, MAX_JOINTS, MAX_KEYPOINTS, MAX_VIEWS, SkeletonMessage, Skeletons, Status,
     ViewPose,
 };
 use nalgebra::{Isometry3, Vector3};
@@ -73,8 +73,8 @@ fn model() -> Model {
     .unwrap()
 }
 
-/// A result in which every joint stands at (1, 2, 3).
-pub(crate) fn pose3d(frame: u64) -> Pose3d {
+/// A result with one person, whose every joint stands at (1, 2, 3).
+pub(crate) fn skeletons(frame: u64) -> Box<Skeletons> {
     let joint = Joint3d {
         in_world: [1.0, 2.0, 3.0],
         covariance: [1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4],
@@ -88,30 +88,29 @@ pub(crate) fn pose3d(frame: u64) -> Pose3d {
         n_parts: 1,
         ..FusedView::default()
     };
-    Pose3d {
-        stamp: Stamp {
-            frame,
-            ..Stamp::default()
-        },
-        timing: Timing::default(),
+    let person = SkeletonMessage {
+        id: 1,
         status: Status::OK,
         n_joints: 14,
+        n_keypoints: 0,
         n_views: 2,
-        views_present: 0b11,
         views_used: 0b11,
         n_pairs: 1,
+        sides: messages::Sides::SURE,
+        kept: messages::Kept::SOLVED,
         facing_margin: 1.0,
         sides_margin: 4.0,
         stature_m: 0.0,
         body_deviation: 0.0,
-        sides: messages::Sides::SURE,
-        kept: messages::Kept::SOLVED,
-        n_people: 0,
-        n_keypoints: 0,
         joints: [joint; MAX_JOINTS],
         views: [fused; MAX_VIEWS],
         keypoints: [joint; MAX_KEYPOINTS],
-    }
+    };
+    let mut skeletons = Box::<Skeletons>::default();
+    skeletons.stamp.frame = frame;
+    skeletons.views_present = 0b11;
+    (skeletons.n_people, skeletons.people[0]) = (1, person);
+    skeletons
 }
 
 /// A frame in which both views found somebody.
@@ -131,7 +130,7 @@ pub(crate) fn record(frame: u64) -> FrameRecord {
         ..ViewRecord::default()
     };
     FrameRecord {
-        pose3d: pose3d(frame),
+        skeletons: skeletons(frame),
         views: vec![view; 2],
         fused: Vec::new(),
     }

@@ -7,7 +7,7 @@ use crate::{FrameRecord, Scene};
 
 /// The line of a frame. What differs from run to run stands here and in no other file of lines.
 pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> TimesLine {
-    let pose = &record.pose3d;
+    let pose = &record.skeletons;
     let ms = |nanos: u64| milliseconds(nanos, pose.stamp.session);
     let views = scene.views.iter().zip(&record.views);
     let views = views.map(|(view, it)| {
@@ -49,8 +49,8 @@ mod tests {
     #[test]
     fn times_count_from_the_beginning_of_the_run_and_lives_are_told_apart() {
         let mut record = record(7);
-        record.pose3d.stamp.session = 1_000_000_000;
-        record.pose3d.timing.sent_at_nanos = 1_040_500_000;
+        record.skeletons.stamp.session = 1_000_000_000;
+        record.skeletons.timing.sent_at_nanos = 1_040_500_000;
         record.views[1].frame = Some(FrameHeader {
             stamp: Stamp {
                 epoch: 2,

@@ -1,19 +1,24 @@
 //! `pose3d.trc` for `OpenSim`: tab separated, metres, y up.
+//!
+//! The format is of one person. While the run lasts it is not known who will come, so the file has who is followed; `parallax export` gives
+//! every person a file.
 
-use messages::Pose3d;
+use messages::Skeletons;
 use nalgebra::Vector3;
 
 use crate::Scene;
-use crate::pose3d::{is_placed, joints, keypoints};
+use crate::pose3d::{is_placed, joints, keypoints, nobody};
 
 /// One row, with its end; the three cells of a missing joint are `NaN`.
 ///
 /// * `row`: number of the row, from 1.
-pub(crate) fn row(scene: &Scene, row: u64, pose: &Pose3d) -> String {
+pub(crate) fn row(scene: &Scene, row: u64, frame: &Skeletons) -> String {
     let axes = scene.opensim_from_world();
-    let time = scene.time_s(pose.stamp.frame).unwrap_or(0.0);
-    let points = joints(scene, pose)
-        .chain(keypoints(scene, pose))
+    let time = scene.time_s(frame.stamp.frame).unwrap_or(0.0);
+    let nobody = nobody(scene, frame.status);
+    let person = frame.followed().unwrap_or(&nobody);
+    let points = joints(scene, person)
+        .chain(keypoints(scene, person))
         .map(|(_, joint)| is_placed(joint).then(|| (axes * Vector3::from(joint.in_world)).into()));
     formats::trc::row(row, time, points)
 }
@@ -43,9 +48,9 @@ mod tests {
     use messages::Status;
 
     use super::*;
-    use crate::testing::{pose3d, scene};
+    use crate::testing::{scene, skeletons};
 
-    fn written(poses: Vec<Pose3d>) -> Trc {
+    fn written(poses: Vec<Box<Skeletons>>) -> Trc {
         let scene = scene();
         let mut text = header(&scene, 60.0, poses.len() as u64);
         for (index, pose) in poses.into_iter().enumerate() {
@@ -56,9 +61,9 @@ mod tests {
 
     #[test]
     fn what_was_written_reads_back() {
-        let mut moved = pose3d(1);
-        moved.joints[0].in_world = [-0.25, 0.5, 1.75];
-        let got = written(vec![pose3d(0), moved]);
+        let mut moved = skeletons(1);
+        moved.people[0].joints[0].in_world = [-0.25, 0.5, 1.75];
+        let got = written(vec![skeletons(0), moved]);
         assert_eq!(got.rate_hz, 30.0);
         assert_eq!(got.units, "m");
         assert_eq!(got.markers.len(), 14);
@@ -72,9 +77,9 @@ mod tests {
     fn extra_keypoints_are_markers_after_the_joints() {
         let mut scene = scene();
         scene.extra_keypoints = vec!["left heel".to_owned()];
-        let mut pose = pose3d(0);
-        pose.n_keypoints = 1;
-        pose.keypoints[0].in_world = [-0.25, 0.5, 1.75];
+        let mut pose = skeletons(0);
+        pose.people[0].n_keypoints = 1;
+        pose.people[0].keypoints[0].in_world = [-0.25, 0.5, 1.75];
         let text = header(&scene, 60.0, 1) + &row(&scene, 1, &pose);
         let got = Trc::parse(&text).unwrap();
         assert_eq!(got.markers[14], "left_heel");
@@ -83,9 +88,9 @@ mod tests {
 
     #[test]
     fn a_missing_joint_reads_back_as_missing() {
-        let mut pose = pose3d(0);
-        pose.joints[3].status = Status::TOO_FEW_VIEWS;
-        pose.joints[13].in_world[0] = f64::NAN;
+        let mut pose = skeletons(0);
+        pose.people[0].joints[3].status = Status::TOO_FEW_VIEWS;
+        pose.people[0].joints[13].in_world[0] = f64::NAN;
         let got = written(vec![pose]);
         assert_eq!(got.frames[0][3], None);
         assert_eq!(got.frames[0][13], None);

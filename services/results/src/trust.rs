@@ -1,8 +1,8 @@
-//! How far the results can be trusted: what they themselves tell, frame by frame.
+//! How far the results can be trusted: what they themselves tell of the person who is followed, frame by frame.
 
 use std::collections::BTreeMap;
 
-use messages::{Joint3d, Pose3d, Sides, Status};
+use messages::{Sides, SkeletonMessage, Status};
 use nalgebra::Vector3;
 use runfiles::{Doubt, Trust};
 
@@ -45,17 +45,20 @@ pub(crate) struct Trusted {
 }
 
 impl Trusted {
-    /// Adds a result.
+    /// Adds the person who is followed in a result.
     ///
     /// * `limbs`: pairs of joints that a bone connects.
     /// * `time_s`: of the frame, if it is known.
     /// * `distances_m`: of what the views show from the joints, metres.
     pub(crate) fn add(
         &mut self,
-        pose: &Pose3d,
+        person: Option<&SkeletonMessage>,
         limbs: &[(usize, usize)],
         (time_s, distances_m): (Option<f64>, &[f64]),
     ) {
+        let Some(pose) = person else {
+            return;
+        };
         let is_nobody = pose.status == Status::IMPLAUSIBLE;
         let is_body = pose.status == Status::OK && pose.stature_m > 0.0;
         // Skeletons of something else than people are not judged.
@@ -79,7 +82,7 @@ impl Trusted {
         }
     }
 
-    fn skeleton(&mut self, pose: &Pose3d) {
+    fn skeleton(&mut self, pose: &SkeletonMessage) {
         self.n_decided += u64::from(pose.sides != Sides::AS_SEEN);
         self.n_unsure += u64::from(pose.sides == Sides::UNSURE);
         if pose.body_deviation.is_finite() {
@@ -87,8 +90,7 @@ impl Trusted {
             *self.deviations.entry(step).or_default() += 1;
         }
         let height_px = mean_height_px(pose);
-        let joints: &[Joint3d] = &pose.joints[..(pose.n_joints as usize).min(pose.joints.len())];
-        for joint in joints {
+        for joint in pose.listed_joints() {
             self.n_joints += 1;
             self.n_joints_implausible += u64::from(joint.status == Status::IMPLAUSIBLE);
             if let Some(height_px) = height_px.filter(|_| joint.status == Status::OK)
@@ -101,7 +103,7 @@ impl Trusted {
         }
     }
 
-    fn bones(&mut self, pose: &Pose3d, limbs: &[(usize, usize)]) {
+    fn bones(&mut self, pose: &SkeletonMessage, limbs: &[(usize, usize)]) {
         for bone in limbs {
             if let (Some(one), Some(other)) = (place(pose, bone.0), place(pose, bone.1)) {
                 let step = (one - other).norm().min(LONGEST_M) / LENGTH_STEP_M;
@@ -115,7 +117,7 @@ impl Trusted {
         }
     }
 
-    fn moved(&mut self, pose: &Pose3d, time_s: Option<f64>) {
+    fn moved(&mut self, pose: &SkeletonMessage, time_s: Option<f64>) {
         let places = (0..pose.n_joints as usize).filter_map(|joint| place(pose, joint));
         let (sum, n) = places.fold((Vector3::zeros(), 0), |(sum, n), it| (sum + it, n + 1));
         let Some(now_s) = time_s.filter(|_| n > 0) else {
@@ -164,7 +166,7 @@ impl Trusted {
     }
 }
 
-fn place(pose: &Pose3d, joint: usize) -> Option<Vector3<f64>> {
+fn place(pose: &SkeletonMessage, joint: usize) -> Option<Vector3<f64>> {
     let joint = pose.joints.get(joint).filter(|it| is_placed(it))?;
     Some(joint.in_world.into())
 }
@@ -193,8 +195,8 @@ fn scatter_m(counts: &[u32]) -> Option<f64> {
 }
 
 /// The mean height of the person in the views that were used, pixels of their frames.
-fn mean_height_px(pose: &Pose3d) -> Option<f64> {
-    let views = pose.views.iter().take(pose.n_views as usize).enumerate();
+fn mean_height_px(pose: &SkeletonMessage) -> Option<f64> {
+    let views = pose.listed_views().iter().enumerate();
     let used = views.filter(|(view, _)| pose.views_used >> view & 1 == 1);
     let heights: Vec<f64> = used.filter_map(|(_, fused)| height_px(fused)).collect();
     let mean = heights.iter().sum::<f64>() / heights.len().max(1) as f64;
@@ -203,19 +205,19 @@ fn mean_height_px(pose: &Pose3d) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use bytemuck::Zeroable as _;
-
     use super::*;
 
-    fn result(sides: Sides) -> Pose3d {
-        let mut pose = Pose3d::zeroed();
-        pose.status = Status::OK;
-        pose.n_joints = 2;
-        pose.n_views = 1;
-        pose.views_used = 1;
-        pose.sides = sides;
-        pose.stature_m = 1.7;
-        pose.body_deviation = 0.8;
+    fn result(sides: Sides) -> SkeletonMessage {
+        let mut pose = SkeletonMessage {
+            status: Status::OK,
+            n_joints: 2,
+            n_views: 1,
+            views_used: 1,
+            sides,
+            stature_m: 1.7,
+            body_deviation: 0.8,
+            ..SkeletonMessage::default()
+        };
         pose.views[0].status = Status::OK;
         pose.views[0].n_parts = 2;
         pose.views[0].centres_px[1] = [0.0, 200.0];
@@ -227,7 +229,7 @@ mod tests {
     #[test]
     fn shares_are_of_what_was_found() {
         let mut trusted = Trusted::default();
-        let mut add = |pose: &Pose3d| trusted.add(pose, &[(0, 1)], (Some(0.0), &[]));
+        let mut add = |pose: &SkeletonMessage| trusted.add(Some(pose), &[(0, 1)], (Some(0.0), &[]));
         add(&result(Sides::SURE));
         add(&result(Sides::UNSURE));
         let mut nobody = result(Sides::SURE);
@@ -262,7 +264,7 @@ mod tests {
             pose.joints[0].in_world = [away, 0.0, 0.0];
             pose.joints[1].in_world = [away, 0.0, 0.4 + long];
             let time_s = Some(0.1 * f64::from(nth));
-            trusted.add(&pose, &[(0, 1)], (time_s, &[0.02, 0.04]));
+            trusted.add(Some(&pose), &[(0, 1)], (time_s, &[0.02, 0.04]));
         }
         let got = trusted.trust();
         assert_eq!(got.jumps, 0.1);

@@ -5,14 +5,14 @@ use std::cell::Ref;
 use std::sync::Arc;
 
 use failure::{ExitKind, Failure, OrFail as _};
-use messages::{EvidenceHeader, Pose3d, ViewPose, topic};
+use messages::{EvidenceHeader, Skeletons, ViewPose, topic};
 use multiview::ViewPlan;
 use pipeline::{
     ExtraKeypoint, ExtrasStep, FoundExtras, FramePeople, Motion, SpaceStep, ViewResult,
 };
 use runtime::{Sample, Service};
 use stage::{Context, Frame, Held, Output, Stage};
-use wire::EvidenceView;
+use wire::{EvidenceView, SolvedPerson};
 
 /// The process's work by the method of networks.
 #[derive(Debug)]
@@ -69,7 +69,7 @@ pub fn run_in_space(service: &Service, job: &SpaceJob, mut step: SpaceStep) -> R
         job,
         held: held?,
         people,
-        output: stage.output(&topic::pose3d(), job.n_consumers)?,
+        output: stage.output(&topic::skeletons(), job.n_consumers)?,
     };
     // Of the extra keypoints.
     let mut motion = Motion::default();
@@ -83,7 +83,7 @@ struct Solver<'a> {
     held: Vec<Held<f32, EvidenceHeader>>,
     /// Slot of the people.
     people: usize,
-    output: Output<'a, Pose3d>,
+    output: Output<'a, Skeletons>,
 }
 
 impl Solver<'_> {
@@ -126,13 +126,17 @@ impl Solver<'_> {
         self.service
             .health()
             .counted_people(skeleton.n_people as u32);
-        let message = wire::skeleton_to_message(&skeleton, present);
-        let mut message = message.or_fail(ExitKind::Run)?;
         motion.begin(instant_s);
         let found = found_extras(&answers, &extras);
         let keypoints = self.job.extras.run(&skeleton, &found, motion);
-        wire::keypoints_to_message(&mut message, &keypoints).or_fail(ExitKind::Run)?;
-        self.output.send_and_account(frame.turn(), 0, message)
+        let solved = people.people.first().map(|person| SolvedPerson {
+            id: person.id,
+            skeleton: &skeleton,
+            keypoints: &keypoints,
+        });
+        let message = wire::skeletons_to_message(solved.as_slice(), skeleton.n_people, present);
+        let message = message.or_fail(ExitKind::Run)?;
+        self.output.send_and_account(frame.turn(), 0, *message)
     }
 
     /// The evidence of a view; `None`, and counted, if it is malformed.

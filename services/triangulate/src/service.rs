@@ -12,9 +12,12 @@ use pipeline::{
 };
 use runtime::Service;
 use stage::{Frame, Item, Stage};
-use wire::WireError;
+use wire::{SolvedPerson, WireError};
 
 use crate::in_space::found_extras;
+
+/// Identity of the person by the paper's method, which names nobody: the one who is followed.
+const UNNAMED: u64 = 1;
 
 /// What the process has to do.
 #[derive(Debug)]
@@ -66,7 +69,7 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
     let pairs = stage.pair_inputs(job.n_workers, job.pairs.len(), |pair| {
         decode_pair(job, pair).map(Box::new).map(Input::Pair)
     })?;
-    let skeletons = stage.output(&topic::pose3d(), job.n_consumers)?;
+    let skeletons = stage.output(&topic::skeletons(), job.n_consumers)?;
     // Of the extra keypoints.
     let mut motion = Motion::default();
     stage.run(|frame| {
@@ -84,13 +87,19 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         let skeleton = skeleton(job.views, &views, pairs, &mut step);
         let n_people = skeleton.n_people as u32;
         service.health().counted_people(n_people);
-        let mut message =
-            wire::skeleton_to_message(&skeleton, views_present).or_fail(ExitKind::Run)?;
         let found = found_extras(&views, &found);
         motion.begin(rate.map(|rate| frame.number() as f64 / rate));
         let keypoints = job.extras.run(&skeleton, &found, &mut motion);
-        wire::keypoints_to_message(&mut message, &keypoints).or_fail(ExitKind::Run)?;
-        skeletons.send_and_account(frame.turn(), 0, message)
+        let is_somebody = skeleton.views.iter().any(Option::is_some);
+        let solved = is_somebody.then_some(SolvedPerson {
+            id: UNNAMED,
+            skeleton: &skeleton,
+            keypoints: &keypoints,
+        });
+        let message =
+            wire::skeletons_to_message(solved.as_slice(), skeleton.n_people, views_present);
+        let message = message.or_fail(ExitKind::Run)?;
+        skeletons.send_and_account(frame.turn(), 0, *message)
     })
 }
 

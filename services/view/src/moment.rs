@@ -1,6 +1,6 @@
-//! One frame as the page draws it.
+//! One frame as the page draws it: of several people the one who is followed.
 
-use messages::{Joint3d, MAX_JOINTS, MAX_PARTS, Pose3d, Status};
+use messages::{Joint3d, MAX_PARTS, SkeletonMessage, Skeletons, Status};
 use serde::Serialize;
 
 use crate::scene::Scene;
@@ -49,11 +49,14 @@ impl Moment {
     /// The name of its type.
     pub(crate) const KIND: &'static str = "moment";
 
-    /// The frame that a message speaks of. Check the message first.
-    pub(crate) fn of_message(scene: &Scene, message: &Pose3d) -> Self {
-        let n_joints = (message.n_joints as usize).min(MAX_JOINTS);
-        let joints = &message.joints[..n_joints];
-        let found = |it: &&Joint3d| it.status == Status::OK;
+    /// The frame that a message speaks of, with the person who is followed. Check the message first.
+    pub(crate) fn of_message(scene: &Scene, message: &Skeletons) -> Self {
+        let person = message.followed();
+        // Of nobody no joint is anywhere.
+        let nowhere = vec![Joint3d::default(); scene.joints.joints.len()];
+        let joints = person.map_or(&nowhere[..], SkeletonMessage::listed_joints);
+        let stature_m = person.map_or(0.0, |person| person.stature_m);
+        let found = |it: &&Joint3d| person.is_some() && it.status == Status::OK;
         let views = scene.views.iter().enumerate();
         let latency = message.timing.sent_at_nanos;
         let latency = latency.checked_sub(message.stamp.captured_at_nanos);
@@ -74,8 +77,8 @@ impl Moment {
                 .map(|it| Some(it).filter(found).and_then(|it| spread(it.covariance)))
                 .collect(),
             views: views.map(|(view, _)| seen(scene, message, view)).collect(),
-            people: Some(message.n_people).filter(|it| *it > 0),
-            stature: Some(rounded(message.stature_m, 1e3)).filter(|it| *it > 0.0),
+            people: Some(message.n_seen).filter(|n_seen| *n_seen > 0),
+            stature: Some(rounded(stature_m, 1e3)).filter(|metres| *metres > 0.0),
             latency_ms: latency.map(|nanos| rounded(nanos as f64 / 1e6, 10.0)),
         }
     }
@@ -87,14 +90,14 @@ impl Moment {
     }
 }
 
-fn seen(scene: &Scene, message: &Pose3d, view: usize) -> Seen {
-    let Some(fused) = message.views.get(view) else {
-        return Seen::default();
-    };
-    if fused.status != Status::OK {
+fn seen(scene: &Scene, message: &Skeletons, view: usize) -> Seen {
+    let views = message.followed().map(SkeletonMessage::listed_views);
+    let fused = views.and_then(|views| views.get(view));
+    let status = fused.map_or(Status::NO_DETECTION, |fused| fused.status);
+    let Some(fused) = fused.filter(|_| status == Status::OK) else {
         let is_there = message.views_present >> view & 1 == 1;
-        let why = if is_there || fused.status != Status::NO_DETECTION {
-            fused.status.reason()
+        let why = if is_there || status != Status::NO_DETECTION {
+            status.reason()
         } else {
             "nothing in time"
         };
@@ -102,7 +105,7 @@ fn seen(scene: &Scene, message: &Pose3d, view: usize) -> Seen {
             why: Some(why.to_owned()),
             ..Seen::default()
         };
-    }
+    };
     let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
     let joints = scene.joints_of(&fused.centres_px[..n_parts]);
     Seen {
@@ -131,4 +134,51 @@ pub(crate) fn in_view(point: [f64; 2]) -> [f64; 2] {
 pub(crate) fn spread(covariance: [f64; 6]) -> Option<[f64; 6]> {
     let is_known = covariance.iter().all(|it| it.is_finite());
     is_known.then(|| covariance.map(|it| rounded(it, 1e8)))
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use skeleton::PARSE14;
+
+    use super::*;
+    use crate::scene::View;
+
+    /// A run of one view.
+    pub(crate) fn scene() -> Scene {
+        Scene {
+            name: "test".to_owned(),
+            views: vec![View {
+                name: "a".to_owned(),
+                size: [640, 480],
+                camera: None,
+            }],
+            joints: &PARSE14,
+            up: [0.0, 0.0, 1.0],
+            frame_rate_hz: None,
+            tells_facing: true,
+            problem: None,
+        }
+    }
+
+    #[test]
+    fn of_several_people_the_one_who_is_followed_is_shown() {
+        let mut message = Box::<Skeletons>::default();
+        (message.n_people, message.n_seen) = (2, 3);
+        for (nth, person) in message.people[..2].iter_mut().enumerate() {
+            (person.id, person.n_joints, person.n_views) = (5 - nth as u64, 14, 1);
+            (person.joints[0].in_world[0], person.stature_m) = (1.0 + nth as f64, 1.7);
+        }
+        let moment = Moment::of_message(&scene(), &message);
+        assert_eq!(moment.joints.len(), 14);
+        assert_eq!(moment.joints[0], Some([1.0, 0.0, 0.0]));
+        assert_eq!(
+            (moment.people, moment.stature, moment.why),
+            (Some(3), Some(1.7), None)
+        );
+        (message.n_people, message.status) = (0, Status::TOO_FEW_VIEWS);
+        let moment = Moment::of_message(&scene(), &message);
+        assert_eq!((moment.joints, moment.stature), (vec![None; 14], None));
+        assert_eq!(moment.why.as_deref(), Some("too few views"));
+        assert_eq!(moment.views[0].why.as_deref(), Some("nothing in time"));
+    }
 }

@@ -25,7 +25,7 @@ fn main() -> Result<(), ClientError> {
             println!("{words}");
             continue;
         };
-        let found = moment.skeleton.as_ref().and_then(|it| it.joint(&joint));
+        let found = moment.followed().and_then(|person| person.joint(&joint));
         match found.map(|it| it.found) {
             Some(Ok(place)) => {
                 let [x, y, z] = place.in_world;

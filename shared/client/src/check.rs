@@ -1,8 +1,8 @@
 //! What must hold of a message from another process before it is given to a program.
 
 use messages::{
-    FrameHeader, MAX_CANDIDATES, MAX_JOINTS, MAX_KEYPOINTS, MAX_PARTS, MAX_VIEW_KEYPOINTS,
-    MAX_VIEWS, Pose3d, Stamp, Status, ViewPose,
+    FrameHeader, MAX_CANDIDATES, MAX_KEYPOINTS, MAX_PARTS, MAX_VIEW_KEYPOINTS, SkeletonMessage,
+    Skeletons, Stamp, Status, ViewPose,
 };
 use runfiles::Running;
 
@@ -11,35 +11,40 @@ pub(crate) fn stamp(stamp: &Stamp, running: &Running, view: usize) -> bool {
     stamp.session == running.session && stamp.view as usize == view
 }
 
-/// Whether the counts of a skeleton are those of the deployment, and its numbers are numbers.
-pub(crate) fn skeleton(message: &Pose3d, running: &Running) -> bool {
-    let (n_joints, n_views) = (message.n_joints as usize, message.n_views as usize);
-    let n_keypoints = message.n_keypoints as usize;
-    if n_joints > MAX_JOINTS || n_views > MAX_VIEWS || n_keypoints > MAX_KEYPOINTS {
-        return false;
-    }
-    // A frame without a skeleton may have no joints and no views.
-    let is_empty = message.status != Status::OK && n_joints == 0 && n_views == 0;
-    let fits = n_joints == running.joints.len() && n_views == running.views.len();
-    let joints = message.joints[..n_joints].iter();
+/// Whether the counts of skeletons are those of the deployment, every identity is of one person, and numbers are numbers.
+pub(crate) fn skeletons(message: &Skeletons, running: &Running) -> bool {
+    let n_people = message.n_people as usize;
+    let people = message.listed();
+    let is_person = |(nth, person): (usize, &SkeletonMessage)| {
+        let is_named_once = people[..nth].iter().all(|other| other.id != person.id);
+        is_named_once && skeleton(person, running)
+    };
+    n_people == people.len() && people.iter().enumerate().all(is_person)
+}
+
+fn skeleton(person: &SkeletonMessage, running: &Running) -> bool {
+    let fits = person.n_joints as usize == running.joints.len()
+        && person.n_views as usize == running.views.len()
+        && person.n_keypoints as usize <= MAX_KEYPOINTS;
+    let joints = person.listed_joints().iter();
     let mut found = joints
-        .chain(&message.keypoints[..n_keypoints])
-        .filter(|it| it.status == Status::OK);
-    let finite = found.all(|it| {
-        let mut numbers = it.in_world.iter().chain(&it.covariance);
-        numbers.all(|it| it.is_finite()) && it.reprojection_px.is_finite()
+        .chain(person.listed_keypoints())
+        .filter(|joint| joint.status == Status::OK);
+    let are_finite = found.all(|joint| {
+        let mut numbers = joint.in_world.iter().chain(&joint.covariance);
+        numbers.all(|number| number.is_finite()) && joint.reprojection_px.is_finite()
     });
-    let views = message.views[..n_views].iter();
-    let mut seen = views.filter(|it| it.status == Status::OK);
-    let placed = seen.all(|it| {
-        let n_parts = it.n_parts as usize;
+    let views = person.listed_views().iter();
+    let mut seen = views.filter(|view| view.status == Status::OK);
+    let are_placed = seen.all(|view| {
+        let n_parts = view.n_parts as usize;
         n_parts <= MAX_PARTS
-            && it.centres_px[..n_parts]
+            && view.centres_px[..n_parts]
                 .as_flattened()
                 .iter()
-                .all(|it| it.is_finite())
+                .all(|number| number.is_finite())
     });
-    (is_empty || fits) && finite && placed
+    fits && are_finite && are_placed
 }
 
 /// Whether the counts of a view's pose fit into it.
@@ -68,7 +73,6 @@ pub(crate) fn picture(header: &FrameHeader, len: usize) -> bool {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use bytemuck::Zeroable as _;
     use messages::Joint3d;
     use proptest::prelude::*;
     use runfiles::RunningView;
@@ -96,25 +100,30 @@ pub(crate) mod tests {
         }
     }
 
-    pub(crate) fn pose3d(frame: u64) -> Pose3d {
-        let mut message = Pose3d::zeroed();
+    /// A frame with one person.
+    pub(crate) fn skeletons(frame: u64) -> Skeletons {
+        let mut message = Skeletons {
+            n_people: 1,
+            ..Skeletons::default()
+        };
         message.stamp.session = 7;
         message.stamp.frame = frame;
-        (message.n_joints, message.n_views) = (2, 2);
-        message.joints[0] = Joint3d {
+        let person = &mut message.people[0];
+        (person.id, person.n_joints, person.n_views) = (1, 2, 2);
+        person.joints[0] = Joint3d {
             in_world: [0.0, 0.0, 1.7],
             covariance: [1e-4, 0.0, 0.0, 1e-4, 0.0, 4e-4],
             reprojection_px: 1.0,
             views_used: 3,
             status: Status::OK,
         };
-        message.joints[1].status = Status::TOO_FEW_VIEWS;
+        person.joints[1].status = Status::TOO_FEW_VIEWS;
         message
     }
 
     #[test]
     fn a_message_of_another_run_or_view_is_none_of_ours() {
-        let mut it = pose3d(3).stamp;
+        let mut it = skeletons(3).stamp;
         assert!(stamp(&it, &running(), 0));
         assert!(!stamp(&it, &running(), 1));
         it.session = 8;
@@ -124,24 +133,29 @@ pub(crate) mod tests {
     #[test]
     fn counts_and_numbers_that_cannot_be_are_refused() {
         let running = running();
-        assert!(skeleton(&pose3d(0), &running));
-        let mut none = Pose3d::zeroed();
-        none.status = Status::TOO_FEW_VIEWS;
-        assert!(skeleton(&none, &running));
-        let changes: [fn(&mut Pose3d); 6] = [
-            |it| it.n_joints = 3,
-            |it| it.n_joints = u32::MAX,
-            |it| it.n_views = 17,
-            |it| it.n_keypoints = 1000,
-            |it| it.joints[0].in_world[1] = f64::NAN,
-            |it| {
-                it.views[1].n_parts = 33;
+        assert!(super::skeletons(&skeletons(0), &running));
+        let none = Skeletons {
+            status: Status::TOO_FEW_VIEWS,
+            ..Skeletons::default()
+        };
+        assert!(super::skeletons(&none, &running));
+        let changes: [fn(&mut Skeletons); 8] = [
+            |frame| frame.n_people = 9,
+            |frame| {
+                frame.people[1] = frame.people[0];
+                frame.n_people = 2;
             },
+            |frame| frame.people[0].n_joints = 3,
+            |frame| frame.people[0].n_joints = u32::MAX,
+            |frame| frame.people[0].n_views = 17,
+            |frame| frame.people[0].n_keypoints = 1000,
+            |frame| frame.people[0].joints[0].in_world[1] = f64::NAN,
+            |frame| frame.people[0].views[1].n_parts = 33,
         ];
         for (nth, change) in changes.iter().enumerate() {
-            let mut message = pose3d(0);
+            let mut message = skeletons(0);
             change(&mut message);
-            assert!(!skeleton(&message, &running), "change {nth}");
+            assert!(!super::skeletons(&message, &running), "change {nth}");
         }
     }
 
@@ -163,9 +177,9 @@ pub(crate) mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_taken_or_refused(bytes in prop::collection::vec(any::<u8>(), size_of::<Pose3d>())) {
-            let message: Pose3d = bytemuck::pod_read_unaligned(&bytes);
-            skeleton(&message, &running());
+        fn any_bytes_are_taken_or_refused(bytes in prop::collection::vec(any::<u8>(), size_of::<Skeletons>())) {
+            let message: Skeletons = bytemuck::pod_read_unaligned(&bytes);
+            super::skeletons(&message, &running());
             let n = size_of::<ViewPose>().min(bytes.len());
             if n == size_of::<ViewPose>() {
                 let message: ViewPose = bytemuck::pod_read_unaligned(&bytes[..n]);

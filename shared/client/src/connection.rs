@@ -5,7 +5,7 @@ use std::io;
 use std::sync::Arc;
 use std::time::Instant;
 
-use messages::{FrameHeader, Pose3d, Status, ViewPose, topic};
+use messages::{FrameHeader, Skeletons, Status, ViewPose, topic};
 use runfiles::Running;
 use runtime::{
     Guest, GuestError, GuestPort, Namespace, ReceiveError, running_deployments,
@@ -26,7 +26,7 @@ const STARTING: Duration = Duration::from_secs(5);
 /// The ports of one run of a deployment. Its description stays the same, and so does its session.
 #[derive(Debug)]
 pub(crate) struct Connection {
-    skeletons: Option<GuestPort<Pose3d, ()>>,
+    skeletons: Option<GuestPort<Skeletons, ()>>,
     views: Vec<ViewPorts>,
     pub(crate) running: Arc<Running>,
     buffers: Option<Buffers>,
@@ -64,7 +64,7 @@ impl Connection {
             .map_err(|error| unreadable(deployment, error))?;
         let running = Running::read(&text)?;
         let skeletons = if wish.skeletons {
-            Some(guest.port(&topic::pose3d())?)
+            Some(guest.port(&topic::skeletons())?)
         } else {
             None
         };
@@ -110,12 +110,12 @@ impl Connection {
             }
         }
         for message in skeletons {
-            joiner.add_skeleton(message, now);
+            joiner.add_skeletons(message, now);
         }
         Ok(turn)
     }
 
-    fn skeletons(&mut self) -> Result<Vec<Box<Pose3d>>, ClientError> {
+    fn skeletons(&mut self) -> Result<Vec<Box<Skeletons>>, ClientError> {
         let mut taken = Vec::new();
         let Some(port) = &self.skeletons else {
             return Ok(taken);
@@ -129,7 +129,7 @@ impl Connection {
             if is_ours && message.status == Status::END {
                 continue;
             }
-            if is_ours && check::skeleton(message, &self.running) {
+            if is_ours && check::skeletons(message, &self.running) {
                 taken.push(Box::new(*message));
             } else {
                 self.n_refused += 1;

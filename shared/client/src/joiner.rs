@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use messages::{Pose3d, Stamp, ViewPose};
+use messages::{Skeletons, Stamp, ViewPose};
 
 use crate::wish::Wish;
 
@@ -15,7 +15,7 @@ const MOST_PENDING: usize = 32;
 pub(crate) struct Gathered<P> {
     pub(crate) frame: u64,
     pub(crate) captured_at_nanos: u64,
-    pub(crate) skeleton: Option<Box<Pose3d>>,
+    pub(crate) skeletons: Option<Box<Skeletons>>,
     /// One for each view that was asked for.
     pub(crate) views: Vec<Parts<P>>,
     pub(crate) is_complete: bool,
@@ -63,9 +63,9 @@ impl<P> Joiner<P> {
         }
     }
 
-    pub(crate) fn add_skeleton(&mut self, message: Box<Pose3d>, now: Instant) {
+    pub(crate) fn add_skeletons(&mut self, message: Box<Skeletons>, now: Instant) {
         if let Some(frame) = self.frame(&message.stamp, now) {
-            frame.skeleton = Some(message);
+            frame.skeletons = Some(message);
         }
     }
 
@@ -103,7 +103,7 @@ impl<P> Joiner<P> {
         let gathered = self.pending.entry(stamp.frame).or_insert_with(|| Gathered {
             frame: stamp.frame,
             captured_at_nanos: stamp.captured_at_nanos,
-            skeleton: None,
+            skeletons: None,
             views: (0..n_views).map(|_| Parts::default()).collect(),
             is_complete: false,
             since: now,
@@ -130,7 +130,7 @@ impl<P> Joiner<P> {
         self.next = last.saturating_add(1);
         let mut given = Vec::new();
         for mut it in done.into_values() {
-            if self.wish.skeletons && it.skeleton.is_none() {
+            if self.wish.skeletons && it.skeletons.is_none() {
                 self.n_late += 1;
                 continue;
             }
@@ -142,7 +142,7 @@ impl<P> Joiner<P> {
 
     fn is_over(&self, it: &Gathered<P>, now: Instant) -> bool {
         if self.wish.skeletons {
-            return it.skeleton.is_some();
+            return it.skeletons.is_some();
         }
         self.has_views(it) || now.saturating_duration_since(it.since) >= self.wish.patience
     }
@@ -163,7 +163,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::check::tests::pose3d;
+    use crate::check::tests::skeletons;
 
     fn stamp(frame: u64) -> Stamp {
         Stamp {
@@ -191,18 +191,18 @@ mod tests {
         joiner.add_pose(1, pose(5), now);
         joiner.add_picture(1, &stamp(5), 'b', now);
         assert_eq!(joiner.take(now).len(), 0, "no skeleton");
-        joiner.add_skeleton(Box::new(pose3d(5)), now);
+        joiner.add_skeletons(Box::new(skeletons(5)), now);
         let given = joiner.take(now);
         // Frame 4 has no skeleton, and will not have one.
         assert_eq!(given.len(), 1);
         assert!(given[0].is_complete);
         assert_eq!(given[0].views[1].picture, Some('b'));
-        joiner.add_skeleton(Box::new(pose3d(4)), now);
+        joiner.add_skeletons(Box::new(skeletons(4)), now);
         assert_eq!(joiner.take(now).len(), 0, "too late");
         assert_eq!(joiner.n_late, 2);
         // A view that is missing is said.
         joiner.add_pose(1, pose(6), now);
-        joiner.add_skeleton(Box::new(pose3d(6)), now);
+        joiner.add_skeletons(Box::new(skeletons(6)), now);
         let given = joiner.take(now);
         assert!(!given[0].is_complete && given[0].views[0].pose.is_none());
     }
@@ -243,7 +243,7 @@ mod tests {
             let mut frames = Vec::new();
             for (frame, part) in parts {
                 match part {
-                    2 => joiner.add_skeleton(Box::new(pose3d(frame)), now),
+                    2 => joiner.add_skeletons(Box::new(skeletons(frame)), now),
                     nth => joiner.add_pose(nth, pose(frame), now),
                 }
                 frames.extend(joiner.take(now).iter().map(|it| it.frame));

@@ -8,7 +8,7 @@
 //! fn main() -> Result<(), client::ClientError> {
 //!     let mut client = Client::open("demo", &Wish::skeletons())?;
 //!     while let Some(moment) = client.next(Duration::from_secs(5))? {
-//!         let Some(wrist) = moment.skeleton.as_ref().and_then(|it| it.joint("right wrist")) else {
+//!         let Some(wrist) = moment.followed().and_then(|person| person.joint("right wrist")) else {
 //!             continue;
 //!         };
 //!         match wrist.found {
@@ -20,7 +20,7 @@
 //! }
 //! ```
 //!
-//! [`Client::next`] gives one [`Moment`] for each frame: the skeleton, and if asked for the pose and the picture of every view,
+//! [`Client::next`] gives one [`Moment`] for each frame: the people, and if asked for the pose and the picture of every view,
 //! joined by the number of the frame. A thread reads the deployment; what waits for the caller is bounded, and either only the
 //! newest moment or every one is given ([`Wish::every_frame`]).
 //!
@@ -43,7 +43,7 @@ mod reader;
 mod wish;
 
 pub use error::ClientError;
-pub use moment::{Joint, Moment, Picture, Place, Skeleton, ViewMoment};
+pub use moment::{Joint, Moment, Picture, Place, Skeleton, Skeletons, ViewMoment};
 pub use reader::{Client, Losses, State};
 pub use runfiles::{Running, RunningView};
 pub use wish::Wish;

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use messages::{FrameHeader, Joint3d, Pose3d, Status, ViewPose};
+use messages::{FrameHeader, Joint3d, SkeletonMessage, Status, ViewPose};
 use runfiles::Running;
 use runtime::Seen;
 
@@ -17,8 +17,8 @@ pub struct Moment {
     pub frame: u64,
     /// When it was captured, nanoseconds of `CLOCK_MONOTONIC`.
     pub captured_at_nanos: u64,
-    /// The skeleton, if skeletons were asked for: there may be a reason in its place ([`Skeleton::status`]).
-    pub skeleton: Option<Skeleton>,
+    /// The people, if skeletons were asked for: there may be a reason in their place ([`Skeletons::status`]).
+    pub skeletons: Option<Skeletons>,
     /// The views that were asked for, in the order of the deployment.
     pub views: Vec<ViewMoment>,
     /// Whether all that was asked for is there.
@@ -40,11 +40,18 @@ pub struct ViewMoment {
     pub picture: Option<Picture>,
 }
 
-/// The skeleton of one frame.
+/// The people of one frame.
 #[derive(Debug, Clone)]
-pub struct Skeleton {
-    message: Box<Pose3d>,
+pub struct Skeletons {
+    message: Box<messages::Skeletons>,
     running: Arc<Running>,
+}
+
+/// One person of a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Skeleton<'a> {
+    message: &'a SkeletonMessage,
+    running: &'a Running,
 }
 
 /// One joint, and where it is or why it is nowhere.
@@ -71,53 +78,78 @@ pub struct Place {
     pub n_views: u32,
 }
 
-impl Skeleton {
-    pub(crate) fn new(message: Box<Pose3d>, running: Arc<Running>) -> Self {
+impl Skeletons {
+    pub(crate) fn new(message: Box<messages::Skeletons>, running: Arc<Running>) -> Self {
         Self { message, running }
     }
 
     /// The message as it was sent.
-    pub fn message(&self) -> &Pose3d {
+    pub fn message(&self) -> &messages::Skeletons {
         &self.message
     }
 
-    /// [`Status::OK`] if there is a skeleton, or why there is none.
+    /// [`Status::OK`] if anybody has a skeleton, or why nobody has.
     pub fn status(&self) -> Status {
         self.message.status
     }
 
-    /// The joints, in the order of the deployment; none if there is no skeleton.
-    pub fn joints(&self) -> impl Iterator<Item = Joint<'_>> {
-        let names = self.running.joints.iter();
-        names.zip(self.joint_slice()).map(named)
+    /// The people, the one who is followed first.
+    pub fn people(&self) -> impl Iterator<Item = Skeleton<'_>> {
+        let people = self.message.listed().iter();
+        people.map(|message| Skeleton {
+            message,
+            running: &self.running,
+        })
     }
 
-    /// The joint of that name; none if the deployment has no such joint, or this frame no skeleton.
-    pub fn joint(&self, name: &str) -> Option<Joint<'_>> {
-        self.joints().find(|it| it.name == name)
+    /// The person who is followed; `None` if there is nobody.
+    pub fn followed(&self) -> Option<Skeleton<'_>> {
+        self.people().next()
+    }
+}
+
+impl<'a> Skeleton<'a> {
+    /// The part of the message that is about the person.
+    pub fn message(self) -> &'a SkeletonMessage {
+        self.message
+    }
+
+    /// Identity within the run, from 1.
+    pub fn id(self) -> u64 {
+        self.message.id
+    }
+
+    /// [`Status::OK`] if there is a skeleton, or why there is none.
+    pub fn status(self) -> Status {
+        self.message.status
+    }
+
+    /// The joints, in the order of the deployment.
+    pub fn joints(self) -> impl Iterator<Item = Joint<'a>> {
+        let names = self.running.joints.iter();
+        names.zip(self.message.listed_joints()).map(named)
+    }
+
+    /// The joint of that name; `None` if the deployment has no such joint.
+    pub fn joint(self, name: &str) -> Option<Joint<'a>> {
+        self.joints().find(|joint| joint.name == name)
     }
 
     /// What networks name beside the joints.
-    pub fn keypoints(&self) -> impl Iterator<Item = Joint<'_>> {
-        let n = (self.message.n_keypoints as usize).min(self.message.keypoints.len());
+    pub fn keypoints(self) -> impl Iterator<Item = Joint<'a>> {
         let names = self.running.keypoints.iter();
-        names.zip(&self.message.keypoints[..n]).map(named)
+        names.zip(self.message.listed_keypoints()).map(named)
     }
 
     /// The centres of the parts in the frame of a view after fusion, `[column, row]` in pixels; empty where the view has no part in
     /// the skeleton.
-    pub fn centres_px(&self, view: usize) -> &[[f64; 2]] {
+    pub fn centres_px(self, view: usize) -> &'a [[f64; 2]] {
         let view = self.message.views.get(view);
-        let seen = view.filter(|it| it.status == Status::OK);
-        seen.map_or(&[], |it| {
-            let n = (it.n_parts as usize).min(it.centres_px.len());
-            &it.centres_px[..n]
+        let seen = view.filter(|view| view.status == Status::OK);
+        seen.map_or(&[], |view| {
+            let n = (view.n_parts as usize).min(view.centres_px.len());
+            &view.centres_px[..n]
         })
-    }
-
-    fn joint_slice(&self) -> &[Joint3d] {
-        let n = (self.message.n_joints as usize).min(self.message.joints.len());
-        &self.message.joints[..n]
     }
 }
 
@@ -225,6 +257,11 @@ impl Drop for Picture {
 }
 
 impl Moment {
+    /// The person who is followed; `None` if there is nobody, or skeletons were not asked for.
+    pub fn followed(&self) -> Option<Skeleton<'_>> {
+        self.skeletons.as_ref()?.followed()
+    }
+
     /// Whether any of its pictures lies where its sender wrote it.
     pub(crate) fn is_in_place(&self) -> bool {
         let mut pictures = self.views.iter().filter_map(|it| it.picture.as_ref());
@@ -235,18 +272,29 @@ impl Moment {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check::tests::{pose3d, running};
+    use crate::check::tests::{running, skeletons};
 
     #[test]
     fn a_joint_has_a_place_or_a_reason() {
-        let skeleton = Skeleton::new(Box::new(pose3d(0)), Arc::new(running()));
-        let head = skeleton.joint("head").unwrap().found.unwrap();
+        let mut message = Box::new(skeletons(0));
+        message.people[1] = message.people[0];
+        (message.n_people, message.people[1].id) = (2, 5);
+        message.people[1].joints[0].in_world[0] = 3.0;
+        let skeletons = Skeletons::new(message, Arc::new(running()));
+        let [one, other] = *skeletons.people().collect::<Vec<_>>() else {
+            panic!("two people")
+        };
+        assert_eq!((one.id(), other.id()), (1, 5));
+        let head = one.joint("head").unwrap().found.unwrap();
         assert_eq!((head.in_world, head.n_views), ([0.0, 0.0, 1.7], 2));
         assert!((head.deviation_m - 0.02_f64 / 2_f64.sqrt()).abs() < 1e-12);
-        let wrist = skeleton.joint("right wrist").unwrap();
+        let wrist = one.joint("right wrist").unwrap();
         assert_eq!(wrist.found, Err(Status::TOO_FEW_VIEWS));
-        assert_eq!(skeleton.joint("tail"), None);
-        assert_eq!(skeleton.centres_px(0).len(), 0);
-        assert_eq!(skeleton.centres_px(99).len(), 0);
+        assert_eq!(one.joint("tail"), None);
+        assert_eq!(one.centres_px(0).len(), 0);
+        assert_eq!(one.centres_px(99).len(), 0);
+        let head = other.joint("head").unwrap().found.unwrap();
+        assert_eq!(head.in_world, [3.0, 0.0, 1.7]);
+        assert_eq!(skeletons.followed().map(Skeleton::id), Some(1));
     }
 }

@@ -12,7 +12,7 @@ use crate::connection::{Connection, Turn};
 use crate::error::ClientError;
 use crate::joiner::{Gathered, Joiner};
 use crate::lock::lock;
-use crate::moment::{Moment, Picture, Skeleton, ViewMoment};
+use crate::moment::{Moment, Picture, Skeletons, ViewMoment};
 use crate::wish::Wish;
 
 /// Pause between two looks at the ports: no sender wakes a client.
@@ -301,13 +301,13 @@ impl Inner {
 }
 
 fn moment(gathered: Gathered<Picture>, views: &[usize], running: &Arc<Running>) -> Moment {
-    let skeleton = gathered.skeleton;
+    let skeletons = gathered.skeletons;
     let parts = views.iter().zip(gathered.views);
     Moment {
         running: Arc::clone(running),
         frame: gathered.frame,
         captured_at_nanos: gathered.captured_at_nanos,
-        skeleton: skeleton.map(|it| Skeleton::new(it, Arc::clone(running))),
+        skeletons: skeletons.map(|message| Skeletons::new(message, Arc::clone(running))),
         views: parts
             .map(|(view, parts)| ViewMoment {
                 view: *view,

@@ -344,7 +344,7 @@ impl Builder<'_> {
             inputs.extend(self.has_quality.then(|| topic::view_quality(view)));
         }
         inputs.extend(self.topology.fused());
-        inputs.push(topic::pose3d());
+        inputs.push(topic::skeletons());
         inputs
     }
 
@@ -361,7 +361,7 @@ impl Builder<'_> {
             None,
             Role::Essential,
             inputs,
-            vec![topic::pose3d()],
+            vec![topic::skeletons()],
         )
     }
 

@@ -11,8 +11,38 @@ pub const DEVIATIONS: f64 = 2.0;
 /// Points of an ellipse.
 const N_POINTS: usize = 40;
 
-/// Draws a frame on the picture of a view.
-pub fn draw(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) {
+/// Draws a frame on the picture of a view: everybody, each with the number of the person if there are several.
+pub fn draw(canvas: &mut Canvas, trials: &[Trial], slot: usize, view: &ViewCamera) {
+    for trial in trials {
+        let at = person(canvas, trial, slot, view);
+        if let Some([x, y]) = at.filter(|_| trials.len() > 1) {
+            canvas.label([x, y], &trial.id().to_string(), CENTRE);
+        }
+    }
+    let Some(trial) = best(trials, slot) else {
+        return;
+    };
+    let status = &trial.slots[slot].status;
+    let time = trial
+        .time_s(slot)
+        .map_or(String::new(), |it| format!(" {it:.3} s"));
+    let what = match &**status {
+        "ok" => "",
+        "" => " no result",
+        other => other,
+    };
+    let text = format!("{} {}{time} {what}", view.name, trial.frame(slot));
+    canvas.label([2.0, 2.0], text.trim_end(), CENTRE);
+}
+
+/// The trial whose status is that of the frame: of somebody who is there, if anybody is.
+fn best(trials: &[Trial], slot: usize) -> Option<&Trial> {
+    let is_there = |trial: &&Trial| trial.slots[slot].points.iter().any(Result::is_ok);
+    trials.iter().find(is_there).or(trials.first())
+}
+
+/// Draws a person; returns the upper left corner of what the view sees of it.
+fn person(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) -> Option<[f64; 2]> {
     let seen: Vec<Option<Seen>> = trial
         .points(slot)
         .map(|it| it.and_then(|it| view.see(it)))
@@ -33,17 +63,8 @@ pub fn draw(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) 
     for (name, at) in names.iter().zip(&places).skip(n_joints) {
         canvas.disc(*at, width, side_of(name).colour());
     }
-    let status = &trial.slots[slot].status;
-    let time = trial
-        .time_s(slot)
-        .map_or(String::new(), |it| format!(" {it:.3} s"));
-    let what = match &**status {
-        "ok" => "",
-        "" => " no result",
-        other => other,
-    };
-    let text = format!("{} {}{time} {what}", view.name, trial.frame(slot));
-    canvas.label([2.0, 2.0], text.trim_end(), CENTRE);
+    let places = seen.iter().flatten().map(|seen| seen.at);
+    places.reduce(|corner, at| [corner[0].min(at[0]), corner[1].min(at[1])])
 }
 
 fn ellipse(canvas: &mut Canvas, seen: &Seen, width: f64, side: Side) {
@@ -117,7 +138,7 @@ mod tests {
 
     fn drawn(trial: &Trial, slot: usize) -> Vec<u8> {
         let mut canvas = Canvas::new(Size::new(320, 240), [0; 3]);
-        draw(&mut canvas, trial, slot, &camera());
+        draw(&mut canvas, core::slice::from_ref(trial), slot, &camera());
         canvas.rgb().to_vec()
     }
 
@@ -129,6 +150,24 @@ mod tests {
         let without = drawn(&trial, 0);
         let lit = |rgb: &[u8]| rgb.iter().filter(|it| **it > 60).count();
         assert!(lit(&with) > lit(&without) + 500 && lit(&without) > 100);
+    }
+
+    #[test]
+    fn everybody_is_drawn_and_the_status_is_that_of_whoever_is_there() {
+        let mut pair = [walker(2), walker(2)];
+        pair[1].ids = vec![7];
+        for point in pair[1].slots[0].points.iter_mut().flatten() {
+            point.in_world.x += 0.6;
+        }
+        pair[0].slots[1] = crate::Slot::default();
+        let lit = |trials: &[Trial], slot: usize| {
+            let mut canvas = Canvas::new(Size::new(320, 240), [0; 3]);
+            draw(&mut canvas, trials, slot, &camera());
+            canvas.rgb().iter().filter(|it| **it > 60).count()
+        };
+        assert!(lit(&pair, 0) > lit(&pair[..1], 0) + 500);
+        assert!(lit(&pair, 1) > lit(&pair[..1], 1) + 500);
+        assert_eq!(best(&pair, 1).map(Trial::id), Some(7));
     }
 
     #[test]

@@ -13,8 +13,17 @@ use crate::{Seen, Trial, ViewCamera};
 /// What files of a frame end in.
 pub const SUFFIX: &str = "_keypoints.json";
 
-/// The file of a view and a frame; nobody is in it where nothing was found.
-pub fn frame(trial: &Trial, slot: usize, view: &ViewCamera) -> String {
+/// The file of a view and a frame; whoever was not found is not in it. `person_id` is -1 in a run of one person.
+pub fn frame(trials: &[Trial], slot: usize, view: &ViewCamera) -> String {
+    let id = |trial: &Trial| (trials.len() > 1).then_some(trial.id());
+    let people = trials
+        .iter()
+        .filter_map(|trial| person(trial, id(trial), slot, view));
+    json!({ "version": 1.3, "people": people.collect::<Vec<Value>>() }).to_string()
+}
+
+/// A person; `None` who is not seen.
+fn person(trial: &Trial, id: Option<u64>, slot: usize, view: &ViewCamera) -> Option<Value> {
     let landmarks = Landmarks::of(trial);
     let (mut numbers, mut deviations) = (Vec::new(), Vec::new());
     let mut is_any = false;
@@ -28,8 +37,9 @@ pub fn frame(trial: &Trial, slot: usize, view: &ViewCamera) -> String {
         numbers.extend([x, y, share].map(|it| (it * 1e4).round() / 1e4));
         deviations.push((deviation * 1e2).round() / 1e2);
     }
+    let id = id.map_or(Value::from(-1), Value::from);
     let person = json!({
-        "person_id": [-1],
+        "person_id": [id],
         "pose_keypoints_2d": numbers,
         "pose_keypoints_sd_px": deviations,
         "face_keypoints_2d": [],
@@ -40,8 +50,7 @@ pub fn frame(trial: &Trial, slot: usize, view: &ViewCamera) -> String {
         "hand_left_keypoints_3d": [],
         "hand_right_keypoints_3d": [],
     });
-    let people: Vec<Value> = is_any.then_some(person).into_iter().collect();
-    json!({ "version": 1.3, "people": people }).to_string()
+    is_any.then_some(person)
 }
 
 /// A keypoint in the picture, and the share of the views that it is from.
@@ -89,7 +98,7 @@ mod tests {
     #[test]
     fn what_was_written_is_read_by_our_reader_where_the_camera_sees_it() {
         let (trial, view) = (walker(3), camera());
-        let text = frame(&trial, 1, &view);
+        let text = frame(core::slice::from_ref(&trial), 1, &view);
         let read = openpose::parse(text.as_bytes(), None).unwrap().people;
         assert_eq!(read.len(), 1);
         let knee = BODY_25.iter().position(|it| *it == "left knee").unwrap();
@@ -103,12 +112,36 @@ mod tests {
     }
 
     #[test]
+    fn of_several_people_each_who_is_seen_has_the_own_number() {
+        let view = camera();
+        let [one, mut other] = [walker(3), walker(3)];
+        other.ids = vec![7];
+        for point in other.slots.iter_mut().flat_map(|slot| &mut slot.points) {
+            point.as_mut().unwrap().in_world.x += 0.3;
+        }
+        other.slots[2].points.clear();
+        let alone: Value =
+            serde_json::from_str(&frame(core::slice::from_ref(&one), 1, &view)).unwrap();
+        assert_eq!(alone["people"][0]["person_id"], json!([-1]));
+        let both = [one, other];
+        let read = |slot| serde_json::from_str::<Value>(&frame(&both, slot, &view)).unwrap();
+        let people = read(1)["people"].as_array().unwrap().clone();
+        let ids: Vec<&Value> = people.iter().map(|person| &person["person_id"]).collect();
+        assert_eq!(ids, [&json!([1]), &json!([7])]);
+        let place = &alone["people"][0]["pose_keypoints_2d"];
+        assert_eq!(people[0]["pose_keypoints_2d"], *place);
+        assert_ne!(people[1]["pose_keypoints_2d"], *place);
+        assert_eq!(read(2)["people"].as_array().map(Vec::len), Some(1));
+    }
+
+    #[test]
     fn a_gap_is_nobody_and_a_missing_joint_zeros() {
         let (mut trial, view) = (walker(3), camera());
         trial.slots[0].points.clear();
-        assert!(frame(&trial, 0, &view).contains("\"people\":[]"));
+        assert!(frame(core::slice::from_ref(&trial), 0, &view).contains("\"people\":[]"));
         trial.slots[1].points[0] = Err(crate::Gap("implausible".into()));
-        let value: Value = serde_json::from_str(&frame(&trial, 1, &view)).unwrap();
+        let value: Value =
+            serde_json::from_str(&frame(core::slice::from_ref(&trial), 1, &view)).unwrap();
         let person = &value["people"][0];
         // The right ankle.
         for nth in 33..36 {

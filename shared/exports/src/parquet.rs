@@ -17,6 +17,7 @@ use crate::{Point, Trial};
 const SCHEMA: &str = "message pose3d {
     REQUIRED INT64 frame;
     OPTIONAL DOUBLE time_s;
+    OPTIONAL INT64 person;
     REQUIRED BYTE_ARRAY joint (UTF8);
     OPTIONAL DOUBLE x_m;
     OPTIONAL DOUBLE y_m;
@@ -63,6 +64,13 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
             .collect();
         column::<Int64Type, _>(&mut group, &frames, None)?;
         numbers(&mut group, places.iter().map(|it| trial.time_s(it.0)))?;
+        let ids = || places.iter().map(|place| trial.id_at(place.0));
+        let known: Vec<i64> = ids()
+            .flatten()
+            .map(|id| i64::try_from(id).unwrap_or(i64::MAX))
+            .collect();
+        let levels: Vec<i16> = ids().map(|id| i16::from(id.is_some())).collect();
+        column::<Int64Type, _>(&mut group, &known, Some(&levels))?;
         texts(&mut group, places.iter().map(|it| names[it.1].clone()))?;
         let point = |it: &(usize, usize)| trial.point(it.0, it.1);
         for axis in 0..3 {
@@ -154,7 +162,7 @@ mod tests {
         let due = trial.point(2, 13).unwrap().in_world;
         let last = rows.last().unwrap();
         assert_eq!(
-            (last.get_long(0).unwrap(), last.get_string(2).unwrap()),
+            (last.get_long(0).unwrap(), last.get_string(3).unwrap()),
             (12, &"head".to_owned())
         );
         assert_eq!(last.get_double(5).unwrap(), due.z);

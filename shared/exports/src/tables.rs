@@ -6,9 +6,10 @@ use crate::sink::{Notes, Sink};
 use crate::{Point, Trial};
 
 /// The columns of the long table: those of `pose3d.csv`, and the standard deviation.
-const LONG: [&str; 16] = [
+const LONG: [&str; 17] = [
     "frame",
     "time_s",
+    "person",
     "joint",
     "x_m",
     "y_m",
@@ -40,7 +41,9 @@ fn place(point: Option<&Point>) -> [String; 4] {
 /// A row for each frame: four columns for each point.
 pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut table = csv::Writer::from_writer(out);
-    let mut head = ["frame", "time_s", "status"].map(str::to_owned).to_vec();
+    let mut head = ["frame", "time_s", "person", "status"]
+        .map(str::to_owned)
+        .to_vec();
     for name in trial.labels() {
         head.extend(["x_m", "y_m", "z_m", "sd_m"].map(|it| format!("{name}_{it}")));
     }
@@ -49,6 +52,7 @@ pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
         let mut row = vec![
             trial.frame(slot).to_string(),
             cell(trial.time_s(slot)),
+            person(trial, slot),
             status(trial, slot).to_owned(),
         ];
         row.extend(trial.points(slot).flat_map(place));
@@ -65,9 +69,10 @@ pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let names = trial.written_names();
     for slot in 0..trial.slots.len() {
         let [frame, time_s] = [trial.frame(slot).to_string(), cell(trial.time_s(slot))];
+        let person = person(trial, slot);
         for (nth, name) in names.iter().enumerate() {
             let point = trial.point(slot, nth);
-            let mut row = vec![frame.clone(), time_s.clone(), name.clone()];
+            let mut row = vec![frame.clone(), time_s.clone(), person.clone(), name.clone()];
             row.extend(place(point));
             row.extend((0..6).map(|it| cell(point.map(|point| point.covariance[it]))));
             row.push(cell(point.and_then(|it| it.reprojection_px)));
@@ -78,6 +83,12 @@ pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     }
     table.flush()?;
     Ok(Notes::new())
+}
+
+/// Identity of the person; empty where it is not known.
+fn person(trial: &Trial, slot: usize) -> String {
+    let id = trial.id_at(slot);
+    id.map_or(String::new(), |id| id.to_string())
 }
 
 /// What became of a frame.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use geometry::{Camera, Intrinsics, Lens};
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
-use runfiles::{FrameLine, JointLine, PlacedJoint};
+use runfiles::{FrameLine, JointLine, PersonLine, PlacedJoint};
 use skeleton::PARSE14;
 
 use crate::{Gathering, Trial, ViewCamera};
@@ -47,24 +47,22 @@ pub(crate) fn line(frame: u64, rate_hz: Option<f64>) -> FrameLine {
         };
         (name.to_owned(), JointLine::Placed(placed))
     };
-    FrameLine {
-        body_deviation: None,
-        facing_margin: None,
-        frame,
+    let person = PersonLine {
+        id: 1,
         joints: PARSE14.joints.iter().map(|it| joint(it.name)).collect(),
-        kept: None,
-        keypoints: BTreeMap::new(),
         pairs: 1,
-        people: None,
+        status: FrameLine::OK.to_owned(),
+        ..PersonLine::default()
+    };
+    FrameLine {
+        frame,
+        people: vec![person],
         reason: None,
-        sides: None,
-        sides_margin: None,
-        stature_m: None,
+        seen: None,
         status: FrameLine::OK.to_owned(),
         time_s: rate_hz.map(|it| frame as f64 / it),
         views_missing: BTreeMap::new(),
         views_present: Vec::new(),
-        views_used: Vec::new(),
     }
 }
 
@@ -74,7 +72,7 @@ pub(crate) fn walker(n: u64) -> Trial {
     for frame in 10..10 + n {
         all.push(&line(frame, Some(30.0))).unwrap();
     }
-    let mut trial = all.finish("walk", None).unwrap();
+    let mut trial = all.finish("walk", None).unwrap().remove(0);
     trial.up_in_world = Some(Vector3::z_axis());
     trial
 }

@@ -1,9 +1,9 @@
 //! What a run found, every frame in its place on the grid of the frame rate.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use nalgebra::{Matrix3, Point3, Rotation3, UnitVector3};
-use runfiles::{FrameLine, JointLine};
+use runfiles::{FrameLine, JointLine, PersonLine};
 use skeleton::JointSet;
 
 use crate::Naming;
@@ -54,17 +54,22 @@ pub struct Gap(pub Box<str>);
 /// A place on the grid.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Slot {
+    /// Identity of whom the points are of; `None` where nobody is.
+    pub person: Option<u64>,
     /// `ok`, or why there is no skeleton; empty where the run left no line.
     pub status: Box<str>,
     /// Joints, then extra keypoints; empty where there is no result.
     pub points: Vec<Result<Point, Gap>>,
 }
 
-/// What a run found.
+/// One person of a run. The trials of a run have the same places, in which whoever is not there has no point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// What the files call the run.
     pub name: String,
+    /// Identities of the person within the run, ascending: more than one where never two people were there, and whoever was followed had
+    /// one after the other.
+    pub ids: Vec<u64>,
     /// What the files call the points.
     pub naming: Naming,
     /// The joints.
@@ -105,6 +110,17 @@ impl Trial {
     pub fn labels(&self) -> Vec<String> {
         let names = self.written_names().into_iter();
         names.map(|it| it.replace(' ', "_")).collect()
+    }
+
+    /// The lowest identity of the person.
+    pub fn id(&self) -> u64 {
+        self.ids.first().copied().unwrap_or(0)
+    }
+
+    /// Identity of the person at a place; `None` where that is not known.
+    pub fn id_at(&self, slot: usize) -> Option<u64> {
+        let only = self.ids.first().filter(|_| self.ids.len() == 1);
+        self.slots[slot].person.or(only.copied())
     }
 
     /// How many points a place has.
@@ -203,13 +219,26 @@ pub enum TrialError {
     },
 }
 
-/// The lines of a run on their way into a [`Trial`]; one at a time, in any order.
+/// Status of a place where others are, but not the person.
+const NOT_THERE: &str = "not there";
+
+/// The lines of a run on their way into a [`Trial`] for each person; one at a time, in any order.
 #[derive(Debug, Clone, Default)]
 pub struct Gathering {
     joints: Option<&'static JointSet>,
     extras: Vec<String>,
     views: Vec<String>,
-    frames: Vec<(u64, Option<f64>, Slot)>,
+    frames: Vec<Gathered>,
+}
+
+/// A line.
+#[derive(Debug, Clone)]
+struct Gathered {
+    frame: u64,
+    time_s: Option<f64>,
+    /// What whoever is not in the line has for a status.
+    status: Box<str>,
+    people: Vec<(u64, Slot)>,
 }
 
 impl Gathering {
@@ -221,67 +250,75 @@ impl Gathering {
         }
     }
 
-    /// Takes a line of `pose3d.jsonl`.
+    /// Takes a line of `pose3d.jsonl` or `pose3d-smooth.jsonl`.
     ///
     /// # Errors
     ///
     /// [`TrialError::Joints`].
     pub fn push(&mut self, line: &FrameLine) -> Result<(), TrialError> {
-        self.push_smoothed(line, &BTreeMap::new())
-    }
-
-    /// Takes a line of smoothed trajectories.
-    ///
-    /// * `states`: what points stand on, by name: those that are `filled` or `rejected` were not measured in this frame.
-    ///
-    /// # Errors
-    ///
-    /// [`TrialError::Joints`].
-    pub fn push_smoothed(
-        &mut self,
-        line: &FrameLine,
-        states: &BTreeMap<String, String>,
-    ) -> Result<(), TrialError> {
-        if self.joints.is_none() && !line.joints.is_empty() {
-            let is_named = |set: &&'static JointSet| {
-                let has = |name: &str| line.joints.contains_key(name);
-                set.joints.len() == line.joints.len() && set.joints.iter().all(|it| has(it.name))
+        let mut people = Vec::with_capacity(line.people.len());
+        for person in &line.people {
+            self.know(person)?;
+            let slot = Slot {
+                person: Some(person.id),
+                status: person.status.as_str().into(),
+                points: self.points(person),
             };
-            let found = JointSet::ALL.into_iter().find(is_named);
-            let names = || line.joints.keys().cloned().collect::<Vec<_>>().join(", ");
-            self.joints = Some(found.ok_or_else(|| TrialError::Joints(names()))?);
-        }
-        let mut points = Vec::new();
-        if let Some(set) = self.joints.filter(|_| !line.joints.is_empty()) {
-            for joint in set.joints {
-                points.push(self.point(joint.name, line.joints.get(joint.name), states));
-            }
-            for name in line.keypoints.keys() {
-                if !self.extras.contains(name) {
-                    self.extras.push(name.clone());
-                }
-            }
-            for name in self.extras.clone() {
-                points.push(self.point(&name, line.keypoints.get(&name), states));
-            }
+            people.push((person.id, slot));
         }
         let status = match &line.reason {
             Some(reason) => format!("{}: {reason}", line.status),
+            None if line.has_pose() => NOT_THERE.to_owned(),
             None => line.status.clone(),
         };
-        let slot = Slot {
+        self.frames.push(Gathered {
+            frame: line.frame,
+            time_s: line.time_s,
             status: status.into(),
-            points,
-        };
-        self.frames.push((line.frame, line.time_s, slot));
+            people,
+        });
         Ok(())
+    }
+
+    /// Finds the set that the joints are of, and notes new extra keypoints.
+    fn know(&mut self, person: &PersonLine) -> Result<(), TrialError> {
+        if self.joints.is_none() && !person.joints.is_empty() {
+            let is_named = |set: &&'static JointSet| {
+                let has = |name: &str| person.joints.contains_key(name);
+                let mut joints = set.joints.iter();
+                set.joints.len() == person.joints.len() && joints.all(|joint| has(joint.name))
+            };
+            let found = JointSet::ALL.into_iter().find(is_named);
+            let names = || person.joints.keys().cloned().collect::<Vec<_>>().join(", ");
+            self.joints = Some(found.ok_or_else(|| TrialError::Joints(names()))?);
+        }
+        for name in person.keypoints.keys() {
+            if !self.extras.contains(name) {
+                self.extras.push(name.clone());
+            }
+        }
+        Ok(())
+    }
+
+    fn points(&mut self, person: &PersonLine) -> Vec<Result<Point, Gap>> {
+        let Some(set) = self.joints.filter(|_| !person.joints.is_empty()) else {
+            return Vec::new();
+        };
+        let joints = set.joints.iter().map(|joint| joint.name);
+        let mut points: Vec<_> = joints
+            .map(|name| self.point(name, person.joints.get(name), person))
+            .collect();
+        for name in self.extras.clone() {
+            points.push(self.point(&name, person.keypoints.get(&name), person));
+        }
+        points
     }
 
     fn point(
         &mut self,
         name: &str,
         joint: Option<&JointLine>,
-        states: &BTreeMap<String, String>,
+        person: &PersonLine,
     ) -> Result<Point, Gap> {
         let placed = match joint {
             None => return Err(Gap("".into())),
@@ -298,9 +335,10 @@ impl Gathering {
             covariance: placed.covariance_m2,
             reprojection_px: placed.reprojection_px.filter(|it| it.is_finite()),
             views: views.fold(0, |all, it| all | 1_u32.checked_shl(it).unwrap_or(0)),
-            is_filled: states
+            is_filled: person
+                .states
                 .get(name)
-                .is_some_and(|it| FILLED.contains(&it.as_str())),
+                .is_some_and(|state| FILLED.contains(&state.as_str())),
         })
     }
 
@@ -319,58 +357,96 @@ impl Gathering {
         self.frames.len()
     }
 
-    /// The trial.
+    /// The trials, one for each person who has a point in any frame, by ascending identity. Where never two people are in a frame, there is
+    /// one trial: the person who is followed gets another identity after a gap or a jump.
     ///
     /// * `rate_hz`: frames of the footage per second, where no line has a time.
     ///
     /// # Errors
     ///
     /// [`TrialError`].
-    pub fn finish(mut self, name: &str, rate_hz: Option<f64>) -> Result<Trial, TrialError> {
+    pub fn finish(mut self, name: &str, rate_hz: Option<f64>) -> Result<Vec<Trial>, TrialError> {
         let n_lines = self.frames.len();
         // Of two lines about a frame the first one counts.
-        self.frames.sort_by_key(|it| it.0);
-        self.frames.dedup_by_key(|it| it.0);
-        let n_repeated = n_lines - self.frames.len();
+        self.frames.sort_by_key(|line| line.frame);
+        self.frames.dedup_by_key(|line| line.frame);
         let ends = self.frames.first().zip(self.frames.last());
-        let (first, last) = ends.map(|it| (it.0.0, it.1.0)).ok_or(TrialError::Empty)?;
+        let (first, last) = ends
+            .map(|(first, last)| (first.frame, last.frame))
+            .ok_or(TrialError::Empty)?;
         let joints = self.joints.ok_or(TrialError::NoPoint { frames: n_lines })?;
-        let step = self
-            .frames
-            .iter()
-            .fold(0, |gcd, it| common(gcd, it.0 - first));
-        let step = step.max(1);
+        let steps = self.frames.iter().map(|line| line.frame - first);
+        let step = steps.fold(0, common).max(1);
         let slots = ((last - first) / step).saturating_add(1);
         if slots > MAX_SLOTS {
             return Err(TrialError::Range { first, last, slots });
         }
         let footage_hz = rate(&self.frames).or(rate_hz);
         let n_irregular = footage_hz.map_or(0, |rate_hz| irregular(&self.frames, rate_hz, step));
-        let n_points = joints.joints.len() + self.extras.len();
-        let mut trial = Trial {
+        let empty = Trial {
             name: name.to_owned(),
+            ids: Vec::new(),
             naming: Naming::default(),
             joints,
-            extras: self.extras,
-            views: self.views,
-            rate_hz: footage_hz.map(|it| it / step as f64),
+            extras: core::mem::take(&mut self.extras),
+            views: core::mem::take(&mut self.views),
+            rate_hz: footage_hz.map(|rate_hz| rate_hz / step as f64),
             first_frame: first,
             frame_step: step,
             up_in_world: None,
             slots: vec![Slot::default(); slots as usize],
             n_irregular,
-            n_repeated,
+            n_repeated: n_lines - self.frames.len(),
         };
-        for (frame, _, mut slot) in self.frames {
+        let listed = self.frames.iter().flat_map(|line| &line.people);
+        let has_point = |slot: &Slot| slot.points.iter().any(Result::is_ok);
+        let people = listed.filter(|(_, slot)| has_point(slot));
+        let people: BTreeSet<u64> = people.map(|(person, _)| *person).collect();
+        if people.is_empty() {
+            return Err(TrialError::NoPoint { frames: n_lines });
+        }
+        let people: Vec<u64> = people.into_iter().collect();
+        let is_one = self.frames.iter().all(|line| line.people.len() < 2);
+        let groups: Vec<Vec<u64>> = if is_one {
+            vec![people]
+        } else {
+            people.into_iter().map(|person| vec![person]).collect()
+        };
+        let groups = groups.into_iter();
+        Ok(groups
+            .map(|ids| {
+                let trial = Trial {
+                    ids,
+                    ..empty.clone()
+                };
+                self.trial(trial, is_one)
+            })
+            .collect())
+    }
+
+    /// Puts a person in its places.
+    ///
+    /// * `is_one`: never two are there, so that whoever is there is the one.
+    fn trial(&mut self, mut trial: Trial, is_one: bool) -> Trial {
+        let n_points = trial.n_points();
+        for line in &mut self.frames {
+            let mut people = line.people.iter();
+            let at = people.position(|(person, _)| is_one || *person == trial.id());
+            let mut slot = at.map_or_else(
+                || Slot {
+                    person: None,
+                    status: line.status.clone(),
+                    points: Vec::new(),
+                },
+                |at| line.people.swap_remove(at).1,
+            );
             if !slot.points.is_empty() {
                 slot.points.resize_with(n_points, || Err(Gap("".into())));
             }
-            trial.slots[((frame - first) / step) as usize] = slot;
+            let place = (line.frame - trial.first_frame) / trial.frame_step;
+            trial.slots[place as usize] = slot;
         }
-        if trial.n_with_points() == 0 {
-            return Err(TrialError::NoPoint { frames: n_lines });
-        }
-        Ok(trial)
+        trial
     }
 }
 
@@ -380,8 +456,10 @@ fn common(a: u64, b: u64) -> u64 {
 }
 
 /// Frames of the footage per second, by the first and the last line with a time; to nine digits, since times are rounded.
-fn rate(frames: &[(u64, Option<f64>, Slot)]) -> Option<f64> {
-    let mut timed = frames.iter().filter_map(|it| Some((it.0, it.1?)));
+fn rate(frames: &[Gathered]) -> Option<f64> {
+    let mut timed = frames
+        .iter()
+        .filter_map(|line| Some((line.frame, line.time_s?)));
     let first = timed.next()?;
     let last = timed.next_back();
     let (frames, seconds) = match last {
@@ -393,10 +471,13 @@ fn rate(frames: &[(u64, Option<f64>, Slot)]) -> Option<f64> {
     is_rate.then(|| format!("{rate_hz:.9e}").parse().unwrap_or(rate_hz))
 }
 
-fn irregular(frames: &[(u64, Option<f64>, Slot)], rate_hz: f64, step: u64) -> usize {
-    let off = |frame: u64, time_s: f64| (time_s * rate_hz - frame as f64).abs() / step as f64;
-    let timed = frames.iter().filter_map(|it| Some((it.0, it.1?)));
-    timed.filter(|it| off(it.0, it.1) >= TOLERANCE).count()
+fn irregular(frames: &[Gathered], rate_hz: f64, step: u64) -> usize {
+    let off = |line: &Gathered| {
+        let time_s = line.time_s?;
+        Some((time_s * rate_hz - line.frame as f64).abs() / step as f64)
+    };
+    let off = frames.iter().filter_map(off);
+    off.filter(|slots| *slots >= TOLERANCE).count()
 }
 
 #[cfg(test)]

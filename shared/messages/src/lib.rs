@@ -14,9 +14,9 @@ mod metrics;
 mod people;
 mod picture;
 mod pose;
-mod pose3d;
 mod quality;
 mod refusal;
+mod skeletons;
 mod stamp;
 pub mod topic;
 
@@ -30,9 +30,9 @@ pub use metrics::{
 pub use people::{NO_CANDIDATE, People, PersonMessage};
 pub use picture::{NO_SEQUENCE, PictureHeader};
 pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
-pub use pose3d::{FusedView, Joint3d, Kept, Pose3d, Sides};
 pub use quality::ViewQuality;
 pub use refusal::Refusal;
+pub use skeletons::{FusedView, Joint3d, Kept, Sides, SkeletonMessage, Skeletons};
 pub use stamp::{Stamp, Status, Timing};
 
 /// Largest number of parts of a model.
@@ -69,7 +69,8 @@ const _: () = {
     assert!(size_of::<PairPose>() == 1064);
     assert!(size_of::<Joint3d>() == 88);
     assert!(size_of::<FusedView>() == 544);
-    assert!(size_of::<Pose3d>() == 11640 + MAX_KEYPOINTS * 88);
+    assert!(size_of::<SkeletonMessage>() == 11592 + MAX_KEYPOINTS * 88);
+    assert!(size_of::<Skeletons>() == 64 + MAX_PEOPLE * size_of::<SkeletonMessage>());
     assert!(size_of::<Health>() == 152);
     assert!(size_of::<MetricsRow>() == 56);
     assert!(size_of::<Metrics>() == 288 + MAX_ROWS * 56);

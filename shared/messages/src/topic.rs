@@ -45,10 +45,10 @@ pub fn people() -> String {
     "people/v1".to_owned()
 }
 
-/// The result: [`Pose3d`](crate::Pose3d).
+/// The result: [`Skeletons`](crate::Skeletons).
 #[must_use]
-pub fn pose3d() -> String {
-    "pose3d/v3".to_owned()
+pub fn skeletons() -> String {
+    "skeletons/v1".to_owned()
 }
 
 /// Heartbeats of a process: [`Health`](crate::Health).

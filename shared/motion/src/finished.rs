@@ -14,10 +14,13 @@ use crate::live;
 use crate::{Motion, Recorded, Report, butterworth};
 use failure::{Console, ExitKind, Failure};
 use nalgebra::UnitVector3;
-use runfiles::{SmoothReport, SmoothedJoint, Unsure};
+use runfiles::{SmoothReport, SmoothedJoint, SmoothedPerson, Unsure};
 
-pub use folder::{Run, read, read_lines};
+pub use folder::{Person, Run, read, read_lines};
 pub use settings::{Method, Settings};
+
+/// The doubt where there is nothing to smooth.
+const NOTHING_MEASURED: &str = "no joint was measured in any frame";
 
 /// The files that are written beside the results.
 pub const FILES: [&str; 3] = ["pose3d-smooth.jsonl", "angles.csv", "smooth.json"];
@@ -40,10 +43,6 @@ pub struct Request {
 pub struct Outcome {
     /// What `smooth.json` holds.
     pub report: SmoothReport,
-    /// What was measured.
-    pub recorded: Recorded,
-    /// The number of the frame of every instant.
-    pub frames: Vec<u64>,
     /// Whether a vertical was known for angles with it.
     pub has_up: bool,
 }
@@ -57,22 +56,19 @@ pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure>
     console.begin("", "reading");
     let run = read(&request.folder, request.rate_hz)?;
     console.begin("", "smoothing");
-    let motion = smoothed(&run.recorded, &request.settings)?;
+    let people = run.people.iter();
+    let motions: Result<Vec<Motion>, Failure> = people
+        .map(|person| smoothed(&person.recorded, &request.settings))
+        .collect();
+    let motions = motions?;
     let up = request.up.or_else(|| folder::up(&request.folder));
-    let mut report = report(
-        &run.recorded,
-        &run.frames,
-        &motion.report,
-        &request.settings,
-    );
+    let mut report = report(&run, &motions, &request.settings);
     report.doubts = doubts(&run, &report);
     console.begin("", "writing");
-    write::all(&request.folder, &run, &motion, &report, up)?;
+    write::all(&request.folder, &run, &motions, &report, up)?;
     console.finish();
     Ok(Outcome {
         report,
-        recorded: run.recorded,
-        frames: run.frames,
         has_up: up.is_some(),
     })
 }
@@ -102,22 +98,43 @@ pub fn smoothed(recorded: &Recorded, settings: &Settings) -> Result<Motion, Fail
     }
 }
 
-fn report(
-    recorded: &Recorded,
-    frames: &[u64],
-    found: &Report,
-    settings: &Settings,
-) -> SmoothReport {
-    let name = |joint: usize| recorded.joints[joint].name.clone();
+fn report(run: &Run, motions: &[Motion], settings: &Settings) -> SmoothReport {
+    let steps: Vec<f64> = run.times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let step = statistics::Sorted::new(steps).interpolated(0.5);
+    let most = |of: &dyn Fn(&Report) -> Option<f64>| {
+        let all = motions.iter().filter_map(|motion| of(&motion.report));
+        all.reduce(f64::max)
+    };
+    let delay_s = most(&|report| Some(report.delay_s)).unwrap_or(0.0);
+    let has_cutoff = settings.method == Method::Butterworth;
+    let people = run.people.iter().zip(motions);
+    SmoothReport {
+        cutoff_hz: has_cutoff.then_some(settings.cutoff_hz),
+        delay_ms: delay_s * 1000.0,
+        doubts: Vec::new(),
+        fill_s: settings.fill_s,
+        method: settings.method.name().to_owned(),
+        n_frames: run.frames.len() as u64,
+        people: people
+            .map(|(person, motion)| person_report(person, &run.frames, &motion.report))
+            .collect(),
+        rate_hz: step.map(|step_s| 1.0 / step_s),
+        resampled_ms: most(&|report| report.resampled_s).map(|s| s * 1000.0),
+        schema_version: runfiles::VERSION,
+    }
+}
+
+fn person_report(person: &Person, frames: &[u64], found: &Report) -> SmoothedPerson {
+    let name = |joint: usize| person.recorded.joints[joint].name.clone();
     let joint = |nth: usize| {
         let counts = found.counts[nth];
         let noise = found.noise[nth];
         let joint = SmoothedJoint {
             absent: counts.absent,
-            covariance_scale: noise.map(|it| it.scale),
+            covariance_scale: noise.map(|noise| noise.scale),
             exchanged: counts.exchanged,
             filled: counts.filled,
-            jerk_m2_s5: noise.map(|it| it.jerk),
+            jerk_m2_s5: noise.map(|noise| noise.jerk),
             measured: counts.measured,
             rejected: counts.rejected,
         };
@@ -125,23 +142,12 @@ fn report(
     };
     let bones = found.bones.iter();
     let bones = bones.map(|([a, b], length)| (format!("{} to {}", name(*a), name(*b)), *length));
-    let steps: Vec<f64> = recorded.times.windows(2).map(|it| it[1] - it[0]).collect();
-    let step = statistics::Sorted::new(steps).interpolated(0.5);
     let [kept, exchanged, left_out] = found.unsure;
-    let has_cutoff = settings.method == Method::Butterworth;
-    SmoothReport {
+    SmoothedPerson {
         bones: bones.collect(),
-        cutoff_hz: has_cutoff.then_some(settings.cutoff_hz),
-        delay_ms: found.delay_s * 1000.0,
-        doubts: Vec::new(),
-        fill_s: settings.fill_s,
-        frames_of_breaks: found.breaks.iter().map(|&it| frames[it]).collect(),
-        joints: (0..recorded.joints.len()).map(joint).collect(),
-        method: settings.method.name().to_owned(),
-        n_frames: frames.len() as u64,
-        rate_hz: step.map(|it| 1.0 / it),
-        resampled_ms: found.resampled_s.map(|it| it * 1000.0),
-        schema_version: runfiles::VERSION,
+        frames_of_breaks: found.breaks.iter().map(|&at| frames[at]).collect(),
+        ids: person.ids.clone(),
+        joints: (0..person.recorded.joints.len()).map(joint).collect(),
         unsure: Unsure {
             exchanged,
             kept,
@@ -150,29 +156,45 @@ fn report(
     }
 }
 
-/// What speaks against trusting the result.
+/// What speaks against trusting the result; of several people with the number of the person.
 fn doubts(run: &Run, report: &SmoothReport) -> Vec<String> {
     let mut doubts = Vec::new();
     doubts.extend(run.cut.clone());
-    let sum = |of: fn(&SmoothedJoint) -> usize| report.joints.values().map(of).sum::<usize>();
-    let n_measured = sum(|it| it.measured) + sum(|it| it.exchanged);
-    let n_rejected = sum(|it| it.rejected);
+    if report.people.is_empty() {
+        doubts.push(NOTHING_MEASURED.to_owned());
+    }
+    for person in &report.people {
+        let own = doubts_of(person, report.n_frames as usize).into_iter();
+        if report.people.len() == 1 {
+            doubts.extend(own);
+        } else {
+            doubts.extend(own.map(|doubt| format!("person {:?}: {doubt}", person.ids)));
+        }
+    }
+    doubts
+}
+
+fn doubts_of(person: &SmoothedPerson, n_frames: usize) -> Vec<String> {
+    let mut doubts = Vec::new();
+    let sum = |of: fn(&SmoothedJoint) -> usize| person.joints.values().map(of).sum::<usize>();
+    let n_measured = sum(|joint| joint.measured) + sum(|joint| joint.exchanged);
+    let n_rejected = sum(|joint| joint.rejected);
     if n_measured == 0 {
-        doubts.push("no joint was measured in any frame".to_owned());
+        doubts.push(NOTHING_MEASURED.to_owned());
     } else if n_rejected * 5 > n_measured {
         doubts.push(format!(
             "{n_rejected} measurements contradict those before and after, {n_measured} do not: look at what was measured first"
         ));
     }
-    let n_unsure = report.unsure.kept + report.unsure.exchanged + report.unsure.left_out;
-    if n_unsure > 0 && n_unsure == report.n_frames as usize {
+    let n_unsure = person.unsure.kept + person.unsure.exchanged + person.unsure.left_out;
+    if n_unsure > 0 && n_unsure == n_frames {
         doubts.push(
             "left and right are not certain in any frame, and were taken as they are".to_owned(),
         );
-    } else if report.unsure.left_out * 5 > report.n_frames as usize {
+    } else if person.unsure.left_out * 5 > n_frames {
         doubts.push(format!(
-            "left and right are not certain in {} of {} frames, nor decided by those before and after",
-            report.unsure.left_out, report.n_frames
+            "left and right are not certain in {} of {n_frames} frames, nor decided by those before and after",
+            person.unsure.left_out
         ));
     }
     doubts
@@ -180,7 +202,13 @@ fn doubts(run: &Run, report: &SmoothReport) -> Vec<String> {
 
 /// Counts of all joints together, for people.
 pub fn totals(report: &SmoothReport) -> BTreeMap<&'static str, usize> {
-    let sum = |of: fn(&SmoothedJoint) -> usize| report.joints.values().map(of).sum::<usize>();
+    let joints = || {
+        report
+            .people
+            .iter()
+            .flat_map(|person| person.joints.values())
+    };
+    let sum = |of: fn(&SmoothedJoint) -> usize| joints().map(of).sum::<usize>();
     [
         ("measured", sum(|it| it.measured)),
         ("exchanged", sum(|it| it.exchanged)),

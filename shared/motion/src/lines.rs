@@ -1,9 +1,7 @@
 //! From the lines of a run's results to measurements, and from smoothed joints back to lines.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Matrix3;
-use runfiles::{FrameLine, JointLine, PlacedJoint, SmoothLine};
+use runfiles::{FrameLine, JointLine, PersonLine, PlacedJoint};
 
 use crate::recorded::Sides;
 use crate::track::{Estimate, Measured, Smoothed};
@@ -18,35 +16,41 @@ pub fn measured(line: &JointLine) -> Option<Measured> {
     })
 }
 
-/// Whether the sides of a frame are certain: everything but a frame that says that they are not. Sides as seen in the pictures are not
+/// Whether the sides of a person are certain: all but those that are said not to be. Sides as seen in the pictures are not
 /// decided either, but are the same in all frames of a run.
-pub fn sides(line: &FrameLine) -> Sides {
-    if line.sides == Some(runfiles::Sides::Unsure) {
+pub fn sides(person: &PersonLine) -> Sides {
+    if person.sides == Some(runfiles::Sides::Unsure) {
         Sides::Unsure
     } else {
         Sides::Sure
     }
 }
 
-/// A line with its joints smoothed.
+/// A person of a line with the joints smoothed; `None` who was neither there nor is anywhere now.
 ///
+/// * `person`: as measured; `None` for somebody who is not in the line.
 /// * `joints`: by name; whether it is an extra keypoint; what it was smoothed to. Others are left out.
 pub fn smoothed<'a>(
-    mut line: FrameLine,
+    id: u64,
+    person: Option<PersonLine>,
     joints: impl IntoIterator<Item = (&'a str, bool, &'a Smoothed)>,
-) -> SmoothLine {
-    let had_result = line.has_result();
+) -> Option<PersonLine> {
+    let was_there = person.is_some();
+    let mut person = person.unwrap_or_else(|| PersonLine {
+        id,
+        ..PersonLine::default()
+    });
     let old = [
-        core::mem::take(&mut line.joints),
-        core::mem::take(&mut line.keypoints),
+        core::mem::take(&mut person.joints),
+        core::mem::take(&mut person.keypoints),
     ];
-    let mut states = BTreeMap::new();
     for (name, is_keypoint, smoothed) in joints {
         let old = old[usize::from(is_keypoint)].get(name);
         let new = match smoothed {
-            Ok(it) => {
-                states.insert(name.to_owned(), it.state.name().to_owned());
-                JointLine::Placed(placed(it, old))
+            Ok(estimate) => {
+                let state = estimate.state.name().to_owned();
+                person.states.insert(name.to_owned(), state);
+                JointLine::Placed(placed(estimate, old))
             }
             Err(why) => match old {
                 // Why it has none stays, if it had none before.
@@ -57,24 +61,26 @@ pub fn smoothed<'a>(
             },
         };
         let part = if is_keypoint {
-            &mut line.keypoints
+            &mut person.keypoints
         } else {
-            &mut line.joints
+            &mut person.joints
         };
         part.insert(name.to_owned(), new);
     }
-    if !states.is_empty() {
+    if !person.states.is_empty() {
+        FrameLine::OK.clone_into(&mut person.status);
+    }
+    (was_there || !person.states.is_empty()).then_some(person)
+}
+
+/// A line with other people.
+pub fn with_people(mut line: FrameLine, people: Vec<PersonLine>) -> FrameLine {
+    if people.iter().any(|person| person.status == FrameLine::OK) {
         FrameLine::OK.clone_into(&mut line.status);
         line.reason = None;
-    } else if !had_result {
-        // As in the file that was read, a line without a result has no joints.
-        line.joints.clear();
-        line.keypoints.clear();
     }
-    SmoothLine {
-        frame: line,
-        states,
-    }
+    line.people = people;
+    line
 }
 
 fn placed(it: &Estimate, old: Option<&JointLine>) -> PlacedJoint {

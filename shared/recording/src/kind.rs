@@ -1,8 +1,8 @@
 //! The message types of topics: their sizes and schemas.
 
 use messages::{
-    EvidenceHeader, FrameHeader, Health, PairPose, People, PictureHeader, Pose3d, ViewPose,
-    ViewQuality, topic,
+    EvidenceHeader, FrameHeader, Health, MAX_PEOPLE, PairPose, People, PictureHeader,
+    SkeletonMessage, Skeletons, ViewPose, ViewQuality, topic,
 };
 
 /// A type of message.
@@ -21,7 +21,7 @@ pub enum Kind {
     /// Who is in a frame.
     People,
     /// The result.
-    Pose3d,
+    Skeletons,
     /// Heartbeats of a process.
     Health,
     /// Pictures of a live camera as they came.
@@ -29,7 +29,7 @@ pub enum Kind {
 }
 
 /// The types that a schema may refer to.
-const PARTS: [(&str, &str); 8] = [
+const PARTS: [(&str, &str); 9] = [
     ("Stamp", include_str!("../msg/Stamp.msg")),
     ("Timing", include_str!("../msg/Timing.msg")),
     ("Pose", include_str!("../msg/Pose.msg")),
@@ -38,6 +38,7 @@ const PARTS: [(&str, &str); 8] = [
     ("Person", include_str!("../msg/Person.msg")),
     ("Joint3d", include_str!("../msg/Joint3d.msg")),
     ("FusedView", include_str!("../msg/FusedView.msg")),
+    ("Skeleton", include_str!("../msg/Skeleton.msg")),
 ];
 
 impl Kind {
@@ -49,7 +50,7 @@ impl Kind {
         Self::ViewQuality,
         Self::PairPose,
         Self::People,
-        Self::Pose3d,
+        Self::Skeletons,
         Self::Health,
         Self::Picture,
     ];
@@ -58,7 +59,7 @@ impl Kind {
     pub fn of_topic(name: &str) -> Option<Self> {
         let family = |name: &str| name.rsplit_once('/').map(|it| it.0.to_owned());
         Self::ALL.into_iter().find(|kind| match kind {
-            Self::People | Self::Pose3d => name == kind.example(),
+            Self::People | Self::Skeletons => name == kind.example(),
             _ => family(name).is_some_and(|it| Some(it) == family(&kind.example())),
         })
     }
@@ -78,13 +79,13 @@ impl Kind {
             Self::ViewQuality => topic::view_quality(0),
             Self::PairPose => topic::pair_pose(0),
             Self::People => topic::people(),
-            Self::Pose3d => topic::pose3d(),
+            Self::Skeletons => topic::skeletons(),
             Self::Health => topic::health("any"),
             Self::Picture => topic::picture(0),
         }
     }
 
-    /// Size of the message without its array, bytes.
+    /// Size of the message without its array, bytes; of skeletons, whose list of people is written as one, what stands before its count.
     pub fn head_bytes(self) -> usize {
         match self {
             Self::Frame => size_of::<FrameHeader>(),
@@ -93,7 +94,7 @@ impl Kind {
             Self::ViewQuality => size_of::<ViewQuality>(),
             Self::PairPose => size_of::<PairPose>(),
             Self::People => size_of::<People>(),
-            Self::Pose3d => size_of::<Pose3d>(),
+            Self::Skeletons => core::mem::offset_of!(Skeletons, n_people),
             Self::Health => size_of::<Health>(),
             Self::Picture => size_of::<PictureHeader>(),
         }
@@ -104,7 +105,16 @@ impl Kind {
         match self {
             Self::Frame | Self::Picture => Some(size_of::<u8>()),
             Self::Evidence => Some(size_of::<f32>()),
+            Self::Skeletons => Some(size_of::<SkeletonMessage>()),
             _ => None,
+        }
+    }
+
+    /// Most elements that its array has.
+    pub(crate) fn most_elements(self) -> u64 {
+        match self {
+            Self::Skeletons => MAX_PEOPLE as u64,
+            _ => u64::from(u32::MAX),
         }
     }
 
@@ -117,7 +127,7 @@ impl Kind {
             Self::ViewQuality => Some(core::mem::offset_of!(ViewQuality, status)),
             Self::PairPose => Some(core::mem::offset_of!(PairPose, status)),
             Self::People => Some(core::mem::offset_of!(People, status)),
-            Self::Pose3d => Some(core::mem::offset_of!(Pose3d, status)),
+            Self::Skeletons => Some(core::mem::offset_of!(Skeletons, status)),
             Self::Picture => Some(core::mem::offset_of!(PictureHeader, status)),
             Self::Health => None,
         }
@@ -132,7 +142,7 @@ impl Kind {
             Self::ViewQuality => "parallax/msg/ViewQuality",
             Self::PairPose => "parallax/msg/PairPose",
             Self::People => "parallax/msg/People",
-            Self::Pose3d => "parallax/msg/Pose3d",
+            Self::Skeletons => "parallax/msg/Skeletons",
             Self::Health => "parallax/msg/Health",
             Self::Picture => "parallax/msg/Picture",
         }
@@ -146,7 +156,7 @@ impl Kind {
             Self::ViewQuality => include_str!("../msg/ViewQuality.msg"),
             Self::PairPose => include_str!("../msg/PairPose.msg"),
             Self::People => include_str!("../msg/People.msg"),
-            Self::Pose3d => include_str!("../msg/Pose3d.msg"),
+            Self::Skeletons => include_str!("../msg/Skeletons.msg"),
             Self::Health => include_str!("../msg/Health.msg"),
             Self::Picture => include_str!("../msg/Picture.msg"),
         }
@@ -202,7 +212,13 @@ mod tests {
         let mut most = 1;
         for line in text.lines() {
             let [bytes, alignment] = size(line.split_whitespace().next().unwrap());
-            assert_eq!(at % alignment, 0, "CDR would leave a gap before {line:?}");
+            // The count of a list stands before it.
+            let begin = at + if line.contains("[] ") { 4 } else { 0 };
+            assert_eq!(
+                begin % alignment,
+                0,
+                "CDR would leave a gap before {line:?}"
+            );
             at += bytes;
             most = most.max(alignment);
         }
@@ -238,8 +254,8 @@ mod tests {
     #[test]
     fn a_topic_of_another_version_is_told_from_a_foreign_one() {
         assert!(Kind::ViewPose.is_of_another_version("view-pose/v5/0"));
-        assert!(Kind::Pose3d.is_of_another_version("pose3d/v2"));
-        for other in ["view-pose/v7/0", "pose3d/v2", "metrics/v0/a", "camera"] {
+        assert!(Kind::Skeletons.is_of_another_version("skeletons/v0"));
+        for other in ["view-pose/v7/0", "skeletons/v0", "metrics/v0/a", "camera"] {
             assert!(!Kind::ViewPose.is_of_another_version(other), "{other}");
         }
     }
@@ -254,9 +270,9 @@ mod tests {
         for other in [
             "frame/v2/0",
             "frame/v1",
-            "pose3d/v1",
-            "pose3d/v3/0",
-            "pose3d",
+            "skeletons/v2",
+            "skeletons/v1/0",
+            "skeletons",
             "",
             "/",
             "x/frame/v1/0",

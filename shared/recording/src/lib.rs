@@ -28,7 +28,7 @@ pub use about::{About, AboutError, Without};
 pub use count::Count;
 pub use index::{Damage, Entry, Extent, Recording, Track, in_order};
 pub use kind::Kind;
-pub use message::{Envelope, Malformed, Message, encode};
+pub use message::{Envelope, Malformed, Message, encode, split_skeletons};
 pub use read::{Buffer, Damaged, ReadError, check, read, read_head};
 pub use scan::scan;
 pub use write::{Foreign, WriteError, Writer};

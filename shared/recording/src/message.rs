@@ -1,7 +1,7 @@
 //! One message as bytes: CDR, little endian.
 
-use bytemuck::{bytes_of, pod_read_unaligned};
-use messages::{Stamp, Status, Timing};
+use bytemuck::{bytes_of, cast_slice, pod_read_unaligned};
+use messages::{Skeletons, Stamp, Status, Timing};
 
 use crate::Kind;
 
@@ -45,6 +45,12 @@ pub fn encode(kind: Kind, head: &[u8], elements: &[u8], out: &mut Vec<u8>) {
     }
 }
 
+/// Skeletons as a struct and its array: the fields before the count, and the people.
+pub fn split_skeletons(skeletons: &Skeletons) -> [&[u8]; 2] {
+    let head = &bytes_of(skeletons)[..Kind::Skeletons.head_bytes()];
+    [head, cast_slice(skeletons.listed())]
+}
+
 /// A parsed message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Message<'a> {
@@ -84,6 +90,25 @@ impl<'a> Message<'a> {
         }
         Ok(Self { head, elements })
     }
+
+    /// The message as [`Skeletons`]; `None` if it is of another kind.
+    pub fn skeletons(&self) -> Option<Box<Skeletons>> {
+        let mut skeletons = Box::<Skeletons>::default();
+        let size = Kind::Skeletons.element_bytes()?;
+        let n_people = self.elements.len() / size;
+        let is_due = self.head.len() == Kind::Skeletons.head_bytes()
+            && self.elements.len().is_multiple_of(size)
+            && n_people <= skeletons.people.len();
+        if !is_due {
+            return None;
+        }
+        let bytes = bytemuck::bytes_of_mut(&mut *skeletons);
+        bytes[..self.head.len()].copy_from_slice(self.head);
+        skeletons.n_people = n_people as u32;
+        let people: &mut [u8] = bytemuck::cast_slice_mut(&mut skeletons.people[..n_people]);
+        people.copy_from_slice(self.elements);
+        Some(skeletons)
+    }
 }
 
 /// Checks the length of a message without reading it.
@@ -95,7 +120,7 @@ pub(crate) fn check_length(kind: Kind, len: u64) -> Result<(), Malformed> {
         Some(size) => {
             len >= expected
                 && (len - expected).is_multiple_of(size as u64)
-                && u32::try_from((len - expected) / size as u64).is_ok()
+                && (len - expected) / size as u64 <= kind.most_elements()
         }
     };
     if fits {
@@ -148,9 +173,8 @@ impl Envelope {
 
 #[cfg(test)]
 mod tests {
-    use bytemuck::{Zeroable as _, cast_slice};
     use messages::{
-        EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Pose3d, ViewPose, ViewQuality,
+        EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, ViewPose, ViewQuality,
     };
     use proptest::prelude::*;
 
@@ -177,7 +201,7 @@ mod tests {
     fn heads(it: Envelope) -> Vec<(Kind, Vec<u8>)> {
         let (mut frame, mut evidence) = (FrameHeader::default(), EvidenceHeader::default());
         let (mut pose, mut quality) = (ViewPose::default(), ViewQuality::default());
-        let (mut pair, mut pose3d) = (PairPose::default(), Pose3d::zeroed());
+        let (mut pair, mut skeletons) = (PairPose::default(), Skeletons::default());
         let (mut people, mut picture) = (People::default(), PictureHeader::default());
         (people.stamp, people.timing, people.status) = (it.stamp, it.timing, it.status);
         (picture.stamp, picture.timing, picture.status) = (it.stamp, it.timing, it.status);
@@ -186,7 +210,7 @@ mod tests {
         (pose.stamp, pose.timing, pose.status) = (it.stamp, it.timing, it.status);
         (quality.stamp, quality.timing, quality.status) = (it.stamp, it.timing, it.status);
         (pair.stamp, pair.timing, pair.status) = (it.stamp, it.timing, it.status);
-        (pose3d.stamp, pose3d.timing, pose3d.status) = (it.stamp, it.timing, it.status);
+        (skeletons.stamp, skeletons.timing, skeletons.status) = (it.stamp, it.timing, it.status);
         let heads = [
             (Kind::Frame, bytes_of(&frame)),
             (Kind::Evidence, bytes_of(&evidence)),
@@ -194,7 +218,7 @@ mod tests {
             (Kind::ViewQuality, bytes_of(&quality)),
             (Kind::PairPose, bytes_of(&pair)),
             (Kind::People, bytes_of(&people)),
-            (Kind::Pose3d, bytes_of(&pose3d)),
+            (Kind::Skeletons, split_skeletons(&skeletons)[0]),
             (Kind::Picture, bytes_of(&picture)),
         ];
         heads.map(|(kind, bytes)| (kind, bytes.to_vec())).into()
@@ -221,6 +245,33 @@ mod tests {
         let got = Message::parse(kind, &data).unwrap();
         assert_eq!(got.head, head);
         assert_eq!(got.elements, cast_slice::<f32, u8>(&values));
+    }
+
+    #[test]
+    fn a_recording_holds_the_people_there_are_and_no_more() {
+        let mut skeletons = Box::<Skeletons>::default();
+        skeletons.stamp.frame = 7;
+        for (nth, person) in skeletons.people.iter_mut().enumerate() {
+            (person.id, person.joints[3].in_world[1]) = (nth as u64 + 1, 0.5 + nth as f64);
+        }
+        for n_people in [0, 2, 8] {
+            skeletons.n_people = n_people as u32;
+            let [head, elements] = split_skeletons(&skeletons);
+            let mut data = Vec::new();
+            encode(Kind::Skeletons, head, elements, &mut data);
+            // As memory holds them: the count right before the list.
+            let n_bytes = core::mem::offset_of!(Skeletons, people) + elements.len();
+            assert_eq!(data[PREAMBLE.len()..], bytes_of(&*skeletons)[..n_bytes]);
+            let got = Message::parse(Kind::Skeletons, &data).unwrap();
+            let got = got.skeletons().unwrap();
+            assert_eq!(got.stamp.frame, 7);
+            assert_eq!(got.listed(), skeletons.listed());
+            assert!(got.people[n_people..].iter().all(|person| person.id == 0));
+        }
+        let people = vec![0; 9 * Kind::Skeletons.element_bytes().unwrap()];
+        let mut data = Vec::new();
+        encode(Kind::Skeletons, &[], &people, &mut data);
+        Message::parse(Kind::Skeletons, &data).unwrap_err();
     }
 
     #[test]

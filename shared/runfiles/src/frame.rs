@@ -2,51 +2,31 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::Missing;
 use crate::nullable::{nullable, numbers};
 
-/// A line of `pose3d.jsonl`.
+/// Most people of a line.
+pub const MOST_PEOPLE: usize = 8;
+
+/// A line of `pose3d.jsonl`, and of `pose3d-smooth.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameLine {
-    /// How much the lengths of the bones differ from those of people, standard deviations; none where there is no body.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub body_deviation: Option<f64>,
-    /// By how much the decision which views see the person from the same side was won; none where it was
-    /// not made.
-    #[serde(deserialize_with = "nullable")]
-    pub facing_margin: Option<f64>,
     /// Number of the frame in the footage.
     pub frame: u64,
-    /// The joints, by name; none in a line without a result.
-    pub joints: BTreeMap<String, JointLine>,
-    /// Whether the skeleton is made of the poses that fusion solved for, or of those that it started from; none in a
-    /// line without a result.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub kept: Option<Kept>,
-    /// What networks name beside the joints (face, feet, hands), by name; each is triangulated by itself. None without such networks.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub keypoints: BTreeMap<String, JointLine>,
-    /// Pairs of views that have a part in the result.
-    pub pairs: u32,
-    /// How many people the views agree on, of whom one is followed; none in a line without a result, and where the model is
-    /// not of people.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub people: Option<u32>,
+    /// The people, each with an identity of its own, the one who is followed first; none in a line without a result.
+    #[serde(deserialize_with = "people")]
+    pub people: Vec<PersonLine>,
     /// Why there is no result; only in a line without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// Whether left and right are certain; none in a line without a result.
+    /// How many people the views agree on, whether or not they are in the list; none in a line without a result, and where the model is
+    /// not of people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sides: Option<Sides>,
-    /// Log-odds that left and right are not exchanged in all views, nats.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sides_margin: Option<f64>,
-    /// Height of the person standing upright, by the lengths of the bones, metres; none where too few are known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stature_m: Option<f64>,
-    /// [`FrameLine::OK`], [`FrameLine::NO_RESULT`], or why the result has no skeleton.
+    pub seen: Option<u32>,
+    /// [`FrameLine::OK`] if anybody has a skeleton, [`FrameLine::NO_RESULT`], or why nobody has.
     pub status: String,
     /// When the frame was taken, seconds after frame 0 of the footage, where its rate is known.
     #[serde(deserialize_with = "nullable")]
@@ -55,11 +35,53 @@ pub struct FrameLine {
     pub views_missing: BTreeMap<String, Missing>,
     /// The views that have a part in the result.
     pub views_present: Vec<String>,
+}
+
+/// A person of a line.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct PersonLine {
+    /// How much the lengths of the bones differ from those of people, standard deviations; none where there is no body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_deviation: Option<f64>,
+    /// By how much the decision which views see the person from the same side was won; none where it was
+    /// not made.
+    #[serde(deserialize_with = "nullable")]
+    pub facing_margin: Option<f64>,
+    /// Identity within the run, from 1.
+    pub id: u64,
+    /// The joints, by name.
+    pub joints: BTreeMap<String, JointLine>,
+    /// Whether the skeleton is made of the poses that fusion solved for, or of those that it started from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kept: Option<Kept>,
+    /// What networks name beside the joints (face, feet, hands), by name; each is triangulated by itself. None without such networks.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub keypoints: BTreeMap<String, JointLine>,
+    /// Pairs of views that have a part in the skeleton.
+    pub pairs: u32,
+    /// Whether left and right are certain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sides: Option<Sides>,
+    /// Log-odds that left and right are not exchanged in all views, nats.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sides_margin: Option<f64>,
+    /// Of every joint and keypoint with a position what it stands on: `measured`, `exchanged`, `filled` or `rejected`; only in
+    /// `pose3d-smooth.jsonl`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub states: BTreeMap<String, String>,
+    /// Height of the person standing upright, by the lengths of the bones, metres; none where too few are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stature_m: Option<f64>,
+    /// [`FrameLine::OK`], or why there is no skeleton.
+    pub status: String,
     /// The views that some joint was triangulated from.
     pub views_used: Vec<String>,
 }
 
 impl FrameLine {
+    /// Name of the file of lines whose joints were smoothed. Their status is [`FrameLine::OK`] where any joint has a position, measured
+    /// or not; positions have no `reprojection_px`.
+    pub const SMOOTHED_FILE: &'static str = "pose3d-smooth.jsonl";
     /// Status of a frame with a skeleton.
     pub const OK: &'static str = "ok";
     /// Status of a frame without a result.
@@ -70,10 +92,34 @@ impl FrameLine {
         self.status != Self::NO_RESULT
     }
 
-    /// Whether there is a skeleton.
+    /// Whether anybody has a skeleton.
     pub fn has_pose(&self) -> bool {
         self.status == Self::OK
     }
+
+    /// The person who is followed; `None` if there is nobody.
+    pub fn followed(&self) -> Option<&PersonLine> {
+        self.people.first()
+    }
+}
+
+/// At most so many people as fit, no two of one identity.
+fn people<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PersonLine>, D::Error> {
+    let people = Vec::<PersonLine>::deserialize(from)?;
+    if people.len() > MOST_PEOPLE {
+        let text = format!("{} people, a frame has at most {MOST_PEOPLE}", people.len());
+        return Err(D::Error::custom(text));
+    }
+    for (nth, person) in people.iter().enumerate() {
+        if person.id == 0 {
+            return Err(D::Error::custom("a person with id 0, ids begin at 1"));
+        }
+        if people[..nth].iter().any(|other| other.id == person.id) {
+            let text = format!("two people with id {}, ids of a frame differ", person.id);
+            return Err(D::Error::custom(text));
+        }
+    }
+    Ok(people)
 }
 
 /// Whether left and right of a skeleton are certain.

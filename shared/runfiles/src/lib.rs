@@ -5,7 +5,7 @@
 //! | `pose3d.jsonl` | [`FrameLine`] | frame, with a result or without |
 //! | `pose2d.jsonl` | [`ViewLine`] | view of a frame that has a result |
 //! | `times.jsonl` | [`TimesLine`] | frame that has a result |
-//! | `pose3d-smooth.jsonl` | [`SmoothLine`] | frame of a run that was smoothed |
+//! | `pose3d-smooth.jsonl` | [`FrameLine`] | frame of a run that was smoothed |
 //! | `smooth.json` | [`SmoothReport`] | run that was smoothed |
 //! | `latency.json` | [`LatencyReport`] | run |
 //! | `summary.json` | [`RunSummary`] | run; holds the version of all files |
@@ -31,19 +31,19 @@ mod times;
 mod trust;
 mod view;
 
-pub use frame::{FrameLine, JointLine, Kept, PlacedJoint, Sides};
+pub use frame::{FrameLine, JointLine, Kept, MOST_PEOPLE, PersonLine, PlacedJoint, Sides};
 pub use latency::{LatencyReport, Percentiles};
 pub use missing::Missing;
 pub use read::{Line, ReadError, lines, to_line};
 pub use running::{Running, RunningError, RunningView};
-pub use smooth::{SmoothLine, SmoothReport, SmoothedJoint, Unsure};
+pub use smooth::{SmoothReport, SmoothedJoint, SmoothedPerson, Unsure};
 pub use summary::{CameraFit, Contradicted, Exchanged, People, RunSummary, Summary, ViewSummary};
 pub use times::{CameraTimes, PoseTimes, TimesLine, ViewTimes};
 pub use trust::{Doubt, Trust};
 pub use view::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};
 
 /// Version of all files of a run; it rises when a field changes its meaning or is removed.
-pub const VERSION: u64 = 1;
+pub const VERSION: u64 = 2;
 
 #[cfg(test)]
 mod tests;

@@ -1,33 +1,15 @@
-//! `pose3d-smooth.jsonl` and `smooth.json`: trajectories that were smoothed, and how.
+//! `smooth.json`: how trajectories were smoothed.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::read::{Line, parse, to_text};
-use crate::{FrameLine, ReadError};
-
-/// A line of `pose3d-smooth.jsonl`: a line of `pose3d.jsonl` whose joints were smoothed, so whatever reads that file reads this one.
-///
-/// Its status is [`FrameLine::OK`] where any joint has a position, measured or not. Positions have no `reprojection_px`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SmoothLine {
-    /// The frame.
-    #[serde(flatten)]
-    pub frame: FrameLine,
-    /// Of every joint and keypoint with a position what it stands on: `measured`, `exchanged`, `filled` or `rejected`.
-    pub states: BTreeMap<String, String>,
-}
-
-impl Line for SmoothLine {
-    const FILE: &'static str = "pose3d-smooth.jsonl";
-}
+use crate::ReadError;
+use crate::read::{parse, to_text};
 
 /// The file `smooth.json`: how `pose3d-smooth.jsonl` was made.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SmoothReport {
-    /// Lengths of bones that were kept constant, by the names of both joints, metres.
-    pub bones: BTreeMap<String, f64>,
     /// Cutoff of the low-pass filter, Hz, where there is one.
     pub cutoff_hz: Option<f64>,
     /// By how much the positions are late, milliseconds; 0 for methods that look ahead.
@@ -36,20 +18,31 @@ pub struct SmoothReport {
     pub doubts: Vec<String>,
     /// The longest time between measurements that was filled, seconds.
     pub fill_s: f64,
-    /// Frames in which somebody else begins: nothing was smoothed across.
-    pub frames_of_breaks: Vec<u64>,
-    /// Every joint and keypoint, by name.
-    pub joints: BTreeMap<String, SmoothedJoint>,
     /// `rts`, `butterworth`, `kalman` or `none`.
     pub method: String,
     /// Lines.
     pub n_frames: u64,
+    /// The people, by ascending identity; each was smoothed alone.
+    pub people: Vec<SmoothedPerson>,
     /// Frames per second: the inverse of the median time between two.
     pub rate_hz: Option<f64>,
     /// By how much the instants are off the uniform grid that they were interpolated to, at most, milliseconds.
     pub resampled_ms: Option<f64>,
     /// [`crate::VERSION`].
     pub schema_version: u64,
+}
+
+/// One person over the run.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct SmoothedPerson {
+    /// Lengths of bones that were kept constant, by the names of both joints, metres.
+    pub bones: BTreeMap<String, f64>,
+    /// Frames in which somebody else begins: nothing was smoothed across.
+    pub frames_of_breaks: Vec<u64>,
+    /// Identities within the run: more than one where never two people were there, and whoever was followed had one after the other.
+    pub ids: Vec<u64>,
+    /// Every joint and keypoint, by name.
+    pub joints: BTreeMap<String, SmoothedJoint>,
     /// Frames whose sides were not certain.
     pub unsure: Unsure,
 }

@@ -98,6 +98,8 @@ pub struct Summary {
 pub struct People {
     /// Which of several is followed: `last`, `largest` or `clearest`.
     pub follow: String,
+    /// How many people were followed, one after the other.
+    pub followed: u64,
     /// Results with more than one.
     pub frames_with_others: u64,
     /// The most in one result.
@@ -109,14 +111,20 @@ impl People {
     pub fn text(&self) -> String {
         let Self {
             follow,
+            followed,
             frames_with_others,
             most,
         } = self;
+        let followed = if *followed > 1 {
+            format!("; {followed} people were followed, one after the other")
+        } else {
+            String::new()
+        };
         if *frames_with_others == 0 {
-            return "no others in view".to_owned();
+            return format!("no others in view{followed}");
         }
         format!(
-            "up to {most} in view, more than one in {frames_with_others} frames; person.follow = \"{follow}\" chooses"
+            "up to {most} in view, more than one in {frames_with_others} frames; person.follow = \"{follow}\" chooses{followed}"
         )
     }
 }

@@ -38,12 +38,13 @@ fn a_frame_without_a_result_says_why_and_a_joint_without_a_position_too() {
         panic!("three lines")
     };
     assert!(!without.has_result() && !without.has_pose());
-    assert!(without.reason.is_some() && without.joints.is_empty());
+    assert!(without.reason.is_some() && without.people.is_empty());
     assert!(without.views_missing.len() == 4);
     assert!(whole.has_pose() && whole.reason.is_none());
-    assert!(whole.joints.values().all(|joint| joint.placed().is_some()));
+    let joints = |line: &FrameLine| line.people[0].joints.clone();
+    assert!(joints(whole).values().all(|joint| joint.placed().is_some()));
     let is_missing = |joint: &JointLine| matches!(joint, JointLine::Missing { status } if status == "too few views");
-    assert!(partial.joints.values().any(is_missing));
+    assert!(joints(partial).values().any(is_missing));
 }
 
 /// Every field of an object, replaced by a text or left out, is an error that names it, unless it may be missing.
@@ -76,7 +77,7 @@ fn assert_strict<T: Serialize>(
 #[test]
 fn a_missing_or_wrong_field_is_an_error_that_names_it() {
     for line in POSE3D.lines() {
-        assert_strict(line, &["reason"], read::parse::<FrameLine>);
+        assert_strict(line, &["reason", "seen"], read::parse::<FrameLine>);
     }
     for line in POSE2D.lines() {
         assert_strict(line, &[], read::parse::<ViewLine>);
@@ -117,11 +118,84 @@ fn an_error_says_where_and_what_was_found() {
     assert!(error.contains("missing field `covariance_m2`"), "{error}");
 }
 
+/// A line with people of these identities.
+fn line_of(ids: &[u64]) -> String {
+    let line = read::<FrameLine>(POSE3D).pop().unwrap();
+    let person = |id: &u64| PersonLine {
+        id: *id,
+        ..line.people[0].clone()
+    };
+    let people = ids.iter().map(person).collect();
+    to_line(&FrameLine { people, ..line }).unwrap()
+}
+
+#[test]
+fn a_line_has_at_most_eight_people_each_with_an_identity_of_its_own() {
+    for ids in [&[][..], &[3], &[7, 2], &[1, 2, 3, 4, 5, 6, 7, u64::MAX]] {
+        let lines = read::<FrameLine>(&line_of(ids));
+        let found = lines[0].people.iter().map(|person| person.id);
+        assert_eq!(found.collect::<Vec<_>>(), ids, "in their order");
+        assert_eq!(
+            lines[0].followed().map(|person| person.id),
+            ids.first().copied()
+        );
+    }
+    for (ids, problem) in [
+        (
+            &[1, 2, 3, 4, 5, 6, 7, 8, 9][..],
+            "9 people, a frame has at most 8",
+        ),
+        (&[4, 5, 4], "two people with id 4, ids of a frame differ"),
+        (&[0], "a person with id 0, ids begin at 1"),
+    ] {
+        let error = read::parse::<FrameLine>(&line_of(ids)).unwrap_err();
+        assert_eq!(
+            (error.field.as_str(), error.problem.as_str()),
+            ("people", problem)
+        );
+    }
+    let two = line_of(&[1, 2]);
+    let wrong = two.replacen("\"id\":2,\"joints\":", "\"id\":2,\"joint\":", 1);
+    let error = read::parse::<FrameLine>(&wrong).unwrap_err();
+    assert_eq!(
+        (error.field.as_str(), error.problem.as_str()),
+        ("people[1]", "missing field `joints`")
+    );
+    let wrong = two.replacen(
+        "\"position_m\":[-0.36290584760858785",
+        "\"position_m\":[NaN",
+        1,
+    );
+    let error = read::parse::<FrameLine>(&wrong).unwrap_err();
+    assert!(error.field.starts_with("people[0].joints"), "{error}");
+}
+
+#[test]
+fn a_field_of_a_person_that_is_missing_or_wrong_is_an_error_that_names_it() {
+    for line in POSE3D.lines() {
+        let line: Value = serde_json::from_str(line).unwrap();
+        for person in line["people"].as_array().unwrap() {
+            let may_be_missing = [
+                "body_deviation",
+                "kept",
+                "sides",
+                "sides_margin",
+                "stature_m",
+            ];
+            assert_strict(
+                &person.to_string(),
+                &may_be_missing,
+                read::parse::<PersonLine>,
+            );
+        }
+    }
+}
+
 #[test]
 fn a_summary_of_another_version_is_refused_and_still_says_of_which_run_it_is() {
-    let other = SUMMARY.replace("\"schema_version\": 1", "\"schema_version\": 2");
+    let other = SUMMARY.replace("\"schema_version\": 2", "\"schema_version\": 9");
     let error = RunSummary::parse(&other).unwrap_err().to_string();
-    assert!(error.contains("version 2"), "{error}");
+    assert!(error.contains("version 9"), "{error}");
     let session = RunSummary::parse(SUMMARY).unwrap().session;
     assert_eq!(RunSummary::parse_session(&other), Ok(session));
 }
@@ -135,7 +209,7 @@ fn unknown_fields_are_passed_over() {
 #[test]
 fn numbers_that_are_none_are_null() {
     let mut line = read::<FrameLine>(POSE3D).pop().unwrap();
-    let Some(JointLine::Placed(joint)) = line.joints.get_mut("head") else {
+    let Some(JointLine::Placed(joint)) = line.people[0].joints.get_mut("head") else {
         panic!("a head")
     };
     joint.covariance_m2[1] = f64::NAN;
@@ -143,7 +217,7 @@ fn numbers_that_are_none_are_null() {
     let text = to_line(&line).unwrap();
     assert!(text.contains("null") && !text.contains("NaN"));
     let again = read::<FrameLine>(&text).pop().unwrap();
-    let head = again.joints["head"].placed().unwrap();
+    let head = again.people[0].joints["head"].placed().unwrap();
     assert!(head.covariance_m2[1].is_nan() && head.covariance_m2[0].is_finite());
     assert_eq!(head.reprojection_px, None);
 }

@@ -71,10 +71,20 @@ impl<T: Message> Subscriber<T> {
     ///
     /// [`ReceiveError`].
     pub fn receive(&self) -> Result<Option<T>, ReceiveError> {
+        self.receive_by(|message| *message)
+    }
+
+    /// Takes the oldest waiting message, if there is one, and reads it where its sender wrote it: for messages that are large for a
+    /// stack.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    pub fn receive_by<R>(&self, read: impl FnOnce(&T) -> R) -> Result<Option<R>, ReceiveError> {
         while let Some(received) = self.port.receive()? {
             if let Some(message) = received.payload::<T, ()>().first() {
                 self.port.copies.add(size_of::<T>());
-                return Ok(Some(*message));
+                return Ok(Some(read(message)));
             }
         }
         Ok(None)
@@ -88,6 +98,19 @@ impl<T: Message> Subscriber<T> {
     pub fn latest(&self) -> Result<Option<T>, ReceiveError> {
         let mut latest = None;
         while let Some(message) = self.receive()? {
+            latest = Some(message);
+        }
+        Ok(latest)
+    }
+
+    /// As [`Self::latest`], for messages that are large for a stack.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    pub fn latest_boxed(&self) -> Result<Option<Box<T>>, ReceiveError> {
+        let mut latest = None;
+        while let Some(message) = self.receive_by(|message| Box::new(*message))? {
             latest = Some(message);
         }
         Ok(latest)

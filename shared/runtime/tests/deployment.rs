@@ -7,7 +7,7 @@ use std::os::unix::fs::MetadataExt as _;
 
 use common::{Deployment, shared_memory};
 use messages::{
-    EvidenceHeader, FrameHeader, Health, PairPose, Pose3d, ViewPose, ViewQuality, topic,
+    EvidenceHeader, FrameHeader, Health, PairPose, Skeletons, ViewPose, ViewQuality, topic,
 };
 use runtime::{
     Bus, Delivery, Limits, Publisher, SlicePublisher, SliceSubscriber, Subscriber, TopicPlan,
@@ -49,8 +49,8 @@ fn topics(delivery: Delivery) -> Vec<TopicPlan> {
     topics.extend((0..N_WORKERS).map(|worker| {
         TopicPlan::messages::<PairPose>(topic::pair_pose(worker), delivery, small(2))
     }));
-    topics.push(TopicPlan::messages::<Pose3d>(
-        topic::pose3d(),
+    topics.push(TopicPlan::messages::<Skeletons>(
+        topic::skeletons(),
         delivery,
         small(1),
     ));
@@ -71,8 +71,8 @@ struct Ports {
     quality_in: Vec<Subscriber<ViewQuality>>,
     pairs_out: Vec<Publisher<PairPose>>,
     pairs_in: Vec<Subscriber<PairPose>>,
-    result_out: Vec<Publisher<Pose3d>>,
-    result_in: Vec<Subscriber<Pose3d>>,
+    result_out: Vec<Publisher<Skeletons>>,
+    result_in: Vec<Subscriber<Skeletons>>,
     health_out: Vec<Publisher<Health>>,
     kept: Vec<(Waiter, Bus)>,
 }
@@ -146,10 +146,10 @@ impl Ports {
         }
         if records {
             self.result_in
-                .push(bus.subscriber(&topic::pose3d(), waiter).unwrap());
+                .push(bus.subscriber(&topic::skeletons(), waiter).unwrap());
         } else {
             self.result_out
-                .push(bus.publisher(&topic::pose3d()).unwrap());
+                .push(bus.publisher(&topic::skeletons()).unwrap());
         }
     }
 }

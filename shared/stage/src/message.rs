@@ -1,7 +1,7 @@
 //! The fields that all messages share.
 
 use messages::{
-    EvidenceHeader, FrameHeader, PairPose, People, Pose3d, Stamp, Status, Timing, ViewPose,
+    EvidenceHeader, FrameHeader, PairPose, People, Skeletons, Stamp, Status, Timing, ViewPose,
     ViewQuality,
 };
 
@@ -57,7 +57,7 @@ stamped! {
     ViewQuality => "view-quality", Self::default();
     PairPose => "pair-pose", Self::default();
     People => "people", Self::default();
-    Pose3d => "pose3d", wire::end_of_results(0);
+    Skeletons => "skeletons", wire::end_of_results(0);
 }
 
 /// The header of bulk data.

@@ -91,6 +91,21 @@ impl<M: Message + Stamped> Port<Subscriber<M>> {
         Ok(Self::new(service.bus().subscriber(topic, waiter)?, sender))
     }
 
+    /// As [`Self::receive`], for messages that are large for a stack.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    pub fn receive_boxed(&self, context: &Context<'_>) -> Result<Option<Box<M>>, ReceiveError> {
+        while let Some(message) = self.receiver.receive_by(|message| Box::new(*message))? {
+            match self.sender.check(&*message, context) {
+                Ok(()) => return Ok(Some(message)),
+                Err(error) => context.refuse(&*message, &error)?,
+            }
+        }
+        Ok(None)
+    }
+
     /// The identifiers of the ports that may send; a restarted sender has a new one.
     pub fn publishers(&self) -> Vec<u128> {
         self.receiver.publishers()

@@ -13,7 +13,7 @@ mod people;
 mod pose;
 mod quality;
 mod seen;
-mod skeleton;
+mod skeletons;
 mod stamp;
 
 pub use all_views::{all_views_from_pairs, all_views_to_messages, check_all_views};
@@ -31,7 +31,7 @@ pub use quality::{
     tau_to_message,
 };
 pub use seen::{heats_from_message, heats_to_message, seen_from_message};
-pub use skeleton::{check_pose3d, end_of_results, keypoints_to_message, skeleton_to_message};
+pub use skeletons::{SolvedPerson, check_skeletons, end_of_results, skeletons_to_message};
 pub use stamp::{Expected, check_frame};
 
 #[cfg(test)]

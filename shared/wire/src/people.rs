@@ -53,7 +53,7 @@ fn person_to_message(person: &KnownPerson) -> Result<PersonMessage, WireError> {
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are too many people, one has a candidate that no view can have or one of a view that is not in the rig, or two
+/// [`WireError`] if there are too many people, one has no identity, a candidate that no view can have or one of a view that is not in the rig, or two
 /// share an identity or a candidate.
 pub fn people_from_message(message: &People, n_views: usize) -> Result<FramePeople, WireError> {
     let n = count("n_people", message.n_people as usize, MAX_PEOPLE)?;
@@ -75,6 +75,7 @@ pub fn people_from_message(message: &People, n_views: usize) -> Result<FramePeop
         }
         let is_known = people.iter().any(|other| other.id == it.id);
         equal("people of an identity", 1 + usize::from(is_known), 1)?;
+        equal("people without an identity", usize::from(it.id == 0), 0)?;
         people.push(KnownPerson {
             id: it.id,
             candidates,
@@ -151,7 +152,7 @@ mod tests {
         ) {
             let mut message = People { n_people, ..People::default() };
             for (nth, (slot, candidates)) in message.people.iter_mut().zip(candidates).enumerate() {
-                *slot = PersonMessage { id: nth as u64, candidates };
+                *slot = PersonMessage { id: nth as u64 + 1, candidates };
             }
             if let Ok(frame) = people_from_message(&message, 3) {
                 for person in &frame.people {

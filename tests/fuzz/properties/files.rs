@@ -3,7 +3,7 @@
 use consistency::{Appearance, JointFile, Learned};
 use datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use deployment::{AnyMachine, Loaded, Stage, Topology};
-use exports::{FILES, Gathering};
+use exports::{FILES, Gathering, Trial};
 use fmp::Model;
 use fmp::files::{describe, mat, own, text};
 use formats::c3d::C3d;
@@ -13,8 +13,7 @@ use motion::{Joint, Recorded, Role};
 use multiview::Compatibility;
 use rigs::boards::{corners_text, parse_corners};
 use runfiles::{
-    FrameLine, LatencyReport, Line, RunSummary, Running, SmoothLine, SmoothReport, TimesLine,
-    ViewLine,
+    FrameLine, LatencyReport, Line, RunSummary, Running, SmoothReport, TimesLine, ViewLine,
 };
 use scene::Address;
 use scene::truth::{Frame, Header};
@@ -364,13 +363,18 @@ fn exported(input: &str) {
             return;
         }
     }
-    let Ok(trial) = all.finish("x", Some(30.0)) else {
+    let Ok(trials) = all.finish("x", Some(30.0)) else {
         return;
     };
+    trials.iter().for_each(written);
+}
+
+/// Every format of one file is written, or refuses a trial.
+fn written(trial: &Trial) {
     // Frames may be as far apart as they like; what lies between is empty.
     for format in FILES.iter().filter(|_| trial.slots.len() < 1000) {
         let mut file = Vec::new();
-        if (format.write)(&trial, &mut file).is_ok() && format.name == "c3d" {
+        if (format.write)(trial, &mut file).is_ok() && format.name == "c3d" {
             let read = C3d::parse(&file).expect("it was written");
             assert_eq!(read.n_frames(), trial.slots.len());
         }
@@ -382,10 +386,12 @@ fn smoothed(input: &str) {
     let mut recorded = Recorded::default();
     for line in runfiles::lines::<FrameLine>(input).flatten() {
         let at = recorded.times.len();
-        let Some(time_s) = line.time_s else { continue };
+        let (Some(time_s), Some(person)) = (line.time_s, line.followed()) else {
+            continue;
+        };
         recorded.times.push(time_s);
-        recorded.sides.push(motion::lines::sides(&line));
-        for (name, it) in &line.joints {
+        recorded.sides.push(motion::lines::sides(person));
+        for (name, it) in &person.joints {
             let known = recorded.joints.iter().position(|it| it.name == *name);
             let nth = known.unwrap_or(recorded.joints.len());
             if known.is_none() {
@@ -441,7 +447,6 @@ pub fn run_files(input: &[u8]) {
     smoothed(input);
     lines::<ViewLine>(input);
     lines::<TimesLine>(input);
-    lines::<SmoothLine>(input);
     if let Ok(report) = SmoothReport::parse(input) {
         let written = report.to_text().expect("it was read");
         let again = SmoothReport::parse(&written).expect("it was written");

@@ -9,9 +9,9 @@ use fmp::{
 use geometry::{Camera, Intrinsics, Lens};
 use kernels::Rgb8View;
 use messages::{
-    EvidenceHeader, FrameHeader, FusedView, Joint3d, Kept, MAX_CANDIDATES, MAX_JOINTS,
-    MAX_KEYPOINTS, MAX_LEVELS, MAX_PARTS, MAX_VIEWS, PairPose, Pose3d, PoseMessage, Sides, Stamp,
-    Status, Timing, ViewPose, ViewQuality,
+    EvidenceHeader, FrameHeader, MAX_CANDIDATES, MAX_JOINTS, MAX_KEYPOINTS, MAX_LEVELS, MAX_PARTS,
+    MAX_PEOPLE, MAX_VIEWS, PairPose, PoseMessage, Skeletons, Stamp, Status, Timing, ViewPose,
+    ViewQuality,
 };
 use multiview::{Settings, ViewPlan};
 use nalgebra::Isometry3;
@@ -356,45 +356,39 @@ fn pair(input: &[u8]) {
 
 fn result(input: &[u8]) {
     let (stamp, timing) = stamp();
-    let mut message = Pose3d {
-        stamp,
-        timing,
-        status: Status::OK,
-        n_joints: 14,
-        n_views: 2,
-        views_present: 3,
-        views_used: 3,
-        n_pairs: 1,
-        facing_margin: 0.0,
-        sides_margin: 0.0,
-        stature_m: 0.0,
-        body_deviation: 0.0,
-        sides: Sides::SURE,
-        kept: Kept::SOLVED,
-        n_people: 1,
-        n_keypoints: 2,
-        joints: [Joint3d::default(); MAX_JOINTS],
-        views: [FusedView::default(); MAX_VIEWS],
-        keypoints: [Joint3d::default(); MAX_KEYPOINTS],
-    };
+    let mut message = Box::<Skeletons>::default();
+    (message.stamp, message.timing) = (stamp, timing);
+    message.n_people = 2;
+    for (nth, person) in message.people.iter_mut().enumerate() {
+        (person.id, person.n_joints, person.n_views) = (nth as u64 + 1, 14, 2);
+        person.n_keypoints = 2;
+    }
     for it in Change::all(input) {
-        match it.field % 8 {
-            0 => message.n_joints = it.value as u32,
-            1 => message.n_views = it.value as u32,
-            2 => message.views[it.of(MAX_VIEWS)].n_parts = it.value as u32,
-            3 => message.joints[it.of(MAX_JOINTS)].in_world[0] = it.double(),
-            4 => message.views[it.of(MAX_VIEWS)].centres_px[0][1] = it.double(),
-            5 => message.n_keypoints = it.value as u32,
-            6 => message.keypoints[it.of(MAX_KEYPOINTS)].in_world[1] = it.double(),
+        let person = &mut message.people[it.of(MAX_PEOPLE)];
+        match it.field % 10 {
+            0 => person.n_joints = it.value as u32,
+            1 => person.n_views = it.value as u32,
+            2 => person.views[it.of(MAX_VIEWS)].n_parts = it.value as u32,
+            3 => person.joints[it.of(MAX_JOINTS)].in_world[0] = it.double(),
+            4 => person.views[it.of(MAX_VIEWS)].centres_px[0][1] = it.double(),
+            5 => person.n_keypoints = it.value as u32,
+            6 => person.keypoints[it.of(MAX_KEYPOINTS)].in_world[1] = it.double(),
+            7 => person.id = it.value,
+            8 => message.n_people = it.value as u32,
             _ => message.status = Status(it.value as u32),
         }
     }
-    if wire::check_pose3d(&message, 2, 14).is_ok() && message.status == Status::OK {
-        assert_eq!((message.n_views, message.n_joints), (2, 14));
-        let keypoints = &message.keypoints[..message.n_keypoints as usize];
-        let found = keypoints.iter().filter(|it| it.status == Status::OK);
-        let joints = message.joints[..14].iter().chain(found);
-        assert!(joints.flat_map(|it| it.in_world).all(f64::is_finite));
+    if wire::check_skeletons(&message, 2, 14).is_ok() {
+        let people = message.listed();
+        assert_eq!(people.len(), message.n_people as usize);
+        for (nth, person) in people.iter().enumerate() {
+            assert!(people[..nth].iter().all(|other| other.id != person.id));
+            assert_eq!((person.n_views, person.n_joints), (2, 14));
+            let keypoints = &person.keypoints[..person.n_keypoints as usize];
+            let points = person.joints[..14].iter().chain(keypoints);
+            let mut found = points.filter(|point| point.status == Status::OK);
+            assert!(found.all(|point| point.in_world.iter().all(|it| it.is_finite())));
+        }
     }
 }
 
@@ -454,8 +448,13 @@ pub fn wire_fusion(input: &[u8]) {
     );
     let mut step = SkeletonStep::new(plans.clone(), None, settings());
     let skeleton = step.run(&answers, &found);
-    let message = wire::skeleton_to_message(&skeleton, 3).expect("it fits");
-    assert_eq!(message.n_views, 2);
+    let person = wire::SolvedPerson {
+        id: 1,
+        skeleton: &skeleton,
+        keypoints: &[],
+    };
+    let message = wire::skeletons_to_message(&[person], 1, 3).expect("it fits");
+    assert_eq!(message.people[0].n_views, 2);
 }
 
 /// Every part is a joint: the joint sets of people have more parts than the chain.

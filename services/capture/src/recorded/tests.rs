@@ -27,7 +27,7 @@ fn recording(pictures: &[(u64, u64, u8)]) -> (tempfile::TempDir, PathBuf) {
         settings: "{}".to_owned(),
         without: Without::default(),
     };
-    let topics = [topic::picture(3), topic::pose3d()];
+    let topics = [topic::picture(3), topic::skeletons()];
     let mut bytes = Vec::new();
     let mut writer = Writer::begin(&mut bytes, &about, &topics).unwrap();
     let mut name = [0; MAX_NAME];

@@ -39,6 +39,13 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let run = finished::read(&arguments.folder, None)?;
+    if let [first, _, ..] = &run.people[..] {
+        output::message(format_args!(
+            "{} people are in the run, one in the truth: compared is person {}",
+            run.people.len(),
+            first.ids[0]
+        ));
+    }
     let settings = finished::Settings::default();
     let comparison = smoothed::against(&run, &settings, &arguments.truth)?;
     if arguments.json {

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use exports::{Gathering, Naming, Trial, TrialError, ViewCamera};
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use geometry::{Framing, OutSize, Rig};
-use messages::{Joint3d, Pose3d, Status, topic};
+use messages::{Joint3d, SkeletonMessage, Skeletons, Status, topic};
 use nalgebra::UnitVector3;
 use recording::{Kind, Recording};
-use runfiles::{FrameLine, JointLine, PlacedJoint};
+use runfiles::{FrameLine, JointLine, Line as _, PersonLine, PlacedJoint};
 use skeleton::JointSet;
 
 use crate::recorded;
@@ -30,17 +30,10 @@ impl Lines {
     /// The file.
     pub fn file(self) -> &'static str {
         match self {
-            Self::Raw => "pose3d.jsonl",
-            Self::Smooth => "pose3d-smooth.jsonl",
+            Self::Raw => FrameLine::FILE,
+            Self::Smooth => FrameLine::SMOOTHED_FILE,
         }
     }
-}
-
-/// What only smoothed lines have.
-#[derive(serde::Deserialize)]
-struct States {
-    #[serde(default)]
-    states: BTreeMap<String, String>,
 }
 
 /// What the user says about a run.
@@ -61,8 +54,8 @@ pub struct Given {
 /// A run to be exported.
 #[derive(Debug)]
 pub struct Origin {
-    /// What was found.
-    pub trial: Trial,
+    /// What was found of each person; at least one.
+    pub trials: Vec<Trial>,
     /// The folder or the recording.
     pub source: PathBuf,
     /// Which trajectories of it.
@@ -105,7 +98,7 @@ impl Origin {
             resolved = Ok(settings);
         }
         let n_lines = gathering.n_lines();
-        let mut trial = gathering
+        let mut trials = gathering
             .finish(&given.name, given.rate_hz)
             .map_err(|error| {
                 let kind = match error {
@@ -117,17 +110,20 @@ impl Origin {
                     format!("{}: {error}; nothing is written", source.display()),
                 )
             })?;
-        trial.naming = given.naming;
-        check_rate(&trial, given)?;
-        flaws.extend(of_times(&trial, n_lines));
+        // All have the same places.
+        check_rate(&trials[0], given)?;
+        flaws.extend(of_times(&trials[0], n_lines));
         let setup = resolved.and_then(|it| {
             let rig = inputs::rig_of(&it.deployment).map_err(|error| error.to_string())?;
             Ok((it, rig))
         });
-        trial.up_in_world = given.up.or_else(|| setup.as_ref().ok()?.1.up_in_world());
+        let up_in_world = given.up.or_else(|| setup.as_ref().ok()?.1.up_in_world());
+        for trial in &mut trials {
+            (trial.naming, trial.up_in_world) = (given.naming, up_in_world);
+        }
         let up_unknown = setup.as_ref().err().filter(|_| given.up.is_none()).cloned();
         Ok(Self {
-            trial,
+            trials,
             source: source.to_owned(),
             lines: given.lines,
             flaws,
@@ -270,13 +266,8 @@ fn lines(
                 return Err(in_file(&path, &error));
             }
         };
-        let states = match which {
-            Lines::Raw => BTreeMap::new(),
-            Lines::Smooth => serde_json::from_str(&text)
-                .map_or_else(|_error| BTreeMap::new(), |it: States| it.states),
-        };
         gathering
-            .push_smoothed(&line, &states)
+            .push(&line)
             .map_err(|error| in_file(&path, &error))?;
     }
     Ok(gathering)
@@ -300,10 +291,10 @@ fn messages(
     })?;
     let mut input = files::open(file).map_err(|error| in_file(file, &error))?;
     let mut gathering = Gathering::new(views(Some(resolved)));
-    let track = recording.tracks.get(&topic::pose3d());
+    let track = recording.tracks.get(&topic::skeletons());
     let (mut buffer, mut n_damaged) = (recording::Buffer::default(), 0);
     for entry in track.map_or(&[][..], |it| &it.entries) {
-        let message = match recording::read(&mut input, Kind::Pose3d, entry, &mut buffer) {
+        let message = match recording::read(&mut input, Kind::Skeletons, entry, &mut buffer) {
             Ok(message) => message,
             Err(error @ recording::ReadError::Read(_)) => return Err(in_file(file, &error)),
             Err(_) => {
@@ -311,12 +302,12 @@ fn messages(
                 continue;
             }
         };
-        let Ok(pose) = bytemuck::try_pod_read_unaligned::<Pose3d>(message.head) else {
+        let Some(skeletons) = message.skeletons() else {
             n_damaged += 1;
             continue;
         };
-        if pose.status != Status::END {
-            let line = line(&pose, joints, resolved);
+        if skeletons.status != Status::END {
+            let line = line(&skeletons, joints, resolved);
             gathering.push(&line).or_fail(ExitKind::Input)?;
         }
     }
@@ -330,41 +321,43 @@ fn messages(
 }
 
 /// The line of a result, as far as an export needs it.
-fn line(pose: &Pose3d, joints: &JointSet, resolved: &Resolved) -> FrameLine {
-    let frame = pose.stamp.frame;
-    let joint = |it: &Joint3d| of_message(it, resolved);
-    let names = joints.joints.iter().map(|it| it.name.to_owned());
-    let has_joints = pose.n_joints as usize == joints.joints.len();
-    let known = pose
-        .joints
-        .iter()
-        .take(if has_joints { joints.joints.len() } else { 0 });
-    let extras = pose.keypoints.iter().take(pose.n_keypoints as usize);
+fn line(skeletons: &Skeletons, joints: &JointSet, resolved: &Resolved) -> FrameLine {
+    let frame = skeletons.stamp.frame;
+    let people = skeletons.listed().iter();
     FrameLine {
-        body_deviation: None,
-        facing_margin: None,
         frame,
-        joints: names.zip(known.map(joint)).collect(),
-        keypoints: resolved
-            .extra_keypoints
-            .iter()
-            .cloned()
-            .zip(extras.map(joint))
+        people: people
+            .map(|message| person(message, joints, resolved))
             .collect(),
-        kept: None,
-        pairs: pose.n_pairs,
-        people: None,
         reason: None,
-        sides: None,
-        sides_margin: None,
-        stature_m: None,
-        status: pose.status.reason().to_owned(),
+        seen: None,
+        status: skeletons.status.reason().to_owned(),
         time_s: resolved
             .frame_rate_hz()
             .map(|rate_hz| frame as f64 / rate_hz),
         views_missing: BTreeMap::new(),
         views_present: Vec::new(),
-        views_used: Vec::new(),
+    }
+}
+
+fn person(message: &SkeletonMessage, joints: &JointSet, resolved: &Resolved) -> PersonLine {
+    let point = |message: &Joint3d| of_message(message, resolved);
+    let has_joints = message.n_joints as usize == joints.joints.len();
+    let listed = message.listed_joints().iter().filter(|_| has_joints);
+    let names = joints.joints.iter().map(|joint| joint.name.to_owned());
+    let extras = message.listed_keypoints().iter();
+    PersonLine {
+        id: message.id,
+        joints: names.zip(listed.map(point)).collect(),
+        keypoints: resolved
+            .extra_keypoints
+            .iter()
+            .cloned()
+            .zip(extras.map(point))
+            .collect(),
+        pairs: message.n_pairs,
+        status: message.status.reason().to_owned(),
+        ..PersonLine::default()
     }
 }
 

@@ -16,14 +16,14 @@ const MARK: &str = ".parallax";
 
 /// A folder of keypoints: in it one for each view, with a file for each frame.
 pub(super) fn openpose(
-    trial: &Trial,
+    trials: &[Trial],
     cameras: &[ViewCamera],
     path: &Path,
     stop: &Stop,
     console: &dyn Console,
 ) -> Result<Written, Failure> {
     let beside = files::beside(path);
-    let made = write_all(trial, cameras, &beside, stop, console);
+    let made = write_all(trials, cameras, &beside, stop, console);
     let placed = made.and_then(|()| {
         results::remove_pictures(path).or_fail(ExitKind::Usage)?;
         fs::rename(&beside, path).map_err(|error| cannot_write(path, &error))
@@ -39,7 +39,7 @@ pub(super) fn openpose(
          standard deviation in the picture"
             .to_owned(),
     ];
-    if trial.joints.joints.iter().any(|it| it.name == "head") {
+    if trials[0].joints.joints.iter().any(|it| it.name == "head") {
         notes.push("the head is left out: BODY_25 has none".to_owned());
     }
     Ok(Written {
@@ -56,13 +56,14 @@ pub(super) fn openpose(
 }
 
 fn write_all(
-    trial: &Trial,
+    trials: &[Trial],
     cameras: &[ViewCamera],
     folder: &Path,
     stop: &Stop,
     console: &dyn Console,
 ) -> Result<(), Failure> {
     let at = |path: &Path, done: io::Result<()>| done.map_err(|error| cannot_write(path, &error));
+    let trial = &trials[0];
     if folder.exists() {
         // Of a process that was killed.
         at(folder, fs::remove_dir_all(folder))?;
@@ -84,7 +85,7 @@ fn write_all(
                 return Err(interrupted());
             }
             let name = openpose::file_name(&view.name, trial.frame(slot));
-            put(&room, &name, &openpose::frame(trial, slot, view))?;
+            put(&room, &name, &openpose::frame(trials, slot, view))?;
             console.advance(1);
         }
     }
@@ -93,14 +94,14 @@ fn write_all(
 
 /// The video of a view with the pose drawn on it.
 pub(super) fn video(
-    trial: &Trial,
+    trials: &[Trial],
     pictures: &mut Pictures,
     path: &Path,
     stop: &Stop,
     console: &dyn Console,
 ) -> Result<Written, Failure> {
     let beside = files::beside(path);
-    let drawn = draw_all(trial, pictures, &beside, stop, console);
+    let drawn = draw_all(trials, pictures, &beside, stop, console);
     let placed = drawn.and_then(|n_without| {
         fs::rename(&beside, path).map_err(|error| cannot_write(path, &error))?;
         Ok(n_without)
@@ -132,7 +133,7 @@ pub(super) fn video(
 
 /// Returns how many frames have no picture.
 fn draw_all(
-    trial: &Trial,
+    trials: &[Trial],
     pictures: &mut Pictures,
     path: &Path,
     stop: &Stop,
@@ -140,6 +141,7 @@ fn draw_all(
 ) -> Result<usize, Failure> {
     let [width, height] = pictures.view.size.map(|it| it as usize);
     let size = Size::new(width, height);
+    let trial = &trials[0];
     let rate_hz = trial.rate_hz.unwrap_or_default();
     let failed = |error: FootageError| Failure::new(ExitKind::Input, error);
     let mut video = VideoWriter::create(path, size, rate_hz, "ffmpeg".as_ref()).map_err(failed)?;
@@ -156,7 +158,7 @@ fn draw_all(
             || Canvas::new(size, [0; 3]),
             |rgb| Canvas::from_rgb(size, rgb),
         );
-        annotate::draw(&mut canvas, trial, slot, &pictures.view);
+        annotate::draw(&mut canvas, trials, slot, &pictures.view);
         video.add(canvas.rgb()).map_err(failed)?;
         console.advance(1);
     }

@@ -128,7 +128,8 @@ fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, Str
     if crate::cameras::is_live(&camera.source) {
         return Err("it was live".to_owned());
     }
-    let trial = &origin.trial;
+    // All have the same places.
+    let trial = &origin.trials[0];
     let spec = SourceSpec {
         start: trial.first_frame,
         step: trial.frame_step,

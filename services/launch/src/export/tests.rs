@@ -26,24 +26,44 @@ impl Console for Silent {
     fn finish(&self) {}
 }
 
-const LINE: &str = r#"{"facing_margin":null,"frame":0,"joints":{},"pairs":1,"status":"ok","time_s":0.0,"views_missing":{},"views_present":[],"views_used":[]}"#;
+/// A line of a frame in which nobody was found.
+const LINE: &str = r#"{"frame":0,"people":[],"status":"too few views","time_s":0.0,"views_missing":{},"views_present":[]}"#;
 
-/// Lines of frames in which all joints are at one place.
-fn lines(n: u64) -> String {
-    let joint = r#"{"covariance_m2":[1e-4,0,0,1e-4,0,1e-4],"position_m":[1.0,2.0,3.0],"reprojection_px":1.0,"views":["a"]}"#;
+/// A person whose joints are all at one place.
+fn person(id: u64, x_m: f64) -> String {
+    let joint = format!(
+        r#"{{"covariance_m2":[1e-4,0,0,1e-4,0,1e-4],"position_m":[{x_m:?},2.0,3.0],"reprojection_px":1.0,"views":["a"]}}"#
+    );
     let joints = skeleton::PARSE14.joints.iter();
     let joints = joints.map(|it| format!("\"{}\":{joint}", it.name));
     let joints = joints.collect::<Vec<_>>().join(",");
-    let line = |frame: u64| {
-        LINE.replace("\"joints\":{}", &format!("\"joints\":{{{joints}}}"))
-            .replace("\"frame\":0", &format!("\"frame\":{frame}"))
-            .replace(
-                "\"time_s\":0.0",
-                &format!("\"time_s\":{}", frame as f64 / 50.0),
-            )
-            + "\n"
+    format!(
+        r#"{{"facing_margin":null,"id":{id},"joints":{{{joints}}},"pairs":1,"status":"ok","views_used":["a"]}}"#
+    )
+}
+
+fn line(frame: u64, people: &[String]) -> String {
+    let status = if people.is_empty() {
+        "too few views"
+    } else {
+        "ok"
     };
-    (0..n).map(line).collect()
+    LINE.replace("too few views", status)
+        .replace(
+            "\"people\":[]",
+            &format!("\"people\":[{}]", people.join(",")),
+        )
+        .replace("\"frame\":0", &format!("\"frame\":{frame}"))
+        .replace(
+            "\"time_s\":0.0",
+            &format!("\"time_s\":{}", frame as f64 / 50.0),
+        )
+        + "\n"
+}
+
+/// Lines of frames with one person.
+fn lines(n: u64) -> String {
+    (0..n).map(|frame| line(frame, &[person(1, 1.0)])).collect()
 }
 
 fn run(files: &[(&str, &str)]) -> tempfile::TempDir {
@@ -100,6 +120,101 @@ fn a_folder_is_written_once_and_again_only_by_force() {
 }
 
 #[test]
+fn each_of_several_people_has_a_file_and_one_alone_the_simple_name() {
+    let text: String = [
+        line(0, &[person(4, 4.0), person(1, 1.0)]),
+        line(1, &[person(4, 4.0)]),
+        line(2, &[person(1, 1.0), person(4, 4.0)]),
+        line(3, &[]),
+    ]
+    .concat();
+    let folder = run(&[("pose3d.jsonl", &text)]);
+    let origin = Origin::read(folder.path(), &given()).unwrap();
+    // Bodies at one point have no bones for glb and bvh.
+    let formats = ["c3d", "trc", "csv", "csv-long"];
+    let written = exported(&origin, &job(folder.path(), &formats)).unwrap();
+    assert_eq!(written.len(), 2 * formats.len());
+    let read = |name: &str| fs::read_to_string(folder.path().join("export").join(name)).unwrap();
+    for (id, frames) in [
+        (1, [true, false, true, false]),
+        (4, [true, true, true, false]),
+    ] {
+        let trc = read(&format!("x-person{id}.trc"));
+        for (nth, is_there) in frames.into_iter().enumerate() {
+            let row = trc.lines().nth(5 + nth).unwrap_or_else(|| panic!("{trc}"));
+            assert_eq!(row.contains("NaN"), !is_there, "{row}");
+        }
+        let table = read(&format!("x-person{id}-long.csv"));
+        for (frame, is_there) in frames.into_iter().enumerate() {
+            let row = format!("{frame},{},{id},head,", frame as f64 / 50.0);
+            let rest = table
+                .lines()
+                .find_map(|line| line.strip_prefix(&row))
+                .unwrap();
+            let place = if is_there {
+                format!("{id},2,3,")
+            } else {
+                ",,,".to_owned()
+            };
+            assert!(rest.starts_with(&place), "{row}{rest}");
+        }
+        assert!(read(&format!("x-person{id}.csv")).contains(&format!("\n0,0,{id},ok,")));
+    }
+    let manifest: Value = serde_json::from_str(&read("x.export.json")).unwrap();
+    let people = manifest["people"].as_array().unwrap();
+    let told = |person: &Value| {
+        let frames = person["frames_with_points"].clone();
+        (
+            person["ids"].clone(),
+            frames,
+            person["gaps"]["head"].clone(),
+        )
+    };
+    let told: Vec<_> = people.iter().map(told).collect();
+    let expected = [
+        (json!([1]), json!(2), json!([[1, 1], [3, 3]])),
+        (json!([4]), json!(3), json!([[3, 3]])),
+    ];
+    assert_eq!(told, expected);
+    let alone = line(0, &[]) + &line(1, &[person(4, 4.0)]);
+    let folder = run(&[("pose3d.jsonl", &alone)]);
+    let origin = Origin::read(folder.path(), &given()).unwrap();
+    exported(&origin, &job(folder.path(), &["trc"])).unwrap();
+    assert!(folder.path().join("export/x.trc").exists());
+}
+
+#[test]
+fn people_that_cannot_be_are_refused_with_the_line_and_the_field() {
+    let refused = |people: &[String]| {
+        let text = line(0, &[person(1, 1.0)]) + &line(1, people);
+        let folder = run(&[("pose3d.jsonl", &text)]);
+        let error = Origin::read(folder.path(), &given()).unwrap_err();
+        assert_eq!(error.kind(), ExitKind::Input);
+        error.to_string()
+    };
+    let nine: Vec<String> = (1..=9).map(|id| person(id, 0.5)).collect();
+    let one = || person(1, 1.0);
+    for (people, due) in [
+        (nine, "line 2, column 1"),
+        (
+            vec![one(), one()],
+            "two people with id 1, ids of a frame differ",
+        ),
+        (
+            vec![one().replace("1.0,2.0", "NaN,2.0")],
+            "field `people[0].joints",
+        ),
+        (
+            vec![one(), person(2, 2.0).replace("joints", "joint")],
+            "field `people[1]`: missing field `joints`",
+        ),
+    ] {
+        let error = refused(&people);
+        assert!(error.contains("line 2") && error.contains(due), "{error}");
+    }
+}
+
+#[test]
 fn what_a_run_does_not_tell_is_asked_for_before_anything_is_written() {
     let timeless = lines(2).replace("\"time_s\":0.02", "\"time_s\":null");
     let timeless = timeless.replace("\"time_s\":0,", "\"time_s\":null,");
@@ -142,7 +257,7 @@ fn runs_that_are_not_whole_say_so_and_those_without_a_joint_are_refused() {
     let text = lines(3);
     let cut = run(&[("pose3d.jsonl.part", &text[..text.len() - 9])]);
     let origin = Origin::read(cut.path(), &given()).unwrap();
-    assert_eq!(origin.trial.slots.len(), 2);
+    assert_eq!(origin.trials[0].slots.len(), 2);
     let flaws = origin.flaws.join("\n");
     assert!(
         flaws.contains("has not ended") && flaws.contains("line 3 is cut off"),

@@ -113,7 +113,7 @@ fn space(folder: &Path, content: &Content<'_>) -> Result<Space, Failure> {
     })
 }
 
-/// Results at equal distances in time, as many as can be drawn.
+/// Results at equal distances in time, as many as can be drawn, with the person who is followed.
 fn moments(folder: &Path, content: &Content<'_>) -> Result<Vec<Moment>, Failure> {
     let path = folder.join(FrameLine::FILE);
     let lines = || -> Result<_, Failure> {
@@ -128,8 +128,9 @@ fn moments(folder: &Path, content: &Content<'_>) -> Result<Vec<Moment>, Failure>
             continue;
         };
         let line = line.map_err(|error| Failure::new(ExitKind::Run, error))?;
+        let person = line.followed();
         let found = content.joints.joints.iter().map(|joint| {
-            let placed = line.joints.get(joint.name)?.placed()?;
+            let placed = person?.joints.get(joint.name)?.placed()?;
             Some(placed.position_m)
         });
         let missing = content.cameras.iter().map(|camera| {

@@ -155,8 +155,8 @@ mod tests {
                 "missing field `frames_not_recorded`",
             ),
             (
-                text.replace("\"schema_version\": 1", "\"schema_version\": 2"),
-                "version 2",
+                text.replace("\"schema_version\": 2", "\"schema_version\": 9"),
+                "version 9",
             ),
             ("{".to_owned(), "EOF"),
         ];

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
-use launch::export::{Format, Given, Job, Lines, Naming, Origin, Written, as_json, export};
+use launch::export::{Format, Given, Job, Lines, Naming, Origin, Trial, Written, as_json, export};
 use nalgebra::{UnitVector3, Vector3};
 use terminal::{Globals, Terminal, output};
 
@@ -33,9 +33,12 @@ With --from raw nothing is filled or smoothed: a joint that was not found or was
 holds. Frames stand on the grid of the frame rate; frames that were dropped are gaps. NAME.export.json says all of this \
 of what was written, with the gaps of every joint. Files take their names when they are whole.
 
-With --json one object, that of NAME.export.json: {\"schema_version\", \"source\", \"trajectories\", \"frames\", \"frames_with_points\", \
-\"first_frame\", \"frame_step\", \"rate_hz\", \"irregular_times\", \"repeated_frames\", \"up_in_world\", \"points\", \"gaps\", \
-\"filled\", \"flaws\", \"files\": [{\"format\", \"path\", \"unit\", \"axes\", \"gaps\", \"uncertainty\", \"notes\"}]}.
+A run of several people has a file for each in every format of one file: NAME-person2.trc for the person with id 2. Keypoints and videos \
+hold everybody. Where never two people are in a frame, the files have whoever was followed, and `ids` says who.
+
+With --json one object, that of NAME.export.json: {\"schema_version\", \"source\", \"trajectories\", \"frames\", \"first_frame\", \
+\"frame_step\", \"rate_hz\", \"irregular_times\", \"repeated_frames\", \"up_in_world\", \"points\", \"people\": [{\"ids\", \
+\"frames_with_points\", \"gaps\", \"filled\"}], \"flaws\", \"files\": [{\"format\", \"path\", \"unit\", \"axes\", \"gaps\", \"uncertainty\", \"notes\"}]}.
 
 Exit codes: 0 done; 2 the command line is wrong, or a file exists; 4 the run cannot be read, does not have what a format needs, \
 or the folder cannot be written; 5 the calibration does not fit; 7 no frame has a joint, or the run is not whole: cut off, \
@@ -203,17 +206,31 @@ fn beside(source: &Path) -> PathBuf {
     source.with_file_name(format!("{name}-export"))
 }
 
+/// Who has joints in how many frames.
+fn found(trials: &[Trial]) -> String {
+    if let [only] = trials {
+        let found = format!("{} of them have joints", only.n_with_points());
+        return match &only.ids[..] {
+            [_] => found,
+            ids => format!("{found}, of who was followed one after the other: people {ids:?}"),
+        };
+    }
+    let one = |trial: &Trial| format!("person {} in {}", trial.id(), trial.n_with_points());
+    let people: Vec<String> = trials.iter().map(one).collect();
+    format!("{} people have joints: {}", trials.len(), people.join(", "))
+}
+
 fn report(origin: &Origin, written: &[Written]) -> Result<(), Failure> {
-    let trial = &origin.trial;
+    let (trials, trial) = (&origin.trials, &origin.trials[0]);
     let rate = trial.rate_hz.map_or_else(
         || "of no known rate".to_owned(),
         |rate_hz| format!("at {rate_hz} Hz"),
     );
     output::line(format_args!(
-        "{} frames {rate}, the first is number {}; {} of them have joints",
+        "{} frames {rate}, the first is number {}; {}",
         trial.slots.len(),
         trial.first_frame,
-        trial.n_with_points()
+        found(trials)
     ))?;
     let turned = written.iter().any(|it| it.about[1].ends_with(" up"));
     if turned && trial.up_in_world.is_none() {

@@ -146,20 +146,26 @@ fn as_json(request: &Request, outcome: &Outcome) -> Value {
 
 fn tell(request: &Request, outcome: &Outcome) -> Result<(), Failure> {
     let report = &outcome.report;
+    let people = report.people.iter();
+    let n_joints = people.map(|person| person.joints.len()).max().unwrap_or(0);
+    let of = match report.people.len() {
+        0 | 1 => String::new(),
+        n => format!(" of {n} people"),
+    };
     output::line(format_args!(
-        "{} over {} frames of {} joints, {:.0} ms late",
-        report.method,
-        report.n_frames,
-        report.joints.len(),
-        report.delay_ms
+        "{} over {} frames{of} of {n_joints} joints, {:.0} ms late",
+        report.method, report.n_frames, report.delay_ms
     ))?;
     let counts: Vec<String> = finished::totals(report)
         .iter()
         .map(|(name, n)| format!("{n} {name}"))
         .collect();
     output::line(format_args!("positions: {}", counts.join(", ")))?;
-    let scales = report.joints.values().filter_map(|it| it.covariance_scale);
-    let scales: Vec<f64> = scales.collect();
+    let joints = report
+        .people
+        .iter()
+        .flat_map(|person| person.joints.values());
+    let scales: Vec<f64> = joints.filter_map(|joint| joint.covariance_scale).collect();
     let scale = statistics::Sorted::new(scales).interpolated(0.5);
     if let Some(scale) = scale {
         let sd = scale.sqrt();
@@ -167,8 +173,8 @@ fn tell(request: &Request, outcome: &Outcome) -> Result<(), Failure> {
             "errors from frame to frame are {sd:.2} times what the covariances say (median of the joints)"
         ))?;
     }
-    if !report.frames_of_breaks.is_empty() {
-        let frames = &report.frames_of_breaks;
+    let breaks = report.people.iter().map(|person| &person.frames_of_breaks);
+    for frames in breaks.filter(|frames| !frames.is_empty()) {
         output::line(format_args!(
             "somebody else begins in {} frames: {frames:?}",
             frames.len()

@@ -65,7 +65,7 @@ fn a_file_that_must_say_the_rate_is_not_written_where_nothing_tells_it() {
 #[test]
 fn skipped_frames_and_missing_views_are_counted() {
     let mut last = record(8);
-    last.pose3d.views_present = 0b01;
+    last.skeletons.views_present = 0b01;
     last.views[1].missing = Some(Missing::Late);
     // Every second frame is used: 0, 2, (4, 6), 8.
     let (_, summary) = written(vec![record(0), record(2), last]);
@@ -189,4 +189,56 @@ fn what_a_full_disk_does_not_take_is_not_counted_as_written_and_its_file_is_not_
     assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1);
     assert!(dir.path().join("pose3d.jsonl.part").exists());
     assert!(!dir.path().join("pose3d.jsonl").exists());
+}
+
+#[test]
+fn files_of_everybody_have_everybody_and_those_of_one_who_is_followed() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = Folder::open(dir.path(), false).unwrap();
+    let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
+    output.smooth().unwrap();
+    // In the third frame another one is followed; in the last one nobody is there.
+    for (frame, ids) in [(0, &[3, 8][..]), (2, &[3, 8]), (4, &[8, 3]), (6, &[])] {
+        let mut record = record(frame);
+        let result = &mut record.skeletons;
+        let somebody = result.people[0];
+        result.n_people = ids.len() as u32;
+        for (person, id) in result.people.iter_mut().zip(ids) {
+            *person = somebody;
+            (person.id, person.joints[0].in_world[0]) = (*id, *id as f64);
+        }
+        if ids.is_empty() {
+            result.status = Status::TOO_FEW_VIEWS;
+        }
+        output.frame(&record);
+    }
+    let summary = output.finish(1);
+    assert_eq!((summary.frames_with_pose, summary.people.followed), (3, 2));
+    let ids = |name: &str| -> Vec<Vec<u64>> {
+        let text = text(&dir, name);
+        let lines = runfiles::lines::<FrameLine>(&text).map(Result::unwrap);
+        let ids = lines.map(|line| line.people.iter().map(|person| person.id).collect());
+        ids.collect()
+    };
+    let expected = [vec![3, 8], vec![3, 8], vec![8, 3], vec![]];
+    assert_eq!(ids("pose3d.jsonl"), expected);
+    assert_eq!(ids("pose3d-smooth.jsonl")[..3], expected[..3]);
+    let rows = text(&dir, "pose3d.csv");
+    assert_eq!(rows.lines().count(), 1 + 3 * 28 + 14);
+    assert!(rows.contains("\n4,0.066667,3,right ankle,3.0"), "{rows}");
+    assert!(rows.contains("\n6,0.100000,,right ankle,,"), "{rows}");
+    let trc = formats::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
+    // z is up in the scene: (y, z, x).
+    let x = trc
+        .frames
+        .iter()
+        .map(|frame| frame[0].map(|place| place[2]));
+    assert_eq!(
+        x.collect::<Vec<_>>(),
+        [Some(3.0), Some(3.0), Some(8.0), None]
+    );
+    let report = SmoothReport::parse(&text(&dir, SmoothReport::FILE)).unwrap();
+    let people = report.people.iter();
+    let measured = people.map(|person| (person.ids[0], person.joints["head"].measured));
+    assert_eq!(measured.collect::<Vec<_>>(), [(3, 3), (8, 3)]);
 }

@@ -17,7 +17,7 @@ pub(crate) struct FrameResult {
     pub epoch: u32,
     /// When it was sent, milliseconds since the planning of the run.
     pub sent_ms: f64,
-    /// The joints of `skeleton::PARSE14`, metres in the world; none for those not found.
+    /// The joints of the person who is followed, of `skeleton::PARSE14`, metres in the world; none for those not found.
     pub joints: Vec<Option<Point>>,
     /// The views, in the order of the rig.
     pub views: Vec<ViewResult>,
@@ -77,7 +77,8 @@ fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<
         .iter()
         .filter_map(|it| Some((it, times.get(&it.frame)?)));
     both.map(|(line, time)| {
-        let joint = |name: &str| Some(line.joints.get(name)?.placed()?.position_m);
+        let person = line.followed();
+        let joint = |name: &str| Some(person?.joints.get(name)?.placed()?.position_m);
         let view = |name: &String| ViewResult {
             missing: line.views_missing.get(name).map(ToString::to_string),
             camera: time.views.get(name).and_then(|it| it.camera),
@@ -98,8 +99,8 @@ fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<
 mod tests {
     use super::*;
 
-    const POSES: &str = r#"{"facing_margin":null,"frame":4,"joints":{"head":{"covariance_m2":[1,0,0,1,0,1],"position_m":[1.0,2.0,3.0],"reprojection_px":1.5,"views":["c1"]},"neck":{"status":"too few views"}},"pairs":1,"status":"ok","time_s":null,"views_missing":{"c2":"late"},"views_present":["c1"],"views_used":["c1"]}
-{"facing_margin":null,"frame":5,"joints":{},"pairs":0,"reason":"late","status":"no result","time_s":null,"views_missing":{},"views_present":[],"views_used":[]}
+    const POSES: &str = r#"{"frame":4,"people":[{"facing_margin":null,"id":1,"joints":{"head":{"covariance_m2":[1,0,0,1,0,1],"position_m":[1.0,2.0,3.0],"reprojection_px":1.5,"views":["c1"]},"neck":{"status":"too few views"}},"pairs":1,"status":"ok","views_used":["c1"]},{"facing_margin":null,"id":9,"joints":{"head":{"covariance_m2":[1,0,0,1,0,1],"position_m":[9.0,9.0,9.0],"reprojection_px":1.5,"views":["c1"]}},"pairs":1,"status":"ok","views_used":["c1"]}],"status":"ok","time_s":null,"views_missing":{"c2":"late"},"views_present":["c1"]}
+{"frame":5,"people":[],"reason":"late","status":"no result","time_s":null,"views_missing":{},"views_present":[]}
 "#;
     const TIMES: &str = r#"{"frame":4,"sent_ms":50.5,"epoch":3,"views":{"c1":{"camera":{"epoch":1,"captured_ms":10.0,"sent_ms":12.0},"pose":{"epoch":2,"sent_ms":20.0}},"c2":{"camera":null,"pose":null}}}
 "#;

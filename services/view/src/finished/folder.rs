@@ -267,10 +267,11 @@ fn pictures(folder: &Path, camera: &str) -> (PathBuf, Vec<u64>) {
     (folder, frames)
 }
 
-/// A frame by its line, without the poses of its views.
+/// A frame by its line, with the person who is followed, without the poses of its views.
 fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
+    let person = line.followed();
     let placed = scene.joints.joints.iter().map(|it| {
-        let joint = line.joints.get(it.name);
+        let joint = person.and_then(|person| person.joints.get(it.name));
         joint.and_then(|it| it.placed())
     });
     let placed: Vec<_> = placed.collect();
@@ -297,8 +298,8 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
             .map(|it| it.and_then(|it| spread(it.covariance_m2)))
             .collect(),
         views: views.collect(),
-        people: line.people,
-        stature: line.stature_m,
+        people: line.seen,
+        stature: person.and_then(|person| person.stature_m),
         latency_ms: None,
     }
 }
@@ -314,5 +315,30 @@ fn see(scene: &Scene, moment: &mut Moment, line: &ViewLine) {
     if let Some(seen) = moment.views.get_mut(view) {
         seen.joints = joints.map(|it| it.into_iter().map(in_view).collect());
         seen.behind = line.facing == Some(runfiles::Facing::Behind);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::moment::tests::scene;
+
+    #[test]
+    fn of_several_people_the_one_who_is_followed_is_shown() {
+        let person = |id: u64| {
+            format!(
+                r#"{{"facing_margin":null,"id":{id},"joints":{{"head":{{"covariance_m2":[1,0,0,1,0,1],"position_m":[{id},2,3],"reprojection_px":1,"views":["a"]}}}},"pairs":1,"stature_m":1.7,"status":"ok","views_used":["a"]}}"#
+            )
+        };
+        let text = format!(
+            r#"{{"frame":4,"people":[{},{}],"seen":2,"status":"ok","time_s":null,"views_missing":{{}},"views_present":["a"]}}"#,
+            person(7),
+            person(2)
+        );
+        let line = runfiles::lines::<FrameLine>(&text).next().unwrap().unwrap();
+        let moment = of_line(&scene(), &line);
+        assert_eq!(moment.joints[13], Some([7.0, 2.0, 3.0]));
+        assert_eq!(moment.joints.iter().flatten().count(), 1);
+        assert_eq!((moment.people, moment.stature), (Some(2), Some(1.7)));
     }
 }

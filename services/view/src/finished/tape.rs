@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bytemuck::pod_read_unaligned;
 use failure::{ExitKind, Failure};
 use launch::recorded::{self, Settings};
-use messages::{FrameHeader, Pose3d, Status, topic};
+use messages::{FrameHeader, Skeletons, Status, topic};
 use recording::{Buffer, Entry, Kind, Recording};
 
 use super::Frame;
@@ -44,7 +44,7 @@ impl Tape {
         let scene = Scene::of_finished(&settings.resolved);
         let mut notes: Vec<String> = scene.problem.clone().into_iter().collect();
         note(&recording, &mut notes);
-        let track = recording.tracks.get(&topic::pose3d());
+        let track = recording.tracks.get(&topic::skeletons());
         let mut poses = track.map_or_else(Vec::new, |it| it.entries.clone());
         let mut input = files::open(path).map_err(|why| failure::in_file(path, &why))?;
         poses.retain(|it| read_pose(&mut input, it).is_ok_and(|it| it.status != Status::END));
@@ -105,7 +105,7 @@ impl Tape {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let message = read_pose(&mut file, &self.poses[at])?;
         let n_joints = self.scene.joints.joints.len();
-        let checked = wire::check_pose3d(&message, self.scene.views.len(), n_joints);
+        let checked = wire::check_skeletons(&message, self.scene.views.len(), n_joints);
         checked.map_err(|why| Failure::new(ExitKind::Input, why))?;
         let mut moment = Moment::of_message(&self.scene, &message);
         moment.at = Some(at);
@@ -124,11 +124,12 @@ impl Tape {
     }
 }
 
-fn read_pose(file: &mut File, entry: &Entry) -> Result<Pose3d, Failure> {
+fn read_pose(file: &mut File, entry: &Entry) -> Result<Box<Skeletons>, Failure> {
     let mut buffer = Buffer::default();
-    let message = recording::read(file, Kind::Pose3d, entry, &mut buffer);
+    let message = recording::read(file, Kind::Skeletons, entry, &mut buffer);
     let message = message.map_err(|why| Failure::new(ExitKind::Input, why))?;
-    Ok(pod_read_unaligned(message.head))
+    let refused = || Failure::new(ExitKind::Input, "a message of results is of another kind");
+    message.skeletons().ok_or_else(refused)
 }
 
 /// What is wrong with a recording.

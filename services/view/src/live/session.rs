@@ -7,7 +7,7 @@ use std::time::Instant;
 use failure::{Failure, Stop};
 use launch::Resolved;
 use launch::live::{self, Live};
-use messages::{FrameHeader, MAX_VIEWS, Pose3d, Status, topic};
+use messages::{FrameHeader, MAX_VIEWS, Skeletons, Status, topic};
 use runtime::{Bus, Namespace, SliceSubscriber, Subscriber};
 use serde_json::{Value, json};
 
@@ -38,7 +38,7 @@ pub(crate) struct Session {
     scene: Arc<Scene>,
     resolved: Resolved,
     live: Live,
-    poses: Subscriber<Pose3d>,
+    poses: Subscriber<Skeletons>,
     cameras: Vec<Camera>,
     events: Events,
     tape: Option<Tape>,
@@ -82,7 +82,7 @@ impl Session {
         let name = format!("view-{}", std::process::id());
         let bus = Bus::open(&namespace, &name, stop)?.as_onlooker();
         let mut waiter = bus.waiter();
-        let poses = bus.subscriber(&topic::pose3d(), &mut waiter)?;
+        let poses = bus.subscriber(&topic::skeletons(), &mut waiter)?;
         let n_views = scene.views.len().min(MAX_VIEWS);
         let pause = Duration::from_secs(1) / pictures_per_second.max(1);
         let mut cameras = Vec::new();
@@ -153,7 +153,7 @@ impl Session {
 
     /// Whether a result has come.
     fn look_at_poses(&mut self, board: &Board) -> Result<bool, Failure> {
-        let Some(message) = self.poses.latest()? else {
+        let Some(message) = self.poses.latest_boxed()? else {
             return Ok(false);
         };
         let scene = &self.scene;
@@ -162,7 +162,7 @@ impl Session {
             return Ok(true);
         }
         let n_joints = scene.joints.joints.len();
-        if let Err(why) = wire::check_pose3d(&message, scene.views.len(), n_joints) {
+        if let Err(why) = wire::check_skeletons(&message, scene.views.len(), n_joints) {
             self.events.refused(board, &why.to_string());
             return Ok(true);
         }

@@ -72,7 +72,7 @@ impl Topology {
             let mut processes = self.processes.iter();
             processes.any(|process| process.outputs.contains(it))
         };
-        let mut all: Vec<String> = of_views.chain(fused).chain([topic::pose3d()]).collect();
+        let mut all: Vec<String> = of_views.chain(fused).chain([topic::skeletons()]).collect();
         all.retain(|it| !is_published(it));
         all
     }

@@ -9,6 +9,8 @@ use crate::capture::Mode;
 const SMALL_QUEUE_REALTIME: usize = 4;
 /// Queue of small messages of one receiver where nothing is dropped.
 const SMALL_QUEUE_LOSSLESS: usize = 16;
+/// Queue of results of one receiver: with room for eight people each is as large as a picture.
+const SKELETONS_QUEUE: usize = 4;
 /// Queue of images or response maps of one receiver.
 const LARGE_QUEUE: usize = 1;
 /// Queue of pictures of live cameras, as they came: a second or less, which costs memory only where the recording lags.
@@ -41,7 +43,7 @@ pub enum Content {
     /// Who is in a frame.
     People,
     /// The result.
-    Pose3d,
+    Skeletons,
 }
 
 /// The room of one topic, which has one sender.
@@ -133,7 +135,10 @@ impl Topology {
                 ..room
             });
         }
-        rooms.push(small(topic::pose3d(), Content::Pose3d, n_recorders));
+        rooms.push(Room {
+            queued: SKELETONS_QUEUE,
+            ..small(topic::skeletons(), Content::Skeletons, n_recorders)
+        });
         rooms
     }
 

@@ -97,7 +97,7 @@ fn the_receivers_of_a_recorded_deployment_with_a_network_are_these() {
     assert_eq!([0, 1, 2].map(|view| n(topic::evidence(view))), [3, 2, 3]);
     assert_eq!(n(topic::view_quality(1)), 4, "fuse twice, results, record");
     assert_eq!(n(topic::pair_pose(1)), 3, "triangulate, results, record");
-    assert_eq!(n(topic::pose3d()), 2, "results, record");
+    assert_eq!(n(topic::skeletons()), 2, "results, record");
     let senders = |name: &str| {
         let receiver = topology.process(name).unwrap();
         let senders = topology.senders_to(receiver);
@@ -154,7 +154,7 @@ fn topics_have_this_room() {
         ("view-quality/v2/2", 5, 4, 2, 1, None),
         ("pair-pose/v3/0", 2, 4, 2, 1, None),
         ("pair-pose/v3/1", 2, 4, 2, 1, None),
-        ("pose3d/v3", 1, 4, 2, 1, None),
+        ("skeletons/v1", 1, 4, 2, 1, None),
     ];
     assert_eq!(numbers(&rooms[8..]), of_last_view_and_later);
 
@@ -169,7 +169,7 @@ fn topics_have_this_room() {
         ("view-quality/v2/2", 6, 16, 2, 1, None),
         ("pair-pose/v3/0", 3, 16, 2, 1, None),
         ("pair-pose/v3/1", 3, 16, 2, 1, None),
-        ("pose3d/v3", 2, 16, 2, 1, None),
+        ("skeletons/v1", 2, 4, 2, 1, None),
     ];
     assert_eq!(numbers(&rooms[8..]), of_last_view_and_later);
 }

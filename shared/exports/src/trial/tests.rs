@@ -3,12 +3,86 @@
 use super::*;
 use crate::testing::{line, walker};
 
-fn gathered(lines: &[FrameLine], rate_hz: Option<f64>) -> Result<Trial, TrialError> {
+fn people(lines: &[FrameLine], rate_hz: Option<f64>) -> Result<Vec<Trial>, TrialError> {
     let mut all = Gathering::new(Vec::new());
     for line in lines {
         all.push(line)?;
     }
     all.finish("x", rate_hz)
+}
+
+/// The only person.
+fn gathered(lines: &[FrameLine], rate_hz: Option<f64>) -> Result<Trial, TrialError> {
+    let [trial] = <[Trial; 1]>::try_from(people(lines, rate_hz)?).unwrap();
+    Ok(trial)
+}
+
+#[test]
+fn every_person_has_a_trial_and_all_have_the_same_places() {
+    let lines = [0, 1, 2, 3].map(|frame| {
+        let mut line = line(frame, Some(30.0));
+        let other = PersonLine {
+            id: 7,
+            ..line.people[0].clone()
+        };
+        match frame {
+            0 => {}
+            1 => line.people = vec![other],
+            2 => line.people.insert(0, other),
+            _ => {
+                line.people.clear();
+                line.status = "too few views".to_owned();
+            }
+        }
+        line
+    });
+    let [one, other] = <[Trial; 2]>::try_from(people(&lines, None).unwrap()).unwrap();
+    assert_eq!((one.id(), other.id()), (1, 7));
+    let found = |trial: &Trial| -> Vec<String> {
+        let slots = trial.slots.iter();
+        slots
+            .map(|slot| format!("{} {}", slot.status, slot.points.len()))
+            .collect()
+    };
+    assert_eq!(
+        found(&one),
+        ["ok 14", "not there 0", "ok 14", "too few views 0"]
+    );
+    assert_eq!(
+        found(&other),
+        ["not there 0", "ok 14", "ok 14", "too few views 0"]
+    );
+    assert_eq!(
+        (one.gaps(0), other.gaps(0)),
+        (vec![[1, 1], [3, 3]], vec![[0, 0], [3, 3]])
+    );
+}
+
+#[test]
+fn one_after_the_other_is_one_trial_with_both_identities() {
+    let lines = [0, 1, 2].map(|frame| {
+        let mut line = line(frame, Some(30.0));
+        match frame {
+            1 => line.people.clear(),
+            _ => line.people[0].id = 4 - frame,
+        }
+        line
+    });
+    let [trial] = <[Trial; 1]>::try_from(people(&lines, None).unwrap()).unwrap();
+    assert_eq!((trial.ids.as_slice(), trial.id()), (&[2, 4][..], 2));
+    assert_eq!(trial.n_with_points(), 2);
+    assert_eq!(
+        [0, 1, 2].map(|slot| trial.id_at(slot)),
+        [Some(4), None, Some(2)]
+    );
+    let mut table = Vec::new();
+    crate::tables::wide(&trial, &mut table).unwrap();
+    let table = String::from_utf8(table).unwrap();
+    let rows = table
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').nth(2).unwrap());
+    assert_eq!(rows.collect::<Vec<_>>(), ["4", "", "2"]);
 }
 
 #[test]
@@ -27,7 +101,7 @@ fn frames_take_their_places_and_those_that_are_missing_are_gaps() {
 #[test]
 fn refused_joints_and_numbers_that_are_none_are_gaps() {
     let mut one = line(0, None);
-    let mut joints = one.joints.values_mut();
+    let mut joints = one.people[0].joints.values_mut();
     *joints.next().unwrap() = JointLine::Missing {
         status: "implausible".to_owned(),
     };
@@ -59,11 +133,11 @@ fn times_off_the_grid_and_frames_twice_are_counted() {
 fn what_holds_nothing_is_refused() {
     assert_eq!(gathered(&[], None), Err(TrialError::Empty));
     let mut empty = line(0, None);
-    empty.joints.clear();
+    empty.people[0].joints.clear();
     let missing = gathered(&[empty.clone(), empty.clone()], None);
     assert_eq!(missing, Err(TrialError::NoPoint { frames: 2 }));
     let mut all_missing = line(0, None);
-    for joint in all_missing.joints.values_mut() {
+    for joint in all_missing.people[0].joints.values_mut() {
         *joint = JointLine::Missing {
             status: "too few views".to_owned(),
         };
@@ -75,7 +149,7 @@ fn what_holds_nothing_is_refused() {
     let far = gathered(&[line(0, None), line(1, None), line(u64::MAX, None)], None);
     assert!(matches!(far, Err(TrialError::Range { .. })), "{far:?}");
     let mut other = line(0, None);
-    other.joints.remove("head");
+    other.people[0].joints.remove("head");
     let other = gathered(&[other], None);
     assert!(matches!(other, Err(TrialError::Joints(_))), "{other:?}");
 }
@@ -97,11 +171,11 @@ fn what_smoothing_has_filled_in_is_marked_in_every_format_that_can() {
     let mut all = Gathering::new(Vec::new());
     let states = ["measured", "filled", "rejected", "exchanged"];
     for (frame, state) in (0..).zip(states) {
-        let states = [("head".to_owned(), state.to_owned())].into();
-        all.push_smoothed(&line(frame, Some(30.0)), &states)
-            .unwrap();
+        let mut line = line(frame, Some(30.0));
+        line.people[0].states = [("head".to_owned(), state.to_owned())].into();
+        all.push(&line).unwrap();
     }
-    let trial = all.finish("x", None).unwrap();
+    let trial = all.finish("x", None).unwrap().remove(0);
     assert_eq!(trial.filled(13), [[1, 2]]);
     assert_eq!(trial.gaps(13), [[0_u64; 2]; 0]);
     let mut table = Vec::new();
@@ -113,8 +187,10 @@ fn what_smoothing_has_filled_in_is_marked_in_every_format_that_can() {
 #[test]
 fn keypoints_that_come_later_are_gaps_before() {
     let mut second = line(11, Some(30.0));
-    let nose = second.joints["head"].clone();
-    second.keypoints.insert("nose, \"tip\"".to_owned(), nose);
+    let nose = second.people[0].joints["head"].clone();
+    second.people[0]
+        .keypoints
+        .insert("nose, \"tip\"".to_owned(), nose);
     let trial = gathered(&[line(10, Some(30.0)), second], None).unwrap();
     assert_eq!(trial.extras, ["nose, \"tip\""]);
     assert_eq!(trial.gaps(14), [[10, 10]]);

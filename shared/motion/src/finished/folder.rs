@@ -1,26 +1,87 @@
-//! What a run left, as a person over time.
+//! What a run left, as people over time.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
+use crate::recorded::Sides;
 use crate::{Joint, Recorded, Role, lines};
 use failure::{ExitKind, Failure, in_file};
 use geometry::files::ReadOptions;
 use nalgebra::UnitVector3;
-use runfiles::{FrameLine, JointLine, Line as _};
+use runfiles::{FrameLine, JointLine, Line as _, PersonLine};
 use serde_json::Value;
 
 /// A run.
 #[derive(Debug)]
 pub struct Run {
-    /// The measured joints.
-    pub recorded: Recorded,
+    /// The instants, seconds, ascending.
+    pub times: Vec<f64>,
     /// The number of the frame of every instant.
     pub frames: Vec<u64>,
-    /// The joints before this are joints, the others extra keypoints.
-    pub n_joints: usize,
+    /// The people, by ascending identity; all over the same instants.
+    pub people: Vec<Person>,
     /// What is missing at the end of the file, in words.
     pub cut: Option<String>,
+}
+
+/// A person of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Person {
+    /// Identities within the run, ascending: more than one where never two people were there, and whoever was followed had one after the
+    /// other.
+    pub ids: Vec<u64>,
+    /// Identity at every instant; where the person is not there, the one before.
+    pub id_at: Vec<u64>,
+    /// The measured joints.
+    pub recorded: Recorded,
+    /// The joints before this are joints, the others extra keypoints.
+    pub n_joints: usize,
+}
+
+/// A person on the way into a [`Person`].
+#[derive(Debug, Default)]
+struct Gathered {
+    ids: BTreeSet<u64>,
+    id_at: Vec<u64>,
+    sides: Vec<Sides>,
+    joints: Vec<Joint>,
+    keypoints: Vec<Joint>,
+}
+
+impl Gathered {
+    /// Adds a line.
+    fn add(&mut self, at: usize, person: &PersonLine) {
+        let before = self.id_at.last().copied();
+        self.id_at.resize(at, before.unwrap_or(person.id));
+        self.id_at.push(person.id);
+        self.ids.insert(person.id);
+        self.sides.resize(at, Sides::default());
+        self.sides.push(lines::sides(person));
+        add(&mut self.joints, at, &person.joints);
+        add(&mut self.keypoints, at, &person.keypoints);
+    }
+
+    fn finish(mut self, times: &[f64]) -> Person {
+        let last = self.id_at.last().copied();
+        self.id_at.resize(times.len(), last.unwrap_or(0));
+        let n_joints = self.joints.len();
+        self.joints.append(&mut self.keypoints);
+        for joint in &mut self.joints {
+            joint.measured.resize(times.len(), None);
+        }
+        self.sides.resize(times.len(), Sides::default());
+        Person {
+            ids: self.ids.into_iter().collect(),
+            id_at: self.id_at,
+            recorded: Recorded {
+                times: times.to_vec(),
+                sides: self.sides,
+                joints: self.joints,
+            },
+            n_joints,
+        }
+    }
 }
 
 /// Lines of `pose3d.jsonl`, one after the other.
@@ -88,13 +149,10 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
 ///
 /// A file cannot be read, a line is none, or times do not ascend.
 pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
-    let mut run = Run {
-        recorded: Recorded::default(),
-        frames: Vec::new(),
-        n_joints: 0,
-        cut: None,
-    };
-    let mut keypoints: Vec<Joint> = Vec::new();
+    let (mut times, mut frames) = (Vec::new(), Vec::new());
+    let mut people: BTreeMap<u64, Gathered> = BTreeMap::new();
+    // Whoever is followed: where never two people are there, it is one person, who gets another identity after a gap or a jump.
+    let (mut one, mut is_one) = (Gathered::default(), true);
     let path = folder.join(FrameLine::FILE);
     let cut = read_lines(folder, |nth, line| {
         let time_s = rate_hz.map_or(line.time_s, |rate| Some(line.frame as f64 / rate));
@@ -103,8 +161,7 @@ pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
             Failure::new(ExitKind::Input, what)
                 .with_hint("--rate-hz says how many frames there are per second")
         })?;
-        let recorded = &mut run.recorded;
-        if let Some(&before_s) = recorded.times.last()
+        if let Some(&before_s) = times.last()
             && time_s <= before_s
         {
             let what = format!(
@@ -115,26 +172,34 @@ pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
             let hint = "lines must be in the order of their times; --rate-hz takes the times from the numbers of the frames";
             return Err(Failure::new(ExitKind::Input, what).with_hint(hint));
         }
-        let at = recorded.times.len();
-        recorded.times.push(time_s);
-        recorded.sides.push(lines::sides(&line));
-        run.frames.push(line.frame);
-        add(&mut recorded.joints, at, &line.joints);
-        add(&mut keypoints, at, &line.keypoints);
+        for (nth, person) in line.people.iter().enumerate() {
+            if nth == 0 {
+                one.add(times.len(), person);
+            }
+            let own = people.entry(person.id).or_default();
+            own.add(times.len(), person);
+        }
+        is_one &= line.people.len() < 2;
+        times.push(time_s);
+        frames.push(line.frame);
         Ok(())
     })?;
-    let recorded = &mut run.recorded;
-    run.n_joints = recorded.joints.len();
-    recorded.joints.append(&mut keypoints);
-    for joint in &mut recorded.joints {
-        joint.measured.resize(recorded.times.len(), None);
-    }
-    if run.frames.is_empty() {
+    if frames.is_empty() {
         let what = format!("{} has no line", path.display());
         return Err(Failure::new(ExitKind::Input, what));
     }
-    run.cut = cut;
-    Ok(run)
+    let people: Vec<Gathered> = match is_one {
+        true if people.is_empty() => Vec::new(),
+        true => vec![one],
+        false => people.into_values().collect(),
+    };
+    let people = people.into_iter();
+    Ok(Run {
+        people: people.map(|person| person.finish(&times)).collect(),
+        times,
+        frames,
+        cut,
+    })
 }
 
 /// Adds the joints of a line; those that it does not name have not been measured.

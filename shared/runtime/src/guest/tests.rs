@@ -11,7 +11,7 @@ use failure::Stop;
 #[test]
 fn a_topic_is_told_apart_from_its_version() {
     assert_eq!(parts_of("frame/v1/0"), Some(("frame", "1", "0")));
-    assert_eq!(parts_of("pose3d/v3"), Some(("pose3d", "3", "")));
+    assert_eq!(parts_of("skeletons/v1"), Some(("skeletons", "1", "")));
     assert_eq!(parts_of("else"), None);
 }
 
@@ -63,7 +63,7 @@ fn deployment(base: &Path) -> (DeploymentLock, Bus, Vec<Topic>) {
     let lock = namespace.acquire().unwrap();
     let bus = Bus::open(&namespace, "supervisor", &Stop::new().unwrap()).unwrap();
     let limits = Limits::new(1, 2, 1).with_onlookers(MOST_GUESTS);
-    let plan = TopicPlan::messages::<Health>("pose3d/v9".to_owned(), Delivery::Lossless, limits);
+    let plan = TopicPlan::messages::<Health>("skeletons/v9".to_owned(), Delivery::Lossless, limits);
     let topics = bus.create_topics(&[plan]).unwrap();
     (lock, bus, topics)
 }
@@ -73,8 +73,8 @@ fn no_sender_waits_for_a_guest_and_what_it_holds_stays() {
     let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
     let (_lock, bus, _topics) = deployment(base.path());
     let guest = Guest::open(bus.namespace()).unwrap();
-    let port = guest.port::<Health, ()>("pose3d/v9").unwrap();
-    let publisher = bus.publisher::<Health>("pose3d/v9").unwrap();
+    let port = guest.port::<Health, ()>("skeletons/v9").unwrap();
+    let publisher = bus.publisher::<Health>("skeletons/v9").unwrap();
     assert_eq!(publisher.n_connected(), 0, "it is no receiver");
     let send = |n_loops| {
         let message = Health {
@@ -102,16 +102,16 @@ fn another_version_and_another_type_are_told_apart() {
     let (lock, bus, topics) = deployment(base.path());
     let guest = Guest::open(bus.namespace()).unwrap();
     let refused = |topic: &str| guest.port::<Health, ()>(topic).unwrap_err().to_string();
-    let version = refused("pose3d/v8");
+    let version = refused("skeletons/v8");
     assert!(
         version.contains("version 9") && version.contains("version 8"),
         "{version}"
     );
     assert!(refused("frame/v1/0").contains("has no topic \"frame/v1/0\""));
     // It was not there when it was opened, and is now.
-    let late = guest.absent("pose3d/v9");
+    let late = guest.absent("skeletons/v9");
     assert!(matches!(late, GuestError::NoSuchTopic { .. }), "{late}");
-    let other = guest.port::<u8, messages::FrameHeader>("pose3d/v9");
+    let other = guest.port::<u8, messages::FrameHeader>("skeletons/v9");
     assert!(matches!(other, Err(GuestError::WrongType { .. })));
     drop((topics, bus, lock));
     assert!(guest.is_over());

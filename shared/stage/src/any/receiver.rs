@@ -2,10 +2,10 @@
 
 use bytemuck::{bytes_of, cast_slice};
 use messages::{
-    EvidenceHeader, FrameHeader, Health, PairPose, People, PictureHeader, Pose3d, Status, ViewPose,
-    ViewQuality,
+    EvidenceHeader, FrameHeader, Health, PairPose, People, PictureHeader, Skeletons, Status,
+    ViewPose, ViewQuality,
 };
-use recording::{Envelope, Kind, encode};
+use recording::{Envelope, Kind, encode, split_skeletons};
 use runtime::{Bus, PortError, ReceiveError, SliceSubscriber, Subscriber, Waiter};
 
 /// A message as bytes, and the fields of its envelope.
@@ -45,7 +45,7 @@ enum Port {
     ViewQuality(Subscriber<ViewQuality>),
     PairPose(Subscriber<PairPose>),
     People(Subscriber<People>),
-    Pose3d(Subscriber<Pose3d>),
+    Skeletons(Subscriber<Skeletons>),
     Health(Subscriber<Health>),
     Picture(SliceSubscriber<u8, PictureHeader>),
 }
@@ -72,7 +72,7 @@ impl Receiver {
             Kind::ViewQuality => Port::ViewQuality(bus.subscriber(topic, waiter)?),
             Kind::PairPose => Port::PairPose(bus.subscriber(topic, waiter)?),
             Kind::People => Port::People(bus.subscriber(topic, waiter)?),
-            Kind::Pose3d => Port::Pose3d(bus.subscriber(topic, waiter)?),
+            Kind::Skeletons => Port::Skeletons(bus.subscriber(topic, waiter)?),
             Kind::Health => Port::Health(bus.subscriber(topic, waiter)?),
             Kind::Picture => Port::Picture(bus.slice_subscriber(topic, waiter)?),
         };
@@ -123,9 +123,13 @@ impl Receiver {
             Port::People(port) => port
                 .receive()?
                 .and_then(|message| of(bytes_of(&message), &[])),
-            Port::Pose3d(port) => port
-                .receive()?
-                .and_then(|message| of(bytes_of(&message), &[])),
+            Port::Skeletons(port) => {
+                let received = port.receive_by(|skeletons| {
+                    let [head, people] = split_skeletons(skeletons);
+                    of(head, people)
+                })?;
+                received.flatten()
+            }
             Port::Picture(port) => port.receive()?.and_then(|sample| {
                 let head = sample.header();
                 let received = of(bytes_of(head), sample.payload())?;

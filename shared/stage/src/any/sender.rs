@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, cast_slice_mut, pod_read_unaligned};
 use messages::{
-    EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Pose3d, Status, ViewPose,
+    EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Skeletons, Status, ViewPose,
     ViewQuality,
 };
 use recording::{Envelope, Kind, Message};
@@ -28,7 +28,7 @@ enum Port {
     ViewQuality(Publisher<ViewQuality>),
     PairPose(Publisher<PairPose>),
     People(Publisher<People>),
-    Pose3d(Publisher<Pose3d>),
+    Skeletons(Publisher<Skeletons>),
     Picture(SlicePublisher<u8, PictureHeader>),
     /// Every process sends its own heartbeats.
     Health,
@@ -48,7 +48,7 @@ impl Sender {
             Kind::ViewQuality => Port::ViewQuality(bus.publisher(topic)?),
             Kind::PairPose => Port::PairPose(bus.publisher(topic)?),
             Kind::People => Port::People(bus.publisher(topic)?),
-            Kind::Pose3d => Port::Pose3d(bus.publisher(topic)?),
+            Kind::Skeletons => Port::Skeletons(bus.publisher(topic)?),
             Kind::Picture => Port::Picture(bus.slice_publisher(topic)?),
             Kind::Health => Port::Health,
         };
@@ -73,7 +73,7 @@ impl Sender {
             Port::ViewQuality(port) => Some(port),
             Port::PairPose(port) => Some(port),
             Port::People(port) => Some(port),
-            Port::Pose3d(port) => Some(port),
+            Port::Skeletons(port) => Some(port),
             Port::Picture(port) => Some(port),
             Port::Health => None,
         }
@@ -94,7 +94,14 @@ impl Sender {
             Port::ViewQuality(port) => plain(port, &head),
             Port::PairPose(port) => plain(port, &head),
             Port::People(port) => plain(port, &head),
-            Port::Pose3d(port) => plain(port, &head),
+            Port::Skeletons(port) => {
+                let message = Message {
+                    head: &head,
+                    ..*message
+                };
+                let skeletons = message.skeletons();
+                skeletons.map_or(Ok(()), |skeletons| port.send(&skeletons).map(drop))
+            }
             Port::Picture(port) => array(port, &head, message.elements),
             Port::Health => Ok(()),
         }

@@ -1,8 +1,8 @@
 //! The layouts as JSON, for languages that build types as they run.
 
 use messages::{
-    Kept, MAX_CANDIDATES, MAX_JOINTS, MAX_KEYPOINTS, MAX_LEVELS, MAX_NAME, MAX_PARTS, MAX_ROWS,
-    MAX_VIEW_KEYPOINTS, MAX_VIEWS, Sides, Status,
+    Kept, MAX_CANDIDATES, MAX_JOINTS, MAX_KEYPOINTS, MAX_LEVELS, MAX_NAME, MAX_PARTS, MAX_PEOPLE,
+    MAX_ROWS, MAX_VIEW_KEYPOINTS, MAX_VIEWS, Sides, Status,
 };
 use serde_json::{Map, Value, json as value};
 use skeleton::JointSet;
@@ -72,11 +72,12 @@ fn statuses() -> impl Iterator<Item = Status> {
     all.take_while(|it| it.reason() != "unknown")
 }
 
-fn limits() -> [(&'static str, usize); 10] {
+fn limits() -> [(&'static str, usize); 11] {
     [
         ("MAX_PARTS", MAX_PARTS),
         ("MAX_VIEWS", MAX_VIEWS),
         ("MAX_CANDIDATES", MAX_CANDIDATES),
+        ("MAX_PEOPLE", MAX_PEOPLE),
         ("MAX_JOINTS", MAX_JOINTS),
         ("MAX_KEYPOINTS", MAX_KEYPOINTS),
         ("MAX_VIEW_KEYPOINTS", MAX_VIEW_KEYPOINTS),

@@ -4,9 +4,9 @@ use core::mem::offset_of;
 
 use messages::{
     CameraCounts, EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, Kept, LocalMessage,
-    Metrics, MetricsRow, PairHypothesis, PairPose, People, PersonMessage, PictureHeader, Pose3d,
-    PoseMessage, Searched, Sides, Span, Stamp, Status, TimedBy, Timing, ViewPose, ViewQuality,
-    topic,
+    Metrics, MetricsRow, PairHypothesis, PairPose, People, PersonMessage, PictureHeader,
+    PoseMessage, Searched, Sides, SkeletonMessage, Skeletons, Span, Stamp, Status, TimedBy, Timing,
+    ViewPose, ViewQuality, topic,
 };
 
 /// The type of a field.
@@ -175,9 +175,10 @@ structs! {
     People, "People.v1": stamp timing status n_people n_seen views_present people;
     Joint3d, "Joint3d.v1": in_world covariance reprojection_px views_used status;
     FusedView, "FusedView.v1": energy n_pairs status exchanged n_parts centres_px single_score;
-    Pose3d, "Pose3d.v3":
-        stamp timing status n_joints n_views views_present views_used n_pairs facing_margin sides_margin stature_m
-        body_deviation sides kept n_people n_keypoints joints views keypoints;
+    SkeletonMessage, "SkeletonMessage.v1":
+        id status n_joints n_keypoints n_views views_used n_pairs sides kept facing_margin sides_margin stature_m
+        body_deviation joints views keypoints;
+    Skeletons, "Skeletons.v1": stamp timing status views_present n_seen n_people people;
     Health, "Health.v4":
         session pid epoch n_loops at_nanos n_received n_sent n_dropped last_frame p50_micros p99_micros
         peak_memory_bytes finished cpu_millis n_total refused;
@@ -205,7 +206,7 @@ pub(super) fn topics() -> Vec<Topic> {
         (topic::view_quality(ANY), "ViewQuality", None),
         (topic::pair_pose(ANY), "PairPose", None),
         (topic::people(), "People", None),
-        (topic::pose3d(), "Pose3d", None),
+        (topic::skeletons(), "Skeletons", None),
         (topic::health(&any), "Health", None),
         (topic::metrics(&any), "Metrics", None),
     ];
@@ -248,7 +249,7 @@ mod tests {
         include_str!("../../../../../shared/messages/src/people.rs"),
         include_str!("../../../../../shared/messages/src/picture.rs"),
         include_str!("../../../../../shared/messages/src/pose.rs"),
-        include_str!("../../../../../shared/messages/src/pose3d.rs"),
+        include_str!("../../../../../shared/messages/src/skeletons.rs"),
         include_str!("../../../../../shared/messages/src/quality.rs"),
         include_str!("../../../../../shared/messages/src/stamp.rs"),
     ];
@@ -278,6 +279,6 @@ mod tests {
         }
         let names: Vec<String> = topics().into_iter().map(|it| it.name).collect();
         assert!(names.contains(&"frame/v1/{}".to_owned()), "{names:?}");
-        assert!(names.contains(&"pose3d/v3".to_owned()), "{names:?}");
+        assert!(names.contains(&"skeletons/v1".to_owned()), "{names:?}");
     }
 }

@@ -42,7 +42,12 @@ impl PerFrame {
                     sum.pixels += bytes;
                     sum.foxglove += if has_foxglove { bytes / 2 } else { 0 };
                 }
-                Some(Kind::Pose3d) if has_foxglove => sum.rest += bytes + SCENE_BYTES,
+                Some(Kind::Skeletons) => {
+                    // Of the room for eight people a recording holds what is used: a run follows one.
+                    let person = Kind::Skeletons.element_bytes().unwrap_or(0);
+                    sum.rest += (Kind::Skeletons.head_bytes() + person) as u64;
+                    sum.rest += if has_foxglove { SCENE_BYTES } else { 0 };
+                }
                 Some(Kind::Evidence) => sum.evidence += bytes,
                 Some(Kind::Picture) => sum.camera += bytes,
                 // Health messages are few and small.

@@ -17,7 +17,8 @@ const MOST_OFF: f64 = 0.15;
 /// The fewest joints in pictures that tell it.
 const LEAST_SEEN: usize = 50;
 
-/// Finds the floor, after a look whether the run is one of this rig.
+/// Finds the floor, after a look whether the run is one of this rig. Of several people it takes the one who is followed: that may be one after
+/// the other, who stand on the same floor.
 ///
 /// * `rate_hz`: frames a second, for a run that does not know.
 pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor, Failure> {
@@ -30,8 +31,9 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
             let message = format!("{}: the frames of the run have no times", run.display());
             Failure::new(ExitKind::Input, message).with_hint("--rate gives the frames a second")
         })?;
-        let joints = PARSE14.joints.iter().map(|it| {
-            let placed = line.joints.get(it.name)?.placed()?;
+        let person = line.followed();
+        let joints = PARSE14.joints.iter().map(|joint| {
+            let placed = person?.joints.get(joint.name)?.placed()?;
             Some(Point3::from(placed.position_m))
         });
         if times_s.last().is_none_or(|last| time_s > *last) {

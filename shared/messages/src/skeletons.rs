@@ -1,9 +1,10 @@
-//! The final result: joints in the world, and the fused pose of every view.
+//! The final result: the people of a frame, each with its joints in the world and its fused pose in every view.
 
+use bytemuck::Zeroable as _;
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{MAX_JOINTS, MAX_KEYPOINTS, MAX_PARTS, MAX_VIEWS, Stamp, Status, Timing};
+use crate::{MAX_JOINTS, MAX_KEYPOINTS, MAX_PARTS, MAX_PEOPLE, MAX_VIEWS, Stamp, Status, Timing};
 
 /// One joint in the world.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
@@ -93,27 +94,29 @@ impl Kept {
     }
 }
 
-/// The skeleton of one frame.
+/// The skeleton of one person.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("Pose3d.v3")]
+#[type_name("SkeletonMessage.v1")]
 #[repr(C)]
-pub struct Pose3d {
-    /// The frame; `view` is 0.
-    pub stamp: Stamp,
-    /// When it was received and sent.
-    pub timing: Timing,
-    /// Whether there is a skeleton.
+pub struct SkeletonMessage {
+    /// Identity within the run, from 1, as [`PersonMessage::id`](crate::PersonMessage::id); 1 by the paper's method, which names nobody.
+    pub id: u64,
+    /// State of the person: [`Status::OK`] with a skeleton, else why there is none.
     pub status: Status,
     /// Number of valid joints.
     pub n_joints: u32,
+    /// Number of valid extra keypoints.
+    pub n_keypoints: u32,
     /// Number of valid views.
     pub n_views: u32,
-    /// Bit `v` is set if the pose of view `v` arrived in time.
-    pub views_present: u32,
     /// Bit `v` is set if any joint uses view `v`.
     pub views_used: u32,
-    /// Number of pairs with a result.
+    /// Number of pairs of views with a part in the skeleton.
     pub n_pairs: u32,
+    /// Whether the margin of the sides is enough.
+    pub sides: Sides,
+    /// Whether the poses are those that fusion solved for.
+    pub kept: Kept,
     /// How certain it is which views see the person from the same side: energy of the chosen assignment
     /// minus that of the best other one.
     pub facing_margin: f64,
@@ -123,18 +126,79 @@ pub struct Pose3d {
     pub stature_m: f64,
     /// Root mean square deviation of the bones' lengths from those of people, standard deviations.
     pub body_deviation: f64,
-    /// Whether the margin of the sides is enough.
-    pub sides: Sides,
-    /// Whether the poses are those that fusion solved for.
-    pub kept: Kept,
-    /// Number of people that several views agree on; 0 if it was not counted.
-    pub n_people: u32,
-    /// Number of valid extra keypoints.
-    pub n_keypoints: u32,
     /// The joints.
     pub joints: [Joint3d; MAX_JOINTS],
     /// The views.
     pub views: [FusedView; MAX_VIEWS],
     /// What networks name beside the joints, as the deployment numbers it; nothing holds them together.
     pub keypoints: [Joint3d; MAX_KEYPOINTS],
+}
+
+impl SkeletonMessage {
+    /// The valid joints, at most as many as fit.
+    #[must_use]
+    pub fn listed_joints(&self) -> &[Joint3d] {
+        &self.joints[..(self.n_joints as usize).min(MAX_JOINTS)]
+    }
+
+    /// The valid extra keypoints, at most as many as fit.
+    #[must_use]
+    pub fn listed_keypoints(&self) -> &[Joint3d] {
+        &self.keypoints[..(self.n_keypoints as usize).min(MAX_KEYPOINTS)]
+    }
+
+    /// The valid views, at most as many as fit.
+    #[must_use]
+    pub fn listed_views(&self) -> &[FusedView] {
+        &self.views[..(self.n_views as usize).min(MAX_VIEWS)]
+    }
+}
+
+/// The skeletons of one frame, that of the person who is followed first.
+///
+/// The count stands right before the list, so that what is in use is one piece of memory: a recording holds that and no more.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
+#[type_name("Skeletons.v1")]
+#[repr(C)]
+pub struct Skeletons {
+    /// The frame; `view` is 0.
+    pub stamp: Stamp,
+    /// When it was received and sent.
+    pub timing: Timing,
+    /// [`Status::OK`] if any person has a skeleton, else why nobody has.
+    pub status: Status,
+    /// Bit `v` is set if what view `v` found arrived in time.
+    pub views_present: u32,
+    /// Number of people that several views agree on, whether or not they are in the list; 0 if it was not counted.
+    pub n_seen: u32,
+    /// Number of valid people.
+    pub n_people: u32,
+    /// The people.
+    pub people: [SkeletonMessage; MAX_PEOPLE],
+}
+
+impl Default for Skeletons {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
+impl Default for SkeletonMessage {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
+impl Skeletons {
+    /// The valid people, at most as many as fit.
+    #[must_use]
+    pub fn listed(&self) -> &[SkeletonMessage] {
+        &self.people[..(self.n_people as usize).min(MAX_PEOPLE)]
+    }
+
+    /// The person who is followed; `None` if there is nobody.
+    #[must_use]
+    pub fn followed(&self) -> Option<&SkeletonMessage> {
+        self.listed().first()
+    }
 }
