@@ -9,8 +9,8 @@ use super::graph::{Meeting, Pair, pair, standing};
 use super::outcome::{Shown, middle};
 use super::pose::board_pose;
 use super::{
-    BoardError, LEAST_BOARDS, LEAST_CORNERS, LensKind, OutOfStep, Outcome, Sight, Task, Together,
-    certainty, choose, intrinsics, verdict,
+    BoardError, CameraOutcome, LEAST_BOARDS, LEAST_CORNERS, LensKind, OutOfStep, Outcome, Sight,
+    Task, Together, certainty, choose, intrinsics, verdict,
 };
 
 /// The most pictures that intrinsics of one camera are begun with.
@@ -118,7 +118,17 @@ fn in_step(
     let free: Vec<Free> = (0..cameras.len())
         .map(|nth| free_of(task, nth, nth != 0))
         .collect();
-    adjusted(task, cameras, &free, &shown)
+    let mut outcome = adjusted(task, cameras, &free, &shown)?;
+    // One board a frame, and the corners of every camera once: as it alone sees them, since others were taken at other times.
+    outcome.boards.dedup_by_key(|(frame, _)| *frame);
+    for (camera, alone) in outcome.cameras.iter_mut().zip(&alone.cameras) {
+        *camera = CameraOutcome {
+            camera: camera.camera.clone(),
+            numbers: core::mem::take(&mut camera.numbers),
+            ..alone.clone()
+        };
+    }
+    Ok(outcome)
 }
 
 /// What one camera saw.
