@@ -198,7 +198,8 @@ mod tests {
                     "sigma_px": null, "sigma_used": null, "status": "ok", "time_s": null, "view": name,
                     "single": {"candidates": 1, "level": 1, "parts": parts, "score": 1.0},
                 });
-                text.push_str(&format!("{line}\n"));
+                text += &line.to_string();
+                text.push('\n');
             }
         }
         text
@@ -224,12 +225,15 @@ mod tests {
         let rig = rig();
         let file = folder.path().join("pose2d.jsonl");
         let lines = seen(&rig, [0, 1, 2, 3]);
-        let fused = lines.lines().map(|line| {
-            let mut line: serde_json::Value = serde_json::from_str(line).unwrap();
-            line["single"] = json!(null);
-            format!("{line}\n")
-        });
-        std::fs::write(&file, fused.collect::<String>()).unwrap();
+        let fused: Vec<String> = lines
+            .lines()
+            .map(|line| {
+                let mut line: serde_json::Value = serde_json::from_str(line).unwrap();
+                line["single"] = json!(null);
+                line.to_string()
+            })
+            .collect();
+        std::fs::write(&file, fused.join("\n")).unwrap();
         let error = agreement(&rig, &file).err().unwrap();
         assert!(error.to_string().contains("(`single`)"), "{error}");
     }
