@@ -109,7 +109,7 @@ mod tests {
     fn a_distance_is_in_pixels_and_in_metres_at_the_depth_of_the_joint() {
         let scene = scene();
         let camera = scene.views[0].framing.camera();
-        let joint = messages::Joint3d {
+        let joint = Joint3d {
             in_world: [0.1, -0.2, 2.0],
             ..crate::testing::pose3d(0).joints[0]
         };
@@ -118,12 +118,12 @@ mod tests {
         assert!((px - 5.0).abs() < 1e-9);
         // Three metres before the world's origin.
         assert!((metres - 5.0 * 5.0 / camera.intrinsics.fx).abs() < 1e-9);
-        let outside = messages::Joint3d {
+        let outside = Joint3d {
             in_world: [9.0, 0.0, 2.0],
             ..joint
         };
         assert!(distance(camera, &outside, [0.0, 0.0]).is_none());
-        let unplaced = messages::Joint3d {
+        let unplaced = Joint3d {
             status: messages::Status::NO_DETECTION,
             ..joint
         };
@@ -160,7 +160,7 @@ mod tests {
         let all = distances_m(&scene, &record);
         assert!(all.len() == 3 && all.iter().all(|it| *it < 1e-6), "{all:?}");
         // A view that saw somebody a metre beside is left out.
-        let aside = geometry::Camera {
+        let aside = Camera {
             camera_from_world: nalgebra::Isometry3::translation(0.5, 0.0, 3.0),
             ..scene.views[2].framing.camera().clone()
         };
@@ -171,6 +171,9 @@ mod tests {
         // Of two views that disagree neither is known to be right: both count, the error up to a limit.
         record.views[0].pose = None;
         let both = distances_m(&scene, &record);
-        assert!(both.len() == 2 && both[1] == MOST_M, "{both:?}");
+        assert!(
+            both.len() == 2 && (both[1] - MOST_M).abs() < 1e-9,
+            "{both:?}"
+        );
     }
 }
