@@ -217,6 +217,19 @@ mod tests {
     }
 
     #[test]
+    fn a_view_that_fusion_over_maps_left_out_is_looked_at_all_the_same() {
+        let scene = scene();
+        let mut record = record(0);
+        record.pose3d.views[0].status = Status::NO_DETECTION;
+        assert_eq!(parts(&scene, &record, 0), None);
+        let maps = Scene {
+            has_maps: true,
+            ..scene
+        };
+        assert_eq!(parts(&maps, &record, 0).unwrap().len(), 1);
+    }
+
+    #[test]
     fn a_view_that_found_nobody_says_nothing_of_the_cameras() {
         let scene = scene();
         let mut record = record(0);

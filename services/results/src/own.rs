@@ -105,4 +105,76 @@ mod tests {
         // The parts of this model are no joints.
         assert_eq!(distances_m(&scene, &record), [0.0; 0]);
     }
+
+    #[test]
+    fn a_distance_is_in_pixels_and_in_metres_at_the_depth_of_the_joint() {
+        let scene = scene();
+        let camera = scene.views[0].framing.camera();
+        let joint = Joint3d {
+            in_world: [0.1, -0.2, 2.0],
+            ..crate::testing::pose3d(0).joints[0]
+        };
+        let pixel = camera.project(&joint.in_world.into()).unwrap();
+        let [px, metres] = distance(camera, &joint, [pixel.x + 3.0, pixel.y - 4.0]).unwrap();
+        assert!((px - 5.0).abs() < 1e-9);
+        // Three metres before the world's origin.
+        assert!((metres - 5.0 * 5.0 / camera.intrinsics.fx).abs() < 1e-9);
+        let outside = Joint3d {
+            in_world: [9.0, 0.0, 2.0],
+            ..joint
+        };
+        assert!(distance(camera, &outside, [0.0, 0.0]).is_none());
+        let unplaced = Joint3d {
+            status: messages::Status::NO_DETECTION,
+            ..joint
+        };
+        assert!(distance(camera, &unplaced, [0.0, 0.0]).is_none());
+    }
+
+    /// A joint that is the one part of the model.
+    static ONE: skeleton::JointSet = skeleton::JointSet {
+        name: "one",
+        joints: &[skeleton::Joint {
+            name: "all",
+            parts: &[0],
+        }],
+        limbs: &[],
+    };
+
+    #[test]
+    fn views_that_show_somebody_else_count_only_where_no_two_agree() {
+        let mut scene = scene();
+        scene.joints = &ONE;
+        scene.views.push(scene.views[1].clone());
+        let mut record = record(0);
+        record.views.push(record.views[1].clone());
+        record.pose3d.n_joints = 1;
+        // The joint stands where every view saw its part, six metres before the cameras.
+        let [parts, _] = readings(&scene, &record, 0).unwrap();
+        let lens = scene.views[0].framing.camera().intrinsics;
+        let right = [
+            6.0 * (parts[0][0] - lens.cx) / lens.fx,
+            6.0 * (parts[0][1] - lens.cy) / lens.fy,
+            3.0,
+        ];
+        record.pose3d.joints[0].in_world = right;
+        let all = distances_m(&scene, &record);
+        assert!(all.len() == 3 && all.iter().all(|it| *it < 1e-6), "{all:?}");
+        // A view that saw somebody a metre beside is left out.
+        let aside = Camera {
+            camera_from_world: nalgebra::Isometry3::translation(0.5, 0.0, 3.0),
+            ..scene.views[2].framing.camera().clone()
+        };
+        let whole = geometry::OutSize::Exact([80, 60]);
+        let framing = geometry::Framing::new(&aside, [80, 60], None, whole, 0.0).unwrap();
+        scene.views[2].framing = framing;
+        assert_eq!(distances_m(&scene, &record).len(), 2);
+        // Of two views that disagree neither is known to be right: both count, the error up to a limit.
+        record.views[0].pose = None;
+        let both = distances_m(&scene, &record);
+        assert!(
+            both.len() == 2 && (both[1] - MOST_M).abs() < 1e-9,
+            "{both:?}"
+        );
+    }
 }

@@ -7,7 +7,7 @@
 //! | how pairs stand that saw the board together, and all along the strongest pairs | `graph` |
 //! | all of it, in this order | `rig` |
 //! | everything adjusted at once, wrong corners left out | `adjust`, `problem`, `outcome` |
-//! | how well places are known where cameras are out of step | `certainty` |
+//! | how much a board that moves tells where cameras are out of step | `certainty` |
 //! | a board that lies still before a rig | `still` |
 //! | what is known how well, and what forbids to trust it | `verdict` |
 
@@ -194,6 +194,17 @@ pub struct Together {
     pub n_agree: usize,
 }
 
+/// How all cameras together do not fit as each alone does: pictures of one frame were not taken at the same time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutOfStep {
+    /// Residuals of each camera alone, pixels.
+    pub alone_px: f64,
+    /// Residuals of all cameras together, with free lenses, pixels.
+    pub together_px: f64,
+    /// The largest change of a focal length from one to the other, as a share of it.
+    pub bent: f64,
+}
+
 /// A calibration.
 #[derive(Debug, Clone)]
 pub struct Outcome {
@@ -205,9 +216,8 @@ pub struct Outcome {
     pub boards: Vec<(usize, Isometry3<f64>)>,
     /// Standard deviation of a corner along each axis, pixels.
     pub sigma_px: f64,
-    /// Where pictures of one frame were not taken at the same time: residuals of each camera by itself, and of all together with
-    /// free lenses, pixels. Lenses that a camera by itself tells are then kept as it has them, and frames in which the board stands still are used.
-    pub out_of_step_px: Option<[f64; 2]>,
+    /// Where pictures of one frame were not taken at the same time.
+    pub out_of_step: Option<OutOfStep>,
     /// What forbids to trust it.
     pub doubts: Vec<Doubt>,
 }

@@ -1,6 +1,8 @@
 //! Console output of offline work: progress on standard error, events and results on standard output.
 
 use core::time::Duration;
+use std::sync::Mutex;
+use std::time::Instant;
 
 use failure::{Console, Failure};
 use indicatif::ProgressBar;
@@ -8,19 +10,35 @@ use serde_json::Value;
 
 use crate::output;
 
+/// A line of progress is printed this often where there is no bar.
+const PERIOD: Duration = Duration::from_secs(5);
+
 /// Shows progress as a bar on a terminal, and messages unless quiet; writes events as JSON if requested.
 #[derive(Debug)]
 pub struct Terminal {
     bar: ProgressBar,
     quiet: bool,
     json: bool,
+    lines: Option<Lines>,
+}
+
+/// Progress in lines.
+#[derive(Debug)]
+struct Lines {
+    /// Name of the things that are counted, such as `pictures`.
+    counted: &'static str,
+    printed_at: Mutex<Instant>,
 }
 
 impl Terminal {
     /// Without a progress bar.
     pub fn without_bar(quiet: bool, json: bool) -> Self {
-        let bar = ProgressBar::hidden();
-        Self { bar, quiet, json }
+        Self {
+            bar: ProgressBar::hidden(),
+            quiet,
+            json,
+            lines: None,
+        }
     }
 
     /// With a progress bar, if standard error is a terminal.
@@ -35,7 +53,12 @@ impl Terminal {
         if let Some(style) = output::bar_style(template) {
             bar.set_style(style);
         }
-        Self { bar, quiet, json }
+        Self {
+            bar,
+            quiet,
+            json,
+            lines: None,
+        }
     }
 
     /// Redraws the bar twice a second, also without progress.
@@ -43,6 +66,41 @@ impl Terminal {
     pub fn ticking(self) -> Self {
         self.bar.enable_steady_tick(Duration::from_millis(500));
         self
+    }
+
+    /// Prints a line of progress every few seconds where standard error is no terminal: in a log, or beside a job in the background.
+    ///
+    /// * `counted`: name of the things that are counted, such as `pictures`.
+    #[must_use]
+    pub fn in_lines_off_terminals(mut self, counted: &'static str) -> Self {
+        if !self.quiet && !output::is_terminal() {
+            let printed_at = Mutex::new(Instant::now());
+            self.lines = Some(Lines {
+                counted,
+                printed_at,
+            });
+        }
+        self
+    }
+
+    fn print_line(&self) {
+        let Some(lines) = &self.lines else {
+            return;
+        };
+        let Ok(mut printed_at) = lines.printed_at.lock() else {
+            return;
+        };
+        if printed_at.elapsed() < PERIOD {
+            return;
+        }
+        *printed_at = Instant::now();
+        let label = self.bar.prefix();
+        let colon = if label.is_empty() { "" } else { ": " };
+        let (done, of) = (self.bar.position(), self.bar.length().unwrap_or(0));
+        output::message(format_args!(
+            "{label}{colon}{done} of {of} {}",
+            lines.counted
+        ));
     }
 }
 
@@ -77,6 +135,9 @@ impl Console for Terminal {
         self.bar.set_prefix(label.to_owned());
         self.bar.set_position(0);
         self.bar.set_message(details.to_owned());
+        if self.lines.is_some() && !details.is_empty() {
+            output::message(details);
+        }
     }
 
     fn details(&self, text: &str) {
@@ -86,10 +147,12 @@ impl Console for Terminal {
     fn set(&self, done: usize, of: usize) {
         self.bar.set_length(of as u64);
         self.bar.set_position(done as u64);
+        self.print_line();
     }
 
     fn advance(&self, n: usize) {
         self.bar.inc(n as u64);
+        self.print_line();
     }
 
     fn finish(&self) {

@@ -126,10 +126,14 @@ pub fn calibrate(
         notes.push(two_sided(&task.names, cameras));
     }
     let outcome = outcome.map_err(|error| refused(&error, looked.as_ref(), &task))?;
-    if let Some([alone, together]) = outcome.out_of_step_px {
+    if let Some(it) = outcome.out_of_step {
         notes.push(format!(
-            "boards fit each camera alone to {alone:.2} px, all together to {together:.2} px: the pictures of a frame were not taken at the \
-             same time. Lenses that a camera alone tells well are kept as it has them, and the frames in which the board moves least tell where cameras stand"
+            "boards fit each camera alone to {:.2} px, all together to {:.2} px with focal lengths changed by up to {:.1} %: the pictures of a frame \
+             were not taken at the same time. What each camera saw alone tells its lens, and the frames in which the board moves least tell where \
+             cameras stand",
+            it.alone_px,
+            it.together_px,
+            100.0 * it.bent
         ));
     }
     Ok(Calibrated {

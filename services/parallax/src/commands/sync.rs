@@ -120,7 +120,9 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
     let reference = reference(arguments, &deployment)?;
-    let terminal = Terminal::with_bar(globals.quiet, false, BAR).ticking();
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR)
+        .ticking()
+        .in_lines_off_terminals("pictures");
     let part = Part {
         every: arguments.every,
         from_s: arguments.from,

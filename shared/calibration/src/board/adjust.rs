@@ -103,7 +103,8 @@ fn without_wrong(
 /// The corners of a frame, with their numbers.
 fn observations(task: &Task, board: &Shown) -> Vec<(usize, Observation)> {
     let centre = middle(task).translation.vector;
-    let each = board.sights.iter().flat_map(|sight| {
+    let sights = board.sights.iter().zip(&board.spreads);
+    let each = sights.flat_map(|(sight, spread)| {
         let points = sight.points.iter().zip(&sight.on_board);
         points.map(|((id, at), on_board)| {
             let on_board = Point3::new(on_board.x, on_board.y, 0.0) - centre;
@@ -115,6 +116,7 @@ fn observations(task: &Task, board: &Shown) -> Vec<(usize, Observation)> {
                     camera,
                     on_board,
                     seen,
+                    spread: *spread,
                 },
             )
         })
@@ -127,7 +129,7 @@ fn limits(solved: &BoardProblem<'_>, n_cameras: usize) -> Vec<f64> {
     let mut lengths: Vec<Vec<f64>> = vec![Vec::new(); n_cameras];
     for (frame, seen) in solved.seen.iter().enumerate() {
         for (off, it) in solved.residuals(frame).into_iter().zip(seen) {
-            lengths[it.camera].extend(off.map(|it| it.norm()));
+            lengths[it.camera].extend(off.map(|off| off.norm() / it.spread));
         }
     }
     let limit = |lengths: Vec<f64>| {
@@ -141,7 +143,7 @@ fn limits(solved: &BoardProblem<'_>, n_cameras: usize) -> Vec<f64> {
 fn right(solved: &BoardProblem<'_>, limits: &[f64]) -> Vec<Vec<bool>> {
     let of_frame = |(frame, seen): (usize, &Vec<Observation>)| {
         let each = solved.residuals(frame).into_iter().zip(seen);
-        each.map(|(off, it)| off.is_some_and(|off| off.norm() <= limits[it.camera]))
+        each.map(|(off, it)| off.is_some_and(|off| off.norm() <= limits[it.camera] * it.spread))
             .collect()
     };
     solved.seen.iter().enumerate().map(of_frame).collect()

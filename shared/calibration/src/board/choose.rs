@@ -13,11 +13,6 @@ const CELLS: [usize; 2] = [8, 6];
 /// Steps of the apparent size of a board (a factor of 1.5 each), and of its tilt.
 const SIZES: usize = 8;
 const TILTS: usize = 6;
-/// The fewest slow frames that are enough.
-const FEWEST_SLOW: usize = 12;
-/// A board whose corners move by less in a frame stands still, pixels.
-const STILL_PX: f64 = 0.7;
-
 /// The frames of `sights` that cover most, at most `most`, in their order.
 ///
 /// One after the other the frame is taken that adds most of what has been seen least: cells of each camera's picture, sizes and
@@ -77,18 +72,10 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
     taken.map(|(frame, _)| *frame).collect()
 }
 
-/// Frames in which the board moves least.
-pub(crate) struct Slow {
-    /// The frames, in their order.
-    pub(crate) frames: Vec<usize>,
-    /// Whether it stands still in all of them.
-    pub(crate) are_still: bool,
-}
-
-/// The frames in which the board stands still, as all cameras see it; where these are few, the quarter in which it moves least. None where
-/// that cannot be told, or is too few.
-pub(crate) fn slow(sights: &[Sight], n_cameras: usize) -> Option<Slow> {
-    let mut speeds: BTreeMap<usize, f64> = BTreeMap::new();
+/// How fast corners of the board move in the picture of a camera, by camera and frame, pixels a frame: the faster of the movements from
+/// the last picture in which it was seen, and to the next.
+pub(crate) fn speeds(sights: &[Sight], n_cameras: usize) -> BTreeMap<(usize, usize), f64> {
+    let mut speeds = BTreeMap::new();
     for camera in 0..n_cameras {
         let mut own: Vec<&Sight> = sights.iter().filter(|it| it.camera == camera).collect();
         own.sort_by_key(|it| it.frame);
@@ -98,24 +85,34 @@ pub(crate) fn slow(sights: &[Sight], n_cameras: usize) -> Option<Slow> {
             let each = near.filter_map(|other| speed(sight, other));
             let fastest = each.fold(f64::NAN, f64::max);
             if fastest.is_finite() {
-                let known = speeds.entry(sight.frame).or_default();
-                *known = known.max(fastest);
+                speeds.insert((camera, sight.frame), fastest);
             }
         }
     }
-    let several = |frame: &usize| sights.iter().filter(|it| it.frame == *frame).count() > 1;
-    let mut order: Vec<(usize, f64)> = speeds.into_iter().filter(|it| several(&it.0)).collect();
-    order.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let n_still = order.iter().filter(|it| it.1 < STILL_PX).count();
-    let quarter = order.len().div_ceil(4).max(FEWEST_SLOW);
-    let are_still = n_still >= FEWEST_SLOW;
-    order.truncate(if are_still { n_still } else { quarter });
-    if order.len() < FEWEST_SLOW {
-        return None;
+    speeds
+}
+
+/// The sights of frames that several cameras see and in which the board moves least: half of them, and at least `least`.
+pub(crate) fn slow(
+    sights: &[Sight],
+    speeds: &BTreeMap<(usize, usize), f64>,
+    least: usize,
+) -> Vec<Sight> {
+    let mut by_frame: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for sight in sights {
+        let speed = speeds.get(&(sight.camera, sight.frame));
+        let own = by_frame.entry(sight.frame).or_default();
+        own.push(*speed.unwrap_or(&f64::INFINITY));
     }
-    let mut frames: Vec<usize> = order.into_iter().map(|it| it.0).collect();
-    frames.sort_unstable();
-    Some(Slow { frames, are_still })
+    by_frame.retain(|_, own| own.len() > 1);
+    let mut order: Vec<(f64, usize)> = by_frame
+        .into_iter()
+        .map(|(frame, own)| (own.into_iter().fold(0.0, f64::max), frame))
+        .collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order.truncate((order.len() / 2).max(least));
+    let is_slow = |sight: &&Sight| order.iter().any(|it| it.1 == sight.frame);
+    sights.iter().filter(is_slow).cloned().collect()
 }
 
 /// The median movement of corners between two pictures, pixels a frame.

@@ -126,6 +126,7 @@ fn adjusted_once(
             camera: 0,
             on_board: Point3::new(on_board.x, on_board.y, 0.0),
             seen: *at,
+            spread: 1.0,
         });
         seen.push(each.collect());
     }

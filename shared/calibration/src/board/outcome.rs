@@ -1,11 +1,14 @@
 //! What an adjustment tells of every camera.
 
 use geometry::Camera;
-use geometry::bundle::{Problem as _, covariance};
+use geometry::bundle::{Problem as _, clustered, covariance};
 use nalgebra::{Isometry3, Point2, Translation3, Vector3};
 
 use super::problem::{BoardProblem, Observation};
 use super::{CameraOutcome, Known, Outcome, Residual, Sight, Task, choose};
+
+/// Into how many parts a recording is divided at most, to see how they differ.
+const MOST_PARTS: usize = 10;
 
 /// A frame that is used.
 pub(crate) struct Shown {
@@ -13,6 +16,8 @@ pub(crate) struct Shown {
     /// Of a board whose origin is its middle.
     pub(crate) world_from_board: Isometry3<f64>,
     pub(crate) sights: Vec<Sight>,
+    /// Of each sight, see [`Observation::spread`].
+    pub(crate) spreads: Vec<f64>,
 }
 
 /// The frame of the board with its origin in the middle of the board.
@@ -84,7 +89,7 @@ pub(crate) fn outcome(task: &Task, adjusted: &Adjusted<'_>) -> Outcome {
             .map(|(board, pose)| (board.frame, pose * back))
             .collect(),
         sigma_px: solved.sigma_px,
-        out_of_step_px: None,
+        out_of_step: None,
         doubts: Vec::new(),
     }
 }
@@ -95,8 +100,16 @@ fn rms(off: impl Iterator<Item = nalgebra::Vector2<f64>>) -> f64 {
 }
 
 /// Every free number with its standard deviation; infinite where the pictures do not tell it.
+///
+/// The larger of two deviations: of corners that err independently, and by how parts of the recording differ, whatever successive
+/// frames have in common (a board that moves is blurred, scanned row by row, and elsewhere in the next camera's picture).
 fn numbers(solved: &BoardProblem<'_>) -> Vec<Known> {
     let spread = covariance(solved).ok();
+    let n_parts = solved.boards.len().min(MOST_PARTS);
+    let parts: Vec<usize> = (0..solved.boards.len())
+        .map(|nth| nth * n_parts / solved.boards.len())
+        .collect();
+    let by_parts = clustered(solved, &parts).ok().flatten();
     let cameras = solved.cameras.cameras();
     let owner = |parameter: usize| {
         (0..cameras.len()).find(|nth| solved.cameras.parameters(*nth).contains(&parameter))
@@ -113,6 +126,7 @@ fn numbers(solved: &BoardProblem<'_>) -> Vec<Known> {
                 1.0
             };
             let sd = spread.as_ref().map_or(f64::INFINITY, |it| it.sd(parameter));
+            let sd = by_parts.as_ref().map_or(sd, |it| sd.max(it.sd(parameter)));
             Known {
                 name,
                 value: value * unit,

@@ -21,6 +21,8 @@ pub(crate) struct Observation {
     pub(crate) on_board: Point3<f64>,
     /// In the picture, pixels.
     pub(crate) seen: Point2<f64>,
+    /// By how much its standard deviation is larger than that of a corner of a board that stands still.
+    pub(crate) spread: f64,
 }
 
 /// Cameras, and a board that is somewhere else in every frame.
@@ -67,7 +69,7 @@ impl Problem for BoardProblem<'_> {
         for it in &self.seen[local] {
             let turned = board.rotation * it.on_board.coords;
             let in_world = Point3::from(turned + board.translation.vector);
-            let seen = (it.seen, self.sigma_px);
+            let seen = (it.seen, self.sigma_px * it.spread);
             let observed = self
                 .cameras
                 .observe(it.camera, &in_world, seen, self.loss, &mut term);

@@ -9,8 +9,8 @@ use super::graph::{Meeting, Pair, pair, standing};
 use super::outcome::{Shown, middle};
 use super::pose::board_pose;
 use super::{
-    BoardError, LEAST_BOARDS, LEAST_CORNERS, LensKind, Outcome, Sight, Task, Together, certainty,
-    choose, intrinsics, verdict,
+    BoardError, CameraOutcome, LEAST_BOARDS, LEAST_CORNERS, LensKind, OutOfStep, Outcome, Sight,
+    Task, Together, certainty, choose, intrinsics, verdict,
 };
 
 /// The most pictures that intrinsics of one camera are begun with.
@@ -61,10 +61,9 @@ pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
     let frames = choose::frames(&sights, &task.sizes, task.most_frames);
     let found = boards(task, &cameras, &placed, &frames);
     let mut outcome = adjusted(task, cameras.clone(), &free, &found)?;
-    let rms_px = [pooled(&alone), pooled(&outcome)];
-    if rms_px[1] > OUT_OF_STEP * rms_px[0] && rms_px[1] > OUT_OF_STEP_PX {
+    if let Some(told) = out_of_step(&alone, &outcome) {
         outcome = in_step(task, (cameras, &alone), &placed, &sights)?;
-        outcome.out_of_step_px = Some(rms_px);
+        outcome.out_of_step = Some(told);
     }
     outcome.pairs = together;
     for (nth, camera) in outcome.cameras.iter_mut().enumerate() {
@@ -74,57 +73,69 @@ pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
     Ok(outcome)
 }
 
-/// Pictures of one frame that were not taken at the same time put boards where they were not, and lenses are bent to fit: so lenses that
-/// each camera by itself tells stay as it has them, unless the joint adjustment agrees, and where the cameras stand is told by the
-/// frames in which the board stands still.
+/// Whether all cameras together do not fit as each alone does: by residuals, or by lenses, which bend to hide it where few frames
+/// have several cameras.
+fn out_of_step(alone: &Outcome, together: &Outcome) -> Option<OutOfStep> {
+    let [alone_px, together_px] = [alone, together].map(pooled);
+    let is_worse = together_px > OUT_OF_STEP * alone_px && together_px > OUT_OF_STEP_PX;
+    let focal = |outcome: &Outcome, nth: usize| outcome.cameras[nth].camera.intrinsics.fx;
+    let bent = (0..alone.cameras.len())
+        .map(|nth| (focal(together, nth) / focal(alone, nth) - 1.0).abs())
+        .fold(0.0, f64::max);
+    let is_bent = !verdict::are_lenses_the_same(together, alone);
+    (is_worse || is_bent).then_some(OutOfStep {
+        alone_px,
+        together_px,
+        bent,
+    })
+}
+
+/// Places cameras whose pictures of one frame were not taken at the same time.
+///
+/// Such pictures put boards where they were not, and an adjustment bends lenses to fit. So what each camera sees tells its lens by boards
+/// of its own, as it does alone; and a sight tells of places the less the faster the board moves in it.
 fn in_step(
     task: &Task,
     (cameras, alone): (Vec<Camera>, &Outcome),
     placed: &[Placed],
     sights: &[Sight],
 ) -> Result<Outcome, BoardError> {
-    let slow = choose::slow(sights, task.names.len());
-    let are_still = slow.as_ref().is_some_and(|it| it.are_still);
-    let frames = slow.map_or_else(
-        || choose::frames(sights, &task.sizes, task.most_frames),
-        |it| it.frames,
-    );
-    let boards = boards(task, &cameras, placed, &frames);
-    let with = |is_held: &[bool]| {
-        let free = is_held.iter().enumerate().map(|(nth, is_held)| {
-            let wants_pose = nth != 0;
-            match (is_held, wants_pose) {
-                (true, false) => Free::default(),
-                (true, true) => Free::POSE,
-                (false, _) => free_of(task, nth, wants_pose),
-            }
-        });
-        let free: Vec<Free> = free.collect();
-        adjusted(task, cameras.clone(), &free, &boards)
-    };
-    // Of a board that moved, the joint adjustment tells nothing of lenses, agree as it may.
-    let is_told: Vec<bool> = alone.cameras.iter().map(verdict::is_lens_told).collect();
-    let mut is_held = if are_still {
-        vec![false; is_told.len()]
-    } else {
-        is_told.clone()
-    };
-    let mut outcome = with(&is_held)?;
-    let mut both = outcome.cameras.iter().zip(&alone.cameras);
-    if both.any(|(joint, alone)| !verdict::is_lens_the_same(joint, alone)) {
-        is_held = is_told;
-        outcome = with(&is_held)?;
-    }
-    certainty::widen(&mut outcome, alone, &is_held, are_still);
-    for ((camera, alone), is_held) in outcome.cameras.iter_mut().zip(&alone.cameras).zip(is_held) {
-        if is_held {
-            camera.numbers.extend(certainty::held(alone));
+    let speeds = choose::speeds(sights, task.names.len());
+    let slow = choose::slow(sights, &speeds, task.most_frames);
+    let frames = choose::frames(&slow, &task.sizes, task.most_frames);
+    let mut shown = boards(task, &cameras, placed, &frames);
+    for board in &mut shown {
+        for (sight, spread) in board.sights.iter().zip(&mut board.spreads) {
+            *spread = certainty::spread(sight, &speeds, alone.sigma_px);
         }
-        // The lens is told by all that the camera saw.
-        camera.coverage = alone.coverage;
-        camera.n_boards[1] = alone.n_boards[1];
+    }
+    for nth in (0..cameras.len()).filter(|nth| task.known[*nth].is_none()) {
+        let (own, own_placed) = own(nth, sights, placed);
+        let frames = choose::frames(&own, &task.sizes, task.most_frames);
+        shown.extend(boards(task, &cameras, &own_placed, &frames));
+    }
+    shown.sort_by_key(|board| board.frame);
+    let free: Vec<Free> = (0..cameras.len())
+        .map(|nth| free_of(task, nth, nth != 0))
+        .collect();
+    let mut outcome = adjusted(task, cameras, &free, &shown)?;
+    // One board a frame, and the corners of every camera once: as it alone sees them, since others were taken at other times.
+    outcome.boards.dedup_by_key(|(frame, _)| *frame);
+    for (camera, alone) in outcome.cameras.iter_mut().zip(&alone.cameras) {
+        *camera = CameraOutcome {
+            camera: camera.camera.clone(),
+            numbers: core::mem::take(&mut camera.numbers),
+            ..alone.clone()
+        };
     }
     Ok(outcome)
+}
+
+/// What one camera saw.
+fn own(nth: usize, sights: &[Sight], placed: &[Placed]) -> (Vec<Sight>, Vec<Placed>) {
+    let sights = sights.iter().filter(|sight| sight.camera == nth);
+    let placed = placed.iter().filter(|placed| placed.sight.camera == nth);
+    (sights.cloned().collect(), placed.cloned().collect())
 }
 
 /// The root mean square of all residuals that were used, pixels.
@@ -240,6 +251,7 @@ fn first_intrinsics(
 }
 
 /// A sight with the pose of the board, one for each way in which the board may have been taken for itself.
+#[derive(Clone)]
 struct Placed {
     sight: Sight,
     ways: Vec<(Sight, Isometry3<f64>)>,
@@ -328,6 +340,7 @@ fn boards(task: &Task, cameras: &[Camera], placed: &[Placed], frames: &[usize]) 
         list.push(Shown {
             frame,
             world_from_board: pose * middle(task),
+            spreads: vec![1.0; ways.len()],
             sights: ways.into_iter().map(|it| it.1).collect(),
         });
     }

@@ -27,6 +27,7 @@ pub fn standing_board(
                 camera: sight.camera,
                 on_board: Point3::new(board[*id].x, board[*id].y, 0.0),
                 seen: *at,
+                spread: 1.0,
             })
         })
         .collect();

@@ -334,58 +334,91 @@ fn a_board_with_two_sides_tells_how_opposite_cameras_stand() {
 }
 
 /// A board that is carried from place to place, before cameras whose pictures of a frame are taken parts of a frame apart.
-fn carried(truth: &[Camera], board: &[Point2<f64>], late: &[f64], n_held: usize) -> Vec<Sight> {
-    const N_CARRIED: usize = 12;
-    let random = &mut fastrand::Rng::with_seed(7);
-    let places: Vec<Isometry3<f64>> = (0..24).map(|_| somewhere(random)).collect();
-    let period = n_held + N_CARRIED;
-    let at = |time: f64| {
-        let nth = (time.max(0.0) as usize / period).min(places.len() - 2);
-        let since = time - (nth * period + n_held) as f64;
-        let share = (since / N_CARRIED as f64).clamp(0.0, 1.0);
-        places[nth].lerp_slerp(&places[nth + 1], share)
-    };
-    let mut sights = Vec::new();
-    for frame in 0..period * (places.len() - 1) {
-        for (nth, camera) in truth.iter().enumerate() {
-            let noise = &mut || noisy(random, 0.2);
-            let pose = at(frame as f64 + late[nth]);
-            sights.extend(seen((nth, camera), (board, &pose), (frame, false), noise));
+struct Carried<'a> {
+    truth: &'a [Camera],
+    board: &'a [Point2<f64>],
+    /// Frames for which it is held still at every place.
+    n_held: usize,
+    /// Every n-th frame is used.
+    every: usize,
+}
+
+impl Carried<'_> {
+    fn sights(&self, seed: u64) -> Vec<Sight> {
+        const N_CARRIED: usize = 12;
+        let random = &mut fastrand::Rng::with_seed(seed);
+        let places: Vec<Isometry3<f64>> = (0..24).map(|_| somewhere(random)).collect();
+        let period = self.n_held + N_CARRIED;
+        let at = |time: f64| {
+            let nth = (time.max(0.0) as usize / period).min(places.len() - 2);
+            let since = time - (nth * period + self.n_held) as f64;
+            let share = (since / N_CARRIED as f64).clamp(0.0, 1.0);
+            places[nth].lerp_slerp(&places[nth + 1], share)
+        };
+        let mut sights = Vec::new();
+        for (nth_frame, frame) in (0..period * (places.len() - 1))
+            .step_by(self.every)
+            .enumerate()
+        {
+            for (nth, camera) in self.truth.iter().enumerate() {
+                let late = [0.0, 0.8, -0.7][nth % 3];
+                let noise = &mut || noisy(random, 0.2);
+                let pose = at(frame as f64 + late);
+                let shown = (nth_frame, false);
+                sights.extend(seen((nth, camera), (self.board, &pose), shown, noise));
+            }
+        }
+        sights
+    }
+}
+
+/// Errors of focal lengths, turns and places along each axis, in stated deviations.
+fn errors_in_deviations(outcome: &Outcome, truth: &[Camera]) -> Vec<f64> {
+    let mut list = Vec::new();
+    let first = truth[0].camera_from_world;
+    for (nth, (found, truth)) in outcome.cameras.iter().zip(truth).enumerate() {
+        let sd = |name: &str| found.numbers.iter().find(|it| it.name == name).unwrap().sd;
+        let [own, focal] = [&found.camera, truth].map(|camera| camera.intrinsics.fx);
+        list.push((own - focal) / sd("focal length"));
+        if nth == 0 {
+            continue;
+        }
+        let expected = truth.camera_from_world * first.inverse();
+        let turn = found.camera.camera_from_world.rotation * expected.rotation.inverse();
+        let place = found.camera.centre_in_world().coords - expected.inverse().translation.vector;
+        for (axis, name) in ["x", "y", "z"].iter().enumerate() {
+            let degrees = turn.scaled_axis()[axis].to_degrees();
+            list.push(degrees / sd(&format!("rotation {name}")));
+            list.push(place[axis] / sd(&format!("place {name}")));
         }
     }
-    sights
+    list
 }
 
 #[test]
-fn cameras_out_of_step_keep_the_lenses_that_they_alone_tell_and_say_what_is_not_known() {
+fn cameras_out_of_step_have_lenses_by_their_own_pictures_and_what_is_stated_holds() {
     let truth = ring(3, BROWN);
     let board = board(6, 4);
-    for n_held in [8, 0] {
-        let sights = carried(&truth, &board, &[0.0, 0.8, -0.7], n_held);
-        let outcome = calibrate(&task(&truth, &board, sights)).unwrap();
-        assert!(outcome.out_of_step_px.is_some(), "{n_held}");
+    let mut errors_stated = Vec::new();
+    // Of few frames an adjustment of all cameras leaves hardly larger residuals than each alone: it bends lenses by up to a quarter.
+    for (n_held, every, seed) in [(8, 1, 7), (0, 1, 7), (3, 1, 2), (8, 6, 3), (0, 6, 4)] {
+        let carried = Carried {
+            truth: &truth,
+            board: &board,
+            n_held,
+            every,
+        };
+        let outcome = calibrate(&task(&truth, &board, carried.sights(seed))).unwrap();
+        assert!(outcome.out_of_step.is_some(), "{n_held} {every}");
         let [focal, degrees, share] = errors(&outcome, &truth);
-        assert!(focal < 0.02, "{n_held}: {focal}");
-        for (found, truth) in outcome.cameras.iter().zip(&truth) {
-            let known = found
-                .numbers
-                .iter()
-                .find(|it| it.name == "focal length")
-                .unwrap();
-            let off = (known.value - truth.intrinsics.fx).abs();
-            assert!(
-                off < 3.0 * known.sd.max(1e-3 * known.value),
-                "{n_held}: {off} {known:?}"
-            );
-        }
-        // What is not known well is said, and how well it is known holds.
-        let is_place = |it: &Doubt| matches!(it, Doubt::Place { .. });
+        assert!(focal < 0.03, "{n_held} {every}: {focal}");
+        let is_place = |doubt: &Doubt| matches!(doubt, Doubt::Place { .. });
         let is_doubted = outcome.doubts.iter().any(is_place);
         let is_near = degrees < 0.5 && share < 0.02;
         assert!(is_doubted || is_near, "{degrees} {share}");
-        let turns = outcome.cameras.iter().flat_map(|it| &it.numbers);
-        let turns = turns.filter(|it| it.name.starts_with("rotation"));
-        let stated = turns.map(|it| it.sd).fold(0.1, f64::max);
-        assert!(degrees < 3.0 * stated, "{n_held}: {degrees} {stated}");
+        errors_stated.extend(errors_in_deviations(&outcome, &truth));
     }
+    let within = |n: f64| errors_stated.iter().filter(|it| it.abs() < n).count() as f64;
+    let shares = [within(2.0), within(4.0)].map(|n| n / errors_stated.len() as f64);
+    assert!(shares[0] > 0.85 && shares[1] > 0.98, "{shares:?}");
 }

@@ -7,10 +7,10 @@ const FEW_BOARDS: usize = 6;
 const LITTLE_COVERED: f64 = 0.2;
 const LARGE_PX: f64 = 3.0;
 const FOCAL_SHARE: f64 = 0.01;
-/// A lens that its camera alone tells to this share is not left to cameras that are out of step.
+/// A lens that its camera alone tells to this share tells whether cameras are out of step.
 const TOLD_SHARE: f64 = 0.1;
 /// Lenses are the same within so many standard deviations.
-const SAME_SIGMAS: f64 = 2.0;
+const SAME_SIGMAS: f64 = 3.0;
 /// Cameras out of step: a place that is known less well, share of the distance from the first camera, or a turn, degrees, is a doubt.
 const PLACE_SHARE: f64 = 0.02;
 const TURN_DEGREES: f64 = 0.5;
@@ -159,15 +159,18 @@ fn focal_share(camera: &CameraOutcome) -> f64 {
 }
 
 /// Whether the focal length of a camera is given, or known at all.
-pub(super) fn is_lens_told(camera: &CameraOutcome) -> bool {
+fn is_lens_told(camera: &CameraOutcome) -> bool {
     camera.is_known || focal_share(camera) <= TOLD_SHARE
 }
 
-/// Whether a joint adjustment left the lens of a camera as its own pictures tell it, or that is not told.
-pub(super) fn is_lens_the_same(joint: &CameraOutcome, alone: &CameraOutcome) -> bool {
-    let [own, joint] = [alone, joint].map(|it| it.camera.intrinsics.fx);
-    let limit = SAME_SIGMAS * focal_share(alone) * own;
-    !is_lens_told(alone) || alone.is_known || (joint - own).abs() <= limit
+/// Whether a joint adjustment left every lens as the camera's own pictures tell it, or that is not told.
+pub(super) fn are_lenses_the_same(joint: &Outcome, alone: &Outcome) -> bool {
+    let is_same = |(joint, alone): (&CameraOutcome, &CameraOutcome)| {
+        let [own, joint] = [alone, joint].map(|camera| camera.camera.intrinsics.fx);
+        let limit = SAME_SIGMAS * focal_share(alone) * own;
+        !is_lens_told(alone) || alone.is_known || (joint - own).abs() <= limit
+    };
+    joint.cameras.iter().zip(&alone.cameras).all(is_same)
 }
 
 /// How well a turn, degrees, and a place, metres, are known: the largest deviations.
@@ -186,8 +189,8 @@ pub(super) fn doubt(task: &Task, outcome: &mut Outcome) {
         let side = f64::from(task.sizes[camera][0].max(task.sizes[camera][1]));
         let limit_px = LARGE_PX * (side / USUAL_SIDE).max(0.5);
         // Out of step, residuals of all together tell of the times, and the deviations of what comes of it.
-        let rms_px = outcome.out_of_step_px.map_or(it.rms_px, |px| px[0]);
-        if outcome.out_of_step_px.is_some() {
+        let rms_px = outcome.out_of_step.map_or(it.rms_px, |it| it.alone_px);
+        if outcome.out_of_step.is_some() {
             let [degrees, metres] = place_of(it);
             let apart = (centre(it) - centre(&outcome.cameras[0])).norm();
             if camera != 0 && (degrees > TURN_DEGREES || metres > PLACE_SHARE * apart) {

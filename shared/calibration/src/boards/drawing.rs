@@ -115,6 +115,14 @@ impl FromStr for Paper {
 }
 
 impl Drawing {
+    /// The page by the name that [`Paper`] is read from, where it has one.
+    pub fn paper(&self) -> Option<&'static str> {
+        let [width, height] = self.page;
+        let is_page = |size: &[f64; 2]| *size == [width, height] || *size == [height, width];
+        let found = PAPERS.iter().find(|(_, size)| is_page(size));
+        found.map(|(name, _)| *name)
+    }
+
     /// A board in its true size on a page, with a ruler and its description below.
     ///
     /// # Errors
@@ -247,6 +255,9 @@ mod tests {
         assert_eq!(page("charuco:7x5:38mm", fitting), Ok([297.0, 420.0]));
         assert_eq!(page("charuco:7x5:34mm", fitting), Ok([297.0, 210.0]));
         assert!(page("charuco:9x9:1m", fitting).unwrap()[0] > 9000.0);
+        let name = |text: &str| Drawing::new(&board(text), fitting).unwrap().paper();
+        assert_eq!(name("charuco:7x5:38mm"), Some("a3"));
+        assert_eq!(name("charuco:9x9:1m"), None);
         let error = page("charuco:7x5:40mm", "letter".parse().unwrap()).unwrap_err();
         assert!(error.to_string().contains("296 x 236 mm"), "{error}");
         "b7".parse::<Paper>().unwrap_err();

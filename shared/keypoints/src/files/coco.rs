@@ -51,7 +51,10 @@ struct Entry {
 
 /// A number, or a text such as `000012`, `cam01_000012` or `000012.jpg`.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "expected an `image_id` that is a number or a text such as `000012.jpg`"
+)]
 enum ImageId {
     Number(u64),
     Text(String),
@@ -99,12 +102,23 @@ pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Film, FileError> {
     if mmpose::is_mmpose(text) {
         return mmpose::film(text, names);
     }
+    if let Some(begin) = not_json(text) {
+        return Err(FileError::NotJson { begin });
+    }
     if text.trim_ascii_start().starts_with(b"[") {
         let entries: Vec<Entry> = from_json(text, RESULTS)?;
         return results(&entries, names);
     }
     let set: DataSet = from_json(text, DATA_SET)?;
     data_set(&set, names)
+}
+
+/// The first letters of a text that is not JSON.
+fn not_json(text: &[u8]) -> Option<String> {
+    let text = text.trim_ascii_start();
+    let is_json = text.first().is_some_and(|first| b"[{".contains(first));
+    let begin = &text[..text.len().min(24)];
+    (!is_json).then(|| String::from_utf8_lossy(begin).into_owned())
 }
 
 fn data_set(set: &DataSet, names: Option<&NameSet>) -> Result<Film, FileError> {

@@ -36,6 +36,14 @@ pub enum FileError {
         /// Why, and where.
         source: serde_json::Error,
     },
+    /// It is not JSON at all.
+    #[error(
+        "begins with {begin:?}, expected JSON; tables, such as those of DeepLabCut, are not read"
+    )]
+    NotJson {
+        /// Its first letters.
+        begin: String,
+    },
     /// A list has a wrong number of numbers.
     #[error("`{entry}` has {got} numbers, expected {expected}")]
     Length {

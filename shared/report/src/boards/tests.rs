@@ -1,6 +1,6 @@
 //! The page with text that would break it, and numbers that are not finite.
 
-use calibration::board::{Doubt, Known, Residual};
+use calibration::board::{Doubt, Known, OutOfStep, Residual};
 use geometry::{Camera, Intrinsics, Lens};
 use nalgebra::{Isometry3, Vector2};
 
@@ -43,7 +43,11 @@ fn outcome(doubts: Vec<Doubt>) -> Outcome {
         pairs: Vec::new(),
         boards: vec![(3, Isometry3::translation(0.0, 0.0, 1.0))],
         sigma_px: 0.2,
-        out_of_step_px: Some([0.3, 1.2]),
+        out_of_step: Some(OutOfStep {
+            alone_px: 0.3,
+            together_px: 1.2,
+            bent: 0.1,
+        }),
         doubts,
     }
 }

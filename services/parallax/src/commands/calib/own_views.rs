@@ -132,3 +132,109 @@ fn frames(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Points>>>, Failure> {
     }
     Ok(frames.into_values().collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use geometry::{Camera, Intrinsics, Lens};
+    use nalgebra::{Isometry3, Point3, Vector3};
+    use serde_json::json;
+
+    use super::*;
+
+    /// Four cameras about a room, z up.
+    fn rig() -> Rig {
+        let camera = |nth: usize| {
+            let bearing = 0.3 + 1.3 * nth as f64;
+            let eye = Point3::new(5.0 * bearing.cos(), 5.0 * bearing.sin(), 1.5);
+            let target = Point3::new(0.0, 0.0, 1.0);
+            let upright = Isometry3::look_at_rh(&eye, &target, &Vector3::z());
+            let half_turn = Isometry3::rotation(Vector3::x() * core::f64::consts::PI);
+            Camera {
+                name: format!("c{nth}"),
+                intrinsics: Intrinsics {
+                    fx: 900.0,
+                    fy: 900.0,
+                    cx: 639.5,
+                    cy: 359.5,
+                    size: [1280, 720],
+                    lens: Lens::default(),
+                },
+                camera_from_world: half_turn * upright,
+            }
+        };
+        Rig::new((0..4).map(camera).collect(), None, "test").unwrap()
+    }
+
+    /// What the cameras see of somebody who walks about; one that sees the back names sides as it sees them.
+    ///
+    /// * `shown`: of every camera the one whose pictures it has.
+    fn seen(rig: &Rig, shown: [usize; 4]) -> String {
+        let mut text = String::new();
+        let random = &mut fastrand::Rng::with_seed(5);
+        let body: Vec<Vector3<f64>> = (0..skeleton::N_PARTS)
+            .map(|_| {
+                let mut spread = |reach: f64| reach * (2.0 * random.f64() - 1.0);
+                Vector3::new(spread(0.3), spread(0.3), 0.9 + spread(0.8))
+            })
+            .collect();
+        for frame in 0..40 {
+            let way = 0.1 * f64::from(frame);
+            let at = Vector3::new(way.sin(), 0.6 * (1.7 * way).cos(), 0.0);
+            for (nth, name) in rig.cameras().iter().map(|camera| &camera.name).enumerate() {
+                let camera = &rig.cameras()[shown[nth]];
+                let is_behind = shown[nth] == 3;
+                let part = |part: usize| {
+                    let part = if is_behind {
+                        skeleton::MIRROR[part]
+                    } else {
+                        part
+                    };
+                    let pixel = camera.project(&Point3::from(at + body[part])).unwrap();
+                    json!({"type": 1, "x": pixel.x + random.f64(), "y": pixel.y + random.f64()})
+                };
+                let parts: Vec<_> = (0..skeleton::N_PARTS).map(part).collect();
+                let line = json!({
+                    "facing": if is_behind { "behind" } else { "front" }, "frame": frame, "fused": null, "search": "full",
+                    "sigma_px": null, "sigma_used": null, "status": "ok", "time_s": null, "view": name,
+                    "single": {"candidates": 1, "level": 1, "parts": parts, "score": 1.0},
+                });
+                text += &line.to_string();
+                text.push('\n');
+            }
+        }
+        text
+    }
+
+    #[test]
+    fn what_views_found_alone_agrees_with_their_rig_and_names_two_that_are_exchanged() {
+        let folder = tempfile::tempdir().unwrap();
+        let rig = rig();
+        let file = folder.path().join("pose2d.jsonl");
+        std::fs::write(&file, seen(&rig, [0, 1, 2, 3])).unwrap();
+        let right = agreement(&rig, &file).unwrap();
+        assert_eq!(right.disagreements, [""; 0]);
+        assert!(right.errors.cameras.iter().all(|it| it.median_px < 1.5));
+        std::fs::write(&file, seen(&rig, [0, 2, 1, 3])).unwrap();
+        let wrong = agreement(&rig, &file).unwrap().disagreements.join("; ");
+        assert!(wrong.contains("c1 and c2 look exchanged"), "{wrong}");
+    }
+
+    #[test]
+    fn poses_after_fusion_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let rig = rig();
+        let file = folder.path().join("pose2d.jsonl");
+        let lines = seen(&rig, [0, 1, 2, 3]);
+        let fused: Vec<String> = lines
+            .lines()
+            .map(|line| {
+                let mut line: serde_json::Value = serde_json::from_str(line).unwrap();
+                line["single"] = json!(null);
+                line.to_string()
+            })
+            .collect();
+        std::fs::write(&file, fused.join("\n")).unwrap();
+        let error = agreement(&rig, &file).err().unwrap();
+        assert!(error.to_string().contains("(`single`)"), "{error}");
+    }
+}

@@ -138,7 +138,9 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let settings = settings(arguments)?;
-    let terminal = Terminal::with_bar(globals.quiet, false, BAR).ticking();
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR)
+        .ticking()
+        .in_lines_off_terminals("pictures");
     let calibrated = calibrate(&settings, &stop, &terminal);
     terminal.finish();
     let calibrated = calibrated?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use calibration::people::Doubt;
 use clap::Args;
 use deployment::Deployment;
-use failure::{ExitKind, Failure, OrFail as _, Stop, unless_stopped};
+use failure::{Console as _, ExitKind, Failure, OrFail as _, Stop, unless_stopped};
 use geometry::files::Format;
 use geometry::{Camera, Rig};
 use launch::films::{Films, Part, Poses, films};
@@ -85,13 +85,17 @@ pub(super) fn walk(
         let message = "the deployment has one camera: where it stands is told by others only";
         return Err(Failure::new(ExitKind::Config, message));
     }
-    let terminal = Terminal::with_bar(globals.quiet, false, BAR).ticking();
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR)
+        .ticking()
+        .in_lines_off_terminals("pictures");
     let part = Part {
         every: arguments.every,
         from_s: arguments.from,
         seconds: arguments.seconds,
     };
     let mut found = films(&deployment, part, poses, (stop, &terminal))?;
+    terminal.finish();
+    terminal.message("adjusting");
     for (camera, film) in deployment.cameras.iter().zip(&mut found.films) {
         let pace = 1.0 + 1e-6 * camera.drift_ppm.unwrap_or(0.0);
         for shot in &mut film.shots {

@@ -104,7 +104,7 @@ fn what_cannot_be_is_refused_with_its_place() {
     let twice = set(&annotation("7", 1, &list(5.0, 2.0)), "").replace("12", "30");
     assert!(refused(&twice).contains("twice 30"));
     assert!(refused("{\"people\":[]}").contains("images"));
-    assert!(refused("nothing").contains("line 1"));
+    assert!(refused("nothing").contains("begins with \"nothing\""));
     let many = vec![annotation("3", 1, &list(5.0, 0.5)); MAX_PEOPLE + 1];
     let many = refused(&format!("[{}]", many.join(",")));
     assert!(many.contains("1001 people in a frame"), "{many}");
@@ -118,4 +118,13 @@ fn a_data_set_without_people_needs_names() {
     let names = NameSet::of_set("coco-17").unwrap();
     let film = parse(set("", "").as_bytes(), Some(&names)).unwrap();
     assert_eq!((film.n_frames, film.frames.len()), (3, 3));
+}
+
+#[test]
+fn what_other_programs_write_is_refused_in_words() {
+    let table = refused("scorer,DLC,DLC,DLC\nbodyparts,nose,nose,nose\n");
+    assert!(table.contains("begins with \"scorer,DLC"), "{table}");
+    // Ultralytics: a list of people for each frame.
+    let frames = refused("[[{\"name\":\"person\",\"keypoints\":{\"x\":[1],\"y\":[2]}}]]");
+    assert!(frames.contains("expected an `image_id`"), "{frames}");
 }

@@ -10,6 +10,11 @@ use terminal::output;
 /// Writes the board.
 pub(super) fn run(board: &Board, paper: Paper, out: Option<&Path>) -> Result<ExitCode, Failure> {
     let drawing = Drawing::new(board, paper).or_fail(ExitKind::Usage)?;
+    let [width, height] = drawing.page;
+    let mut page = format!("{width:.0} x {height:.0} mm");
+    if let Some(name) = drawing.paper() {
+        page = format!("{} ({page})", name.to_uppercase());
+    }
     let files = if let Some(file) = out {
         vec![file.to_path_buf()]
     } else {
@@ -31,11 +36,15 @@ pub(super) fn run(board: &Board, paper: Paper, out: Option<&Path>) -> Result<Exi
             }
         };
         files::replace(&file, &bytes).map_err(|error| in_file(&file, &error))?;
-        let [width, height] = drawing.page;
         output::message(format_args!(
-            "wrote {}: {board} on {width:.0} x {height:.0} mm; print at 100 %, and measure the ruler",
+            "wrote {}: {board} on {page}; print at 100 %, and measure the ruler",
             file.display()
         ));
+    }
+    if paper == Paper::Fitting {
+        output::message(
+            "this is the smallest page that holds the board: smaller squares fit a smaller page, --paper names another (a4, letter, 300x400mm)",
+        );
     }
     Ok(ExitCode::SUCCESS)
 }
