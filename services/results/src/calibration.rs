@@ -220,7 +220,7 @@ mod tests {
     fn a_view_that_fusion_over_maps_left_out_is_looked_at_all_the_same() {
         let scene = scene();
         let mut record = record(0);
-        record.pose3d.views[0].status = Status::NO_DETECTION;
+        record.skeletons.people[0].views[0].status = Status::NO_DETECTION;
         assert_eq!(parts(&scene, &record, 0), None);
         let maps = Scene {
             has_maps: true,

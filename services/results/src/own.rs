@@ -112,7 +112,7 @@ mod tests {
         let camera = scene.views[0].framing.camera();
         let joint = Joint3d {
             in_world: [0.1, -0.2, 2.0],
-            ..crate::testing::pose3d(0).joints[0]
+            ..crate::testing::skeletons(0).people[0].joints[0]
         };
         let pixel = camera.project(&joint.in_world.into()).unwrap();
         let [px, metres] = distance(camera, &joint, [pixel.x + 3.0, pixel.y - 4.0]).unwrap();
@@ -148,7 +148,7 @@ mod tests {
         scene.views.push(scene.views[1].clone());
         let mut record = record(0);
         record.views.push(record.views[1].clone());
-        record.pose3d.n_joints = 1;
+        record.skeletons.people[0].n_joints = 1;
         // The joint stands where every view saw its part, six metres before the cameras.
         let [parts, _] = readings(&scene, &record, 0).unwrap();
         let lens = scene.views[0].framing.camera().intrinsics;
@@ -157,7 +157,7 @@ mod tests {
             6.0 * (parts[0][1] - lens.cy) / lens.fy,
             3.0,
         ];
-        record.pose3d.joints[0].in_world = right;
+        record.skeletons.people[0].joints[0].in_world = right;
         let all = distances_m(&scene, &record);
         assert!(all.len() == 3 && all.iter().all(|it| *it < 1e-6), "{all:?}");
         // A view that saw somebody a metre beside is left out.

@@ -126,6 +126,7 @@ mod space_person;
 mod space_places;
 mod space_solve;
 mod space_tree;
+mod space_view;
 mod start;
 
 mod anatomy;
@@ -151,9 +152,8 @@ pub use pair::PairInput;
 pub use settings::{EnergyKind, Settings, SwitchBy, TypeTables};
 pub use sides::{Sides, SidesFilter, SidesSettings};
 pub use space_person::{SolvedPerson, solve_person};
-pub use space_tree::{
-    BoneLength, JointEvidence, SpacePose, SpaceSettings, SpaceView, TREE, lengths_of,
-};
+pub use space_tree::{BoneLength, SpacePose, SpaceSettings, TREE, lengths_of};
+pub use space_view::{JointEvidence, SpaceView};
 pub use start::{Start, choose_start, rank_starts};
 pub use term::Epipolar;
 pub use view::{ViewInput, ViewPlan};

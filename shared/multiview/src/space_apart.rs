@@ -9,9 +9,8 @@
 //! the other one is, the tree solved again, and the better one of both sides chosen.
 
 use crate::space_places::Choices;
-use crate::space_tree::{
-    BoneLength, LIMBS, N, Occupied, SpacePose, SpaceSettings, TREE, best_on_tree, cost,
-};
+use crate::space_tree::{BoneLength, Occupied, SpacePose, SpaceSettings, TREE, best_on_tree, cost};
+use crate::space_view::{LIMBS, N};
 
 /// What it costs that the pairs of a limb lie near each other.
 fn crowding(joints: &Occupied, pairs: &[[usize; 2]], settings: &SpaceSettings) -> f64 {

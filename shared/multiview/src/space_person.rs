@@ -7,9 +7,8 @@ use nalgebra::Point3;
 use crate::front::{FrontEvidence, front_log_ratio_of};
 use crate::space_places::{Choices, Crossings, Used};
 use crate::space_solve::solve_in_space;
-use crate::space_tree::{
-    BoneLength, LIMBS, N, SpacePose, SpaceSettings, SpaceView, TREE, best_on_tree, lengths_of,
-};
+use crate::space_tree::{BoneLength, SpacePose, SpaceSettings, TREE, best_on_tree, lengths_of};
+use crate::space_view::{LIMBS, N, SpaceView};
 
 /// A person in space, and what was decided about the views.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,7 +5,7 @@ use nalgebra::Point3;
 
 use geometry::Ray;
 
-use crate::space_tree::{LIMBS, N, Places, SpaceView};
+use crate::space_view::{N, Places, SpaceView, name, other_side};
 
 /// Places of every joint, and the evidence of all views for the joint at each of them.
 pub(crate) struct Choices {
@@ -38,24 +38,6 @@ pub(crate) struct Crossings<'a> {
     rays: Vec<[Vec<Ray>; N]>,
     /// By pair of views, name in the first one, and whether the second one has the other side of that name; made when asked for.
     points: Vec<Option<Points>>,
-}
-
-/// The other side's joint of the pair; the joint itself of the middle of the body.
-pub(crate) fn other_side(joint: usize) -> usize {
-    let pair = LIMBS.iter().flatten().find(|pair| pair.contains(&joint));
-    pair.map_or(joint, |[right, left]| right + left - joint)
-}
-
-/// What a view calls a joint of the body.
-pub(crate) fn name(joint: usize, exchanged: [bool; 2]) -> usize {
-    let limb = LIMBS
-        .iter()
-        .zip(exchanged)
-        .filter(|(_, exchanged)| *exchanged);
-    let pair = limb
-        .flat_map(|(pairs, _)| pairs)
-        .find(|pair| pair.contains(&joint));
-    pair.map_or(joint, |[right, left]| right + left - joint)
 }
 
 impl<'a> Crossings<'a> {

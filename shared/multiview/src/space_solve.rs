@@ -4,9 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use crate::space_apart::kept_apart;
 use crate::space_places::Choices;
-use crate::space_tree::{
-    BoneLength, N, Occupied, SpacePose, SpaceSettings, SpaceView, TREE, best_on_tree, cost, unary,
-};
+use crate::space_tree::{BoneLength, Occupied, SpacePose, SpaceSettings, TREE, best_on_tree, cost};
+use crate::space_view::{N, SpaceView, unary};
 
 /// Places along each axis of the coarsest grid, and of the finer ones.
 const COARSEST: usize = 5;

@@ -11,17 +11,10 @@
 
 use nalgebra::Point3;
 
-use geometry::{Camera, Ray};
 use kernels::{Isa, LengthSpring, ScoredPoints};
 
-use crate::front::FrontEvidence;
-use crate::space_places::{Choices, name};
-
-/// Number of joints: those of `skeleton::PARSE14`.
-pub(crate) const N: usize = 14;
-
-/// Places of every joint, metres in the world.
-pub(crate) type Places = [Vec<Point3<f64>>; N];
+use crate::space_places::Choices;
+use crate::space_view::N;
 
 /// The bones of the tree, `[parent, child]`, joints of `skeleton::PARSE14`, parents first. A hip hangs on the neck.
 pub const TREE: [[usize; 2]; N - 1] = [
@@ -40,29 +33,6 @@ pub const TREE: [[usize; 2]; N - 1] = [
     [4, 5],
 ];
 const ROOT: usize = 12;
-
-/// The evidence of a view.
-pub trait JointEvidence {
-    /// How well a joint fits at a point of the picture, pixels.
-    fn at(&self, joint: usize, point: [f64; 2]) -> f32;
-    /// Where a joint may be, pixels of the picture, the best first, each with its evidence.
-    fn maxima(&self, joint: usize) -> &[([f64; 2], f32)];
-    /// What is known of a joint where the view shows nothing of it: the floor of its evidence.
-    fn floor(&self) -> f32;
-}
-
-/// A view.
-#[derive(Clone, Copy)]
-pub struct SpaceView<'a> {
-    /// Its camera.
-    pub camera: &'a Camera,
-    /// What it shows.
-    pub evidence: &'a dyn JointEvidence,
-    /// Whether left and right are exchanged in its evidence, of the arms and of the legs.
-    pub exchanged: [bool; 2],
-    /// What the picture says about the direction in which the person faces; zeros say nothing.
-    pub front: FrontEvidence,
-}
 
 /// The expected length of a bone of [`TREE`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -171,58 +141,6 @@ pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N -
         BoneLength { mean: length, sd }
     })
 }
-
-/// The evidence of all views for a joint at a place.
-pub(crate) fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
-    views
-        .iter()
-        .map(|view| view.at(view.named(joint), at))
-        .sum()
-}
-
-impl SpaceView<'_> {
-    /// The evidence for a joint of the body at a place, whatever the view calls it.
-    pub fn evidence_at(&self, joint: usize, at: &Point3<f64>) -> f32 {
-        self.at(self.named(joint), at) as f32
-    }
-
-    /// The rays of the places in the picture where a joint may be; not of those for which the lens has none.
-    ///
-    /// * `named`: what the view calls the joint.
-    pub(crate) fn rays(&self, named: usize) -> Vec<Ray> {
-        let maxima = self.evidence.maxima(named).iter();
-        maxima
-            .filter_map(|(at, _)| self.camera.ray(&(*at).into()))
-            .collect()
-    }
-
-    /// What the view calls a joint.
-    pub(crate) fn named(&self, joint: usize) -> usize {
-        name(joint, self.exchanged)
-    }
-
-    /// The evidence for two names that the view has for joints, at a place.
-    pub(crate) fn evidence_of(&self, named: [usize; 2], at: &Point3<f64>) -> [f64; 2] {
-        let pixel = self.camera.project(at);
-        named.map(|named| {
-            f64::from(pixel.map_or(self.evidence.floor(), |pixel| {
-                self.evidence.at(named, [pixel.x, pixel.y])
-            }))
-        })
-    }
-
-    /// The evidence for what the view calls a joint, at a place.
-    pub(crate) fn at(&self, named: usize, at: &Point3<f64>) -> f64 {
-        f64::from(match self.camera.project(at) {
-            Some(pixel) => self.evidence.at(named, [pixel.x, pixel.y]),
-            None => self.evidence.floor(),
-        })
-    }
-}
-
-/// Joints of the arms and of the legs, right and left.
-pub(crate) const LIMBS: [[[usize; 2]; 3]; 2] =
-    [[[8, 9], [7, 10], [6, 11]], [[2, 3], [1, 4], [0, 5]]];
 
 /// Where each joint must not be: at that of the other side. `None` for joints that are not kept away from anything.
 pub(crate) type Occupied = [Option<Point3<f64>>; N];

@@ -1,11 +1,12 @@
 //! People solved in space over maps whose truth is known.
 
-use geometry::{Intrinsics, Lens};
+use geometry::{Camera, Intrinsics, Lens};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::*;
 use crate::front::{front, front_in_view};
 use crate::solve_person;
+use crate::space_view::{JointEvidence, LIMBS, SpaceView};
 use crate::{SeenPerson, same_person};
 
 /// A man who stands with one arm raised, metres; joints of `skeleton::PARSE14`, z up.

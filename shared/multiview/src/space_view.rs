@@ -1,0 +1,106 @@
+//! The evidence of a view for joints at places in space.
+
+use nalgebra::Point3;
+
+use geometry::{Camera, Ray};
+
+use crate::front::FrontEvidence;
+
+/// Number of joints: those of `skeleton::PARSE14`.
+pub(crate) const N: usize = 14;
+
+/// Places of every joint, metres in the world.
+pub(crate) type Places = [Vec<Point3<f64>>; N];
+
+/// The other side's joint of the pair; the joint itself of the middle of the body.
+pub(crate) fn other_side(joint: usize) -> usize {
+    let pair = LIMBS.iter().flatten().find(|pair| pair.contains(&joint));
+    pair.map_or(joint, |[right, left]| right + left - joint)
+}
+
+/// What a view calls a joint of the body.
+pub(crate) fn name(joint: usize, exchanged: [bool; 2]) -> usize {
+    let limb = LIMBS
+        .iter()
+        .zip(exchanged)
+        .filter(|(_, exchanged)| *exchanged);
+    let pair = limb
+        .flat_map(|(pairs, _)| pairs)
+        .find(|pair| pair.contains(&joint));
+    pair.map_or(joint, |[right, left]| right + left - joint)
+}
+
+/// The evidence of a view.
+pub trait JointEvidence {
+    /// How well a joint fits at a point of the picture, pixels.
+    fn at(&self, joint: usize, point: [f64; 2]) -> f32;
+    /// Where a joint may be, pixels of the picture, the best first, each with its evidence.
+    fn maxima(&self, joint: usize) -> &[([f64; 2], f32)];
+    /// What is known of a joint where the view shows nothing of it: the floor of its evidence.
+    fn floor(&self) -> f32;
+}
+
+/// A view.
+#[derive(Clone, Copy)]
+pub struct SpaceView<'a> {
+    /// Its camera.
+    pub camera: &'a Camera,
+    /// What it shows.
+    pub evidence: &'a dyn JointEvidence,
+    /// Whether left and right are exchanged in its evidence, of the arms and of the legs.
+    pub exchanged: [bool; 2],
+    /// What the picture says about the direction in which the person faces; zeros say nothing.
+    pub front: FrontEvidence,
+}
+
+/// The evidence of all views for a joint at a place.
+pub(crate) fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
+    views
+        .iter()
+        .map(|view| view.at(view.named(joint), at))
+        .sum()
+}
+
+impl SpaceView<'_> {
+    /// The evidence for a joint of the body at a place, whatever the view calls it.
+    pub fn evidence_at(&self, joint: usize, at: &Point3<f64>) -> f32 {
+        self.at(self.named(joint), at) as f32
+    }
+
+    /// The rays of the places in the picture where a joint may be; not of those for which the lens has none.
+    ///
+    /// * `named`: what the view calls the joint.
+    pub(crate) fn rays(&self, named: usize) -> Vec<Ray> {
+        let maxima = self.evidence.maxima(named).iter();
+        maxima
+            .filter_map(|(at, _)| self.camera.ray(&(*at).into()))
+            .collect()
+    }
+
+    /// What the view calls a joint.
+    pub(crate) fn named(&self, joint: usize) -> usize {
+        name(joint, self.exchanged)
+    }
+
+    /// The evidence for two names that the view has for joints, at a place.
+    pub(crate) fn evidence_of(&self, named: [usize; 2], at: &Point3<f64>) -> [f64; 2] {
+        let pixel = self.camera.project(at);
+        named.map(|named| {
+            f64::from(pixel.map_or(self.evidence.floor(), |pixel| {
+                self.evidence.at(named, [pixel.x, pixel.y])
+            }))
+        })
+    }
+
+    /// The evidence for what the view calls a joint, at a place.
+    pub(crate) fn at(&self, named: usize, at: &Point3<f64>) -> f64 {
+        f64::from(match self.camera.project(at) {
+            Some(pixel) => self.evidence.at(named, [pixel.x, pixel.y]),
+            None => self.evidence.floor(),
+        })
+    }
+}
+
+/// Joints of the arms and of the legs, right and left.
+pub(crate) const LIMBS: [[[usize; 2]; 3]; 2] =
+    [[[8, 9], [7, 10], [6, 11]], [[2, 3], [1, 4], [0, 5]]];
