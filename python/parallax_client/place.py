@@ -35,7 +35,8 @@ def supervisor(folder):
         return None
     try:
         about = os.stat(folder / "lock")
-        lines = pathlib.Path("/proc/locks").read_text().splitlines()
+        # It comes page by page: where others lock and unlock meanwhile, a line may be passed over.
+        lines = [line for _ in range(3) for line in pathlib.Path("/proc/locks").read_text().splitlines()]
     except OSError:
         return None
     place = f"{os.major(about.st_dev):02x}:{os.minor(about.st_dev):02x}:{about.st_ino}"

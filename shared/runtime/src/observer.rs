@@ -1,7 +1,6 @@
 //! Observing a running deployment from a process that is not part of it.
 
 use core::time::Duration;
-use std::fs;
 use std::io;
 use std::time::Instant;
 
@@ -11,7 +10,7 @@ use messages::{Metrics, topic};
 
 use crate::lock::{ENDING_FILE, living};
 use crate::private::LOCK_FILE;
-use crate::remains::supervisor;
+use crate::remains::{all_locks, supervisor};
 use crate::{Bus, BusError, Namespace, PortError, ReceiveError, Subscriber};
 use failure::{ExitKind, Fault, Stop};
 
@@ -218,8 +217,7 @@ pub(crate) fn running_supervisor(namespace: &Namespace) -> Option<u32> {
     if root.join(ENDING_FILE).exists() {
         return None;
     }
-    let locks = fs::read_to_string("/proc/locks").unwrap_or_default();
-    supervisor(&root.join(LOCK_FILE), &locks)
+    supervisor(&root.join(LOCK_FILE), &all_locks())
 }
 
 /// The names of all processes of a deployment, read off its metrics topics.

@@ -53,7 +53,7 @@ pub fn deployments(base: &Path) -> Result<Vec<Remains>, LockError> {
     let Some(opened) = private::open_base(base).map_err(BusError::from)? else {
         return Ok(Vec::new());
     };
-    let locks = fs::read_to_string("/proc/locks").unwrap_or_default();
+    let locks = all_locks();
     let mut found = Vec::new();
     let unreadable = |error: Errno| LockError::File {
         path: base.to_owned(),
@@ -96,6 +96,13 @@ fn inspect(namespace: Namespace, is_marked: bool, locks: &str) -> Result<Remains
         bytes: size.1,
         namespace,
     })
+}
+
+/// The kernel's list of locks, three readings one after the other: it comes page by page, and where others lock and unlock meanwhile, a
+/// line may be passed over.
+pub(crate) fn all_locks() -> String {
+    let reading = |_| fs::read_to_string("/proc/locks").unwrap_or_default();
+    (0..3).map(reading).collect()
 }
 
 /// The process that holds a lock file, from the kernel's list of locks: trying to lock it could disturb a
