@@ -80,6 +80,8 @@ fn the_service_and_the_library_predict_the_same() {
     let mut forecaster = Forecaster::new(network);
     let (rig, model) = (planted::rig(2), planted::model());
     let [width, height] = planted::SIZE.map(|it| it as usize);
+    // No frame waits for the network: on a loaded machine one may have gone on without it.
+    let mut n_late = 0;
     for (view, camera) in rig.cameras().iter().enumerate() {
         let (step, layout) = step_of(&pipeline::plan(&model, camera).unwrap());
         let mut responses = vec![0.0; layout.n_responses()];
@@ -100,11 +102,16 @@ fn the_service_and_the_library_predict_the_same() {
                 "nothing to compare"
             );
             let line = &lines[frame * 2 + view];
+            if line["sigma_px"].is_null() {
+                n_late += 1;
+                continue;
+            }
             let at = format!("frame {frame}, view {view}");
             assert_eq!(line["sigma_px"], json!(forecast.sigma_px), "{at}");
             assert_eq!(line["sigma_used"], json!(0), "{at}");
         }
     }
+    assert!(n_late <= 4, "{n_late} of 16 without expected errors");
 }
 
 /// The candidates of every view, each for its own frame.
