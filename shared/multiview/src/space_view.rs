@@ -20,14 +20,13 @@ pub(crate) fn other_side(joint: usize) -> usize {
 
 /// What a view calls a joint of the body.
 pub(crate) fn name(joint: usize, exchanged: [bool; 2]) -> usize {
-    let limb = LIMBS
-        .iter()
-        .zip(exchanged)
-        .filter(|(_, exchanged)| *exchanged);
-    let pair = limb
-        .flat_map(|(pairs, _)| pairs)
-        .find(|pair| pair.contains(&joint));
-    pair.map_or(joint, |[right, left]| right + left - joint)
+    let limbs = LIMBS.iter().zip(exchanged);
+    let mut exchanged = limbs.filter(|(_, is_exchanged)| *is_exchanged);
+    if exchanged.any(|(pairs, _)| pairs.as_flattened().contains(&joint)) {
+        other_side(joint)
+    } else {
+        joint
+    }
 }
 
 /// The evidence of a view.

@@ -3,6 +3,7 @@
 use fmp::{Layout, Pose};
 use multiview::FrontEvidence;
 use posenetwork::{JointMaps, LookMemory, Turn};
+use statistics::Sorted;
 
 use crate::tracks::Track;
 
@@ -195,9 +196,7 @@ fn steps(first: &JointMaps, second: &JointMaps) -> impl Iterator<Item = [f64; 2]
 }
 
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    Sorted::new(values.collect::<Vec<f64>>()).upper_median()
 }
 
 /// How far the joints of two sights lie from each other, their median, share of the height of the first one's window; `None` if no joint is
