@@ -199,6 +199,8 @@ fn home(base: &Path, name: &str) -> PathBuf {
     }
     fs::create_dir(home.join("photos")).unwrap();
     fs::write(home.join("photos/one.jpg"), "x").unwrap();
+    // Whatever umask another test of this process has set: a base that others may write is closed.
+    fs::set_permissions(&home, Permissions::from_mode(0o755)).unwrap();
     home
 }
 
