@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use datasets::{Person, Picture, ReadOptions, Selection};
-use fmp::{Extractor, Layout, Model, Responses, Solver};
+use fmp::{Extractor, Layout, Responses, Solver};
 use inputs::network::NetworkFile;
-use posenetwork::springs::TurnedSprings;
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, outline_of, overlap};
 use rayon::prelude::*;
 use score::{PcpRule, evaluate};
@@ -62,9 +61,6 @@ fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_bett
     let models = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/models");
     let network = NetworkFile::open(&models.join("person.pose.onnx"), None).unwrap();
     let network = network.fitted().unwrap();
-    let springs = std::fs::read(models.join("person.springs")).unwrap();
-    let springs = fmp::files::own::decode(&springs).unwrap();
-    let springs = TurnedSprings::new(&Arc::new(Model::new(springs).unwrap()));
     let options = ReadOptions {
         only: Some(Selection::from_argument("101-130").unwrap()),
         ..ReadOptions::default()
@@ -75,12 +71,8 @@ fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_bett
     let mut shares = [Vec::new(), Vec::new()];
     for person in &people.people {
         let picture = Picture::read(&person.image).unwrap();
-        let size = picture.size();
-        let layout = Layout::new(springs.model(), size.width, size.height).unwrap();
         let looker = Looker {
             network: &network,
-            springs: &springs,
-            layout: &layout,
             settings: &MapSettings::default(),
         };
         let truth = outline_of(person.joints.iter().copied()).unwrap();

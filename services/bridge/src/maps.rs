@@ -1,25 +1,22 @@
 //! The maps of a view to Gaussians and back: what of the evidence crosses with the poses.
 
-use std::sync::Arc;
-
-use fmp::{Bound, Bounds, Layout, Region, Scope};
-use hosts::{Gaussian, MOST_GAUSSIANS, Maps, MapsError};
-use messages::EvidenceHeader;
-use posenetwork::{Bump, MOST_OF_A_JOINT, MapSettings, bumps, fill_from_bumps};
+use hosts::{Gaussian, MOST_GAUSSIANS, Maps, MapsError, PersonGaussians};
+use messages::{EvidenceHeader, GridMessage, MAX_CANDIDATES};
+use posenetwork::{Bump, MOST_OF_A_JOINT, MapGrid, MapSettings, bumps, fill_from_bumps};
 use recording::Kind;
 use skeleton::PARSE14;
 use wire::WireError;
 
 const _: () = assert!(
-    PARSE14.joints.len() * MOST_OF_A_JOINT <= MOST_GAUSSIANS,
+    MAX_CANDIDATES * PARSE14.joints.len() * MOST_OF_A_JOINT <= MOST_GAUSSIANS,
     "all that a view can have"
 );
 
-/// The maps of a view, and how long their responses may be.
-#[derive(Debug, Clone)]
+/// The maps of a view.
+#[derive(Debug, Clone, Copy)]
 pub struct ViewMaps {
-    /// The pyramid of the view.
-    pub layout: Arc<Layout>,
+    /// Width and height of the frames.
+    pub size: [usize; 2],
     /// Most values of its evidence.
     pub longest: usize,
 }
@@ -27,21 +24,25 @@ pub struct ViewMaps {
 /// Maps from another host that were checked.
 #[derive(Debug, Clone)]
 pub(crate) struct Checked {
-    scope: Scope,
-    bumps: Vec<Bump>,
+    header: EvidenceHeader,
+    grids: Vec<MapGrid>,
+    /// By person.
+    bumps: Vec<Vec<Bump>>,
 }
 
 /// Why maps from another host are refused.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum Refused {
     #[error(transparent)]
     Format(#[from] MapsError),
-    #[error("maps of a region that the view does not have: {0}")]
-    Scope(#[from] fmp::ScopeError),
+    #[error(transparent)]
+    Wire(#[from] WireError),
+    #[error("{0} people")]
+    People(usize),
     #[error("maps of {n} cells, at most {longest}")]
     Cells { n: usize, longest: usize },
-    #[error("Gaussian {0} of the maps is none")]
-    Gaussian(usize),
+    #[error("Gaussian {nth} of the maps of person {person} is none")]
+    Gaussian { person: usize, nth: usize },
 }
 
 impl ViewMaps {
@@ -49,27 +50,30 @@ impl ViewMaps {
     ///
     /// # Errors
     ///
-    /// It is not that of the view.
+    /// It is not that of a view.
     pub(crate) fn pack(
         &self,
         header: &EvidenceHeader,
         values: &[f32],
     ) -> Result<Vec<u8>, WireError> {
-        let evidence = wire::evidence_from_message(header, values, &self.layout)?;
-        let responses = evidence.responses();
-        let region = responses.scope().region();
-        let gaussian = |it: Bump| Gaussian {
-            joint: it.joint as u32,
-            at: it.at,
-            heat: it.heat,
-            precision: it.precision,
+        let gaussian = |bump: Bump| Gaussian {
+            joint: bump.joint as u32,
+            at: bump.at,
+            heat: bump.heat,
+            precision: bump.precision,
         };
-        let found = bumps(&responses, &MapSettings::default());
+        let maps = wire::maps_from_message(header, values)?;
+        let people = maps.iter().map(|maps| PersonGaussians {
+            first_px: maps.grid().first_px,
+            cell_px: maps.grid().cell_px,
+            size: maps.grid().size.map(|side| side as u32),
+            gaussians: bumps(maps, &MapSettings::default())
+                .into_iter()
+                .map(gaussian)
+                .collect(),
+        });
         let maps = Maps {
-            level: responses.levels().first().copied().unwrap_or_default(),
-            x: region.x,
-            y: region.y,
-            gaussians: found.into_iter().map(gaussian).collect(),
+            people: people.collect(),
         };
         Ok(maps.to_bytes())
     }
@@ -77,56 +81,68 @@ impl ViewMaps {
     /// Reads and checks what another host made of its evidence.
     pub(crate) fn unpack(&self, bytes: &[u8]) -> Result<Checked, Refused> {
         let maps = Maps::parse(bytes)?;
-        let levels = maps.level..maps.level.saturating_add(1);
-        let region = Region {
-            x: maps.x,
-            y: maps.y,
-        };
-        let scope = Scope::new(&self.layout, levels, region)?;
-        let n = self.layout.n_values(&scope);
+        if maps.people.len() > MAX_CANDIDATES {
+            return Err(Refused::People(maps.people.len()));
+        }
+        let mut header = wire::maps_to_message(&[], self.size)?;
+        header.n_people = maps.people.len() as u32;
+        for (slot, person) in header.people.iter_mut().zip(&maps.people) {
+            *slot = GridMessage {
+                first_px: person.first_px,
+                cell_px: person.cell_px,
+                size: person.size,
+            };
+        }
+        let grids = wire::grids_from_message(&header)?;
+        let n = wire::n_values(&grids);
         if n > self.longest {
             return Err(Refused::Cells {
                 n,
                 longest: self.longest,
             });
         }
-        let bump = |(nth, it): (usize, &Gaussian)| {
-            let bump = Bump {
-                joint: it.joint as usize,
-                at: it.at,
-                heat: it.heat,
-                precision: it.precision,
-            };
-            bump.is_sound()
-                .then_some(bump)
-                .ok_or(Refused::Gaussian(nth))
-        };
-        let bumps: Result<Vec<Bump>, Refused> =
-            maps.gaussians.iter().enumerate().map(bump).collect();
+        let mut bumps = Vec::with_capacity(grids.len());
+        for (person, sent) in maps.people.iter().enumerate() {
+            let all: Vec<Bump> = sent.gaussians.iter().map(bump).collect();
+            if let Some(nth) = all.iter().position(|bump| !bump.is_sound()) {
+                return Err(Refused::Gaussian { person, nth });
+            }
+            bumps.push(all);
+        }
         Ok(Checked {
-            scope,
-            bumps: bumps?,
+            header,
+            grids,
+            bumps,
         })
     }
+}
 
+fn bump(gaussian: &Gaussian) -> Bump {
+    Bump {
+        joint: gaussian.joint as usize,
+        at: gaussian.at,
+        heat: gaussian.heat,
+        precision: gaussian.precision,
+    }
+}
+
+impl Checked {
     /// Number of values of the evidence.
-    pub(crate) fn n_values(&self, maps: &Checked) -> usize {
-        self.layout.n_values(&maps.scope)
+    pub(crate) fn n_values(&self) -> usize {
+        wire::n_values(&self.grids)
     }
 
     /// Writes the evidence, and returns its header without stamp and times.
     ///
     /// * `values`: as many as [`Self::n_values`].
-    pub(crate) fn fill(
-        &self,
-        maps: &Checked,
-        values: &mut [f32],
-    ) -> Result<EvidenceHeader, WireError> {
-        let place = (&*self.layout, &maps.scope);
-        fill_from_bumps(&maps.bumps, place, &MapSettings::default(), values);
-        let levels: Vec<u16> = maps.scope.levels().collect();
-        let bounds = Bounds::new(vec![Bound::UNKNOWN; self.layout.levels.len()]);
-        wire::evidence_to_message(&levels, &bounds, &maps.scope, &self.layout)
+    pub(crate) fn fill(&self, values: &mut [f32]) -> EvidenceHeader {
+        let mut left = values;
+        for (grid, bumps) in self.grids.iter().zip(&self.bumps) {
+            let (own, others) = left.split_at_mut(grid.n_values());
+            fill_from_bumps(bumps, grid.size, &MapSettings::default(), own);
+            left = others;
+        }
+        self.header
     }
 }
 
@@ -157,20 +173,11 @@ pub(crate) fn split(body: &[u8]) -> Option<(Vec<u8>, &[u8])> {
 
 #[cfg(test)]
 mod tests {
-    use fmp::Responses;
-    use posenetwork::springs::{SpringSettings, learn};
-
     use super::*;
 
-    fn person(nth: usize) -> [[f64; 2]; 14] {
-        core::array::from_fn(|it| [(it * 3 + nth % 3) as f64, (it * 5 % 60 + nth % 2) as f64])
-    }
-
     fn view(longest: usize) -> ViewMaps {
-        let people: Vec<_> = (0..30).map(person).collect();
-        let model = learn(&people, &SpringSettings::default()).unwrap();
         ViewMaps {
-            layout: Arc::new(Layout::new(&model, 160, 200).unwrap()),
+            size: [160, 200],
             longest,
         }
     }
@@ -178,15 +185,18 @@ mod tests {
     fn maps() -> Maps {
         let gaussian = |joint: u32| Gaussian {
             joint,
-            at: [40.5, 52.25],
+            at: [20.5, 32.25],
             heat: 0.8,
             precision: [0.25, 0.0, 0.25],
         };
-        Maps {
-            level: 0,
-            x: [20, 150],
-            y: [30, 180],
+        let person = |x: f64| PersonGaussians {
+            first_px: [x, 30.0],
+            cell_px: [2.0; 2],
+            size: [48, 64],
             gaussians: (0..14).map(gaussian).collect(),
+        };
+        Maps {
+            people: vec![person(20.0), person(60.0)],
         }
     }
 
@@ -194,20 +204,18 @@ mod tests {
     fn evidence_crosses() {
         let view = view(1 << 20);
         let checked = view.unpack(&maps().to_bytes()).unwrap();
-        let mut values = vec![0.0; view.n_values(&checked)];
-        let header = view.fill(&checked, &mut values).unwrap();
+        let mut values = vec![0.0; checked.n_values()];
+        let header = checked.fill(&mut values);
         let again = view.unpack(&view.pack(&header, &values).unwrap()).unwrap();
-        let mut others = vec![0.0; view.n_values(&again)];
-        assert_eq!(view.fill(&again, &mut others).unwrap(), header);
+        let mut others = vec![0.0; again.n_values()];
+        assert_eq!(again.fill(&mut others), header);
         let settings = MapSettings::default();
         let off = values.iter().zip(&others);
         let off = off.map(|(a, b)| (settings.heat(*a) - settings.heat(*b)).abs());
         assert!(off.fold(0.0, f64::max) < 0.03);
-        let evidence = wire::evidence_from_message(&header, &others, &view.layout).unwrap();
-        let responses: Responses<'_> = evidence.responses();
-        let window = responses.window(0);
-        let at = (52 - window.top) * window.cols + 41 - window.left;
-        assert!(settings.heat(responses.map(0, 13)[at]) > 0.7);
+        let maps = wire::maps_from_message(&header, &others).unwrap();
+        let heat = settings.heat(maps[1].at(13, [60.0 + 41.0, 30.0 + 64.5]));
+        assert!(heat > 0.7, "{heat}");
     }
 
     #[test]
@@ -219,11 +227,16 @@ mod tests {
             error.to_string()
         };
         let room = 1 << 20;
-        assert!(refused(|it| it.x = [20, 161], room).contains("161"));
-        assert!(refused(|it| it.level = u16::MAX, room).contains("levels"));
+        assert!(refused(|it| it.people[1].size = [0, 64], room).contains("grid.size"));
+        assert!(refused(|it| it.people[0].cell_px[0] = f64::NAN, room).contains("NaN"));
+        assert!(refused(|it| it.people = vec![it.people[0].clone(); 9], room).contains('9'));
         assert!(refused(|_| {}, 100).contains("at most 100"));
-        assert!(refused(|it| it.gaussians[3].heat = f32::NAN, room).contains("Gaussian 3"));
-        assert!(refused(|it| it.gaussians[2].joint = 14, room).contains("Gaussian 2"));
+        let heat = refused(|it| it.people[1].gaussians[3].heat = f32::NAN, room);
+        assert!(
+            heat.contains("Gaussian 3 of the maps of person 1"),
+            "{heat}"
+        );
+        assert!(refused(|it| it.people[0].gaussians[2].joint = 14, room).contains("Gaussian 2"));
         let cut = maps().to_bytes();
         let cut = view(room).unpack(&cut[..30]).unwrap_err().to_string();
         assert!(cut.contains("30 bytes"), "{cut}");

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use messages::{Span, ViewPose, topic};
 use multiview::ViewPlan;
-use pipeline::{Follow, ViewResult, WhoStep};
+use pipeline::{Follow, Sightings, WhoStep};
 use runtime::Service;
 use stage::{Frame, Stage};
 
@@ -36,15 +36,17 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
     let n_views = job.plans.len();
     let mut stage = Stage::new(service, job.patience);
     stage.skip_when_behind(job.frame_step);
-    for (view, plan) in job.plans.iter().enumerate() {
+    for view in 0..n_views {
+        // Who is who does not depend on extra keypoints.
         stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
-            wire::seen_from_message(pose, plan)
+            let n_extras = pose.n_keypoints as usize;
+            wire::sightings_from_message(pose, n_extras)
         })?;
     }
     let people = stage.output(&topic::people(), job.n_consumers)?;
     let mut step = WhoStep::new(job.plans.clone(), job.follow, job.as_seen);
     stage.run(|frame| {
-        let answers: Vec<Option<ViewResult>> = (0..n_views)
+        let answers: Vec<Option<Sightings>> = (0..n_views)
             .map(|view| answer(service, frame, view))
             .collect();
         let present = answers.iter().enumerate();
@@ -60,9 +62,9 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
 /// The candidates of a view; `None` if it has none.
 fn answer(
     service: &Service,
-    frame: &mut Frame<'_, Option<ViewResult>>,
+    frame: &mut Frame<'_, Option<Sightings>>,
     view: usize,
-) -> Option<ViewResult> {
+) -> Option<Sightings> {
     let item = frame.take(view)?;
     let now = frame.turn().received_at();
     let waited = now.saturating_sub(item.timing.sent_at_nanos);

@@ -97,7 +97,6 @@ impl Worker<'_> {
             let mut answer = ViewResult {
                 candidates: found.poses,
                 front: found.front,
-                heats: Vec::new(),
                 sigma_px: None,
                 tau_px: None,
                 skew_s: found.skew_s,

@@ -3,12 +3,10 @@
 use datasets::{People, Person, Picture, Sides};
 use evaluation::{Joints, Pictures};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
-use fmp::{Layout, Pose, Search};
+use fmp::Search;
 use keypoints::Keypoint;
 use pipeline::ViewSettings;
-use posenetwork::springs::{TurnedSprings, joint_of};
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Turn, outline_of};
-use skeleton::PARSE14;
 
 use crate::judged::{go_on, pictures, truth};
 use inputs::pictures::{BOXES_PX, Picture as Shown, Searched};
@@ -16,17 +14,12 @@ use inputs::pictures::{BOXES_PX, Picture as Shown, Searched};
 /// Of the neck and the top of the head in `skeleton::PARSE14`.
 const NECK: usize = 12;
 const HEAD: usize = 13;
-/// A joint lies where its map is highest if the springs put it nearer than this, cells: between cells the maxima of the maps
-/// are more exact.
-const SAME: f64 = 1.5;
 
-/// A network, and the tree of springs that holds its maps together.
+/// A network, and how its boxes are found.
 #[derive(Debug)]
 pub struct NetworkReader {
     /// The network.
     pub network: PoseNetwork,
-    /// Solve the tree of springs.
-    pub springs: TurnedSprings,
     /// What left and right mean in the marks.
     pub sides: Sides,
     /// Finds the boxes; the box around the marked joints is used without it.
@@ -36,7 +29,7 @@ pub struct NetworkReader {
 /// What a network found on people.
 #[derive(Debug)]
 pub struct Seen {
-    /// The joints at the maxima of the maps, and those that the springs choose, as [`Pictures::found`].
+    /// The joints at the maxima of the maps: the first of [`Pictures::found`].
     pub pictures: Pictures,
     /// Of every person, the joints with a mark and a maximum.
     pub errors: Vec<Vec<JointError>>,
@@ -118,14 +111,8 @@ impl NetworkReader {
         maps: &mut JointMaps,
     ) -> Result<[Option<Joints>; 2], Failure> {
         let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
-        let size = picture.size();
-        let Ok(layout) = Layout::new(self.springs.model(), size.width, size.height) else {
-            return Ok([None, None]);
-        };
         let looker = Looker {
             network: &self.network,
-            springs: &self.springs,
-            layout: &layout,
             settings: &MapSettings::default(),
         };
         let image = picture.view();
@@ -143,27 +130,7 @@ impl NetworkReader {
         if self.sides == Sides::Marked {
             maps.name_sides(&self.network, look.front);
         }
-        let peaks = at_peaks(maps.peaks());
-        let pose = maps.pose(self.springs.of(look.turn), &layout, &mut Vec::new());
-        let held = pose.map(|pose| self.joints(&layout, &pose, maps.peaks()));
-        Ok([Some(peaks), held])
-    }
-
-    /// The joints of a pose that the springs chose.
-    fn joints(&self, layout: &Layout, pose: &Pose, peaks: &[Option<Keypoint>]) -> Joints {
-        let model = self.springs.model();
-        let near = SAME * layout.levels[usize::from(pose.level)].scale;
-        let mut joints = [[f64::NAN; 2]; PARSE14.joints.len()];
-        for part in 0..pose.parts.len() {
-            let Some(joint) = joint_of(part) else {
-                continue;
-            };
-            let [x, y] = pose.centre(model, layout, part);
-            let peak = peaks.get(joint).copied().flatten().map(|it| it.at);
-            let is_near = |it: &[f64; 2]| (it[0] - x).hypot(it[1] - y) < near;
-            joints[joint] = peak.filter(is_near).unwrap_or([x, y]);
-        }
-        joints
+        Ok([Some(at_peaks(maps.peaks())), None])
     }
 }
 

@@ -20,7 +20,6 @@ pub mod person;
 pub mod posetraining;
 pub mod quality;
 pub mod smoothed;
-pub mod springs;
 pub mod synth;
 
 pub use failures::{dataset_failure, sequence_failure};

@@ -357,29 +357,3 @@ fn a_wrong_command_line_is_refused_before_the_training() {
         .wait();
     assert!(printed.stdout.contains("seed = 7\n"), "{}", printed.stdout);
 }
-
-#[test]
-fn springs_are_learned_of_marks_and_few_people_are_refused() {
-    let drawn = Drawn::new(60);
-    let fixed = ["train", "springs", "people.jsonl", "--json"];
-    let train = |out: &str, more: &[&str]| {
-        let ended = drawn.start(&[&fixed[..], &["--out", out], more].concat());
-        ended.wait()
-    };
-    let ended = train("person.springs", &["--types", "2"]);
-    assert_ended(&ended, 0, &[]);
-    let summary = events(&ended).pop().unwrap();
-    assert_eq!(summary["sets"][0]["people"], 60);
-    assert_eq!(summary["parts"], 26);
-    let spec = fmp::files::read(&drawn.path("person.springs")).unwrap();
-    assert!(posenetwork::springs::is_tree(&spec));
-    let elbow = spec.spec().parts.iter().map(|it| it.filter_of_type.len());
-    assert_eq!(elbow.max(), Some(2));
-    // The same people, the same bits.
-    assert_ended(&train("again.springs", &["--types", "2"]), 0, &[]);
-    let bytes = |name: &str| fs::read(drawn.path(name)).unwrap();
-    assert_eq!(bytes("person.springs"), bytes("again.springs"));
-    let few = train("few.springs", &["--only", "1-8"]);
-    assert_ended(&few, 4, &["only 8 people", "50"]);
-    assert!(is_gone(&drawn.path("few.springs")));
-}

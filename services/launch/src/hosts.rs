@@ -1,7 +1,6 @@
 //! Deployments of several hosts: which of them this machine is, what must be the same on all, and the job of the bridge.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use bridge::{Address, KeyFiles, NearHost, ViewMaps};
 use deployment::hosts::{Carry, Host};
@@ -103,7 +102,6 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     let config = &deployment.network;
     let mut files: Vec<(&str, &Path)> = Vec::new();
     let settings = if deployment.has_maps() {
-        files.push(("network.springs", &config.springs));
         let networks = deployment.pose_networks().into_iter();
         files.extend(networks.map(|file| ("network.file", file)));
         let detector = config.detector.as_deref();
@@ -156,7 +154,6 @@ fn without_files(config: &network::Config) -> network::Config {
     network::Config {
         file: PathBuf::new(),
         detector: None,
-        springs: PathBuf::new(),
         onnx_runtime: None,
         ..config.clone()
     }
@@ -232,6 +229,10 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
         carry: deployment.link.carry,
         has_quality: deployment.has_quality(),
         maps: if deployment.maps_cross() {
+            let view_maps = |view: &View| ViewMaps {
+                size: view.framing.out_size().map(|side| side as usize),
+                longest: pipeline::most_values(deployment.network.people),
+            };
             prepared.views.iter().map(view_maps).collect()
         } else {
             Vec::new()
@@ -243,15 +244,6 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
         frame_step: step,
         role,
     })
-}
-
-/// The maps of a view, where they cross.
-fn view_maps(view: &View) -> ViewMaps {
-    let layout = view.plan.layout();
-    ViewMaps {
-        longest: pipeline::most_values(layout),
-        layout: Arc::new(layout.clone()),
-    }
 }
 
 #[cfg(test)]

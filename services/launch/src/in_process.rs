@@ -1,11 +1,11 @@
 //! The pipeline of a deployment in one process, by the method of networks: the same steps as its processes, the same bits.
 
-use std::sync::Arc;
-
 use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
 use keypoints::files::SeenKeypoints;
-use pipeline::{Estimate, NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame};
+use pipeline::{
+    NetworkEstimate, NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame,
+};
 
 use crate::prepare::{Prepared, space_settings};
 use crate::process::{most_apart, view_step};
@@ -42,9 +42,8 @@ impl InProcess {
         let prepared = Prepared::new(resolved)?;
         let plans = prepared.plans();
         let (mut steps, mut keypoints) = (Vec::new(), Vec::new());
-        for (view, plan) in plans.iter().enumerate() {
-            let layout = Arc::new(plan.layout().clone());
-            match view_step::of_view(resolved, &prepared, view, layout)? {
+        for view in 0..plans.len() {
+            match view_step::of_view(resolved, &prepared, view)? {
                 pose::Step::Network(step) => {
                     steps.push(*step);
                     keypoints.push(None);
@@ -84,7 +83,10 @@ impl InProcess {
     /// # Errors
     ///
     /// A network fails.
-    pub fn estimate(&mut self, frames: &[Option<SentFrame<'_>>]) -> Result<Estimate, Failure> {
+    pub fn estimate(
+        &mut self,
+        frames: &[Option<SentFrame<'_>>],
+    ) -> Result<NetworkEstimate, Failure> {
         let frame = self.start_frame + self.n_frames * self.frame_step;
         self.n_frames += 1;
         let mut people: Vec<Vec<SeenKeypoints>> = Vec::new();

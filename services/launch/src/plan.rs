@@ -150,7 +150,7 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
                 .product::<usize>()
                 * 3,
             evidence_values: if resolved.deployment.has_maps() {
-                pipeline::most_values(it.plan.layout())
+                pipeline::most_values(resolved.deployment.network.people)
             } else {
                 it.plan.layout().n_responses()
             },

@@ -63,11 +63,7 @@ impl Prepared {
 
     fn read(resolved: &Resolved) -> Result<Self, Failure> {
         let deployment = &resolved.deployment;
-        let model = if deployment.has_maps() {
-            inputs::springs(&deployment.network.springs)?
-        } else {
-            inputs::model_or_shipped(deployment.paper.model.as_deref())?
-        };
+        let model = inputs::model_or_shipped(deployment.paper.model.as_deref())?;
         let rig = inputs::rig_of(deployment)?;
         let (mut views, mut sizes) = (Vec::new(), Vec::new());
         let names = deployment.cameras.iter().map(|it| it.name.as_str());

@@ -195,10 +195,9 @@ fn most_shrink(framing: &Framing) -> usize {
 fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let topology = resolved.topology();
-    let layout = Arc::new(prepared.views[view].plan.layout().clone());
     let job = pose::Job {
         view,
-        step: view_step::of_view(resolved, &prepared, view, layout)?,
+        step: view_step::of_view(resolved, &prepared, view)?,
         n_extras: resolved.extra_keypoints.len(),
         n_pose_consumers: topology.receivers_of(&topic::view_pose(view)),
         n_evidence_consumers: topology.receivers_of(&topic::evidence(view)),
@@ -291,17 +290,17 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let topology = resolved.topology();
     let plans = prepared.plans();
-    let extras = ExtrasStep::new(
-        &resolved.extra_keypoints,
-        plans.clone(),
-        prepared.settings.skeleton.triangulation,
-    );
     // Twice the patience of the process before, which waits for late views itself.
     let patience = 2 * resolved.patience();
     let n_consumers = topology.receivers_of(&topic::skeletons());
     if topology.has_maps() {
         let settings = space_settings(resolved, &prepared);
         let step = SpaceStep::new(plans.clone(), prepared.up_in_world, settings);
+        let extras = ExtrasStep::new(
+            &resolved.extra_keypoints,
+            plans.iter().map(|plan| plan.camera().clone()).collect(),
+            prepared.settings.skeleton.triangulation,
+        );
         let job = triangulate::SpaceJob {
             plans,
             extras,
@@ -319,7 +318,6 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     );
     let job = triangulate::Job {
         plans,
-        extras,
         frame_rate_hz: resolved.frame_rate_hz(),
         views: prepared.settings.views,
         n_workers: topology.n_workers(),

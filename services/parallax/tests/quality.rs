@@ -126,7 +126,6 @@ fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>>
         Some(ViewResult {
             candidates: found.candidates,
             front: found.front,
-            heats: Vec::new(),
             sigma_px: None,
             tau_px: None,
             skew_s: 0.0,

@@ -47,8 +47,8 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     assert_eq!(recording["lost"], json!(0), "{recording:#}");
     for topic in [
         "frame/v1/0",
-        "view-pose/v7/1",
-        "evidence/v3/2",
+        "view-pose/v8/1",
+        "evidence/v4/2",
         "skeletons/v1",
     ] {
         let n = recording["topics"][topic]["messages"].as_u64().unwrap();
@@ -111,7 +111,7 @@ fn omitted_messages_and_existing_files_are_reported() {
     let case = Case::new("less", &[3; 2], PLAIN);
     let report = recorded(&case, &["--without", "pixels", "--without", "evidence"]);
     let topics = &report["recording"]["topics"];
-    assert_eq!(topics.get("evidence/v3/0"), None);
+    assert_eq!(topics.get("evidence/v4/0"), None);
     assert!(report["recording"]["bytes"].as_u64().unwrap() < 1_000_000);
     for (from, lacks) in [("pose", "the pixels of its frames"), ("fuse", "evidence")] {
         let ended = replayed(&case, &["--from", from]);
@@ -152,7 +152,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     recorded(&case, &["--without", "evidence", "--without", "pixels"]);
     let mut file = fs::read(case.path("run.mcap")).unwrap();
     let recording = recording::scan(&mut std::io::Cursor::new(&file)).unwrap();
-    let poses = &recording.tracks["view-pose/v7/1"].entries;
+    let poses = &recording.tracks["view-pose/v8/1"].entries;
     let entry = poses.iter().find(|it| it.frame == Some(3)).unwrap();
     // Behind stamp and times, in the content. Six bytes of a pose move a joint.
     let at = (entry.offset + entry.len / 2) as usize;
@@ -162,11 +162,11 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     let ended = replayed(&case, &["--from", "triangulate", "--out", "less", "--json"]);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let Entry { offset, chunk, .. } = entry;
-    let named = format!("view-pose/v7/1, frame 3, at byte {offset}, in the chunk at byte {chunk}");
+    let named = format!("view-pose/v8/1, frame 3, at byte {offset}, in the chunk at byte {chunk}");
     assert!(ended.stderr.contains(&named), "{}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let expected =
-        json!({ "topic": "view-pose/v7/1", "frame": 3, "offset": offset, "chunk": chunk });
+        json!({ "topic": "view-pose/v8/1", "frame": 3, "offset": offset, "chunk": chunk });
     let damaged = report["recording"]["damaged"].as_array().unwrap();
     assert!(damaged.contains(&expected), "{damaged:?}");
     assert!(

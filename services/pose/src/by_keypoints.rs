@@ -1,7 +1,7 @@
 //! Takes what another program found in a frame.
 
 use failure::Failure;
-use messages::{Searched, Stamp, Status};
+use messages::{Stamp, Status};
 
 use crate::job::Keypoints;
 use crate::memory::KeypointState;
@@ -19,7 +19,6 @@ impl View<'_> {
         let KeypointState {
             memory,
             people,
-            responses,
             has_failed,
         } = state;
         if let Err(error) = keypoints.source.read(stamp.frame, people) {
@@ -34,11 +33,8 @@ impl View<'_> {
             }
             return Ok(Err(Status::BAD_INPUT));
         }
-        let seen = people.iter().map(|it| &it.keypoints[..]);
-        let Some(scope) = keypoints.step.take(seen, memory) else {
-            return Ok(Err(Status::NO_DETECTION));
-        };
-        let fill = |responses: &mut [f32]| keypoints.step.fill(scope, responses, memory);
-        self.fill(&scope, Searched::FULL, responses, fill).map(Ok)
+        let seen = people.iter().map(|person| &person.keypoints[..]);
+        keypoints.step.take(seen, memory);
+        self.seen(&keypoints.step, memory)
     }
 }

@@ -1,9 +1,10 @@
 //! Looks at a frame with a network that finds keypoints.
 
-use failure::{Failure, now_nanos};
+use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use kernels::Rgb8View;
-use messages::{Searched, Stamp, Status};
+use messages::{Searched, Stamp, Status, ViewPose};
 use pipeline::{NetworkMemory, NetworkStep};
+use posenetwork::{MapGrid, PersonMaps};
 
 use crate::memory::NetworkState;
 use crate::view::{Found, View};
@@ -20,35 +21,63 @@ impl View<'_> {
         let begin = now_nanos();
         let looked = step.look(image, &mut state.memory);
         self.put_off_search(now_nanos() - begin, &mut state.memory);
-        let scope = match looked {
-            Ok(scope) => scope,
-            Err(error) => {
-                if !state.has_failed {
-                    let error = wording::in_one_line(&error);
-                    tracing::warn!(
-                        frame = stamp.frame,
-                        error,
-                        "the network has no answer for a frame"
-                    );
-                    state.has_failed = true;
-                }
-                return Ok(Err(Status::BAD_INPUT));
+        if let Err(error) = looked {
+            if !state.has_failed {
+                let error = wording::in_one_line(&error);
+                tracing::warn!(
+                    frame = stamp.frame,
+                    error,
+                    "the network has no answer for a frame"
+                );
+                state.has_failed = true;
             }
-        };
-        state.sees(scope.is_some(), &stamp);
-        let Some(scope) = scope else {
+            return Ok(Err(Status::BAD_INPUT));
+        }
+        let found = self.seen(step, &mut state.memory)?;
+        state.sees(found.is_ok(), &stamp);
+        Ok(found)
+    }
+
+    /// The people of a frame that was looked at, and their maps.
+    pub(crate) fn seen(
+        &self,
+        step: &NetworkStep,
+        memory: &mut NetworkMemory,
+    ) -> Result<Result<Found<'_>, Status>, Failure> {
+        let people = step.sightings(memory);
+        if people.is_empty() {
             return Ok(Err(Status::NO_DETECTION));
-        };
-        let searched = if state.memory.has_searched() {
-            Searched::FULL
-        } else {
-            Searched::TRACKED
-        };
-        let NetworkState {
-            memory, responses, ..
-        } = state;
-        let fill = |responses: &mut [f32]| step.fill(scope, responses, memory);
-        self.fill(&scope, searched, responses, fill).map(Ok)
+        }
+        let maps: Vec<PersonMaps<'_>> = step.evidence(memory).collect();
+        let grids: Vec<MapGrid> = maps.iter().map(|maps| *maps.grid()).collect();
+        let header = wire::maps_to_message(&grids, step.size()).or_fail(ExitKind::Run)?;
+        let n_values = wire::n_values(&grids);
+        let (loan_nanos, mut loan) = self.loan(n_values)?;
+        let mut evidence_bytes = 0;
+        if let Some(loan) = &mut loan {
+            let mut left = loan.payload_mut();
+            for maps in &maps {
+                let (own, others) = left.split_at_mut(maps.values().len());
+                own.copy_from_slice(maps.values());
+                left = others;
+            }
+            evidence_bytes = (n_values * size_of::<f32>()) as u64;
+        }
+        let message = wire::sightings_to_message(&people, self.job.n_extras, step.size());
+        Ok(Ok(Found {
+            message: ViewPose {
+                searched: if memory.has_searched() {
+                    Searched::FULL
+                } else {
+                    Searched::TRACKED
+                },
+                evidence_bytes,
+                ..message.or_fail(ExitKind::Run)?
+            },
+            header,
+            evidence: loan,
+            loan_nanos,
+        }))
     }
 
     /// Puts off the next search for boxes where this one took long: of a slow machine the others need the cores as well.

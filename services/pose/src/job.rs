@@ -2,10 +2,7 @@
 
 use core::time::Duration;
 
-use std::sync::Arc;
-
 use deployment::Timeline;
-use fmp::Layout;
 use keypoints::files::SeenKeypoints;
 use keypoints::keypointfiles::{KeypointFileError, KeypointSource};
 use pipeline::{NetworkStep, ViewStep};
@@ -68,12 +65,12 @@ pub enum Step {
 }
 
 impl Step {
-    /// The pyramid of the evidence.
-    pub(crate) fn layout(&self) -> &Arc<Layout> {
+    /// Width and height of the frames.
+    pub(crate) fn size(&self) -> [usize; 2] {
         match self {
-            Self::Filters(it) => it.layout(),
-            Self::Network(it) => it.layout(),
-            Self::Keypoints(it) => it.step.layout(),
+            Self::Filters(step) => step.layout().image_size,
+            Self::Network(step) => step.size(),
+            Self::Keypoints(keypoints) => keypoints.step.size(),
         }
     }
 }

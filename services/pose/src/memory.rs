@@ -20,8 +20,6 @@ const LONG_NANOS: u64 = 60_000_000_000;
 #[derive(Debug, Default)]
 pub(crate) struct NetworkState {
     pub(crate) memory: NetworkMemory,
-    /// Responses that do not lie in shared memory.
-    pub(crate) responses: Vec<f32>,
     /// When somebody was seen last, or a warning was given, and the number of frames since.
     pub(crate) nobody: Option<(u64, u64)>,
     /// Whether a failure of the network was told.
@@ -53,8 +51,6 @@ impl NetworkState {
 pub(crate) struct KeypointState {
     pub(crate) memory: NetworkMemory,
     pub(crate) people: Vec<SeenKeypoints>,
-    /// Responses that do not lie in shared memory.
-    pub(crate) responses: Vec<f32>,
     /// Whether a file that cannot be read was told.
     pub(crate) has_failed: bool,
 }

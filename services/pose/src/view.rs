@@ -1,27 +1,36 @@
-//! Searches a frame, writes the responses into shared memory, sends candidates and evidence.
+//! Searches a frame, writes its evidence into shared memory, sends what was found and the evidence.
 
 use std::rc::Rc;
 
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
-use fmp::{FrameTime, Scope, Tracker};
+use fmp::{FrameTime, Layout, Scope, Tracker};
 use kernels::Rgb8View;
 use messages::{EvidenceHeader, FrameHeader, Searched, Status, Timing, ViewPose};
 use metrics::Passage;
 use pipeline::{ViewEstimate, ViewStep};
 use runtime::{Loan, Sample, Service, SlicePublisher};
 use stage::{Output, StreamFrame, Turn};
+use wire::WireError;
 
 use crate::job::{Job, Step};
 use crate::memory::Memory;
 
 /// What was found in a frame, and its evidence if a process receives it.
 pub(crate) struct Found<'a> {
-    pub(crate) estimate: ViewEstimate,
+    /// Without stamp and times, as `header`.
+    pub(crate) message: ViewPose,
+    pub(crate) header: EvidenceHeader,
+    pub(crate) evidence: Option<Loan<'a, f32, EvidenceHeader>>,
     /// How long the stage waited for the memory of the evidence.
     pub(crate) loan_nanos: u64,
-    /// The responses of the scope that was searched.
-    pub(crate) evidence: Option<Loan<'a, f32, EvidenceHeader>>,
-    pub(crate) searched: Searched,
+}
+
+/// The result of the filters, and its evidence if a process receives it.
+struct Searching<'a> {
+    estimate: ViewEstimate,
+    evidence: Option<Loan<'a, f32, EvidenceHeader>>,
+    loan_nanos: u64,
+    searched: Searched,
 }
 
 /// The search of one view, and its outputs.
@@ -41,7 +50,7 @@ impl View<'_> {
         // The frame is released before the process waits for any receiver.
         drop(sample);
         let message = match &outcome {
-            Ok(found) => self.message(found)?,
+            Ok(found) => found.message,
             Err(status) => ViewPose {
                 status: *status,
                 ..ViewPose::default()
@@ -57,7 +66,7 @@ impl View<'_> {
         if let Ok(found) = outcome
             && let Some(loan) = found.evidence
         {
-            self.send_evidence(&turn, &found.estimate, loan)?;
+            send_evidence(&turn, found.header, loan)?;
             let n_bytes = message.evidence_bytes;
             self.service.health().sent_evidence(n_bytes);
         }
@@ -72,49 +81,6 @@ impl View<'_> {
         Ok(())
     }
 
-    fn send_evidence(
-        &self,
-        turn: &Turn,
-        estimate: &ViewEstimate,
-        mut loan: Loan<'_, f32, EvidenceHeader>,
-    ) -> Result<(), Failure> {
-        let (layout, found) = (self.job.step.layout(), estimate);
-        let header = wire::evidence_to_message(&found.levels, &found.bounds, &found.scope, layout);
-        *loan.header_mut() = EvidenceHeader {
-            stamp: *turn.stamp(),
-            timing: Timing {
-                received_at_nanos: turn.received_at(),
-                sent_at_nanos: now_nanos(),
-            },
-            ..header.or_fail(ExitKind::Run)?
-        };
-        loan.send()?;
-        Ok(())
-    }
-
-    /// The candidates, the search mode, and the size of their evidence.
-    fn message(&self, found: &Found<'_>) -> Result<ViewPose, Failure> {
-        let layout = self.job.step.layout();
-        let Found {
-            estimate, evidence, ..
-        } = found;
-        let message = wire::candidates_to_message(&estimate.candidates, layout.image_size);
-        let mut message = message.or_fail(ExitKind::Run)?;
-        wire::local_to_message(&mut message, &estimate.local).or_fail(ExitKind::Run)?;
-        wire::front_to_message(&mut message, &estimate.front).or_fail(ExitKind::Run)?;
-        wire::heats_to_message(&mut message, &estimate.heats).or_fail(ExitKind::Run)?;
-        wire::extras_to_message(&mut message, self.job.n_extras, &estimate.extras)
-            .or_fail(ExitKind::Run)?;
-        let n_values = evidence
-            .as_ref()
-            .map_or(0, |_| layout.n_values(&estimate.scope));
-        Ok(ViewPose {
-            searched: found.searched,
-            evidence_bytes: (n_values * size_of::<f32>()) as u64,
-            ..message
-        })
-    }
-
     /// The estimate and its evidence, or why there is none.
     fn solve(
         &self,
@@ -126,12 +92,12 @@ impl View<'_> {
         if header.status != Status::OK {
             return Ok(Err(header.status));
         }
-        let layout = self.job.step.layout();
+        let expected = self.job.step.size();
         let size = [header.width as usize, header.height as usize];
         let image = match Rgb8View::new(size[0], size[1], sample.payload()) {
-            Ok(image) if size == layout.image_size => image,
+            Ok(image) if size == expected => image,
             _ => {
-                tracing::warn!(?size, expected = ?layout.image_size, "a frame of another size");
+                tracing::warn!(?size, ?expected, "a frame of another size");
                 return Ok(Err(Status::BAD_INPUT));
             }
         };
@@ -170,7 +136,7 @@ impl View<'_> {
             found = self.find(step, (image, Scope::whole(layout)), responses)?;
         }
         step.update(tracker, at, &found.estimate);
-        Ok(found)
+        found.message(layout).or_fail(ExitKind::Run)
     }
 
     /// Searches a frame. Responses that a process receives are written into shared memory directly.
@@ -179,46 +145,82 @@ impl View<'_> {
         step: &ViewStep,
         (image, scope): (Rgb8View<'_>, Scope),
         responses: &mut Vec<f32>,
-    ) -> Result<Found<'_>, Failure> {
+    ) -> Result<Searching<'_>, Failure> {
         let searched = if scope == Scope::whole(step.layout()) {
             Searched::FULL
         } else {
             Searched::TRACKED
         };
-        let run = |responses: &mut [f32]| step.run(image, scope, responses);
-        self.fill(&scope, searched, responses, run)
-    }
-
-    /// Has the responses of a scope written: into shared memory directly if a process receives them.
-    ///
-    /// * `responses`: memory for those that nobody receives.
-    pub(crate) fn fill(
-        &self,
-        scope: &Scope,
-        searched: Searched,
-        responses: &mut Vec<f32>,
-        run: impl FnOnce(&mut [f32]) -> ViewEstimate,
-    ) -> Result<Found<'_>, Failure> {
-        let n_values = self.job.step.layout().n_values(scope);
-        if self.job.n_evidence_consumers == 0 {
-            responses.resize(responses.len().max(n_values), 0.0);
-            return Ok(Found {
-                estimate: run(responses),
-                loan_nanos: 0,
-                evidence: None,
-                searched,
-            });
-        }
-        let begin = now_nanos();
-        let mut loan = self.evidence.loan(n_values)?;
-        let loan_nanos = now_nanos() - begin;
-        let estimate = run(loan.payload_mut());
+        let n_values = step.layout().n_values(&scope);
+        let (loan_nanos, mut loan) = self.loan(n_values)?;
+        let estimate = match &mut loan {
+            Some(loan) => step.run(image, scope, loan.payload_mut()),
+            None => {
+                responses.resize(responses.len().max(n_values), 0.0);
+                step.run(image, scope, responses)
+            }
+        };
         let is_there = !estimate.candidates.is_empty();
-        Ok(Found {
-            evidence: is_there.then_some(loan),
+        Ok(Searching {
+            evidence: loan.filter(|_| is_there),
             estimate,
             loan_nanos,
             searched,
         })
     }
+
+    /// Memory for the evidence of a frame, and how long the stage waited for it; none where no process receives evidence.
+    pub(crate) fn loan(
+        &self,
+        n_values: usize,
+    ) -> Result<(u64, Option<Loan<'_, f32, EvidenceHeader>>), Failure> {
+        if self.job.n_evidence_consumers == 0 {
+            return Ok((0, None));
+        }
+        let begin = now_nanos();
+        let loan = self.evidence.loan(n_values)?;
+        Ok((now_nanos() - begin, Some(loan)))
+    }
+}
+
+impl<'a> Searching<'a> {
+    /// The candidates, the search mode, and the size of their evidence.
+    fn message(self, layout: &Layout) -> Result<Found<'a>, WireError> {
+        let estimate = &self.estimate;
+        let mut message = wire::candidates_to_message(&estimate.candidates, layout.image_size)?;
+        wire::local_to_message(&mut message, &estimate.local)?;
+        wire::front_to_message(&mut message, &estimate.front)?;
+        let n_values = match &self.evidence {
+            Some(_) => layout.n_values(&estimate.scope),
+            None => 0,
+        };
+        let (levels, bounds) = (&estimate.levels, &estimate.bounds);
+        Ok(Found {
+            message: ViewPose {
+                searched: self.searched,
+                evidence_bytes: (n_values * size_of::<f32>()) as u64,
+                ..message
+            },
+            header: wire::evidence_to_message(levels, bounds, &estimate.scope, layout)?,
+            evidence: self.evidence,
+            loan_nanos: self.loan_nanos,
+        })
+    }
+}
+
+fn send_evidence(
+    turn: &Turn,
+    header: EvidenceHeader,
+    mut loan: Loan<'_, f32, EvidenceHeader>,
+) -> Result<(), Failure> {
+    *loan.header_mut() = EvidenceHeader {
+        stamp: *turn.stamp(),
+        timing: Timing {
+            received_at_nanos: turn.received_at(),
+            sent_at_nanos: now_nanos(),
+        },
+        ..header
+    };
+    loan.send()?;
+    Ok(())
 }

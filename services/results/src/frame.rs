@@ -6,6 +6,8 @@ use messages::{
     ViewQuality,
 };
 
+use pipeline::Sighting;
+
 use crate::{Missing, Scene};
 
 /// The messages of one view about one frame; `None` where none came.
@@ -110,40 +112,50 @@ impl FrameRecord {
     }
 
     /// The candidates of a view, best first; none if it had none, or sent what cannot be read.
-    pub(crate) fn candidates(&self, scene: &Scene, view: usize) -> Vec<Pose> {
-        let message = self.views.get(view).and_then(|it| it.pose.as_ref());
-        let read = message
-            .map(|it| wire::candidates_from_message(it, &scene.model, &scene.views[view].layout));
-        match read {
-            Some(Ok(candidates)) => candidates,
-            Some(Err(error)) => {
-                tracing::warn!(view, frame = self.frame(), %error, "unreadable candidates");
-                Vec::new()
-            }
-            None => Vec::new(),
-        }
+    pub(crate) fn candidates(&self, scene: &Scene, view: usize) -> Vec<Own> {
+        let Some(message) = self.views.get(view).and_then(|it| it.pose.as_ref()) else {
+            return Vec::new();
+        };
+        let read = if scene.has_maps {
+            wire::sightings_from_message(message, message.n_keypoints as usize).map(|seen| {
+                let people = seen.into_iter().flat_map(|seen| seen.people);
+                people.map(|person| Own::seen(&person)).collect()
+            })
+        } else {
+            let layout = &scene.views[view].layout;
+            let candidates = wire::candidates_from_message(message, &scene.model, layout);
+            candidates.map(|poses| {
+                let poses = poses.into_iter();
+                poses.map(|pose| Own::solved(pose, scene, view)).collect()
+            })
+        };
+        read.unwrap_or_else(|error| {
+            tracing::warn!(view, frame = self.frame(), %error, "unreadable candidates");
+            Vec::new()
+        })
     }
 
     /// The candidate of a view that is the person, as far as the view itself can tell: the best one of the filters; of the people that a
     /// network sees, the one nearest to where fusion put the person; the largest one where fusion left out the view.
-    pub(crate) fn own(&self, scene: &Scene, view: usize) -> Option<Pose> {
+    pub(crate) fn own(&self, scene: &Scene, view: usize) -> Option<Own> {
         let candidates = self.candidates(scene, view);
         if !scene.has_maps || candidates.len() < 2 {
             return candidates.into_iter().next();
         }
         let fused = self.fused(view).filter(|fused| fused.n_parts > 0);
-        let layout = &scene.views[view].layout;
-        let distance = |it: &Pose| -> f64 {
-            let centres = it.centres(&scene.model, layout);
+        let distance = |own: &Own| -> f64 {
+            let known = own.centres_px.iter().copied();
             let Some(fused) = fused else {
-                return -geometry::longer_side(centres.into_iter()).unwrap_or(0.0);
+                let known = known.filter(|at| at[0].is_finite());
+                return -geometry::longer_side(known).unwrap_or(0.0);
             };
-            let both = centres.iter().zip(&fused.centres_px);
-            both.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum()
+            let both = known.zip(&fused.centres_px);
+            let each = both.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
+            each.filter(|px| px.is_finite()).sum()
         };
-        let distances = candidates.into_iter().map(|it| (distance(&it), it));
+        let distances = candidates.into_iter().map(|own| (distance(&own), own));
         let nearest = distances.min_by(|a, b| a.0.total_cmp(&b.0));
-        nearest.map(|it| it.1)
+        nearest.map(|(_, own)| own)
     }
 
     /// How many frames ago the expected errors were predicted that fusion used for a view, at least: the
@@ -160,5 +172,33 @@ impl FrameRecord {
         wire::sigma_from_message(message, scene.model.n_parts())
             .ok()
             .flatten()
+    }
+}
+
+/// What a view found by itself of one person.
+#[derive(Debug, Clone)]
+pub(crate) struct Own {
+    /// The parts of the body, pixels of the frame, by the names of the view; NaN for one that is not seen.
+    pub(crate) centres_px: Vec<[f64; 2]>,
+    pub(crate) score: f32,
+    /// By the paper's method.
+    pub(crate) pose: Option<Pose>,
+}
+
+impl Own {
+    fn seen(person: &Sighting) -> Self {
+        Self {
+            centres_px: pipeline::parts_of(&person.places(false)),
+            score: person.score,
+            pose: None,
+        }
+    }
+
+    fn solved(pose: Pose, scene: &Scene, view: usize) -> Self {
+        Self {
+            centres_px: pose.centres(&scene.model, &scene.views[view].layout),
+            score: pose.score,
+            pose: Some(pose),
+        }
     }
 }

@@ -69,13 +69,16 @@ fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: u
         return;
     };
     let width = thin(canvas);
-    let centres = best.centres(&scene.model, &scene.views[view].layout);
+    let centres = best.centres_px;
     if let Some(joints) = joints_of(scene, &centres) {
         for &(from, to) in scene.joints.limbs {
-            canvas.line(joints[from], joints[to], width, FAINT);
+            let ends = [joints[from], joints[to]];
+            if ends.as_flattened().iter().all(|side| side.is_finite()) {
+                canvas.line(ends[0], ends[1], width, FAINT);
+            }
         }
     }
-    for centre in centres {
+    for centre in centres.into_iter().filter(|at| at[0].is_finite()) {
         canvas.disc(centre, 1.2 * width, FAINT);
     }
 }

@@ -21,10 +21,8 @@ pub(crate) fn readings(
 ) -> Option<[Vec<[f64; 2]>; 2]> {
     let best = record
         .own(scene, view)
-        .filter(|it| it.score >= scene.least_score)?;
-    let layout = &scene.views[view].layout;
-    let centre = |part: usize| best.centre(&scene.model, layout, part);
-    let named: Vec<[f64; 2]> = (0..best.parts.len()).map(centre).collect();
+        .filter(|own| own.score >= scene.least_score)?;
+    let named = best.centres_px;
     let mirror = scene.model.spec().mirror.as_deref();
     let exchanged = mirror.map(|it| it.iter().map(|part| named[*part]).collect());
     Some([named.clone(), exchanged.unwrap_or(named)])

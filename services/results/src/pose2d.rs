@@ -63,16 +63,16 @@ fn single(scene: &Scene, record: &FrameRecord, view: usize) -> Option<SinglePose
     let candidates = record.candidates(scene, view);
     let best = record.own(scene, view)?;
     let it = &scene.views[view];
-    let part = |part: usize| {
-        let centre = best.centre(&scene.model, &it.layout, part);
-        let [x, y] = it.in_source(centre).map(finite);
-        let part_type = u64::from(best.parts[part].mixture) + 1;
+    let pose = best.pose.as_ref();
+    let part = |(part, centre): (usize, &[f64; 2])| {
+        let [x, y] = it.in_source(*centre).map(finite);
+        let part_type = pose.map(|pose| u64::from(pose.parts[part].mixture) + 1);
         TypedPart { part_type, x, y }
     };
     Some(SinglePose {
         candidates: candidates.len() as u64,
-        level: u64::from(best.level) + 1,
-        parts: (0..best.parts.len()).map(part).collect(),
+        level: pose.map(|pose| u64::from(pose.level) + 1),
+        parts: best.centres_px.iter().enumerate().map(part).collect(),
         score: finite(f64::from(best.score)),
     })
 }
@@ -107,7 +107,7 @@ mod tests {
         let scene = scene();
         let record = record(0);
         let candidates = record.candidates(&scene, 0);
-        let centre = candidates[0].centre(&scene.model, &scene.views[0].layout, 0);
+        let centre = candidates[0].centres_px[0];
         let [x, y] = scene.views[0].in_source(centre);
         let got = lines(&record);
         assert_eq!(got[0]["single"]["parts"][0]["x"], json!(x));

@@ -2,17 +2,17 @@
 
 use core::time::Duration;
 use std::cell::Ref;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use failure::{ExitKind, Failure, OrFail as _};
 use messages::{EvidenceHeader, Skeletons, ViewPose, topic};
 use multiview::ViewPlan;
-use pipeline::{
-    ExtraKeypoint, ExtrasStep, FoundExtras, FramePeople, Motion, SpaceStep, ViewResult,
-};
+use pipeline::{ExtrasStep, FramePeople, Motion, Sightings, SpaceStep};
+use posenetwork::PersonMaps;
 use runtime::{Sample, Service};
 use stage::{Context, Frame, Held, Output, Stage};
-use wire::{EvidenceView, SolvedPerson};
+use wire::SolvedPerson;
 
 /// The process's work by the method of networks.
 #[derive(Debug)]
@@ -35,7 +35,7 @@ pub struct SpaceJob {
 /// A decoded message.
 #[derive(Debug)]
 enum Input {
-    Seen(Option<ViewResult>, Vec<ExtraKeypoint>),
+    Seen(Option<Sightings>),
     People(FramePeople),
 }
 
@@ -49,15 +49,12 @@ enum Input {
 pub fn run_in_space(service: &Service, job: &SpaceJob, mut step: SpaceStep) -> Result<(), Failure> {
     let mut stage = Stage::new(service, job.patience);
     stage.skip_when_behind(job.frame_step);
-    for (view, plan) in job.plans.iter().enumerate() {
+    let n_views = job.plans.len();
+    for view in 0..n_views {
         stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
-            let seen = wire::seen_from_message(pose, plan)?;
-            let n = seen.as_ref().map_or(0, |seen| seen.candidates.len());
-            let extras = wire::extras_from_message(pose, job.extras.n_keypoints(), n)?;
-            Ok(Input::Seen(seen, extras))
+            wire::sightings_from_message(pose, job.extras.n_keypoints()).map(Input::Seen)
         })?;
     }
-    let n_views = job.plans.len();
     let people = stage.people_input(move |message| {
         wire::people_from_message(message, n_views).map(Input::People)
     })?;
@@ -71,9 +68,9 @@ pub fn run_in_space(service: &Service, job: &SpaceJob, mut step: SpaceStep) -> R
         people,
         output: stage.output(&topic::skeletons(), job.n_consumers)?,
     };
-    // Of the extra keypoints.
-    let mut motion = Motion::default();
-    stage.run(|frame| solver.solve(frame, &mut step, &mut motion))
+    // Of the extra keypoints, by person.
+    let mut motions = BTreeMap::new();
+    stage.run(|frame| solver.solve(frame, &mut step, &mut motions))
 }
 
 /// The inputs and the output of the process.
@@ -91,11 +88,10 @@ impl Solver<'_> {
         &self,
         frame: &mut Frame<'_, Input>,
         step: &mut SpaceStep,
-        motion: &mut Motion,
+        motions: &mut BTreeMap<u64, Motion>,
     ) -> Result<(), Failure> {
         let n_views = self.job.plans.len();
-        let (answers, extras): (Vec<Option<ViewResult>>, Vec<Vec<ExtraKeypoint>>) =
-            (0..n_views).map(|view| seen(frame, view)).unzip();
+        let answers: Vec<Option<Sightings>> = (0..n_views).map(|view| seen(frame, view)).collect();
         let people = match frame.take(self.people).map(|item| item.value) {
             Some(Input::People(people)) => people,
             _ => FramePeople::default(),
@@ -105,74 +101,52 @@ impl Solver<'_> {
             .iter()
             .map(|held| held.of(frame.number()))
             .collect();
-        let evidence: Vec<Option<EvidenceView<'_>>> = samples
-            .iter()
-            .zip(&self.job.plans)
-            .map(|(sample, plan)| self.evidence(sample.as_deref()?, plan))
-            .collect();
-        let responses: Vec<_> = evidence
-            .iter()
-            .map(|view| view.as_ref().map(EvidenceView::responses))
-            .collect();
+        let maps = samples.iter().map(|sample| match sample {
+            Some(sample) => self.maps(sample),
+            None => Vec::new(),
+        });
+        let maps: Vec<Vec<PersonMaps<'_>>> = maps.collect();
         let instant_s = self
             .job
             .frame_rate_hz
             .map(|rate| frame.number() as f64 / rate);
         step.begin(instant_s);
-        let skeleton = step.run(&answers, &responses, &people);
+        let solved = step.run(&answers, &maps, &people);
         let present = answers.iter().enumerate();
         let present = present.filter(|(_, answer)| answer.is_some());
         let present = present.fold(0, |mask, (view, _)| mask | 1_u32 << view);
-        self.service
-            .health()
-            .counted_people(skeleton.n_people as u32);
-        motion.begin(instant_s);
-        let found = found_extras(&answers, &extras);
-        let keypoints = self.job.extras.run(&skeleton, &found, motion);
-        let solved = people.people.first().map(|person| SolvedPerson {
-            id: person.id,
-            skeleton: &skeleton,
-            keypoints: &keypoints,
+        self.service.health().counted_people(people.n_seen as u32);
+        motions.retain(|id, _| solved.iter().any(|person| person.id == *id));
+        let keypoints = solved.iter().map(|person| {
+            let motion = motions.entry(person.id).or_default();
+            motion.begin(instant_s);
+            self.job.extras.run(&person.skeleton, &answers, motion)
         });
-        let message = wire::skeletons_to_message(solved.as_slice(), skeleton.n_people, present);
+        let keypoints: Vec<Vec<_>> = keypoints.collect();
+        let solved = solved.iter().zip(&keypoints);
+        let solved = solved.map(|(person, keypoints)| SolvedPerson {
+            id: person.id,
+            skeleton: &person.skeleton,
+            keypoints,
+        });
+        let solved: Vec<SolvedPerson<'_>> = solved.collect();
+        let message = wire::skeletons_to_message(&solved, people.n_seen, present);
         let message = message.or_fail(ExitKind::Run)?;
         self.output.send_and_account(frame.turn(), 0, *message)
     }
 
-    /// The evidence of a view; `None`, and counted, if it is malformed.
-    fn evidence<'a>(
-        &self,
-        sample: &'a Sample<f32, EvidenceHeader>,
-        plan: &'a ViewPlan,
-    ) -> Option<EvidenceView<'a>> {
-        let values = sample.payload();
-        let read = wire::evidence_from_message(sample.header(), values, plan.layout());
-        let read = read.and_then(|view| wire::check_maps(values).map(|()| view));
+    /// The maps of a view; none, and counted, if they are malformed.
+    fn maps<'a>(&self, sample: &'a Sample<f32, EvidenceHeader>) -> Vec<PersonMaps<'a>> {
         let context = Context::of(self.service);
-        read.inspect_err(|error| context.count_refused("evidence", error))
-            .ok()
+        let read = wire::maps_from_message(sample.header(), sample.payload());
+        let read = read.inspect_err(|error| context.count_refused("evidence", error));
+        read.unwrap_or_default()
     }
 }
 
-fn seen(frame: &mut Frame<'_, Input>, view: usize) -> (Option<ViewResult>, Vec<ExtraKeypoint>) {
-    match frame.take(view).map(|item| item.value) {
-        Some(Input::Seen(seen, extras)) => (seen, extras),
-        _ => (None, Vec::new()),
+fn seen(frame: &mut Frame<'_, Input>, view: usize) -> Option<Sightings> {
+    match frame.take(view)?.value {
+        Input::Seen(seen) => seen,
+        Input::People(_) => None,
     }
-}
-
-/// The candidates of every view with their extra keypoints.
-pub(crate) fn found_extras<'a>(
-    views: &'a [Option<ViewResult>],
-    extras: &'a [Vec<ExtraKeypoint>],
-) -> Vec<Option<FoundExtras<'a>>> {
-    let found = |(view, extras): (&'a Option<ViewResult>, &'a Vec<ExtraKeypoint>)| {
-        let view = view.as_ref()?;
-        Some(FoundExtras {
-            candidates: &view.candidates,
-            extras,
-            skew_s: view.skew_s,
-        })
-    };
-    views.iter().zip(extras).map(found).collect()
 }

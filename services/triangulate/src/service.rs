@@ -7,14 +7,10 @@ use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Pose;
 use messages::{PairPose, ViewPose, topic};
 use multiview::{FrontEvidence, ViewPlan};
-use pipeline::{
-    ExtraKeypoint, ExtrasStep, Motion, PairResult, Skeleton, SkeletonStep, ViewResult, Views,
-};
+use pipeline::{PairResult, Skeleton, SkeletonStep, ViewResult, Views};
 use runtime::Service;
 use stage::{Frame, Item, Stage};
 use wire::{SolvedPerson, WireError};
-
-use crate::in_space::found_extras;
 
 /// Identity of the person by the paper's method, which names nobody: the one who is followed.
 const UNNAMED: u64 = 1;
@@ -29,8 +25,6 @@ pub struct Job {
     /// The pairs of the deployment; if all views are solved at once: the first view with each other one. They are assigned
     /// to the workers in turn.
     pub pairs: Vec<[usize; 2]>,
-    /// Triangulates the extra keypoints.
-    pub extras: ExtrasStep,
     /// Frames of the footage per second, if that is known: without it nothing is moved from the time of its picture to the instant
     /// of its frame.
     pub frame_rate_hz: Option<f64>,
@@ -56,12 +50,9 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
             let candidates = wire::candidates_from_message(pose, plan.model(), plan.layout())?;
             let front = wire::front_from_message(pose, candidates.len())?;
-            let extras =
-                wire::extras_from_message(pose, job.extras.n_keypoints(), candidates.len())?;
             Ok(Input::Candidates(Found {
                 candidates,
                 front,
-                extras,
                 skew_s: wire::skew_from_message(pose)?,
             }))
         })?;
@@ -70,8 +61,6 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         decode_pair(job, pair).map(Box::new).map(Input::Pair)
     })?;
     let skeletons = stage.output(&topic::skeletons(), job.n_consumers)?;
-    // Of the extra keypoints.
-    let mut motion = Motion::default();
     stage.run(|frame| {
         let pairs: Vec<PairInput> = (pairs..pairs + job.pairs.len())
             .filter_map(|slot| match frame.take(slot)?.value {
@@ -79,7 +68,7 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
                 Input::Candidates(_) => None,
             })
             .collect();
-        let (views, found) = view_answers(frame, n_views, &pairs);
+        let views = view_answers(frame, n_views, &pairs);
         let present = (0..n_views).filter(|view| views[*view].is_some());
         let views_present = present.fold(0, |mask, view| mask | 1_u32 << view);
         let rate = job.frame_rate_hz;
@@ -87,14 +76,11 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         let skeleton = skeleton(job.views, &views, pairs, &mut step);
         let n_people = skeleton.n_people as u32;
         service.health().counted_people(n_people);
-        let found = found_extras(&views, &found);
-        motion.begin(rate.map(|rate| frame.number() as f64 / rate));
-        let keypoints = job.extras.run(&skeleton, &found, &mut motion);
         let is_somebody = skeleton.views.iter().any(Option::is_some);
         let solved = is_somebody.then_some(SolvedPerson {
             id: UNNAMED,
             skeleton: &skeleton,
-            keypoints: &keypoints,
+            keypoints: &[],
         });
         let message =
             wire::skeletons_to_message(solved.as_slice(), skeleton.n_people, views_present);
@@ -116,8 +102,6 @@ struct Found {
     candidates: Vec<Pose>,
     /// What their pictures say about the direction in which they face.
     front: Vec<FrontEvidence>,
-    /// The extra keypoints of one candidate after the other.
-    extras: Vec<ExtraKeypoint>,
     /// How long after the instant of the frame the picture was taken, seconds.
     skew_s: f64,
 }
@@ -145,37 +129,34 @@ fn decode_pair(job: &Job, message: &PairPose) -> Result<PairInput, WireError> {
     })
 }
 
-/// The single-view poses with the expected errors that fusion used (the latest if workers used different ones), and the extra
-/// keypoints of every view.
+/// The single-view poses with the expected errors that fusion used: the latest if workers used different ones.
 fn view_answers(
     frame: &mut Frame<'_, Input>,
     n_views: usize,
     pairs: &[PairInput],
-) -> (Vec<Option<ViewResult>>, Vec<Vec<ExtraKeypoint>>) {
+) -> Vec<Option<ViewResult>> {
     let mut answer = |view: usize| {
         let Some(Item {
             value: Input::Candidates(found),
             ..
         }) = frame.take(view)
         else {
-            return (None, Vec::new());
+            return None;
         };
         let of_view = pairs.iter().filter_map(|pair| {
             let side = pair.views.iter().position(|other| *other == view)?;
             pair.sigma_px[side].as_ref()
         });
         let latest = of_view.min_by_key(|(age, _)| *age);
-        let result = (!found.candidates.is_empty()).then(|| ViewResult {
+        (!found.candidates.is_empty()).then(|| ViewResult {
             candidates: found.candidates,
             front: found.front,
-            heats: Vec::new(),
             sigma_px: latest.map(|(_, sigma_px)| sigma_px.clone()),
             tau_px: None,
             skew_s: found.skew_s,
-        });
-        (result, found.extras)
+        })
     };
-    (0..n_views).map(&mut answer).unzip()
+    (0..n_views).map(&mut answer).collect()
 }
 
 /// The skeleton from the fused and the single-view poses. A pair is used only if the single-view poses of both views were

@@ -16,8 +16,6 @@ pub struct Config {
     pub file: PathBuf,
     /// The detector of people that says where the network looks, an ONNX file with its card beside it; without it filters say so.
     pub detector: Option<PathBuf>,
-    /// What holds the maps of the joints together: a file of `parallax-lab train springs`, or `"shipped"`.
-    pub springs: PathBuf,
     /// People are looked for in every n-th frame; without it twice a second with a `detector`, once without.
     pub find_every: Option<u64>,
     /// Least mean heat of the joints of a person who is seen, 0 to 1.
@@ -35,7 +33,6 @@ impl Default for Config {
         Self {
             file: PathBuf::from(SHIPPED),
             detector: None,
-            springs: PathBuf::from(SHIPPED),
             find_every: None,
             least_heat: 0.2,
             people: 3,
@@ -48,9 +45,7 @@ impl Default for Config {
 impl Config {
     /// Takes every relative path as relative to `base`.
     pub(crate) fn resolve(&mut self, base: &Path) {
-        for file in [&mut self.file, &mut self.springs] {
-            *file = relative_to(file, base);
-        }
+        self.file = relative_to(&self.file, base);
         for file in [&mut self.detector, &mut self.onnx_runtime]
             .into_iter()
             .flatten()

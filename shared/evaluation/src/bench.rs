@@ -208,7 +208,6 @@ impl Bench {
             };
             let expected = expected(&single);
             Some(ViewResult {
-                heats: Vec::new(),
                 candidates: it.candidates.clone(),
                 front: it.front.clone(),
                 tau_px: expected.as_ref().and_then(|it| it.tau.clone()),

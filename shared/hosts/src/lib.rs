@@ -29,7 +29,7 @@ pub use clock::{Clock, Estimate, Exchange, ExchangeError};
 pub use fingerprint::{Difference, Fingerprint};
 pub use forecast::{Costs, Forecast, Load, forecast};
 pub use hello::{Answer, Hello, HelloError, Welcome};
-pub use maps::{Gaussian, MOST_GAUSSIANS, Maps, MapsError};
+pub use maps::{Gaussian, MOST_GAUSSIANS, Maps, MapsError, PersonGaussians};
 pub use outbox::{Outbox, Parcel, Sent};
 pub use packet::{Content, Expected, HEAD_BYTES, Head, Packet, PacketError};
 pub use signal::{Signal, SignalError};

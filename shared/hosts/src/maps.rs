@@ -1,20 +1,21 @@
 //! The maps of a view on their way between two hosts, as Gaussians after its poses.
 //!
-//! Bytes, little endian: level and number of Gaussians (`u16` each), first column and the one after the last, first row and the one after
-//! the last of the region (`u32` each), then for every Gaussian its joint (`u32`), place, height and precision (six `f32`).
+//! Bytes, little endian: number of people (`u32`); for every person the place of the first cell and the distance of cells (two `f64`
+//! each), number of columns, rows and Gaussians (`u32` each); for every Gaussian its joint (`u32`), place, height and precision (six
+//! `f32`).
 
-/// Bytes before the Gaussians, and of each of them.
-const HEAD: usize = 20;
+/// Bytes of each person, and of each Gaussian.
+const PERSON: usize = 44;
 const EACH: usize = 28;
 /// Most Gaussians of a message.
-pub const MOST_GAUSSIANS: usize = 512;
+pub const MOST_GAUSSIANS: usize = 1024;
 
 /// A Gaussian of the heat of a joint's map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gaussian {
     /// The joint.
     pub joint: u32,
-    /// Where it is highest: column and row, cells of the level.
+    /// Where it is highest: column and row, cells of the map.
     pub at: [f32; 2],
     /// The heat there.
     pub heat: f32,
@@ -22,17 +23,24 @@ pub struct Gaussian {
     pub precision: [f32; 3],
 }
 
+/// The maps of a person.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PersonGaussians {
+    /// Centre of the first cell, pixels of the frame.
+    pub first_px: [f64; 2],
+    /// Distance of neighbouring cells, across and down, pixels of the frame.
+    pub cell_px: [f64; 2],
+    /// Number of columns and rows.
+    pub size: [u32; 2],
+    /// The highest first, of one joint after the other.
+    pub gaussians: Vec<Gaussian>,
+}
+
 /// The maps of a view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Maps {
-    /// The level of the pyramid that they have.
-    pub level: u16,
-    /// First column of the picture that they cover, and the one after the last, pixels.
-    pub x: [u32; 2],
-    /// First row that they cover, and the one after the last, pixels.
-    pub y: [u32; 2],
-    /// The highest first, of one joint after the other.
-    pub gaussians: Vec<Gaussian>,
+    /// The people, in the order of the candidates.
+    pub people: Vec<PersonGaussians>,
 }
 
 /// Bytes that are no maps.
@@ -57,58 +65,118 @@ pub enum MapsError {
 impl Maps {
     /// The maps as bytes. Beyond [`MOST_GAUSSIANS`] the last are left out.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let gaussians = &self.gaussians[..self.gaussians.len().min(MOST_GAUSSIANS)];
-        let mut out = Vec::with_capacity(HEAD + EACH * gaussians.len());
-        out.extend_from_slice(&self.level.to_le_bytes());
-        out.extend_from_slice(&(gaussians.len() as u16).to_le_bytes());
-        for number in [self.x, self.y].as_flattened() {
-            out.extend_from_slice(&number.to_le_bytes());
-        }
-        for it in gaussians {
-            out.extend_from_slice(&it.joint.to_le_bytes());
-            let [xx, xy, yy] = it.precision;
-            for number in [it.at[0], it.at[1], it.heat, xx, xy, yy] {
+        let mut out = (self.people.len() as u32).to_le_bytes().to_vec();
+        let mut n_left = MOST_GAUSSIANS;
+        for person in &self.people {
+            let n = person.gaussians.len().min(n_left);
+            n_left -= n;
+            for number in [person.first_px, person.cell_px].as_flattened() {
                 out.extend_from_slice(&number.to_le_bytes());
+            }
+            let [columns, rows] = person.size;
+            for number in [columns, rows, n as u32] {
+                out.extend_from_slice(&number.to_le_bytes());
+            }
+            for gaussian in &person.gaussians[..n] {
+                out.extend_from_slice(&gaussian.joint.to_le_bytes());
+                let [xx, xy, yy] = gaussian.precision;
+                let [x, y] = gaussian.at;
+                for number in [x, y, gaussian.heat, xx, xy, yy] {
+                    out.extend_from_slice(&number.to_le_bytes());
+                }
             }
         }
         out
     }
 
-    /// Reads maps. Whether the region lies in the picture, and whether the numbers can be, is for the receiver to say.
+    /// Reads maps. Whether the cells lie in the picture, and whether the numbers can be, is for the receiver to say.
     ///
     /// # Errors
     ///
     /// [`MapsError`].
     pub fn parse(bytes: &[u8]) -> Result<Self, MapsError> {
-        let length = |expected| MapsError::Length {
-            len: bytes.len(),
-            expected,
-        };
-        let (head, rest) = bytes.split_at_checked(HEAD).ok_or(length(HEAD))?;
-        let two = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
-        let four = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|it| head[at + it]));
-        let n = usize::from(two(2));
-        if n > MOST_GAUSSIANS {
-            return Err(MapsError::Many { got: n });
-        }
-        if rest.len() != n * EACH {
-            return Err(length(HEAD + n * EACH));
-        }
-        let gaussian = |it: &[u8]| {
-            let word = |nth: usize| [0, 1, 2, 3].map(|byte| it[4 * nth + byte]);
-            let number = |nth: usize| f32::from_le_bytes(word(nth));
-            Gaussian {
-                joint: u32::from_le_bytes(word(0)),
-                at: [1, 2].map(number),
-                heat: number(3),
-                precision: [4, 5, 6].map(number),
+        let mut reader = Reader { bytes, at: 0 };
+        let n_people = reader.u32()?;
+        let mut people = Vec::new();
+        let mut n_gaussians = 0;
+        for _ in 0..n_people {
+            reader.needs(PERSON)?;
+            let mut number = || reader.f64();
+            let (first_px, cell_px) = ([number()?, number()?], [number()?, number()?]);
+            let size = [reader.u32()?, reader.u32()?];
+            let n = reader.u32()? as usize;
+            n_gaussians += n;
+            if n_gaussians > MOST_GAUSSIANS {
+                return Err(MapsError::Many { got: n_gaussians });
             }
-        };
-        Ok(Self {
-            level: two(0),
-            x: [four(4), four(8)],
-            y: [four(12), four(16)],
-            gaussians: rest.chunks_exact(EACH).map(gaussian).collect(),
+            reader.needs(n * EACH)?;
+            let gaussians: Result<Vec<Gaussian>, MapsError> =
+                (0..n).map(|_| reader.gaussian()).collect();
+            people.push(PersonGaussians {
+                first_px,
+                cell_px,
+                size,
+                gaussians: gaussians?,
+            });
+        }
+        if reader.at != bytes.len() {
+            return Err(reader.length(reader.at));
+        }
+        Ok(Self { people })
+    }
+}
+
+/// Reads numbers one after the other.
+struct Reader<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl Reader<'_> {
+    fn length(&self, expected: usize) -> MapsError {
+        MapsError::Length {
+            len: self.bytes.len(),
+            expected,
+        }
+    }
+
+    /// Checks that there are so many bytes more.
+    fn needs(&self, n: usize) -> Result<(), MapsError> {
+        let end = self.at + n;
+        if self.bytes.len() < end {
+            return Err(self.length(end));
+        }
+        Ok(())
+    }
+
+    fn next<const N: usize>(&mut self) -> Result<[u8; N], MapsError> {
+        let left = self
+            .bytes
+            .get(self.at..)
+            .and_then(|left| left.first_chunk());
+        let chunk = left.ok_or(self.length(self.at + N))?;
+        self.at += N;
+        Ok(*chunk)
+    }
+
+    fn u32(&mut self) -> Result<u32, MapsError> {
+        self.next().map(u32::from_le_bytes)
+    }
+
+    fn f32(&mut self) -> Result<f32, MapsError> {
+        self.next().map(f32::from_le_bytes)
+    }
+
+    fn f64(&mut self) -> Result<f64, MapsError> {
+        self.next().map(f64::from_le_bytes)
+    }
+
+    fn gaussian(&mut self) -> Result<Gaussian, MapsError> {
+        Ok(Gaussian {
+            joint: self.u32()?,
+            at: [self.f32()?, self.f32()?],
+            heat: self.f32()?,
+            precision: [self.f32()?, self.f32()?, self.f32()?],
         })
     }
 }
@@ -126,11 +194,14 @@ mod tests {
             heat: 0.5,
             precision: [0.25, -0.125, 1.0],
         };
-        Maps {
-            level: 3,
-            x: [10, 300],
-            y: [0, 70_000],
+        let person = |n: usize| PersonGaussians {
+            first_px: [10.5, -3.0],
+            cell_px: [4.0, 4.25],
+            size: [48, 64],
             gaussians: (0..n).map(gaussian).collect(),
+        };
+        Maps {
+            people: vec![person(n / 2), person(n - n / 2)],
         }
     }
 
@@ -139,19 +210,24 @@ mod tests {
         for n in [0, 1, 40, MOST_GAUSSIANS] {
             assert_eq!(Maps::parse(&maps(n).to_bytes()), Ok(maps(n)));
         }
-        let more = Maps::parse(&maps(MOST_GAUSSIANS + 5).to_bytes()).unwrap();
-        assert_eq!(more, maps(MOST_GAUSSIANS));
+        let mut more = maps(MOST_GAUSSIANS);
+        let first = more.people[0].gaussians[0];
+        more.people[1].gaussians.push(first);
+        let sent = Maps::parse(&more.to_bytes()).unwrap();
+        assert_eq!(sent, maps(MOST_GAUSSIANS));
     }
 
     #[test]
     fn what_is_cut_off_or_too_much_is_refused_with_the_number() {
         let whole = maps(2).to_bytes();
         let refused = |bytes: &[u8]| Maps::parse(bytes).unwrap_err().to_string();
-        assert!(refused(&whole[..10]).contains("10 bytes, expected 20"));
+        assert_eq!(whole.len(), 4 + 2 * (PERSON + EACH));
+        assert!(refused(&whole[..10]).contains("10 bytes, expected 48"));
         assert!(refused(&whole[..75]).contains("75 bytes, expected 76"));
+        assert!(refused(&[&whole[..], b"x"].concat()).contains("149 bytes, expected 148"));
         let mut many = whole;
-        many[2..4].copy_from_slice(&600_u16.to_le_bytes());
-        assert!(refused(&many).contains("600 Gaussians, at most 512"));
+        many[44..48].copy_from_slice(&1200_u32.to_le_bytes());
+        assert!(refused(&many).contains("1200 Gaussians, at most 1024"));
     }
 
     proptest! {

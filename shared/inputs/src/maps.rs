@@ -1,36 +1,16 @@
-//! Networks that find keypoints, and what goes with them: detectors of people, and the springs between joints.
+//! Networks that find keypoints, and detectors of people.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use crate::library::Library;
 use crate::network::NetworkFile;
 use deployment::network::Config;
 use deployment::{Deployment, is_shipped};
-use failure::{ExitKind, Failure, OrFail as _, in_file};
-use fmp::Model;
+use failure::{ExitKind, Failure};
 use keypoints::Card;
 use posenetwork::{Detector, PoseNetwork};
 
 use crate::shipped::Shipped;
-
-/// Reads the tree of springs that holds the maps of a network together; `shipped` stands for the one that ships.
-///
-/// # Errors
-///
-/// The file cannot be read, or is another model.
-pub fn springs(file: &Path) -> Result<Arc<Model>, Failure> {
-    let bytes = Shipped::Springs.read(file)?;
-    let spec = fmp::files::own::decode(&bytes).map_err(|error| in_file(file, &error))?;
-    let model = Model::new(spec).or_fail(ExitKind::Input)?;
-    if !posenetwork::springs::is_tree(&model) {
-        let message = format!("{}: a model, but no tree of springs", file.display());
-        let hint =
-            "`parallax-lab train springs` makes such a file; \"shipped\": the one that is built in";
-        return Err(Failure::new(ExitKind::Input, message).with_hint(hint));
-    }
-    Ok(Arc::new(model))
-}
 
 /// Loads the network of a camera, if it has one, and tries it once.
 ///

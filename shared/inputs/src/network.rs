@@ -6,12 +6,10 @@ mod nearest;
 use std::path::{Path, PathBuf};
 
 use failure::{ExitKind, Failure, OrFail as _, in_file};
-use fmp::Layout;
 use footage::Size;
 use inference::{Description, RunBy, Session};
 use kernels::Rgb8View;
 use keypoints::Card;
-use posenetwork::springs::TurnedSprings;
 use posenetwork::{
     JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Sight, Turn, Workspace,
 };
@@ -148,13 +146,12 @@ pub fn look<'a>(
 /// picture is to be turned there.
 ///
 /// * `outline`: the box in which the person is seen, pixels of the picture.
-/// * Returns that box itself in a picture that is too small for the tree of springs.
 ///
 /// # Errors
 ///
 /// As for [`look`].
 pub fn closest(
-    (network, springs): (&PoseNetwork, &TurnedSprings),
+    network: &PoseNetwork,
     picture: &Picture,
     outline: [f64; 4],
     memory: &mut LookMemory,
@@ -163,13 +160,8 @@ pub fn closest(
     let image = Rgb8View::new(width, height, &picture.rgb);
     let image = image.map_err(|error| in_file(&picture.path, &error))?;
     let as_it_is = (outline, Turn::Up);
-    let Ok(layout) = Layout::new(springs.model(), width, height) else {
-        return Ok(as_it_is);
-    };
     let looker = Looker {
         network,
-        springs,
-        layout: &layout,
         settings: &MapSettings::default(),
     };
     let mut maps = JointMaps::default();

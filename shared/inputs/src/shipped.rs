@@ -20,21 +20,18 @@ pub enum Shipped {
     Orientation,
     /// Where joints lie among the parts of the model.
     Joints,
-    /// The springs that hold the maps of a network together.
-    Springs,
     /// The network that finds joints.
     PoseNetwork,
 }
 
 impl Shipped {
     /// All of them.
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 6] = [
         Self::Model,
         Self::Network,
         Self::Consistency,
         Self::Orientation,
         Self::Joints,
-        Self::Springs,
         Self::PoseNetwork,
     ];
 
@@ -46,7 +43,6 @@ impl Shipped {
             Self::Consistency => include_bytes!("../../../configs/models/person.consistency"),
             Self::Orientation => include_bytes!("../../../configs/models/person.orientation"),
             Self::Joints => include_bytes!("../../../configs/models/person.joints"),
-            Self::Springs => include_bytes!("../../../configs/models/person.springs"),
             Self::PoseNetwork => include_bytes!("../../../configs/models/person.pose.onnx"),
         }
     }
@@ -59,7 +55,6 @@ impl Shipped {
             Self::Consistency => "consistency",
             Self::Orientation => "orientation",
             Self::Joints => "joints",
-            Self::Springs => "springs",
             Self::PoseNetwork => "pose-network",
         };
         format!("{SHIPPED}:{kind}").into()
@@ -103,7 +98,6 @@ impl Shipped {
             Self::Consistency => ["paper.consistency", "train consistency"],
             Self::Orientation => ["paper.orientation", "train orientation"],
             Self::Joints => ["paper.joint_map", "train joints"],
-            Self::Springs => ["network.springs", "train springs"],
             Self::PoseNetwork => ["network.file", "train network"],
         };
         format!(
@@ -124,7 +118,6 @@ mod tests {
         let text = core::str::from_utf8(Shipped::Consistency.bytes()).unwrap();
         consistency::Learned::parse(text).unwrap();
         orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
-        crate::springs(Path::new(SHIPPED)).unwrap();
         let library = crate::library::Library::BuiltIn;
         let network = crate::open_network((Path::new(SHIPPED), None), &library);
         network.unwrap().fitted().unwrap();

@@ -3,12 +3,26 @@
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{MAX_LEVELS, Stamp, Status, Timing};
+use crate::{MAX_CANDIDATES, MAX_LEVELS, Stamp, Status, Timing};
 
-/// The user header of a sample of responses: `[f32]`, those of an `fmp::Scope`, without gaps. Its
-/// alignment places the responses at the start of a cache line.
+/// Where the cells of one person's maps lie in the picture: `posenetwork::MapGrid`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
+#[type_name("GridMessage.v1")]
+#[repr(C)]
+pub struct GridMessage {
+    /// Centre of the first cell, pixels of the frame.
+    pub first_px: [f64; 2],
+    /// Distance of neighbouring cells, across and down, pixels of the frame.
+    pub cell_px: [f64; 2],
+    /// Number of columns and rows.
+    pub size: [u32; 2],
+}
+
+/// The user header of a sample of `[f32]`, without gaps. By the method of networks these are the maps of one person after the other,
+/// in the order of the candidates, `[joint][row][column]`; by the paper's method the responses of an `fmp::Scope`. Its alignment
+/// places the values at the start of a cache line.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("EvidenceHeader.v3")]
+#[type_name("EvidenceHeader.v4")]
 #[repr(C)]
 #[repr(align(64))]
 pub struct EvidenceHeader {
@@ -24,6 +38,12 @@ pub struct EvidenceHeader {
     pub status: Status,
     /// Number of valid entries of `levels`.
     pub n_levels: u32,
+    /// Number of people with maps; 0 by the paper's method. The fields after `people` are of the paper's method.
+    pub n_people: u32,
+    /// Explicit padding.
+    pub padding: u32,
+    /// The maps of each person.
+    pub people: [GridMessage; MAX_CANDIDATES],
     /// First column of the image that the responses cover, and the one after the last, pixels.
     pub x: [u32; 2],
     /// First row that they cover, and the one after the last, pixels.
@@ -38,7 +58,7 @@ pub struct EvidenceHeader {
     /// Upper bound of all partial sums of a score on each of `levels`, by this view alone.
     pub size: [f32; MAX_LEVELS],
     /// Explicit padding.
-    pub reserved: [u32; 11],
+    pub reserved: [u32; 9],
 }
 
 impl Default for EvidenceHeader {
@@ -50,13 +70,16 @@ impl Default for EvidenceHeader {
             height: 0,
             status: Status::default(),
             n_levels: 0,
+            n_people: 0,
+            padding: 0,
+            people: [GridMessage::default(); MAX_CANDIDATES],
             x: [0; 2],
             y: [0; 2],
             scope_levels: [0; 2],
             levels: [0; MAX_LEVELS],
             best: [0.0; MAX_LEVELS],
             size: [0.0; MAX_LEVELS],
-            reserved: [0; 11],
+            reserved: [0; 9],
         }
     }
 }

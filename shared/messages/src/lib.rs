@@ -20,7 +20,7 @@ mod skeletons;
 mod stamp;
 pub mod topic;
 
-pub use evidence::EvidenceHeader;
+pub use evidence::{EvidenceHeader, GridMessage};
 pub use frame::FrameHeader;
 pub use health::Health;
 pub use metrics::{
@@ -57,11 +57,11 @@ const _: () = {
     assert!(size_of::<Timing>() == 16);
     assert!(size_of::<FrameHeader>() == 128);
     assert!(size_of::<PictureHeader>() == 192);
-    assert!(size_of::<EvidenceHeader>() == 1088);
+    assert!(size_of::<EvidenceHeader>() == 1408);
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<LocalMessage>() == 12);
     assert!(
-        size_of::<ViewPose>() == 1880 + MAX_CANDIDATES * MAX_JOINTS * 4 + MAX_VIEW_KEYPOINTS * 12
+        size_of::<ViewPose>() == 1880 + MAX_CANDIDATES * MAX_JOINTS * 12 + MAX_VIEW_KEYPOINTS * 12
     );
     assert!(size_of::<PersonMessage>() == 24);
     assert!(size_of::<People>() == 64 + MAX_PEOPLE * 24);

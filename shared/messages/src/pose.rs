@@ -65,7 +65,7 @@ impl Searched {
 
 /// The single-view result: distinct candidates, best first.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("ViewPose.v7")]
+#[type_name("ViewPose.v8")]
 #[repr(C)]
 pub struct ViewPose {
     /// The frame and the view.
@@ -88,15 +88,17 @@ pub struct ViewPose {
     pub searched: Searched,
     /// Number of extra keypoints of a candidate, as many as all views of the deployment know together.
     pub n_keypoints: u32,
-    /// The candidates.
+    /// The candidates: cells by the paper's method, by that of networks the score alone, with `joints` and `heats`.
     pub candidates: [PoseMessage; MAX_CANDIDATES],
+    /// By the method of networks: where every joint of every candidate is seen best, pixels of the frame.
+    pub joints: [[[f32; 2]; MAX_JOINTS]; MAX_CANDIDATES],
     /// Local scores of the parts of the first candidate.
     pub local: [LocalMessage; MAX_PARTS],
     /// What the picture says about the direction in which the person of every candidate faces:
     /// `multiview::FrontEvidence`, `[towards the right of the picture, towards the camera]`; zeros where
     /// there is no evidence.
     pub front: [[f32; 2]; MAX_CANDIDATES],
-    /// How sure the network is of every joint of every candidate, 0 to 1; zeros of filters.
+    /// How sure the network is of every joint of every candidate, 0 to 1: 0 for one that is not seen; zeros of filters.
     pub heats: [[f32; MAX_JOINTS]; MAX_CANDIDATES],
     /// The extra keypoints of one candidate after the other, for as many candidates as there is room: `[column, row, standard
     /// deviation along one axis]`, pixels of the frame; a deviation of 0 for one that was not found.

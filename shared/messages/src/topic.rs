@@ -18,13 +18,13 @@ pub fn picture(view: usize) -> String {
 /// Single-view candidates of a view: [`ViewPose`](crate::ViewPose).
 #[must_use]
 pub fn view_pose(view: usize) -> String {
-    format!("view-pose/v7/{view}")
+    format!("view-pose/v8/{view}")
 }
 
 /// Response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).
 #[must_use]
 pub fn evidence(view: usize) -> String {
-    format!("evidence/v3/{view}")
+    format!("evidence/v4/{view}")
 }
 
 /// Expected errors of a view: [`ViewQuality`](crate::ViewQuality).

@@ -1,18 +1,17 @@
-//! The method of networks in one process: pictures or keypoints of all views in, one skeleton out.
+//! The method of networks in one process: pictures or keypoints of all views in, skeletons out.
 
 use std::sync::Arc;
 
-use fmp::Responses;
 use kernels::Rgb8View;
 use keypoints::Keypoint;
 use multiview::ViewPlan;
 use nalgebra::UnitVector3;
-use posenetwork::LookError;
+use posenetwork::{LookError, PersonMaps};
 use rayon::prelude::*;
 
 use crate::{
-    Estimate, Follow, NetworkMemory, NetworkStep, SpaceStep, SpaceStepSettings, ViewEstimate,
-    ViewResult, WhoStep,
+    Follow, FramePeople, NetworkMemory, NetworkStep, PersonSkeleton, Sightings, SpaceStep,
+    SpaceStepSettings, WhoStep,
 };
 
 /// Settings of all steps but those of the views.
@@ -55,7 +54,17 @@ pub enum ViewContent<'a> {
 struct View {
     step: NetworkStep,
     memory: NetworkMemory,
-    responses: Vec<f32>,
+}
+
+/// A frame, estimated.
+#[derive(Debug, Clone)]
+pub struct NetworkEstimate {
+    /// The people that each view sees; `None` of one that is missing or sees nobody.
+    pub sightings: Vec<Option<Sightings>>,
+    /// Who they are.
+    pub people: FramePeople,
+    /// Their skeletons, the person who is followed first.
+    pub skeletons: Vec<PersonSkeleton>,
 }
 
 /// The method of networks in one process.
@@ -84,7 +93,6 @@ impl NetworkEstimator {
         let view = |step| View {
             step,
             memory: NetworkMemory::default(),
-            responses: Vec::new(),
         };
         Self {
             views: steps.into_iter().map(view).collect(),
@@ -103,50 +111,35 @@ impl NetworkEstimator {
     /// # Errors
     ///
     /// [`LookError`] if a network or detector fails.
-    pub fn estimate(&mut self, frames: &[Option<ViewFrame<'_>>]) -> Result<Estimate, LookError> {
+    pub fn estimate(
+        &mut self,
+        frames: &[Option<ViewFrame<'_>>],
+    ) -> Result<NetworkEstimate, LookError> {
         let frame = self.settings.start_frame + self.n_frames * self.settings.frame_step.max(1);
         self.n_frames += 1;
         let most_apart = self.settings.most_apart;
         let viewed = self.views.par_iter_mut().zip(frames);
-        let viewed: Result<Vec<Option<ViewEstimate>>, LookError> = viewed
+        let sightings: Result<Vec<Option<Sightings>>, LookError> = viewed
             .map(|(view, content)| match content {
-                Some(content) => view.look(frame, most_apart, content.content),
+                Some(content) => view.look(frame, most_apart, content),
                 None => Ok(None),
             })
             .collect();
-        let viewed = viewed?;
-        let answers = viewed.iter().zip(frames).map(|(found, frame)| {
-            Some(ViewResult {
-                skew_s: frame.as_ref()?.skew_s,
-                ..found.as_ref()?.result(None)?
-            })
+        let sightings = sightings?;
+        let people = self.who.run(&sightings);
+        let evidence = self.views.iter().zip(&sightings).map(|(view, seen)| {
+            let maps = view.step.evidence(&view.memory);
+            maps.take(seen.as_ref().map_or(0, |seen| seen.people.len()))
+                .collect()
         });
-        let answers: Vec<Option<ViewResult>> = answers.collect();
-        let people = self.who.run(&answers);
-        let evidence = self.views.iter().zip(&viewed).map(|(view, found)| {
-            let found = found.as_ref()?;
-            let layout = view.step.layout();
-            let levels = &found.levels;
-            Some(Responses::within(
-                layout,
-                &view.responses,
-                levels,
-                found.scope,
-            ))
-        });
-        let evidence: Vec<Option<Responses<'_>>> = evidence.collect();
+        let evidence: Vec<Vec<PersonMaps<'_>>> = evidence.collect();
         let rate = self.settings.frame_rate_hz;
         self.space.begin(rate.map(|rate| frame as f64 / rate));
-        let skeleton = self.space.run(&answers, &evidence, &people);
-        let scopes = viewed.iter().map(|found| Some(found.as_ref()?.scope));
-        Ok(Estimate {
-            scopes: scopes.collect(),
-            start: vec![None; answers.len()],
-            answers,
+        let skeletons = self.space.run(&sightings, &evidence, &people);
+        Ok(NetworkEstimate {
+            sightings,
             people,
-            pairs: Vec::new(),
-            all_views: None,
-            skeleton,
+            skeletons,
         })
     }
 }
@@ -156,25 +149,19 @@ impl View {
         &mut self,
         frame: u64,
         most_apart: Option<f64>,
-        content: ViewContent<'_>,
-    ) -> Result<Option<ViewEstimate>, LookError> {
-        let scope = match content {
+        content: &ViewFrame<'_>,
+    ) -> Result<Option<Sightings>, LookError> {
+        match content.content {
             ViewContent::Picture(image) => {
                 self.memory.begin(frame, most_apart);
-                self.step.look(image, &mut self.memory)?
+                self.step.look(image, &mut self.memory)?;
             }
             ViewContent::Keypoints(people) => self.step.take(people.iter(), &mut self.memory),
-        };
-        let Some(scope) = scope else {
-            return Ok(None);
-        };
-        let n_values = self.step.layout().n_values(&scope);
-        self.responses
-            .resize(self.responses.len().max(n_values), 0.0);
-        Ok(Some(self.step.fill(
-            scope,
-            &mut self.responses,
-            &mut self.memory,
-        )))
+        }
+        let people = self.step.sightings(&mut self.memory);
+        Ok((!people.is_empty()).then_some(Sightings {
+            people,
+            skew_s: content.skew_s,
+        }))
     }
 }

@@ -9,7 +9,7 @@ use skeleton::JointSet;
 
 use crate::bodies::NoJoint;
 use crate::motion::Motion;
-use crate::view_result::ViewResult;
+use crate::sighting::Sightings;
 
 /// Farthest that the median joint of a view lies from the result where the view shows the same person, metres.
 const SAME_PERSON_M: f64 = 0.25;
@@ -24,7 +24,7 @@ const NOISE_SHARE: f64 = 0.5;
 #[derive(Clone, Copy)]
 pub(crate) struct FoundByViews<'a> {
     pub(crate) plans: &'a [Arc<ViewPlan>],
-    pub(crate) answers: &'a [Option<ViewResult>],
+    pub(crate) answers: &'a [Option<Sightings>],
     /// Whether a view has a part in the result.
     pub(crate) takes_part: &'a [bool],
     /// Least score of a candidate of a view without a part in the result, for which the view counts as one that sees the person
@@ -153,29 +153,18 @@ fn median(values: &[f64]) -> Option<f64> {
 fn readings<'a>(
     found_by: &FoundByViews<'a>,
     view: usize,
-    answer: &'a ViewResult,
+    answer: &'a Sightings,
 ) -> impl Iterator<Item = Vec<[f64; 2]>> + 'a {
-    let FoundByViews {
-        plans,
-        takes_part,
-        joints,
-        ..
-    } = *found_by;
-    let least_score = if takes_part.get(view) == Some(&true) {
+    let least_score = if found_by.takes_part.get(view) == Some(&true) {
         f32::NEG_INFINITY
     } else {
         found_by.least_score
     };
-    let plan = &plans[view];
-    let mirror = plan.model().spec().mirror.as_deref();
-    let seen = answer.candidates.iter();
-    let seen = seen.filter(move |pose| pose.score >= least_score);
-    let each = seen.flat_map(move |pose| [(pose, None), (pose, mirror)]);
-    each.map(move |(pose, mirror)| {
-        let centre = |part: usize| plan.centre(pose, mirror.map_or(part, |mirror| mirror[part]));
-        let centres: Vec<[f64; 2]> = (0..pose.parts.len()).map(centre).collect();
-        joints.from_parts(&centres)
-    })
+    let joints = found_by.joints;
+    let seen = answer.people.iter();
+    let seen = seen.filter(move |sighting| sighting.score >= least_score);
+    let each = seen.flat_map(|sighting| [(sighting, false), (sighting, true)]);
+    each.map(move |(sighting, is_exchanged)| sighting.joints_of_set(joints, is_exchanged))
 }
 
 fn sum(distances: &[f64]) -> f64 {

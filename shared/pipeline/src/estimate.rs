@@ -10,7 +10,7 @@ use nalgebra::UnitVector3;
 use rayon::prelude::*;
 
 use crate::{
-    AllViewsResult, Follow, Following, FramePeople, FuseStep, PairResult, PairTables, Skeleton,
+    AllViewsResult, Follow, Following, FuseStep, PairResult, PairTables, Skeleton,
     SkeletonSettings, SkeletonStep, Support, ViewEstimate, ViewResult, ViewSettings, ViewStep,
     Views, all_pairs,
 };
@@ -33,8 +33,6 @@ pub enum EstimatorError {
 pub struct Estimate {
     /// The result of every single view.
     pub answers: Vec<Option<ViewResult>>,
-    /// Who is in the frame; by the paper's method nobody is named.
-    pub people: FramePeople,
     /// The joint start: candidate and exchange of every view.
     pub start: Vec<Option<(usize, bool)>>,
     /// The part of every view's image that was searched.
@@ -172,7 +170,6 @@ impl Estimator {
         };
         Estimate {
             answers,
-            people: FramePeople::default(),
             start,
             scopes: estimates
                 .iter()

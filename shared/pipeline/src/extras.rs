@@ -3,18 +3,15 @@
 //! The tree does not know them, so nothing holds them together: each is triangulated by itself, from the views in which it was found
 //! on the person whom fusion chose.
 
-use std::sync::Arc;
-
-use fmp::Pose;
-use geometry::{Observation, Settings, Triangulated};
+use geometry::{Camera, Observation, Settings, Triangulated};
 use keypoints::mirrored;
-use multiview::ViewPlan;
 use nalgebra::Point2;
 use skeleton::{PARSE14, SIDES};
 
 use crate::bodies::NoJoint;
 use crate::fused_view::FusedView;
 use crate::motion::Motion;
+use crate::sighting::Sightings;
 use crate::skeleton_step::Skeleton;
 use crate::space::by_view;
 use crate::view_result::ExtraKeypoint;
@@ -35,17 +32,6 @@ const LEGS: [[usize; 2]; 2] = [SIDES[0], SIDES[1]];
 const ARMS: [[usize; 2]; 2] = [SIDES[3], SIDES[4]];
 const TRUNK: [[usize; 2]; 2] = [SIDES[2], SIDES[5]];
 
-/// What one view found of a frame.
-#[derive(Debug, Clone, Copy)]
-pub struct FoundExtras<'a> {
-    /// Its candidates.
-    pub candidates: &'a [Pose],
-    /// The extra keypoints of one candidate after the other; those of the last ones may be missing.
-    pub extras: &'a [ExtraKeypoint],
-    /// How long after the instant of the frame its picture was taken, seconds.
-    pub skew_s: f64,
-}
-
 /// An extra keypoint.
 #[derive(Debug)]
 struct Extra {
@@ -58,7 +44,7 @@ struct Extra {
 /// Triangulates the extra keypoints of a rig.
 #[derive(Debug)]
 pub struct ExtrasStep {
-    plans: Vec<Arc<ViewPlan>>,
+    cameras: Vec<Camera>,
     extras: Vec<Extra>,
     triangulation: Settings,
 }
@@ -78,7 +64,7 @@ impl ExtrasStep {
     /// Prepares the step.
     ///
     /// * `names`: of the keypoints, as every view numbers them.
-    pub fn new(names: &[String], plans: Vec<Arc<ViewPlan>>, triangulation: Settings) -> Self {
+    pub fn new(names: &[String], cameras: Vec<Camera>, triangulation: Settings) -> Self {
         let number = |name: &String| names.iter().position(|it| it == name);
         let extra = |(own, name): (usize, &String)| Extra {
             mirror: mirrored(name).and_then(|it| number(&it)).unwrap_or(own),
@@ -86,7 +72,7 @@ impl ExtrasStep {
         };
         Self {
             extras: names.iter().enumerate().map(extra).collect(),
-            plans,
+            cameras,
             triangulation,
         }
     }
@@ -104,13 +90,13 @@ impl ExtrasStep {
     pub fn run(
         &self,
         skeleton: &Skeleton,
-        views: &[Option<FoundExtras<'_>>],
+        views: &[Option<Sightings>],
         motion: &mut Motion,
     ) -> Vec<Result<Triangulated, NoJoint>> {
         let each = views.iter().zip(&skeleton.views).enumerate();
         let matches: Vec<Match> = each
             .filter_map(|(view, (found, fused))| {
-                let found = *found.as_ref()?;
+                let found = found.as_ref()?;
                 let mut it = self.person(view, found, fused.as_ref()?)?;
                 it.move_to_instant(found.skew_s, motion);
                 Some(it)
@@ -127,26 +113,24 @@ impl ExtrasStep {
     }
 
     /// The candidate of a view that is the person.
-    fn person(&self, view: usize, found: FoundExtras<'_>, fused: &FusedView) -> Option<Match> {
+    fn person(&self, view: usize, found: &Sightings, fused: &FusedView) -> Option<Match> {
         if fused.pose.centres_px.len() != skeleton::N_PARTS {
             return None;
         }
-        let n = self.extras.len();
         let joints = PARSE14.from_parts(&fused.pose.centres_px);
         let longer_px = geometry::longer_side(joints.iter().copied())?;
-        let candidates = found
-            .candidates
-            .iter()
-            .zip(found.extras.chunks_exact(n.max(1)));
-        let of_candidate = candidates.map(|(pose, extras)| {
-            let own = PARSE14.from_parts(&self.plans[view].centres(pose));
-            (middle_distance(&own, &joints), own, extras)
+        // Those of the last people may be missing.
+        let told = found.people.iter();
+        let told = told.filter(|sighting| sighting.extras.len() == self.extras.len());
+        let of_candidate = told.map(|sighting| {
+            let own = sighting.places(false).to_vec();
+            (middle_distance(&own, &joints), own, &sighting.extras)
         });
         let nearest = of_candidate.min_by(|a, b| a.0.total_cmp(&b.0));
         let (distance, own, extras) = nearest?;
         (distance < SAME * longer_px).then_some(Match {
             view,
-            extras: extras.to_vec(),
+            extras: extras.clone(),
             joints: [own, joints],
             longer_px,
         })
@@ -169,7 +153,7 @@ impl ExtrasStep {
             reach = reach.max((MOST_SIGMAS * sigma_px).max(LEAST_REACH * it.longer_px));
             views.push(it.view);
             observations.push(Observation {
-                camera: self.plans[it.view].camera(),
+                camera: &self.cameras[it.view],
                 point_px: Point2::from(at),
                 sigma_px,
             });
@@ -231,9 +215,9 @@ fn middle_distance(own: &[[f64; 2]], fused: &[[f64; 2]]) -> f64 {
         let direct = distance(own[joint], fused[joint]);
         direct.min(distance(own[joint], fused[mirror(joint)]))
     });
-    let mut each: Vec<f64> = each.collect();
-    each.sort_by(f64::total_cmp);
-    each[each.len() / 2]
+    let seen = each.filter(|distance| distance.is_finite());
+    let middle = statistics::Sorted::new(seen.collect::<Vec<f64>>()).upper_median();
+    middle.unwrap_or(f64::INFINITY)
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {

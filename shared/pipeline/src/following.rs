@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use geometry::Camera;
 use multiview::ViewPlan;
 use nalgebra::Point3;
 
-use crate::ViewResult;
-use crate::people::{Found, Person, find};
+use crate::people::{Found, FoundBody, Person, bodies_of_poses, find};
+use crate::view_result::ViewResult;
 
 /// Which of several people is followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -96,16 +97,17 @@ impl Following {
 
     /// Chooses the person of the next frame, and says which candidates are others.
     pub fn others(&mut self, plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Others {
-        self.next(plans, answers).others
+        let views = plans.iter().zip(answers);
+        let views = views.map(|(plan, answer)| bodies_of_poses(plan, answer.as_ref()));
+        self.next(plans, views.collect()).others
     }
 
     /// Chooses the person of the next frame.
-    pub(crate) fn next(
-        &mut self,
-        plans: &[Arc<ViewPlan>],
-        answers: &[Option<ViewResult>],
-    ) -> Followed {
-        let found = find(plans, answers);
+    ///
+    /// * `views`: the candidates of every view.
+    pub(crate) fn next(&mut self, plans: &[Arc<ViewPlan>], views: Vec<Vec<FoundBody>>) -> Followed {
+        let cameras: Vec<&Camera> = plans.iter().map(|plan| plan.camera()).collect();
+        let found = find(&cameras, views);
         let followed = self.choose(&found);
         Followed {
             others: Others::of(&found, followed),

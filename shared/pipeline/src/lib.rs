@@ -12,16 +12,19 @@ mod following;
 mod fuse_step;
 mod fused;
 mod fused_view;
+mod looks;
 mod motion;
 mod network_memory;
 mod network_step;
 mod people;
 mod person_evidence;
+mod person_step;
 mod placed;
-mod sightings;
+mod sighting;
 mod skeleton_settings;
 mod skeleton_step;
 mod space;
+mod space_settings;
 mod space_step;
 mod tracks;
 mod view_result;
@@ -31,9 +34,11 @@ mod who;
 mod estimate;
 
 pub use bodies::{Body, NoJoint};
-pub use by_network::{NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame};
+pub use by_network::{
+    NetworkEstimate, NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame,
+};
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
-pub use extras::{ExtrasStep, FoundExtras};
+pub use extras::ExtrasStep;
 pub use following::{Follow, Following, Others};
 pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, Views, all_pairs,
@@ -42,9 +47,11 @@ pub use fused_view::FusedView;
 pub use motion::Motion;
 pub use network_memory::{LOST, NetworkMemory};
 pub use network_step::{Boxes, Eyes, NetworkSettings, NetworkStep, most_values};
+pub use sighting::{Sighting, Sightings, parts_of};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
-pub use space_step::{SpaceStep, SpaceStepSettings};
+pub use space_settings::SpaceStepSettings;
+pub use space_step::{PersonSkeleton, SpaceStep};
 pub use view_result::{ExtraKeypoint, ViewResult};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};
 pub use who::{FramePeople, KnownPerson, WhoStep};

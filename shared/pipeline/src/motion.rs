@@ -134,7 +134,6 @@ mod tests {
         ViewResult {
             candidates: Vec::new(),
             front: Vec::new(),
-            heats: Vec::new(),
             sigma_px: None,
             tau_px: None,
             skew_s,

@@ -1,6 +1,5 @@
 //! What the step with a network keeps from frame to frame.
 
-use fmp::{Layout, Pose};
 use multiview::FrontEvidence;
 use posenetwork::{JointMaps, LookMemory, Turn};
 use statistics::Sorted;
@@ -66,10 +65,8 @@ pub(crate) struct Hold {
 /// A person in a frame.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
-    /// Where the person is looked for next; none of one who was looked at before the tree is solved.
+    /// Where the person is looked for next; `None` of one who was just looked at.
     pub(crate) next: Option<Track>,
-    /// The best pose of the tree on the maps, on the person's own level.
-    pub(crate) pose: Option<Pose>,
     /// As in [`Track`].
     pub(crate) is_to_widen: bool,
     /// As in [`Track`].
@@ -84,8 +81,6 @@ pub(crate) struct Seen {
     pub(crate) heat: f64,
     /// In which direction the trunk faces, if the network tells.
     pub(crate) front: Option<FrontEvidence>,
-    pub(crate) level: u16,
-    pub(crate) responses: Vec<f32>,
 }
 
 impl NetworkMemory {
@@ -94,7 +89,7 @@ impl NetworkMemory {
         &self.seen[..self.n_seen]
     }
 
-    /// What the network tells of the people of this frame, those first who are seen best.
+    /// What the network tells of the people of this frame, the largest and best seen first.
     pub fn maps(&self) -> impl Iterator<Item = &JointMaps> {
         self.people().iter().map(|it| &it.maps)
     }
@@ -169,12 +164,11 @@ impl NetworkMemory {
 impl Seen {
     /// Judges what is seen of a person who was looked at; returns whether the person is seen well, and in the frame.
     ///
-    /// * `layout`: of the frame; `least_heat`: mean heat of the joints of somebody who is seen well, 0 to 1.
-    pub(crate) fn judge(&mut self, layout: &Layout, least_heat: f64) -> bool {
-        (self.next, self.pose) = (None, None);
+    /// * `size`: width and height of the frame; `least_heat`: mean heat of the joints of somebody who is seen well, 0 to 1.
+    pub(crate) fn judge(&mut self, size: [usize; 2], least_heat: f64) -> bool {
+        self.next = None;
         self.heat = self.maps.heat();
-        self.level = self.maps.level(layout);
-        self.heat >= least_heat && self.maps.region(layout).is_some()
+        self.heat >= least_heat && self.maps.overlaps(size)
     }
 }
 

@@ -1,14 +1,13 @@
 //! The people that the views of a frame could mean: candidates of different views that are one person in space.
 
-use std::sync::Arc;
-
 use geometry::{Camera, Ray};
 use multiview::ViewPlan;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use posenetwork::MapSettings;
 use skeleton::PARSE14;
 
-use crate::ViewResult;
+use crate::sighting::{Sighting, Sightings};
+use crate::view_result::ViewResult;
 
 /// The parts whose mean is a point of the middle line of the body: head, neck, hips, knees, ankles. Where these lie does
 /// not depend on which side is called left.
@@ -68,14 +67,28 @@ impl Person {
 type Line = [[f64; 2]; N_POINTS];
 
 /// A candidate of a view.
-struct Sighting {
+pub(crate) struct FoundBody {
     points_px: Line,
     rays: [Option<Ray>; N_POINTS],
     size_px: f64,
     strength: f64,
 }
 
-impl Sighting {
+impl FoundBody {
+    /// * `strength`: how clearly the view sees it; at least 0 counts.
+    fn new(camera: &Camera, points_px: Line, size_px: f64, strength: f64) -> Self {
+        let ray = |[x, y]: [f64; 2]| {
+            let is_seen = x.is_finite() && y.is_finite();
+            is_seen.then(|| camera.ray(&Point2::new(x, y))).flatten()
+        };
+        Self {
+            points_px,
+            rays: points_px.map(ray),
+            size_px: size_px.max(1.0),
+            strength: strength.max(0.0),
+        }
+    }
+
     fn middle(&self) -> [f64; 2] {
         let [neck, hips] = [self.points_px[NECK], self.points_px[HIPS]];
         [0, 1].map(|axis| f64::midpoint(neck[axis], hips[axis]))
@@ -98,7 +111,7 @@ impl Sighting {
 
 /// A frame's candidates, and the people that they could mean.
 pub(crate) struct Found {
-    views: Vec<Vec<Sighting>>,
+    views: Vec<Vec<FoundBody>>,
     pub(crate) people: Vec<Person>,
 }
 
@@ -110,13 +123,13 @@ impl Found {
     /// * `followed`: who is followed; `None` if it is none of them.
     pub(crate) fn others(&self, followed: Option<usize>) -> Vec<u64> {
         let people = || self.people.iter().enumerate();
-        let of_view = |(view, sightings): (usize, &Vec<Sighting>)| {
-            let is_of = |person: &Person, it: &Sighting| {
+        let of_view = |(view, sightings): (usize, &Vec<FoundBody>)| {
+            let is_of = |person: &Person, it: &FoundBody| {
                 person.lines_px[view]
                     .as_ref()
                     .is_some_and(|line| it.is_on(line))
             };
-            let is_other = |it: &Sighting| {
+            let is_other = |it: &FoundBody| {
                 let mut others = people().filter(|(index, _)| Some(*index) != followed);
                 !followed.is_some_and(|it_is| is_of(&self.people[it_is], it))
                     && others.any(|(_, other)| is_of(other, it))
@@ -152,29 +165,14 @@ impl Found {
 /// space and in all pictures but one. A person is seen by three views, or by both of two, and at least 0.28 times as strong as
 /// the first. People whose trunks are less than half a metre apart count as one. The paper knows one person; this is our own.
 ///
-/// * `plans`: of the views; nothing is found with models that do not have the 26 parts of the published ones.
-pub(crate) fn people(plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Vec<Person> {
-    find(plans, answers).people
-}
-
-/// The same, with the candidates.
-pub(crate) fn find(plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Found {
-    let is_body = |plan: &Arc<ViewPlan>| plan.model().n_parts() == skeleton::N_PARTS;
-    let views: Vec<Vec<Sighting>> = if plans.iter().all(is_body) {
-        let views = plans.iter().zip(answers);
-        views
-            .map(|(plan, it)| sightings(plan, it.as_ref()))
-            .collect()
-    } else {
-        Vec::new()
-    };
-    let cameras: Vec<&Camera> = plans.iter().map(|it| it.camera()).collect();
-    let people = distinct(&views, groups(&cameras, &views));
+/// * `cameras`, `views`: the cameras of the views, and the candidates of each.
+pub(crate) fn find(cameras: &[&Camera], views: Vec<Vec<FoundBody>>) -> Found {
+    let people = distinct(&views, groups(cameras, &views));
     Found { views, people }
 }
 
 /// Everything that enough views agree on; the same person many times.
-fn groups(cameras: &[&Camera], views: &[Vec<Sighting>]) -> Vec<Person> {
+fn groups(cameras: &[&Camera], views: &[Vec<FoundBody>]) -> Vec<Person> {
     let n_present = views.iter().filter(|it| !it.is_empty()).count();
     let needed = MIN_VIEWS.min(n_present).max(2);
     let mut found = Vec::new();
@@ -199,7 +197,7 @@ fn groups(cameras: &[&Camera], views: &[Vec<Sighting>]) -> Vec<Person> {
 }
 
 /// The best of the groups, and of the others those that are somebody else.
-fn distinct(views: &[Vec<Sighting>], mut found: Vec<Person>) -> Vec<Person> {
+fn distinct(views: &[Vec<FoundBody>], mut found: Vec<Person>) -> Vec<Person> {
     found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     let mut kept: Vec<Person> = Vec::new();
     for person in found {
@@ -214,7 +212,7 @@ fn distinct(views: &[Vec<Sighting>], mut found: Vec<Person>) -> Vec<Person> {
 }
 
 /// Whether two are different people: apart in space, and sharing a place in at most one picture.
-fn differ(views: &[Vec<Sighting>], one: &Person, other: &Person) -> bool {
+fn differ(views: &[Vec<FoundBody>], one: &Person, other: &Person) -> bool {
     let shared = views.iter().enumerate().filter(|(view, sightings)| {
         let line = one.lines_px[*view].as_ref();
         line.zip(other.candidates[*view])
@@ -226,7 +224,7 @@ fn differ(views: &[Vec<Sighting>], one: &Person, other: &Person) -> bool {
 }
 
 /// Whether the rays to the necks pass each other so near, and those to the hips, that the two may be one person.
-fn may_meet(one: &Sighting, other: &Sighting) -> bool {
+fn may_meet(one: &FoundBody, other: &FoundBody) -> bool {
     [NECK, HIPS].into_iter().all(|point| {
         let (Some(a), Some(b)) = (&one.rays[point], &other.rays[point]) else {
             return false;
@@ -241,7 +239,7 @@ fn may_meet(one: &Sighting, other: &Sighting) -> bool {
 /// * `rays`: a buffer.
 fn person<'a>(
     cameras: &[&Camera],
-    views: &'a [Vec<Sighting>],
+    views: &'a [Vec<FoundBody>],
     candidates: &mut [Option<usize>],
     rays: &mut Vec<&'a Ray>,
 ) -> Option<Person> {
@@ -260,7 +258,7 @@ fn person<'a>(
 /// The person of these candidates, and the candidates that see it there.
 fn placed<'a>(
     cameras: &[&Camera],
-    views: &'a [Vec<Sighting>],
+    views: &'a [Vec<FoundBody>],
     candidates: &[Option<usize>],
     rays: &mut Vec<&'a Ray>,
 ) -> Option<Person> {
@@ -301,7 +299,7 @@ fn placed<'a>(
 
 /// The points nearest to the rays of some candidates; `None` if they are parallel or meet behind a camera.
 fn line_in_world<'a>(
-    views: &'a [Vec<Sighting>],
+    views: &'a [Vec<FoundBody>],
     candidates: &[Option<usize>],
     rays: &mut Vec<&'a Ray>,
 ) -> Option<[Point3<f64>; N_POINTS]> {
@@ -350,33 +348,65 @@ fn distance_to_segment(point: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     (point - (a + along * share.clamp(0.0, 1.0))).norm()
 }
 
-/// The candidates of a view.
-fn sightings(plan: &ViewPlan, answer: Option<&ViewResult>) -> Vec<Sighting> {
-    let Some(answer) = answer else {
+/// The candidates of a view of the paper's method; none of a model that does not have the parts of the published ones.
+pub(crate) fn bodies_of_poses(plan: &ViewPlan, answer: Option<&ViewResult>) -> Vec<FoundBody> {
+    let is_body = plan.model().n_parts() == skeleton::N_PARTS;
+    let Some(answer) = answer.filter(|_| is_body) else {
         return Vec::new();
     };
-    let scores = answer.candidates.iter().map(|it| f64::from(it.score));
+    let scores = answer.candidates.iter().map(|pose| f64::from(pose.score));
     let mut scores: Vec<f64> = scores.collect();
     scores.sort_by(|a, b| b.total_cmp(a));
-    let usual = if posenetwork::springs::is_tree(plan.model()) {
-        // Whoever a network sees is somebody: the score counts above that of a place of which it says nothing.
-        f64::from(MapSettings::default().floor()) * PARSE14.joints.len() as f64
-    } else {
-        scores.get(scores.len() * 2 / 3).copied().unwrap_or(0.0)
-    };
-    let sighting = |pose: &fmp::Pose| {
+    let usual = scores.get(scores.len() * 2 / 3).copied().unwrap_or(0.0);
+    let body = |pose: &fmp::Pose| {
         let points_px = LINE.map(|parts| {
             let [a, b] = parts.map(|part| plan.centre(pose, part));
-            [0, 1].map(|axis| f64::midpoint(a[axis], b[axis]))
+            middle(a, b)
         });
-        Sighting {
-            points_px,
-            rays: points_px.map(|[x, y]| plan.camera().ray(&Point2::new(x, y))),
-            size_px: plan.size(pose).max(1.0),
-            strength: (f64::from(pose.score) - usual).max(0.0),
-        }
+        let strength = f64::from(pose.score) - usual;
+        FoundBody::new(plan.camera(), points_px, plan.size(pose), strength)
     };
-    answer.candidates.iter().map(sighting).collect()
+    answer.candidates.iter().map(body).collect()
+}
+
+/// The candidates of a view of the method of networks. Whoever a network sees is somebody: the score counts above that of a place of
+/// which it says nothing.
+pub(crate) fn bodies_of_people(camera: &Camera, seen: Option<&Sightings>) -> Vec<FoundBody> {
+    let floor = f64::from(MapSettings::default().floor()) * PARSE14.joints.len() as f64;
+    let body = |sighting: &Sighting| {
+        let outline = sighting.outline().unwrap_or_default();
+        let size_px = (outline[2] - outline[0]).max(outline[3] - outline[1]);
+        let strength = f64::from(sighting.score) - floor;
+        FoundBody::new(camera, line_of(&sighting.places(false)), size_px, strength)
+    };
+    let people = seen.iter().flat_map(|seen| &seen.people);
+    people.map(body).collect()
+}
+
+/// The middle line of the joints that are seen; what is not seen continues the trunk.
+fn line_of(joints: &[[f64; 2]; PARSE14.joints.len()]) -> Line {
+    const PAIRS: [[usize; 2]; N_POINTS] = [[13, 13], [12, 12], [2, 3], [1, 4], [0, 5]];
+    const SHOULDERS: [usize; 2] = [8, 9];
+    /// Place of every point along the trunk of somebody who stands, neck 0, hips 1.
+    const ALONG: [f64; N_POINTS] = [-0.4, 0.0, 1.0, 1.8, 2.6];
+    let seen = |pair: [usize; 2]| {
+        let [a, b] = pair.map(|joint| joints[joint]);
+        let both = middle(a, b);
+        [both, a, b].into_iter().find(|at| at[0].is_finite())
+    };
+    let mut line = PAIRS.map(seen);
+    line[NECK] = line[NECK].or_else(|| seen(SHOULDERS));
+    let trunk = line[NECK].zip(line[HIPS]);
+    core::array::from_fn(|point| {
+        let continued = trunk.map(|(neck, hips)| {
+            [0, 1].map(|axis| neck[axis] + ALONG[point] * (hips[axis] - neck[axis]))
+        });
+        line[point].or(continued).unwrap_or([f64::NAN; 2])
+    })
+}
+
+fn middle(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|axis| f64::midpoint(a[axis], b[axis]))
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 use geometry::{MAX_VIEWS, TriangulateError, Triangulated};
 use multiview::{FusedPose, SpaceView, ViewPlan};
 use nalgebra::{Matrix3, Point3};
-use posenetwork::springs::joint_of;
 use posenetwork::{MapSettings, expected_error};
 use skeleton::{Joint, JointSet, N_PARTS, PARENT, PARSE14};
 
@@ -146,14 +145,22 @@ pub(crate) fn shown_in(
 }
 
 /// Where a part lies between two joints.
-struct Between {
+pub(crate) struct Between {
     /// The next joint towards the head, and the next one away from it.
-    joints: [usize; 2],
+    pub(crate) joints: [usize; 2],
     /// How far along, 0 to 1.
-    share: f64,
+    pub(crate) share: f64,
 }
 
-fn between(part: usize) -> Between {
+/// The joint of a part, by number in `skeleton::PARSE14`; `None` for a part between joints.
+fn joint_of(part: usize) -> Option<usize> {
+    PARSE14
+        .joints
+        .iter()
+        .position(|joint| joint.parts == [part])
+}
+
+pub(crate) fn between(part: usize) -> Between {
     if let Some(joint) = joint_of(part) {
         return Between {
             joints: [joint; 2],

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use fmp::Pose;
-use geometry::{TriangulateError, Triangulated};
+use geometry::{Camera, TriangulateError, Triangulated};
 use multiview::{
     ConsensusWorkspace, Exchanges, FacingFilter, FacingHypothesis, Sides, SidesFilter, Sightings,
     ViewPlan, anatomical, is_exchanged,
@@ -17,7 +17,7 @@ use crate::bodies::{Bodies, Body, NoJoint};
 use crate::fused::Fused;
 use crate::fused_view::{Candidate, Candidates, FusedView, fuse};
 use crate::motion::Motion;
-use crate::people::people;
+use crate::people::{bodies_of_poses, find};
 use crate::skeleton_settings::{Combine, SkeletonSettings};
 use crate::space::{Seen, Space};
 use crate::{AllViewsResult, PairResult, ViewResult};
@@ -123,7 +123,11 @@ impl SkeletonStep {
     }
 
     fn settle(&mut self, answers: &[Option<ViewResult>], fused: &Fused<'_>) -> Skeleton {
-        let n_people = people(&self.space.plans, answers).len();
+        let plans = &self.space.plans;
+        let cameras: Vec<&Camera> = plans.iter().map(|plan| plan.camera()).collect();
+        let bodies = plans.iter().zip(answers);
+        let bodies = bodies.map(|(plan, answer)| bodies_of_poses(plan, answer.as_ref()));
+        let n_people = find(&cameras, bodies.collect()).people.len();
         let frame = Frame {
             answers,
             fused,

@@ -15,8 +15,6 @@ pub struct ViewResult {
     /// What the picture says about the direction in which the person of every candidate faces; empty
     /// without a detector of it.
     pub front: Vec<FrontEvidence>,
-    /// How sure the network is of every joint of `skeleton::PARSE14` of every candidate, 0 to 1; empty with the filters.
-    pub heats: Vec<Vec<f32>>,
     /// Expected error of every part, pixels of the frame, if there is a prediction.
     pub sigma_px: Option<Vec<f32>>,
     /// Thresholds that came with the prediction, pixels of the frame; used where the settings have

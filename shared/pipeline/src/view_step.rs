@@ -11,7 +11,7 @@ use kernels::Rgb8View;
 use multiview::FrontEvidence;
 use orientation::Detector;
 
-use crate::view_result::{ExtraKeypoint, ViewResult};
+use crate::view_result::ViewResult;
 
 /// Which levels of the pyramid a view offers as evidence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -72,10 +72,6 @@ pub struct ViewEstimate {
     /// What the picture says about the direction in which the person of every candidate faces; empty: nothing was
     /// asked.
     pub front: Vec<FrontEvidence>,
-    /// How sure the network is of every joint of every candidate, 0 to 1; empty with the filters.
-    pub heats: Vec<Vec<f32>>,
-    /// Keypoints that no joint follows from, of one candidate after the other: of each as many as were asked for.
-    pub extras: Vec<ExtraKeypoint>,
     /// Levels whose responses are offered as evidence, ascending.
     pub levels: Vec<u16>,
     /// How well each part of the best pose fits at its position; empty without a pose.
@@ -92,7 +88,6 @@ impl ViewEstimate {
         (!self.candidates.is_empty()).then(|| ViewResult {
             candidates: self.candidates.clone(),
             front: self.front.clone(),
-            heats: self.heats.clone(),
             sigma_px,
             tau_px: None,
             skew_s: 0.0,
@@ -162,8 +157,6 @@ impl ViewStep {
         let levels = self.settings.window.levels(scope.levels(), &candidates);
         ViewEstimate {
             front: self.front(image, &candidates),
-            heats: Vec::new(),
-            extras: Vec::new(),
             candidates,
             local: local.unwrap_or_default(),
             levels,

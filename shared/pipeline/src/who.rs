@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use multiview::{SeenPerson, ViewPlan, same_person};
-use skeleton::PARSE14;
 
 use crate::following::{Follow, Following, Others};
-use crate::view_result::ViewResult;
+use crate::people::{FoundBody, bodies_of_people};
+use crate::placed::N;
+use crate::sighting::{Sighting, Sightings};
 
 /// A person of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,7 +38,7 @@ pub struct WhoStep {
 impl WhoStep {
     /// Prepares the step.
     ///
-    /// * `plans`: the views of the rig, in the rig's order, with a tree of [`posenetwork::springs`].
+    /// * `plans`: the views of the rig, in the rig's order.
     /// * `as_seen`: whether left and right follow the picture, so that two views may have them exchanged.
     pub fn new(plans: Vec<Arc<ViewPlan>>, follow: Follow, as_seen: bool) -> Self {
         Self {
@@ -48,8 +49,12 @@ impl WhoStep {
     }
 
     /// Says who is in the next frame: the person who is followed, if at least two views show that person.
-    pub fn run(&mut self, answers: &[Option<ViewResult>]) -> FramePeople {
-        let followed = self.following.next(&self.plans, answers);
+    pub fn run(&mut self, answers: &[Option<Sightings>]) -> FramePeople {
+        let views = self.plans.iter().zip(answers);
+        let views: Vec<Vec<FoundBody>> = views
+            .map(|(plan, seen)| bodies_of_people(plan.camera(), seen.as_ref()))
+            .collect();
+        let followed = self.following.next(&self.plans, views);
         let candidates = self.candidates(answers, &followed.others);
         let n_views = candidates.iter().flatten().count();
         let person = (n_views >= 2).then_some(KnownPerson {
@@ -64,18 +69,18 @@ impl WhoStep {
 
     /// The candidate of every view that is the same person: the one who is followed where the view sees it, else among those who are
     /// nobody else.
-    fn candidates(&self, answers: &[Option<ViewResult>], others: &Others) -> Vec<Option<usize>> {
+    fn candidates(&self, answers: &[Option<Sightings>], others: &Others) -> Vec<Option<usize>> {
         let mut indices: Vec<Vec<usize>> = vec![Vec::new(); answers.len()];
         let mut people: Vec<Vec<SeenPerson>> = vec![Vec::new(); answers.len()];
         for (view, answer) in answers.iter().enumerate() {
             let Some(answer) = answer.as_ref().filter(|_| !others.only(view)) else {
                 continue;
             };
-            for index in 0..answer.candidates.len() {
+            for (index, sighting) in answer.people.iter().enumerate() {
                 let is_own = others.own(view).is_none_or(|own| own == index);
                 if is_own && others.of_view(view) >> index & 1 == 0 {
                     indices[view].push(index);
-                    people[view].push(self.seen(view, index, answer));
+                    people[view].push(self.seen(view, sighting));
                 }
             }
         }
@@ -90,19 +95,17 @@ impl WhoStep {
     }
 
     /// The person of a candidate.
-    fn seen(&self, view: usize, candidate: usize, answer: &ViewResult) -> SeenPerson {
-        let plan = &self.plans[view];
-        let pose = &answer.candidates[candidate];
-        let heats = answer.heats.get(candidate);
+    fn seen(&self, view: usize, sighting: &Sighting) -> SeenPerson {
+        let [_, height] = self.plans[view].layout().image_size;
         let joint = |joint: usize| {
-            let heat = heats?.get(joint)?;
-            let at = plan.centre(pose, PARSE14.joints[joint].parts[0]);
-            Some((at, f64::from(*heat)))
+            let at = sighting.joint(joint)?;
+            Some((at, f64::from(sighting.heats[joint])))
         };
-        let [_, height] = plan.layout().image_size;
+        let outline = sighting.outline().unwrap_or_default();
+        let longer_px = (outline[2] - outline[0]).max(outline[3] - outline[1]);
         SeenPerson {
-            joints: (0..PARSE14.joints.len()).map(joint).collect(),
-            height: plan.size(pose) / height as f64,
+            joints: (0..N).map(joint).collect(),
+            height: longer_px / height as f64,
         }
     }
 }

@@ -1,10 +1,11 @@
-//! The pose of one person by the maps of that person alone.
+//! One person by the peaks of the maps: how well seen, where, and which way up.
 
-use fmp::{Layout, Pose, Region, Responses, Scope, Solver};
-
-use crate::maps::JointMaps;
+use crate::maps::{JointMaps, MapSettings};
 use crate::network::Turn;
-use crate::springs::WINDOW_CELLS;
+use crate::outline::outline_of;
+
+/// Least heat of a joint that counts for the box around its person, 0 to 1.
+const FAINT: f64 = 0.02;
 
 /// Least heat of a joint that tells where the head points, 0 to 1.
 const SURE: f64 = 0.2;
@@ -49,48 +50,29 @@ impl JointMaps {
         now.towards(towards, MOST_LEAN)
     }
 
-    /// The level of a pyramid whose cells are nearest to those that the springs were learned with.
-    pub fn level(&self, layout: &Layout) -> u16 {
-        let [_, top, _, bottom] = self.extent();
-        let cell = (bottom - top) / WINDOW_CELLS;
-        let distance = |level: usize| (layout.levels[level].scale / cell).ln().abs();
-        let levels = 0..layout.levels.len();
-        let nearest = levels.min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
-        nearest.unwrap_or(0) as u16
+    /// Evidence of all joints at their peaks, summed; a joint without a peak has the floor.
+    pub fn score(&self, settings: &MapSettings) -> f32 {
+        let floor = self.floor();
+        let peaks = self.peaks().iter();
+        let evidence =
+            peaks.map(|peak| peak.map_or(floor, |peak| settings.of_heat(peak.score, floor)));
+        evidence.sum()
     }
 
-    /// The pixels of the picture that the maps cover; `None` if they lie beyond it.
-    pub fn region(&self, layout: &Layout) -> Option<Region> {
-        let [left, top, right, bottom] = self.extent();
-        let along = |from: f64, to: f64, side: usize| {
-            let from = from.floor().clamp(0.0, side as f64) as u32;
-            let to = to.ceil().clamp(0.0, side as f64) as u32;
-            (from < to).then_some([from, to])
-        };
-        let [width, height] = layout.image_size;
-        Some(Region {
-            x: along(left, right, width)?,
-            y: along(top, bottom, height)?,
-        })
+    /// Box around the joints at their peaks ([`outline_of`]), pixels of the picture; `None` where none is seen.
+    pub fn around(&self) -> Option<[f64; 4]> {
+        let seen = self.peaks().iter().flatten();
+        let seen = seen.filter(|peak| peak.score >= FAINT);
+        outline_of(seen.map(|peak| peak.at))
     }
 
-    /// The best pose of a tree of [`springs`](crate::springs) over these maps, on their own level; `None` if they lie beyond the
-    /// picture.
+    /// Whether the maps cover any pixel of a picture.
     ///
-    /// * `layout`: of the picture, for that tree.
-    /// * `responses`: memory that is used again.
-    pub fn pose(
-        &mut self,
-        solver: &Solver,
-        layout: &Layout,
-        responses: &mut Vec<f32>,
-    ) -> Option<Pose> {
-        let level = self.level(layout);
-        let scope = Scope::new(layout, level..level + 1, self.region(layout)?).ok()?;
-        responses.resize(layout.n_values(&scope), 0.0);
-        self.fill(layout, &scope, responses);
-        let levels = [level];
-        solver.best(&Responses::within(layout, responses, &levels, scope), None)
+    /// * `size`: width and height of the picture.
+    pub fn overlaps(&self, size: [usize; 2]) -> bool {
+        let [left, top, right, bottom] = self.extent();
+        let [width, height] = size.map(|side| side as f64);
+        left < right && top < bottom && left < width && top < height && right > 0.0 && bottom > 0.0
     }
 }
 
@@ -99,7 +81,6 @@ mod tests {
     use keypoints::{Keypoint, LSP_14, joint_ways};
 
     use super::*;
-    use crate::maps::MapSettings;
 
     /// Somebody who stands: ankle, knee, hip; hip, knee, ankle; wrist, elbow, shoulder; shoulder, elbow, wrist; neck, head.
     const STANDING: [[f64; 2]; 14] = [

@@ -1,10 +1,10 @@
 //! The maps of a view as a few Gaussians: joints with their uncertainty, in place of all cells.
 
-use fmp::{Layout, Responses, Scope, Window};
 use nalgebra::{Matrix6, Vector6};
 
 use crate::MapSettings;
 use crate::maps::N_JOINTS;
+use crate::person_maps::PersonMaps;
 
 /// Least heat of a Gaussian: what is left below it is not told.
 const LEAST_HEAT: f64 = 0.03;
@@ -28,7 +28,7 @@ const NOTHING: f64 = 1e-5;
 pub struct Bump {
     /// The joint of `skeleton::PARSE14`.
     pub joint: usize,
-    /// Where it is highest: column and row, cells of the level.
+    /// Where it is highest: column and row, cells of the maps.
     pub at: [f32; 2],
     /// The heat there, above 0 and at most 1.
     pub heat: f32,
@@ -54,24 +54,24 @@ impl Bump {
             && trace / 2.0 + spread <= 1.1 * high
     }
 
-    /// The heat at a cell of the level.
+    /// The heat at a cell.
     fn heat_at(&self, [column, row]: [f64; 2]) -> f64 {
         let [xx, xy, yy] = self.precision.map(f64::from);
         let [x, y] = [column - f64::from(self.at[0]), row - f64::from(self.at[1])];
         f64::from(self.heat) * (-0.5 * (xx * x * x + 2.0 * xy * x * y + yy * y * y)).exp()
     }
 
-    /// The cells of a window where it is anything: first column and row, and those after the last.
-    fn extent(&self, window: &Window) -> [[usize; 2]; 2] {
+    /// The cells where it is anything: first column and the one after the last, first row and the one after the last.
+    ///
+    /// * `size`: number of columns and rows.
+    fn extent(&self, size: [usize; 2]) -> [[usize; 2]; 2] {
         let [xx, xy, yy] = self.precision.map(f64::from);
         let reach = (2.0 * (f64::from(self.heat) / NOTHING).ln().max(0.0)).sqrt();
         let determinant = xx * yy - xy * xy;
         let sigma = [(yy / determinant).sqrt(), (xx / determinant).sqrt()];
-        let firsts = [window.left, window.top];
-        let counts = [window.cols, window.rows];
         [0, 1].map(|axis| {
-            let middle = f64::from(self.at[axis]) - firsts[axis] as f64;
-            let within = |it: f64| it.clamp(0.0, counts[axis] as f64) as usize;
+            let middle = f64::from(self.at[axis]);
+            let within = |cell: f64| cell.clamp(0.0, size[axis] as f64) as usize;
             let away = reach * sigma[axis];
             [
                 within((middle - away).floor()),
@@ -88,77 +88,63 @@ fn precisions() -> [f64; 2] {
 }
 
 /// The maps of all joints as sums of Gaussians: the highest first, each fitted to what those before it leave.
-///
-/// * `responses`: of maps that [`JointMaps::fill`](crate::JointMaps::fill) wrote, on one level. Of several the first is read.
-pub fn bumps(responses: &Responses<'_>, settings: &MapSettings) -> Vec<Bump> {
-    let Some(level) = responses.levels().first() else {
-        return Vec::new();
-    };
-    let level = usize::from(*level);
-    let window = responses.window(level);
+pub fn bumps(maps: &PersonMaps<'_>, settings: &MapSettings) -> Vec<Bump> {
+    let size = maps.grid().size;
+    let floor = settings.floor();
     let mut found = Vec::new();
     let mut heats = Vec::new();
-    for joint in 0..N_JOINTS.min(responses.layout().n_filters) {
+    for joint in 0..N_JOINTS {
         heats.clear();
-        let floor = settings.floor();
-        heats.extend(
-            responses
-                .map(level, joint)
-                .iter()
-                .map(|it| if *it > floor { settings.heat(*it) } else { 0.0 }),
-        );
+        let heat = |value: &f32| {
+            if *value > floor {
+                settings.heat(*value)
+            } else {
+                0.0
+            }
+        };
+        heats.extend(maps.map(joint).iter().map(heat));
         let first = found.len();
         while found.len() < first + MOST_OF_A_JOINT
-            && let Some(bump) = highest(joint, &heats, &window)
+            && let Some(bump) = highest(joint, &heats, size)
         {
-            for_each_cell(&bump, &window, |cell, heat| heats[cell] -= heat);
+            for_each_cell(&bump, size, |cell, heat| heats[cell] -= heat);
             found.push(bump);
-            fit_heights(&mut found[first..], &mut heats, &window);
+            fit_heights(&mut found[first..], &mut heats, size);
         }
     }
     found
 }
 
-/// Fills the responses of a scope from Gaussians, as [`JointMaps::fill`](crate::JointMaps::fill) does from maps. What no Gaussian
-/// reaches is the floor; filters beyond the joints respond with 0.
+/// Fills maps from Gaussians. Cells that no Gaussian reaches have the floor.
 ///
-/// * `bumps`: sound ones ([`Bump::is_sound`]); of a scope of one level.
-/// * `responses`: [`Layout::n_values`] values, overwritten.
-///
-/// # Panics
-///
-/// If there are fewer values.
+/// * `bumps`: sound ones ([`Bump::is_sound`]).
+/// * `size`: number of columns and rows of a map.
+/// * `values`: `[joint][row][column]`, overwritten.
 pub fn fill_from_bumps(
     bumps: &[Bump],
-    (layout, scope): (&Layout, &Scope),
+    size: [usize; 2],
     settings: &MapSettings,
-    responses: &mut [f32],
+    values: &mut [f32],
 ) {
     let floor = settings.floor();
-    for level in scope.levels().map(usize::from) {
-        let window = layout.window(scope, level);
-        let maps = &mut responses[layout.maps_in(scope, level)];
-        let area = (window.rows * window.cols).max(1);
-        maps.fill(0.0);
-        for bump in bumps {
-            if let Some(map) = maps.chunks_exact_mut(area).nth(bump.joint) {
-                for_each_cell(bump, &window, |cell, heat| map[cell] += heat as f32);
-            }
+    let area = (size[0] * size[1]).max(1);
+    values.fill(0.0);
+    for bump in bumps {
+        if let Some(map) = values.chunks_exact_mut(area).nth(bump.joint) {
+            for_each_cell(bump, size, |cell, heat| map[cell] += heat as f32);
         }
-        for map in maps.chunks_exact_mut(area).take(N_JOINTS) {
-            for value in map {
-                *value = settings.of_heat(f64::from(value.clamp(0.0, 1.0)), floor);
-            }
-        }
+    }
+    for value in values {
+        *value = settings.of_heat(f64::from(value.clamp(0.0, 1.0)), floor);
     }
 }
 
-fn for_each_cell(bump: &Bump, window: &Window, mut cell: impl FnMut(usize, f64)) {
-    let [[left, right], [top, bottom]] = bump.extent(window);
+fn for_each_cell(bump: &Bump, size: [usize; 2], mut cell: impl FnMut(usize, f64)) {
+    let [[left, right], [top, bottom]] = bump.extent(size);
     for row in top..bottom {
         for column in left..right {
-            let at = [(window.left + column) as f64, (window.top + row) as f64];
-            cell(row * window.cols + column, bump.heat_at(at));
+            let heat = bump.heat_at([column as f64, row as f64]);
+            cell(row * size[0] + column, heat);
         }
     }
 }
@@ -166,11 +152,11 @@ fn for_each_cell(bump: &Bump, window: &Window, mut cell: impl FnMut(usize, f64))
 /// Makes the heights of the Gaussians of a map those of the least squares together, one after the other: neighbours share the heat between them.
 ///
 /// * `left`: what they leave of the map.
-fn fit_heights(bumps: &mut [Bump], left: &mut [f64], window: &Window) {
+fn fit_heights(bumps: &mut [Bump], left: &mut [f64], size: [usize; 2]) {
     for _ in 0..SWEEPS {
         for bump in &mut *bumps {
             let (mut along, mut square) = (0.0, 0.0);
-            for_each_cell(bump, window, |cell, heat| {
+            for_each_cell(bump, size, |cell, heat| {
                 along += left[cell] * heat;
                 square += heat * heat;
             });
@@ -178,24 +164,23 @@ fn fit_heights(bumps: &mut [Bump], left: &mut [f64], window: &Window) {
             let wanted = height * (1.0 + along / square.max(f64::MIN_POSITIVE));
             let next = wanted.clamp(LEAST_HEIGHT, 1.0) as f32;
             let change = f64::from(next) / height - 1.0;
-            for_each_cell(bump, window, |cell, heat| left[cell] -= change * heat);
+            for_each_cell(bump, size, |cell, heat| left[cell] -= change * heat);
             bump.heat = next;
         }
     }
 }
 
 /// The Gaussian of the highest cell of a map.
-fn highest(joint: usize, heats: &[f64], window: &Window) -> Option<Bump> {
+fn highest(joint: usize, heats: &[f64], [columns, rows]: [usize; 2]) -> Option<Bump> {
     let (cell, top) = heats.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
     if *top < LEAST_HEAT {
         return None;
     }
-    let [column, row] = [cell % window.cols, cell / window.cols];
+    let [column, row] = [cell % columns, cell / columns];
     let around = |across: i64, down: i64| {
         let at = [column as i64 + across, row as i64 + down];
-        let is_inside =
-            (0..window.cols as i64).contains(&at[0]) && (0..window.rows as i64).contains(&at[1]);
-        is_inside.then(|| heats[at[1] as usize * window.cols + at[0] as usize])
+        let is_inside = (0..columns as i64).contains(&at[0]) && (0..rows as i64).contains(&at[1]);
+        is_inside.then(|| heats[at[1] as usize * columns + at[0] as usize])
     };
     let fitted = fit(&around, *top);
     // Where no Gaussian fits, one as narrow as a cell takes its maximum away.
@@ -203,8 +188,8 @@ fn highest(joint: usize, heats: &[f64], window: &Window) -> Option<Bump> {
     Some(Bump {
         joint,
         at: [
-            ((window.left + column) as f64 + away[0]) as f32,
-            ((window.top + row) as f64 + away[1]) as f32,
+            (column as f64 + away[0]) as f32,
+            (row as f64 + away[1]) as f32,
         ],
         heat: heat as f32,
         precision: precision.map(|it| it as f32),

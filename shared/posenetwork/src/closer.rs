@@ -1,12 +1,10 @@
 //! Looking at people in boxes that may not fit: into several, and closer where somebody is seen.
 
-use fmp::Layout;
 use kernels::Rgb8View;
 
 use crate::maps::{JointMaps, MapSettings};
 use crate::network::{LookError, PoseNetwork, Turn, Workspace};
-use crate::outline::{outline_of_pose, overlap};
-use crate::springs::TurnedSprings;
+use crate::outline::overlap;
 
 /// Boxes that cover each other by more show the same to a network: another look tells nothing new.
 const FITS: f64 = 0.8;
@@ -20,10 +18,6 @@ const MOST_MORE: usize = 2;
 pub struct Looker<'a> {
     /// The network.
     pub network: &'a PoseNetwork,
-    /// Solve the tree of springs, which says where a whole person is.
-    pub springs: &'a TurnedSprings,
-    /// Of the picture, for that tree.
-    pub layout: &'a Layout,
     /// How maps become evidence.
     pub settings: &'a MapSettings,
 }
@@ -34,7 +28,6 @@ pub struct LookMemory {
     workspace: Workspace,
     /// What is seen in a box that may turn out the better one.
     other: JointMaps,
-    responses: Vec<f32>,
 }
 
 /// What was seen in a box, beside the maps.
@@ -46,10 +39,9 @@ pub struct Look {
     pub front: Option<[f32; 2]>,
     /// Mean heat of the joints ([`JointMaps::heat`]): how well the person is seen, also compared with boxes of other sizes.
     pub heat: f64,
-    /// Of the best pose of the springs on the maps: how much a person this is, compared with boxes of the same size. Negative infinity
-    /// where the maps lie beyond the picture.
+    /// Evidence of the joints at their peaks ([`JointMaps::score`]).
     pub score: f32,
-    /// The box around that pose.
+    /// The box around the joints ([`JointMaps::around`]).
     pub around: Option<[f64; 4]>,
     /// How the picture was turned.
     pub turn: Turn,
@@ -78,15 +70,14 @@ impl Looker<'_> {
         memory: &mut LookMemory,
         maps: &mut JointMaps,
     ) -> Result<Option<Look>, LookError> {
-        let memory = (&mut memory.workspace, &mut memory.responses);
-        self.look_in(what, Turn::Up, memory, maps)
+        self.look_in(what, Turn::Up, &mut memory.workspace, maps)
     }
 
     fn look_in(
         &self,
         (image, outline): (Rgb8View<'_>, [f64; 4]),
         turn: Turn,
-        (workspace, responses): (&mut Workspace, &mut Vec<f32>),
+        workspace: &mut Workspace,
         maps: &mut JointMaps,
     ) -> Result<Option<Look>, LookError> {
         let sight = self
@@ -96,40 +87,28 @@ impl Looker<'_> {
             return Ok(None);
         };
         maps.read(&sight, self.settings)?;
-        let front = sight.front();
-        Ok(Some(self.judged((outline, turn, front), responses, maps)))
+        Ok(Some(self.judge((outline, turn, sight.front()), maps)))
     }
 
-    /// What was seen in a box whose maps are read.
+    /// Judges what was seen in a box whose maps are read.
     ///
     /// * `turn`: how the picture was turned; `front`: what was told of the direction in which the trunk faces.
     pub fn judge(
         &self,
-        seen: ([f64; 4], Turn, Option<[f32; 2]>),
-        memory: &mut LookMemory,
-        maps: &mut JointMaps,
-    ) -> Look {
-        self.judged(seen, &mut memory.responses, maps)
-    }
-
-    fn judged(
-        &self,
         (outline, turn, front): ([f64; 4], Turn, Option<[f32; 2]>),
-        responses: &mut Vec<f32>,
-        maps: &mut JointMaps,
+        maps: &JointMaps,
     ) -> Look {
-        let pose = maps.pose(self.springs.of(turn), self.layout, responses);
         Look {
             outline,
             front,
             heat: maps.heat(),
-            score: pose.as_ref().map_or(f32::NEG_INFINITY, |it| it.score),
-            around: pose.and_then(|it| outline_of_pose(&it, (self.springs.model(), self.layout))),
+            score: maps.score(self.settings),
+            around: maps.around(),
             turn,
         }
     }
 
-    /// Looks into the box around the pose that was seen in another one, and so on, as long as that is another box and shows the person
+    /// Looks into the box around the joints that were seen in another one, and so on, as long as that is another box and shows the person
     /// about as well or better: a box in which a person is small or at the edge is left for one that fits. One that cuts off the feet
     /// stays: a network puts them at its edge.
     ///
@@ -222,11 +201,6 @@ impl Looker<'_> {
         turn: Turn,
         memory: &mut LookMemory,
     ) -> Result<Option<Look>, LookError> {
-        let LookMemory {
-            workspace,
-            other,
-            responses,
-        } = memory;
-        self.look_in(what, turn, (workspace, responses), other)
+        self.look_in(what, turn, &mut memory.workspace, &mut memory.other)
     }
 }

@@ -1,17 +1,14 @@
 //! The maps of the skeleton's joints, as logarithms: the evidence that a network gives.
 
 mod sides;
-mod write;
 
-use fmp::{Layout, Placement, Scope};
 use keypoints::{Codec, Keypoint, Way, Window, joint_rows};
 use skeleton::PARSE14;
 
-use self::write::Write;
-use crate::between::{Tap, between, for_each_row};
 use crate::expected::expected_error;
 use crate::found::{likelihood, score_of, scored, weighted};
 use crate::network::{LookError, Read, Sight};
+use crate::person_maps::{MapGrid, PersonMaps};
 
 /// Number of joints, each with a map.
 pub(crate) const N_JOINTS: usize = PARSE14.joints.len();
@@ -71,6 +68,8 @@ pub struct JointMaps {
     values: Vec<f32>,
     rows: usize,
     columns: usize,
+    /// Of the network's own maps every n-th row and column is kept.
+    every: usize,
     /// Pixels of the input between two cells, across and down; the first cell lies on the first pixel.
     step: [f64; 2],
     floor: f32,
@@ -83,10 +82,15 @@ pub struct JointMaps {
     told: Vec<Option<f64>>,
     /// Standard deviation of a keypoint whose score is 1 on the maps themselves; `None` where the heat tells it.
     sigma_px: Option<f64>,
-    /// Across and down: between which cells those of a layout lie.
-    taps: [Vec<Tap>; 2],
-    /// Memory for rows of a map between their cells.
-    lines: Vec<f32>,
+}
+
+/// Most cells of a map: larger ones are kept coarser.
+pub const MOST_CELLS: usize = 1 << 15;
+
+/// By how many cells two that are kept lie apart, so that at most [`MOST_CELLS`] are.
+fn coarseness([rows, columns]: [usize; 2]) -> usize {
+    let area = |every: &usize| rows.div_ceil(*every) * columns.div_ceil(*every);
+    (1..).find(|every| area(every) <= MOST_CELLS).unwrap_or(1)
 }
 
 /// Cells between two columns or rows of a grid that is made for a codec without maps.
@@ -121,9 +125,14 @@ impl JointMaps {
                 sight.network().card().output,
                 Codec::HeatMap { udp: true, .. }
             );
-            (rows, columns, maps.step(size, udp))
+            self.every = coarseness([rows, columns]);
+            let step = maps.step(size, udp).map(|step| step * self.every as f64);
+            let sides = [rows, columns].map(|side| side.div_ceil(self.every));
+            (sides[0], sides[1], step)
         } else {
-            let [columns, rows] = size.map(|it| (it as f64 / GRID_PX) as usize);
+            let [columns, rows] = size.map(|side| (side as f64 / GRID_PX) as usize);
+            let coarser = coarseness([rows, columns]);
+            let [columns, rows] = [columns, rows].map(|side| side.div_ceil(coarser));
             let step = [
                 size[0] as f64 / columns as f64,
                 size[1] as f64 / rows as f64,
@@ -265,6 +274,7 @@ impl JointMaps {
                 let score = score_of(sight);
                 for (row, line) in lines {
                     for (column, value) in line.iter_mut().enumerate() {
+                        let [row, column] = [row, column].map(|cell| cell * self.every);
                         *value = heat(score.of(f64::from(maps.value(*keypoint, row, column))));
                     }
                 }
@@ -320,62 +330,18 @@ impl JointMaps {
         &self.peaks
     }
 
-    /// The evidence for a joint at a point of the picture, between sixteen cells, so that a maximum may lie between two; the floor
-    /// beyond the window.
+    /// The evidence for a joint at a point of the picture ([`PersonMaps::at`]); the floor before the first picture.
     pub fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
-        let Some(window) = &self.window else {
-            return self.floor;
-        };
-        let at = window.in_input(point);
-        let [across, down] = [
-            Tap::at(at[0] / self.step[0], self.columns),
-            Tap::at(at[1] / self.step[1], self.rows),
-        ];
-        if !(across.is_inside && down.is_inside) {
-            return self.floor;
-        }
-        let area = self.rows * self.columns;
-        let map = &self.values[joint * area..(joint + 1) * area];
-        between(map, self.columns, &down, &across)
+        self.evidence()
+            .map_or(self.floor, |maps| maps.at(joint, point))
     }
 
-    /// The highest maxima of a joint's map, at cells: pixels of the picture, and the evidence there.
+    /// The highest maxima of a joint's map ([`PersonMaps::maxima`]).
     ///
     /// * `n`: at most so many.
     pub fn maxima(&self, joint: usize, n: usize) -> Vec<([f64; 2], f32)> {
-        let Some(window) = &self.window else {
-            return Vec::new();
-        };
-        let area = self.rows * self.columns;
-        let map = &self.values[joint * area..(joint + 1) * area];
-        let value = |column: i64, row: i64| {
-            let inside =
-                (0..self.columns as i64).contains(&column) && (0..self.rows as i64).contains(&row);
-            if inside {
-                map[row as usize * self.columns + column as usize]
-            } else {
-                f32::NEG_INFINITY
-            }
-        };
-        let mut found: Vec<([f64; 2], f32)> = Vec::new();
-        for row in 0..self.rows as i64 {
-            for column in 0..self.columns as i64 {
-                let here = value(column, row);
-                let around = |down: i64, across: i64| value(column + across, row + down);
-                let is_highest = here > self.floor
-                    && (-1..=1).all(|down| {
-                        (-1..=1)
-                            .all(|across| (down, across) == (0, 0) || around(down, across) <= here)
-                    });
-                if is_highest {
-                    let at = [column as f64 * self.step[0], row as f64 * self.step[1]];
-                    found.push((window.in_picture(at), here));
-                }
-            }
-        }
-        found.sort_by(|a, b| b.1.total_cmp(&a.1));
-        found.truncate(n);
-        found
+        self.evidence()
+            .map_or_else(Vec::new, |maps| maps.maxima(joint, n, |_| true))
     }
 
     /// The evidence where a view shows nothing of a joint.
@@ -405,92 +371,17 @@ impl JointMaps {
         [left, top, right, bottom]
     }
 
-    /// Fills the responses of a scope. Filter `j` is joint `j` of `skeleton::PARSE14`; further filters, of parts between
-    /// joints, respond with 0 everywhere. Every value is that of [`Self::at`], to the bit.
-    ///
-    /// * `layout`: of a model of [`springs`](crate::springs), whose filters have one cell.
-    /// * `responses`: [`Layout::n_values`] values of the scope, overwritten.
-    ///
-    /// # Panics
-    ///
-    /// If there are fewer values.
-    pub fn fill(&mut self, layout: &Layout, scope: &Scope, responses: &mut [f32]) {
-        self.write(layout, scope, (responses, Write::Over));
-    }
-
-    /// Raises the responses of a scope to these maps where they are lower: the maps of another person.
-    ///
-    /// * the others as for [`Self::fill`].
-    ///
-    /// # Panics
-    ///
-    /// If there are fewer values.
-    pub fn raise(&mut self, layout: &Layout, scope: &Scope, responses: &mut [f32]) {
-        self.write(layout, scope, (responses, Write::Highest));
-    }
-
-    fn write(&mut self, layout: &Layout, scope: &Scope, (responses, how): (&mut [f32], Write)) {
-        for level in scope.levels().map(usize::from) {
-            let window = layout.window(scope, level);
-            let values = &mut responses[layout.maps_in(scope, level)];
-            let firsts = [window.left, window.top];
-            let counts = [window.cols, window.rows];
-            for axis in 0..2 {
-                self.taps(axis, counts[axis], |nth| {
-                    let at = (firsts[axis] + nth) as u16;
-                    let place = Placement {
-                        x: at,
-                        y: at,
-                        mixture: 0,
-                    };
-                    layout.centre(level, [1, 1], place)[axis]
-                });
-            }
-            let area = window.rows * window.cols;
-            for (filter, map) in values.chunks_exact_mut(area.max(1)).enumerate() {
-                if filter < N_JOINTS {
-                    self.write_joint(filter, map, how);
-                } else if how == Write::Over {
-                    map.fill(0.0);
-                }
-            }
-        }
-    }
-
-    /// Which cells of the maps the cells of a layout lie between, along one axis, and how much each counts.
-    fn taps(&mut self, axis: usize, n: usize, centre: impl Fn(usize) -> f64) {
-        let cells = [self.columns, self.rows][axis];
-        let (window, step) = (self.window, self.step[axis]);
-        let taps = &mut self.taps[axis];
-        taps.clear();
-        taps.extend((0..n).map(|nth| {
-            let centre = centre(nth);
-            let cell = window.map_or(f64::NAN, |it| it.in_input([centre; 2])[axis] / step);
-            Tap::at(cell, cells)
-        }));
-    }
-
-    fn write_joint(&mut self, joint: usize, map: &mut [f32], how: Write) {
-        let area = self.rows * self.columns;
-        let own = &self.values[joint * area..(joint + 1) * area];
-        let (floor, [across, down]) = (self.floor, &self.taps);
-        let width = across.len();
-        for_each_row(
-            own,
-            self.columns,
-            [across, down],
-            &mut self.lines,
-            |row, line| {
-                let to = &mut map[row * width..(row + 1) * width];
-                for (nth, (value, tap)) in to.iter_mut().zip(across).enumerate() {
-                    let here = line.filter(|_| tap.is_inside).map_or(floor, |it| it[nth]);
-                    *value = match how {
-                        Write::Over => here,
-                        Write::Highest => value.max(here),
-                    };
-                }
-            },
-        );
+    /// The maps as they lie in the picture; `None` before the first picture.
+    pub fn evidence(&self) -> Option<PersonMaps<'_>> {
+        let window = self.window.as_ref()?;
+        let at = |cell: f64| window.in_picture(self.step.map(|step| cell * step));
+        let ([x0, y0], [x1, y1]) = (at(0.0), at(1.0));
+        let grid = MapGrid {
+            first_px: [x0, y0],
+            cell_px: [x1 - x0, y1 - y0],
+            size: [self.columns, self.rows],
+        };
+        Some(PersonMaps::new(grid, &self.values, self.floor))
     }
 }
 

@@ -1,9 +1,5 @@
 //! The box around a person whose joints are known.
 
-use fmp::{Layout, Model, Pose};
-
-use crate::springs::joint_of;
-
 /// By how much hands, feet and hair reach beyond the joints: share of the longer side, on each side.
 const BEYOND: f64 = 0.05;
 
@@ -26,14 +22,6 @@ pub fn outline_of(joints: impl IntoIterator<Item = [f64; 2]>) -> Option<[f64; 4]
     }
     let more = BEYOND * longer;
     Some([low[0] - more, low[1] - more, high[0] + more, high[1] + more])
-}
-
-/// The box around a pose of the springs, as [`outline_of`], pixels of the picture.
-///
-/// * `model`: the tree; `layout`: of the picture, for that tree.
-pub fn outline_of_pose(pose: &Pose, (model, layout): (&Model, &Layout)) -> Option<[f64; 4]> {
-    let joints = (0..pose.parts.len()).filter(|part| joint_of(*part).is_some());
-    outline_of(joints.map(|part| pose.centre(model, layout, part)))
 }
 
 /// By how much the box of the filters' parts is enlarged for a network, share of its sides, on each side.

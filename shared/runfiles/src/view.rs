@@ -88,8 +88,9 @@ pub struct Part {
 pub struct SinglePose {
     /// Candidates that the view had.
     pub candidates: u64,
-    /// Level of the pyramid, from 1.
-    pub level: u64,
+    /// Level of the pyramid, from 1; null by the method of networks.
+    #[serde(deserialize_with = "nullable")]
+    pub level: Option<u64>,
     /// Every part.
     pub parts: Vec<TypedPart>,
     /// Score of the best candidate.
@@ -100,9 +101,9 @@ pub struct SinglePose {
 /// The centre of a part, pixels of the footage, and its type.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TypedPart {
-    /// From 1.
-    #[serde(rename = "type")]
-    pub part_type: u64,
+    /// From 1; null by the method of networks.
+    #[serde(rename = "type", deserialize_with = "nullable")]
+    pub part_type: Option<u64>,
     /// To the right.
     #[serde(deserialize_with = "nullable")]
     pub x: Option<f64>,

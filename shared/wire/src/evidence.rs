@@ -105,26 +105,6 @@ pub fn evidence_from_message<'a>(
     })
 }
 
-/// Checks that received values are numbers: over the maps of a network one that is not could lie anywhere in a sum.
-///
-/// # Errors
-///
-/// [`WireError`] with the first that is not finite.
-pub fn check_maps(values: &[f32]) -> Result<(), WireError> {
-    // Without a branch for each: a frame has up to a million.
-    if values.iter().fold(0.0_f32, |sum, value| sum + value * 0.0) == 0.0 {
-        return Ok(());
-    }
-    let entry = values.iter().position(|value| !value.is_finite());
-    let entry = entry.unwrap_or_default();
-    Err(WireError::Value {
-        field: "maps",
-        entry,
-        got: f64::from(values[entry]),
-        expected: "a finite number",
-    })
-}
-
 /// The error of an invalid bound.
 fn refusal(entry: usize, bound: Bound) -> Option<WireError> {
     let refused = |field, got: f32, expected| {
@@ -337,19 +317,6 @@ mod tests {
         assert!(error_of(f32::NEG_INFINITY, 1.0).contains("best"));
         for size in [f32::NAN, f32::INFINITY, -1.0] {
             assert!(error_of(0.0, size).contains("size"));
-        }
-    }
-
-    #[test]
-    fn maps_hold_numbers() {
-        let mut values = vec![-3.5, 0.0, f32::MAX, f32::MIN_POSITIVE];
-        check_maps(&values).unwrap();
-        check_maps(&[]).unwrap();
-        for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-            values[2] = wrong;
-            let error = check_maps(&values).unwrap_err().to_string();
-            let expected = format!("maps of entry 2 is {wrong}, expected a finite number");
-            assert_eq!(error, expected);
         }
     }
 

@@ -12,13 +12,13 @@ mod pair;
 mod people;
 mod pose;
 mod quality;
-mod seen;
+mod sightings;
 mod skeletons;
 mod stamp;
 
 pub use all_views::{all_views_from_pairs, all_views_to_messages, check_all_views};
 pub use error::WireError;
-pub use evidence::{EvidenceView, check_maps, evidence_from_message, evidence_to_message};
+pub use evidence::{EvidenceView, evidence_from_message, evidence_to_message};
 pub use pair::{check_views, pair_from_message, pair_to_message};
 pub use people::{people_from_message, people_to_message};
 pub use pose::{
@@ -30,7 +30,10 @@ pub use quality::{
     sigma_from_message, sigma_from_pair, sigma_to_message, sigma_to_pair, tau_from_message,
     tau_to_message,
 };
-pub use seen::{heats_from_message, heats_to_message, seen_from_message};
+pub use sightings::{
+    grids_from_message, maps_from_message, maps_to_message, n_values, sightings_from_message,
+    sightings_to_message,
+};
 pub use skeletons::{SolvedPerson, check_skeletons, end_of_results, skeletons_to_message};
 pub use stamp::{Expected, check_frame};
 

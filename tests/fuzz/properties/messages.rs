@@ -231,7 +231,7 @@ fn view_pose(input: &[u8]) -> ViewPose {
     for it in Change::all(input) {
         let candidate = it.value.to_le_bytes()[7];
         let candidate = &mut message.candidates[usize::from(candidate) % MAX_CANDIDATES];
-        match it.field % 15 {
+        match it.field % 17 {
             field @ 0..6 => change_pose(candidate, field, it),
             6 => message.status = Status(it.value as u32),
             7 => message.n_candidates = it.value as u32,
@@ -241,6 +241,8 @@ fn view_pose(input: &[u8]) -> ViewPose {
             11 => message.front[it.of(MAX_CANDIDATES)][1] = it.float(),
             12 => message.n_keypoints = it.value as u32,
             13 => message.keypoints[it.of(4)][it.of(3)] = it.float(),
+            14 => message.heats[it.of(2)][it.of(MAX_JOINTS)] = it.float(),
+            15 => message.joints[it.of(2)][it.of(MAX_JOINTS)][it.of(2)] = it.float(),
             _ => change_stamp(&mut message.stamp, &mut message.timing, it),
         }
     }
@@ -258,6 +260,14 @@ fn candidates(input: &[u8]) {
     }
     if let Ok(front) = wire::front_from_message(&message, message.n_candidates as usize) {
         assert!(front.as_flattened().iter().all(|it| it.is_finite()));
+    }
+    if let Ok(Some(seen)) = wire::sightings_from_message(&message, 2) {
+        let joints = seen
+            .people
+            .iter()
+            .flat_map(|person| person.joints)
+            .flatten();
+        assert!(joints.flatten().all(f32::is_finite));
     }
     let extras = wire::extras_from_message(&message, 2, message.n_candidates as usize);
     if let Ok(extras) = extras {
@@ -410,7 +420,6 @@ pub fn wire_fusion(input: &[u8]) {
     let changed = ViewResult {
         candidates,
         front: front.unwrap_or_default(),
-        heats: Vec::new(),
         sigma_px: sigma.ok().flatten(),
         tau_px: None,
         skew_s: 0.0,
@@ -419,7 +428,6 @@ pub fn wire_fusion(input: &[u8]) {
     let whole = ViewResult {
         candidates: vec![pose()],
         front: vec![[0.5, -2.0]],
-        heats: Vec::new(),
         sigma_px: expected.ok().flatten().map(|(_, sigma)| sigma),
         tau_px: None,
         skew_s: 0.0,
@@ -428,6 +436,9 @@ pub fn wire_fusion(input: &[u8]) {
     let mut found = Vec::new();
     let (header, values) = evidence(input);
     let (whole_header, whole_values) = evidence(&[]);
+    if let Ok(maps) = wire::maps_from_message(&header, &values) {
+        assert!(maps.iter().all(|it| it.at(3, [9.0, 9.0]).is_finite()));
+    }
     let read = wire::evidence_from_message(&header, &values, plans[0].layout());
     let other = wire::evidence_from_message(&whole_header, &whole_values, plans[1].layout());
     if let (Ok(first), Ok(second)) = (read, other) {
@@ -505,7 +516,7 @@ fn evidence(input: &[u8]) -> (EvidenceHeader, Vec<f32>) {
     let mut values: Vec<f32> = (0..n).map(|it| (it * 37 % 101) as f32 * 0.01).collect();
     for it in Change::all(input) {
         let level = it.of(MAX_LEVELS);
-        match it.field % 11 {
+        match it.field % 14 {
             0 => header.width = it.value as u32,
             1 => header.n_levels = it.value as u32,
             2 => header.x[it.of(2)] = it.value as u32,
@@ -516,6 +527,9 @@ fn evidence(input: &[u8]) -> (EvidenceHeader, Vec<f32>) {
             7 => header.size[level] = it.float(),
             8 => values.truncate(it.value as usize),
             9 => values.fill(it.float()),
+            10 => header.n_people = it.value as u32,
+            11 => header.people[it.of(MAX_CANDIDATES)].size[it.of(2)] = it.value as u32,
+            12 => header.people[it.of(MAX_CANDIDATES)].cell_px[it.of(2)] = it.double(),
             _ => {
                 let n = values.len().max(1);
                 if let Some(value) = values.get_mut((it.value >> 32) as usize % n) {

@@ -23,28 +23,24 @@ enum Port {
     Pose {
         pose: Box<Sender>,
         quality: Option<Box<Sender>>,
-        evidence: Option<Box<Evidence>>,
+        evidence: Option<Box<SlicePublisher<f32, EvidenceHeader>>>,
     },
 }
 
-/// Where the evidence of a view goes, whose maps cross.
-struct Evidence {
-    port: SlicePublisher<f32, EvidenceHeader>,
-    maps: ViewMaps,
-}
-
-impl Evidence {
-    fn send(&self, maps: &Checked, stamp: Stamp, timing: Timing) -> Result<(), Failure> {
-        let mut loan = self.port.loan(self.maps.n_values(maps))?;
-        let header = self.maps.fill(maps, loan.payload_mut());
-        *loan.header_mut() = EvidenceHeader {
-            stamp,
-            timing,
-            ..header.or_fail(ExitKind::Run)?
-        };
-        loan.send()?;
-        Ok(())
-    }
+fn send_maps(
+    port: &SlicePublisher<f32, EvidenceHeader>,
+    maps: &Checked,
+    (stamp, timing): (Stamp, Timing),
+) -> Result<(), Failure> {
+    let mut loan = port.loan(maps.n_values())?;
+    let header = maps.fill(loan.payload_mut());
+    *loan.header_mut() = EvidenceHeader {
+        stamp,
+        timing,
+        ..header
+    };
+    loan.send()?;
+    Ok(())
 }
 
 /// The times of a message, by our clock, nanoseconds. None lies in the future, whatever the error of the clock.
@@ -80,13 +76,9 @@ impl Publisher {
             Carry::Frames => Port::Frame(Box::new(bus.slice_publisher(&topic::frame(view))?)),
             Carry::Poses => {
                 let quality = || Sender::open(bus, Kind::ViewQuality, &topic::view_quality(view));
-                let evidence = |maps: &ViewMaps| {
-                    let port = bus.slice_publisher(&topic::evidence(view))?;
-                    let maps = maps.clone();
-                    Ok::<_, Failure>(Box::new(Evidence { port, maps }))
-                };
+                let evidence = |_: &ViewMaps| bus.slice_publisher(&topic::evidence(view));
                 Port::Pose {
-                    evidence: job.maps.get(view).map(evidence).transpose()?,
+                    evidence: job.maps.get(view).map(evidence).transpose()?.map(Box::new),
                     pose: Box::new(Sender::open(bus, Kind::ViewPose, &topic::view_pose(view))?),
                     quality: job.has_quality.then(quality).transpose()?.map(Box::new),
                 }
@@ -172,7 +164,7 @@ impl Publisher {
             } => {
                 // The evidence is sent first: a receiver of the candidates may rely on it.
                 if let (Some(evidence), Some(maps)) = (evidence, &arrived.maps) {
-                    evidence.send(maps, stamp, timing)?;
+                    send_maps(evidence, maps, (stamp, timing))?;
                 }
                 let kind = kind_of(arrived.head.content).unwrap_or(Kind::ViewPose);
                 let message = Message::parse(kind, &arrived.body).or_fail(ExitKind::Run)?;

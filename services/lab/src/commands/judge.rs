@@ -41,8 +41,7 @@ person, found within 0.2 of the person's size, the mean along its bone (positive
 across it (positive outwards), percent of the height of the person, and their intervals.
 
 A network that finds keypoints (.onnx, docs/networks.md) is asked for every person in the box around the marked joints, widened
-by 5 % on each side: \"peaks\" are the joints at the maxima of its maps, \"springs\" those that the tree of springs chooses on
-the same maps. With --json these two stand in place of \"best\" and \"on_person\", each also with \"intervals\": of the totals, 95 %
+by 5 % on each side: \"peaks\" are the joints at the maxima of its maps. With --json they stand in place of \"best\" and \"on_person\", also with \"intervals\": of the totals, 95 %
 over the people, {\"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}. \"expected_errors\" says how well the \
 height of the maxima tells how far off the joints are: {\"joints\", \"off_by_half_a_head\", \"auc\" (of telling these), \
 \"auc_interval\", \"rank_correlation\"}.
@@ -78,9 +77,6 @@ pub(crate) struct Arguments {
     /// The card of a network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
     #[arg(long, value_name = "CARD")]
     card: Option<PathBuf>,
-    /// The tree of springs for the maps of a network; if not given, the one that ships.
-    #[arg(long, value_name = "FILE")]
-    springs: Option<PathBuf>,
     /// A network is told nothing but the picture: it looks into the box of the best pose that the filters find.
     #[arg(long)]
     find_boxes: bool,
@@ -118,13 +114,9 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if is_network.is_some_and(|it| it.eq_ignore_ascii_case("onnx")) {
         return network::run(arguments, &stop, &terminal);
     }
-    if arguments.card.is_some()
-        || arguments.springs.is_some()
-        || arguments.find_boxes
-        || arguments.mirror
-    {
+    if arguments.card.is_some() || arguments.find_boxes || arguments.mirror {
         let message = format!(
-            "{}: --card, --springs, --find-boxes and --mirror are for networks, files that end in .onnx",
+            "{}: --card, --find-boxes and --mirror are for networks, files that end in .onnx",
             arguments.model.display()
         );
         return Err(Failure::new(ExitKind::Usage, message));

@@ -7,7 +7,6 @@ mod network;
 mod orientation;
 mod people;
 mod quality;
-mod springs;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -73,8 +72,6 @@ pub(crate) enum Command {
     Orientation(Box<orientation::Arguments>),
     /// Learn where joints lie among the parts of a model, on photographs of marked people.
     Joints(Box<joints::Arguments>),
-    /// Learn the springs that hold the maps of a network together, from the marks of people.
-    Springs(Box<springs::Arguments>),
     /// Prepare people for training the network that finds joints.
     NetworkPeople(Box<network::people::Arguments>),
     /// Train the network that finds joints, the direction of the trunk, and how far off it may be.
@@ -125,7 +122,6 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
         Command::Consistency(it) => return consistency::run(&it, globals),
         Command::Orientation(arguments) => return orientation::run(&arguments, globals),
         Command::Joints(it) => return joints::run(&it, globals),
-        Command::Springs(it) => return springs::run(&it, globals),
         Command::NetworkPeople(it) => return network::people::run(&it, globals),
         Command::Network(it) => return network::learn::run(&it, globals),
         Command::Quality(arguments) => return quality::network::run(&arguments, globals),

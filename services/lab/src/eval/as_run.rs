@@ -8,13 +8,14 @@ use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::Camera;
 use keypoints::Sides;
+use multiview::ViewPlan;
 use pipeline::{
     Boxes, Eyes, NetworkEstimator, NetworkEstimatorSettings, NetworkSettings, NetworkStep,
     SpaceStepSettings, ViewContent, ViewFrame, ViewSettings, ViewStep,
 };
-use posenetwork::springs::TurnedSprings;
 use posenetwork::{Detector, PoseNetwork};
 use score::Point;
+use skeleton::PARSE14;
 
 /// Opens what every view has for itself.
 pub trait OpenView {
@@ -37,9 +38,7 @@ pub trait OpenView {
 pub struct AsRun<'a> {
     /// Opens the networks of a view.
     pub open: &'a dyn OpenView,
-    /// The tree of springs.
-    pub springs: Arc<Model>,
-    /// The filters that find people without a detector.
+    /// The filters, which find people without a detector.
     pub filters: Arc<Model>,
 }
 
@@ -62,10 +61,10 @@ impl AsRun<'_> {
     ) -> Result<NetworkEstimator, Failure> {
         let (mut plans, mut steps, mut as_seen) = (Vec::new(), Vec::new(), false);
         for camera in cameras {
-            let plan = pipeline::plan(&self.springs, camera).or_fail(ExitKind::Input)?;
+            let plan = pipeline::plan(&self.filters, camera).or_fail(ExitKind::Input)?;
             let boxes = match self.open.detector()? {
                 Some(detector) => Boxes::Detector(Box::new(detector)),
-                None => Boxes::Filters(Box::new(self.filters(camera)?)),
+                None => Boxes::Filters(Box::new(self.filters(&plan))),
             };
             let network = self.open.network()?;
             as_seen |= network.card().keypoints.sides == Sides::Seen;
@@ -74,9 +73,7 @@ impl AsRun<'_> {
                 find_every: 1,
                 ..NetworkSettings::default()
             };
-            let layout = Arc::new(plan.layout().clone());
-            let springs = TurnedSprings::new(&self.springs);
-            steps.push(NetworkStep::new(eyes, springs, layout, settings));
+            steps.push(NetworkStep::new(eyes, plan.layout().image_size, settings));
             plans.push(plan);
         }
         let settings = NetworkEstimatorSettings {
@@ -88,11 +85,9 @@ impl AsRun<'_> {
         Ok(NetworkEstimator::new(&plans, steps, up, settings))
     }
 
-    fn filters(&self, camera: &Camera) -> Result<ViewStep, Failure> {
-        let plan = pipeline::plan(&self.filters, camera).or_fail(ExitKind::Input)?;
+    fn filters(&self, plan: &ViewPlan) -> ViewStep {
         let layout = Arc::new(plan.layout().clone());
-        let model = Arc::clone(&self.filters);
-        Ok(ViewStep::new(model, layout, ViewSettings::default()))
+        ViewStep::new(Arc::clone(&self.filters), layout, ViewSettings::default())
     }
 }
 
@@ -113,7 +108,10 @@ pub fn joints(
     };
     let frames: Vec<_> = images.into_iter().map(|image| image.map(view)).collect();
     let estimate = estimator.estimate(&frames).or_fail(ExitKind::Input)?;
-    let joints = estimate.skeleton.joints.iter();
+    let Some(followed) = estimate.skeletons.first() else {
+        return Ok(vec![None; PARSE14.joints.len()]);
+    };
+    let joints = followed.skeleton.joints.iter();
     Ok(joints
         .map(|joint| Some(joint.as_ref().ok()?.in_world.coords.into()))
         .collect())

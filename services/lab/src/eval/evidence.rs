@@ -12,7 +12,6 @@ use kernels::Rgb8View;
 use keypoints::Sides;
 use multiview::{SeenPerson, same_person};
 use pipeline::ViewSettings;
-use posenetwork::springs::TurnedSprings;
 use posenetwork::{
     Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
 };
@@ -40,8 +39,6 @@ pub struct EvidenceJob<'a> {
     pub network: &'a PoseNetwork,
     /// What finds the boxes.
     pub boxes: Boxes<'a>,
-    /// Solve the tree of springs, which tells better boxes.
-    pub springs: &'a TurnedSprings,
     /// Solves the undisturbed sequences as `run` does, beside the methods that are compared.
     pub as_run: &'a AsRun<'a>,
     /// What goes wrong.
@@ -254,12 +251,8 @@ impl EvidenceJob<'_> {
             }
             _ => image,
         };
-        let layout =
-            Layout::new(self.springs.model(), size[0], size[1]).or_fail(ExitKind::Input)?;
         let looker = Looker {
             network: self.network,
-            springs: self.springs,
-            layout: &layout,
             settings: &MapSettings::default(),
         };
         let boxes = self.boxes.find(image, values)?;

@@ -1,16 +1,13 @@
 //! Who finds the joints in the pictures of a camera: a network, or the filters.
 
-use std::sync::Arc;
-
 use deployment::Deployment;
 use failure::{ExitKind, Failure, OrFail as _, in_file};
-use fmp::{CandidateSettings, Layout, Model, Search};
+use fmp::{CandidateSettings, Search};
 use footage::{FrameView, Size, Turn};
 use inputs::pictures::{BOXES_PX, Picture, Searched};
 use kernels::Rgb8View;
 use keypoints::{Keypoint, Sides};
 use pipeline::{Boxes, NetworkMemory, NetworkSettings, NetworkStep};
-use posenetwork::springs::TurnedSprings;
 use posenetwork::{Detector, JointMaps, LookError, PoseNetwork};
 use skeleton::PARSE14;
 
@@ -33,8 +30,6 @@ struct Network {
     joints: PoseNetwork,
     /// Who finds the boxes; the filters without it.
     detector: Option<Detector>,
-    /// The tree that its joints hang in.
-    springs: Arc<Model>,
 }
 
 /// The keypoints of one person, pixels of the picture.
@@ -46,7 +41,6 @@ impl Eyes {
             Some(joints) => Some(Network {
                 joints,
                 detector: inputs::detector(&deployment.network)?,
-                springs: inputs::springs(&deployment.network.springs)?,
             }),
             None => None,
         };
@@ -120,7 +114,6 @@ impl Eyes {
                 .or_fail(ExitKind::Config)?;
             return Ok(Watch::Filters(Box::new(search)));
         };
-        let layout = Layout::new(&network.springs, size.width, size.height);
         let boxes = match network.detector {
             Some(it) => Boxes::Detector(Box::new(it)),
             None => Boxes::Caller,
@@ -132,14 +125,11 @@ impl Eyes {
             ..NetworkSettings::default()
         };
         let eyes = pipeline::Eyes::Network(Box::new(network.joints), boxes);
-        let springs = TurnedSprings::new(&network.springs);
-        let layout = Arc::new(layout.or_fail(ExitKind::Input)?);
         Ok(Watch::Network(Box::new(Follower {
-            step: NetworkStep::new(eyes, springs, layout, settings),
+            step: NetworkStep::new(eyes, [size.width, size.height], settings),
             search,
             n_keypoints,
             memory: NetworkMemory::default(),
-            responses: Vec::new(),
         })))
     }
 }
@@ -182,7 +172,6 @@ pub(super) struct Follower {
     search: Option<Filters>,
     n_keypoints: usize,
     memory: NetworkMemory,
-    responses: Vec<f32>,
 }
 
 /// Why a picture was not looked at.
@@ -218,18 +207,12 @@ impl Follower {
                 self.step.look_by(image, &mut find, &mut self.memory)
             }
         };
-        let scope = looked.map_err(|trouble| match trouble {
+        looked.map_err(|trouble| match trouble {
             Trouble::Look(error) => in_file(camera.as_ref(), &error),
             Trouble::Boxes(failure) => failure,
         })?;
-        let Some(scope) = scope else {
-            return Ok(Vec::new());
-        };
-        let n_values = self.step.layout().n_values(&scope);
-        self.responses
-            .resize(n_values.max(self.responses.len()), 0.0);
         // Tells the boxes of the next picture.
-        self.step.fill(scope, &mut self.responses, &mut self.memory);
+        self.step.sightings(&mut self.memory);
         let found = |maps: &JointMaps| {
             let each = (0..self.n_keypoints).map(|it| maps.keypoint(it).map(|it| it.0));
             each.collect()

@@ -3,9 +3,7 @@
 use std::sync::Arc;
 
 use failure::{ExitKind, Failure, OrFail as _};
-use fmp::Layout;
 use pipeline::{Boxes, Eyes, NetworkSettings, NetworkStep, ViewStep};
-use posenetwork::springs::TurnedSprings;
 
 use crate::find_every::find_every;
 use crate::keypoints;
@@ -20,8 +18,7 @@ use crate::resolved::Resolved;
 /// Model, network or rig cannot be read or used.
 pub fn network_step(resolved: &Resolved, view: usize) -> Result<Option<NetworkStep>, Failure> {
     let prepared = Prepared::new(resolved)?;
-    let layout = Arc::new(prepared.views[view].plan.layout().clone());
-    Ok(match of_view(resolved, &prepared, view, layout)? {
+    Ok(match of_view(resolved, &prepared, view)? {
         pose::Step::Network(step) => Some(*step),
         pose::Step::Filters(_) | pose::Step::Keypoints(_) => None,
     })
@@ -32,18 +29,19 @@ pub(crate) fn of_view(
     resolved: &Resolved,
     prepared: &Prepared,
     view: usize,
-    layout: Arc<Layout>,
 ) -> Result<pose::Step, Failure> {
     let deployment = &resolved.deployment;
+    let plan = &prepared.views[view].plan;
     if !deployment.has_maps() {
         let step = ViewStep::new(
             Arc::clone(&prepared.model),
-            layout,
+            Arc::new(plan.layout().clone()),
             prepared.settings.view.clone(),
         );
         return Ok(pose::Step::Filters(Box::new(step)));
     }
     let config = &deployment.network;
+    let size = plan.layout().image_size;
     let step = deployment.capture.frame_step.max(1) as f64;
     let find_every = find_every(config, resolved.frame_rate_hz().map(|it| it / step));
     let settings = NetworkSettings {
@@ -57,9 +55,8 @@ pub(crate) fn of_view(
         let extras = extras(resolved, source.names().names());
         let eyes = Eyes::Keypoints(::keypoints::joint_ways(source.names().names()));
         let frame_from_source = prepared.views[view].framing.output_from_source();
-        let springs = TurnedSprings::new(&prepared.model);
         return Ok(pose::Step::Keypoints(Box::new(pose::Keypoints {
-            step: NetworkStep::new(eyes, springs, layout, settings).with_extras(extras),
+            step: NetworkStep::new(eyes, size, settings).with_extras(extras),
             source: pose::Source {
                 files: source,
                 timeline: resolved.footage[view].timeline,
@@ -76,8 +73,7 @@ pub(crate) fn of_view(
     };
     let extras = extras(resolved, network.names());
     let eyes = Eyes::Network(Box::new(network), boxes);
-    let springs = TurnedSprings::new(&prepared.model);
-    let step = NetworkStep::new(eyes, springs, layout, settings).with_extras(extras);
+    let step = NetworkStep::new(eyes, size, settings).with_extras(extras);
     Ok(pose::Step::Network(Box::new(step)))
 }
 

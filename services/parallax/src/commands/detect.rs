@@ -14,7 +14,6 @@ use inputs::library::Library;
 use inputs::pictures::{self, Frames, Picture, Pictures, Searched};
 use inputs::sheet::{Sheet, Skeleton, limbs};
 use kernels::Rgb8View;
-use posenetwork::springs::TurnedSprings;
 use serde_json::json;
 use skeleton::{JointSet, PARSE14};
 use terminal::{Outline, outline, output};
@@ -208,11 +207,9 @@ impl Arguments {
         let card = self.detector_card.as_deref();
         let detector = self.detector.as_ref();
         let detector = detector.map(|it| inputs::detector::open(it, card));
-        let springs = inputs::springs(Path::new(deployment::SHIPPED))?;
         Ok(Some(Eyes {
             file: file.to_path_buf(),
             network,
-            springs: TurnedSprings::new(&springs),
             detector: detector.transpose()?,
         }))
     }

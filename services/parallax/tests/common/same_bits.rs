@@ -7,7 +7,7 @@ use footage::{Canvas, Fill, Size, Warp};
 use geometry::files::ReadOptions;
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
-use pipeline::{BodySettings, Estimate, Estimator, EstimatorSettings};
+use pipeline::{BodySettings, Estimate, Estimator, EstimatorSettings, Skeleton};
 use serde_json::{Value, json};
 use skeleton::PARSE14;
 
@@ -61,7 +61,7 @@ impl OneProcess {
             let sigma = (0..n_views).map(|view| Some(self.sigma_px?(frame, view)));
             let estimate = estimator.estimate(&images, &sigma.collect::<Vec<_>>());
             n_placed += estimate.skeleton.joints.iter().flatten().count();
-            assert_same_skeleton(&pose3d[frame], frame, &estimate);
+            assert_same_skeleton(&pose3d[frame], frame, &estimate.skeleton);
             let there = views.iter().enumerate();
             for (view, it) in there.filter(|it| !is_missing(it.0)) {
                 let line = &pose2d[frame * n_views + view];
@@ -151,19 +151,16 @@ impl View {
 }
 
 /// Compares a line of `pose3d.jsonl` with an estimate.
-pub(crate) fn assert_same_skeleton(line: &Value, frame: usize, estimate: &Estimate) {
+pub(crate) fn assert_same_skeleton(line: &Value, frame: usize, skeleton: &Skeleton) {
     assert_eq!(line["frame"], json!(frame));
     let Some(person) = line["people"].get(0) else {
-        assert_eq!(estimate.skeleton.joints.iter().flatten().count(), 0);
+        assert_eq!(skeleton.joints.iter().flatten().count(), 0);
         return;
     };
     assert_eq!(line["people"].as_array().map(Vec::len), Some(1));
-    assert_eq!(person["pairs"], json!(estimate.skeleton.n_pairs));
-    assert_eq!(
-        person["facing_margin"],
-        json!(estimate.skeleton.facing_margin)
-    );
-    for (joint, expected) in PARSE14.joints.iter().zip(&estimate.skeleton.joints) {
+    assert_eq!(person["pairs"], json!(skeleton.n_pairs));
+    assert_eq!(person["facing_margin"], json!(skeleton.facing_margin));
+    for (joint, expected) in PARSE14.joints.iter().zip(&skeleton.joints) {
         let got = &person["joints"][joint.name];
         let Ok(expected) = expected else {
             assert_eq!(

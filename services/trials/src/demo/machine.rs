@@ -43,7 +43,6 @@ struct GaugedView {
     picture: Vec<u8>,
     step: NetworkStep,
     memory: NetworkMemory,
-    responses: Vec<f32>,
 }
 
 impl Gauge {
@@ -65,7 +64,6 @@ impl Gauge {
                 view,
                 step,
                 memory: NetworkMemory::default(),
-                responses: Vec::new(),
             })
         };
         let views = (0..synthetic.rig.cameras().len()).map(view);
@@ -112,12 +110,8 @@ impl GaugedView {
         let image = Rgb8View::new(size.width, size.height, &self.picture);
         let image = image.or_fail(ExitKind::Run)?;
         let looked = self.step.look(image, &mut self.memory);
-        if let Some(scope) = looked.or_fail(ExitKind::Run)? {
-            let n_values = self.step.layout().n_values(&scope);
-            self.responses
-                .resize(n_values.max(self.responses.len()), 0.0);
-            self.step.fill(scope, &mut self.responses, &mut self.memory);
-        }
+        looked.or_fail(ExitKind::Run)?;
+        self.step.sightings(&mut self.memory);
         Ok(())
     }
 }

@@ -155,7 +155,7 @@ mod tests {
             ("", vec!["frame/v1/0", "frame/v1/2"]),
             (
                 "carry = 'poses'\n",
-                vec!["view-pose/v7/0", "view-pose/v7/2"],
+                vec!["view-pose/v8/0", "view-pose/v8/2"],
             ),
         ] {
             let it = deployment(more);
@@ -180,7 +180,7 @@ mod tests {
         let far = Topology::new(&it, None, None).on_host(&it, &it.hosts[1]);
         let expected = ["bridge", "pose-0", "pose-2", "capture-0", "capture-2"];
         assert_eq!(names(&far), expected);
-        assert_eq!(far.receivers_of("evidence/v3/0"), 0);
+        assert_eq!(far.receivers_of("evidence/v4/0"), 0);
     }
 
     #[test]

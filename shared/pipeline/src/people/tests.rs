@@ -29,10 +29,10 @@ pub(crate) fn camera(view: usize) -> Camera {
 }
 
 /// What a view sees of a person who stands at a place.
-fn sighting(camera: &Camera, [x, y]: [f64; 2], strength: f64) -> Sighting {
+fn sighting(camera: &Camera, [x, y]: [f64; 2], strength: f64) -> FoundBody {
     let line = [1.75, 1.5, 0.95, 0.5, 0.08].map(|z| Point3::new(x, y, z));
     let points_px = line.map(|it| <[f64; 2]>::from(camera.project(&it).unwrap()));
-    Sighting {
+    FoundBody {
         points_px,
         rays: points_px.map(|[x, y]| camera.ray(&Point2::new(x, y))),
         size_px: points_px[4][1] - points_px[0][1],
@@ -41,9 +41,9 @@ fn sighting(camera: &Camera, [x, y]: [f64; 2], strength: f64) -> Sighting {
 }
 
 /// The sightings of people in all views, in an order that differs from view to view.
-fn seen(cameras: &[Camera], people: &[([f64; 2], f64)]) -> Vec<Vec<Sighting>> {
+fn seen(cameras: &[Camera], people: &[([f64; 2], f64)]) -> Vec<Vec<FoundBody>> {
     let of_view = |(view, camera): (usize, &Camera)| {
-        let mut all: Vec<Sighting> = people
+        let mut all: Vec<FoundBody> = people
             .iter()
             .map(|(place, strength)| sighting(camera, *place, *strength))
             .collect();
@@ -58,7 +58,7 @@ pub(crate) fn found(cameras: &[Camera], people: &[([f64; 2], f64)]) -> Found {
     of_views(cameras, seen(cameras, people))
 }
 
-fn of_views(cameras: &[Camera], views: Vec<Vec<Sighting>>) -> Found {
+fn of_views(cameras: &[Camera], views: Vec<Vec<FoundBody>>) -> Found {
     let cameras: Vec<&Camera> = cameras.iter().collect();
     let people = distinct(&views, groups(&cameras, &views));
     Found { views, people }

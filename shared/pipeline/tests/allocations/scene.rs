@@ -44,7 +44,6 @@ impl Scene {
             let evidence = Responses::new(&layout, values, &levels);
             let (candidates, _) = solver.distinct_and_bounds(&evidence, 4, 1.0);
             Some(ViewResult {
-                heats: Vec::new(),
                 candidates,
                 front: Vec::new(),
                 sigma_px: Some(vec![5.0; N_PARTS]),

@@ -1,11 +1,7 @@
 //! Tests of maps as Gaussians.
 
-use std::sync::Arc;
-
-use fmp::{Model, Region};
-
 use super::*;
-use crate::springs::{SpringSettings, learn};
+use crate::person_maps::MapGrid;
 
 const SETTINGS: MapSettings = MapSettings {
     lambda: 1.0,
@@ -13,28 +9,21 @@ const SETTINGS: MapSettings = MapSettings {
     point_sigma: 0.0,
 };
 
-fn model() -> Arc<Model> {
-    let person = |nth: usize| {
-        core::array::from_fn(|joint| {
-            [
-                (joint * 3 + nth % 3) as f64,
-                (joint * 5 % 60 + nth % 2) as f64,
-            ]
-        })
+const SIZE: [usize; 2] = [80, 90];
+
+fn maps(values: &[f32]) -> PersonMaps<'_> {
+    let grid = MapGrid {
+        first_px: [20.0, 30.0],
+        cell_px: [2.0; 2],
+        size: SIZE,
     };
-    let people: Vec<_> = (0..30).map(person).collect();
-    Arc::new(learn(&people, &SpringSettings::default()).unwrap())
+    PersonMaps::new(grid, values, SETTINGS.floor())
 }
 
-/// A layout, and a scope of its finest level that does not begin with the picture.
-fn place(model: &Model) -> (Layout, Scope) {
-    let layout = Layout::new(model, 160, 200).unwrap();
-    let region = Region {
-        x: [20, 150],
-        y: [30, 180],
-    };
-    let scope = Scope::new(&layout, 0..1, region).unwrap();
-    (layout, scope)
+fn filled(bumps: &[Bump]) -> Vec<f32> {
+    let mut values = vec![7.0; N_JOINTS * SIZE[0] * SIZE[1]];
+    fill_from_bumps(bumps, SIZE, &SETTINGS, &mut values);
+    values
 }
 
 fn bump(joint: usize, at: [f32; 2], heat: f32, sigma: [f32; 2], turned: f32) -> Bump {
@@ -52,15 +41,11 @@ fn bump(joint: usize, at: [f32; 2], heat: f32, sigma: [f32; 2], turned: f32) -> 
     }
 }
 
-/// The responses of Gaussians, and those of the Gaussians that are found in them.
+/// The maps of Gaussians, the Gaussians that are found in them, and the maps of those.
 fn there_and_back(given: &[Bump]) -> (Vec<f32>, Vec<Bump>, Vec<f32>) {
-    let model = model();
-    let (layout, scope) = place(&model);
-    let mut sent = vec![7.0; layout.n_values(&scope)];
-    fill_from_bumps(given, (&layout, &scope), &SETTINGS, &mut sent);
-    let found = bumps(&Responses::within(&layout, &sent, &[0], scope), &SETTINGS);
-    let mut received = vec![7.0; sent.len()];
-    fill_from_bumps(&found, (&layout, &scope), &SETTINGS, &mut received);
+    let sent = filled(given);
+    let found = bumps(&maps(&sent), &SETTINGS);
+    let received = filled(&found);
     (sent, found, received)
 }
 
@@ -123,23 +108,10 @@ fn two_people_and_a_ridge_come_back_to_a_few_hundredths() {
 }
 
 #[test]
-fn nothing_is_the_floor_and_parts_between_joints_are_0() {
-    let model = model();
-    let (layout, scope) = place(&model);
-    let mut values = vec![7.0; layout.n_values(&scope)];
-    fill_from_bumps(&[], (&layout, &scope), &SETTINGS, &mut values);
-    let window = layout.window(&scope, 0);
-    let area = window.rows * window.cols;
-    for (filter, map) in values.chunks_exact(area).enumerate() {
-        let due = if filter < N_JOINTS {
-            SETTINGS.floor()
-        } else {
-            0.0
-        };
-        assert!(map.iter().all(|it| *it == due), "{filter}");
-    }
-    let evidence = Responses::within(&layout, &values, &[0], scope);
-    assert_eq!(bumps(&evidence, &SETTINGS), []);
+fn nothing_is_the_floor() {
+    let values = filled(&[]);
+    assert!(values.iter().all(|value| *value == SETTINGS.floor()));
+    assert_eq!(bumps(&maps(&values), &SETTINGS), []);
 }
 
 #[test]

@@ -10,7 +10,6 @@ use fmp::Search;
 use inputs::library::Library;
 use lab::eval::as_run::{AsRun, OpenView};
 use lab::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
-use posenetwork::springs::TurnedSprings;
 use posenetwork::{Detector, PoseNetwork};
 use score::Bootstrap;
 use terminal::{Globals, Terminal, output};
@@ -93,11 +92,8 @@ pub(super) fn run(
     let files = Files { file, options };
     let (network, detector) = (files.network()?, files.detector()?);
     let filters = Search::new(inputs::model_or_shipped(None)?);
-    let tree = inputs::springs(Path::new(deployment::SHIPPED))?;
-    let springs = TurnedSprings::new(&tree);
     let as_run = AsRun {
         open: &files,
-        springs: tree,
         filters: inputs::model_or_shipped(None)?,
     };
     let _claim = Claim::take(&arguments.out, "eval")?;
@@ -106,7 +102,6 @@ pub(super) fn run(
         boxes: detector
             .as_ref()
             .map_or(Boxes::Filters(&filters), Boxes::Detector),
-        springs: &springs,
         as_run: &as_run,
         stress: &stress,
         film: FilmSettings {

@@ -10,18 +10,11 @@ use fmp::Search;
 use inputs::library::Library;
 use lab::judged;
 use lab::judged_network::{self, JointError, NetworkReader, Seen};
-use posenetwork::springs::TurnedSprings;
 use score::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
 use serde_json::{Value, json};
 use terminal::output;
 
 use super::Arguments;
-
-/// What is judged, as [`Judged::ALL`]: keys and titles.
-const NAMES: [(&str, &str); 2] = [
-    ("peaks", "maxima of the maps, in the person's box"),
-    ("springs", "the same maps, held together by springs"),
-];
 
 /// Runs the command.
 pub(super) fn run(
@@ -32,8 +25,6 @@ pub(super) fn run(
     refuse(arguments)?;
     let named = (arguments.model.as_path(), arguments.card.as_deref());
     let file = inputs::open_network(named, &Library::BuiltIn)?;
-    let shipped = Path::new(deployment::SHIPPED);
-    let springs = arguments.springs.as_deref().unwrap_or(shipped);
     let finder = arguments.find_boxes.then(|| {
         let model = inputs::model_or_shipped(None)?;
         Ok::<_, Failure>(Search::new(model))
@@ -44,13 +35,13 @@ pub(super) fn run(
     }
     let reader = NetworkReader {
         network,
-        springs: TurnedSprings::new(&inputs::springs(springs)?),
         sides: arguments.sides,
         finder: finder.transpose()?,
     };
     let people = arguments.people()?;
     let Seen { pictures, errors } = judged_network::judged(&reader, &people, stop, console)?;
     let expected = Expected::of(&errors);
+    let [which, _] = Judged::ALL;
     if arguments.json {
         let mut report = json!({
             "schema_version": 1,
@@ -58,23 +49,21 @@ pub(super) fn run(
             "images": pictures.truths.len(),
             "left_out": pictures.n_left_out,
         });
-        for ((key, _), which) in NAMES.into_iter().zip(Judged::ALL) {
-            report[key] = numbers(&pictures, which);
-        }
+        report["peaks"] = numbers(&pictures, which);
         report["expected_errors"] = expected.json();
         output::json(&report)?;
         return Ok(ExitCode::SUCCESS);
     }
-    for (nth, ((_, title), which)) in NAMES.into_iter().zip(Judged::ALL).enumerate() {
-        let gap = if nth == 0 { "" } else { "\n" };
-        output::line(format_args!("{gap}{title}: {}", pictures.report(which)))?;
-        let Intervals { pcp, pck } = pictures.intervals(which, &Bootstrap::default());
-        let [mean_of_ends, both_ends] = pcp.map(interval);
-        let [near, far] = pck.map(interval);
-        output::line(format_args!(
-            "95 % intervals of the totals: PCP mean of ends {mean_of_ends}, both ends {both_ends}; PCK {near}, {far}"
-        ))?;
-    }
+    output::line(format_args!(
+        "maxima of the maps, in the person's box: {}",
+        pictures.report(which)
+    ))?;
+    let Intervals { pcp, pck } = pictures.intervals(which, &Bootstrap::default());
+    let [mean_of_ends, both_ends] = pcp.map(interval);
+    let [near, far] = pck.map(interval);
+    output::line(format_args!(
+        "95 % intervals of the totals: PCP mean of ends {mean_of_ends}, both ends {both_ends}; PCK {near}, {far}"
+    ))?;
     output::line(format_args!("\n{expected}"))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -7,7 +7,6 @@ use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use inputs::pictures::{Picture, Searched};
 use inputs::sheet::{Sheet, Skeleton};
 use inputs::{detector, network};
-use posenetwork::springs::TurnedSprings;
 use posenetwork::{
     Detector as BoxDetector, JointMaps, LookMemory, MapSettings, OF_FILTERS, PoseNetwork, Turn,
     Workspace, overlap,
@@ -31,8 +30,6 @@ pub(super) struct Eyes {
     /// As it is named on the command line.
     pub(super) file: PathBuf,
     pub(super) network: PoseNetwork,
-    /// Tell how well a box of the filters fits.
-    pub(super) springs: TurnedSprings,
     pub(super) detector: Option<BoxDetector>,
 }
 
@@ -261,10 +258,8 @@ impl Person {
         outline: Outline,
         memory: &mut LookMemory,
     ) -> Result<Self, Failure> {
-        let Eyes {
-            network, springs, ..
-        } = eyes;
-        let (sides, turn) = network::closest((network, springs), picture, outline.sides, memory)?;
+        let network = &eyes.network;
+        let (sides, turn) = network::closest(network, picture, outline.sides, memory)?;
         let closer = Outline { sides, ..outline };
         let (person, _) = Self::turned(network, picture, (closer, turn), memory.workspace())?;
         Ok(person)

@@ -15,7 +15,6 @@ pub(super) const OTHERS: &[&str] = &[
     "person.joints",
     "network.file",
     "network.detector",
-    "network.springs",
     "network.mirror",
     "network.onnx_runtime",
     "paper.model",

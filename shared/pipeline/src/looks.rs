@@ -15,9 +15,11 @@ const SURE: f64 = 0.2;
 
 /// The people of a frame, one after another.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sightings<'a> {
+pub(crate) struct Looks<'a> {
     pub(crate) looker: Looker<'a>,
     pub(crate) image: Rgb8View<'a>,
+    /// Width and height of the picture.
+    pub(crate) size: [usize; 2],
     /// Most people that are looked at.
     pub(crate) n_most: usize,
     /// Least mean heat of the joints of a person who is seen well, 0 to 1.
@@ -34,7 +36,7 @@ fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
     outline_of(sure).is_some_and(|it| overlap(it, outline) < SAME)
 }
 
-impl Sightings<'_> {
+impl Looks<'_> {
     /// Looks at a person of the frame before: around the box of then if that is long ago, in a wider box where boxes were looked for or the
     /// last pose was doubtful, else in the same. All but the first are looked at in a wider box when their turn comes, and need no look
     /// while they stand still.
@@ -229,7 +231,7 @@ impl Sightings<'_> {
         let has_moved = !is_soon && has_moved(&seen.maps, track.outline);
         if has_moved || seen.maps.turn(track.turn) != track.turn {
             let first = (track.outline, track.turn, seen.front);
-            let first = self.looker.judge(first, look, &mut seen.maps);
+            let first = self.looker.judge(first, &seen.maps);
             let what = (self.image, first);
             let best = if has_moved {
                 self.looker.look_closer(what, look, &mut seen.maps)?
@@ -264,7 +266,7 @@ impl Sightings<'_> {
     /// Keeps the next person if it is seen well and not known yet; returns whether somebody known, or now known, is seen.
     fn keep(&self, memory: &mut NetworkMemory) -> bool {
         let (_, seen) = memory.next();
-        if !seen.judge(self.looker.layout, self.least_heat) {
+        if !seen.judge(self.size, self.least_heat) {
             return false;
         }
         let (known, last) = memory.seen.split_at(memory.n_seen);

@@ -1,0 +1,316 @@
+//! The solution of one person in space, over the maps of networks of all views in place.
+
+use std::sync::Arc;
+
+use geometry::Triangulated;
+use multiview::{
+    FrontEvidence, Sides, SidesFilter, SolvedPerson, SpaceView, ViewPlan, anatomical_evidence,
+    front, front_log_ratio_of, solve_person,
+};
+use nalgebra::{Point2, UnitVector3};
+use posenetwork::PersonMaps;
+use skeleton::SIDES;
+
+use crate::bodies::{Bodies, Body, NoJoint};
+use crate::disagreement::{self, FoundByViews};
+use crate::fused_view::FusedView;
+use crate::motion::Motion;
+use crate::person_evidence::PersonEvidence;
+use crate::placed::{N, PartView, Places, joints_at, of_set, shown_in};
+use crate::sighting::{Sighting, Sightings};
+use crate::skeleton_step::{Kept, Skeleton};
+use crate::space_settings::SpaceStepSettings;
+
+/// Least number of joints that two views see well of a person: half of it is often hidden. Of what was seen in six empty rooms the
+/// seventh best joint had a heat of 0.41 in two views at most, of people who stood, sat or ran before three cameras or four 0.58 at least.
+const WELL_SEEN: usize = 7;
+/// Least number of joints that a view sees of a person in which it has a part.
+const SEEN: usize = 3;
+
+/// What does not change from frame to frame.
+#[derive(Debug)]
+pub(crate) struct Rig {
+    pub(crate) plans: Vec<Arc<ViewPlan>>,
+    pub(crate) up_in_world: Option<UnitVector3<f64>>,
+    pub(crate) settings: SpaceStepSettings,
+}
+
+/// The step of one person; keeps sides, bone lengths and motion of the frames before.
+#[derive(Debug)]
+pub(crate) struct PersonStep {
+    rig: Arc<Rig>,
+    bodies: Bodies,
+    sides: SidesFilter,
+    /// Motion of the candidates in the pictures.
+    seen: Motion,
+    /// Motion of the solution in the pictures.
+    solved: Motion,
+}
+
+/// A person in the views of a frame.
+struct Shown<'a> {
+    view: usize,
+    front: FrontEvidence,
+    evidence: PersonEvidence<'a>,
+}
+
+/// A solution with its sides.
+struct Solution<'a> {
+    places: Places,
+    energy: f64,
+    views: Vec<PartView<'a>>,
+    sides: Option<Sides>,
+}
+
+impl PersonStep {
+    pub(crate) fn new(rig: &Arc<Rig>) -> Self {
+        Self {
+            rig: Arc::clone(rig),
+            bodies: Bodies::default(),
+            sides: SidesFilter::default(),
+            seen: Motion::default(),
+            solved: Motion::default(),
+        }
+    }
+
+    /// Begins a frame, as [`SpaceStep::begin`](crate::SpaceStep::begin).
+    pub(crate) fn begin(&mut self, instant_s: Option<f64>) {
+        self.seen.begin(instant_s);
+        self.solved.begin(instant_s);
+    }
+
+    /// Solves for the person in a frame.
+    ///
+    /// * `answers`: by view; `evidence`: by view the maps of its people. A view without either has no part.
+    /// * `candidates`: by view, which of its people is the person; `n_seen`: number of people of the frame.
+    /// * Returns a skeleton without joints if fewer than two views show the person: what networks see in an empty room is nowhere the
+    ///   same in two.
+    pub(crate) fn run(
+        &mut self,
+        answers: &[Option<Sightings>],
+        evidence: &[Vec<PersonMaps<'_>>],
+        (candidates, n_seen): (&[Option<usize>], usize),
+    ) -> Skeleton {
+        let shown = self.shown(answers, evidence, candidates);
+        let rig = Arc::clone(&self.rig);
+        let Rig {
+            plans, settings, ..
+        } = &*rig;
+        let solution = self.solve(plans, &shown);
+        let solution = solution.as_ref();
+        let joints = match solution {
+            Some(it) => joints_at(&it.places, &it.views, &settings.maps),
+            None => joints_at(&[None; N], &[], &settings.maps),
+        };
+        let of_set = of_set(settings.joints, &joints);
+        let settled = self
+            .bodies
+            .settle(&settings.body, &joints, (settings.joints, of_set));
+        let (mut settled, body): (Vec<Result<Triangulated, NoJoint>>, Option<Body>) = settled;
+        let takes_part =
+            |view: usize| solution.is_some_and(|it| it.views.iter().any(|part| part.view == view));
+        let takes_part: Vec<bool> = (0..plans.len()).map(takes_part).collect();
+        let found_by = FoundByViews {
+            plans,
+            answers,
+            takes_part: &takes_part,
+            least_score: settings.least_score,
+            joints: settings.joints,
+        };
+        disagreement::measure(&found_by, &mut self.solved, &mut settled);
+        Skeleton {
+            joints: settled,
+            body,
+            views: self.views(answers, solution),
+            n_people: n_seen,
+            n_pairs: pairs_of(takes_part.iter().filter(|takes_part| **takes_part).count()),
+            facing_margin: f64::INFINITY,
+            sides: solution.and_then(|it| it.sides),
+            kept: Kept::Solved,
+        }
+    }
+
+    /// The views that show the person by a candidate, at the instant of the frame.
+    fn shown<'a>(
+        &mut self,
+        answers: &[Option<Sightings>],
+        evidence: &[Vec<PersonMaps<'a>>],
+        candidates: &[Option<usize>],
+    ) -> Vec<Shown<'a>> {
+        let mut shown = Vec::new();
+        for (view, candidate) in candidates.iter().enumerate() {
+            let (Some(candidate), Some(Some(answer)), Some(maps)) =
+                (*candidate, answers.get(view), evidence.get(view))
+            else {
+                continue;
+            };
+            // A restarted process can repeat a frame and see others in it than the one whose maps arrived before.
+            let (Some(sighting), Some(maps), true) = (
+                answer.people.get(candidate),
+                maps.get(candidate),
+                maps.len() == answer.people.len(),
+            ) else {
+                continue;
+            };
+            let Some(mut evidence) = PersonEvidence::new(*maps, sighting) else {
+                continue;
+            };
+            let found = sighting.places(false).map(Point2::from);
+            let found = found.map(|at| Some(at).filter(|at| at.x.is_finite()));
+            if let Some(by) = self
+                .seen
+                .since_instant(view, [answer.skew_s; 2], found.to_vec())
+            {
+                evidence.move_to_instant(by);
+            }
+            shown.push(Shown {
+                view,
+                front: front_seen(sighting),
+                evidence,
+            });
+        }
+        shown
+    }
+
+    /// Solves for the person; `None` if fewer than two views show the person well.
+    fn solve<'a>(
+        &mut self,
+        plans: &'a [Arc<ViewPlan>],
+        shown: &'a [Shown<'_>],
+    ) -> Option<Solution<'a>> {
+        let views = shown.iter().map(|it| SpaceView {
+            camera: plans[it.view].camera(),
+            evidence: &it.evidence,
+            exchanged: [false; 2],
+            front: it.front,
+        });
+        let views: Vec<SpaceView<'a>> = views.collect();
+        if views.len() < 2 {
+            return None;
+        }
+        let found = solve_person(&views, &self.rig.settings.space)?;
+        let used = found.views.iter().zip(&views).zip(shown);
+        let used = used.filter_map(|((exchanged, view), it)| {
+            Some(PartView {
+                view: it.view,
+                shown: SpaceView {
+                    exchanged: (*exchanged)?,
+                    ..*view
+                },
+                window_px: it.evidence.window_px,
+            })
+        });
+        let mut used: Vec<PartView<'a>> = used.collect();
+        if !self.is_well_seen(&found, &used) {
+            return None;
+        }
+        used.retain(|part| self.shows(&found, part));
+        if used.len() < 2 {
+            return None;
+        }
+        Some(self.with_sides(&found, used))
+    }
+
+    /// Decides left and right of the whole body where those of the views follow the picture.
+    fn with_sides<'a>(
+        &mut self,
+        found: &SolvedPerson,
+        mut views: Vec<PartView<'a>>,
+    ) -> Solution<'a> {
+        let mut places = found.pose.joints;
+        let sides = self.rig.settings.sides.as_ref().map(|settings| {
+            let said = views.iter().map(|it| (it.shown.camera, it.shown.front));
+            let said: Vec<_> = said.collect();
+            let evidence = settings.anatomy_weight
+                * anatomical_evidence(&places, self.rig.up_in_world)
+                + settings.front_weight * front_log_ratio_of(&places, &said);
+            self.sides.decide(settings, front(&places), evidence)
+        });
+        if sides.is_some_and(|sides| sides.exchange) {
+            for [right, left] in SIDES {
+                places.swap(right, left);
+            }
+            for part in &mut views {
+                part.shown.exchanged = part.shown.exchanged.map(|exchanged| !exchanged);
+            }
+        }
+        Solution {
+            places,
+            energy: found.pose.energy,
+            views,
+            sides,
+        }
+    }
+
+    /// Whether enough joints of a solution are seen well by two views.
+    fn is_well_seen(&self, found: &SolvedPerson, views: &[PartView<'_>]) -> bool {
+        let is_seen = |joint: &usize| {
+            let heats = views.iter().map(|view| self.heat_of(*joint, found, view));
+            let well = heats.filter(|heat| *heat >= self.rig.settings.least_heat);
+            well.count() >= 2
+        };
+        (0..N).filter(is_seen).count() >= WELL_SEEN
+    }
+
+    /// The heat of a joint of a solution in a view, 0 to 1.
+    fn heat_of(&self, joint: usize, found: &SolvedPerson, view: &PartView<'_>) -> f64 {
+        let at = found.pose.joints[joint];
+        at.map_or(0.0, |at| {
+            self.rig
+                .settings
+                .maps
+                .heat(view.shown.evidence_at(joint, &at))
+        })
+    }
+
+    /// Whether a view shows the person of a solution at all. One that looks at something else had nothing to say of it, and its pixels
+    /// are not those of the person.
+    fn shows(&self, found: &SolvedPerson, view: &PartView<'_>) -> bool {
+        let heats = (0..N).map(|joint| self.heat_of(joint, found, view));
+        let seen = heats.filter(|heat| *heat >= self.rig.settings.least_heat / 2.0);
+        seen.count() >= SEEN
+    }
+
+    /// Where the views that have a part in a solution show it.
+    fn views(
+        &self,
+        answers: &[Option<Sightings>],
+        solution: Option<&Solution<'_>>,
+    ) -> Vec<Option<FusedView>> {
+        let mut views = vec![None; self.rig.plans.len()];
+        let Some(solution) = solution else {
+            return views;
+        };
+        for part in &solution.views {
+            let best = answers[part.view].as_ref();
+            let best = best.and_then(|answer| answer.people.first());
+            let score = best.map_or(0.0, |sighting| f64::from(sighting.score));
+            let exchanged = solution.sides.is_some_and(|sides| sides.exchange);
+            views[part.view] = Some(FusedView {
+                exchanged,
+                ..shown_in(
+                    &self.rig.plans[part.view],
+                    &solution.places,
+                    solution.energy,
+                    score,
+                )
+            });
+        }
+        views
+    }
+}
+
+/// What a view says of the direction in which a person faces.
+fn front_seen(sighting: &Sighting) -> FrontEvidence {
+    if !sighting.front.iter().all(|number| number.is_finite()) {
+        return FrontEvidence::default();
+    }
+    // Who stands on the hands was upright for the network. Of who lies it tells nothing of up and down in the picture.
+    let weight = sighting.trunk_upward().unwrap_or(1.0).powi(2) as f32;
+    sighting.front.map(|told| weight * told)
+}
+
+/// Number of pairs of views.
+fn pairs_of(n_views: usize) -> usize {
+    n_views * n_views.saturating_sub(1) / 2
+}

@@ -1,0 +1,140 @@
+//! The maps of one person where they lie in a picture.
+
+use crate::between::{Tap, between};
+use crate::maps::N_JOINTS;
+
+/// Evidence above the floor from which a cell may be a maximum.
+const LEAST_ABOVE: f32 = 1e-3;
+
+/// Where the cells of maps lie in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapGrid {
+    /// Centre of the first cell, pixels of the picture.
+    pub first_px: [f64; 2],
+    /// Distance of neighbouring cells, across and down, pixels of the picture.
+    pub cell_px: [f64; 2],
+    /// Number of columns and rows.
+    pub size: [usize; 2],
+}
+
+impl MapGrid {
+    /// Number of cells of a map.
+    pub fn area(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    /// Number of values of the maps of all joints.
+    pub fn n_values(&self) -> usize {
+        N_JOINTS * self.area()
+    }
+
+    /// The cell at a point of the picture, with fractions.
+    pub fn cell(&self, point: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| (point[axis] - self.first_px[axis]) / self.cell_px[axis])
+    }
+
+    /// The point of the picture at a cell, pixels.
+    ///
+    /// * `cell`: column and row, with fractions.
+    pub fn place(&self, cell: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| self.first_px[axis] + cell[axis] * self.cell_px[axis])
+    }
+}
+
+/// The maps of one person, as logarithms ([`MapSettings`](crate::MapSettings)), in place.
+#[derive(Debug, Clone, Copy)]
+pub struct PersonMaps<'a> {
+    grid: MapGrid,
+    values: &'a [f32],
+    floor: f32,
+}
+
+impl<'a> PersonMaps<'a> {
+    /// Takes maps as they are.
+    ///
+    /// * `values`: `[joint][row][column]`, joints of `skeleton::PARSE14`.
+    /// * `floor`: evidence of a place that the maps say nothing of.
+    ///
+    /// # Panics
+    ///
+    /// If the number of values is not that of the grid.
+    pub fn new(grid: MapGrid, values: &'a [f32], floor: f32) -> Self {
+        assert_eq!(values.len(), grid.n_values(), "values of the maps");
+        Self {
+            grid,
+            values,
+            floor,
+        }
+    }
+
+    /// Where the cells lie.
+    pub fn grid(&self) -> &MapGrid {
+        &self.grid
+    }
+
+    /// All values: `[joint][row][column]`.
+    pub fn values(&self) -> &'a [f32] {
+        self.values
+    }
+
+    /// Evidence of a place that the maps say nothing of.
+    pub fn floor(&self) -> f32 {
+        self.floor
+    }
+
+    /// The map of a joint, row by row.
+    pub fn map(&self, joint: usize) -> &'a [f32] {
+        let area = self.grid.area();
+        &self.values[joint * area..(joint + 1) * area]
+    }
+
+    /// The evidence for a joint at a point of the picture, pixels: between sixteen cells (Catmull & Rom 1974), so that a maximum may lie
+    /// between two; the floor beyond the maps.
+    pub fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
+        let [x, y] = self.grid.cell(point);
+        let [columns, rows] = self.grid.size;
+        let [across, down] = [Tap::at(x, columns), Tap::at(y, rows)];
+        if !(across.is_inside && down.is_inside) {
+            return self.floor;
+        }
+        between(self.map(joint), columns, &down, &across)
+    }
+
+    /// The highest maxima of a joint's map, at cells: pixels of the picture, and the evidence there; the best first.
+    ///
+    /// * `n`: at most so many.
+    /// * `is_wanted`: whether a place counts, pixels of the picture.
+    pub fn maxima(
+        &self,
+        joint: usize,
+        n: usize,
+        is_wanted: impl Fn([f64; 2]) -> bool,
+    ) -> Vec<([f64; 2], f32)> {
+        let [columns, rows] = self.grid.size;
+        let map = self.map(joint);
+        let least = self.floor + LEAST_ABOVE;
+        let mut found: Vec<([f64; 2], f32)> = Vec::new();
+        for (row, line) in map.chunks_exact(columns.max(1)).enumerate() {
+            // Most of a map is the floor.
+            let above = line.iter().enumerate().filter(|(_, here)| **here > least);
+            for (column, here) in above {
+                let mut around = row.saturating_sub(1)..(row + 2).min(rows);
+                let beside = column.saturating_sub(1)..(column + 2).min(columns);
+                let is_highest = around.all(|row| {
+                    let line = &map[row * columns..(row + 1) * columns];
+                    line[beside.clone()].iter().all(|other| other <= here)
+                });
+                if !is_highest {
+                    continue;
+                }
+                let at = self.grid.place([column as f64, row as f64]);
+                if is_wanted(at) {
+                    found.push((at, *here));
+                }
+            }
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        found.truncate(n);
+        found
+    }
+}
