@@ -9,6 +9,7 @@ use deployment::{Deployment, RecordingPlan, Replay, Topology};
 use failure::{ExitKind, Failure, OrFail as _};
 use runtime::Delivery;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::cameras::Footage;
 use crate::search_size::SearchSize;
@@ -34,6 +35,9 @@ pub struct Resolved {
     /// The recording that replaces the first stages, if there is one.
     pub replay: Option<Replay>,
 }
+
+/// Key of what `ffprobe` answered, beside those of [`Resolved`].
+const ANSWERS: &str = "ffprobe";
 
 /// The services, in pipeline order.
 pub const SERVICES: [&str; 6] = [
@@ -102,9 +106,11 @@ impl Resolved {
         .map_err(|error| failure::in_file(file, &error))
     }
 
-    /// The text that every process gets as standard input.
+    /// The text that every process gets as standard input: also what is known of the footage, which need not be asked again.
     pub(crate) fn to_text(&self) -> Result<String, Failure> {
-        serde_json::to_string_pretty(self).or_fail(ExitKind::Run)
+        let mut value = serde_json::to_value(self).or_fail(ExitKind::Run)?;
+        value[ANSWERS] = footage::answers_so_far();
+        serde_json::to_string_pretty(&value).or_fail(ExitKind::Run)
     }
 
     /// Reads the resolved deployment from standard input, where the supervisor writes it. The file in the output
@@ -126,7 +132,9 @@ impl Resolved {
         if text.is_empty() {
             text = failure::read_text(file)?;
         }
-        serde_json::from_str(&text).map_err(|error| wrong(&error))
+        let value: Value = serde_json::from_str(&text).map_err(|error| wrong(&error))?;
+        footage::remember_answers(&value[ANSWERS]);
+        serde_json::from_value(value).map_err(|error| wrong(&error))
     }
 
     /// The delivery of messages to receivers that are slower than their senders.

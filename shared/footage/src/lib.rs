@@ -40,8 +40,8 @@ pub use remade::RemadeStream;
 pub use size::Size;
 pub use source::{
     Complaints, Counting, Depth, FrameView, LiveAddress, RecordedSound, Source, SourceInfo,
-    SourceKind, is_address, is_image, is_live, picture_numbers, read_image, read_sound,
-    read_upright, stored, without_passwords,
+    SourceKind, answers_so_far, is_address, is_image, is_live, picture_numbers, read_image,
+    read_sound, read_upright, remember_answers, stored, without_passwords,
 };
 pub use spec::{PictureNumbers, SourceSpec};
 pub use stream::{LiveStream, StreamEnd, StreamFrame, StreamSpec, Transport};

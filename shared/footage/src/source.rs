@@ -1,5 +1,6 @@
 //! Footage, frame by frame.
 
+mod answers;
 mod decode;
 mod exif;
 mod images;
@@ -14,6 +15,7 @@ mod video;
 
 use std::path::Path;
 
+pub use answers::{answers_so_far, remember_answers};
 pub use decode::Depth;
 pub(crate) use decode::{jpeg_into, jpeg_is_whole};
 use images::{Images, Still};

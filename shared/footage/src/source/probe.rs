@@ -1,15 +1,11 @@
 //! The properties of a video, from `ffprobe`.
 
-use std::collections::BTreeMap;
-use std::fs::Metadata;
 use std::io;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::sync::{Mutex, PoisonError};
-use std::time::SystemTime;
+use std::path::Path;
 
 use serde_json::Value;
 
+use super::answers::run_ffprobe;
 use crate::{FootageError, Size, SourceSpec, Turn};
 
 /// What is known of a video before it is decoded.
@@ -278,91 +274,6 @@ pub(super) fn key_frames(
         .filter(|it| it.1.1.contains('K'))
         .map(|it| it.0)
         .collect())
-}
-
-/// Asks `ffprobe` about a stream of a file.
-/// Asks `ffprobe` about a stream of a file; once, as long as the file stays as it is: a start of it takes longer than its answer.
-pub(super) fn run_ffprobe(
-    path: &Path,
-    spec: &SourceSpec,
-    stream: &str,
-    wanted: &[&str],
-) -> Result<Value, FootageError> {
-    let question = Question::about(path, spec, stream, wanted);
-    let answers = || ANSWERS.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(known) = question
-        .as_ref()
-        .and_then(|question| answers().get(question).cloned())
-    {
-        return Ok(known);
-    }
-    let answer = ask_ffprobe(path, spec, stream, wanted)?;
-    if let Some(question) = question {
-        let mut answers = answers();
-        if answers.len() == MOST_ANSWERS {
-            answers.clear();
-        }
-        answers.insert(question, answer.clone());
-    }
-    Ok(answer)
-}
-
-/// Most answers that are kept.
-const MOST_ANSWERS: usize = 64;
-static ANSWERS: Mutex<BTreeMap<Question, Value>> = Mutex::new(BTreeMap::new());
-
-/// A question to `ffprobe` about a file as it is.
-#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Question {
-    program: PathBuf,
-    path: PathBuf,
-    n_bytes: u64,
-    changed_at: SystemTime,
-    words: Vec<String>,
-}
-
-impl Question {
-    /// None about what is no regular file.
-    fn about(path: &Path, spec: &SourceSpec, stream: &str, wanted: &[&str]) -> Option<Self> {
-        let metadata = path.metadata().ok().filter(Metadata::is_file)?;
-        let words = [stream].into_iter().chain(wanted.iter().copied());
-        Some(Self {
-            program: spec.ffprobe.clone(),
-            path: path.to_path_buf(),
-            n_bytes: metadata.len(),
-            changed_at: metadata.modified().ok()?,
-            words: words.map(str::to_owned).collect(),
-        })
-    }
-}
-
-fn ask_ffprobe(
-    path: &Path,
-    spec: &SourceSpec,
-    stream: &str,
-    wanted: &[&str],
-) -> Result<Value, FootageError> {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = Command::new(&spec.ffprobe)
-        .args(["-v", "error", "-select_streams", stream, "-of", "json"])
-        .args(wanted)
-        .args(input_options(path))
-        .arg(input_name(path))
-        .stdin(Stdio::null())
-        .output()
-        .map_err(|source| missing(&spec.ffprobe, path, source))?;
-    let unreadable = |message: String| FootageError::Video {
-        path: path.to_path_buf(),
-        message,
-    };
-    if !status.success() {
-        return Err(unreadable(super::log::summary(&stderr)));
-    }
-    serde_json::from_slice(&stdout)
-        .map_err(|error| unreadable(format!("the output of ffprobe is not JSON: {error}")))
 }
 
 /// What ffmpeg must know to read a file: pictures one behind the other are no picture, whatever the file is called.

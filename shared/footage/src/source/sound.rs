@@ -5,9 +5,10 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
+use super::answers::run_ffprobe;
 use super::listing::{self, Listing};
 use super::log::summary;
-use super::probe::{input_name, missing, number, probe, run_ffprobe};
+use super::probe::{input_name, missing, number, probe};
 use crate::{FootageError, SourceSpec, is_image};
 
 /// The sound of a video, all channels mixed.
