@@ -1,0 +1,310 @@
+//! A set of several people in the layout of 4D Association's Shelf: what a detector found in every view, and where people were.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use geometry::{Camera, Intrinsics, Lens, LensModel, rotation_from_matrix};
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3};
+use people::{Detection, Keypoint, View};
+use serde::Deserialize;
+
+/// Keypoints of OpenPose's body-25.
+pub const N_KEYPOINTS: usize = 25;
+/// Joints of the truth: the first twelve of `skeleton::PARSE14`, then the bottom and the top of the head, and the middle of the hips.
+pub const N_TRUE: usize = 15;
+/// The ends of OpenPose's 26 part affinity fields.
+const FIELDS: [[usize; 26]; 2] = [
+    [1, 9, 10, 8, 8, 12, 13, 1, 2, 3, 2, 1, 5, 6, 5, 1, 0, 0, 15, 16, 14, 19, 14, 11, 22, 11],
+    [8, 10, 11, 9, 12, 13, 14, 2, 3, 4, 17, 5, 6, 7, 18, 0, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24],
+];
+/// The keypoints that are joints of `skeleton::PARSE14`; none is the top of the head.
+const JOINTS: [Option<usize>; 14] = [
+    Some(11), Some(10), Some(9), Some(12), Some(13), Some(14), Some(4), Some(3), Some(2), Some(5), Some(6), Some(7), Some(1), None,
+];
+/// A person has so many keypoints at least.
+const LEAST_KEYPOINTS: usize = 5;
+/// Keypoints of less confidence are none.
+const LEAST_CONFIDENCE: f64 = 0.05;
+/// Standard deviation of a keypoint of full confidence, as a share of the size of the picture of the person; of a lower confidence, more.
+const SD_SHARE: f64 = 0.02;
+
+/// Why a set could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ShelfError {
+    /// A file could not be read.
+    #[error("cannot read {}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        source: std::io::Error,
+    },
+    /// The calibration is not what it should be.
+    #[error("{} is not a calibration of this layout: {reason}", path.display())]
+    Calibration {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A text file of numbers is not what it should be.
+    #[error("{}: number {number} should be {expected}", path.display())]
+    Number {
+        /// The file.
+        path: PathBuf,
+        /// Which number of the file, from 1.
+        number: usize,
+        /// What it should be.
+        expected: &'static str,
+    },
+}
+
+/// A keypoint of a person in a picture.
+pub type Keypoints = [Option<Keypoint>; N_KEYPOINTS];
+
+/// What a detector found in a view of a frame.
+#[derive(Debug, Clone, Default)]
+pub struct Found {
+    /// The keypoints of each person.
+    pub people: Vec<Keypoints>,
+    /// The people as the tracker takes them.
+    pub view: View,
+}
+
+/// A person who was there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TruePerson {
+    /// Which person.
+    pub id: usize,
+    /// The joints, metres.
+    pub joints: [Point3<f64>; N_TRUE],
+}
+
+/// A set.
+#[derive(Debug, Clone, Default)]
+pub struct Shelf {
+    /// The cameras.
+    pub cameras: Vec<Camera>,
+    /// What was found, frame by frame, view by view.
+    pub frames: Vec<Vec<Found>>,
+    /// Who was there, frame by frame.
+    pub truth: Vec<Vec<TruePerson>>,
+}
+
+impl Shelf {
+    /// Reads a folder.
+    ///
+    /// # Errors
+    ///
+    /// [`ShelfError`].
+    pub fn read(folder: &Path) -> Result<Self, ShelfError> {
+        let cameras = cameras(&folder.join("calibration.json"))?;
+        let mut views = Vec::with_capacity(cameras.len());
+        for (view, camera) in cameras.iter().enumerate() {
+            views.push(detections(&folder.join(format!("detection/{view}.txt")), camera)?.into_iter());
+        }
+        let truth = truth(&folder.join("gt.txt"))?;
+        let frames = (0..truth.len()).map(|_| {
+            views.iter_mut().map(|view| view.next().unwrap_or_default()).collect()
+        });
+        Ok(Self { cameras, frames: frames.collect(), truth })
+    }
+
+    /// The set with some of the views.
+    #[must_use]
+    pub fn with_views(&self, views: &[usize]) -> Self {
+        Self {
+            cameras: views.iter().map(|view| self.cameras[*view].clone()).collect(),
+            frames: self.frames.iter().map(|frame| views.iter().map(|view| frame[*view].clone()).collect()).collect(),
+            truth: self.truth.clone(),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+struct CameraEntry {
+    #[serde(rename = "K")]
+    intrinsic: [f64; 9],
+    #[serde(rename = "RT")]
+    extrinsic: [f64; 12],
+    #[serde(rename = "imgSize")]
+    size: [u32; 2],
+}
+
+fn cameras(path: &Path) -> Result<Vec<Camera>, ShelfError> {
+    let refuse = |reason: String| ShelfError::Calibration { path: path.to_owned(), reason };
+    let text = read(path)?;
+    let entries: std::collections::BTreeMap<usize, CameraEntry> =
+        serde_json::from_str(&text).map_err(|error| refuse(error.to_string()))?;
+    let camera = |(name, entry): (&usize, &CameraEntry)| {
+        let [fx, _, cx, _, fy, cy, ..] = entry.intrinsic;
+        let m = entry.extrinsic;
+        let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
+        let rotation = rotation_from_matrix(&rotation).map_err(|error| refuse(format!("RT of camera {name}: {error}")))?;
+        Ok(Camera {
+            name: name.to_string(),
+            intrinsics: Intrinsics { fx, fy, cx, cy, size: entry.size, lens: Lens::new(LensModel::Pinhole) },
+            camera_from_world: Isometry3::from_parts(Translation3::new(m[3], m[7], m[11]), rotation),
+        })
+    };
+    entries.iter().map(camera).collect()
+}
+
+fn read(path: &Path) -> Result<String, ShelfError> {
+    fs::read_to_string(path).map_err(|source| ShelfError::Read { path: path.to_owned(), source })
+}
+
+/// The numbers of a text file, one after another.
+struct Numbers<'a> {
+    path: &'a Path,
+    words: std::iter::Enumerate<std::str::SplitAsciiWhitespace<'a>>,
+}
+
+impl<'a> Numbers<'a> {
+    fn new(path: &'a Path, text: &'a str) -> Self {
+        Self { path, words: text.split_ascii_whitespace().enumerate() }
+    }
+
+    fn next<T: std::str::FromStr>(&mut self, expected: &'static str) -> Result<T, ShelfError> {
+        let next = self.words.next();
+        let number = next.map_or(0, |it| it.0 + 1);
+        let value = next.and_then(|it| it.1.parse().ok());
+        value.ok_or_else(|| ShelfError::Number { path: self.path.to_owned(), number, expected })
+    }
+
+    fn many(&mut self, n: usize) -> Result<Vec<f64>, ShelfError> {
+        (0..n).map(|_| self.next("a number")).collect()
+    }
+}
+
+/// The candidates of a keypoint: columns, rows and confidences.
+type Candidates = Vec<[f64; 3]>;
+
+fn detections(path: &Path, camera: &Camera) -> Result<Vec<Found>, ShelfError> {
+    let text = read(path)?;
+    let mut numbers = Numbers::new(path, &text);
+    let _kind: usize = numbers.next("4, OpenPose's body-25")?;
+    let n_frames: usize = numbers.next("the number of frames")?;
+    let [width, height] = camera.intrinsics.size.map(|side| f64::from(side) - 1.0);
+    let mut frames = Vec::new();
+    for _ in 0..n_frames {
+        let mut candidates: Vec<Candidates> = Vec::with_capacity(N_KEYPOINTS);
+        for _ in 0..N_KEYPOINTS {
+            let n: usize = numbers.next("a number of candidates")?;
+            let rows = numbers.many(3 * n)?;
+            candidates.push((0..n).map(|i| [rows[i] * width, rows[n + i] * height, rows[2 * n + i]]).collect());
+        }
+        let mut fields = Vec::with_capacity(FIELDS[0].len());
+        for (from, to) in FIELDS[0].iter().zip(&FIELDS[1]) {
+            fields.push(numbers.many(candidates[*from].len() * candidates[*to].len())?);
+        }
+        frames.push(grouped(&candidates, &fields));
+    }
+    Ok(frames)
+}
+
+/// Makes people of candidates: the strongest field first, one candidate of a keypoint for each person.
+fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> Found {
+    struct Edge {
+        strength: f64,
+        ends: [(usize, usize); 2],
+    }
+    let mut edges = Vec::new();
+    for (field, strengths) in fields.iter().enumerate() {
+        let [from, to] = [FIELDS[0][field], FIELDS[1][field]];
+        let n_to = candidates[to].len().max(1);
+        let each = strengths.iter().enumerate().filter(|it| *it.1 > 0.0);
+        edges.extend(each.map(|(nth, strength)| Edge {
+            strength: *strength,
+            ends: [(from, nth / n_to), (to, nth % n_to)],
+        }));
+    }
+    edges.sort_by(|a, b| b.strength.total_cmp(&a.strength));
+    let mut groups: Vec<[Option<usize>; N_KEYPOINTS]> = Vec::new();
+    for Edge { ends: [a, b], .. } in edges {
+        let owner = |(keypoint, candidate): (usize, usize)| {
+            groups.iter().position(|group| group[keypoint] == Some(candidate))
+        };
+        match (owner(a), owner(b)) {
+            (None, None) => {
+                let mut group = [None; N_KEYPOINTS];
+                (group[a.0], group[b.0]) = (Some(a.1), Some(b.1));
+                groups.push(group);
+            }
+            (Some(one), None) => _ = groups[one][b.0].get_or_insert(b.1),
+            (None, Some(one)) => _ = groups[one][a.0].get_or_insert(a.1),
+            (Some(one), Some(other)) if one != other => {
+                let both = groups[one].iter().zip(&groups[other]);
+                if both.into_iter().all(|(a, b)| a.is_none() || b.is_none()) {
+                    let taken = groups.remove(other);
+                    let one = if other < one { one - 1 } else { one };
+                    for (own, more) in groups[one].iter_mut().zip(taken) {
+                        *own = own.or(more);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    groups.retain(|group| group.iter().flatten().count() >= LEAST_KEYPOINTS);
+    found(candidates, &groups)
+}
+
+fn found(candidates: &[Candidates], groups: &[[Option<usize>; N_KEYPOINTS]]) -> Found {
+    let sizes: Vec<f64> = groups.iter().map(|group| size(candidates, group)).collect();
+    let usual = sizes.iter().copied().fold(0.0, f64::max);
+    let keypoint = |keypoint: usize, candidate: usize, size: f64| {
+        let [x, y, confidence] = candidates[keypoint][candidate];
+        let sd_px = (SD_SHARE * size / confidence.max(LEAST_CONFIDENCE).sqrt()).max(1.0);
+        (confidence > LEAST_CONFIDENCE).then_some(Keypoint { at_px: [x, y], sd_px, heat: confidence.min(1.0) })
+    };
+    let people: Vec<Keypoints> = groups
+        .iter()
+        .zip(&sizes)
+        .map(|(group, size)| core::array::from_fn(|nth| keypoint(nth, group[nth]?, *size)))
+        .collect();
+    let loose = JOINTS.map(|joint| {
+        let Some(joint) = joint else { return Vec::new() };
+        let is_free = |candidate: &usize| groups.iter().all(|group| group[joint] != Some(*candidate));
+        let free = (0..candidates[joint].len()).filter(is_free);
+        free.filter_map(|candidate| keypoint(joint, candidate, usual)).collect()
+    });
+    let detections = people.iter().map(|person| Detection {
+        joints: JOINTS.map(|joint| person[joint?]),
+        colour: None,
+    });
+    Found {
+        view: View { detections: detections.collect(), loose: loose.to_vec() },
+        people,
+    }
+}
+
+/// The longer side of the box around a person, pixels.
+fn size(candidates: &[Candidates], group: &[Option<usize>; N_KEYPOINTS]) -> f64 {
+    let side = |axis: usize| {
+        let each = group.iter().enumerate().filter_map(|(keypoint, it)| Some(candidates[keypoint][(*it)?][axis]));
+        let ends = each.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| [low.min(at), high.max(at)]);
+        ends[1] - ends[0]
+    };
+    side(0).max(side(1))
+}
+
+fn truth(path: &Path) -> Result<Vec<Vec<TruePerson>>, ShelfError> {
+    let text = read(path)?;
+    let mut numbers = Numbers::new(path, &text);
+    let n_joints: usize = numbers.next("15 joints")?;
+    let n_frames: usize = numbers.next("the number of frames")?;
+    let mut frames = Vec::new();
+    for _ in 0..n_frames {
+        let n: usize = numbers.next("a number of people")?;
+        let mut people = Vec::with_capacity(n.min(64));
+        for _ in 0..n {
+            let id = numbers.next("an identity")?;
+            let rows = numbers.many(4 * n_joints)?;
+            let at = |joint: usize| [0, 1, 2].map(|axis| rows.get(axis * n_joints + joint).copied().unwrap_or(f64::NAN));
+            people.push(TruePerson { id, joints: core::array::from_fn(|joint| Point3::from(at(joint))) });
+        }
+        frames.push(people);
+    }
+    Ok(frames)
+}
