@@ -107,7 +107,9 @@ mod tests {
 
     /// The least total of all assignments of the rows from `row` on.
     fn least(costs: &[Vec<f64>], row: usize, taken: u32) -> f64 {
-        let Some(own) = costs.get(row) else { return 0.0 };
+        let Some(own) = costs.get(row) else {
+            return 0.0;
+        };
         let free = (0..own.len()).filter(|column| taken >> column & 1 == 0);
         let with = free.map(|column| own[column] + least(costs, row + 1, taken | 1 << column));
         with.fold(NEVER + least(costs, row + 1, taken), f64::min)

@@ -47,7 +47,12 @@ pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
             distances[a * n + b] = Some(fit.distance);
             distances[b * n + a] = Some(fit.distance);
             if fit.distance < GATE_M {
-                pairs.push(Pair { distance: fit.distance, a, b, is_exchanged: fit.is_exchanged });
+                pairs.push(Pair {
+                    distance: fit.distance,
+                    a,
+                    b,
+                    is_exchanged: fit.is_exchanged,
+                });
             }
         }
     }
@@ -68,7 +73,10 @@ pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
             }
         }
     }
-    let member = |nth: usize| Member { at: free[nth], is_exchanged: sides[nth] };
+    let member = |nth: usize| Member {
+        at: free[nth],
+        is_exchanged: sides[nth],
+    };
     let groups = (0..n).map(|name| {
         let members = (0..n).filter(|nth| group[*nth] == name);
         members.map(member).collect::<Vec<Member>>()
@@ -79,7 +87,12 @@ pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
 }
 
 /// Whether two groups have no view in common, and a mean distance below the gate.
-fn may_join(free: &[Place], distances: &[Option<f64>], group: &[usize], [a, b]: [usize; 2]) -> bool {
+fn may_join(
+    free: &[Place],
+    distances: &[Option<f64>],
+    group: &[usize],
+    [a, b]: [usize; 2],
+) -> bool {
     let n = free.len();
     let (mut sum, mut count) = (0.0, 0);
     for one in (0..n).filter(|nth| group[*nth] == a) {

@@ -31,7 +31,9 @@ impl Coarse {
 
     /// Whether the bones are those of a person.
     pub(crate) fn is_body(&self) -> bool {
-        body::check(&self.joints, &self.covariances, None).nobody.is_none()
+        body::check(&self.joints, &self.covariances, None)
+            .nobody
+            .is_none()
     }
 }
 
@@ -41,9 +43,11 @@ pub(crate) fn coarse(frame: &Frame, members: &[Member]) -> Coarse {
     let mut rays: Vec<Sight> = Vec::with_capacity(members.len());
     for joint in 0..N {
         rays.clear();
-        rays.extend(members.iter().filter_map(|member| {
-            frame.sights(member.at)[named(joint, member.is_exchanged)]
-        }));
+        rays.extend(
+            members
+                .iter()
+                .filter_map(|member| frame.sights(member.at)[named(joint, member.is_exchanged)]),
+        );
         if let Some(met) = meet(&rays) {
             person.joints[joint] = Some(met.point);
             person.covariances[joint] = Some(met.covariance);
@@ -71,7 +75,11 @@ pub(crate) fn agree(frame: &Frame, mut members: Vec<Member>, expected: Option<&J
             fit.map(|fit| fit.distance)
         };
         let is_placed = person.n_core() >= 4;
-        let seen = if is_placed { Some(&person.joints) } else { expected };
+        let seen = if is_placed {
+            Some(&person.joints)
+        } else {
+            expected
+        };
         let worst = seen.and_then(|joints| {
             let each = members.iter().enumerate();
             let each = each.map(|(nth, member)| (nth, distance(member, joints).unwrap_or(1.0)));
@@ -80,7 +88,11 @@ pub(crate) fn agree(frame: &Frame, mut members: Vec<Member>, expected: Option<&J
         match worst.filter(|worst| members.len() >= 2 && (!is_placed || worst.1 > CONTRADICTS_M)) {
             Some((nth, _)) => refused.push(members.remove(nth)),
             None => {
-                return Agreed { members, person, refused };
+                return Agreed {
+                    members,
+                    person,
+                    refused,
+                };
             }
         }
     }

@@ -29,7 +29,10 @@ struct Term {
 
 /// The trimmed mean of the distances; `None` of too few.
 fn trimmed(terms: impl Iterator<Item = Option<Term>>) -> Option<f64> {
-    let mut kept = [Term { distance: 0.0, weight: 0.0 }; N];
+    let mut kept = [Term {
+        distance: 0.0,
+        weight: 0.0,
+    }; N];
     let mut n = 0;
     for term in terms.flatten().take(N) {
         kept[n] = term;
@@ -50,7 +53,10 @@ fn trimmed(terms: impl Iterator<Item = Option<Term>>) -> Option<f64> {
 fn better(as_seen: bool, distance: impl Fn(bool) -> Option<f64>) -> Option<Fit> {
     let fit = |is_exchanged: bool| {
         let distance = distance(is_exchanged)?;
-        Some(Fit { distance, is_exchanged })
+        Some(Fit {
+            distance,
+            is_exchanged,
+        })
     };
     let named = fit(false);
     let exchanged = if as_seen { fit(true) } else { None };
@@ -89,7 +95,10 @@ pub(crate) fn between(a: &Sights, b: &Sights, as_seen: bool) -> Option<Fit> {
             let at = passing(a, b)?;
             let variance = a.sd(&at.point).powi(2) + b.sd(&at.point).powi(2);
             let weight = (a.heat * b.heat).sqrt() / variance;
-            Some(Term { distance: at.gap, weight })
+            Some(Term {
+                distance: at.gap,
+                weight,
+            })
         }))
     })
 }

@@ -60,7 +60,9 @@ pub(crate) fn hypotheses(
     let mut places = Vec::new();
     for (nth, a) in candidates.iter().enumerate() {
         for b in candidates[nth + 1..].iter().filter(|b| b.view != a.view) {
-            let Some(at) = passing(&a.sight, &b.sight) else { continue };
+            let Some(at) = passing(&a.sight, &b.sight) else {
+                continue;
+            };
             let sd = a.sight.sd(&at.point).hypot(b.sight.sd(&at.point));
             if at.gap < APART * sd {
                 places.push(at.point);
@@ -77,7 +79,10 @@ pub(crate) fn hypotheses(
         places.retain(|place| (place - near).norm() < RADIUS_M);
     }
     places.extend(prior.map(|prior| prior.point));
-    let each = places.into_iter().map(|place| Hypothesis { place, support: support(candidates, &place) });
+    let each = places.into_iter().map(|place| Hypothesis {
+        place,
+        support: support(candidates, &place),
+    });
     let mut all: Vec<Hypothesis> = each.collect();
     all.sort_by(|a, b| b.support.total_cmp(&a.support));
     let mut kept: Vec<Hypothesis> = Vec::with_capacity(MOST);
@@ -85,7 +90,10 @@ pub(crate) fn hypotheses(
         if kept.len() == MOST {
             break;
         }
-        if kept.iter().all(|other| (other.place - one.place).norm() > SAME_M) {
+        if kept
+            .iter()
+            .all(|other| (other.place - one.place).norm() > SAME_M)
+        {
             kept.push(one);
         }
     }

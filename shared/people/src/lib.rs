@@ -31,7 +31,7 @@ use body::{Covariances, Joints};
 use nalgebra::Vector3;
 
 pub(crate) use frame::Frame;
-pub use solver::{Solved, Solver, extra_point};
+pub use solver::{Solved, Solver};
 pub use tracker::{Memory, Remembered, Settings, Tracker};
 
 /// Number of joints, those of `skeleton::PARSE14`.

@@ -26,7 +26,9 @@ impl Sight {
     /// Of a keypoint; `None` where the lens has no ray.
     pub(crate) fn new(camera: &Camera, keypoint: &Keypoint) -> Option<Self> {
         let usable = keypoint.sd_px.is_finite() && keypoint.sd_px > 0.0 && keypoint.heat > 0.0;
-        let ray = camera.ray(&Point2::from(keypoint.at_px)).filter(|_| usable)?;
+        let ray = camera
+            .ray(&Point2::from(keypoint.at_px))
+            .filter(|_| usable)?;
         let focal = (camera.intrinsics.fx * camera.intrinsics.fy).sqrt();
         Some(Self {
             origin: ray.origin,
@@ -100,7 +102,10 @@ pub(crate) fn passing(a: &Sight, b: &Sight) -> Option<Passing> {
     if along_a <= 0.0 || along_b <= 0.0 {
         return None;
     }
-    let ends = [a.origin + a.direction * along_a, b.origin + b.direction * along_b];
+    let ends = [
+        a.origin + a.direction * along_a,
+        b.origin + b.direction * along_b,
+    ];
     Some(Passing {
         point: nalgebra::center(&ends[0], &ends[1]),
         gap: (ends[0] - ends[1]).norm(),
@@ -148,7 +153,10 @@ pub(crate) fn meet(sights: &[Sight]) -> Option<Met> {
         return None;
     }
     let met = settle(&near, &start, None)?;
-    Some(Met { n: near.len(), ..met })
+    Some(Met {
+        n: near.len(),
+        ..met
+    })
 }
 
 /// How far a place at so many standard deviations is supported, 0 to 1.
@@ -165,11 +173,7 @@ pub(crate) struct Prior {
 }
 
 /// The place of the least squared distances from rays, weighted by their heats; and from a prior.
-pub(crate) fn settle(
-    sights: &[Sight],
-    start: &Point3<f64>,
-    prior: Option<Prior>,
-) -> Option<Met> {
+pub(crate) fn settle(sights: &[Sight], start: &Point3<f64>, prior: Option<Prior>) -> Option<Met> {
     let (mut normal, mut target) = (Matrix3::zeros(), Vector3::zeros());
     for sight in sights {
         let information = sight.information(start) * sight.heat;
@@ -184,6 +188,13 @@ pub(crate) fn settle(
     let factor = normal.cholesky()?;
     let point = start + factor.solve(&target);
     let covariance = factor.inverse();
-    let is_finite = point.iter().chain(covariance.iter()).all(|entry| entry.is_finite());
-    is_finite.then_some(Met { point, covariance, n: sights.len() })
+    let is_finite = point
+        .iter()
+        .chain(covariance.iter())
+        .all(|entry| entry.is_finite());
+    is_finite.then_some(Met {
+        point,
+        covariance,
+        n: sights.len(),
+    })
 }

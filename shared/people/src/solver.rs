@@ -2,20 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use body::{Covariances, Joints, Lengths};
+use body::{Covariances, Joints};
 use geometry::Camera;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::distance::named;
 use crate::hypotheses::{Candidate, Hypothesis, hypotheses};
-use crate::sight::{Prior, Sight, Sights, meet, settle, sights};
+use crate::sight::{Prior, Sight, Sights, settle, sights};
 use crate::tree::{Choice, Expectations, choose};
-use crate::{Keypoint, MIRROR, N, Person, View};
+use crate::{N, Person, View};
 
-/// How likely a place in a picture is a person's joint that the detector gave to somebody else, to nobody, or to the other side.
+/// How likely a place in a picture is a person's joint that the detector gave to somebody else, or to nobody.
 const TRUST_OTHERS: f64 = 0.3;
 const TRUST_LOOSE: f64 = 0.6;
-const TRUST_OTHER_SIDE: f64 = 0.3;
 /// A joint is expected where it goes; how well that is known, metres, and how much less for every second, metres a second.
 const EXPECTED_SD_M: f64 = 0.04;
 const EXPECTED_SD_M_PER_S: f64 = 1.5;
@@ -60,7 +59,6 @@ struct Past {
 struct Knowledge {
     joints: [Option<Past>; N],
     time_s: f64,
-    lengths: Lengths,
 }
 
 impl Knowledge {
@@ -69,17 +67,20 @@ impl Knowledge {
         let step_s = (time_s - self.time_s).max(0.0);
         Some(Prior {
             point: past.point + past.velocity * (DAMPING * step_s),
-            sd: past.sd.hypot(EXPECTED_SD_M).hypot(EXPECTED_SD_M_PER_S * step_s),
+            sd: past
+                .sd
+                .hypot(EXPECTED_SD_M)
+                .hypot(EXPECTED_SD_M_PER_S * step_s),
         })
     }
 }
 
 /// Finds the joints of known people, frame by frame.
 ///
-/// A joint may be wherever rays meet that could be its own: those of the person's detections, those that the detector gave to nobody, and,
-/// with less trust, those of others and of the other side. Of all these places the ones are taken which most views support, which lie
-/// where the joint was going, and between which the bones have the person's lengths: exactly, over the tree of the body. Then every joint
-/// moves to the least squared distances from its rays, and the bones pull as far as the joints are uncertain.
+/// A joint may be wherever rays meet that could be its own: those of the person's detections, and, with less trust, those that the detector
+/// gave to nobody or to others. Of all these places the ones are taken which most views support, which lie where the joint was going, and
+/// between which the bones have lengths of a person of this stature: exactly, over the tree of the body. Then every joint moves to the least
+/// squared distances from its rays, and the bones pull as far as the joints are uncertain.
 #[derive(Debug, Clone)]
 pub struct Solver {
     cameras: Vec<Camera>,
@@ -100,7 +101,11 @@ impl Solver {
     pub fn new(cameras: Vec<Camera>) -> Self {
         let mut order: Vec<usize> = (0..cameras.len()).collect();
         order.sort_by(|a, b| cameras[*a].name.cmp(&cameras[*b].name));
-        Self { cameras, order, known: BTreeMap::new() }
+        Self {
+            cameras,
+            order,
+            known: BTreeMap::new(),
+        }
     }
 
     /// Finds the joints of the people of the next frame.
@@ -108,9 +113,17 @@ impl Solver {
     /// * `people`: as [`Tracker::step`](crate::Tracker::step) gives them.
     /// * `views`: what it was given.
     pub fn step(&mut self, time_s: f64, people: &[Person], views: &[View]) -> Vec<Solved> {
-        let rays: Vec<Rays> = self.cameras.iter().zip(views).map(|(camera, view)| rays(camera, view)).collect();
-        self.known.retain(|_, known| time_s - known.time_s <= CARRIED_S);
-        let solved = people.iter().map(|person| self.solve(time_s, person, people, &rays));
+        let rays: Vec<Rays> = self
+            .cameras
+            .iter()
+            .zip(views)
+            .map(|(camera, view)| rays(camera, view))
+            .collect();
+        self.known
+            .retain(|_, known| time_s - known.time_s <= CARRIED_S);
+        let solved = people
+            .iter()
+            .map(|person| self.solve(time_s, person, people, &rays));
         solved.collect::<Vec<Solved>>()
     }
 
@@ -118,18 +131,29 @@ impl Solver {
         let known = self.known.entry(person.id).or_default();
         let candidates: [Vec<Candidate>; N] =
             core::array::from_fn(|joint| candidates(joint, person, people, (&self.order, rays)));
-        let priors: [Option<Prior>; N] = core::array::from_fn(|joint| known.expected(joint, time_s));
+        let priors: [Option<Prior>; N] =
+            core::array::from_fn(|joint| known.expected(joint, time_s));
         let places: [Vec<Hypothesis>; N] = core::array::from_fn(|joint| {
-            let near = priors[joint].map(|prior| prior.point).or(person.joints[joint]);
+            let near = priors[joint]
+                .map(|prior| prior.point)
+                .or(person.joints[joint]);
             hypotheses(&candidates[joint], near, priors[joint])
         });
         let choices: [Vec<Choice>; N] = core::array::from_fn(|joint| {
-            places[joint].iter().map(|place| choice(place, priors[joint])).collect()
+            places[joint]
+                .iter()
+                .map(|place| choice(place, priors[joint]))
+                .collect()
         });
         let stature = body::stature(&person.joints).map_or(ANY_STATURE_M, |stature| stature.metres);
-        let expectations = Expectations::new(stature.clamp(body::STATURES[0], body::STATURES[1]), &known.lengths);
+        let expectations = Expectations::new(stature.clamp(body::STATURES[0], body::STATURES[1]));
         let chosen = choose(&choices, &expectations);
-        let mut solved = Solved { id: person.id, joints: [None; N], covariances: [None; N], n_views: [0; N] };
+        let mut solved = Solved {
+            id: person.id,
+            joints: [None; N],
+            covariances: [None; N],
+            n_views: [0; N],
+        };
         for joint in 0..N {
             let Some(nth) = chosen[joint] else { continue };
             let start = places[joint][nth].place;
@@ -140,10 +164,7 @@ impl Solver {
                 solved.n_views[joint] = n;
             }
         }
-        let seen: Joints = core::array::from_fn(|joint| solved.joints[joint].filter(|_| solved.n_views[joint] >= 2));
-        let verdict = body::check(&seen, &solved.covariances, None);
-        known.lengths.add(&seen, &verdict);
-        let refined = body::refine(&solved.joints, &solved.covariances, Some(&known.lengths));
+        let refined = body::refine(&solved.joints, &solved.covariances, None);
         (solved.joints, solved.covariances) = (refined.joints, refined.covariances);
         remember(known, time_s, &solved);
         solved
@@ -156,7 +177,10 @@ fn choice(place: &Hypothesis, prior: Option<Prior>) -> Choice {
         let z = (place.place - prior.point).norm() / prior.sd;
         (MOVED * 0.5 * z * z).min(MOST_OF_MOVED)
     });
-    Choice { place: place.place, worth: place.support - moved }
+    Choice {
+        place: place.place,
+        worth: place.support - moved,
+    }
 }
 
 /// Keeps what the next frame has to know.
@@ -168,19 +192,34 @@ fn remember(known: &mut Knowledge, time_s: f64, solved: &Solved) {
             continue;
         };
         let past = known.joints[joint];
-        let measured = past.filter(|_| step_s > 0.0).map(|past| (point - past.point) / step_s);
+        let measured = past
+            .filter(|_| step_s > 0.0)
+            .map(|past| (point - past.point) / step_s);
         let before = past.map_or_else(Vector3::zeros, |past| past.velocity);
         let velocity = before + NEW_VELOCITY * (measured.unwrap_or(before) - before);
         let is_seen = solved.n_views[joint] > 0;
         let variance = solved.covariances[joint].map_or(0.0, |it| it.trace() / 3.0);
-        let seen_s = if is_seen { time_s } else { past.map_or(time_s, |past| past.seen_s) };
-        known.joints[joint] = Some(Past { point, velocity, sd: variance.sqrt(), seen_s });
+        let seen_s = if is_seen {
+            time_s
+        } else {
+            past.map_or(time_s, |past| past.seen_s)
+        };
+        known.joints[joint] = Some(Past {
+            point,
+            velocity,
+            sd: variance.sqrt(),
+            seen_s,
+        });
     }
     known.time_s = time_s;
 }
 
 /// A joint moved to the least squared distances from the rays that support its place; with its covariance and the number of views.
-fn refined(candidates: &[Candidate], start: Point3<f64>, prior: Option<Prior>) -> Option<(Point3<f64>, Matrix3<f64>, usize)> {
+fn refined(
+    candidates: &[Candidate],
+    start: Point3<f64>,
+    prior: Option<Prior>,
+) -> Option<(Point3<f64>, Matrix3<f64>, usize)> {
     let mut at = start;
     let mut result = None;
     for _ in 0..2 {
@@ -189,7 +228,10 @@ fn refined(candidates: &[Candidate], start: Point3<f64>, prior: Option<Prior>) -
             let near = view.iter().filter(|it| it.sight.deviations(&at) < OUTLYING);
             near.max_by(|a, b| a.support(&at).total_cmp(&b.support(&at)))
         });
-        let weighted = best.map(|it| Sight { heat: it.sight.heat * it.trust, ..it.sight });
+        let weighted = best.map(|it| Sight {
+            heat: it.sight.heat * it.trust,
+            ..it.sight
+        });
         let rays: Vec<Sight> = weighted.collect();
         let met = settle(&rays, &at, prior)?;
         at = met.point;
@@ -210,17 +252,25 @@ fn candidates(
         let first = all.len();
         let name = named(joint, person.is_exchanged[*view]);
         let mut add = |sight: Option<Sight>, trust: f64| {
-            all.extend(sight.map(|sight| Candidate { view: nth, sight, trust }));
+            all.extend(sight.map(|sight| Candidate {
+                view: nth,
+                sight,
+                trust,
+            }));
         };
         for (index, sights) in rays[*view].detections.iter().enumerate() {
             if person.detections[*view] == Some(index) {
                 add(sights[name], 1.0);
-                if MIRROR[name] != name {
-                    add(sights[MIRROR[name]], TRUST_OTHER_SIDE);
-                }
             } else {
                 let is_anybodys = people.iter().any(|it| it.detections[*view] == Some(index));
-                add(sights[name], if is_anybodys { TRUST_OTHERS } else { TRUST_LOOSE });
+                add(
+                    sights[name],
+                    if is_anybodys {
+                        TRUST_OTHERS
+                    } else {
+                        TRUST_LOOSE
+                    },
+                );
             }
         }
         for sight in rays[*view].loose.get(name).into_iter().flatten() {
@@ -238,18 +288,17 @@ fn candidates(
 
 fn rays(camera: &Camera, view: &View) -> Rays {
     let loose = view.loose.iter().map(|joint| {
-        joint.iter().filter_map(|keypoint| Sight::new(camera, keypoint)).collect()
+        joint
+            .iter()
+            .filter_map(|keypoint| Sight::new(camera, keypoint))
+            .collect()
     });
     Rays {
-        detections: view.detections.iter().map(|it| sights(camera, it)).collect(),
+        detections: view
+            .detections
+            .iter()
+            .map(|it| sights(camera, it))
+            .collect(),
         loose: loose.collect(),
     }
-}
-
-/// The place of a keypoint that is no joint, from those of a person's detections; `None` if no two views agree.
-///
-/// * `keypoints`: a camera and what it sees, in the order of the cameras' names.
-pub fn extra_point(keypoints: &[(&Camera, Keypoint)]) -> Option<Point3<f64>> {
-    let rays = keypoints.iter().filter_map(|(camera, keypoint)| Sight::new(camera, keypoint));
-    meet(&rays.collect::<Vec<Sight>>()).map(|met| met.point)
 }

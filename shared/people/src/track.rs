@@ -63,7 +63,9 @@ impl Track {
     pub(crate) fn expected(&self, time_s: f64) -> Joints {
         let unseen_s = (time_s - self.placed_s).max(0.0);
         let moved = self.velocity * DAMPED_S * (1.0 - (-unseen_s / DAMPED_S).exp());
-        self.coarse.joints.map(|joint| joint.map(|point| point + moved))
+        self.coarse
+            .joints
+            .map(|joint| joint.map(|point| point + moved))
     }
 
     /// How far away a detection may be, metres.
@@ -143,7 +145,9 @@ impl Track {
     /// The middle of the trunk; `None` if nothing of it is known.
     pub(crate) fn trunk(&self) -> Option<Point3<f64>> {
         let points = TRUNK.iter().filter_map(|joint| self.coarse.joints[*joint]);
-        let (n, sum) = points.fold((0.0, Vector3::zeros()), |(n, sum), point| (n + 1.0, sum + point.coords));
+        let (n, sum) = points.fold((0.0, Vector3::zeros()), |(n, sum), point| {
+            (n + 1.0, sum + point.coords)
+        });
         (n > 0.0).then(|| Point3::from(sum / n))
     }
 }
@@ -151,8 +155,12 @@ impl Track {
 /// By how much the trunk moved; by how much everything did, where nothing of the trunk is known.
 fn moved(from: &Joints, to: &Joints) -> Option<Vector3<f64>> {
     let of = |joints: &[usize]| {
-        let both = joints.iter().filter_map(|joint| Some(to[*joint]? - from[*joint]?));
-        let (n, sum) = both.fold((0.0, Vector3::zeros()), |(n, sum), step| (n + 1.0, sum + step));
+        let both = joints
+            .iter()
+            .filter_map(|joint| Some(to[*joint]? - from[*joint]?));
+        let (n, sum) = both.fold((0.0, Vector3::zeros()), |(n, sum), step| {
+            (n + 1.0, sum + step)
+        });
         (n > 0.0).then(|| sum / n)
     };
     of(&TRUNK).or_else(|| of(&core::array::from_fn::<usize, N, _>(|joint| joint)))

@@ -136,12 +136,23 @@ impl Tracker {
     pub fn step(&mut self, time_s: f64, views: &[View]) -> Vec<Person> {
         let frame = Frame::new(&self.cameras, &self.order, views, self.settings.as_seen);
         let was_empty = self.tracks.iter().all(|track| track.id.is_none());
-        let expected: Vec<Joints> = self.tracks.iter().map(|track| track.expected(time_s)).collect();
-        let mut free: Vec<Vec<Place>> = (0..frame.n_views()).map(|view| frame.places(view).collect()).collect();
+        let expected: Vec<Joints> = self
+            .tracks
+            .iter()
+            .map(|track| track.expected(time_s))
+            .collect();
+        let mut free: Vec<Vec<Place>> = (0..frame.n_views())
+            .map(|view| frame.places(view).collect())
+            .collect();
         self.tracks.iter_mut().for_each(Track::wait);
         let mut members = vec![Vec::new(); self.tracks.len()];
         for is_known in [true, false] {
-            self.follow(&frame, time_s, (&expected, &mut free, &mut members), is_known);
+            self.follow(
+                &frame,
+                time_s,
+                (&expected, &mut free, &mut members),
+                is_known,
+            );
         }
         self.place(&frame, time_s, &expected, members, &mut free);
         // What contradicts a group goes back once.
@@ -171,13 +182,27 @@ impl Tracker {
                 let fit = to_person(frame.sights(free[column]), &expected[track], frame.as_seen);
                 fit.filter(|fit| fit.distance < self.tracks[track].reach(time_s))
             };
-            let fits: Vec<_> = (0..rows.len()).map(|row| (0..free.len()).map(|column| fit(row, column)).collect::<Vec<_>>()).collect();
-            let cost = |row: usize, column: usize| fits[row][column].map_or(NEVER, |fit| fit.distance);
+            let fits: Vec<_> = (0..rows.len())
+                .map(|row| {
+                    (0..free.len())
+                        .map(|column| fit(row, column))
+                        .collect::<Vec<_>>()
+                })
+                .collect();
+            let cost =
+                |row: usize, column: usize| fits[row][column].map_or(NEVER, |fit| fit.distance);
             let assigned = assign(rows.len(), free.len(), cost);
             let mut taken = Vec::new();
             for (row, column) in assigned.into_iter().enumerate() {
-                let Some((column, fit)) = column.and_then(|column| Some((column, fits[row][column]?))) else { continue };
-                members[rows[row]].push(Member { at: free[column], is_exchanged: fit.is_exchanged });
+                let Some((column, fit)) =
+                    column.and_then(|column| Some((column, fits[row][column]?)))
+                else {
+                    continue;
+                };
+                members[rows[row]].push(Member {
+                    at: free[column],
+                    is_exchanged: fit.is_exchanged,
+                });
                 taken.push(free[column]);
             }
             free.retain(|at| !taken.contains(at));
@@ -242,13 +267,18 @@ impl Tracker {
             is_placed(track) && distance.is_some_and(|distance| distance < ONE_M)
         });
         if let Some(twin) = twin {
-            let is_free = |member: &Member| twin.members.iter().all(|own| own.at.view != member.at.view);
+            let is_free =
+                |member: &Member| twin.members.iter().all(|own| own.at.view != member.at.view);
             let more: Vec<Member> = members.into_iter().filter(is_free).collect();
             let agreed = agree(frame, [twin.members.clone(), more].concat(), None);
             if agreed.members.len() > twin.members.len() {
                 twin.coarse = Coarse {
-                    joints: core::array::from_fn(|joint| agreed.person.joints[joint].or(twin.coarse.joints[joint])),
-                    covariances: core::array::from_fn(|joint| agreed.person.covariances[joint].or(twin.coarse.covariances[joint])),
+                    joints: core::array::from_fn(|joint| {
+                        agreed.person.joints[joint].or(twin.coarse.joints[joint])
+                    }),
+                    covariances: core::array::from_fn(|joint| {
+                        agreed.person.covariances[joint].or(twin.coarse.covariances[joint])
+                    }),
                 };
                 twin.members = agreed.members;
             }
@@ -273,13 +303,17 @@ impl Tracker {
 
     /// Takes away who has not been seen for too long.
     fn bury(&mut self, time_s: f64) {
-        let (alive, dead) = self.tracks.drain(..).partition(|track: &Track| match track.id {
-            Some(_) => time_s - track.seen_s <= DEATH_S,
-            None => track.is_possible(),
-        });
+        let (alive, dead) = self
+            .tracks
+            .drain(..)
+            .partition(|track: &Track| match track.id {
+                Some(_) => time_s - track.seen_s <= DEATH_S,
+                None => track.is_possible(),
+            });
         self.tracks = alive;
         self.gone.extend(dead.iter().filter_map(remembered));
-        self.gone.retain(|person| time_s - person.seen_s <= REMEMBERED_S);
+        self.gone
+            .retain(|person| time_s - person.seen_s <= REMEMBERED_S);
     }
 
     /// Gives ids to those who are somebody by now.
@@ -289,7 +323,11 @@ impl Tracker {
         for nth in 0..self.tracks.len() {
             let track = &self.tracks[nth];
             let is_clear = was_empty && track.members.len() >= needed;
-            let n_known = self.tracks.iter().filter(|track| track.id.is_some()).count();
+            let n_known = self
+                .tracks
+                .iter()
+                .filter(|track| track.id.is_some())
+                .count();
             let is_born = track.id.is_none()
                 && track.state == State::Tracked
                 && (is_clear || track.is_somebody())
@@ -323,15 +361,23 @@ impl Tracker {
             let is_past = time_s > person.seen_s;
             (is_same && is_past).then_some((nth, bones / SAME_BONES + colour / SAME_COLOUR))
         });
-        each.min_by(|a, b| a.1.total_cmp(&b.1)).map(|nearest| nearest.0)
+        each.min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|nearest| nearest.0)
     }
 
     /// Marks those who are too near to each other to be told apart.
     fn mark_near(&mut self) {
-        let trunks: Vec<_> = self.tracks.iter().map(|track| track.trunk().filter(|_| track.state == State::Tracked)).collect();
+        let trunks: Vec<_> = self
+            .tracks
+            .iter()
+            .map(|track| track.trunk().filter(|_| track.state == State::Tracked))
+            .collect();
         for (nth, track) in self.tracks.iter_mut().enumerate() {
             let is_near = trunks.iter().enumerate().any(|(other, trunk)| {
-                other != nth && trunks[nth].zip(*trunk).is_some_and(|(a, b)| (a - b).norm() < ONE_M)
+                other != nth
+                    && trunks[nth]
+                        .zip(*trunk)
+                        .is_some_and(|(a, b)| (a - b).norm() < ONE_M)
             });
             if is_near {
                 track.state = State::Unsure;

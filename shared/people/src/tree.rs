@@ -1,6 +1,6 @@
 //! One place for every joint, so that the views support all of them and the bones keep their lengths.
 
-use body::{BONES, Bone, Lengths};
+use body::BONES;
 use nalgebra::Point3;
 
 use crate::N;
@@ -46,32 +46,31 @@ struct Expected {
     sd: f64,
 }
 
-/// The lengths of a person's bones: learned, else those of people of the stature.
+/// The lengths of the bones of people of a stature.
 #[derive(Debug, Clone)]
 pub(crate) struct Expectations {
     limbs: [Expected; N - 1],
 }
 
 impl Expectations {
-    pub(crate) fn new(stature: f64, lengths: &Lengths) -> Self {
+    pub(crate) fn new(stature: f64) -> Self {
         let of_bone = |index: usize| {
-            let bone: &Bone = &BONES[index];
-            let proportion = bone.kind.proportion();
-            let general = Expected {
-                metres: proportion.length(stature),
-                sd: proportion.spread() * proportion.length(stature),
-            };
-            lengths.bone(index).map_or(general, |learned| Expected {
-                metres: learned.metres,
-                sd: learned.sd.hypot(proportion.posture * learned.metres),
-            })
+            let proportion = BONES[index].kind.proportion();
+            let metres = proportion.length(stature);
+            Expected {
+                metres,
+                sd: proportion.spread() * metres,
+            }
         };
         Self {
             limbs: BRANCHES.map(|(_, _, limb)| match limb {
                 Limb::Bone(index) => of_bone(index),
                 Limb::TrunkToHip => {
                     let [trunk, hips] = [of_bone(TRUNK), of_bone(HIP_WIDTH)];
-                    Expected { metres: trunk.metres.hypot(0.5 * hips.metres), sd: trunk.sd }
+                    Expected {
+                        metres: trunk.metres.hypot(0.5 * hips.metres),
+                        sd: trunk.sd,
+                    }
                 }
             }),
         }
@@ -94,7 +93,10 @@ pub(crate) struct Choice {
 /// Chooses one place for every joint so that the worth of all, less the costs of the bones between them, is the most.
 ///
 /// * Returns the index of the choice; `None` for a joint whose best place costs more than it is worth.
-pub(crate) fn choose(choices: &[Vec<Choice>; N], expectations: &Expectations) -> [Option<usize>; N] {
+pub(crate) fn choose(
+    choices: &[Vec<Choice>; N],
+    expectations: &Expectations,
+) -> [Option<usize>; N] {
     // Worth of every choice with what hangs on it, and of no place for the joint; the children of every joint are done first.
     let mut worths: [Vec<f64>; N] = core::array::from_fn(|joint| {
         let each = choices[joint].iter().map(|choice| choice.worth);
@@ -102,9 +104,15 @@ pub(crate) fn choose(choices: &[Vec<Choice>; N], expectations: &Expectations) ->
     });
     let mut best_of: [Vec<usize>; N - 1] = core::array::from_fn(|_| Vec::new());
     for (branch, (joint, parent, _)) in BRANCHES.iter().enumerate().rev() {
-        let above = choices[*parent].iter().map(|choice| Some(choice.place)).chain([None]);
+        let above = choices[*parent]
+            .iter()
+            .map(|choice| Some(choice.place))
+            .chain([None]);
         for (nth, above) in above.enumerate() {
-            let below = choices[*joint].iter().map(|choice| Some(choice.place)).chain([None]);
+            let below = choices[*joint]
+                .iter()
+                .map(|choice| Some(choice.place))
+                .chain([None]);
             let with = below.zip(&worths[*joint]).map(|(place, worth)| {
                 let both = above.zip(place);
                 worth - both.map_or(0.0, |(a, b)| expectations.cost(branch, (a - b).norm()))
@@ -123,7 +131,9 @@ pub(crate) fn choose(choices: &[Vec<Choice>; N], expectations: &Expectations) ->
 }
 
 fn most(worths: impl Iterator<Item = f64>) -> (usize, f64) {
-    worths.enumerate().fold((0, f64::NEG_INFINITY), |best, (nth, worth)| {
-        if worth > best.1 { (nth, worth) } else { best }
-    })
+    worths
+        .enumerate()
+        .fold((0, f64::NEG_INFINITY), |best, (nth, worth)| {
+            if worth > best.1 { (nth, worth) } else { best }
+        })
 }

@@ -25,6 +25,8 @@ pub const PARTS: [(&str, [usize; 2]); 10] = [
 const FOUND_M: f64 = 0.5;
 /// Frames that are drawn together for an interval: a second.
 const BLOCK: usize = 25;
+/// Where the ears are between the neck and the top of the head, as `keypoints::joint_ways` has it.
+const EARS: f64 = 1.0 / 1.8;
 /// The average is over these actors.
 pub const ACTORS: usize = 3;
 
@@ -38,12 +40,12 @@ pub struct Put {
 }
 
 impl Put {
-    /// By the rule of 4D Association: the head is made up of the ears (or another keypoint of the face) and the shoulders.
-    ///
-    /// * `ears`: the middle of the ears, metres.
-    pub fn new(id: u64, joints: &Joints, ears: Option<Point3<f64>>) -> Self {
+    /// By the rule of 4D Association: the bottom of the head is the middle of the shoulders and of the ears, its top 0.125 m along the face
+    /// and 0.145 m up. The ears are [`EARS`] of the way from the neck to the top of the head.
+    pub fn new(id: u64, joints: &Joints) -> Self {
         let middle = |a: usize, b: usize| Some(nalgebra::center(&joints[a]?, &joints[b]?));
         let [shoulders, hips] = [middle(8, 9), middle(2, 3)];
+        let ears = joints[12].zip(joints[13]).map(|(neck, head)| neck + (head - neck) * EARS);
         let mut all = [None; N_TRUE];
         all[..12].copy_from_slice(&joints[..12]);
         all[14] = hips;
@@ -136,7 +138,6 @@ impl Actor {
             let length = (person.joints[*a] - person.joints[*b]).norm();
             let both = error(*a).zip(error(*b));
             let is_right = both.is_some_and(|(a, b)| f64::midpoint(a, b) <= 0.5 * length);
-            if !is_right && std::env::var_os("DUMP").is_some() { println!("WRONG frame {} actor {} {name} {a}-{b} len {length:.2} errs {:?} {:?}", self.parts.len(), person.id, error(*a).map(|e| (e*1e3) as i32), error(*b).map(|e| (e*1e3) as i32)); }
             (*name, f64::from(is_right))
         });
         let right: Vec<(&str, f64)> = right.collect();
@@ -148,6 +149,7 @@ impl Actor {
         self.errors_mm.push(Share::of((0..12).filter_map(error).map(|metres| 1e3 * metres)));
         if let Some(put) = put {
             self.n_found += 1;
+            if self.last_id.is_some_and(|id| id != put.id) { println!("SWITCH actor {} frame {} {:?} -> {}", person.id, self.parts.len(), self.last_id, put.id); }
             self.switches += usize::from(self.last_id.is_some_and(|id| id != put.id));
             self.last_id = Some(put.id);
         }

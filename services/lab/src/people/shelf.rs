@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use keypoints::{BODY_25, Way, joint_ways};
 use geometry::{Camera, Intrinsics, Lens, LensModel, rotation_from_matrix};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3};
 use people::{Detection, Keypoint, View};
@@ -16,10 +17,6 @@ pub const N_TRUE: usize = 15;
 const FIELDS: [[usize; 26]; 2] = [
     [1, 9, 10, 8, 8, 12, 13, 1, 2, 3, 2, 1, 5, 6, 5, 1, 0, 0, 15, 16, 14, 19, 14, 11, 22, 11],
     [8, 10, 11, 9, 12, 13, 14, 2, 3, 4, 17, 5, 6, 7, 18, 0, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24],
-];
-/// The keypoints that are joints of `skeleton::PARSE14`; none is the top of the head.
-const JOINTS: [Option<usize>; 14] = [
-    Some(11), Some(10), Some(9), Some(12), Some(13), Some(14), Some(4), Some(3), Some(2), Some(5), Some(6), Some(7), Some(1), None,
 ];
 /// A person has so many keypoints at least.
 const LEAST_KEYPOINTS: usize = 5;
@@ -59,18 +56,6 @@ pub enum ShelfError {
     },
 }
 
-/// A keypoint of a person in a picture.
-pub type Keypoints = [Option<Keypoint>; N_KEYPOINTS];
-
-/// What a detector found in a view of a frame.
-#[derive(Debug, Clone, Default)]
-pub struct Found {
-    /// The keypoints of each person.
-    pub people: Vec<Keypoints>,
-    /// The people as the tracker takes them.
-    pub view: View,
-}
-
 /// A person who was there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TruePerson {
@@ -86,7 +71,7 @@ pub struct Shelf {
     /// The cameras.
     pub cameras: Vec<Camera>,
     /// What was found, frame by frame, view by view.
-    pub frames: Vec<Vec<Found>>,
+    pub frames: Vec<Vec<View>>,
     /// Who was there, frame by frame.
     pub truth: Vec<Vec<TruePerson>>,
 }
@@ -177,10 +162,13 @@ impl<'a> Numbers<'a> {
     }
 }
 
+/// The candidate of each keypoint that a person has.
+type Group = [Option<usize>; N_KEYPOINTS];
+
 /// The candidates of a keypoint: columns, rows and confidences.
 type Candidates = Vec<[f64; 3]>;
 
-fn detections(path: &Path, camera: &Camera) -> Result<Vec<Found>, ShelfError> {
+fn detections(path: &Path, camera: &Camera) -> Result<Vec<View>, ShelfError> {
     let text = read(path)?;
     let mut numbers = Numbers::new(path, &text);
     let _kind: usize = numbers.next("4, OpenPose's body-25")?;
@@ -204,7 +192,7 @@ fn detections(path: &Path, camera: &Camera) -> Result<Vec<Found>, ShelfError> {
 }
 
 /// Makes people of candidates: the strongest field first, one candidate of a keypoint for each person.
-fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> Found {
+fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> View {
     struct Edge {
         strength: f64,
         ends: [(usize, usize); 2],
@@ -220,7 +208,7 @@ fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> Found {
         }));
     }
     edges.sort_by(|a, b| b.strength.total_cmp(&a.strength));
-    let mut groups: Vec<[Option<usize>; N_KEYPOINTS]> = Vec::new();
+    let mut groups: Vec<Group> = Vec::new();
     for Edge { ends: [a, b], .. } in edges {
         let owner = |(keypoint, candidate): (usize, usize)| {
             groups.iter().position(|group| group[keypoint] == Some(candidate))
@@ -247,40 +235,56 @@ fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> Found {
         }
     }
     groups.retain(|group| group.iter().flatten().count() >= LEAST_KEYPOINTS);
-    found(candidates, &groups)
+    seen(candidates, &groups)
 }
 
-fn found(candidates: &[Candidates], groups: &[[Option<usize>; N_KEYPOINTS]]) -> Found {
+/// The groups as people, and the candidates that are nobody's.
+fn seen(candidates: &[Candidates], groups: &[Group]) -> View {
+    let ways = joint_ways(&BODY_25.map(str::to_owned));
     let sizes: Vec<f64> = groups.iter().map(|group| size(candidates, group)).collect();
-    let usual = sizes.iter().copied().fold(0.0, f64::max);
-    let keypoint = |keypoint: usize, candidate: usize, size: f64| {
-        let [x, y, confidence] = candidates[keypoint][candidate];
-        let sd_px = (SD_SHARE * size / confidence.max(LEAST_CONFIDENCE).sqrt()).max(1.0);
-        (confidence > LEAST_CONFIDENCE).then_some(Keypoint { at_px: [x, y], sd_px, heat: confidence.min(1.0) })
-    };
-    let people: Vec<Keypoints> = groups
-        .iter()
-        .zip(&sizes)
-        .map(|(group, size)| core::array::from_fn(|nth| keypoint(nth, group[nth]?, *size)))
-        .collect();
-    let loose = JOINTS.map(|joint| {
-        let Some(joint) = joint else { return Vec::new() };
-        let is_free = |candidate: &usize| groups.iter().all(|group| group[joint] != Some(*candidate));
-        let free = (0..candidates[joint].len()).filter(is_free);
-        free.filter_map(|candidate| keypoint(joint, candidate, usual)).collect()
-    });
-    let detections = people.iter().map(|person| Detection {
-        joints: JOINTS.map(|joint| person[joint?]),
+    let people = groups.iter().zip(&sizes);
+    let detections = people.map(|(group, size)| Detection {
+        joints: core::array::from_fn(|nth| {
+            let complete = |way: &&Way| way.row.iter().all(|(keypoint, _)| group[*keypoint].is_some());
+            joint(candidates, group, ways[nth].iter().find(complete)?, *size)
+        }),
         colour: None,
     });
-    Found {
-        view: View { detections: detections.collect(), loose: loose.to_vec() },
-        people,
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
+    let loose = ways.iter().map(|ways| {
+        let [Way { row, .. }] = &ways[..] else { return Vec::new() };
+        let [(keypoint, _)] = row[..] else { return Vec::new() };
+        let is_free = |candidate: &usize| groups.iter().all(|group| group[keypoint] != Some(*candidate));
+        let free = (0..candidates[keypoint].len()).filter(is_free);
+        free.filter_map(|candidate| placed(candidates[keypoint][candidate], largest)).collect()
+    });
+    View { detections: detections.collect(), loose: loose.collect() }
+}
+
+/// A candidate with its deviation; `None` if the detector is too little sure of it.
+///
+/// * `size`: of the person in the picture, pixels.
+fn placed([x, y, confidence]: [f64; 3], size: f64) -> Option<Keypoint> {
+    let sd_px = (SD_SHARE * size / confidence.max(LEAST_CONFIDENCE).sqrt()).max(1.0);
+    (confidence > LEAST_CONFIDENCE).then_some(Keypoint { at_px: [x, y], sd_px, heat: confidence.min(1.0) })
+}
+
+/// A joint from the keypoints of a way.
+fn joint(candidates: &[Candidates], group: &Group, way: &Way, size: f64) -> Option<Keypoint> {
+    let mut joint = Keypoint { at_px: [0.0; 2], sd_px: 0.0, heat: 1.0 };
+    for (keypoint, weight) in &way.row {
+        let one = placed(candidates[*keypoint][group[*keypoint]?], size)?;
+        joint.at_px[0] += weight * one.at_px[0];
+        joint.at_px[1] += weight * one.at_px[1];
+        joint.sd_px = joint.sd_px.hypot(weight * one.sd_px);
+        joint.heat = joint.heat.min(one.heat);
     }
+    joint.sd_px = joint.sd_px.hypot(way.spread * size);
+    Some(joint)
 }
 
 /// The longer side of the box around a person, pixels.
-fn size(candidates: &[Candidates], group: &[Option<usize>; N_KEYPOINTS]) -> f64 {
+fn size(candidates: &[Candidates], group: &Group) -> f64 {
     let side = |axis: usize| {
         let each = group.iter().enumerate().filter_map(|(keypoint, it)| Some(candidates[keypoint][(*it)?][axis]));
         let ends = each.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| [low.min(at), high.max(at)]);
