@@ -3,7 +3,7 @@
 use body::{Covariances, Joints};
 
 use crate::cluster::Member;
-use crate::distance::{named, to_person};
+use crate::distance::{LEAST_JOINTS, named, to_person};
 use crate::sight::{Sight, meet};
 use crate::{Frame, N};
 
@@ -70,22 +70,27 @@ pub(crate) fn agree(frame: &Frame, mut members: Vec<Member>, expected: Option<&J
     let mut refused = Vec::new();
     loop {
         let person = coarse(frame, &members);
-        let distance = |member: &Member, joints: &Joints| {
-            let fit = to_person(frame.sights(member.at), joints, frame.as_seen);
-            fit.map(|fit| fit.distance)
-        };
-        let is_placed = person.n_core() >= 4;
+        let is_placed = person.n_core() >= LEAST_JOINTS;
+        let n_common = n_common(frame, &members);
+        let is_disputed = n_common >= LEAST_JOINTS && 2 * person.n_core() < n_common;
         let seen = if is_placed {
             Some(&person.joints)
         } else {
             expected
         };
-        let worst = seen.and_then(|joints| {
-            let each = members.iter().enumerate();
-            let each = each.map(|(nth, member)| (nth, distance(member, joints).unwrap_or(1.0)));
-            each.max_by(|a, b| a.1.total_cmp(&b.1))
-        });
-        match worst.filter(|worst| members.len() >= 2 && (!is_placed || worst.1 > CONTRADICTS_M)) {
+        let distance = |member: &Member| {
+            let fit = to_person(frame.sights(member.at), seen?, frame.as_seen);
+            fit.map(|fit| fit.distance)
+        };
+        let each = members
+            .iter()
+            .map(|member| distance(member).unwrap_or(0.0))
+            .enumerate();
+        let worst = each.max_by(|a, b| a.1.total_cmp(&b.1));
+        let is_one_too_many = |worst: &(usize, f64)| {
+            members.len() >= 2 && (is_disputed || is_placed && worst.1 > CONTRADICTS_M)
+        };
+        match worst.filter(is_one_too_many) {
             Some((nth, _)) => refused.push(members.remove(nth)),
             None => {
                 return Agreed {
@@ -96,4 +101,15 @@ pub(crate) fn agree(frame: &Frame, mut members: Vec<Member>, expected: Option<&J
             }
         }
     }
+}
+
+/// Number of joints, but for the head, that at least two detections show.
+fn n_common(frame: &Frame, members: &[Member]) -> usize {
+    let shows = |joint: usize| {
+        let each = members
+            .iter()
+            .filter(|member| frame.sights(member.at)[named(joint, member.is_exchanged)].is_some());
+        each.count() >= 2
+    };
+    (0..N - 1).filter(|joint| shows(*joint)).count()
 }

@@ -27,6 +27,11 @@ mod hypotheses;
 mod solver;
 mod tree;
 
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+
 use body::{Covariances, Joints};
 use nalgebra::Vector3;
 

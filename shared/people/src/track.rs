@@ -19,6 +19,8 @@ const NEW_VELOCITY: f64 = 0.5;
 const REACH_M: f64 = 0.25;
 const REACH_M_PER_S: f64 = 0.5;
 const LONGEST_S: f64 = 1.0;
+/// A glimpse keeps this share of the velocity, and makes the time since the joints were seen shorter by it.
+const GLIMPSED: f64 = 0.5;
 /// A person is somebody who was seen in this many of the last five frames.
 const FRAMES_OF_BIRTH: u32 = 3;
 const RECENT: u32 = 0b1_1111;
@@ -114,24 +116,27 @@ impl Track {
         self.state = State::Tracked;
     }
 
-    /// Takes the detection of the only view that sees the person: the joints move to its rays.
-    pub(crate) fn glimpse(&mut self, time_s: f64, frame: &Frame, member: Member) {
+    /// Takes detections that place too few joints, as that of the only view that sees the person: the joints move to their rays.
+    pub(crate) fn glimpse(&mut self, time_s: f64, frame: &Frame, members: Vec<Member>) {
         let expected = self.expected(time_s);
-        let sights = frame.sights(member.at);
         let (mut sum, mut n) = (Vector3::zeros(), 0.0);
-        for joint in 0..N {
-            let sight = sights[named(joint, member.is_exchanged)];
-            if let (Some(sight), Some(point)) = (sight, expected[joint]) {
-                sum += sight.nearest(&point) - point;
-                n += 1.0;
+        for member in &members {
+            let sights = frame.sights(member.at);
+            for joint in 0..N {
+                let sight = sights[named(joint, member.is_exchanged)];
+                if let (Some(sight), Some(point)) = (sight, expected[joint]) {
+                    sum += sight.nearest(&point) - point;
+                    n += 1.0;
+                }
             }
         }
         let shift = if n > 0.0 { sum / n } else { sum };
         self.coarse.joints = expected.map(|joint| joint.map(|point| point + shift));
-        self.velocity *= 0.5;
-        self.placed_s = time_s.min(self.placed_s + 0.5 * (time_s - self.placed_s));
+        self.velocity *= GLIMPSED;
+        self.placed_s += GLIMPSED * (time_s - self.placed_s);
         self.seen_s = time_s;
-        self.members = vec![member];
+        self.history |= u32::from(members.len() >= 2);
+        self.members = members;
         self.state = State::Unsure;
     }
 

@@ -225,8 +225,7 @@ impl Tracker {
             if n >= self.settings.min_views.max(2) && agreed.person.n_core() >= LEAST_SEEN {
                 track.place(time_s, frame, agreed.members, agreed.person);
             } else if n >= 1 && track.id.is_some() {
-                track.glimpse(time_s, frame, agreed.members[0]);
-                give_back(free, &agreed.members[1..]);
+                track.glimpse(time_s, frame, agreed.members);
             } else {
                 give_back(free, &agreed.members);
             }

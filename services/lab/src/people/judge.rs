@@ -149,7 +149,6 @@ impl Actor {
         self.errors_mm.push(Share::of((0..12).filter_map(error).map(|metres| 1e3 * metres)));
         if let Some(put) = put {
             self.n_found += 1;
-            if self.last_id.is_some_and(|id| id != put.id) { println!("SWITCH actor {} frame {} {:?} -> {}", person.id, self.parts.len(), self.last_id, put.id); }
             self.switches += usize::from(self.last_id.is_some_and(|id| id != put.id));
             self.last_id = Some(put.id);
         }
