@@ -1,6 +1,6 @@
 //! People from frame to frame, by ids that last.
 
-use body::Joints;
+use body::{Covariances, Joints};
 use geometry::Camera;
 use nalgebra::Vector3;
 
@@ -60,6 +60,8 @@ pub struct Remembered {
     pub id: u64,
     /// The joints, metres in the world.
     pub joints: Joints,
+    /// Their covariances, square metres.
+    pub covariances: Covariances,
     /// Velocity of the trunk, metres a second.
     pub velocity: Vector3<f64>,
     /// When the joints were seen, seconds.
@@ -425,6 +427,7 @@ fn remembered(track: &Track) -> Option<Remembered> {
     Some(Remembered {
         id: track.id?,
         joints: track.coarse.joints,
+        covariances: track.coarse.covariances,
         velocity: track.velocity,
         seen_s: track.seen_s,
         bones: track.bones,
@@ -436,6 +439,7 @@ fn revived(person: Remembered) -> Track {
     let mut track = Track::new(person.seen_s);
     track.id = Some(person.id);
     track.coarse.joints = person.joints;
+    track.coarse.covariances = person.covariances;
     track.velocity = person.velocity;
     track.bones = person.bones;
     track.colour = person.colour;
