@@ -3,7 +3,7 @@
 use crate::Frame;
 use crate::distance::between;
 
-/// Detections whose rays pass each other farther away, on the mean, are not one person: metres.
+/// Detections whose rays pass each other farther away, on the mean, are not one person: metres beyond the deviation that is stated.
 const GATE_M: f64 = 0.12;
 
 /// A detection of a view.
@@ -44,9 +44,10 @@ pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
             }
             let fit = between(frame.sights(free[a]), frame.sights(free[b]), frame.as_seen);
             let Some(fit) = fit else { continue };
-            distances[a * n + b] = Some(fit.distance);
-            distances[b * n + a] = Some(fit.distance);
-            if fit.distance < GATE_M {
+            let beyond = fit.distance - fit.unknown;
+            distances[a * n + b] = Some(beyond);
+            distances[b * n + a] = Some(beyond);
+            if beyond < GATE_M {
                 pairs.push(Pair {
                     distance: fit.distance,
                     a,

@@ -16,21 +16,32 @@ const TRIMMED: usize = 4;
 pub(crate) struct Fit {
     /// Trimmed mean of the joints' distances, each weighted by its heat over its variance; metres.
     pub(crate) distance: f64,
+    /// Standard deviation of these distances by what the detector states, metres.
+    pub(crate) unknown: f64,
     /// Whether it fits with left and right exchanged.
     pub(crate) is_exchanged: bool,
 }
 
-/// A joint's distance and its weight.
+/// Means over the joints.
+#[derive(Debug, Clone, Copy)]
+struct Mean {
+    distance: f64,
+    unknown: f64,
+}
+
+/// A joint's distance, its deviation and its weight.
 #[derive(Debug, Clone, Copy)]
 struct Term {
     distance: f64,
+    unknown: f64,
     weight: f64,
 }
 
 /// The trimmed mean of the distances; `None` of too few.
-fn trimmed(terms: impl Iterator<Item = Option<Term>>) -> Option<f64> {
+fn trimmed(terms: impl Iterator<Item = Option<Term>>) -> Option<Mean> {
     let mut kept = [Term {
         distance: 0.0,
+        unknown: 0.0,
         weight: 0.0,
     }; N];
     let mut n = 0;
@@ -45,16 +56,23 @@ fn trimmed(terms: impl Iterator<Item = Option<Term>>) -> Option<f64> {
     kept.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     let kept = &kept[..n - n / TRIMMED];
     let weight: f64 = kept.iter().map(|term| term.weight).sum();
-    let sum: f64 = kept.iter().map(|term| term.weight * term.distance).sum();
-    Some(sum / weight)
+    let mean = |of: fn(&Term) -> f64| {
+        let sum: f64 = kept.iter().map(|term| term.weight * of(term)).sum();
+        sum / weight
+    };
+    Some(Mean {
+        distance: mean(|term| term.distance),
+        unknown: mean(|term| term.unknown),
+    })
 }
 
 /// The better of the two ways to call the sides; the exchanged one only where views call them as they see them.
-fn better(as_seen: bool, distance: impl Fn(bool) -> Option<f64>) -> Option<Fit> {
+fn better(as_seen: bool, mean: impl Fn(bool) -> Option<Mean>) -> Option<Fit> {
     let fit = |is_exchanged: bool| {
-        let distance = distance(is_exchanged)?;
+        let mean = mean(is_exchanged)?;
         Some(Fit {
-            distance,
+            distance: mean.distance,
+            unknown: mean.unknown,
             is_exchanged,
         })
     };
@@ -79,7 +97,12 @@ pub(crate) fn to_person(sights: &Sights, joints: &Joints, as_seen: bool) -> Opti
             let point: Point3<f64> = joints[joint]?;
             let distance = sight.distance(&point);
             let weight = sight.heat / sight.sd(&point).powi(2);
-            distance.is_finite().then_some(Term { distance, weight })
+            let unknown = sight.stated(&point);
+            distance.is_finite().then_some(Term {
+                distance,
+                unknown,
+                weight,
+            })
         }))
     })
 }
@@ -97,6 +120,7 @@ pub(crate) fn between(a: &Sights, b: &Sights, as_seen: bool) -> Option<Fit> {
             let weight = (a.heat * b.heat).sqrt() / variance;
             Some(Term {
                 distance: at.gap,
+                unknown: a.stated(&at.point).hypot(b.stated(&at.point)),
                 weight,
             })
         }))

@@ -48,9 +48,14 @@ impl Sight {
         (offset.norm_squared() - along * along).max(0.0).sqrt()
     }
 
-    /// Standard deviation of the ray at the distance of a point, metres.
+    /// Standard deviation of the ray at the distance of a point, by what the detector states; metres.
+    pub(crate) fn stated(&self, point: &Point3<f64>) -> f64 {
+        self.spread * (point - self.origin).norm()
+    }
+
+    /// The same, but never less than joints are off where the picture is sharp.
     pub(crate) fn sd(&self, point: &Point3<f64>) -> f64 {
-        FLOOR_M.hypot(self.spread * (point - self.origin).norm())
+        FLOOR_M.hypot(self.stated(point))
     }
 
     /// How far a point is from the ray, in standard deviations.
