@@ -45,6 +45,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "messages",
             "metrics",
             "motion",
+            "people",
             "recording",
             "runfiles",
             "scene",

@@ -24,6 +24,7 @@ mod people;
 mod shipped;
 mod single_view;
 mod tiles;
+mod together;
 mod tracked;
 
 use std::path::{Path, PathBuf};

@@ -19,6 +19,7 @@ pub mod orientation;
 pub mod person;
 pub mod posetraining;
 pub mod quality;
+pub mod several;
 pub mod smoothed;
 pub mod synth;
 

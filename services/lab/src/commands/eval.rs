@@ -4,6 +4,7 @@ mod evidence;
 mod height;
 mod pictures;
 mod report;
+mod several;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -52,6 +53,10 @@ intervals; --only and --without choose among them. They and sequences are not ju
 OUT holds report.html, report.json, report.tex, and poses/ with what was found in every frame. With \
 --resume frames that are there are not solved again; other settings are refused. --json prints the report's \
 numbers.
+
+A folder of several people in the layout of Shelf (calibration.json, detection/, gt.txt) is judged for who is who: what the detector \
+found is made people, followed and solved, and compared by PCP3D as 4D Association does, its rule for the head included. --views \
+chooses cameras. OUT then holds people.json.
 
 --network-evidence FILE [--detector FILE] judges the keypoints of a network (docs/networks.md): by plain \
 triangulation, with cameras left out, and in space over its maps, without and with the bones of a body. \
@@ -135,6 +140,9 @@ pub(crate) struct Arguments {
     /// The part of each sequence to use: 0.8-1 is the last fifth.
     #[arg(long, value_name = "FROM-TO", value_parser = share)]
     share: Option<[f64; 2]>,
+    /// Several people: the views to use, from 0, separated by commas; all if not given.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    views: Vec<usize>,
     /// UMPM: compare every frame with the pose of the frame before, as the released tools do.
     #[arg(long)]
     umpm_late: bool,
@@ -180,6 +188,11 @@ fn share(text: &str) -> Result<[f64; 2], String> {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    if let [folder] = &arguments.sequences[..]
+        && lab::several::is_one(folder)
+    {
+        return several::run(arguments, folder);
+    }
     if are_pictures(arguments)? {
         return pictures::run(arguments, globals, &stop);
     }

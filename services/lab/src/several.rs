@@ -1,0 +1,52 @@
+//! Several people: who is who and where, from what a detector found, judged by the truth.
+
+mod judge;
+mod report;
+mod shelf;
+
+use std::time::{Duration, Instant};
+
+use people::{Person, Settings, Solver, Tracker};
+
+pub use judge::{Put, Score};
+pub use report::{ActorReport, Measured, Report};
+pub use shelf::{Shelf, ShelfError, TruePerson, is_one};
+
+/// Frames a second of the set.
+const RATE_HZ: f64 = 25.0;
+/// Fewer views do not give a person a place.
+const LEAST_VIEWS: usize = 2;
+
+/// A run over a set.
+#[derive(Debug, Clone, Default)]
+pub struct Run {
+    /// The score.
+    pub score: Score,
+    /// Time of the association alone, frame by frame.
+    pub association: Vec<Duration>,
+}
+
+/// Follows and solves the people of a set, frame after frame, with nothing but the frames before.
+pub fn run(set: &Shelf) -> Run {
+    let settings = Settings {
+        max: 8,
+        ..Settings::default()
+    };
+    let mut tracker = Tracker::new(set.cameras.clone(), settings);
+    let mut solver = Solver::new(set.cameras.clone());
+    let mut run = Run::default();
+    for (nth, (frame, truth)) in set.frames.iter().zip(&set.truth).enumerate() {
+        let time_s = nth as f64 / RATE_HZ;
+        let start = Instant::now();
+        let mut people = tracker.step(time_s, frame);
+        run.association.push(start.elapsed());
+        let n_views = |person: &Person| person.detections.iter().flatten().count();
+        people.retain(|person| n_views(person) >= LEAST_VIEWS);
+        let solved = solver.step(time_s, &people, frame);
+        let put = solved
+            .iter()
+            .map(|person| Put::new(person.id, &person.joints));
+        run.score.add(truth, &put.collect::<Vec<Put>>());
+    }
+    run
+}

@@ -1,0 +1,220 @@
+//! PCP3D of several people, by the protocol of Shelf.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use body::Joints;
+use nalgebra::{Point3, Vector3};
+use score::Share;
+
+use super::shelf::{N_TRUE, TruePerson};
+
+/// The parts that are judged, by the joints at their ends.
+const PARTS: [(&str, [usize; 2]); 10] = [
+    ("upper arms", [9, 10]),
+    ("upper arms", [8, 7]),
+    ("lower arms", [10, 11]),
+    ("lower arms", [7, 6]),
+    ("upper legs", [3, 4]),
+    ("upper legs", [2, 1]),
+    ("lower legs", [4, 5]),
+    ("lower legs", [1, 0]),
+    ("head", [12, 13]),
+    ("torso", [12, 14]),
+];
+/// A truth is found by nothing that is farther away, mean over the joints, metres.
+const FOUND_M: f64 = 0.5;
+/// Where the ears are between the neck and the top of the head, as `keypoints::joint_ways` has it.
+const EARS: f64 = 1.0 / 1.8;
+/// The average is over the first three actors.
+pub(super) const ACTORS: usize = 3;
+
+/// A person as it was put out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Put {
+    /// Identity.
+    pub id: u64,
+    /// The joints of the truth, where they were found.
+    pub joints: [Option<Point3<f64>>; N_TRUE],
+}
+
+impl Put {
+    /// By the rule of 4D Association: the bottom of the head is the middle of the shoulders and of the ears, its top 0.125 m along the face
+    /// and 0.145 m up. The ears are [`EARS`] of the way from the neck to the top of the head.
+    pub fn new(id: u64, joints: &Joints) -> Self {
+        let middle = |a: usize, b: usize| Some(nalgebra::center(&joints[a]?, &joints[b]?));
+        let [shoulders, hips] = [middle(8, 9), middle(2, 3)];
+        let ears = joints[12]
+            .zip(joints[13])
+            .map(|(neck, head)| neck + (head - neck) * EARS);
+        let mut all = [None; N_TRUE];
+        all[..12].copy_from_slice(&joints[..12]);
+        all[14] = hips;
+        all[12] = shoulders
+            .zip(ears)
+            .map(|(shoulders, ears)| nalgebra::center(&shoulders, &ears));
+        let face = || {
+            let across = joints[8]? - joints[9]?;
+            Some((shoulders? - hips?).cross(&across).normalize())
+        };
+        let face = face().unwrap_or_else(Vector3::zeros);
+        all[13] = all[12].map(|bottom| bottom + face * 0.125 + Vector3::new(0.0, 0.0, 0.145));
+        Self { id, joints: all }
+    }
+}
+
+/// The parts of a person that are right in a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartsOfFrame {
+    /// Who.
+    pub actor: usize,
+    /// How many, of how many.
+    pub right: Share,
+}
+
+/// The score of a person.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Actor {
+    /// Parts that are right, in each frame in which the person is there.
+    pub parts: Vec<Share>,
+    /// In all frames, by the name of the part.
+    pub by_part: BTreeMap<&'static str, Share>,
+    /// Distances of the twelve joints of the limbs, metres.
+    pub errors_m: Vec<Share>,
+    /// Frames in which the person was found.
+    pub n_found: usize,
+    /// How often the id changed.
+    pub switches: usize,
+    last_id: Option<u64>,
+}
+
+/// The score of a run.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Score {
+    /// The people who were there, by their ids in the truth.
+    pub actors: BTreeMap<usize, Actor>,
+    /// Parts that are right, frame by frame.
+    pub frames: Vec<Vec<PartsOfFrame>>,
+    /// All ids that were put out.
+    pub ids: BTreeSet<u64>,
+    /// People put out, in all frames together.
+    pub n_put: usize,
+}
+
+impl Score {
+    /// Adds a frame: for every person who was there the nearest one that was put out, the closest pairs first.
+    pub fn add(&mut self, truth: &[TruePerson], put: &[Put]) {
+        self.ids.extend(put.iter().map(|person| person.id));
+        self.n_put += put.len();
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        for (a, person) in truth.iter().enumerate() {
+            let near = put.iter().enumerate();
+            let near = near.filter_map(|(b, put)| Some((put.distance(person)?, a, b)));
+            pairs.extend(near.filter(|pair| pair.0 < FOUND_M));
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut found = vec![None; truth.len()];
+        for (_, a, b) in pairs {
+            if found[a].is_none() && !found.contains(&Some(b)) {
+                found[a] = Some(b);
+            }
+        }
+        let each = truth.iter().zip(found).map(|(person, found)| {
+            let actor = self.actors.entry(person.id).or_default();
+            let right = actor.add(person, found.map(|nth| &put[nth]));
+            PartsOfFrame {
+                actor: person.id,
+                right,
+            }
+        });
+        self.frames.push(each.collect());
+    }
+}
+
+impl Put {
+    /// Mean distance of the joints, metres; `None` of fewer than four.
+    fn distance(&self, person: &TruePerson) -> Option<f64> {
+        let each = person.joints.iter().zip(&self.joints);
+        let each = each.filter_map(|(a, b)| Some((a - (*b)?).norm()));
+        let share = Share::of(each);
+        (share.n >= 4.0).then(|| share.sum / share.n)
+    }
+}
+
+impl Actor {
+    /// Adds a frame; returns the parts that are right.
+    fn add(&mut self, person: &TruePerson, put: Option<&Put>) -> Share {
+        let error = |joint: usize| {
+            let point = put.and_then(|put| put.joints[joint])?;
+            Some((point - person.joints[joint]).norm())
+        };
+        let mut right = Share::default();
+        for (name, [a, b]) in PARTS {
+            let length = (person.joints[a] - person.joints[b]).norm();
+            let both = error(a).zip(error(b));
+            let is_right = both.is_some_and(|(a, b)| f64::midpoint(a, b) <= 0.5 * length);
+            for share in [&mut right, self.by_part.entry(name).or_default()] {
+                share.sum += f64::from(is_right);
+                share.n += 1.0;
+            }
+        }
+        self.parts.push(right);
+        self.errors_m.push(Share::of((0..12).filter_map(error)));
+        if let Some(put) = put {
+            self.n_found += 1;
+            self.switches += usize::from(self.last_id.is_some_and(|id| id != put.id));
+            self.last_id = Some(put.id);
+        }
+        right
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A person of 1.7 m, somewhere.
+    fn person(id: usize, x: f64) -> TruePerson {
+        let joint = |nth: usize| Point3::new(x + 0.1 * (nth % 2) as f64, 0.0, 0.12 * nth as f64);
+        TruePerson {
+            id,
+            joints: core::array::from_fn(joint),
+        }
+    }
+
+    fn put(id: u64, person: &TruePerson, off_m: f64) -> Put {
+        let joints = person
+            .joints
+            .map(|joint| Some(joint + Vector3::y() * off_m));
+        Put { id, joints }
+    }
+
+    #[test]
+    fn a_part_is_right_up_to_half_its_length_on_the_mean_of_both_ends() {
+        let truth = [person(0, 0.0)];
+        let mut score = Score::default();
+        for off_m in [0.05, 0.4] {
+            score.add(&truth, &[put(1, &truth[0], off_m)]);
+        }
+        let parts = &score.actors[&0].parts;
+        assert_eq!((parts[0].sum, parts[0].n), (10.0, 10.0));
+        assert_eq!(parts[1].sum, 0.0);
+    }
+
+    #[test]
+    fn people_are_the_nearest_and_a_change_of_the_id_is_counted() {
+        let truth = [person(0, 0.0), person(1, 1.0)];
+        let both = |ids: [u64; 2]| vec![put(ids[1], &truth[1], 0.01), put(ids[0], &truth[0], 0.02)];
+        let mut score = Score::default();
+        for ids in [[1, 2], [1, 2], [2, 1], [2, 3]] {
+            score.add(&truth, &both(ids));
+        }
+        let switches = [0, 1].map(|actor| score.actors[&actor].switches);
+        assert_eq!((switches, score.ids.len(), score.n_put), ([1, 2], 3, 8));
+        score.add(&truth, &[]);
+        let actor = &score.actors[&0];
+        assert_eq!(
+            (actor.n_found, actor.parts.len(), actor.parts[4].sum),
+            (4, 5, 0.0)
+        );
+    }
+}

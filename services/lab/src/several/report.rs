@@ -1,0 +1,140 @@
+//! What came of a run, as numbers.
+
+use std::collections::BTreeMap;
+
+use score::{Bootstrap, Share};
+use serde::Serialize;
+use statistics::Sorted;
+
+use super::Run;
+use super::judge::{ACTORS, Actor, PartsOfFrame};
+
+/// Frames that are drawn together for an interval: a second.
+const BLOCK: usize = 25;
+
+/// A number with its 95 % interval, by bootstrap over blocks of 25 frames.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Measured {
+    /// The number.
+    pub value: f64,
+    /// The lower and the upper end.
+    pub interval: [f64; 2],
+}
+
+/// The score of a person.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ActorReport {
+    /// The person, from 1 as in publications.
+    pub actor: usize,
+    /// Frames in which the person is there, and was found.
+    pub frames: usize,
+    /// See [`frames`](Self::frames).
+    pub found: usize,
+    /// Parts that are right, percent.
+    pub pcp3d: Option<Measured>,
+    /// The same for each part.
+    pub parts: BTreeMap<&'static str, f64>,
+    /// Mean distance of the twelve joints of the limbs, millimetres.
+    pub mpjpe_mm: Option<Measured>,
+    /// How often the id changed.
+    pub switches: usize,
+}
+
+/// The score of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// The views that were used, from 0.
+    pub views: Vec<usize>,
+    /// Frames.
+    pub frames: usize,
+    /// Mean PCP3D of the first three actors, percent.
+    pub mean_pcp3d: Option<Measured>,
+    /// The people who were there.
+    pub actors: Vec<ActorReport>,
+    /// How often an id changed.
+    pub switches: usize,
+    /// Number of ids that were given.
+    pub ids: usize,
+    /// People put out in each frame, mean.
+    pub put_out: f64,
+    /// Time of the association alone, milliseconds a frame: median and 99th percentile.
+    pub association_ms: [f64; 2],
+}
+
+impl Report {
+    /// Sums up a run.
+    ///
+    /// * `views`: those of the set that were used.
+    pub fn new(run: &Run, views: &[usize]) -> Self {
+        let score = &run.score;
+        let times: Vec<f64> = run
+            .association
+            .iter()
+            .map(|time| 1e3 * time.as_secs_f64())
+            .collect();
+        let times = Sorted::new(times);
+        let time = |share: f64| times.nearest_rank(share).unwrap_or(0.0);
+        let actors: Vec<ActorReport> = score
+            .actors
+            .iter()
+            .map(|(id, actor)| of_actor(*id, actor))
+            .collect();
+        Self {
+            views: views.to_vec(),
+            frames: score.frames.len(),
+            mean_pcp3d: mean(&score.frames),
+            switches: actors.iter().map(|actor| actor.switches).sum(),
+            actors,
+            ids: score.ids.len(),
+            put_out: score.n_put as f64 / score.frames.len().max(1) as f64,
+            association_ms: [time(0.5), time(0.99)],
+        }
+    }
+}
+
+fn of_actor(id: usize, actor: &Actor) -> ActorReport {
+    let parts = actor
+        .by_part
+        .iter()
+        .map(|(name, share)| (*name, 100.0 * share.sum / share.n.max(1.0)));
+    ActorReport {
+        actor: id + 1,
+        frames: actor.parts.len(),
+        found: actor.n_found,
+        pcp3d: measured(&actor.parts, 100.0),
+        parts: parts.collect(),
+        mpjpe_mm: measured(&actor.errors_m, 1e3),
+        switches: actor.switches,
+    }
+}
+
+fn measured(frames: &[Share], scale: f64) -> Option<Measured> {
+    let bootstrap = Bootstrap {
+        block: BLOCK,
+        ..Bootstrap::default()
+    };
+    Some(Measured {
+        value: scale * Share::mean(frames)?,
+        interval: bootstrap.interval(frames)?.map(|end| scale * end),
+    })
+}
+
+/// Mean of the percentages of the first actors; `None` if one of them is never there.
+fn mean(frames: &[Vec<PartsOfFrame>]) -> Option<Measured> {
+    let of_parts = |parts: &[PartsOfFrame]| {
+        let of_actor = |id: usize| {
+            let own = parts
+                .iter()
+                .filter(|part| part.actor == id)
+                .map(|part| part.right);
+            Share::mean(&own.collect::<Vec<Share>>())
+        };
+        let each: Option<Vec<f64>> = (0..ACTORS).map(of_actor).collect();
+        Some(100.0 * each?.iter().sum::<f64>() / ACTORS as f64)
+    };
+    let blocks: Vec<Vec<PartsOfFrame>> = frames.chunks(BLOCK).map(<[_]>::concat).collect();
+    Some(Measured {
+        value: of_parts(&blocks.concat())?,
+        interval: Bootstrap::default().interval_of(&blocks, of_parts)?,
+    })
+}

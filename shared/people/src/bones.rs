@@ -1,0 +1,42 @@
+//! How long a person's bones are, to know the person again.
+
+use body::{BONES, Joints, Kind};
+
+/// A length counts as the mean of so many frames at most.
+const MOST_FRAMES: f64 = 100.0;
+/// Bodies with fewer kinds of bones in common cannot be compared.
+const LEAST_KINDS: usize = 6;
+
+/// Mean lengths of a person's bones, metres; both sides together.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Bones {
+    /// Mean length of each kind of bone, in the order of `body::Kind::ALL`; 0 where none was seen.
+    pub mean_m: [f64; Kind::ALL.len()],
+    /// Number of frames of each.
+    pub n: [f64; Kind::ALL.len()],
+}
+
+impl Bones {
+    /// Adds a frame.
+    pub(crate) fn add(&mut self, joints: &Joints) {
+        for (nth, kind) in Kind::ALL.iter().enumerate() {
+            let of_kind = BONES.iter().filter(|bone| bone.kind == *kind);
+            for length in of_kind.filter_map(|bone| bone.length(joints)) {
+                self.n[nth] = (self.n[nth] + 1.0).min(MOST_FRAMES);
+                self.mean_m[nth] += (length - self.mean_m[nth]) / self.n[nth];
+            }
+        }
+    }
+
+    /// Mean difference of the logarithms of the lengths; `None` if too few can be compared.
+    pub(crate) fn difference(&self, other: &Self) -> Option<f64> {
+        let (mut sum, mut n) = (0.0, 0);
+        for nth in 0..Kind::ALL.len() {
+            if self.n[nth] > 0.0 && other.n[nth] > 0.0 {
+                sum += (self.mean_m[nth] / other.mean_m[nth]).ln().abs();
+                n += 1;
+            }
+        }
+        (n >= LEAST_KINDS).then(|| sum / n as f64)
+    }
+}

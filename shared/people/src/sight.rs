@@ -1,0 +1,205 @@
+//! What a view says of one joint: a ray, and how far the joint may be from it.
+
+use geometry::Camera;
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
+
+use crate::{Detection, Keypoint, N};
+
+/// The joints of a view are off by this much in space even where the picture is sharp: standard deviation, metres.
+const FLOOR_M: f64 = 0.03;
+/// Rays with a smaller sine of the angle between them say nothing about how far away the joint is: 3 degrees.
+const LEAST_SINE: f64 = 0.05;
+
+/// A joint as a view sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sight {
+    pub(crate) origin: Point3<f64>,
+    /// Of length 1.
+    pub(crate) direction: Vector3<f64>,
+    /// Standard deviation across the ray, metres for every metre of distance.
+    pub(crate) spread: f64,
+    /// How sure the detector is, 0 to 1.
+    pub(crate) heat: f64,
+}
+
+impl Sight {
+    /// Of a keypoint; `None` where the lens has no ray.
+    pub(crate) fn new(camera: &Camera, keypoint: &Keypoint) -> Option<Self> {
+        let usable = keypoint.sd_px.is_finite() && keypoint.sd_px > 0.0 && keypoint.heat > 0.0;
+        let ray = camera
+            .ray(&Point2::from(keypoint.at_px))
+            .filter(|_| usable)?;
+        let focal = (camera.intrinsics.fx * camera.intrinsics.fy).sqrt();
+        Some(Self {
+            origin: ray.origin,
+            direction: ray.direction.into_inner(),
+            spread: keypoint.sd_px / focal,
+            heat: keypoint.heat.min(1.0),
+        })
+    }
+
+    /// Distance of a point from the ray, metres; infinite behind the camera.
+    pub(crate) fn distance(&self, point: &Point3<f64>) -> f64 {
+        let offset = point - self.origin;
+        let along = offset.dot(&self.direction);
+        if along <= 0.0 {
+            return f64::INFINITY;
+        }
+        (offset.norm_squared() - along * along).max(0.0).sqrt()
+    }
+
+    /// Standard deviation of the ray at the distance of a point, by what the detector states; metres.
+    pub(crate) fn stated(&self, point: &Point3<f64>) -> f64 {
+        self.spread * (point - self.origin).norm()
+    }
+
+    /// The same, but never less than joints are off where the picture is sharp.
+    pub(crate) fn sd(&self, point: &Point3<f64>) -> f64 {
+        FLOOR_M.hypot(self.stated(point))
+    }
+
+    /// How far a point is from the ray, in standard deviations.
+    pub(crate) fn deviations(&self, point: &Point3<f64>) -> f64 {
+        self.distance(point) / self.sd(point)
+    }
+
+    /// The point of the ray that is nearest to a point.
+    pub(crate) fn nearest(&self, point: &Point3<f64>) -> Point3<f64> {
+        let along = (point - self.origin).dot(&self.direction);
+        self.origin + self.direction * along.max(0.0)
+    }
+
+    /// The rows of the normal equations for the joint: inverse covariance across the ray.
+    pub(crate) fn information(&self, point: &Point3<f64>) -> Matrix3<f64> {
+        let across = Matrix3::identity() - self.direction * self.direction.transpose();
+        across / self.sd(point).powi(2)
+    }
+}
+
+/// The joints of a detection as a view sees them.
+pub(crate) type Sights = [Option<Sight>; N];
+
+/// The joints of a detection as rays.
+pub(crate) fn sights(camera: &Camera, detection: &Detection) -> Sights {
+    core::array::from_fn(|joint| Sight::new(camera, detection.joints[joint].as_ref()?))
+}
+
+/// Where two rays pass each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Passing {
+    /// The middle between the two.
+    pub(crate) point: Point3<f64>,
+    /// Distance of the rays, metres.
+    pub(crate) gap: f64,
+}
+
+/// Where two rays pass each other; `None` if they are parallel, or pass behind a camera.
+pub(crate) fn passing(a: &Sight, b: &Sight) -> Option<Passing> {
+    let between = b.origin - a.origin;
+    let cosine = a.direction.dot(&b.direction);
+    let sine_squared = 1.0 - cosine * cosine;
+    if sine_squared < LEAST_SINE * LEAST_SINE {
+        return None;
+    }
+    let (on_a, on_b) = (between.dot(&a.direction), between.dot(&b.direction));
+    let along_a = (on_a - cosine * on_b) / sine_squared;
+    let along_b = (cosine * on_a - on_b) / sine_squared;
+    if along_a <= 0.0 || along_b <= 0.0 {
+        return None;
+    }
+    let ends = [
+        a.origin + a.direction * along_a,
+        b.origin + b.direction * along_b,
+    ];
+    Some(Passing {
+        point: nalgebra::center(&ends[0], &ends[1]),
+        gap: (ends[0] - ends[1]).norm(),
+    })
+}
+
+/// A joint in space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Met {
+    pub(crate) point: Point3<f64>,
+    pub(crate) covariance: Matrix3<f64>,
+    /// Number of rays that agree.
+    pub(crate) n: usize,
+}
+
+/// Rays farther from the joint than this many standard deviations do not count.
+const OUTLYING: f64 = 3.0;
+
+/// The joint on which most of the rays agree, each weighted by its deviation and heat.
+///
+/// Every two rays propose a place; the place that the others support most is moved to where the rays that agree with it have the least
+/// squared distances.
+///
+/// * `sights`: one for each view.
+/// * Returns `None` if no two rays agree.
+pub(crate) fn meet(sights: &[Sight]) -> Option<Met> {
+    let mut best: Option<(f64, Point3<f64>)> = None;
+    for (nth, a) in sights.iter().enumerate() {
+        for b in &sights[nth + 1..] {
+            let Some(it) = passing(a, b) else { continue };
+            let support = |sight: &Sight| sight.heat * agreement(sight.deviations(&it.point));
+            let score: f64 = sights.iter().map(support).sum();
+            if best.is_none_or(|best| score > best.0) {
+                best = Some((score, it.point));
+            }
+        }
+    }
+    let start = best?.1;
+    let near: Vec<Sight> = sights
+        .iter()
+        .filter(|sight| sight.deviations(&start) < OUTLYING)
+        .copied()
+        .collect();
+    if near.len() < 2 {
+        return None;
+    }
+    let met = settle(&near, &start, None)?;
+    Some(Met {
+        n: near.len(),
+        ..met
+    })
+}
+
+/// How far a place at so many standard deviations is supported, 0 to 1.
+pub(crate) fn agreement(deviations: f64) -> f64 {
+    (-0.5 * deviations * deviations).exp()
+}
+
+/// What is known of a joint before it is looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Prior {
+    pub(crate) point: Point3<f64>,
+    /// Standard deviation, metres.
+    pub(crate) sd: f64,
+}
+
+/// The place of the least squared distances from rays, weighted by their heats; and from a prior.
+pub(crate) fn settle(sights: &[Sight], start: &Point3<f64>, prior: Option<Prior>) -> Option<Met> {
+    let (mut normal, mut target) = (Matrix3::zeros(), Vector3::zeros());
+    for sight in sights {
+        let information = sight.information(start) * sight.heat;
+        normal += information;
+        target += information * (sight.origin - start);
+    }
+    if let Some(prior) = prior {
+        let information = 1.0 / (prior.sd * prior.sd);
+        normal += Matrix3::from_diagonal_element(information);
+        target += (prior.point - start) * information;
+    }
+    let factor = normal.cholesky()?;
+    let point = start + factor.solve(&target);
+    let covariance = factor.inverse();
+    let is_finite = point
+        .iter()
+        .chain(covariance.iter())
+        .all(|entry| entry.is_finite());
+    is_finite.then_some(Met {
+        point,
+        covariance,
+        n: sights.len(),
+    })
+}

@@ -1,0 +1,304 @@
+//! Where the joints of known people are, by all that the views saw.
+
+use std::collections::BTreeMap;
+
+use body::{Covariances, Joints};
+use geometry::Camera;
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::distance::named;
+use crate::hypotheses::{Candidate, Hypothesis, hypotheses};
+use crate::sight::{Prior, Sight, Sights, settle, sights};
+use crate::tree::{Choice, Expectations, choose};
+use crate::{N, Person, View};
+
+/// How likely a place in a picture is a person's joint that the detector gave to somebody else, or to nobody.
+const TRUST_OTHERS: f64 = 0.3;
+const TRUST_LOOSE: f64 = 0.6;
+/// A joint is expected where it goes; how well that is known, metres, and how much less for every second, metres a second.
+const EXPECTED_SD_M: f64 = 0.04;
+const EXPECTED_SD_M_PER_S: f64 = 1.5;
+/// Share of a new velocity in the kept one, and of the kept one in what is expected.
+const NEW_VELOCITY: f64 = 0.5;
+const DAMPING: f64 = 0.5;
+/// A joint that no view sees is given for so long where it is expected, seconds.
+const CARRIED_S: f64 = 1.0;
+/// A place costs this much for every half squared standard deviation from where the joint is expected, and at most so much.
+const MOVED: f64 = 0.25;
+const MOST_OF_MOVED: f64 = 0.5;
+/// Rays farther from the joint than this many standard deviations do not count.
+const OUTLYING: f64 = 3.0;
+/// The stature of somebody who does not show it, metres.
+const ANY_STATURE_M: f64 = 1.7;
+
+/// The joints of a person.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solved {
+    /// The person's identity.
+    pub id: u64,
+    /// The joints, metres in the world.
+    pub joints: Joints,
+    /// Their covariances, square metres.
+    pub covariances: Covariances,
+    /// Number of views that agree on each joint; 0 of one that is only expected there.
+    pub n_views: [usize; N],
+}
+
+/// What is known of a joint from the frames before.
+#[derive(Debug, Clone, Copy)]
+struct Past {
+    point: Point3<f64>,
+    velocity: Vector3<f64>,
+    sd: f64,
+    /// When a view last saw it, seconds.
+    seen_s: f64,
+}
+
+/// What is known of a person from the frames before.
+#[derive(Debug, Clone, Default)]
+struct Knowledge {
+    joints: [Option<Past>; N],
+    time_s: f64,
+}
+
+impl Knowledge {
+    fn expected(&self, joint: usize, time_s: f64) -> Option<Prior> {
+        let past = self.joints[joint].filter(|past| time_s - past.seen_s <= CARRIED_S)?;
+        let step_s = (time_s - self.time_s).max(0.0);
+        Some(Prior {
+            point: past.point + past.velocity * (DAMPING * step_s),
+            sd: past
+                .sd
+                .hypot(EXPECTED_SD_M)
+                .hypot(EXPECTED_SD_M_PER_S * step_s),
+        })
+    }
+}
+
+/// Finds the joints of known people, frame by frame.
+///
+/// A joint may be wherever rays meet that could be its own: those of the person's detections, and, with less trust, those that the detector
+/// gave to nobody or to others. Of all these places the ones are taken which most views support, which lie where the joint was going, and
+/// between which the bones have lengths of a person of this stature: exactly, over the tree of the body. Then every joint moves to the least
+/// squared distances from its rays, and the bones pull as far as the joints are uncertain.
+#[derive(Debug, Clone)]
+pub struct Solver {
+    cameras: Vec<Camera>,
+    order: Vec<usize>,
+    known: BTreeMap<u64, Knowledge>,
+}
+
+/// The joints of everything that a view shows, as rays.
+struct Rays {
+    detections: Vec<Sights>,
+    loose: Vec<Vec<Sight>>,
+}
+
+impl Solver {
+    /// Begins without anybody.
+    ///
+    /// * `cameras`: of the views, in the order in which views will be given.
+    pub fn new(cameras: Vec<Camera>) -> Self {
+        let mut order: Vec<usize> = (0..cameras.len()).collect();
+        order.sort_by(|a, b| cameras[*a].name.cmp(&cameras[*b].name));
+        Self {
+            cameras,
+            order,
+            known: BTreeMap::new(),
+        }
+    }
+
+    /// Finds the joints of the people of the next frame.
+    ///
+    /// * `people`: as [`Tracker::step`](crate::Tracker::step) gives them.
+    /// * `views`: what it was given.
+    pub fn step(&mut self, time_s: f64, people: &[Person], views: &[View]) -> Vec<Solved> {
+        let rays: Vec<Rays> = self
+            .cameras
+            .iter()
+            .zip(views)
+            .map(|(camera, view)| rays(camera, view))
+            .collect();
+        self.known
+            .retain(|_, known| time_s - known.time_s <= CARRIED_S);
+        let solved = people
+            .iter()
+            .map(|person| self.solve(time_s, person, people, &rays));
+        solved.collect::<Vec<Solved>>()
+    }
+
+    fn solve(&mut self, time_s: f64, person: &Person, people: &[Person], rays: &[Rays]) -> Solved {
+        let known = self.known.entry(person.id).or_default();
+        let candidates: [Vec<Candidate>; N] =
+            core::array::from_fn(|joint| candidates(joint, person, people, (&self.order, rays)));
+        let priors: [Option<Prior>; N] =
+            core::array::from_fn(|joint| known.expected(joint, time_s));
+        let places: [Vec<Hypothesis>; N] = core::array::from_fn(|joint| {
+            let near = priors[joint]
+                .map(|prior| prior.point)
+                .or(person.joints[joint]);
+            hypotheses(&candidates[joint], near, priors[joint])
+        });
+        let choices: [Vec<Choice>; N] = core::array::from_fn(|joint| {
+            places[joint]
+                .iter()
+                .map(|place| choice(place, priors[joint]))
+                .collect()
+        });
+        let stature = body::stature(&person.joints).map_or(ANY_STATURE_M, |stature| stature.metres);
+        let expectations = Expectations::new(stature.clamp(body::STATURES[0], body::STATURES[1]));
+        let chosen = choose(&choices, &expectations);
+        let mut solved = Solved {
+            id: person.id,
+            joints: [None; N],
+            covariances: [None; N],
+            n_views: [0; N],
+        };
+        for joint in 0..N {
+            let Some(nth) = chosen[joint] else { continue };
+            let start = places[joint][nth].place;
+            let met = refined(&candidates[joint], start, priors[joint]);
+            if let Some((point, covariance, n)) = met {
+                solved.joints[joint] = Some(point);
+                solved.covariances[joint] = Some(covariance);
+                solved.n_views[joint] = n;
+            }
+        }
+        let refined = body::refine(&solved.joints, &solved.covariances, None);
+        (solved.joints, solved.covariances) = (refined.joints, refined.covariances);
+        remember(known, time_s, &solved);
+        solved
+    }
+}
+
+/// What a place is worth for a joint.
+fn choice(place: &Hypothesis, prior: Option<Prior>) -> Choice {
+    let moved = prior.map_or(0.0, |prior| {
+        let z = (place.place - prior.point).norm() / prior.sd;
+        (MOVED * 0.5 * z * z).min(MOST_OF_MOVED)
+    });
+    Choice {
+        place: place.place,
+        worth: place.support - moved,
+    }
+}
+
+/// Keeps what the next frame has to know.
+fn remember(known: &mut Knowledge, time_s: f64, solved: &Solved) {
+    let step_s = time_s - known.time_s;
+    for joint in 0..N {
+        let Some(point) = solved.joints[joint] else {
+            known.joints[joint] = None;
+            continue;
+        };
+        let past = known.joints[joint];
+        let measured = past
+            .filter(|_| step_s > 0.0)
+            .map(|past| (point - past.point) / step_s);
+        let before = past.map_or_else(Vector3::zeros, |past| past.velocity);
+        let velocity = before + NEW_VELOCITY * (measured.unwrap_or(before) - before);
+        let is_seen = solved.n_views[joint] > 0;
+        let variance = solved.covariances[joint].map_or(0.0, |it| it.trace() / 3.0);
+        let seen_s = if is_seen {
+            time_s
+        } else {
+            past.map_or(time_s, |past| past.seen_s)
+        };
+        known.joints[joint] = Some(Past {
+            point,
+            velocity,
+            sd: variance.sqrt(),
+            seen_s,
+        });
+    }
+    known.time_s = time_s;
+}
+
+/// A joint moved to the least squared distances from the rays that support its place; with its covariance and the number of views.
+fn refined(
+    candidates: &[Candidate],
+    start: Point3<f64>,
+    prior: Option<Prior>,
+) -> Option<(Point3<f64>, Matrix3<f64>, usize)> {
+    let mut at = start;
+    let mut result = None;
+    for _ in 0..2 {
+        let views = candidates.chunk_by(|a, b| a.view == b.view);
+        let best = views.filter_map(|view| {
+            let near = view.iter().filter(|it| it.sight.deviations(&at) < OUTLYING);
+            near.max_by(|a, b| a.support(&at).total_cmp(&b.support(&at)))
+        });
+        let weighted = best.map(|it| Sight {
+            heat: it.sight.heat * it.trust,
+            ..it.sight
+        });
+        let rays: Vec<Sight> = weighted.collect();
+        let met = settle(&rays, &at, prior)?;
+        at = met.point;
+        result = Some((met.point, met.covariance, rays.len()));
+    }
+    result
+}
+
+/// The places in the pictures that may be a joint of a person, view by view.
+fn candidates(
+    joint: usize,
+    person: &Person,
+    people: &[Person],
+    (order, rays): (&[usize], &[Rays]),
+) -> Vec<Candidate> {
+    let mut all = Vec::new();
+    for (nth, view) in order.iter().enumerate().filter(|it| *it.1 < rays.len()) {
+        let first = all.len();
+        let name = named(joint, person.is_exchanged[*view]);
+        let mut add = |sight: Option<Sight>, trust: f64| {
+            all.extend(sight.map(|sight| Candidate {
+                view: nth,
+                sight,
+                trust,
+            }));
+        };
+        for (index, sights) in rays[*view].detections.iter().enumerate() {
+            if person.detections[*view] == Some(index) {
+                add(sights[name], 1.0);
+            } else {
+                let is_anybodys = people.iter().any(|it| it.detections[*view] == Some(index));
+                add(
+                    sights[name],
+                    if is_anybodys {
+                        TRUST_OTHERS
+                    } else {
+                        TRUST_LOOSE
+                    },
+                );
+            }
+        }
+        for sight in rays[*view].loose.get(name).into_iter().flatten() {
+            add(Some(*sight), TRUST_LOOSE);
+        }
+        let by_ray = |it: &Candidate| [it.sight.direction.x, it.sight.direction.y, it.trust];
+        all[first..].sort_by(|a, b| {
+            let (a, b) = (by_ray(a), by_ray(b));
+            let each = a.iter().zip(&b).map(|(a, b)| a.total_cmp(b));
+            each.fold(core::cmp::Ordering::Equal, core::cmp::Ordering::then)
+        });
+    }
+    all
+}
+
+fn rays(camera: &Camera, view: &View) -> Rays {
+    let loose = view.loose.iter().map(|joint| {
+        joint
+            .iter()
+            .filter_map(|keypoint| Sight::new(camera, keypoint))
+            .collect()
+    });
+    Rays {
+        detections: view
+            .detections
+            .iter()
+            .map(|it| sights(camera, it))
+            .collect(),
+        loose: loose.collect(),
+    }
+}

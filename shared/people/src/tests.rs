@@ -1,0 +1,295 @@
+//! Laws of who is who.
+
+use std::collections::BTreeSet;
+
+use fastrand::Rng;
+use proptest::prelude::*;
+
+use crate::testing::{Actor, ring, seen};
+use crate::{Person, Settings, Solver, State, Tracker, View};
+
+const RATE_HZ: f64 = 25.0;
+
+fn settings() -> Settings {
+    Settings {
+        max: 8,
+        ..Settings::default()
+    }
+}
+
+/// People who walk about, who come and go; the same seed gives the same.
+fn walk(seed: u64, n_people: usize, n_frames: usize, n_views: usize) -> Vec<Vec<View>> {
+    let mut random = Rng::with_seed(seed);
+    let cameras = ring(n_views);
+    let mut actor = || Actor {
+        at: [0, 1].map(|_| 2.4 * (random.f64() - 0.5)),
+        turn: 6.0 * random.f64(),
+        stature: 1.5 + 0.4 * random.f64(),
+    };
+    let starts: Vec<Actor> = (0..n_people).map(|_| actor()).collect();
+    let ends: Vec<Actor> = (0..n_people).map(|_| actor()).collect();
+    let frame = |nth: usize| {
+        let share = nth as f64 / n_frames as f64;
+        let each = starts.iter().zip(&ends).enumerate();
+        let present = each.filter(|(who, _)| (nth / 10 + who) % 4 != 3);
+        let people = present.map(|(_, (start, end))| Actor {
+            at: [0, 1].map(|axis| start.at[axis] + share * (end.at[axis] - start.at[axis])),
+            ..*start
+        });
+        people.collect::<Vec<Actor>>()
+    };
+    (0..n_frames)
+        .map(|nth| seen(&cameras, &frame(nth), 3.0, &mut random))
+        .collect()
+}
+
+fn follow(n_views: usize, frames: &[Vec<View>]) -> Vec<Vec<Person>> {
+    let mut tracker = Tracker::new(ring(n_views), settings());
+    let frames = frames.iter().enumerate();
+    frames
+        .map(|(nth, views)| tracker.step(nth as f64 / RATE_HZ, views))
+        .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn the_order_of_views_and_of_detections_changes_nothing(seed in any::<u64>(), n_people in 1_usize..6) {
+        let frames = walk(seed, n_people, 24, 4);
+        let expected = follow(4, &frames);
+        let mut random = Rng::with_seed(seed);
+        let mut order: Vec<usize> = (0..4).collect();
+        random.shuffle(&mut order);
+        let cameras = ring(4);
+        let cameras: Vec<_> = order.iter().map(|view| cameras[*view].clone()).collect();
+        let mut tracker = Tracker::new(cameras.clone(), settings());
+        let (mut one, mut other) = (Solver::new(ring(4)), Solver::new(cameras));
+        for (nth, (views, expected)) in frames.iter().zip(&expected).enumerate() {
+            let time_s = nth as f64 / RATE_HZ;
+            let mut orders = Vec::new();
+            let shuffled: Vec<View> = order.iter().map(|view| {
+                let mut order: Vec<usize> = (0..views[*view].detections.len()).collect();
+                random.shuffle(&mut order);
+                let detections = order.iter().map(|nth| views[*view].detections[*nth]).collect();
+                orders.push(order);
+                View { detections, loose: Vec::new() }
+            }).collect();
+            let got = tracker.step(time_s, &shuffled);
+            let solved = other.step(time_s, &got, &shuffled);
+            prop_assert_eq!(one.step(time_s, expected, views), solved);
+            prop_assert_eq!(got.len(), expected.len());
+            for (got, expected) in got.iter().zip(expected) {
+                prop_assert_eq!((got.id, got.state, got.joints), (expected.id, expected.state, expected.joints));
+                for (place, view) in order.iter().enumerate() {
+                    prop_assert_eq!(got.detections[place].map(|nth| orders[place][nth]), expected.detections[*view]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_detection_is_one_persons_and_an_id_is_never_given_to_another(seed in any::<u64>(), n_people in 1_usize..7, n_views in 2_usize..6) {
+        let frames = walk(seed, n_people, 30, n_views);
+        let (mut known, mut last) = (BTreeSet::new(), 0);
+        for people in follow(n_views, &frames) {
+            let mut taken = BTreeSet::new();
+            for person in &people {
+                for (view, detection) in person.detections.iter().enumerate() {
+                    prop_assert!(detection.is_none_or(|detection| taken.insert((view, detection))));
+                }
+                // Somebody who is new has the next number, or is one of those who were there.
+                prop_assert!(known.contains(&person.id) || person.id == last + 1);
+                last = last.max(person.id);
+                known.insert(person.id);
+            }
+            let ids: BTreeSet<u64> = people.iter().map(|person| person.id).collect();
+            prop_assert_eq!(ids.len(), people.len(), "nobody is in two places");
+        }
+    }
+
+    #[test]
+    fn a_tracker_that_takes_up_the_work_of_another_goes_on_with_the_same_people(seed in any::<u64>(), n_people in 1_usize..5) {
+        // Everybody is there, so that nobody is about to be born.
+        let actors: Vec<Actor> = (0..n_people).map(|nth| Actor { at: [nth as f64 - 1.5, 0.3], turn: nth as f64, stature: 1.7 }).collect();
+        let mut random = Rng::with_seed(seed);
+        let frames: Vec<_> = (0..12).map(|_| seen(&ring(4), &actors, 3.0, &mut random)).collect();
+        let mut tracker = Tracker::new(ring(4), settings());
+        for (nth, views) in frames.iter().enumerate() {
+            let time_s = nth as f64 / RATE_HZ;
+            let mut other = Tracker::resume(ring(4), settings(), tracker.memory());
+            let expected: Vec<Person> = tracker.step(time_s, views);
+            if nth > 3 {
+                let got = other.step(time_s, views);
+                prop_assert_eq!(got, expected);
+            }
+        }
+    }
+}
+
+/// The ids of every frame.
+fn ids(people: &[Vec<Person>]) -> Vec<Vec<u64>> {
+    people
+        .iter()
+        .map(|people| people.iter().map(|person| person.id).collect())
+        .collect()
+}
+
+#[test]
+fn two_who_pass_each_other_keep_their_ids() {
+    let mut random = Rng::with_seed(1);
+    let frames: Vec<_> = (0..100)
+        .map(|nth| {
+            let x = -1.5 + 0.03 * f64::from(nth);
+            let both = [
+                Actor {
+                    at: [x, 0.35],
+                    turn: 0.0,
+                    stature: 1.7,
+                },
+                Actor {
+                    at: [-x, -0.35],
+                    turn: 3.0,
+                    stature: 1.7,
+                },
+            ];
+            seen(&ring(4), &both, 4.0, &mut random)
+        })
+        .collect();
+    let people = follow(4, &frames);
+    assert!(ids(&people).iter().all(|ids| *ids == [1, 2]));
+    let side = |people: &[Person], id: usize| people[id].joints[12].unwrap().y > 0.0;
+    let first = [0, 1].map(|id| side(&people[0], id));
+    assert_ne!(first[0], first[1]);
+    assert!(
+        people
+            .iter()
+            .all(|people| [0, 1].map(|id| side(people, id)) == first)
+    );
+}
+
+#[test]
+fn who_comes_back_is_known_by_the_bones_and_a_stranger_is_not() {
+    let mut random = Rng::with_seed(2);
+    let at = |stature: f64| Actor {
+        at: [0.2, 0.0],
+        turn: 1.0,
+        stature,
+    };
+    let stay = |random: &mut Rng, people: &[Actor], n: usize| {
+        (0..n)
+            .map(|_| seen(&ring(4), people, 2.0, random))
+            .collect::<Vec<_>>()
+    };
+    let mut frames = stay(&mut random, &[at(1.9)], 40);
+    frames.extend(stay(&mut random, &[], 40));
+    frames.extend(stay(&mut random, &[at(1.5)], 40));
+    frames.extend(stay(&mut random, &[], 40));
+    frames.extend(stay(&mut random, &[at(1.9)], 40));
+    let people = follow(4, &frames);
+    let mut ids: Vec<u64> = ids(&people).into_iter().flatten().collect();
+    ids.dedup();
+    assert_eq!(ids, [1, 2, 1]);
+}
+
+#[test]
+fn somebody_new_is_given_in_the_third_frame_and_at_once_where_nobody_was_known() {
+    let mut random = Rng::with_seed(3);
+    let [one, other] = [[-0.8, 0.0], [0.8, 0.0]].map(|at| Actor {
+        at,
+        turn: 0.0,
+        stature: 1.7,
+    });
+    let frames: Vec<_> = (0..6)
+        .map(|nth| {
+            let people = if nth < 2 { vec![one] } else { vec![one, other] };
+            seen(&ring(4), &people, 2.0, &mut random)
+        })
+        .collect();
+    let people = follow(4, &frames);
+    let n: Vec<usize> = people.iter().map(Vec::len).collect();
+    assert_eq!(n, [1, 1, 1, 1, 2, 2]);
+    assert_eq!(
+        (people[0][0].state, people[1][0].state, people[4][1].state),
+        (State::New, State::Tracked, State::New)
+    );
+}
+
+#[test]
+fn one_view_alone_keeps_a_person_but_is_unsure() {
+    let mut random = Rng::with_seed(4);
+    let actor = Actor {
+        at: [0.0, 0.0],
+        turn: 0.0,
+        stature: 1.7,
+    };
+    let frames: Vec<_> = (0..50)
+        .map(|nth| {
+            let mut views = seen(&ring(4), &[actor], 2.0, &mut random);
+            if nth > 10 {
+                views[1..].fill(View::default());
+            }
+            views
+        })
+        .collect();
+    let people = follow(4, &frames);
+    let last = &people[49][0];
+    assert_eq!((last.id, last.state), (1, State::Unsure));
+    assert_eq!(last.detections, [Some(0), None, None, None]);
+}
+
+#[test]
+fn sides_that_views_call_as_they_see_them_are_found() {
+    let mut random = Rng::with_seed(5);
+    let actor = Actor {
+        at: [0.0, 0.0],
+        turn: 0.4,
+        stature: 1.7,
+    };
+    let mut views = seen(&ring(4), &[actor], 2.0, &mut random);
+    for view in [1, 2] {
+        let joints = views[view].detections[0].joints;
+        views[view].detections[0].joints = crate::MIRROR.map(|joint| joints[joint]);
+    }
+    let as_seen = Settings {
+        as_seen: true,
+        ..settings()
+    };
+    let people = Tracker::new(ring(4), as_seen).step(0.0, &views);
+    let exchanged = &people[0].is_exchanged;
+    assert!(
+        exchanged[1] == exchanged[2]
+            && exchanged[0] == exchanged[3]
+            && exchanged[0] != exchanged[1]
+    );
+}
+
+#[test]
+fn joints_are_found_by_what_the_detector_gave_to_nobody() {
+    let mut random = Rng::with_seed(6);
+    let actor = Actor {
+        at: [0.0, 0.0],
+        turn: 0.4,
+        stature: 1.7,
+    };
+    let mut views = seen(&ring(4), &[actor], 2.0, &mut random);
+    let wrist = 6;
+    for (view, camera) in views.iter_mut().zip(ring(4)) {
+        let at = camera.project(&actor.joints()[wrist]).unwrap();
+        view.detections[0].joints[wrist] = None;
+        view.loose = vec![Vec::new(); 14];
+        view.loose[wrist] = vec![crate::Keypoint {
+            at_px: [at.x, at.y],
+            sd_px: 2.0,
+            heat: 0.8,
+        }];
+    }
+    let people = Tracker::new(ring(4), settings()).step(0.0, &views);
+    assert_eq!(people[0].joints[wrist], None);
+    let solved = Solver::new(ring(4)).step(0.0, &people, &views);
+    let distance = (solved[0].joints[wrist].unwrap() - actor.joints()[wrist]).norm();
+    assert!(
+        distance < 0.05 && solved[0].n_views[wrist] == 4,
+        "{distance}"
+    );
+}

@@ -1,0 +1,172 @@
+//! A person from frame to frame.
+
+use body::Joints;
+use nalgebra::{Point3, Vector3};
+
+use crate::bones::Bones;
+use crate::cluster::Member;
+use crate::coarse::Coarse;
+use crate::distance::named;
+use crate::{Frame, N, State};
+
+/// Neck, shoulders, hips.
+const TRUNK: [usize; 5] = [2, 3, 8, 9, 12];
+/// A velocity is forgotten in this time, seconds.
+const DAMPED_S: f64 = 0.3;
+/// Share of a new velocity in the kept one.
+const NEW_VELOCITY: f64 = 0.5;
+/// How far from where a person is expected the detections may be, metres; and how much farther for every second without being seen.
+const REACH_M: f64 = 0.25;
+const REACH_M_PER_S: f64 = 0.5;
+const LONGEST_S: f64 = 1.0;
+/// A glimpse keeps this share of the velocity, and makes the time since the joints were seen shorter by it.
+const GLIMPSED: f64 = 0.5;
+/// A person is somebody who was seen in this many of the last five frames.
+const FRAMES_OF_BIRTH: u32 = 3;
+const RECENT: u32 = 0b1_1111;
+
+/// A person from frame to frame.
+#[derive(Debug, Clone)]
+pub(crate) struct Track {
+    /// `None` until it is clear that this is somebody.
+    pub(crate) id: Option<u64>,
+    pub(crate) coarse: Coarse,
+    /// Of the trunk, metres a second.
+    pub(crate) velocity: Vector3<f64>,
+    /// When the joints were last seen, and when any view last saw the person.
+    pub(crate) placed_s: f64,
+    pub(crate) seen_s: f64,
+    /// Bit `n` is set if the person was seen `n` frames ago.
+    history: u32,
+    pub(crate) bones: Bones,
+    pub(crate) colour: Option<[f64; 3]>,
+    pub(crate) members: Vec<Member>,
+    pub(crate) state: State,
+}
+
+impl Track {
+    /// Somebody who was not there before.
+    pub(crate) fn new(time_s: f64) -> Self {
+        Self {
+            id: None,
+            coarse: Coarse::UNKNOWN,
+            velocity: Vector3::zeros(),
+            placed_s: time_s,
+            seen_s: time_s,
+            history: 0,
+            bones: Bones::default(),
+            colour: None,
+            members: Vec::new(),
+            state: State::New,
+        }
+    }
+
+    /// Where the joints are expected.
+    pub(crate) fn expected(&self, time_s: f64) -> Joints {
+        let unseen_s = (time_s - self.placed_s).max(0.0);
+        let moved = self.velocity * DAMPED_S * (1.0 - (-unseen_s / DAMPED_S).exp());
+        self.coarse
+            .joints
+            .map(|joint| joint.map(|point| point + moved))
+    }
+
+    /// How far away a detection may be, metres.
+    pub(crate) fn reach(&self, time_s: f64) -> f64 {
+        REACH_M + REACH_M_PER_S * (time_s - self.placed_s).clamp(0.0, LONGEST_S)
+    }
+
+    /// Begins a frame without having been seen in it.
+    pub(crate) fn wait(&mut self) {
+        self.history <<= 1;
+        self.members.clear();
+        self.state = State::Lost;
+    }
+
+    /// Whether this may still become somebody.
+    pub(crate) fn is_possible(&self) -> bool {
+        self.history & 0b111 != 0
+    }
+
+    /// Whether it was seen in enough of the last frames.
+    pub(crate) fn is_somebody(&self) -> bool {
+        (self.history & RECENT).count_ones() >= FRAMES_OF_BIRTH
+    }
+
+    /// Takes the joints of this frame.
+    pub(crate) fn place(&mut self, time_s: f64, frame: &Frame, members: Vec<Member>, seen: Coarse) {
+        let expected = self.expected(time_s);
+        let step_s = time_s - self.placed_s;
+        if let Some(moved) = moved(&self.coarse.joints, &seen.joints).filter(|_| step_s > 0.0) {
+            self.velocity += NEW_VELOCITY * (moved / step_s - self.velocity);
+        }
+        // A joint that was not seen goes with the others.
+        let shift = moved(&expected, &seen.joints).unwrap_or_else(Vector3::zeros);
+        for joint in 0..N {
+            let unseen = expected[joint].map(|point| point + shift);
+            self.coarse.joints[joint] = seen.joints[joint].or(unseen);
+            if seen.covariances[joint].is_some() {
+                self.coarse.covariances[joint] = seen.covariances[joint];
+            }
+        }
+        self.bones.add(&seen.joints);
+        self.take_colour(frame, &members);
+        self.members = members;
+        (self.placed_s, self.seen_s) = (time_s, time_s);
+        self.history |= 1;
+        self.state = State::Tracked;
+    }
+
+    /// Takes detections that place too few joints, as that of the only view that sees the person: the joints move to their rays.
+    pub(crate) fn glimpse(&mut self, time_s: f64, frame: &Frame, members: Vec<Member>) {
+        let expected = self.expected(time_s);
+        let (mut sum, mut n) = (Vector3::zeros(), 0.0);
+        for member in &members {
+            let sights = frame.sights(member.at);
+            for joint in 0..N {
+                let sight = sights[named(joint, member.is_exchanged)];
+                if let (Some(sight), Some(point)) = (sight, expected[joint]) {
+                    sum += sight.nearest(&point) - point;
+                    n += 1.0;
+                }
+            }
+        }
+        let shift = if n > 0.0 { sum / n } else { sum };
+        self.coarse.joints = expected.map(|joint| joint.map(|point| point + shift));
+        self.velocity *= GLIMPSED;
+        self.placed_s += GLIMPSED * (time_s - self.placed_s);
+        self.seen_s = time_s;
+        self.history |= u32::from(members.len() >= 2);
+        self.members = members;
+        self.state = State::Unsure;
+    }
+
+    fn take_colour(&mut self, frame: &Frame, members: &[Member]) {
+        for colour in members.iter().filter_map(|member| frame.colour(member.at)) {
+            let kept = self.colour.unwrap_or(colour);
+            self.colour = Some([0, 1, 2].map(|nth| kept[nth] + 0.1 * (colour[nth] - kept[nth])));
+        }
+    }
+
+    /// The middle of the trunk; `None` if nothing of it is known.
+    pub(crate) fn trunk(&self) -> Option<Point3<f64>> {
+        let points = TRUNK.iter().filter_map(|joint| self.coarse.joints[*joint]);
+        let (n, sum) = points.fold((0.0, Vector3::zeros()), |(n, sum), point| {
+            (n + 1.0, sum + point.coords)
+        });
+        (n > 0.0).then(|| Point3::from(sum / n))
+    }
+}
+
+/// By how much the trunk moved; by how much everything did, where nothing of the trunk is known.
+fn moved(from: &Joints, to: &Joints) -> Option<Vector3<f64>> {
+    let of = |joints: &[usize]| {
+        let both = joints
+            .iter()
+            .filter_map(|joint| Some(to[*joint]? - from[*joint]?));
+        let (n, sum) = both.fold((0.0, Vector3::zeros()), |(n, sum), step| {
+            (n + 1.0, sum + step)
+        });
+        (n > 0.0).then(|| sum / n)
+    };
+    of(&TRUNK).or_else(|| of(&core::array::from_fn::<usize, N, _>(|joint| joint)))
+}

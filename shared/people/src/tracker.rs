@@ -1,0 +1,448 @@
+//! People from frame to frame, by ids that last.
+
+use body::{Covariances, Joints};
+use geometry::Camera;
+use nalgebra::Vector3;
+
+use crate::assignment::{NEVER, assign};
+use crate::bones::Bones;
+use crate::cluster::{Member, Place, clusters};
+use crate::coarse::{Coarse, agree};
+use crate::distance::{of_people, to_person};
+use crate::track::Track;
+use crate::{Frame, Person, State, View};
+
+/// People of fewer joints, the head not counted, are not taken for new ones.
+const LEAST_CORE: usize = 6;
+/// And of fewer are not where they were expected.
+const LEAST_SEEN: usize = 5;
+/// People whose trunks are nearer cannot be told apart, metres.
+const ONE_M: f64 = 0.3;
+/// Somebody who was not seen is looked for as far away, metres, beyond the reach of single detections.
+const TAKEN_UP_M: f64 = 0.25;
+/// Nobody is kept for longer without being seen, seconds.
+const DEATH_S: f64 = 1.0;
+/// Nobody is known again after longer, seconds.
+const REMEMBERED_S: f64 = 60.0;
+/// Somebody is known again by bones that differ by less, mean of the logarithms, after this many frames at least; and by a colour of the
+/// trunk that differs by less.
+const SAME_BONES: f64 = 0.06;
+const FRAMES_TO_KNOW: f64 = 20.0;
+const SAME_COLOUR: f64 = 0.2;
+/// Where nobody was known before, those are somebody at once whom so many views see.
+const VIEWS_AT_ONCE: usize = 3;
+
+/// What is to be tracked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// The most people at once.
+    pub max: usize,
+    /// The least number of views that see a person, 2 or more.
+    pub min_views: usize,
+    /// Whether left and right follow the picture, so that two views may have them exchanged.
+    pub as_seen: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            max: 4,
+            min_views: 2,
+            as_seen: false,
+        }
+    }
+}
+
+/// A person as a [`Memory`] holds it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Remembered {
+    /// Identity.
+    pub id: u64,
+    /// The joints, metres in the world.
+    pub joints: Joints,
+    /// Their covariances, square metres.
+    pub covariances: Covariances,
+    /// Velocity of the trunk, metres a second.
+    pub velocity: Vector3<f64>,
+    /// When the joints were seen, seconds.
+    pub seen_s: f64,
+    /// Lengths of the bones.
+    pub bones: Bones,
+    /// Colour of the trunk.
+    pub colour: Option<[f64; 3]>,
+}
+
+/// What a tracker that takes up the work of another has to know.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Memory {
+    /// The id of the next new person is one more, or more.
+    pub last_id: u64,
+    /// The people, also those who are gone.
+    pub people: Vec<Remembered>,
+}
+
+/// Tells who is who, frame by frame.
+///
+/// 1. Everybody is expected where they go. 2. In every view detections are assigned to people, those whose rays pass nearest. 3. Of what
+///    is left, detections of different views whose rays pass near each other are one person. 4. A detection that contradicts its person
+///    goes back to 3, once; what has no bones of a person is nobody. 5. Somebody new is given after three of five frames, and at once where
+///    nobody was known and three views agree. Who was not seen for a second is gone, and known again by the bones and the colour of the
+///    trunk within a minute.
+#[derive(Debug, Clone)]
+pub struct Tracker {
+    cameras: Vec<Camera>,
+    /// The views by the names of their cameras.
+    order: Vec<usize>,
+    settings: Settings,
+    tracks: Vec<Track>,
+    gone: Vec<Remembered>,
+    last_id: u64,
+}
+
+impl Tracker {
+    /// Begins without anybody.
+    ///
+    /// * `cameras`: of the views, in the order in which views will be given.
+    pub fn new(cameras: Vec<Camera>, settings: Settings) -> Self {
+        Self::resume(cameras, settings, Memory::default())
+    }
+
+    /// Takes up the work of a tracker that has ended.
+    pub fn resume(cameras: Vec<Camera>, settings: Settings, memory: Memory) -> Self {
+        let mut order: Vec<usize> = (0..cameras.len()).collect();
+        order.sort_by(|a, b| cameras[*a].name.cmp(&cameras[*b].name));
+        let last_id = memory.people.iter().map(|person| person.id).max();
+        Self {
+            cameras,
+            order,
+            settings,
+            tracks: memory.people.into_iter().map(revived).collect(),
+            gone: Vec::new(),
+            last_id: memory.last_id.max(last_id.unwrap_or(0)),
+        }
+    }
+
+    /// What another tracker has to know to go on from here.
+    pub fn memory(&self) -> Memory {
+        let known = self.tracks.iter().filter_map(remembered);
+        Memory {
+            last_id: self.last_id,
+            people: known.chain(self.gone.iter().cloned()).collect(),
+        }
+    }
+
+    /// Says who is in the next frame, in the order of their ids.
+    ///
+    /// * `time_s`: when the frame was taken; not before the last one.
+    /// * `views`: in the order of the cameras; a view that is missing sees nobody.
+    pub fn step(&mut self, time_s: f64, views: &[View]) -> Vec<Person> {
+        let frame = Frame::new(&self.cameras, &self.order, views, self.settings.as_seen);
+        let was_empty = self.tracks.iter().all(|track| track.id.is_none());
+        let expected: Vec<Joints> = self
+            .tracks
+            .iter()
+            .map(|track| track.expected(time_s))
+            .collect();
+        let mut free: Vec<Vec<Place>> = (0..frame.n_views())
+            .map(|view| frame.places(view).collect())
+            .collect();
+        self.tracks.iter_mut().for_each(Track::wait);
+        let mut members = vec![Vec::new(); self.tracks.len()];
+        for is_known in [true, false] {
+            self.follow(
+                &frame,
+                time_s,
+                (&expected, &mut free, &mut members),
+                is_known,
+            );
+        }
+        self.place(&frame, time_s, &expected, members, &mut free);
+        // What contradicts a group goes back once.
+        for _ in 0..2 {
+            self.group(&frame, time_s, &expected, &mut free);
+        }
+        self.bury(time_s);
+        let births = self.births(&frame, time_s, was_empty);
+        self.mark_near();
+        self.people(&frame, &births)
+    }
+
+    /// Assigns the detections of every view to the people.
+    fn follow(
+        &self,
+        frame: &Frame,
+        time_s: f64,
+        (expected, free, members): (&[Joints], &mut [Vec<Place>], &mut [Vec<Member>]),
+        is_known: bool,
+    ) {
+        let rows: Vec<usize> = (0..self.tracks.len())
+            .filter(|nth| self.tracks[*nth].id.is_some() == is_known)
+            .collect();
+        for free in free.iter_mut() {
+            let fit = |row: usize, column: usize| {
+                let track = rows[row];
+                let fit = to_person(frame.sights(free[column]), &expected[track], frame.as_seen);
+                fit.filter(|fit| fit.distance < self.tracks[track].reach(time_s))
+            };
+            let fits: Vec<_> = (0..rows.len())
+                .map(|row| {
+                    (0..free.len())
+                        .map(|column| fit(row, column))
+                        .collect::<Vec<_>>()
+                })
+                .collect();
+            let cost =
+                |row: usize, column: usize| fits[row][column].map_or(NEVER, |fit| fit.distance);
+            let assigned = assign(rows.len(), free.len(), cost);
+            let mut taken = Vec::new();
+            for (row, column) in assigned.into_iter().enumerate() {
+                let Some((column, fit)) =
+                    column.and_then(|column| Some((column, fits[row][column]?)))
+                else {
+                    continue;
+                };
+                members[rows[row]].push(Member {
+                    at: free[column],
+                    is_exchanged: fit.is_exchanged,
+                });
+                taken.push(free[column]);
+            }
+            free.retain(|at| !taken.contains(at));
+        }
+    }
+
+    /// Places the people who were expected.
+    fn place(
+        &mut self,
+        frame: &Frame,
+        time_s: f64,
+        expected: &[Joints],
+        members: Vec<Vec<Member>>,
+        free: &mut [Vec<Place>],
+    ) {
+        for ((track, members), expected) in self.tracks.iter_mut().zip(members).zip(expected) {
+            let agreed = agree(frame, members, Some(expected));
+            give_back(free, &agreed.refused);
+            let n = agreed.members.len();
+            if n >= self.settings.min_views.max(2) && agreed.person.n_core() >= LEAST_SEEN {
+                track.place(time_s, frame, agreed.members, agreed.person);
+            } else if n >= 1 && track.id.is_some() {
+                track.glimpse(time_s, frame, agreed.members);
+            } else {
+                give_back(free, &agreed.members);
+            }
+        }
+    }
+
+    /// Makes people of the detections that are nobody's.
+    fn group(&mut self, frame: &Frame, time_s: f64, expected: &[Joints], free: &mut [Vec<Place>]) {
+        let all: Vec<Place> = free.iter().flatten().copied().collect();
+        for members in clusters(frame, &all) {
+            let agreed = agree(frame, members, None);
+            let person = agreed.person;
+            let is_one = agreed.members.len() >= self.settings.min_views.max(2)
+                && person.n_core() >= LEAST_CORE
+                && person.is_body();
+            if !is_one {
+                continue;
+            }
+            for member in &agreed.members {
+                free[member.at.view].retain(|at| *at != member.at);
+            }
+            self.take(frame, time_s, expected, agreed.members, person);
+        }
+    }
+
+    /// Gives a group to the person whom it shows: one who was placed, one who was missed, or a new one.
+    fn take(
+        &mut self,
+        frame: &Frame,
+        time_s: f64,
+        expected: &[Joints],
+        members: Vec<Member>,
+        person: Coarse,
+    ) {
+        let is_placed = |track: &Track| track.state == State::Tracked;
+        let twin = self.tracks.iter_mut().find(|track| {
+            let distance = of_people(&track.coarse.joints, &person.joints);
+            is_placed(track) && distance.is_some_and(|distance| distance < ONE_M)
+        });
+        if let Some(twin) = twin {
+            let is_free =
+                |member: &Member| twin.members.iter().all(|own| own.at.view != member.at.view);
+            let more: Vec<Member> = members.into_iter().filter(is_free).collect();
+            let agreed = agree(frame, [twin.members.clone(), more].concat(), None);
+            if agreed.members.len() > twin.members.len() {
+                twin.coarse = Coarse {
+                    joints: core::array::from_fn(|joint| {
+                        agreed.person.joints[joint].or(twin.coarse.joints[joint])
+                    }),
+                    covariances: core::array::from_fn(|joint| {
+                        agreed.person.covariances[joint].or(twin.coarse.covariances[joint])
+                    }),
+                };
+                twin.members = agreed.members;
+            }
+            return;
+        }
+        let missed = self.tracks.iter().zip(expected).enumerate();
+        let missed = missed.filter(|(_, (track, _))| !is_placed(track));
+        let near = missed.filter_map(|(nth, (track, expected))| {
+            let distance = of_people(expected, &person.joints)?;
+            let is_near = distance < track.reach(time_s) + TAKEN_UP_M;
+            is_near.then_some((track.id.is_none(), distance, nth))
+        });
+        let nearest = near.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        if let Some((_, _, nth)) = nearest {
+            self.tracks[nth].place(time_s, frame, members, person);
+        } else {
+            let mut track = Track::new(time_s);
+            track.place(time_s, frame, members, person);
+            self.tracks.push(track);
+        }
+    }
+
+    /// Takes away who has not been seen for too long.
+    fn bury(&mut self, time_s: f64) {
+        let (alive, dead) = self
+            .tracks
+            .drain(..)
+            .partition(|track: &Track| match track.id {
+                Some(_) => time_s - track.seen_s <= DEATH_S,
+                None => track.is_possible(),
+            });
+        self.tracks = alive;
+        self.gone.extend(dead.iter().filter_map(remembered));
+        self.gone
+            .retain(|person| time_s - person.seen_s <= REMEMBERED_S);
+    }
+
+    /// Gives ids to those who are somebody by now.
+    fn births(&mut self, frame: &Frame, time_s: f64, was_empty: bool) -> Vec<u64> {
+        let needed = VIEWS_AT_ONCE.min(frame.n_seeing()).max(2);
+        let mut births = Vec::new();
+        for nth in 0..self.tracks.len() {
+            let track = &self.tracks[nth];
+            let is_clear = was_empty && track.members.len() >= needed;
+            let n_known = self
+                .tracks
+                .iter()
+                .filter(|track| track.id.is_some())
+                .count();
+            let is_born = track.id.is_none()
+                && track.state == State::Tracked
+                && (is_clear || track.is_somebody())
+                && n_known < self.settings.max;
+            if !is_born {
+                continue;
+            }
+            let known = self.known_again(track, time_s);
+            let id = known.map_or(self.last_id + 1, |known| {
+                let known = self.gone.remove(known);
+                self.tracks[nth].bones = known.bones;
+                known.id
+            });
+            self.last_id = self.last_id.max(id);
+            self.tracks[nth].id = Some(id);
+            births.push(id);
+        }
+        births
+    }
+
+    /// The one of those who are gone who has the same bones, and the same colour.
+    fn known_again(&self, track: &Track, time_s: f64) -> Option<usize> {
+        let each = self.gone.iter().enumerate().filter_map(|(nth, person)| {
+            let n = person.bones.n.iter().copied().fold(f64::INFINITY, f64::min);
+            let bones = track.bones.difference(&person.bones)?;
+            let colour = match (track.colour, person.colour) {
+                (Some(a), Some(b)) => Vector3::from(a).metric_distance(&Vector3::from(b)),
+                _ => 0.0,
+            };
+            let is_same = n >= FRAMES_TO_KNOW && bones < SAME_BONES && colour < SAME_COLOUR;
+            let is_past = time_s > person.seen_s;
+            (is_same && is_past).then_some((nth, bones / SAME_BONES + colour / SAME_COLOUR))
+        });
+        each.min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|nearest| nearest.0)
+    }
+
+    /// Marks those who are too near to each other to be told apart.
+    fn mark_near(&mut self) {
+        let trunks: Vec<_> = self
+            .tracks
+            .iter()
+            .map(|track| track.trunk().filter(|_| track.state == State::Tracked))
+            .collect();
+        for (nth, track) in self.tracks.iter_mut().enumerate() {
+            let is_near = trunks.iter().enumerate().any(|(other, trunk)| {
+                other != nth
+                    && trunks[nth]
+                        .zip(*trunk)
+                        .is_some_and(|(a, b)| (a - b).norm() < ONE_M)
+            });
+            if is_near {
+                track.state = State::Unsure;
+            }
+        }
+    }
+
+    /// The people in the order of their ids.
+    fn people(&self, frame: &Frame, births: &[u64]) -> Vec<Person> {
+        let person = |track: &Track| {
+            let id = track.id?;
+            let mut detections = vec![None; self.cameras.len()];
+            let mut is_exchanged = vec![false; self.cameras.len()];
+            for member in &track.members {
+                let view = self.order[member.at.view];
+                detections[view] = Some(frame.given(member.at));
+                is_exchanged[view] = member.is_exchanged;
+            }
+            let is_new = births.contains(&id);
+            Some(Person {
+                id,
+                state: if is_new { State::New } else { track.state },
+                detections,
+                is_exchanged,
+                joints: track.coarse.joints,
+                covariances: track.coarse.covariances,
+                velocity: track.velocity,
+            })
+        };
+        let mut people: Vec<Person> = self.tracks.iter().filter_map(person).collect();
+        people.sort_by_key(|person| person.id);
+        people
+    }
+}
+
+/// Makes detections nobody's.
+fn give_back(free: &mut [Vec<Place>], members: &[Member]) {
+    for member in members {
+        let free = &mut free[member.at.view];
+        free.push(member.at);
+        free.sort_unstable();
+    }
+}
+
+fn remembered(track: &Track) -> Option<Remembered> {
+    Some(Remembered {
+        id: track.id?,
+        joints: track.coarse.joints,
+        covariances: track.coarse.covariances,
+        velocity: track.velocity,
+        seen_s: track.seen_s,
+        bones: track.bones,
+        colour: track.colour,
+    })
+}
+
+fn revived(person: Remembered) -> Track {
+    let mut track = Track::new(person.seen_s);
+    track.id = Some(person.id);
+    track.coarse.joints = person.joints;
+    track.coarse.covariances = person.covariances;
+    track.velocity = person.velocity;
+    track.bones = person.bones;
+    track.colour = person.colour;
+    track.state = State::Lost;
+    track
+}

@@ -1,0 +1,139 @@
+//! One place for every joint, so that the views support all of them and the bones keep their lengths.
+
+use body::BONES;
+use nalgebra::Point3;
+
+use crate::N;
+
+/// A joint and the joint towards the neck, with the bone between them; the neck first, every joint behind its parent.
+const BRANCHES: [(usize, usize, Limb); N - 1] = [
+    (13, 12, Limb::Bone(13)),
+    (8, 12, Limb::Bone(9)),
+    (9, 12, Limb::Bone(10)),
+    (7, 8, Limb::Bone(6)),
+    (10, 9, Limb::Bone(7)),
+    (6, 7, Limb::Bone(5)),
+    (11, 10, Limb::Bone(8)),
+    (2, 12, Limb::TrunkToHip),
+    (3, 12, Limb::TrunkToHip),
+    (1, 2, Limb::Bone(1)),
+    (4, 3, Limb::Bone(3)),
+    (0, 1, Limb::Bone(0)),
+    (5, 4, Limb::Bone(4)),
+];
+const ROOT: usize = 12;
+/// Bones of the trunk and of the hips' width in `BONES`.
+const TRUNK: usize = 12;
+const HIP_WIDTH: usize = 2;
+
+/// Standard deviation of a bone's length between places of joints, metres, beside that of the length itself.
+const PLACE_SD_M: f64 = 0.04;
+/// A bone costs this much for every half squared standard deviation, and at most so much.
+const BONE: f64 = 0.25;
+const MOST_OF_BONE: f64 = 1.0;
+
+#[derive(Debug, Clone, Copy)]
+enum Limb {
+    /// Index in `BONES`.
+    Bone(usize),
+    TrunkToHip,
+}
+
+/// A length that is expected, metres.
+#[derive(Debug, Clone, Copy)]
+struct Expected {
+    metres: f64,
+    sd: f64,
+}
+
+/// The lengths of the bones of people of a stature.
+#[derive(Debug, Clone)]
+pub(crate) struct Expectations {
+    limbs: [Expected; N - 1],
+}
+
+impl Expectations {
+    pub(crate) fn new(stature: f64) -> Self {
+        let of_bone = |index: usize| {
+            let proportion = BONES[index].kind.proportion();
+            let metres = proportion.length(stature);
+            Expected {
+                metres,
+                sd: proportion.spread() * metres,
+            }
+        };
+        Self {
+            limbs: BRANCHES.map(|(_, _, limb)| match limb {
+                Limb::Bone(index) => of_bone(index),
+                Limb::TrunkToHip => {
+                    let [trunk, hips] = [of_bone(TRUNK), of_bone(HIP_WIDTH)];
+                    Expected {
+                        metres: trunk.metres.hypot(0.5 * hips.metres),
+                        sd: trunk.sd,
+                    }
+                }
+            }),
+        }
+    }
+
+    fn cost(&self, branch: usize, length: f64) -> f64 {
+        let expected = self.limbs[branch];
+        let z = (length - expected.metres) / expected.sd.hypot(PLACE_SD_M);
+        (BONE * 0.5 * z * z).min(MOST_OF_BONE)
+    }
+}
+
+/// A place that a joint may have, and what it is worth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Choice {
+    pub(crate) place: Point3<f64>,
+    pub(crate) worth: f64,
+}
+
+/// Chooses one place for every joint so that the worth of all, less the costs of the bones between them, is the most.
+///
+/// * Returns the index of the choice; `None` for a joint whose best place costs more than it is worth.
+pub(crate) fn choose(
+    choices: &[Vec<Choice>; N],
+    expectations: &Expectations,
+) -> [Option<usize>; N] {
+    // Worth of every choice with what hangs on it, and of no place for the joint; the children of every joint are done first.
+    let mut worths: [Vec<f64>; N] = core::array::from_fn(|joint| {
+        let each = choices[joint].iter().map(|choice| choice.worth);
+        each.chain([0.0]).collect()
+    });
+    let mut best_of: [Vec<usize>; N - 1] = core::array::from_fn(|_| Vec::new());
+    for (branch, (joint, parent, _)) in BRANCHES.iter().enumerate().rev() {
+        let above = choices[*parent]
+            .iter()
+            .map(|choice| Some(choice.place))
+            .chain([None]);
+        for (nth, above) in above.enumerate() {
+            let below = choices[*joint]
+                .iter()
+                .map(|choice| Some(choice.place))
+                .chain([None]);
+            let with = below.zip(&worths[*joint]).map(|(place, worth)| {
+                let both = above.zip(place);
+                worth - both.map_or(0.0, |(a, b)| expectations.cost(branch, (a - b).norm()))
+            });
+            let (best, worth) = most(with);
+            best_of[branch].push(best);
+            worths[*parent][nth] += worth;
+        }
+    }
+    let mut chosen = [0; N];
+    chosen[ROOT] = most(worths[ROOT].iter().copied()).0;
+    for (branch, (joint, parent, _)) in BRANCHES.iter().enumerate() {
+        chosen[*joint] = best_of[branch][chosen[*parent]];
+    }
+    core::array::from_fn(|joint| Some(chosen[joint]).filter(|nth| *nth < choices[joint].len()))
+}
+
+fn most(worths: impl Iterator<Item = f64>) -> (usize, f64) {
+    worths
+        .enumerate()
+        .fold((0, f64::NEG_INFINITY), |best, (nth, worth)| {
+            if worth > best.1 { (nth, worth) } else { best }
+        })
+}

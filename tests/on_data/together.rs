@@ -1,0 +1,349 @@
+//! Who is who among several people: real motion, real cameras, made keypoints.
+
+use std::path::Path;
+
+use fastrand::Rng;
+use geometry::Camera;
+use geometry::files::ReadOptions;
+use nalgebra::{Point3, Vector3};
+use people::{Detection, Keypoint, Settings, Tracker, View};
+use score::Bootstrap;
+use serde_json::Value;
+
+use crate::shared_dir;
+
+const N_JOINTS: usize = 14;
+/// Joints of `skeleton::PARSE14` among the 19 of the set; it has no top of the head.
+const JOINTS: [Option<usize>; N_JOINTS] = [
+    Some(14),
+    Some(13),
+    Some(12),
+    Some(6),
+    Some(7),
+    Some(8),
+    Some(11),
+    Some(10),
+    Some(9),
+    Some(3),
+    Some(4),
+    Some(5),
+    Some(0),
+    None,
+];
+const HIPS: [usize; 2] = [2, 3];
+const NECK: usize = 12;
+/// Side of the square in which people are, metres, and their least distance.
+const SQUARE_M: f64 = 3.6;
+const APART_M: f64 = 0.45;
+/// A trunk hides what lies behind it so near to its middle line, metres.
+const TRUNK_M: f64 = 0.15;
+/// Share of the joints that the detector misses.
+const MISSED: f64 = 0.1;
+/// Instants of a clip, and seconds between two.
+const N_INSTANTS: usize = 20;
+/// The first instant that is judged.
+const FIRST: usize = 5;
+const STEP_S: f64 = 1.0 / 29.97;
+
+/// A person's joints, metres.
+type Body = [Option<Point3<f64>>; N_JOINTS];
+
+/// Motion and cameras of the set.
+struct Motion {
+    cameras: Vec<Camera>,
+    /// Every person of every stretch, instant by instant.
+    clips: Vec<Vec<Body>>,
+}
+
+fn body(person: &Value) -> Option<(u64, Body)> {
+    let numbers = person["joints19"]
+        .as_array()?
+        .iter()
+        .filter_map(Value::as_f64);
+    let numbers: Vec<f64> = numbers.collect();
+    let joint = |nth: usize| {
+        let [x, y, z, confidence] = *numbers.get(4 * nth..4 * nth + 4)? else {
+            return None;
+        };
+        (confidence > 0.0).then(|| Point3::new(x, y, z) / 100.0)
+    };
+    Some((person["id"].as_u64()?, JOINTS.map(|nth| joint(nth?))))
+}
+
+impl Motion {
+    fn read(folder: &Path) -> Self {
+        let calibration = folder.join("band1/calibration.json");
+        let rig = geometry::files::read(&calibration, &ReadOptions::default()).unwrap();
+        let is_hd = |camera: &&Camera| camera.name.starts_with("00_");
+        let mut clips = Vec::new();
+        for band in ["band1", "band2"] {
+            let mut files: Vec<_> = std::fs::read_dir(folder.join(band))
+                .unwrap()
+                .map(|file| file.unwrap().path())
+                .collect();
+            files.retain(|file| {
+                file.file_name()
+                    .is_some_and(|name| name.to_string_lossy().starts_with("body3DScene"))
+            });
+            files.sort();
+            let instants = files.iter().map(|file| {
+                let scene: Value =
+                    serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
+                scene["bodies"]
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .filter_map(body)
+                    .collect::<Vec<(u64, Body)>>()
+            });
+            let instants: Vec<Vec<(u64, Body)>> = instants.collect();
+            for (id, _) in &instants[0] {
+                let of_id =
+                    |people: &Vec<(u64, Body)>| people.iter().find(|it| it.0 == *id).map(|it| it.1);
+                let clip: Vec<Body> = instants.iter().filter_map(of_id).collect();
+                if clip.len() == N_INSTANTS {
+                    clips.push(clip);
+                }
+            }
+        }
+        Self {
+            cameras: rig.cameras().iter().filter(is_hd).cloned().collect(),
+            clips,
+        }
+    }
+
+    /// Some people in a room: clips turned and moved, not too near to each other.
+    fn people(&self, n: usize, random: &mut Rng) -> Vec<Vec<Body>> {
+        let mut people: Vec<Vec<Body>> = Vec::new();
+        let mut places: Vec<Vector3<f64>> = Vec::new();
+        while people.len() < n {
+            let clip = &self.clips[random.usize(..self.clips.len())];
+            let side = |random: &mut Rng| (random.f64() - 0.5) * SQUARE_M;
+            let place = Vector3::new(side(random), 0.0, side(random));
+            if places.iter().any(|other| (place - other).norm() < APART_M) {
+                continue;
+            }
+            let turn = nalgebra::Rotation3::from_axis_angle(
+                &Vector3::y_axis(),
+                random.f64() * std::f64::consts::TAU,
+            );
+            let middle = clip[0][NECK]
+                .unwrap()
+                .coords
+                .component_mul(&Vector3::new(1.0, 0.0, 1.0));
+            let moved =
+                |body: &Body| body.map(|joint| joint.map(|point| turn * (point - middle) + place));
+            people.push(clip.iter().map(moved).collect());
+            places.push(place);
+        }
+        people
+    }
+}
+
+/// Whether another's trunk is before a joint.
+fn is_hidden(camera: &Camera, joint: &Point3<f64>, nth: usize, people: &[Body]) -> bool {
+    let from = camera.centre_in_world();
+    let ray = (joint - from).normalize();
+    people
+        .iter()
+        .enumerate()
+        .filter(|it| it.0 != nth)
+        .any(|(_, other)| {
+            let [Some(neck), Some(right), Some(left)] =
+                [other[NECK], other[HIPS[0]], other[HIPS[1]]]
+            else {
+                return false;
+            };
+            let hips = nalgebra::center(&right, &left);
+            (0..=8).any(|step| {
+                let point = neck + (hips - neck) * (f64::from(step) / 8.0);
+                let along = (point - from).dot(&ray);
+                along > 0.0
+                    && along < (joint - from).norm() - TRUNK_M
+                    && (point - from - ray * along).norm() < TRUNK_M
+            })
+        })
+}
+
+/// What a view sees of each person; nothing of one who is hidden.
+fn seen(
+    camera: &Camera,
+    people: &[Body],
+    noise_m: f64,
+    random: &mut Rng,
+) -> Vec<Option<Detection>> {
+    let focal = camera.intrinsics.fx;
+    let mut detections = Vec::new();
+    for (nth, person) in people.iter().enumerate() {
+        let joints = person.map(|joint| {
+            let joint = joint.filter(|joint| !is_hidden(camera, joint, nth, people))?;
+            let sd_px = noise_m * focal / (joint - camera.centre_in_world()).norm();
+            let at = camera.project(&joint)?;
+            let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+            let at_px = [at.x + sd_px * normal(), at.y + sd_px * normal()];
+            let [width, height] = camera.intrinsics.size.map(f64::from);
+            let is_inside = (0.0..width).contains(&at_px[0]) && (0.0..height).contains(&at_px[1]);
+            let is_missed = random.f64() < MISSED;
+            (is_inside && !is_missed).then_some(Keypoint {
+                at_px,
+                sd_px,
+                heat: 0.8,
+            })
+        });
+        let is_found = joints.iter().flatten().count() >= 5;
+        detections.push(is_found.then_some(Detection {
+            joints,
+            colour: None,
+        }));
+    }
+    detections
+}
+
+/// Whether two detections have so many joints in common that they can be compared.
+fn can_be_compared(a: &Detection, b: &Detection) -> bool {
+    let both = a.joints.iter().zip(&b.joints);
+    both.filter(|(a, b)| a.is_some() && b.is_some()).count() >= 4
+}
+
+/// Pairs of detections of two views: of one person in truth, as found, and both.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pairs {
+    true_ones: usize,
+    found: usize,
+    right: usize,
+}
+
+/// What a view shows: who each detection is, and whom it was taken for.
+struct Shown<'a> {
+    detection: &'a Detection,
+    person: usize,
+    id: Option<u64>,
+}
+
+impl Pairs {
+    fn add(&mut self, views: &[Vec<Shown<'_>>]) {
+        for (nth, view) in views.iter().enumerate() {
+            let others = || views[nth + 1..].iter().flatten();
+            for a in view {
+                for b in others().filter(|b| can_be_compared(a.detection, b.detection)) {
+                    let is_found = a.id.is_some() && a.id == b.id;
+                    let is_true = a.person == b.person;
+                    self.true_ones += usize::from(is_true);
+                    self.found += usize::from(is_found);
+                    self.right += usize::from(is_found && is_true);
+                }
+            }
+        }
+    }
+
+    /// F1, precision and recall.
+    fn scores(&self) -> [f64; 3] {
+        let share = |of: usize| self.right as f64 / of as f64;
+        let f1 = 2.0 * self.right as f64 / (self.true_ones + self.found) as f64;
+        [f1, share(self.found), share(self.true_ones)]
+    }
+}
+
+/// How many people, views, and how far off the keypoints are.
+#[derive(Debug, Clone, Copy)]
+struct Setting {
+    n_people: usize,
+    n_views: usize,
+    noise_m: f64,
+}
+
+/// Follows people for twenty instants, drawn anew with every seed; counts the pairs of each from the sixth instant on, when who is
+/// seen has been given.
+fn pairs(motion: &Motion, setting: Setting, n_draws: u64) -> Vec<Pairs> {
+    let draw = |seed: u64| {
+        let mut random = Rng::with_seed(seed);
+        let people = motion.people(setting.n_people, &mut random);
+        let mut cameras = motion.cameras.clone();
+        random.shuffle(&mut cameras);
+        cameras.truncate(setting.n_views);
+        let settings = Settings {
+            max: 8,
+            ..Settings::default()
+        };
+        let mut tracker = Tracker::new(cameras.clone(), settings);
+        let mut pairs = Pairs::default();
+        for instant in 0..N_INSTANTS {
+            let bodies: Vec<Body> = people.iter().map(|clip| clip[instant]).collect();
+            let mut who = Vec::new();
+            let mut views = Vec::new();
+            for camera in &cameras {
+                let mut order: Vec<usize> = (0..setting.n_people).collect();
+                random.shuffle(&mut order);
+                let all = seen(camera, &bodies, setting.noise_m, &mut random);
+                order.retain(|person| all[*person].is_some());
+                views.push(View {
+                    detections: order.iter().filter_map(|person| all[*person]).collect(),
+                    loose: Vec::new(),
+                });
+                who.push(order);
+            }
+            let found = tracker.step(instant as f64 * STEP_S, &views);
+            let id = |view: usize, nth: usize| {
+                let is_it = |person: &&people::Person| person.detections[view] == Some(nth);
+                found.iter().find(is_it).map(|person| person.id)
+            };
+            let shown = |(view, detections): (usize, &View)| {
+                let each = detections.detections.iter().enumerate();
+                let each = each.map(|(nth, detection)| Shown {
+                    detection,
+                    person: who[view][nth],
+                    id: id(view, nth),
+                });
+                each.collect::<Vec<Shown<'_>>>()
+            };
+            if instant >= FIRST {
+                pairs.add(&views.iter().enumerate().map(shown).collect::<Vec<_>>());
+            }
+        }
+        pairs
+    };
+    (0..n_draws).map(draw).collect()
+}
+
+#[test]
+fn two_to_eight_people_are_told_apart_in_the_views_of_real_cameras() {
+    let Some(shared) = shared_dir() else { return };
+    let motion = Motion::read(&shared.join("data/panoptic_motion"));
+    assert_eq!((motion.cameras.len(), motion.clips.len()), (31, 6));
+    // Of 60 draws: people, views, millimetres, and the least F1 of pairs.
+    for (n_people, n_views, noise_mm, least) in [
+        (8, 5, 20.0, 0.994),
+        (8, 5, 50.0, 0.988),
+        (8, 3, 20.0, 0.97),
+        (4, 5, 50.0, 0.994),
+        (2, 5, 50.0, 0.996),
+    ] {
+        let setting = Setting {
+            n_people,
+            n_views,
+            noise_m: noise_mm / 1e3,
+        };
+        let draws: Vec<Vec<Pairs>> = pairs(&motion, setting, 60)
+            .into_iter()
+            .map(|it| vec![it])
+            .collect();
+        let of = |nth: usize| {
+            move |pairs: &[Pairs]| {
+                let sum = |of: fn(&Pairs) -> usize| pairs.iter().map(of).sum();
+                let all = Pairs {
+                    true_ones: sum(|it| it.true_ones),
+                    found: sum(|it| it.found),
+                    right: sum(|it| it.right),
+                };
+                Some(all.scores()[nth])
+            }
+        };
+        let [f1, precision, recall] = [0, 1, 2].map(|nth| of(nth)(&draws.concat()).unwrap());
+        let [low, high] = Bootstrap::default().interval_of(&draws, of(0)).unwrap();
+        println!(
+            "{n_people} people, {n_views} views, {noise_mm} mm: F1 of pairs {f1:.4} ({low:.4} to {high:.4}), precision {precision:.4}, \
+             recall {recall:.4}"
+        );
+        assert!(f1 >= least, "{setting:?}: {f1}");
+    }
+}
