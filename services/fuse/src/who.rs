@@ -1,24 +1,23 @@
 //! Joins what the views found, says who is who, sends.
 
 use core::time::Duration;
-use std::sync::Arc;
 
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
+use geometry::Camera;
 use messages::{Span, ViewPose, topic};
-use multiview::ViewPlan;
-use pipeline::{Follow, Sightings, WhoStep};
+use pipeline::{Sightings, WhoSettings, WhoStep, time_s};
 use runtime::Service;
 use stage::{Frame, Stage};
 
 /// The process's work by the method of networks.
 #[derive(Debug)]
 pub struct WhoJob {
-    /// The views of the rig.
-    pub plans: Vec<Arc<ViewPlan>>,
-    /// Which of several people is followed.
-    pub follow: Follow,
-    /// Left and right follow the picture, not the body.
-    pub as_seen: bool,
+    /// Cameras of the views, in the rig's order.
+    pub cameras: Vec<Camera>,
+    /// Who is who.
+    pub settings: WhoSettings,
+    /// Frames of the footage per second, if that is known.
+    pub frame_rate_hz: Option<f64>,
     /// Distance between the frames used, at least 1.
     pub frame_step: u64,
     /// Processes that receive the people.
@@ -33,7 +32,7 @@ pub struct WhoJob {
 ///
 /// What the transport reports.
 pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
-    let n_views = job.plans.len();
+    let n_views = job.cameras.len();
     let mut stage = Stage::new(service, job.patience);
     stage.skip_when_behind(job.frame_step);
     for view in 0..n_views {
@@ -44,7 +43,11 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
         })?;
     }
     let people = stage.output(&topic::people(), job.n_consumers)?;
-    let mut step = WhoStep::new(job.plans.clone(), job.follow, job.as_seen);
+    let settings = WhoSettings {
+        n_restarts: u64::from(service.epoch()),
+        ..job.settings
+    };
+    let mut step = WhoStep::new(job.cameras.clone(), settings);
     stage.run(|frame| {
         let answers: Vec<Option<Sightings>> = (0..n_views)
             .map(|view| answer(service, frame, view))
@@ -53,7 +56,7 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
         let present = present.filter(|(_, answer)| answer.is_some());
         let present = present.fold(0, |mask, (view, _)| mask | 1_u32 << view);
         frame.turn().restart(now_nanos());
-        let found = step.run(&answers);
+        let found = step.run(time_s(frame.number(), job.frame_rate_hz), &answers);
         let message = wire::people_to_message(&found, present).or_fail(ExitKind::Run)?;
         people.send_and_account(frame.turn(), 0, message)
     })

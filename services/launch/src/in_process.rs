@@ -7,7 +7,7 @@ use pipeline::{
     NetworkEstimate, NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame,
 };
 
-use crate::prepare::{Prepared, space_settings};
+use crate::prepare::{Prepared, space_settings, who_settings};
 use crate::process::{most_apart, view_step};
 use crate::resolved::Resolved;
 
@@ -60,7 +60,7 @@ impl InProcess {
             }
         }
         let settings = NetworkEstimatorSettings {
-            follow: prepared.settings.follow,
+            who: who_settings(resolved, &prepared),
             space: space_settings(resolved, &prepared),
             start_frame: deployment.capture.start_frame,
             frame_step: deployment.capture.frame_step.max(1),

@@ -12,7 +12,7 @@ use geometry::{Framing, OutSize, Rig, upright_roll};
 use multiview::ViewPlan;
 use nalgebra::UnitVector3;
 use pipeline::{
-    BodySettings, EstimatorSettings, SkeletonSettings, SpaceStepSettings, ViewSettings,
+    BodySettings, EstimatorSettings, SkeletonSettings, SpaceStepSettings, ViewSettings, WhoSettings,
 };
 use posenetwork::MapSettings;
 use skeleton::JointSet;
@@ -275,6 +275,16 @@ fn skeleton_settings(
         facing: config.facing,
         ..defaults
     })
+}
+
+/// Settings of who is who.
+pub(crate) fn who_settings(resolved: &Resolved, prepared: &Prepared) -> WhoSettings {
+    WhoSettings {
+        follow: prepared.settings.follow,
+        as_seen: resolved.sides_as_seen,
+        n_people: resolved.deployment.network.people,
+        n_restarts: 0,
+    }
 }
 
 /// The settings of the step in space.

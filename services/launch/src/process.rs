@@ -19,7 +19,7 @@ use viewquality::Forecaster;
 
 use crate::find_every::{self, FOLLOWED_S};
 use crate::hosts;
-use crate::prepare::{Prepared, frame_scale, framing, least_score, space_settings};
+use crate::prepare::{Prepared, frame_scale, framing, least_score, space_settings, who_settings};
 use crate::recorded;
 use crate::resolved::Resolved;
 
@@ -255,9 +255,9 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
     let plans = prepared.plans();
     if topology.has_maps() {
         let job = fuse::WhoJob {
-            plans,
-            follow: prepared.settings.follow,
-            as_seen: resolved.sides_as_seen,
+            cameras: plans.iter().map(|plan| plan.camera().clone()).collect(),
+            settings: who_settings(resolved, &prepared),
+            frame_rate_hz: resolved.frame_rate_hz(),
             frame_step: resolved.deployment.capture.frame_step.max(1),
             n_consumers: topology.receivers_of(&topic::people()),
             patience: resolved.patience(),

@@ -35,7 +35,7 @@ impl Default for Config {
             detector: None,
             find_every: None,
             least_heat: 0.2,
-            people: 3,
+            people: 4,
             mirror: false,
             onnx_runtime: None,
         }

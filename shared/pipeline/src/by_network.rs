@@ -10,15 +10,15 @@ use posenetwork::{LookError, PersonMaps};
 use rayon::prelude::*;
 
 use crate::{
-    Follow, FramePeople, NetworkMemory, NetworkStep, PersonSkeleton, Sightings, SpaceStep,
-    SpaceStepSettings, WhoStep,
+    FramePeople, NetworkMemory, NetworkStep, PersonSkeleton, Sightings, SpaceStep,
+    SpaceStepSettings, WhoSettings, WhoStep,
 };
 
 /// Settings of all steps but those of the views.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NetworkEstimatorSettings {
-    /// Which of several people is followed.
-    pub follow: Follow,
+    /// Who is who.
+    pub who: WhoSettings,
     /// The step in space.
     pub space: SpaceStepSettings,
     /// Number of the first frame.
@@ -89,14 +89,14 @@ impl NetworkEstimator {
         up_in_world: Option<UnitVector3<f64>>,
         settings: NetworkEstimatorSettings,
     ) -> Self {
-        let as_seen = settings.space.space.as_seen;
+        let cameras = plans.iter().map(|plan| plan.camera().clone()).collect();
         let view = |step| View {
             step,
             memory: NetworkMemory::default(),
         };
         Self {
             views: steps.into_iter().map(view).collect(),
-            who: WhoStep::new(plans.to_vec(), settings.follow, as_seen),
+            who: WhoStep::new(cameras, settings.who),
             space: SpaceStep::new(plans.to_vec(), up_in_world, settings.space.clone()),
             settings,
             n_frames: 0,
@@ -126,7 +126,9 @@ impl NetworkEstimator {
             })
             .collect();
         let sightings = sightings?;
-        let people = self.who.run(&sightings);
+        let people = self
+            .who
+            .run(time_s(frame, self.settings.frame_rate_hz), &sightings);
         let evidence = self.views.iter().zip(&sightings).map(|(view, seen)| {
             let maps = view.step.evidence(&view.memory);
             maps.take(seen.as_ref().map_or(0, |seen| seen.people.len()))
@@ -164,4 +166,10 @@ impl View {
             skew_s: content.skew_s,
         }))
     }
+}
+
+/// When a frame was taken, seconds; without a rate, frames are taken to be of a common one.
+pub fn time_s(frame: u64, frame_rate_hz: Option<f64>) -> f64 {
+    const COMMON_HZ: f64 = 30.0;
+    frame as f64 / frame_rate_hz.unwrap_or(COMMON_HZ)
 }

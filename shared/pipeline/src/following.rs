@@ -6,7 +6,7 @@ use geometry::Camera;
 use multiview::ViewPlan;
 use nalgebra::Point3;
 
-use crate::people::{Found, FoundBody, Person, bodies_of_poses, find};
+use crate::people::{Found, Person, bodies_of_poses, find};
 use crate::view_result::ViewResult;
 
 /// Which of several people is followed.
@@ -38,17 +38,6 @@ pub struct Following {
     n_without: u32,
     /// Identity of the person, from 1; 0 before the first.
     id: u64,
-}
-
-/// The person who is followed in a frame.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Followed {
-    /// The candidates that are other people.
-    pub(crate) others: Others,
-    /// Number of people that several views agree on.
-    pub(crate) n_seen: usize,
-    /// Identity of the person, from 1.
-    pub(crate) id: u64,
 }
 
 /// The candidates of a frame that are other people than the one who is followed.
@@ -99,21 +88,10 @@ impl Following {
     pub fn others(&mut self, plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Others {
         let views = plans.iter().zip(answers);
         let views = views.map(|(plan, answer)| bodies_of_poses(plan, answer.as_ref()));
-        self.next(plans, views.collect()).others
-    }
-
-    /// Chooses the person of the next frame.
-    ///
-    /// * `views`: the candidates of every view.
-    pub(crate) fn next(&mut self, plans: &[Arc<ViewPlan>], views: Vec<Vec<FoundBody>>) -> Followed {
         let cameras: Vec<&Camera> = plans.iter().map(|plan| plan.camera()).collect();
-        let found = find(&cameras, views);
+        let found = find(&cameras, views.collect());
         let followed = self.choose(&found);
-        Followed {
-            others: Others::of(&found, followed),
-            n_seen: found.people.len(),
-            id: self.id.max(1),
-        }
+        Others::of(&found, followed)
     }
 
     /// The one who is followed; `None` if that is none of those who were found.

@@ -35,7 +35,7 @@ mod estimate;
 
 pub use bodies::{Body, NoJoint};
 pub use by_network::{
-    NetworkEstimate, NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame,
+    NetworkEstimate, NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame, time_s,
 };
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
 pub use extras::ExtrasStep;
@@ -54,4 +54,4 @@ pub use space_settings::SpaceStepSettings;
 pub use space_step::{PersonSkeleton, SpaceStep};
 pub use view_result::{ExtraKeypoint, ViewResult};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};
-pub use who::{FramePeople, KnownPerson, WhoStep};
+pub use who::{FramePeople, KnownPerson, WhoSettings, WhoStep};

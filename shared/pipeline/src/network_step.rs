@@ -61,7 +61,7 @@ pub struct NetworkSettings {
 impl Default for NetworkSettings {
     fn default() -> Self {
         Self {
-            n_people: 3,
+            n_people: 4,
             find_every: 10,
             find_phase: 0,
             least_heat: 0.2,

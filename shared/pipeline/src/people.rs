@@ -3,10 +3,7 @@
 use geometry::{Camera, Ray};
 use multiview::ViewPlan;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
-use posenetwork::MapSettings;
-use skeleton::PARSE14;
 
-use crate::sighting::{Sighting, Sightings};
 use crate::view_result::ViewResult;
 
 /// The parts whose mean is a point of the middle line of the body: head, neck, hips, knees, ankles. Where these lie does
@@ -367,42 +364,6 @@ pub(crate) fn bodies_of_poses(plan: &ViewPlan, answer: Option<&ViewResult>) -> V
         FoundBody::new(plan.camera(), points_px, plan.size(pose), strength)
     };
     answer.candidates.iter().map(body).collect()
-}
-
-/// The candidates of a view of the method of networks. Whoever a network sees is somebody: the score counts above that of a place of
-/// which it says nothing.
-pub(crate) fn bodies_of_people(camera: &Camera, seen: Option<&Sightings>) -> Vec<FoundBody> {
-    let floor = f64::from(MapSettings::default().floor()) * PARSE14.joints.len() as f64;
-    let body = |sighting: &Sighting| {
-        let outline = sighting.outline().unwrap_or_default();
-        let size_px = (outline[2] - outline[0]).max(outline[3] - outline[1]);
-        let strength = f64::from(sighting.score) - floor;
-        FoundBody::new(camera, line_of(&sighting.places(false)), size_px, strength)
-    };
-    let people = seen.iter().flat_map(|seen| &seen.people);
-    people.map(body).collect()
-}
-
-/// The middle line of the joints that are seen; what is not seen continues the trunk.
-fn line_of(joints: &[[f64; 2]; PARSE14.joints.len()]) -> Line {
-    const PAIRS: [[usize; 2]; N_POINTS] = [[13, 13], [12, 12], [2, 3], [1, 4], [0, 5]];
-    const SHOULDERS: [usize; 2] = [8, 9];
-    /// Place of every point along the trunk of somebody who stands, neck 0, hips 1.
-    const ALONG: [f64; N_POINTS] = [-0.4, 0.0, 1.0, 1.8, 2.6];
-    let seen = |pair: [usize; 2]| {
-        let [a, b] = pair.map(|joint| joints[joint]);
-        let both = middle(a, b);
-        [both, a, b].into_iter().find(|at| at[0].is_finite())
-    };
-    let mut line = PAIRS.map(seen);
-    line[NECK] = line[NECK].or_else(|| seen(SHOULDERS));
-    let trunk = line[NECK].zip(line[HIPS]);
-    core::array::from_fn(|point| {
-        let continued = trunk.map(|(neck, hips)| {
-            [0, 1].map(|axis| neck[axis] + ALONG[point] * (hips[axis] - neck[axis]))
-        });
-        line[point].or(continued).unwrap_or([f64::NAN; 2])
-    })
 }
 
 fn middle(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {

@@ -1,13 +1,16 @@
-//! Who is in a frame: the candidates of every view that are one person.
+//! Who is in a frame: the candidates of every view that are one person, by identities that last.
 
-use std::sync::Arc;
+use ::people::{Detection, Keypoint, Memory, Person, Settings, State, Tracker, View};
+use geometry::Camera;
+use posenetwork::expected_error;
 
-use multiview::{SeenPerson, ViewPlan, same_person};
-
-use crate::following::{Follow, Following, Others};
-use crate::people::{FoundBody, bodies_of_people};
-use crate::placed::N;
+use crate::following::Follow;
 use crate::sighting::{Sighting, Sightings};
+
+/// The window of a network about a person, as a multiple of the longer side of the box around the joints.
+const WINDOW: f64 = 1.25;
+/// Identities of a process that was restarted begin after as many for each restart: none is used twice.
+const IDS_OF_A_PROCESS: u64 = 1000;
 
 /// A person of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,91 +24,151 @@ pub struct KnownPerson {
 /// The people of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FramePeople {
-    /// The people, the one who is followed first.
+    /// The people, the one who is followed first, even where no view sees that person but others are there.
     pub people: Vec<KnownPerson>,
     /// Number of people that several views agree on.
     pub n_seen: usize,
 }
 
-/// The step that says who is who, from the candidates of networks alone.
+/// Settings of the step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WhoSettings {
+    /// Which of several people comes first.
+    pub follow: Follow,
+    /// Whether left and right follow the picture, so that two views may have them exchanged.
+    pub as_seen: bool,
+    /// Most people at once.
+    pub n_people: usize,
+    /// How often the process was restarted.
+    pub n_restarts: u64,
+}
+
+impl Default for WhoSettings {
+    fn default() -> Self {
+        Self {
+            follow: Follow::default(),
+            as_seen: false,
+            n_people: crate::network_step::NetworkSettings::default().n_people,
+            n_restarts: 0,
+        }
+    }
+}
+
+/// The step that says who is who, from what the views see alone.
 #[derive(Debug)]
 pub struct WhoStep {
-    plans: Vec<Arc<ViewPlan>>,
-    following: Following,
-    as_seen: bool,
+    tracker: Tracker,
+    follow: Follow,
+    /// Identity of the person who is followed; 0 before the first.
+    followed: u64,
 }
 
 impl WhoStep {
     /// Prepares the step.
     ///
-    /// * `plans`: the views of the rig, in the rig's order.
-    /// * `as_seen`: whether left and right follow the picture, so that two views may have them exchanged.
-    pub fn new(plans: Vec<Arc<ViewPlan>>, follow: Follow, as_seen: bool) -> Self {
+    /// * `cameras`: of the views, in the rig's order.
+    pub fn new(cameras: Vec<Camera>, settings: WhoSettings) -> Self {
+        let of_tracker = Settings {
+            max: settings.n_people,
+            as_seen: settings.as_seen,
+            ..Settings::default()
+        };
+        let memory = Memory {
+            last_id: settings.n_restarts * IDS_OF_A_PROCESS,
+            people: Vec::new(),
+        };
         Self {
-            plans,
-            following: Following::new(follow),
-            as_seen,
+            tracker: Tracker::resume(cameras, of_tracker, memory),
+            follow: settings.follow,
+            followed: 0,
         }
     }
 
-    /// Says who is in the next frame: the person who is followed, if at least two views show that person.
-    pub fn run(&mut self, answers: &[Option<Sightings>]) -> FramePeople {
-        let views = self.plans.iter().zip(answers);
-        let views: Vec<Vec<FoundBody>> = views
-            .map(|(plan, seen)| bodies_of_people(plan.camera(), seen.as_ref()))
-            .collect();
-        let followed = self.following.next(&self.plans, views);
-        let candidates = self.candidates(answers, &followed.others);
-        let n_views = candidates.iter().flatten().count();
-        let person = (n_views >= 2).then_some(KnownPerson {
-            id: followed.id,
-            candidates,
-        });
+    /// Says who is in the next frame.
+    ///
+    /// * `time_s`: when the frame was taken; not before the last one.
+    /// * `answers`: by view.
+    pub fn run(&mut self, time_s: f64, answers: &[Option<Sightings>]) -> FramePeople {
+        let views: Vec<View> = answers.iter().map(|seen| view(seen.as_ref())).collect();
+        let mut found = self.tracker.step(time_s, &views);
+        let is_seen = |person: &Person| {
+            person.state != State::Lost && person.detections.iter().flatten().count() >= 2
+        };
+        let n_seen = found.iter().filter(|person| is_seen(person)).count();
+        self.choose(&found, answers);
+        let followed = self.followed;
+        found.retain(|person| is_seen(person) || (person.id == followed && n_seen > 0));
+        // The order of identities, but for the one who is followed.
+        found.sort_by_key(|person| (person.id != followed, person.id));
+        let known = |person: Person| KnownPerson {
+            candidates: if is_seen(&person) {
+                person.detections
+            } else {
+                vec![None; answers.len()]
+            },
+            id: person.id,
+        };
         FramePeople {
-            people: person.into_iter().collect(),
-            n_seen: followed.n_seen,
+            people: found.into_iter().map(known).collect(),
+            n_seen,
         }
     }
 
-    /// The candidate of every view that is the same person: the one who is followed where the view sees it, else among those who are
-    /// nobody else.
-    fn candidates(&self, answers: &[Option<Sightings>], others: &Others) -> Vec<Option<usize>> {
-        let mut indices: Vec<Vec<usize>> = vec![Vec::new(); answers.len()];
-        let mut people: Vec<Vec<SeenPerson>> = vec![Vec::new(); answers.len()];
-        for (view, answer) in answers.iter().enumerate() {
-            let Some(answer) = answer.as_ref().filter(|_| !others.only(view)) else {
-                continue;
-            };
-            for (index, sighting) in answer.people.iter().enumerate() {
-                let is_own = others.own(view).is_none_or(|own| own == index);
-                if is_own && others.of_view(view) >> index & 1 == 0 {
-                    indices[view].push(index);
-                    people[view].push(self.seen(view, sighting));
+    /// Chooses the person who is followed.
+    fn choose(&mut self, found: &[Person], answers: &[Option<Sightings>]) {
+        let is_known = found.iter().any(|person| person.id == self.followed);
+        if self.follow == Follow::Last && is_known {
+            return;
+        }
+        let size = |person: &Person| -> f64 {
+            let seen = answers.iter().zip(&person.detections);
+            let seen = seen.filter_map(|(seen, index)| seen.as_ref()?.people.get((*index)?));
+            match self.follow {
+                Follow::Largest => seen.map(longer_px).sum(),
+                Follow::Last | Follow::Clearest => {
+                    let heats = seen.flat_map(|sighting| sighting.heats);
+                    heats.map(f64::from).sum()
                 }
             }
-        }
-        let views = self.plans.iter().zip(&people);
-        let views: Vec<_> = views
-            .map(|(plan, people)| (plan.camera(), &people[..]))
-            .collect();
-        let chosen = same_person(&views, self.as_seen).into_iter().zip(indices);
-        chosen
-            .map(|(chosen, indices)| indices.get(chosen?).copied())
-            .collect()
-    }
-
-    /// The person of a candidate.
-    fn seen(&self, view: usize, sighting: &Sighting) -> SeenPerson {
-        let [_, height] = self.plans[view].layout().image_size;
-        let joint = |joint: usize| {
-            let at = sighting.joint(joint)?;
-            Some((at, f64::from(sighting.heats[joint])))
         };
-        let outline = sighting.outline().unwrap_or_default();
-        let longer_px = (outline[2] - outline[0]).max(outline[3] - outline[1]);
-        SeenPerson {
-            joints: (0..N).map(joint).collect(),
-            height: longer_px / height as f64,
+        let sizes = found.iter().map(|person| (size(person), person.id));
+        // Of equal ones the first.
+        let largest = sizes.rev().max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, id)) = largest.filter(|(size, _)| *size > 0.0) {
+            self.followed = id;
         }
     }
 }
+
+/// The longer side of the box around a person, pixels.
+fn longer_px(sighting: &Sighting) -> f64 {
+    let [left, top, right, bottom] = sighting.outline().unwrap_or_default();
+    (right - left).max(bottom - top)
+}
+
+/// What a view saw, as detections with their deviations.
+fn view(seen: Option<&Sightings>) -> View {
+    let detection = |sighting: &Sighting| {
+        let window_px = WINDOW * longer_px(sighting);
+        let joint = |joint: usize| {
+            let heat = f64::from(sighting.heats[joint]);
+            Some(Keypoint {
+                at_px: sighting.joint(joint)?,
+                sd_px: (expected_error(heat) * window_px).max(1.0),
+                heat,
+            })
+        };
+        Detection {
+            joints: core::array::from_fn(joint),
+            colour: None,
+        }
+    };
+    let people = seen.iter().flat_map(|seen| &seen.people);
+    View {
+        detections: people.map(detection).collect(),
+        loose: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

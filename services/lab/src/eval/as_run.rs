@@ -11,7 +11,7 @@ use keypoints::Sides;
 use multiview::ViewPlan;
 use pipeline::{
     Boxes, Eyes, NetworkEstimator, NetworkEstimatorSettings, NetworkSettings, NetworkStep,
-    SpaceStepSettings, ViewContent, ViewFrame, ViewSettings, ViewStep,
+    SpaceStepSettings, ViewContent, ViewFrame, ViewSettings, ViewStep, WhoSettings,
 };
 use posenetwork::{Detector, PoseNetwork};
 use score::Point;
@@ -78,6 +78,10 @@ impl AsRun<'_> {
         }
         let settings = NetworkEstimatorSettings {
             space: SpaceStepSettings::for_views(NetworkSettings::default().least_heat, as_seen),
+            who: WhoSettings {
+                as_seen,
+                ..WhoSettings::default()
+            },
             frame_step: 1,
             ..NetworkEstimatorSettings::default()
         };

@@ -1,0 +1,145 @@
+//! People who stand before cameras on a circle.
+
+use nalgebra::Point3;
+
+use super::*;
+use crate::people::tests::camera;
+
+const RATE_HZ: f64 = 30.0;
+const N_VIEWS: usize = 4;
+
+/// The 14 joints of somebody who stands at the origin, metres.
+const JOINTS: [[f64; 3]; 14] = [
+    [0.1, -0.12, 0.08],
+    [0.05, -0.11, 0.5],
+    [0.0, -0.1, 0.92],
+    [0.0, 0.1, 0.92],
+    [0.05, 0.11, 0.5],
+    [0.0, 0.12, 0.08],
+    [0.1, -0.3, 0.9],
+    [0.05, -0.25, 1.15],
+    [0.0, -0.19, 1.43],
+    [0.0, 0.19, 1.43],
+    [0.05, 0.25, 1.15],
+    [0.1, 0.3, 0.9],
+    [0.0, 0.0, 1.5],
+    [0.03, 0.0, 1.75],
+];
+
+fn sighting(camera: &Camera, [x, y]: [f64; 2], heat: f32) -> Sighting {
+    let at = |[jx, jy, jz]: [f64; 3]| {
+        let pixel = camera.project(&Point3::new(jx + x, jy + y, jz))?;
+        Some([pixel.x as f32, pixel.y as f32])
+    };
+    Sighting {
+        joints: JOINTS.map(at),
+        heats: [heat; 14],
+        score: -5.0,
+        front: [0.0; 2],
+        extras: Vec::new(),
+    }
+}
+
+/// What the views see of people at places, in an order that differs from view to view.
+fn seen(people: &[([f64; 2], f32)]) -> Vec<Option<Sightings>> {
+    let view = |view: usize| {
+        let camera = camera(view);
+        let all = people.iter();
+        let mut all: Vec<Sighting> = all
+            .map(|(place, heat)| sighting(&camera, *place, *heat))
+            .collect();
+        let n = all.len().max(1);
+        all.rotate_left(view % n);
+        (!all.is_empty()).then_some(Sightings {
+            people: all,
+            skew_s: 0.0,
+        })
+    };
+    (0..N_VIEWS).map(view).collect()
+}
+
+/// The people of every frame.
+fn run(follow: Follow, frames: &[&[([f64; 2], f32)]]) -> Vec<FramePeople> {
+    let settings = WhoSettings {
+        follow,
+        ..WhoSettings::default()
+    };
+    let mut step = WhoStep::new((0..N_VIEWS).map(camera).collect(), settings);
+    let each = frames.iter().enumerate();
+    each.map(|(frame, people)| step.run(frame as f64 / RATE_HZ, &seen(people)))
+        .collect()
+}
+
+fn ids(frame: &FramePeople) -> Vec<u64> {
+    frame.people.iter().map(|person| person.id).collect()
+}
+
+#[test]
+fn everybody_is_told_with_the_candidate_of_every_view() {
+    let both: &[([f64; 2], f32)] = &[([-0.6, 0.0], 0.9), ([0.9, 0.4], 0.7)];
+    let frames = run(Follow::Last, &[both; 4]);
+    for frame in &frames {
+        assert_eq!((ids(frame), frame.n_seen), (vec![1, 2], 2));
+        // Person p is candidate (p - v) mod 2 of view v.
+        let mut candidates: Vec<_> = frame
+            .people
+            .iter()
+            .map(|it| it.candidates.clone())
+            .collect();
+        candidates.sort();
+        let [even, odd] = [0, 1].map(|first| {
+            let each = (0..N_VIEWS).map(|view| Some((view + first) % 2));
+            each.collect::<Vec<_>>()
+        });
+        assert_eq!(candidates, [even, odd]);
+    }
+}
+
+#[test]
+fn who_is_followed_stays_first_and_keeps_the_identity_through_a_second_without_sight() {
+    let both: &[([f64; 2], f32)] = &[([-0.6, 0.0], 0.9), ([0.9, 0.4], 0.7)];
+    let other: &[([f64; 2], f32)] = &[([0.9, 0.4], 0.95)];
+    let frames = [vec![both; 5], vec![other; 10], vec![both; 5]].concat();
+    let found = run(Follow::Last, &frames);
+    let first = found[0].people[0].id;
+    let (before, gone, after) = (&found[4], &found[9], &found[19]);
+    assert_eq!(ids(gone)[0], first, "the place of the one who is followed");
+    assert_eq!(gone.people[0].candidates, [None; N_VIEWS]);
+    assert_eq!((gone.n_seen, gone.people.len()), (1, 2));
+    assert_eq!((ids(before), ids(after)[0]), (ids(after), first));
+    let clearest = run(Follow::Clearest, &frames);
+    assert_eq!(ids(&clearest[9]), [3 - first]);
+}
+
+#[test]
+fn somebody_else_is_followed_once_the_person_is_gone() {
+    let both: &[([f64; 2], f32)] = &[([-0.6, 0.0], 0.9), ([0.9, 0.4], 0.7)];
+    let other: &[([f64; 2], f32)] = &[([0.9, 0.4], 0.7)];
+    let frames = [vec![both; 5], vec![other; 45]].concat();
+    let found = run(Follow::Last, &frames);
+    let [first, last] = [&found[0], &found[49]].map(ids);
+    assert_eq!(last, [first[1]]);
+}
+
+#[test]
+fn nobody_and_one_view_are_nobody() {
+    let mut step = WhoStep::new((0..N_VIEWS).map(camera).collect(), WhoSettings::default());
+    assert_eq!(
+        step.run(0.0, &[None, None, None, None]),
+        FramePeople::default()
+    );
+    let mut one = seen(&[([0.0, 0.0], 0.9)]);
+    one[1..].fill(None);
+    assert_eq!(step.run(0.1, &one), FramePeople::default());
+}
+
+#[test]
+fn a_restarted_process_gives_no_identity_again() {
+    let settings = WhoSettings {
+        n_restarts: 2,
+        ..WhoSettings::default()
+    };
+    let mut step = WhoStep::new((0..N_VIEWS).map(camera).collect(), settings);
+    let found = step.run(0.0, &seen(&[([0.0, 0.0], 0.9)]));
+    assert_eq!(ids(&found), [2001]);
+}
