@@ -78,7 +78,7 @@ impl WhoStep {
             people: Vec::new(),
         };
         Self {
-            tracker: Tracker::resume(cameras, of_tracker, memory),
+            tracker: Tracker::resume(cameras, of_tracker, &memory),
             follow: settings.follow,
             followed: 0,
         }
