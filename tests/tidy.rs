@@ -23,7 +23,6 @@ const LAYERS: &[(&str, &[&str])] = &[
             "files",
             "formats",
             "kernels",
-            "onnx",
             "skeleton",
             "statistics",
             "wording",

@@ -1,6 +1,6 @@
 //! A trained network as an ONNX file.
 
-use onnx::{Attribute, Network as Graph, Side};
+use inference::onnx::{Attribute, Network as Graph, Side};
 
 use crate::ops::{Along, Conv, Dims, Network, Ops, Places, Scaling, convolved, grid};
 use crate::parameters::{EPSILON_OF_BATCH, Parameter, standardised};

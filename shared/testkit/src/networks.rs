@@ -1,6 +1,6 @@
 //! Networks whose answers can be computed by hand.
 
-use onnx::{Network, Side};
+use inference::onnx::{Network, Side};
 
 /// Takes a `tile` of 4 x 3 pixels:
 /// `sigma = means of the three colours x [[1, 2], [10, 20], [100, 200]] + [0.5, 0.25]`.

@@ -1,6 +1,6 @@
 //! The parameters of a network that was trained before: what a training goes on from.
 
-use onnx::value_of_half;
+use inference::onnx::value_of_half;
 use rten_onnx::onnx::{DataType, ModelProto, TensorProto};
 
 use super::network::Shape;

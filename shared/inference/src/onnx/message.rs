@@ -1,6 +1,6 @@
 //! The wire format of protocol buffers, as much of it as an ONNX file needs: fields of numbers, texts, bytes and messages.
 
-/// A message in the wire format of protocol buffers that is being written: for parts of files that [`Network`](crate::Network) does not write.
+/// A message in the wire format of protocol buffers that is being written: for parts of files that [`Network`](crate::onnx::Network) does not write.
 #[must_use]
 #[derive(Debug, Default, Clone)]
 pub struct Message(Vec<u8>);

@@ -1,7 +1,6 @@
-//! Writer of ONNX files: a network as data, and its bytes. Pure, without dependencies.
+//! Writer of ONNX files: a network as data, and its bytes.
 //!
 //! Numbers of fields are those of `onnx.proto` of the published schema, intermediate representation 8.
-#![forbid(unsafe_code)]
 
 mod half;
 mod message;
@@ -68,17 +67,6 @@ pub struct Constant {
 }
 
 /// A network, put together node by node.
-///
-/// ```
-/// use onnx::{Network, Side};
-///
-/// let mut net = Network::default();
-/// net.inputs.push(("x".to_owned(), vec![Side::Named("n"), Side::Fixed(2)]));
-/// net.outputs.push(("y".to_owned(), vec![Side::Named("n"), Side::Fixed(1)]));
-/// net.floats("w", &[2, 1], vec![0.5, -1.0]);
-/// net.node("MatMul", &["x", "w"], "y", vec![]);
-/// assert!(net.file().len() > 60);
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
     /// Name of the graph.
