@@ -19,7 +19,6 @@ const LAYERS: &[(&str, &[&str])] = &[
     (
         "ground",
         &[
-            "checksum",
             "files",
             "formats",
             "kernels",

@@ -1,6 +1,6 @@
 //! Whether two hosts of a deployment have the same files and settings.
 
-use checksum::fnv1a;
+use formats::checksum::fnv1a;
 use serde::{Deserialize, Serialize};
 
 /// Hashes of what must be the same on all hosts, by name. They tell mistakes, not attacks: those are for the keys.

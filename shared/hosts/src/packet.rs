@@ -1,6 +1,6 @@
 //! A message of a view on its way between two hosts.
 
-use checksum::fnv1a;
+use formats::checksum::fnv1a;
 use messages::Status;
 
 use crate::VERSION;

@@ -1,6 +1,6 @@
 //! Short questions and answers between two hosts: times, and what has arrived.
 
-use checksum::fnv1a;
+use formats::checksum::fnv1a;
 
 use crate::VERSION;
 use crate::packet::Content;

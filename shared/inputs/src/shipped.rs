@@ -134,7 +134,7 @@ mod tests {
     fn the_joints_that_ship_belong_to_the_model_that_ships() {
         let text = core::str::from_utf8(Shipped::Joints.bytes()).unwrap();
         let file = consistency::JointFile::parse(text).unwrap();
-        let model = checksum::fnv1a(Shipped::Model.bytes());
+        let model = formats::checksum::fnv1a(Shipped::Model.bytes());
         assert_eq!(file.model, format!("{model:016x}"));
     }
 }

@@ -9,7 +9,7 @@
 //! | 28.. | payload: bincode 2, standard configuration |
 
 use bincode::config::{self, Configuration, Limit, LittleEndian, Varint};
-use checksum::{Envelope, EnvelopeError};
+use formats::checksum::{Envelope, EnvelopeError};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// Kind of a file that holds the state of a training.

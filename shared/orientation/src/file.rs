@@ -11,9 +11,9 @@
 //! | 2 x units, f32 | weights of the outputs |
 //! | 2, f32 | what is added to them |
 //!
-//! All little-endian, behind the checked header of [`checksum::Envelope`].
+//! All little-endian, behind the checked header of [`formats::checksum::Envelope`].
 
-use checksum::{Envelope, EnvelopeError};
+use formats::checksum::{Envelope, EnvelopeError};
 
 use crate::features::n_features;
 use crate::network::{N_OUTPUTS, Network};

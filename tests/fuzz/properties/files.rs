@@ -22,7 +22,7 @@ use viewquality::{Card, Network, Table, Tau};
 
 /// A payload behind our own header, of version 1.
 fn with_checksum(magic: [u8; 8], payload: &[u8]) -> Vec<u8> {
-    checksum::Envelope { magic, version: 1 }.seal(payload)
+    formats::checksum::Envelope { magic, version: 1 }.seal(payload)
 }
 /// Deployment files; the first line may be an option of the command line.
 ///

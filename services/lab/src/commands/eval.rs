@@ -423,10 +423,12 @@ fn settings_text(
     let digest = |file: &PathBuf| {
         let bytes =
             files::read(file, files::MODEL).map_err(|error| failure::in_file(file, &error))?;
-        Ok::<_, Failure>(checksum::fnv1a(&bytes))
+        Ok::<_, Failure>(formats::checksum::fnv1a(&bytes))
     };
-    let of = |kind: Shipped, file: &PathBuf| Ok::<_, Failure>(checksum::fnv1a(&kind.read(file)?));
-    let model = checksum::fnv1a(&inputs::model_bytes(arguments.model.as_deref())?);
+    let of = |kind: Shipped, file: &PathBuf| {
+        Ok::<_, Failure>(formats::checksum::fnv1a(&kind.read(file)?))
+    };
+    let model = formats::checksum::fnv1a(&inputs::model_bytes(arguments.model.as_deref())?);
     let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
     let network = arguments
         .network

@@ -135,5 +135,5 @@ fn stamp(files: &[&Path]) -> u64 {
         let name = file.file_name().unwrap_or_default().as_encoded_bytes();
         name.iter().copied().chain(length.to_le_bytes())
     });
-    checksum::fnv1a_of(named)
+    formats::checksum::fnv1a_of(named)
 }

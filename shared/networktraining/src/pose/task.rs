@@ -417,11 +417,11 @@ fn judged(found: &Found, seen: &NetworkSample, (at, cells): (usize, [usize; 2]))
 fn stamp(settings: &Settings, people: [&[Person]; 2], from: Option<&[Parameter]>) -> u64 {
     let mut bytes = format!("{settings:?}").into_bytes();
     for person in people.into_iter().flatten() {
-        bytes.extend(checksum::fnv1a(&person.rgb).to_le_bytes());
+        bytes.extend(formats::checksum::fnv1a(&person.rgb).to_le_bytes());
         bytes.extend(format!("{:?}{:?}", person.targets, person.front).into_bytes());
     }
     for value in from.into_iter().flatten().flat_map(|list| &list.values) {
         bytes.extend(value.to_bits().to_le_bytes());
     }
-    checksum::fnv1a(&bytes)
+    formats::checksum::fnv1a(&bytes)
 }

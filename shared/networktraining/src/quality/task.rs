@@ -361,7 +361,7 @@ impl Trainer<QualityTask<'_>> {
 /// Whether a sample is validated on: by its group alone.
 fn is_validated(sample: &Sample, settings: &Settings) -> bool {
     let seed = settings.seed.to_le_bytes();
-    let hash = checksum::fnv1a_of(sample.group.bytes().chain(seed));
+    let hash = formats::checksum::fnv1a_of(sample.group.bytes().chain(seed));
     // The lowest bits of the hash are the worst.
     (hash >> 40) as f32 / (1_u32 << 24) as f32 <= settings.validation
 }
@@ -395,13 +395,14 @@ fn stamp(settings: &Settings, samples: &Samples, weights: &[Parameter]) -> u64 {
     let of_sample = |sample: &Sample| {
         let picture = sample.picture.iter().step_by(97).copied();
         let errors = sample.errors_px.iter().flat_map(|px| px.to_le_bytes());
-        checksum::fnv1a_of(sample.source.bytes().chain(picture).chain(errors)).to_le_bytes()
+        formats::checksum::fnv1a_of(sample.source.bytes().chain(picture).chain(errors))
+            .to_le_bytes()
     };
     let weights = weights
         .iter()
         .flat_map(|list| list.values.iter().step_by(97))
         .flat_map(|value| value.to_le_bytes());
-    checksum::fnv1a_of(
+    formats::checksum::fnv1a_of(
         settings
             .into_iter()
             .chain(samples.all.iter().flat_map(of_sample))

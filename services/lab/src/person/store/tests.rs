@@ -1,8 +1,8 @@
 //! Checkpoints that are damaged, foreign or fine.
 
-use checksum::Envelope;
 use datasets::Picture;
 use footage::Size;
+use formats::checksum::Envelope;
 use proptest::prelude::*;
 use training::{Album, AlbumError, Event, Plan, Settings, Trainer, Tree, Watch};
 

@@ -6,7 +6,7 @@
 /// of the state, so two inputs of one length that differ in one byte never agree.
 ///
 /// ```
-/// assert_eq!(checksum::fnv1a(b"foobar"), 0x8594_4171_f739_67e8);
+/// assert_eq!(formats::checksum::fnv1a(b"foobar"), 0x8594_4171_f739_67e8);
 /// ```
 pub fn fnv1a(bytes: &[u8]) -> u64 {
     fnv1a_of(bytes.iter().copied())
@@ -16,7 +16,7 @@ pub fn fnv1a(bytes: &[u8]) -> u64 {
 ///
 /// ```
 /// let parts = b"foo".iter().chain(b"bar").copied();
-/// assert_eq!(checksum::fnv1a_of(parts), checksum::fnv1a(b"foobar"));
+/// assert_eq!(formats::checksum::fnv1a_of(parts), formats::checksum::fnv1a(b"foobar"));
 /// ```
 pub fn fnv1a_of(bytes: impl IntoIterator<Item = u8>) -> u64 {
     bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
@@ -27,7 +27,7 @@ pub fn fnv1a_of(bytes: impl IntoIterator<Item = u8>) -> u64 {
 /// FNV-1a, 32 bits: for fields of messages that have no room for 64.
 ///
 /// ```
-/// assert_eq!(checksum::fnv1a_32(b"foobar"), 0xbf9c_f968);
+/// assert_eq!(formats::checksum::fnv1a_32(b"foobar"), 0xbf9c_f968);
 /// ```
 pub fn fnv1a_32(bytes: &[u8]) -> u32 {
     bytes.iter().fold(0x811c_9dc5, |hash, &byte| {

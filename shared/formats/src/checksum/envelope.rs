@@ -1,6 +1,6 @@
 //! A checked header in front of a payload.
 
-use crate::fnv1a;
+use crate::checksum::fnv1a;
 
 /// Bytes of the header.
 pub const HEADER_BYTES: usize = 28;
@@ -16,7 +16,7 @@ pub const HEADER_BYTES: usize = 28;
 /// | 28.. | payload |
 ///
 /// ```
-/// let envelope = checksum::Envelope { magic: *b"PLXTILES", version: 1 };
+/// let envelope = formats::checksum::Envelope { magic: *b"PLXTILES", version: 1 };
 /// let file = envelope.seal(b"payload");
 /// assert_eq!(envelope.open(&file), Ok(&b"payload"[..]));
 /// assert!(envelope.open(&file[..file.len() - 1]).is_err());

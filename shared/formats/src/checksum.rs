@@ -1,6 +1,5 @@
 //! Checksums of bytes, and the checked header in front of the payload of Parallax's own binary files. Pure: bytes in,
 //! bytes out.
-#![forbid(unsafe_code)]
 
 mod envelope;
 mod fnv;
