@@ -41,7 +41,6 @@ const LAYERS: &[(&str, &[&str])] = &[
             "inference",
             "keypoints",
             "messages",
-            "metrics",
             "motion",
             "recording",
             "runfiles",

@@ -15,9 +15,9 @@ use std::path::PathBuf;
 
 use failure::{ExitKind, Failure};
 use messages::Refusal;
-use metrics::Reading;
 use report::run::Verdict;
 use runfiles::{CameraFit, Doubt, LatencyReport, Summary};
+use runtime::metrics::Reading;
 use serde_json::{Value, json};
 use supervise::Outcome;
 

@@ -6,8 +6,8 @@ use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use fmp::{FrameTime, Scope, Tracker};
 use kernels::Rgb8View;
 use messages::{EvidenceHeader, FrameHeader, Searched, Status, Timing, ViewPose};
-use metrics::Passage;
 use pipeline::{ViewEstimate, ViewStep};
+use runtime::metrics::Passage;
 use runtime::{Loan, Sample, Service, SlicePublisher};
 use stage::{Output, StreamFrame, Turn};
 
