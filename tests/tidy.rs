@@ -82,7 +82,6 @@ const LAYERS: &[(&str, &[&str])] = &[
             "publish",
             "quality",
             "record",
-            "replay",
             "results",
             "supervise",
             "triangulate",

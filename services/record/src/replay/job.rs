@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
-use crate::Pace;
+use crate::replay::Pace;
 
 /// What the process has to do.
 #[derive(Debug)]

@@ -10,8 +10,8 @@ use runtime::{Place, SendError, Service, Woken};
 use stage::Stage;
 use stage::any::Sender;
 
-use crate::clock::Clock;
-use crate::job::{Job, Output};
+use crate::replay::clock::Clock;
+use crate::replay::job::{Job, Output};
 
 /// Sends the recorded messages of some topics in the order in which they were sent, then the end of the stream.
 ///
