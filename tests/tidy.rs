@@ -49,16 +49,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "terminal",
         ],
     ),
-    (
-        "paper",
-        &[
-            "consistency",
-            "fmp",
-            "multiview",
-            "orientation",
-            "viewquality",
-        ],
-    ),
+    ("paper", &["consistency", "fmp", "multiview", "viewquality"]),
     (
         "frame",
         &[

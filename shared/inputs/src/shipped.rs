@@ -123,7 +123,7 @@ mod tests {
         viewquality::Network::parse(Shipped::Network.bytes().to_vec(), n_parts).unwrap();
         let text = core::str::from_utf8(Shipped::Consistency.bytes()).unwrap();
         consistency::Learned::parse(text).unwrap();
-        orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
+        viewquality::orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
         crate::springs(Path::new(SHIPPED)).unwrap();
         let library = crate::library::Library::BuiltIn;
         let network = crate::open_network((Path::new(SHIPPED), None), &library);

@@ -13,9 +13,9 @@ use evaluation::{
 };
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop, in_file, read_text};
 use fmp::Model;
-use orientation::Detector;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
 use skeleton::{JointMap, JointSet, PARSE14};
+use viewquality::orientation::Detector;
 use viewquality::{ForecastInput, Forecaster, Table};
 
 use super::progress::Progress;

@@ -3,9 +3,9 @@
 use datasets::{Person, ReadOptions, Selection, SkeletonTable};
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::Fill;
-use orientation::{Sample, Tile};
 use rayon::prelude::*;
 use viewquality::Sampler;
+use viewquality::orientation::{Sample, Tile};
 
 use super::{Job, Work};
 use crate::failures::dataset_failure;
@@ -105,7 +105,7 @@ fn of_person(person: &Person) -> Result<Option<Sample>, Failure> {
     }
     let joints = &sample.joints;
     let parts = SkeletonTable::published().parts_of(joints);
-    let Some(head) = orientation::head_of(&parts) else {
+    let Some(head) = viewquality::orientation::head_of(&parts) else {
         return Ok(None);
     };
     let [x, y] = trunk(joints);

@@ -4,9 +4,9 @@
 use fastrand::Rng;
 use rayon::prelude::*;
 
-use crate::features::{Buffers, features, n_features};
-use crate::network::{N_OUTPUTS, Network};
-use crate::tile::{Crop, Tile};
+use crate::orientation::features::{Buffers, features, n_features};
+use crate::orientation::network::{N_OUTPUTS, Network};
+use crate::orientation::tile::{Crop, Tile};
 
 /// A person whose direction is known.
 #[derive(Debug, Clone, PartialEq)]
@@ -304,7 +304,7 @@ fn leave_out(values: &mut [f32], share: f32, seed: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Detector, score};
+    use crate::orientation::{Detector, score};
 
     /// People whose faces are bright on the side to which they look, and dark from behind.
     fn made_up(n: u64, seed: u64) -> Vec<Sample> {
@@ -312,7 +312,7 @@ mod tests {
         let one = |_| {
             let angle = rng.f32() * std::f32::consts::TAU;
             let front = [angle.sin(), angle.cos()];
-            let size = crate::TILE;
+            let size = crate::orientation::TILE;
             let mut rgb = Vec::new();
             for y in 0..size.height {
                 for x in 0..size.width {

@@ -1,7 +1,7 @@
 //! The part of a frame around a pose, and patches of it.
 
+use crate::{Normalisation, Sampler, TileShape};
 use kernels::Rgb8View;
-use viewquality::{Normalisation, Sampler, TileShape};
 
 /// The size of a tile.
 pub const TILE: TileShape = TileShape {
@@ -40,9 +40,9 @@ impl Tile {
             mean: [0.0; 3],
             deviation: [1.0; 3],
         };
-        let tile = viewquality::Tile {
+        let tile = crate::Tile {
             shape: TILE,
-            ..viewquality::Tile::around(bounds, BOX)?
+            ..crate::Tile::around(bounds, BOX)?
         };
         if head.iter().any(|it| !it.is_finite()) {
             return None;

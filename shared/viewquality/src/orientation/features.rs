@@ -2,7 +2,7 @@
 
 use kernels::{HogShape, HogWorkspace, Isa, Planes, Rgb8View, ShrinkWorkspace, hog, resize};
 
-use crate::tile::{Crop, Tile};
+use crate::orientation::tile::{Crop, Tile};
 
 /// A square patch.
 struct Patch {

@@ -15,8 +15,8 @@
 
 use formats::checksum::{Envelope, EnvelopeError};
 
-use crate::features::n_features;
-use crate::network::{N_OUTPUTS, Network};
+use crate::orientation::features::n_features;
+use crate::orientation::network::{N_OUTPUTS, Network};
 
 const ENVELOPE: Envelope = Envelope {
     magic: *b"PLXFRONT",

@@ -1,12 +1,12 @@
 //! The evidence for a pose of a frame.
 
+use crate::Sampler;
 use kernels::Rgb8View;
 use multiview::FrontEvidence;
-use viewquality::Sampler;
 
-use crate::features::{Buffers, features};
-use crate::network::Network;
-use crate::tile::{Crop, Tile};
+use crate::orientation::features::{Buffers, features};
+use crate::orientation::network::Network;
+use crate::orientation::tile::{Crop, Tile};
 
 /// Tells from the picture in which direction a person faces.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::detector::{Detector, Workspace};
-use crate::train::Sample;
+use crate::orientation::detector::{Detector, Workspace};
+use crate::orientation::train::Sample;
 
 /// How often a detector tells a direction from its opposite.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

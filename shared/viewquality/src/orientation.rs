@@ -14,7 +14,6 @@
 //!
 //! Inference adds and multiplies single-precision numbers in one order only: the same picture and pose give the
 //! same bits on every machine.
-#![forbid(unsafe_code)]
 
 mod detector;
 mod features;
