@@ -30,7 +30,6 @@ const LAYERS: &[(&str, &[&str])] = &[
     (
         "tools",
         &[
-            "body",
             "calibration",
             "deployment",
             "exports",

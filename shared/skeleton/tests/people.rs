@@ -1,8 +1,8 @@
 //! The synthetic people of `scene`, in all their actions: every one of them is somebody, whole, and of about their stature.
 
-use body::{Joints, check, deviation, refine};
 use nalgebra::Point3;
 use scene::{Action, Scene, Settings};
+use skeleton::body::{Joints, check, deviation, refine};
 
 #[test]
 fn synthetic_people_are_people_whatever_they_do() {

@@ -1,9 +1,9 @@
 //! How unlike a person a skeleton is: a number to choose among many by.
 
-use crate::bone::{self, BONES};
-use crate::proportion::MEASUREMENT_SD;
-use crate::stature::median_of_lengths;
-use crate::{Joints, N_BONES};
+use crate::body::bone::{self, BONES};
+use crate::body::proportion::MEASUREMENT_SD;
+use crate::body::stature::median_of_lengths;
+use crate::body::{Joints, N_BONES};
 
 /// No bone adds more than this many squared standard deviations to [`deviation`], and the stature no more than four times
 /// as many.

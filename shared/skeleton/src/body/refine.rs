@@ -4,10 +4,10 @@ mod rows;
 
 use nalgebra::{Cholesky, Const, Matrix3, Point3, SMatrix, SVector, Vector3};
 
-use crate::bone::{clean, joints_of};
-use crate::lengths::Lengths;
-use crate::stature::{STATURES, stature};
-use crate::{Covariances, Joints, N_JOINTS};
+use crate::body::bone::{clean, joints_of};
+use crate::body::lengths::Lengths;
+use crate::body::stature::{STATURES, stature};
+use crate::body::{Covariances, Joints, N_JOINTS};
 
 use rows::{Linear, N_ROWS, Row, State};
 

@@ -2,9 +2,9 @@
 
 use core::fmt;
 
-use crate::bone::clean;
-use crate::stature::Stature;
-use crate::{Joints, N_JOINTS};
+use crate::body::bone::clean;
+use crate::body::stature::Stature;
+use crate::body::{Joints, N_JOINTS};
 
 /// Why a skeleton is nobody.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::*;
-use crate::testing::{self, POSTURES};
+use crate::body::testing::{self, POSTURES};
 
 #[test]
 fn people_of_all_ages_hardly_deviate() {

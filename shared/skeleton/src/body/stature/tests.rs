@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Rotation3, Vector3};
 
 use super::*;
-use crate::testing::{self, POSTURES};
+use crate::body::testing::{self, POSTURES};
 
 fn of(joints: &Joints) -> f64 {
     stature(joints).unwrap().metres

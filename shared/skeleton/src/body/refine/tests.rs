@@ -1,7 +1,7 @@
 //! Tests of the refinement.
 
 use super::*;
-use crate::testing::{self, NO_COVARIANCES, POSTURES};
+use crate::body::testing::{self, NO_COVARIANCES, POSTURES};
 
 /// Of the noise: 5 cm along x, 1 cm across.
 fn depth_noise() -> Covariances {

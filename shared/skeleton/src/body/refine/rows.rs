@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::bone::{BONES, N_BONES, SIDES};
-use crate::check::expected;
-use crate::lengths::Lengths;
-use crate::{Joints, N_JOINTS};
+use crate::body::bone::{BONES, N_BONES, SIDES};
+use crate::body::check::expected;
+use crate::body::lengths::Lengths;
+use crate::body::{Joints, N_JOINTS};
 
 /// One row for every bone, then one for every pair of sides.
 pub(super) const N_ROWS: usize = N_BONES + SIDES.len();
@@ -161,7 +161,7 @@ impl Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing;
+    use crate::body::testing;
 
     #[test]
     fn derivatives_are_those_of_the_residual() {

@@ -12,7 +12,7 @@
 //! | how long are the bones of this very person? | [`Lengths`], learned over a run |
 //! | where are the joints, if bones keep their lengths? | [`refine`]: a soft prior in triangulation |
 //!
-//! Joints are the 14 of `skeleton::PARSE14` in its order, in metres in the world. A joint that is not finite, or
+//! Joints are the 14 of `crate::PARSE14` in its order, in metres in the world. A joint that is not finite, or
 //! farther than 1000 km from the origin, counts as missing everywhere. Nothing here knows up or down: a body lying or
 //! hanging is a body. Nothing is allocated but by [`Lengths::default`]; the same input gives the same bits.
 //!
@@ -23,7 +23,6 @@
 //! and data sets place the same joint ([`Proportion::place`]), what postures change ([`Proportion::posture`]), and the
 //! error of a measured length ([`MEASUREMENT_SD`]).
 //! The limits are wide on purpose: the detector errs by 5 to 15 cm, and what is called impossible is taken away.
-#![forbid(unsafe_code)]
 
 mod bone;
 mod check;
@@ -48,10 +47,10 @@ pub use refine::{Refined, refine};
 pub use stature::{MIN_BONES, STATURES, Stature, stature};
 pub use verdict::{Reason, Verdict};
 
-/// Number of joints, those of `skeleton::PARSE14`.
+/// Number of joints, those of `crate::PARSE14`.
 pub const N_JOINTS: usize = 14;
 
-/// The joints of `skeleton::PARSE14` in its order, metres in the world; `None` where a joint is missing.
+/// The joints of `crate::PARSE14` in its order, metres in the world; `None` where a joint is missing.
 pub type Joints = [Option<Point3<f64>>; N_JOINTS];
 
 /// The covariance of every joint, square metres in the world; `None` where it is unknown.

@@ -1,12 +1,12 @@
 //! Whether a skeleton can be a person, and which of its joints cannot.
 
-use crate::bone::{self, BONES, SIDES, clean, joints_of};
-use crate::lengths::{Learned, Lengths};
-use crate::proportion::{Kind, MEASUREMENT_SD};
-use crate::reach::{self, RANK};
-use crate::stature::{MIN_BONES, STATURES, Stature, of_lengths};
-use crate::verdict::{Reason, Verdict};
-use crate::{Covariances, Joints, N_BONES, N_JOINTS};
+use crate::body::bone::{self, BONES, SIDES, clean, joints_of};
+use crate::body::lengths::{Learned, Lengths};
+use crate::body::proportion::{Kind, MEASUREMENT_SD};
+use crate::body::reach::{self, RANK};
+use crate::body::stature::{MIN_BONES, STATURES, Stature, of_lengths};
+use crate::body::verdict::{Reason, Verdict};
+use crate::body::{Covariances, Joints, N_BONES, N_JOINTS};
 
 /// A bone is impossible if its length is this many standard deviations from the expected one.
 ///

@@ -1,9 +1,9 @@
 //! The lengths of one person's own bones, learned over a run.
 
-use crate::bone::{self, BONES};
-use crate::proportion::Kind;
-use crate::verdict::Verdict;
-use crate::{Joints, N_BONES};
+use crate::body::bone::{self, BONES};
+use crate::body::proportion::Kind;
+use crate::body::verdict::Verdict;
+use crate::body::{Joints, N_BONES};
 
 /// Number of frames whose lengths are kept, the last ones.
 pub const MAX_FRAMES: usize = 240;
@@ -58,7 +58,7 @@ impl Lengths {
     /// Adds a frame: the bones whose joints the verdict keeps; nothing of a skeleton that is nobody.
     ///
     /// * `joints`: as they were triangulated; not refined, or the lengths confirm themselves.
-    /// * `verdict`: of [`check`](crate::check) on these joints.
+    /// * `verdict`: of [`check`](crate::body::check) on these joints.
     pub fn add(&mut self, joints: &Joints, verdict: &Verdict) {
         if verdict.nobody.is_some() {
             return;

@@ -1,9 +1,9 @@
-//! The bones between the joints of `skeleton::PARSE14`.
+//! The bones between the joints of `crate::PARSE14`.
 
 use nalgebra::{Point3, Vector3};
 
-use crate::Joints;
-use crate::proportion::Kind;
+use crate::body::Joints;
+use crate::body::proportion::Kind;
 
 /// Number of bones.
 pub const N_BONES: usize = 14;
@@ -124,11 +124,11 @@ pub(crate) fn joints_of(mut mask: u32) -> impl Iterator<Item = usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::N_JOINTS;
+    use crate::body::N_JOINTS;
 
     #[test]
     fn the_joints_of_the_bones_are_those_of_their_names() {
-        let joints = skeleton::PARSE14.joints;
+        let joints = crate::PARSE14.joints;
         assert_eq!(joints.len(), N_JOINTS);
         assert_eq!(joints[NECK].name, "neck");
         assert_eq!(joints[HEAD].name, "head");

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::{Covariances, Joints, Kind, Lengths, MIN_FRAMES, N_JOINTS, check};
+use crate::body::{Covariances, Joints, Kind, Lengths, MIN_FRAMES, N_JOINTS, check};
 
 pub(crate) const NO_COVARIANCES: Covariances = [None; N_JOINTS];
 

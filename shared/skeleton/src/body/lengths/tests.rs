@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::*;
-use crate::check::check;
-use crate::testing::{self, NO_COVARIANCES};
+use crate::body::check::check;
+use crate::body::testing::{self, NO_COVARIANCES};
 
 fn add(lengths: &mut Lengths, joints: &Joints) {
     lengths.add(

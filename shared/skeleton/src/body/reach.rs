@@ -1,10 +1,10 @@
 //! How far apart two joints can be when what lies between them is missing.
 
-use crate::bone::{
+use crate::body::bone::{
     BONES, L_ELBOW, L_HIP, L_KNEE, L_SHOULDER, NECK, R_ELBOW, R_HIP, R_KNEE, R_SHOULDER, joints_of,
 };
-use crate::proportion::Kind;
-use crate::{Joints, N_JOINTS};
+use crate::body::proportion::Kind;
+use crate::body::{Joints, N_JOINTS};
 
 /// The next joint towards the neck, and the kinds of bone between; a hip has half the width of the hips besides.
 const TOWARDS_NECK: [Option<(usize, Kind)>; N_JOINTS] = [

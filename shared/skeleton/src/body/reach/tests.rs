@@ -1,7 +1,7 @@
 //! Tests of the reaches.
 
 use super::*;
-use crate::testing;
+use crate::body::testing;
 
 fn one(_kind: Kind) -> f64 {
     1.0

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::testing::{self, NO_COVARIANCES, POSTURES};
+use crate::body::testing::{self, NO_COVARIANCES, POSTURES};
 
 fn verdict(joints: &Joints) -> Verdict {
     check(joints, &NO_COVARIANCES, None)
@@ -275,8 +275,8 @@ proptest! {
             prop_assert_eq!((again.nobody, again.dropped), (None, [false; N_JOINTS]));
         }
         lengths.add(&joints, &found);
-        prop_assert!(crate::deviation(&joints).is_finite());
-        let refined = crate::refine(&joints, &covariances, Some(&lengths));
+        prop_assert!(crate::body::deviation(&joints).is_finite());
+        let refined = crate::body::refine(&joints, &covariances, Some(&lengths));
         for i in 0..N_JOINTS {
             prop_assert_eq!(refined.joints[i].is_some(), clean(&joints)[i].is_some());
             prop_assert_eq!(refined.joints[i].is_some(), refined.covariances[i].is_some());

@@ -1,8 +1,8 @@
 //! How tall a person is, from the bones that are there.
 
-use crate::Joints;
-use crate::bone::{self, BONES, N_BONES};
-use crate::proportion::{Kind, MEASUREMENT_SD};
+use crate::body::Joints;
+use crate::body::bone::{self, BONES, N_BONES};
+use crate::body::proportion::{Kind, MEASUREMENT_SD};
 
 /// The statures that a person can have, metres.
 ///
