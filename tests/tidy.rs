@@ -44,7 +44,6 @@ const LAYERS: &[(&str, &[&str])] = &[
             "recording",
             "runfiles",
             "scene",
-            "score",
             "terminal",
         ],
     ),

@@ -8,8 +8,8 @@ use inputs::network::NetworkFile;
 use posenetwork::springs::TurnedSprings;
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, outline_of, overlap};
 use rayon::prelude::*;
-use score::{PcpRule, evaluate};
 use skeleton::PARSE14;
+use statistics::score::{PcpRule, evaluate};
 
 use crate::shared_dir;
 

@@ -8,8 +8,8 @@ use motion::judge::{self, Errors, Sum};
 use motion::live;
 use motion::{Joint, Motion, Recorded, Role, Settings, butterworth};
 use nalgebra::Vector3;
-use score::{Bootstrap, Share};
 use serde_json::{Value, json};
+use statistics::score::{Bootstrap, Share};
 use wording::Table;
 
 /// What is compared, in the order of tables.

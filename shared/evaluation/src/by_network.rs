@@ -7,7 +7,7 @@ use multiview::{
 };
 use nalgebra::Point3;
 use posenetwork::JointMaps;
-use score::Point;
+use statistics::score::Point;
 
 use crate::plain::{Sighting, dropping, linear};
 

@@ -1,6 +1,6 @@
 //! The paper's tables for LaTeX.
 
-use score::{Bootstrap, SEGMENT_NAMES};
+use statistics::score::{Bootstrap, SEGMENT_NAMES};
 
 use crate::{Group, Pictures, Summary, Version, published};
 

@@ -1,6 +1,6 @@
 //! Evaluation on single pictures of annotated people (PARSE, LSP).
 
-use score::{
+use statistics::score::{
     Bootstrap, Offset, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, Share, evaluate, offsets,
 };
 

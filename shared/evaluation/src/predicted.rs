@@ -1,8 +1,8 @@
 //! Quality of the expected errors, on which adaptive selection depends.
 
-use score::{area_under_roc, rank_correlation};
 use serde::{Deserialize, Serialize};
 use skeleton::{N_PARTS, PART_NAMES};
+use statistics::score::{area_under_roc, rank_correlation};
 
 /// Expected and true errors of one view; one number per part, pixels of the frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,7 @@
 //! Results frame by frame, as they are stored on disk so that a run can be resumed.
 
-use score::Point;
 use serde::{Deserialize, Serialize};
+use statistics::score::Point;
 
 use crate::Predicted;
 

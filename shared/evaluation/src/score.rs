@@ -3,8 +3,8 @@
 use datasets::sequences::{Frame, Sequence};
 use geometry::Camera;
 use nalgebra::Point3;
-use score::{Point, aligned, joint_errors, segment_errors, segments};
 use skeleton::SIDES;
+use statistics::score::{Point, aligned, joint_errors, segment_errors, segments};
 
 use crate::{FrameResult, parse14};
 

@@ -1,7 +1,7 @@
 //! Aggregates scores by sequence, by action over all subjects, by subject, and over all.
 
-use score::{Bootstrap, Changes, PcpRule, Report, Share};
 use serde::Serialize;
+use statistics::score::{Bootstrap, Changes, PcpRule, Report, Share};
 
 use crate::{FrameScore, Judgement};
 
@@ -76,7 +76,7 @@ pub struct Numbers {
     pub gain: Option<f64>,
     /// Its confidence interval, frame by frame against the first version.
     pub gain_interval: Option<[f64; 2]>,
-    /// Percent of each segment, in the order of `score::SEGMENT_NAMES`.
+    /// Percent of each segment, in the order of `statistics::score::SEGMENT_NAMES`.
     pub parts: Vec<Option<f64>>,
     /// Threshold and percent.
     pub curve: Vec<[f64; 2]>,
@@ -247,7 +247,9 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
         pcp3d_interval: bootstrap.interval(&pcp),
         gain: Share::mean(&gains).filter(|_| is_compared),
         gain_interval: bootstrap.interval(&gains).filter(|_| is_compared),
-        parts: (0..score::SEGMENT_NAMES.len()).map(segment).collect(),
+        parts: (0..statistics::score::SEGMENT_NAMES.len())
+            .map(segment)
+            .collect(),
         curve: curve(&own),
         mpjpe_mm: Share::mean(&errors),
         mpjpe_interval: bootstrap.interval(&errors),

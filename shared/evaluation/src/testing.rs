@@ -1,7 +1,7 @@
 //! An evaluation with made-up numbers, for the tests of what shows one: of this crate, and with the feature `testing` of
 //! others.
 
-use score::Bootstrap;
+use statistics::score::Bootstrap;
 
 use crate::{Combining, FrameScore, Measured, Summary, Terms, Version, summarise};
 

@@ -1,7 +1,7 @@
 //! The 14 true joints that all joint sets share, and true positions of the 26 parts.
 
-use score::Point;
 use skeleton::{JointSet, MIRROR, N_PARTS, PARSE14};
+use statistics::score::Point;
 
 /// The 14 joints of `skeleton::PARSE14`, out of those of another set.
 ///

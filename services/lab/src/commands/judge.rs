@@ -12,9 +12,9 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use inputs::Joints;
 use lab::judged::{self, Reader};
-use score::Bootstrap;
 use serde_json::json;
 use skeleton::PARSE14;
+use statistics::score::Bootstrap;
 use terminal::{Globals, Terminal, output};
 
 /// The progress bar.

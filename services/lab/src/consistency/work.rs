@@ -10,7 +10,7 @@ use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use kernels::Rgb8View;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
-use score::Point as Joint;
+use statistics::score::Point as Joint;
 
 use crate::failures::film_failure;
 

@@ -14,7 +14,7 @@ use pipeline::{
 };
 use posenetwork::springs::TurnedSprings;
 use posenetwork::{Detector, PoseNetwork};
-use score::Point;
+use statistics::score::Point;
 
 /// Opens what every view has for itself.
 pub trait OpenView {

@@ -16,8 +16,8 @@ use posenetwork::springs::TurnedSprings;
 use posenetwork::{
     Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
 };
-use score::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
 use skeleton::PARSE14;
+use statistics::score::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
 
 use super::as_run::{self, AsRun};
 

@@ -7,8 +7,8 @@ use datasets::People;
 use evaluation::page::pictures_html;
 use evaluation::{Intervals, Judged, Pictures, pictures_latex};
 use failure::{ExitKind, Failure, OrFail as _, in_file};
-use score::Bootstrap;
 use serde_json::{Value, json};
+use statistics::score::Bootstrap;
 
 use crate::judged;
 

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use formats::trc::Trc;
 use geometry::Rig;
 use geometry::files::ReadOptions;
-use score::Point;
 use serde::Deserialize;
 use skeleton::JointSet;
+use statistics::score::Point;
 
 use crate::sequences::error::{invalid, text};
 use crate::sequences::{Frame, Options, Sequence, SequenceError, View};

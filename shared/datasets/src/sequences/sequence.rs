@@ -1,8 +1,8 @@
 //! The common form of all data sets.
 
 use geometry::Rig;
-use score::Point;
 use skeleton::JointSet;
+use statistics::score::Point;
 
 /// One person doing one action in front of one rig.
 #[derive(Debug, Clone, PartialEq)]

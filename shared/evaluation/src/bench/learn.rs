@@ -5,7 +5,7 @@ use datasets::sequences::Sequence;
 use kernels::Rgb8View;
 use multiview::{ViewInput, angle_between};
 use nalgebra::Point3;
-use score::Point;
+use statistics::score::Point;
 
 use super::Bench;
 use crate::{parse14, part_errors_and_facing, projected, size};

@@ -1,7 +1,7 @@
 //! The paper's figures as SVG: bars of every part, curves over the threshold, histograms of changes.
 
 use crate::{ChangesOf, Group};
-use score::SEGMENT_NAMES;
+use statistics::score::SEGMENT_NAMES;
 
 use report::html::Html;
 use report::put;

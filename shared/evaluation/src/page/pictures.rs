@@ -1,7 +1,7 @@
 //! The page of single pictures.
 
 use crate::{Pictures, number};
-use score::Bootstrap;
+use statistics::score::Bootstrap;
 
 use report::parts::{about_table, begin};
 use report::put;

@@ -4,7 +4,7 @@
 
 use crate::testing::made_up;
 use crate::{Judgement, Pictures};
-use score::{Bootstrap, SEGMENT_NAMES};
+use statistics::score::{Bootstrap, SEGMENT_NAMES};
 
 use super::figure::{tick, top};
 use super::*;

@@ -12,7 +12,7 @@ use lab::eval::as_run::{AsRun, OpenView};
 use lab::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
 use posenetwork::springs::TurnedSprings;
 use posenetwork::{Detector, PoseNetwork};
-use score::Bootstrap;
+use statistics::score::Bootstrap;
 use terminal::{Globals, Terminal, output};
 
 use super::Arguments;

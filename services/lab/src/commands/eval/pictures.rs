@@ -8,8 +8,8 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use lab::eval::pictures;
 use lab::judged::{self, Reader};
-use score::Bootstrap;
 use skeleton::PARSE14;
+use statistics::score::Bootstrap;
 use terminal::{Globals, Terminal, output};
 
 use super::Arguments;

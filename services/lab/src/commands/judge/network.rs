@@ -11,8 +11,8 @@ use inputs::library::Library;
 use lab::judged;
 use lab::judged_network::{self, JointError, NetworkReader, Seen};
 use posenetwork::springs::TurnedSprings;
-use score::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
 use serde_json::{Value, json};
+use statistics::score::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
 use terminal::output;
 
 use super::Arguments;

@@ -9,7 +9,7 @@
 use formats::c3d::C3d;
 use geometry::rotation_from_matrix;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
-use score::Point;
+use statistics::score::Point;
 
 /// Length of the head, mm.
 const HEAD_MM: f64 = 316.103;

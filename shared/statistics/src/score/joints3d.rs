@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::Point;
-use crate::pcp3d::distance;
+use crate::score::Point;
+use crate::score::pcp3d::distance;
 
 /// Distance of every joint from the truth, in their unit.
 ///

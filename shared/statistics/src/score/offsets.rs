@@ -5,7 +5,7 @@
 //! trunk: a knee that is found too high on the thigh has a negative one. *Across* is positive away from the body where the
 //! limb hangs down: to the left in the picture for right limbs, to the right for left ones.
 
-use crate::{Bootstrap, Share};
+use crate::score::{Bootstrap, Share};
 
 /// Joints of `skeleton::PARSE14`.
 const N_JOINTS: usize = 14;
@@ -98,7 +98,7 @@ fn of_person(
     found: &[[f64; 2]; N_JOINTS],
     truth: &[[f64; 2]; N_JOINTS],
 ) -> [Option<[f64; 2]>; N_JOINTS] {
-    let is_found = crate::joints_found(found, truth, FOUND_WITHIN);
+    let is_found = crate::score::joints_found(found, truth, FOUND_WITHIN);
     let height = height(truth);
     std::array::from_fn(|joint| {
         let from = middle(truth, BONES[joint]);

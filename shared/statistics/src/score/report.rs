@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::pck::{PCK_GROUPS, joints_found};
-use crate::pcp::{PARSE_STICKS, Pcp, PcpRule, sticks_found};
+use crate::score::pck::{PCK_GROUPS, joints_found};
+use crate::score::pcp::{PARSE_STICKS, Pcp, PcpRule, sticks_found};
 
 /// PCK thresholds, as shares of the person's size.
 pub const PCK_SHARES: [f64; 2] = [0.1, 0.2];

@@ -3,7 +3,6 @@
 //! In three dimensions: [`segment_errors`] (PCP3D, the paper's eq. 13), [`joint_errors`] and [`aligned`]
 //! (MPJPE and its Procrustes form, 3D PCK), [`Changes`] against a baseline, and [`Bootstrap`] intervals of
 //! any of them.
-#![forbid(unsafe_code)]
 
 mod offsets;
 mod pck;

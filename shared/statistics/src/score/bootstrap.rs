@@ -1,6 +1,6 @@
 //! Confidence intervals by resampling frames (bootstrap).
 
-use statistics::Sorted;
+use crate::Sorted;
 
 /// The contribution of one frame to a mean: the sum and the number of its values.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -2,7 +2,7 @@
 
 use skeleton::JointSet;
 
-use crate::Point;
+use crate::score::Point;
 
 /// A segment of the body: the mean of some joints at either end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
