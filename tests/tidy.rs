@@ -47,7 +47,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "terminal",
         ],
     ),
-    ("paper", &["consistency", "fmp", "multiview", "viewquality"]),
+    ("paper", &["fmp", "multiview", "viewquality"]),
     (
         "frame",
         &[

@@ -3,10 +3,12 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use consistency::{JointFile, JointsLearned, LearnedSet, Marked, best_local, mean_error, try_all};
 use datasets::{Person, SkeletonTable};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Model, Search};
+use multiview::learned::{
+    JointFile, JointsLearned, LearnedSet, Marked, best_local, mean_error, try_all,
+};
 use rayon::prelude::*;
 
 use crate::failures::dataset_failure;
@@ -22,7 +24,7 @@ pub struct Learned {
     /// The file.
     pub file: JointFile,
     /// What was tried: reach, ridge, and the error of every data set on people that were left out.
-    pub tried: Vec<consistency::Tried>,
+    pub tried: Vec<multiview::learned::Tried>,
 }
 
 /// A data set, found.

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use consistency::{JointFile, Learned};
 use deployment::{is_none, is_shipped};
 use failure::{ExitKind, Failure, in_file, no_text};
+use multiview::learned::{JointFile, Learned};
 use skeleton::{JointMap, JointSet};
 
 use super::model_bytes;

@@ -23,12 +23,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use consistency::{Appearance, Learned, Shape};
 use deployment::Deployment;
 use failure::{ExitKind, Failure, OrFail as _, no_text};
 use fmp::Model;
 use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
+use multiview::learned::{Appearance, Learned, Shape};
 use multiview::{Compatibility, TypeTables};
 use nalgebra::UnitVector3;
 use pipeline::PairTables;

@@ -122,7 +122,7 @@ mod tests {
         let n_parts = model.parts.len();
         viewquality::Network::parse(Shipped::Network.bytes().to_vec(), n_parts).unwrap();
         let text = core::str::from_utf8(Shipped::Consistency.bytes()).unwrap();
-        consistency::Learned::parse(text).unwrap();
+        multiview::learned::Learned::parse(text).unwrap();
         viewquality::orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
         crate::springs(Path::new(SHIPPED)).unwrap();
         let library = crate::library::Library::BuiltIn;
@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn the_joints_that_ship_belong_to_the_model_that_ships() {
         let text = core::str::from_utf8(Shipped::Joints.bytes()).unwrap();
-        let file = consistency::JointFile::parse(text).unwrap();
+        let file = multiview::learned::JointFile::parse(text).unwrap();
         let model = formats::checksum::fnv1a(Shipped::Model.bytes());
         assert_eq!(file.model, format!("{model:016x}"));
     }

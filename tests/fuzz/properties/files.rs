@@ -1,6 +1,5 @@
 //! What must hold of every reader of files, whatever is in them.
 
-use consistency::{Appearance, JointFile, Learned};
 use datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use deployment::{AnyMachine, Loaded, Stage, Topology};
 use exports::{FILES, Gathering, Trial};
@@ -11,6 +10,7 @@ use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisy
 use keypoints::files::{NameSet, SeenKeypoints, coco, openpose};
 use motion::{Joint, Recorded, Role};
 use multiview::Compatibility;
+use multiview::learned::{Appearance, JointFile, Learned};
 use rigs::boards::{corners_text, parse_corners};
 use runfiles::{
     FrameLine, LatencyReport, Line, RunSummary, Running, SmoothReport, TimesLine, ViewLine,

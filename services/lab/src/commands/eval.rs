@@ -10,7 +10,6 @@ use std::process::ExitCode;
 use std::sync::{Arc, Mutex};
 
 use clap::Args;
-use consistency::Learned;
 use datasets::Selection;
 use datasets::sequences::{Alignment, Sequence};
 use deployment::energy_numbers;
@@ -20,6 +19,7 @@ use failure::{Claim, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use inputs::Shipped;
 use lab::eval::{Done, Fusion, Job};
+use multiview::learned::Learned;
 use skeleton::JointSet;
 use viewquality::{Forecaster, Network, Table};
 

@@ -5,7 +5,6 @@ use std::io::{Seek as _, SeekFrom, Write as _};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use consistency::Learned;
 use datasets::sequences::{Frame, Sequence};
 use evaluation::{
     Bench, Expectation, Film, FilmSettings, Header, Predicted, Record, Setup, SingleView, Trial,
@@ -13,6 +12,7 @@ use evaluation::{
 };
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop, in_file, read_text};
 use fmp::Model;
+use multiview::learned::Learned;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
 use skeleton::{JointMap, JointSet, PARSE14};
 use viewquality::orientation::Detector;

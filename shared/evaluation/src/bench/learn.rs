@@ -1,8 +1,8 @@
 //! Compares single views with the truth: the training data of the consistency terms.
 
-use consistency::{Learner, Pair, ViewObservation};
 use datasets::sequences::Sequence;
 use kernels::Rgb8View;
+use multiview::learned::{Learner, Pair, ViewObservation};
 use multiview::{ViewInput, angle_between};
 use nalgebra::Point3;
 use statistics::score::Point;

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use ::consistency::Learned;
 use clap::Args;
 use evaluation::FilmSettings;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use lab::consistency::{Done, Job, Learning, Sequences};
+use multiview::learned::Learned;
 
 use crate::commands::eval::size;
 use terminal::{Globals, Terminal, output};

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use proptest::prelude::*;
 use skeleton::{MIRROR, N_PARTS, PARSE14};
 
-use crate::*;
+use crate::learned::*;
 
 fn shape() -> Shape {
     Shape {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::Weights;
+use crate::learned::Weights;
 
 /// The grid of values.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,8 +103,8 @@ impl Grid {
         let at = at.unwrap_or_default();
         let alphas = &self.alphas[at.saturating_sub(1)..(at + 2).min(self.alphas.len())];
         let forms = [
-            (crate::Appearance::Joint, &self.joint_betas),
-            (crate::Appearance::Lift, &self.lift_betas),
+            (crate::learned::Appearance::Joint, &self.joint_betas),
+            (crate::learned::Appearance::Lift, &self.lift_betas),
         ];
         let mut all = Vec::new();
         for (appearance, betas) in forms {
@@ -126,7 +126,7 @@ fn without_appearance(alpha: f64, max_distance_cells: Option<f64>) -> Weights {
         alpha,
         beta: 0.0,
         max_distance_cells,
-        appearance: crate::Appearance::Lift,
+        appearance: crate::learned::Appearance::Lift,
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use skeleton::{JointSet, MIRROR, N_PARTS};
 
-use crate::JointWeights;
+use crate::learned::JointWeights;
 
 /// One person in one picture: the detected parts, named by the side of the body, and a true joint.
 #[derive(Debug, Clone, Copy)]

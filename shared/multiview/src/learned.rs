@@ -7,7 +7,6 @@
 //!
 //! [`Local`] learns from single views of marked people where joints lie among the parts around them; [`JointFile`] is
 //! the file with that. Nothing here reads a file or a clock.
-#![forbid(unsafe_code)]
 
 mod counts;
 mod file;

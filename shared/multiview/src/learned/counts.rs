@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use multiview::{Compatibility, TypeTables};
+use crate::{Compatibility, TypeTables};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 

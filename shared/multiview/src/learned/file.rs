@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use multiview::{AngleTables, TypeTables};
+use crate::{AngleTables, TypeTables};
 use serde::{Deserialize, Serialize};
 use skeleton::{JointMap, JointSet};
 
-use crate::counts::{Appearance, Counts, Shape, marginals};
+use crate::learned::counts::{Appearance, Counts, Shape, marginals};
 
 /// The format name of a consistency file.
 const FORMAT: &str = "parallax-consistency";
@@ -94,9 +94,9 @@ pub struct Weights {
 }
 
 impl Default for Weights {
-    /// Those of `multiview::Settings`.
+    /// Those of `crate::Settings`.
     fn default() -> Self {
-        let settings = multiview::Settings::default();
+        let settings = crate::Settings::default();
         let cap = settings.max_distance_cells;
         Self {
             alpha: settings.alpha,

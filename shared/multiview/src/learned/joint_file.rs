@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use skeleton::{JointMap, JointSet, N_PARTS, PARSE14};
 
-use crate::local::own;
+use crate::learned::local::own;
 
 /// The format name of a file of joints.
 const FORMAT: &str = "parallax-joints";
@@ -104,7 +104,7 @@ pub enum JointFileError {
 }
 
 impl JointFile {
-    /// A file of the rows that [`Local::learn`](crate::Local::learn) gave.
+    /// A file of the rows that [`Local::learn`](crate::learned::Local::learn) gave.
     ///
     /// * `model`: fingerprint of the model file.
     pub fn new(model: String, rows: Vec<Vec<f64>>, learned: JointsLearned) -> Self {

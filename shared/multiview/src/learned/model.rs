@@ -2,7 +2,7 @@
 
 use fmp::Model;
 
-use crate::Shape;
+use crate::learned::Shape;
 
 impl Shape {
     /// The number of types of every part of a model, and the parts on the other side.

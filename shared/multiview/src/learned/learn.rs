@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 use skeleton::{JointSet, N_PARTS, PARENT};
 use statistics::Sorted;
 
-use crate::counts::{Counts, Shape};
-use crate::joints::{JointFit, JointSample};
-use crate::{Learned, LearnedFrom, ModelOf, NamedPair, NamedRig, Weights};
+use crate::learned::counts::{Counts, Shape};
+use crate::learned::joints::{JointFit, JointSample};
+use crate::learned::{Learned, LearnedFrom, ModelOf, NamedPair, NamedRig, Weights};
 
 /// Settings of the learning.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +55,7 @@ pub struct ViewObservation {
 pub struct Pair<'a> {
     /// What was observed in each.
     pub views: [&'a ViewObservation; 2],
-    /// The angle from the first to the second as seen from the person (`multiview::angle_between`), radians.
+    /// The angle from the first to the second as seen from the person (`crate::angle_between`), radians.
     pub angle: Option<f64>,
     /// Names of the two cameras, if their pair is also learned by name.
     pub cameras: Option<[&'a str; 2]>,
@@ -189,7 +189,8 @@ impl Learner {
     /// Mean lift of another learner's types under the tables of this one: the mean over all parts of `ln p(a,
     /// b) / (p(a) p(b))`; above 0 if the tables are informative.
     pub fn lift_on(&self, other: &Self) -> Option<f64> {
-        let marginals = crate::marginals(&self.shape, &self.ring.iter().collect::<Vec<_>>());
+        let marginals =
+            crate::learned::marginals(&self.shape, &self.ring.iter().collect::<Vec<_>>());
         let (mut sum, mut n) = (0.0, 0.0);
         for (own, theirs) in self.ring.iter().zip(&other.ring) {
             for exchanged in [false, true] {

@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use skeleton::{HUMANEVA20, JointSet, MIRROR, N_PARTS, PARSE14, UMPM15};
 
-use crate::local::own;
-use crate::{JointFile, JointsLearned, LearnedSet, Local, Marked, best_local, try_all};
+use crate::learned::local::own;
+use crate::learned::{JointFile, JointsLearned, LearnedSet, Local, Marked, best_local, try_all};
 
 /// What is one and the same for all these tests: reach and ridge.
 const SETTINGS: Local = Local {
