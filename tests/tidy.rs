@@ -18,14 +18,7 @@ use std::process::Command;
 const LAYERS: &[(&str, &[&str])] = &[
     (
         "ground",
-        &[
-            "files",
-            "formats",
-            "kernels",
-            "skeleton",
-            "statistics",
-            "wording",
-        ],
+        &["files", "formats", "kernels", "skeleton", "statistics"],
     ),
     (
         "tools",

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use failure::wording::Table;
 use failure::{ExitKind, Failure, in_file};
 use motion::finished::{self, Run};
 use motion::judge::{self, Errors, Sum};
@@ -10,7 +11,6 @@ use motion::{Joint, Motion, Recorded, Role, Settings, butterworth};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use statistics::score::{Bootstrap, Share};
-use wording::Table;
 
 /// What is compared, in the order of tables.
 const METHODS: [&str; 5] = ["raw", "rts", "rts, constant bones", "butterworth", "kalman"];

@@ -11,7 +11,7 @@
 //! | frame | [`stage`](../stage/index.html), [`wire`](../wire/index.html), [`runtime`](../runtime/index.html), [`client`](../client/index.html), [`pipeline`](../pipeline/index.html), [`posenetwork`](../posenetwork/index.html), [`inputs`](../inputs/index.html), [`report`](../report/index.html) |
 //! | paper | [`fmp`](../fmp/index.html), [`multiview`](../multiview/index.html), [`viewquality`](../viewquality/index.html) |
 //! | tools | [`geometry`](../geometry/index.html), [`calibration`](../calibration/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`recording`](../recording/index.html), [`runfiles`](../runfiles/index.html), [`exports`](../exports/index.html), [`motion`](../motion/index.html), [`keypoints`](../keypoints/index.html), [`inference`](../inference/index.html), [`deployment`](../deployment/index.html), [`hosts`](../hosts/index.html), [`failure`](../failure/index.html), [`terminal`](../terminal/index.html) |
-//! | ground | [`skeleton`](../skeleton/index.html), [`kernels`](../kernels/index.html), [`formats`](../formats/index.html), [`files`](../files/index.html), [`statistics`](../statistics/index.html), [`wording`](../wording/index.html) |
+//! | ground | [`skeleton`](../skeleton/index.html), [`kernels`](../kernels/index.html), [`formats`](../formats/index.html), [`files`](../files/index.html), [`statistics`](../statistics/index.html) |
 //! | laboratory | [`lab`](../lab/index.html), [`datasets`](../datasets/index.html), [`training`](../training/index.html), [`networktraining`](../networktraining/index.html), [`evaluation`](../evaluation/index.html) |
 //!
 //! For tests only: [`testkit`](../testkit/index.html).

@@ -24,7 +24,7 @@ impl View<'_> {
             Ok(scope) => scope,
             Err(error) => {
                 if !state.has_failed {
-                    let error = wording::in_one_line(&error);
+                    let error = failure::wording::in_one_line(&error);
                     tracing::warn!(
                         frame = stamp.frame,
                         error,

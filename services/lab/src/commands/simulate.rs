@@ -8,9 +8,9 @@ use std::process::ExitCode;
 use ::hosts::{Costs, Forecast, Load, forecast};
 use clap::{Args, Subcommand};
 use failure::Failure;
+use failure::wording::Table;
 use serde_json::json;
 use terminal::output;
-use wording::Table;
 
 /// The costs of the machine that the guide names, with the network that ships.
 const DEFAULT: Costs = Costs {

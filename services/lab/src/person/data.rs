@@ -45,7 +45,11 @@ pub struct Chosen {
 /// The text is not a skeleton table.
 pub fn parse_skeleton(file: &Path, text: &str) -> Result<SkeletonTable, Failure> {
     SkeletonTable::parse(text).map_err(|error| {
-        let message = format!("{}: {}", file.display(), wording::in_one_line(&error));
+        let message = format!(
+            "{}: {}",
+            file.display(),
+            failure::wording::in_one_line(&error)
+        );
         Failure::new(ExitKind::Input, message)
     })
 }

@@ -1,8 +1,8 @@
 //! A snapshot of a deployment as text: a table of the processes, and one of their times.
 
+use failure::wording::Table;
 use messages::{Cause, UNMEASURED};
 use runtime::metrics::{Reading, Timed};
-use wording::Table;
 
 use super::snapshot::{ProcessSnapshot, Snapshot, State};
 

@@ -5,9 +5,9 @@ use std::io::Write as _;
 use std::path::Path;
 
 use failure::Failure;
+use failure::wording::Table;
 use report::run::Limit;
 use serde_json::{Value, json};
-use wording::Table;
 
 use super::provenance::Provenance;
 

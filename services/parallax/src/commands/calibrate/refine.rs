@@ -5,11 +5,11 @@ use std::process::ExitCode;
 use calibration::people::Recording;
 use calibration::refine::{Outcome, Settings, refine};
 use clap::Args;
+use failure::wording::Table;
 use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use launch::films::Poses;
 use serde_json::{Value, json};
 use terminal::{Globals, output};
-use wording::Table;
 
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};

@@ -13,7 +13,7 @@ pub fn chain<'a>(
 ///
 /// ```
 /// let error = std::io::Error::other("the disk is full");
-/// assert_eq!(wording::in_one_line(&error), "the disk is full");
+/// assert_eq!(failure::wording::in_one_line(&error), "the disk is full");
 /// ```
 pub fn in_one_line(error: &(dyn Error + 'static)) -> String {
     let texts: Vec<String> = chain(error).map(ToString::to_string).collect();

@@ -1,6 +1,5 @@
 //! Error texts for users: an error with its causes in one line, the texts of TOML and JSON parsers and of the transport in
 //! words that users know; and words of commands, quoted; and tables, aligned.
-#![forbid(unsafe_code)]
 
 mod causes;
 mod table;
@@ -13,8 +12,8 @@ pub use table::Table;
 /// A word of a command that is printed, quoted where a shell would take it for something else.
 ///
 /// ```
-/// assert_eq!(wording::shell("runs/one.toml"), "runs/one.toml");
-/// assert_eq!(wording::shell("room 1 #a/it's.toml"), r"'room 1 #a/it'\''s.toml'");
+/// assert_eq!(failure::wording::shell("runs/one.toml"), "runs/one.toml");
+/// assert_eq!(failure::wording::shell("room 1 #a/it's.toml"), r"'room 1 #a/it'\''s.toml'");
 /// ```
 #[must_use]
 pub fn shell(word: impl Display) -> String {
@@ -31,7 +30,7 @@ pub fn shell(word: impl Display) -> String {
 /// ```
 /// let text = "line 3: invalid type: string \"x\", expected u64";
 /// assert_eq!(
-///     wording::in_words(text),
+///     failure::wording::in_words(text),
 ///     "line 3: expected a whole number of at least 0, found the text \"x\""
 /// );
 /// ```

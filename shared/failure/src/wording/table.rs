@@ -5,7 +5,7 @@ use core::fmt;
 /// A table with a line of titles.
 ///
 /// ```
-/// let mut table = wording::Table::new(["<camera", "rms, px"]);
+/// let mut table = failure::wording::Table::new(["<camera", "rms, px"]);
 /// table.row(["left".to_owned(), "0.31".to_owned()]);
 /// assert_eq!(table.to_string(), "camera  rms, px\nleft       0.31");
 /// ```
