@@ -29,7 +29,6 @@ const LAYERS: &[(&str, &[&str])] = &[
             "failure",
             "footage",
             "geometry",
-            "hosts",
             "inference",
             "keypoints",
             "messages",

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::hosts::{Gaussian, MOST_GAUSSIANS, Maps, MapsError};
 use fmp::{Bound, Bounds, Layout, Region, Scope};
-use hosts::{Gaussian, MOST_GAUSSIANS, Maps, MapsError};
 use messages::EvidenceHeader;
 use posenetwork::{Bump, MOST_OF_A_JOINT, MapSettings, bumps, fill_from_bumps};
 use recording::Kind;

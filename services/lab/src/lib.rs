@@ -11,6 +11,7 @@ mod searches;
 pub mod consistency;
 pub mod eval;
 pub mod examples;
+pub mod forecast;
 pub mod joints;
 pub mod judged;
 pub mod judged_network;

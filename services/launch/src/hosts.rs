@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use bridge::hosts::Fingerprint;
 use bridge::{Address, KeyFiles, NearHost, ViewMaps};
 use deployment::hosts::{Carry, Host};
 use deployment::paper::Errors;
 use deployment::{Deployment, network};
 use failure::{ExitKind, Failure, OrFail as _};
-use hosts::Fingerprint;
 use messages::topic;
 
 use crate::prepare::{Prepared, View};

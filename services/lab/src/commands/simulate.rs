@@ -5,10 +5,10 @@ mod report;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use ::hosts::{Costs, Forecast, Load, forecast};
 use clap::{Args, Subcommand};
 use failure::Failure;
 use failure::wording::Table;
+use lab::forecast::{Costs, Forecast, Load, forecast};
 use serde_json::json;
 use terminal::output;
 

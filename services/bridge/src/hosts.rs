@@ -9,15 +9,12 @@
 //! | what waits to be sent: the newest of every lane, and no more than a few on their way | [`Outbox`] |
 //! | which frame of the run a message is for, and what became of the others | [`Arrivals`] |
 //! | whether two hosts have the same files | [`Fingerprint`] |
-//! | how many hosts a number of cameras needs | [`Costs`], [`forecast`] |
 //!
 //! No socket, no clock and no file: `services/bridge` has those.
-#![forbid(unsafe_code)]
 
 mod arrivals;
 mod clock;
 mod fingerprint;
-mod forecast;
 mod hello;
 mod maps;
 mod outbox;
@@ -27,7 +24,6 @@ mod signal;
 pub use arrivals::{Arrivals, Gap, Grid, Place, Tally};
 pub use clock::{Clock, Estimate, Exchange, ExchangeError};
 pub use fingerprint::{Difference, Fingerprint};
-pub use forecast::{Costs, Forecast, Load, forecast};
 pub use hello::{Answer, Hello, HelloError, Welcome};
 pub use maps::{Gaussian, MOST_GAUSSIANS, Maps, MapsError};
 pub use outbox::{Outbox, Parcel, Sent};

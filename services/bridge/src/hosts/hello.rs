@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::VERSION;
-use crate::fingerprint::{Difference, Fingerprint};
+use crate::hosts::VERSION;
+use crate::hosts::fingerprint::{Difference, Fingerprint};
 
 /// The longest introduction or answer, bytes.
 const MOST_BYTES: usize = 1 << 16;
@@ -11,7 +11,7 @@ const MOST_BYTES: usize = 1 << 16;
 /// A host that wants to take part.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {
-    /// [`crate::VERSION`] of its link.
+    /// [`crate::hosts::VERSION`] of its link.
     pub version: u16,
     /// Its name.
     pub host: String,

@@ -2,8 +2,8 @@
 
 use formats::checksum::fnv1a;
 
-use crate::VERSION;
-use crate::packet::Content;
+use crate::hosts::VERSION;
+use crate::hosts::packet::Content;
 
 const MAGIC: [u8; 4] = *b"PXHS";
 const BYTES: usize = 56;

@@ -3,7 +3,7 @@
 use formats::checksum::fnv1a;
 use messages::Status;
 
-use crate::VERSION;
+use crate::hosts::VERSION;
 
 const MAGIC: [u8; 4] = *b"PXHP";
 /// Bytes before the body.
@@ -20,7 +20,7 @@ const MOST_SKEW: u64 = 3_600_000_000_000;
 pub enum Content {
     /// A frame as JPEG; empty without a picture.
     Frame,
-    /// Poses of a view, as in a recording; after them its [`Maps`](crate::Maps), where they cross.
+    /// Poses of a view, as in a recording; after them its [`Maps`](crate::hosts::Maps), where they cross.
     ViewPose,
     /// Expected errors of a view, as in a recording.
     ViewQuality,
