@@ -60,7 +60,6 @@ const LAYERS: &[(&str, &[&str])] = &[
             "capture",
             "fuse",
             "pose",
-            "publish",
             "quality",
             "record",
             "results",

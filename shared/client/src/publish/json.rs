@@ -4,8 +4,8 @@ use core::fmt::Write as _;
 
 use serde_json::Value;
 
-use crate::MOST_BYTES;
-use crate::frame::{Frame, Place};
+use crate::publish::MOST_BYTES;
+use crate::publish::frame::{Frame, Place};
 
 /// One line of JSON about a person of a frame; none if it does not even fit without the names of the joints.
 ///

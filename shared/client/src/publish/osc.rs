@@ -1,7 +1,7 @@
 //! A person of a frame as bundles of Open Sound Control 1.0.
 
-use crate::MOST_BYTES;
-use crate::frame::Frame;
+use crate::publish::MOST_BYTES;
+use crate::publish::frame::Frame;
 
 /// The time tag that means at once.
 const AT_ONCE: u64 = 1;
@@ -107,7 +107,7 @@ fn plain(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::json::tests::frame;
+    use crate::publish::json::tests::frame;
 
     /// The addresses and bytes of arguments of a bundle, read as the specification says.
     fn messages(bundle: &[u8]) -> Vec<(String, Vec<u8>)> {

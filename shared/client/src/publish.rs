@@ -2,7 +2,6 @@
 //!
 //! A program beside the deployment, which reads it as any other does (`client`): no process of the pipeline waits for it, and
 //! what the receiver does not take is lost and counted. [`json_datagram`] and [`osc_datagrams`] are pure.
-#![forbid(unsafe_code)]
 
 mod beside;
 mod frame;

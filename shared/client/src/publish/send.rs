@@ -6,13 +6,13 @@ use std::io;
 use std::net::UdpSocket;
 use std::time::Instant;
 
-use client::{Client, State, Wish};
+use crate::{Client, State, Wish};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 
-use crate::frame::Frame;
-use crate::json::{json_datagram, json_names};
-use crate::osc::osc_datagrams;
-use crate::target::{Form, Target};
+use crate::publish::frame::Frame;
+use crate::publish::json::{json_datagram, json_names};
+use crate::publish::osc::osc_datagrams;
+use crate::publish::target::{Form, Target};
 
 /// Moments that may wait to be sent.
 const MOST_WAITING: usize = 64;
@@ -54,7 +54,7 @@ pub fn run(
         outlets.push(Outlet::open(*target).or_fail(ExitKind::Run)?);
     }
     let wish = Wish::skeletons().every_frame(MOST_WAITING);
-    let failed = |error: client::ClientError| {
+    let failed = |error: crate::ClientError| {
         let hint = error.hint();
         let failure = Failure::new(ExitKind::Run, error.to_string());
         match hint {

@@ -1,6 +1,6 @@
 //! One person of a frame, as it is sent.
 
-use client::{Joint, Moment};
+use crate::{Joint, Moment};
 use messages::{Sides, Status};
 
 /// One person of a frame, or a frame with nobody.
