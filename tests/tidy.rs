@@ -68,10 +68,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         ],
     ),
     ("whole runs", &["launch", "trials", "view"]),
-    (
-        "laboratory",
-        &["datasets", "evaluation", "networktraining", "training"],
-    ),
+    ("laboratory", &["datasets", "evaluation", "training"]),
     ("executables", &["lab", "parallax"]),
 ];
 

@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use datasets::{Person as Annotated, Picture, ReadOptions, Sides, SkeletonTable};
 use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
-use networktraining::pose::{
+use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace};
+use training::networks::pose::{
     MIRROR, Marks, N_JOINTS, Person, SIDE, Source, Target, exchange_sides,
 };
-use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace};
 
 use super::crop::Crop;
 use super::{People, Work};

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use datasets::{Picture, ReadOptions, Selection};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
-use networktraining::quality::sample::Sample;
-use networktraining::quality::store::Samples;
 use rayon::prelude::*;
+use training::networks::quality::sample::Sample;
+use training::networks::quality::store::Samples;
 use viewquality::TileShape;
 
 use super::observer::Observer;
