@@ -68,7 +68,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         ],
     ),
     ("whole runs", &["launch", "trials", "view"]),
-    ("laboratory", &["datasets", "evaluation", "training"]),
+    ("laboratory", &["evaluation", "training"]),
     ("executables", &["lab", "parallax"]),
 ];
 

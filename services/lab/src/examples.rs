@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::model_page::Examples;
-use datasets::Picture;
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::{Layout, Model, Pose, Search};
 use footage::{Canvas, Fill, Size, Warp, resize_map};
 use rayon::prelude::*;
+use training::datasets::Picture;
 
 /// Most examples of a type.
 const MOST: usize = 4;

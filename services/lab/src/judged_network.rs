@@ -1,6 +1,5 @@
 //! A network on pictures of people whose joints are known: what it finds in their true boxes.
 
-use datasets::{People, Person, Picture, Sides};
 use evaluation::{Joints, Pictures};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Layout, Pose, Search};
@@ -9,6 +8,7 @@ use pipeline::ViewSettings;
 use posenetwork::springs::{TurnedSprings, joint_of};
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Turn, outline_of};
 use skeleton::PARSE14;
+use training::datasets::{People, Person, Picture, Sides};
 
 use crate::judged::{go_on, pictures, truth};
 use inputs::pictures::{BOXES_PX, Picture as Shown, Searched};

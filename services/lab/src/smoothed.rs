@@ -83,8 +83,11 @@ fn truth(
     recorded: &Recorded,
     frames: &[u64],
 ) -> Result<Vec<Vec<Option<Vector3<f64>>>>, Failure> {
-    let sequences = datasets::sequences::read(path, &datasets::sequences::Options::default())
-        .map_err(|error| in_file(path, &error))?;
+    let sequences = training::datasets::sequences::read(
+        path,
+        &training::datasets::sequences::Options::default(),
+    )
+    .map_err(|error| in_file(path, &error))?;
     let [sequence] = &sequences[..] else {
         let what = format!(
             "{}: {} sequences, expected one",

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use datasets::SkeletonTable;
 use failure::{Console, ExitKind, Failure, OrFail as _};
 use posenetwork::springs::{SpringSettings, WINDOW_CELLS, learn};
+use training::datasets::SkeletonTable;
 
 use crate::failures::dataset_failure;
 use crate::judged;
@@ -43,7 +43,7 @@ pub fn train(
     let (mut people, mut sets) = (Vec::new(), Vec::new());
     for ((path, options), sides) in chosen.datasets.iter().zip(&options).zip(sides) {
         let sides = sides_of(&sides)?;
-        let read = datasets::read(path, options).map_err(dataset_failure)?;
+        let read = training::datasets::read(path, options).map_err(dataset_failure)?;
         for problem in &read.problems {
             console.message(&format!("left out: {problem}: {}", problem.fault));
         }

@@ -1,9 +1,9 @@
 //! The frames of a sequence, all views in step, framed as the pipeline takes them.
 
-use datasets::sequences::Sequence;
 use footage::{Fill, FootageError, Size, Source, SourceSpec, Warp, WarpError};
 use geometry::{Camera, Framing, FramingError, OutSize, upright_roll};
 use kernels::Rgb8View;
+use training::datasets::sequences::Sequence;
 
 /// How frames are derived from footage.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,7 +72,7 @@ impl Film {
     /// [`FilmError`], which names the camera.
     pub fn open(sequence: &Sequence, settings: &FilmSettings) -> Result<Self, FilmError> {
         let views = sequence.views.iter().zip(sequence.rig.cameras());
-        let reel = |(view, camera): (&datasets::sequences::View, &Camera)| {
+        let reel = |(view, camera): (&training::datasets::sequences::View, &Camera)| {
             let name = || camera.name.clone();
             let spec = SourceSpec {
                 start: view.first,

@@ -45,7 +45,7 @@ pub fn published(dataset: &str, subject: &str, action: &str, version: Version) -
 
 #[cfg(test)]
 mod tests {
-    use datasets::sequences::PAPER_TEST;
+    use training::datasets::sequences::PAPER_TEST;
 
     use super::*;
 

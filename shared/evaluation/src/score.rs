@@ -1,10 +1,10 @@
 //! Scores the result of one version on one frame.
 
-use datasets::sequences::{Frame, Sequence};
 use geometry::Camera;
 use nalgebra::Point3;
 use skeleton::SIDES;
 use statistics::score::{Point, aligned, joint_errors, segment_errors, segments};
+use training::datasets::sequences::{Frame, Sequence};
 
 use crate::{FrameResult, parse14};
 

@@ -8,6 +8,7 @@
 
 mod album;
 mod confuse;
+pub mod datasets;
 mod dual;
 mod example;
 mod filters;

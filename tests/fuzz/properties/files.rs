@@ -1,6 +1,5 @@
 //! What must hold of every reader of files, whatever is in them.
 
-use datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use deployment::{AnyMachine, Loaded, Stage, Topology};
 use exports::{FILES, Gathering, Trial};
 use fmp::Model;
@@ -18,6 +17,7 @@ use runfiles::{
 use scene::Address;
 use scene::truth::{Frame, Header};
 use training::Checkpoint;
+use training::datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use viewquality::{Card, Network, Table, Tau};
 
 /// A payload behind our own header, of version 1.

@@ -10,8 +10,6 @@ use std::process::ExitCode;
 use std::sync::{Arc, Mutex};
 
 use clap::Args;
-use datasets::Selection;
-use datasets::sequences::{Alignment, Sequence};
 use deployment::energy_numbers;
 use deployment::paper::{Config, Consistency};
 use evaluation::{FilmSettings, Version};
@@ -21,6 +19,8 @@ use inputs::Shipped;
 use lab::eval::{Done, Fusion, Job};
 use multiview::learned::Learned;
 use skeleton::JointSet;
+use training::datasets::Selection;
+use training::datasets::sequences::{Alignment, Sequence};
 use viewquality::{Forecaster, Network, Table};
 
 use super::judge::selection;
@@ -318,7 +318,7 @@ fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
 }
 
 fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
-    let options = datasets::sequences::Options {
+    let options = training::datasets::sequences::Options {
         alignment: if arguments.umpm_late {
             Alignment::OneLate
         } else {
@@ -328,7 +328,7 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
     };
     let mut all: Vec<Sequence> = Vec::new();
     for path in &arguments.sequences {
-        let read = datasets::sequences::read(path, &options);
+        let read = training::datasets::sequences::read(path, &options);
         for mut sequence in read.map_err(lab::sequence_failure)? {
             sequence.thin_out(arguments.every, arguments.frames);
             if all

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use datasets::sequences::{Frame, Sequence};
 use evaluation::{Bench, Combining, Film, FilmSettings, Setup, Terms, Trial, Version, score};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
@@ -11,6 +10,7 @@ use kernels::Rgb8View;
 use multiview::learned::{Grid, Learned, Learner, Point, Settings, Shape, Tally, Weights, best};
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
 use statistics::score::Point as Joint;
+use training::datasets::sequences::{Frame, Sequence};
 
 use crate::failures::film_failure;
 

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use datasets::sequences::Sequence;
 use evaluation::Film;
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
@@ -15,6 +14,7 @@ use pipeline::{
 use posenetwork::springs::TurnedSprings;
 use posenetwork::{Detector, PoseNetwork};
 use statistics::score::Point;
+use training::datasets::sequences::Sequence;
 
 /// Opens what every view has for itself.
 pub trait OpenView {

@@ -1,6 +1,5 @@
 //! Sequences judged on the keypoints of a network, undisturbed and under stress: in space, and by what everyone does.
 
-use datasets::sequences::{Frame, Sequence};
 use evaluation::{
     Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
     projected,
@@ -18,6 +17,7 @@ use posenetwork::{
 };
 use skeleton::PARSE14;
 use statistics::score::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
+use training::datasets::sequences::{Frame, Sequence};
 
 use super::as_run::{self, AsRun};
 

@@ -5,7 +5,6 @@ use std::io::{Seek as _, SeekFrom, Write as _};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use datasets::sequences::{Frame, Sequence};
 use evaluation::{
     Bench, Expectation, Film, FilmSettings, Header, Predicted, Record, Setup, SingleView, Trial,
     Version, parse14, part_errors, projected, read_records, tenth_of,
@@ -15,6 +14,7 @@ use fmp::Model;
 use multiview::learned::Learned;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
 use skeleton::{JointMap, JointSet, PARSE14};
+use training::datasets::sequences::{Frame, Sequence};
 use viewquality::orientation::Detector;
 use viewquality::{ForecastInput, Forecaster, Table};
 

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use datasets::SkeletonTable;
 use failure::Failure;
 use fmp::{Model, Scope};
 use nalgebra::{Point3, Vector3};
+use training::datasets::SkeletonTable;
 use viewquality::Sampler;
 use viewquality::orientation::{Sample, Tile};
 

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use datasets::{Person, Picture, Sample, SkeletonTable};
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::Fill;
 use rayon::prelude::*;
+use training::datasets::{Person, Picture, Sample, SkeletonTable};
 use training::{Album, AlbumError};
 
 use super::data::Data;

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use datasets::Problem;
 use failure::{Console, ExitKind, Failure, Stop};
 use serde_json::{Map, Value, json};
+use training::datasets::Problem;
 use training::{Event, Gap, Step, Watch};
 
 /// Tells a console what is being done, and how long it will take.

@@ -1,11 +1,11 @@
 //! Compares single views with the truth: the training data of the consistency terms.
 
-use datasets::sequences::Sequence;
 use kernels::Rgb8View;
 use multiview::learned::{Learner, Pair, ViewObservation};
 use multiview::{ViewInput, angle_between};
 use nalgebra::Point3;
 use statistics::score::Point;
+use training::datasets::sequences::Sequence;
 
 use super::Bench;
 use crate::{parse14, part_errors_and_facing, projected, size};

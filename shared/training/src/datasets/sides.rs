@@ -4,7 +4,7 @@ use core::str::FromStr;
 
 use statistics::Sorted;
 
-use crate::Person;
+use crate::datasets::Person;
 
 /// The convention of left and right for the joints of a data set.
 ///
@@ -41,7 +41,7 @@ impl Sides {
     /// Applies the convention to the joints of a person.
     ///
     /// * `joint_mirror`: the joint on the other side for every joint, see
-    ///   [`SkeletonTable::joint_mirror`](crate::SkeletonTable::joint_mirror).
+    ///   [`SkeletonTable::joint_mirror`](crate::datasets::SkeletonTable::joint_mirror).
     ///
     /// # Panics
     ///
@@ -87,7 +87,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::SkeletonTable;
+    use crate::datasets::SkeletonTable;
 
     /// A person that faces the camera, arms and legs apart: the right side is on the left of the picture.
     fn facing() -> Person {

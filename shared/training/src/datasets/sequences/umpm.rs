@@ -12,8 +12,8 @@ use geometry::files::ReadOptions;
 use nalgebra::Vector3;
 use skeleton::UMPM15;
 
-use crate::sequences::error::{invalid, motion, text};
-use crate::sequences::{Alignment, Frame, Options, Sequence, SequenceError, View};
+use crate::datasets::sequences::error::{invalid, motion, text};
+use crate::datasets::sequences::{Alignment, Frame, Options, Sequence, SequenceError, View};
 
 const CAMERAS: [&str; 4] = ["f", "l", "r", "s"];
 

@@ -6,13 +6,13 @@ use std::error::Error as _;
 use std::fs;
 use std::path::Path;
 
-use datasets::{
-    DatasetError, FaultKind, People, Person, ReadOptions, Selection, parse_joints, parse_labels,
-    read, to_line,
-};
 use proptest::prelude::*;
 use tempfile::TempDir;
 use testkit::mat::{Mat, file};
+use training::datasets::{
+    DatasetError, FaultKind, People, Person, ReadOptions, Selection, parse_joints, parse_labels,
+    read, to_line,
+};
 
 const N_JOINTS: usize = 3;
 
@@ -70,7 +70,7 @@ fn images(people: &People) -> Vec<String> {
 }
 
 fn messages(problems: &People) -> Vec<String> {
-    let full = |it: &datasets::Problem| {
+    let full = |it: &training::datasets::Problem| {
         let file = it.file.file_name().unwrap().to_string_lossy();
         format!("{file}, {}: {}", it.row, it.source().unwrap())
     };

@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::sequences::error::io;
-use crate::sequences::{Options, Sequence, SequenceError, described, humaneva, synthetic, umpm};
+use crate::datasets::sequences::error::io;
+use crate::datasets::sequences::{
+    Options, Sequence, SequenceError, described, humaneva, synthetic, umpm,
+};
 
 /// Reads all sequences that a path stands for.
 ///

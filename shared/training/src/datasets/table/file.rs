@@ -87,7 +87,7 @@ impl SkeletonTable {
     /// [`SkeletonFileError`]
     ///
     /// ```
-    /// let table = datasets::SkeletonTable::parse(
+    /// let table = training::datasets::SkeletonTable::parse(
     ///     r#"
     ///     joints = ["left hand", "right hand", "head"]
     ///     joint_mirror = [["left hand", "right hand"]]
@@ -104,7 +104,7 @@ impl SkeletonTable {
     /// )?;
     /// let parts = table.parts_of(&[[0.0, 4.0], [8.0, 4.0], [3.0, 1.0]]);
     /// assert_eq!(parts, [[3.0, 1.0], [4.0, 4.0]]);
-    /// # Ok::<(), datasets::SkeletonFileError>(())
+    /// # Ok::<(), training::datasets::SkeletonFileError>(())
     /// ```
     pub fn parse(text: &str) -> Result<Self, SkeletonFileError> {
         let file: Skeleton = toml::from_str(text)?;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Fault, Person};
+use crate::datasets::{Fault, Person};
 
 /// The content of a line.
 #[derive(Debug, Serialize, Deserialize)]

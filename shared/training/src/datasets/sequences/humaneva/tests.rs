@@ -6,7 +6,7 @@ use testkit::c3d::{Processor, write};
 
 use super::body::tests::person;
 use super::*;
-use crate::sequences::tests::{rig, touch};
+use crate::datasets::sequences::tests::{rig, touch};
 
 #[test]
 fn the_paper_tests_on_4493_frames_of_each_camera() {
@@ -55,7 +55,7 @@ fn a_subject_is_read_with_synchronised_streams() {
     let dir = tempfile::tempdir().unwrap();
     subject(dir.path());
     // The parent folder is that of the data set.
-    let got = crate::sequences::read(dir.path(), &Options::default()).unwrap();
+    let got = crate::datasets::sequences::read(dir.path(), &Options::default()).unwrap();
     let [walking] = &got[..] else {
         panic!("{} sequences", got.len())
     };
@@ -84,13 +84,13 @@ fn missing_files_are_named() {
     let dir = tempfile::tempdir().unwrap();
     let folder = subject(dir.path());
     std::fs::remove_file(folder.join("Image_Data/Walking_1_(C2).avi")).unwrap();
-    let got = crate::sequences::read(&folder, &Options::default()).unwrap_err();
+    let got = crate::datasets::sequences::read(&folder, &Options::default()).unwrap_err();
     assert!(got.to_string().contains("(C2)"), "{got}");
     std::fs::remove_file(folder.join("Mocap_Data/S1.mp")).unwrap();
     touch(&folder.join("Image_Data/Walking_1_(C2).avi"));
-    let got = crate::sequences::read(&folder, &Options::default()).unwrap_err();
+    let got = crate::datasets::sequences::read(&folder, &Options::default()).unwrap_err();
     assert!(got.to_string().contains("S1.mp"), "{got}");
     std::fs::remove_file(folder.join("Mocap_Data/Walking_1.c3d")).unwrap();
-    let got = crate::sequences::read(&folder, &Options::default());
+    let got = crate::datasets::sequences::read(&folder, &Options::default());
     assert!(matches!(got, Err(SequenceError::Unknown { .. })), "{got:?}");
 }

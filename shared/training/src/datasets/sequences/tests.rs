@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use skeleton::{PARSE14, UMPM15};
 use testkit::c3d::{Processor, Trial, write};
 
-use crate::sequences::{Alignment, Options, SequenceError, read};
+use crate::datasets::sequences::{Alignment, Options, SequenceError, read};
 
 /// Cameras on a circle of 4 m.
 pub(crate) fn rig(names: &[&str], size: [u32; 2]) -> Rig {
@@ -77,7 +77,7 @@ fn every_second_pose_of_umpm_belongs_to_a_frame() {
         let got = read(dir.path(), &options).unwrap().remove(0);
         assert_eq!((got.action.as_str(), got.joints), ("Chair", &UMPM15));
         assert_eq!(got.views.len(), 4);
-        let pose = |it: &crate::sequences::Frame| {
+        let pose = |it: &crate::datasets::sequences::Frame| {
             let [x, y, _] = it.joints[14].unwrap();
             assert!((y - 0.014).abs() < 1e-9, "metres, of the first person");
             (it.index, (x * 1000.0).round() as u32)

@@ -2,7 +2,7 @@
 
 use footage::{Affine, Fill, FootageError, Size, Warp, WarpError};
 
-use crate::{Person, Picture};
+use crate::datasets::{Person, Picture};
 
 /// One annotated person and the image.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +29,7 @@ impl Sample {
     /// The mirror image: `x` becomes `width - 1 - x`, and the joints of the left side those of the right.
     ///
     /// * `joint_mirror`: the joint on the other side for every joint, see
-    ///   [`SkeletonTable::joint_mirror`](crate::SkeletonTable::joint_mirror).
+    ///   [`SkeletonTable::joint_mirror`](crate::datasets::SkeletonTable::joint_mirror).
     ///
     /// # Panics
     ///

@@ -1,6 +1,6 @@
 //! Which people of a data set are read, and which of their faults are accepted.
 
-use crate::{FaultKind, Selection};
+use crate::datasets::{FaultKind, Selection};
 
 /// Which people of a data set are read, and which faults are accepted.
 #[derive(Debug, Clone, PartialEq)]

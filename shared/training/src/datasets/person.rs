@@ -12,7 +12,7 @@ pub struct Person {
     /// The place in the data set, for messages.
     pub row: String,
     /// The joints, `[x, y]` in pixels, the centre of the top-left pixel at `(0, 0)`. Unknown joints
-    /// are NaN; there are none unless [`ReadOptions::unknown_joints`](crate::ReadOptions) is set.
+    /// are NaN; there are none unless [`ReadOptions::unknown_joints`](crate::datasets::ReadOptions) is set.
     pub joints: Vec<[f64; 2]>,
     /// Whether the joint is visible according to the annotation.
     pub visible: Vec<bool>,

@@ -9,8 +9,8 @@ use serde::Deserialize;
 use skeleton::JointSet;
 use statistics::score::Point;
 
-use crate::sequences::error::{invalid, text};
-use crate::sequences::{Frame, Options, Sequence, SequenceError, View};
+use crate::datasets::sequences::error::{invalid, text};
+use crate::datasets::sequences::{Frame, Options, Sequence, SequenceError, View};
 
 /// The description. Paths are relative to its file.
 #[derive(Debug, Deserialize)]

@@ -4,10 +4,10 @@
 pub const PRESETS: [&str; 4] = ["cmu", "pose2sim", "parallax", "optitrack36"];
 
 const TEXTS: [&str; 4] = [
-    include_str!("../../../../../configs/markers/cmu.toml"),
-    include_str!("../../../../../configs/markers/pose2sim.toml"),
-    include_str!("../../../../../configs/markers/parallax.toml"),
-    include_str!("../../../../../configs/markers/optitrack36.toml"),
+    include_str!("../../../../../../configs/markers/cmu.toml"),
+    include_str!("../../../../../../configs/markers/pose2sim.toml"),
+    include_str!("../../../../../../configs/markers/parallax.toml"),
+    include_str!("../../../../../../configs/markers/optitrack36.toml"),
 ];
 
 /// The text of one of [`PRESETS`].

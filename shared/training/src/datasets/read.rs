@@ -5,9 +5,9 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::check::{Row, validate};
-use crate::mat_files::Annotation;
-use crate::{
+use crate::datasets::check::{Row, validate};
+use crate::datasets::mat_files::Annotation;
+use crate::datasets::{
     MatLayoutError, People, Person, Problem, ReadOptions, SelectError, Selection, parse_joints,
     parse_labels, parse_line,
 };

@@ -6,8 +6,8 @@ use geometry::files::ReadOptions;
 use serde::Deserialize;
 use skeleton::PARSE14;
 
-use crate::sequences::error::{invalid, text};
-use crate::sequences::{Frame, Options, Sequence, SequenceError, View};
+use crate::datasets::sequences::error::{invalid, text};
+use crate::datasets::sequences::{Frame, Options, Sequence, SequenceError, View};
 
 /// The file that identifies such a folder.
 pub(crate) const TRUTH: &str = "truth.jsonl";

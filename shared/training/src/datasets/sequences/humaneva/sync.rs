@@ -1,6 +1,6 @@
 //! Synchronisation of the streams of a trial.
 
-use crate::sequences::SyncError;
+use crate::datasets::sequences::SyncError;
 
 /// The content of an `.ofs` file: a frame of the camera, the frame of motion capture at the same time, and the
 /// number of frames of motion capture per frame of the camera. Frames count from 1.

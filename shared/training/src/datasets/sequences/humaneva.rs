@@ -14,8 +14,8 @@ use geometry::files::ReadOptions;
 use nalgebra::Vector3;
 use skeleton::HUMANEVA20;
 
-use crate::sequences::error::{invalid, motion, text};
-use crate::sequences::{Frame, Options, Sequence, SequenceError, SyncError, View};
+use crate::datasets::sequences::error::{invalid, motion, text};
+use crate::datasets::sequences::{Frame, Options, Sequence, SequenceError, SyncError, View};
 use body::{Body, Measures};
 use sync::Offset;
 pub use sync::Sync;

@@ -23,7 +23,6 @@
 //! | `name` | optional, no two people of a file may have the same |
 //!
 //! Other keys are refused.
-#![forbid(unsafe_code)]
 
 mod person;
 pub mod sequences;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use footage::{FootageError, Size};
 use rayon::prelude::*;
 
-use crate::{Fault, People, Person, Problem, ReadOptions};
+use crate::datasets::{Fault, People, Person, Problem, ReadOptions};
 
 /// A person of a data set as it was read, not validated yet.
 #[derive(Debug)]
