@@ -68,7 +68,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         ],
     ),
     ("whole runs", &["launch", "trials", "view"]),
-    ("laboratory", &["evaluation", "training"]),
+    ("laboratory", &["training"]),
     ("executables", &["lab", "parallax"]),
 ];
 

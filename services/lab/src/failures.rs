@@ -1,6 +1,6 @@
 //! Exit status of the errors of data sets, sequences, films and networks.
 
-use evaluation::FilmError;
+use crate::evaluation::FilmError;
 use failure::{ExitKind, Failure};
 use training::datasets::DatasetError;
 use training::datasets::sequences::SequenceError;

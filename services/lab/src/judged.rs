@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use evaluation::{Joints, Pictures};
+use crate::evaluation::{Joints, Pictures};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Layout, Pose, Search};
 use rayon::prelude::*;

@@ -1,6 +1,6 @@
 //! A network on pictures of people whose joints are known: what it finds in their true boxes.
 
-use evaluation::{Joints, Pictures};
+use crate::evaluation::{Joints, Pictures};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Layout, Pose, Search};
 use keypoints::Keypoint;

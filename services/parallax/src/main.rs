@@ -12,7 +12,7 @@
 //! | paper | [`fmp`](../fmp/index.html), [`multiview`](../multiview/index.html), [`viewquality`](../viewquality/index.html) |
 //! | tools | [`geometry`](../geometry/index.html), [`calibration`](../calibration/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`recording`](../recording/index.html), [`runfiles`](../runfiles/index.html), [`exports`](../exports/index.html), [`motion`](../motion/index.html), [`keypoints`](../keypoints/index.html), [`inference`](../inference/index.html), [`deployment`](../deployment/index.html), [`failure`](../failure/index.html), [`terminal`](../terminal/index.html) |
 //! | ground | [`skeleton`](../skeleton/index.html), [`kernels`](../kernels/index.html), [`formats`](../formats/index.html), [`files`](../files/index.html), [`statistics`](../statistics/index.html) |
-//! | laboratory | [`lab`](../lab/index.html), [`training`](../training/index.html), [`evaluation`](../evaluation/index.html) |
+//! | laboratory | [`lab`](../lab/index.html), [`training`](../training/index.html) |
 //!
 //! For tests only: [`testkit`](../testkit/index.html).
 //!

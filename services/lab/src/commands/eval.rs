@@ -12,11 +12,11 @@ use std::sync::{Arc, Mutex};
 use clap::Args;
 use deployment::energy_numbers;
 use deployment::paper::{Config, Consistency};
-use evaluation::{FilmSettings, Version};
 use failure::{Claim, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use inputs::Shipped;
 use lab::eval::{Done, Fusion, Job};
+use lab::evaluation::{FilmSettings, Version};
 use multiview::learned::Learned;
 use skeleton::JointSet;
 use training::datasets::Selection;
@@ -391,7 +391,7 @@ fn paper_section(file: Option<&Path>) -> Result<Config, Failure> {
 fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Failure> {
     let expects = arguments.sigma.is_some() || arguments.network.is_some() || arguments.oracle;
     if let [_, ..] = arguments.versions[..] {
-        let adaptive = |it: &Version| it.terms == evaluation::Terms::Adaptive;
+        let adaptive = |it: &Version| it.terms == lab::evaluation::Terms::Adaptive;
         if !expects && arguments.versions.iter().any(adaptive) {
             let message = "adaptive selection needs expected errors: --network FILE, --sigma FILE or --oracle";
             return Err(Failure::new(ExitKind::Usage, message));

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use evaluation::Judged;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use inputs::Joints;
+use lab::evaluation::Judged;
 use lab::judged::{self, Reader};
 use serde_json::json;
 use skeleton::PARSE14;

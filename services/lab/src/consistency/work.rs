@@ -3,7 +3,9 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use evaluation::{Bench, Combining, Film, FilmSettings, Setup, Terms, Trial, Version, score};
+use crate::evaluation::{
+    Bench, Combining, Film, FilmSettings, Setup, Terms, Trial, Version, score,
+};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use kernels::Rgb8View;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use evaluation::Film;
+use crate::evaluation::Film;
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::Camera;

@@ -1,6 +1,6 @@
 //! Sequences judged on the keypoints of a network, undisturbed and under stress: in space, and by what everyone does.
 
-use evaluation::{
+use crate::evaluation::{
     Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
     projected,
 };

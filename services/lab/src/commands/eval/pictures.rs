@@ -2,10 +2,10 @@
 
 use std::process::ExitCode;
 
-use evaluation::{Judged, Pictures};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use lab::eval::pictures;
+use lab::evaluation::{Judged, Pictures};
 use lab::judged::{self, Reader};
 use skeleton::PARSE14;
 use statistics::score::Bootstrap;

@@ -4,10 +4,10 @@ use core::fmt;
 use std::path::Path;
 use std::process::ExitCode;
 
-use evaluation::{Intervals, Judged, Pictures};
 use failure::{Console, ExitKind, Failure, Stop};
 use fmp::Search;
 use inputs::library::Library;
+use lab::evaluation::{Intervals, Judged, Pictures};
 use lab::judged;
 use lab::judged_network::{self, JointError, NetworkReader, Seen};
 use posenetwork::springs::TurnedSprings;

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use evaluation::FilmSettings;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use lab::consistency::{Done, Job, Learning, Sequences};
+use lab::evaluation::FilmSettings;
 use multiview::learned::Learned;
 
 use crate::commands::eval::size;

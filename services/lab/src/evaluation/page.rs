@@ -3,7 +3,7 @@
 mod figure;
 mod pictures;
 
-use crate::{Group, Numbers, Summary, Version, number, overall, published};
+use crate::evaluation::{Group, Numbers, Summary, Version, number, overall, published};
 
 use figure::{bars, colour, curves, histogram};
 use report::html::Html;

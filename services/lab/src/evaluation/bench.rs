@@ -17,7 +17,7 @@ use pipeline::{
 use rayon::prelude::*;
 use skeleton::{JointMap, PARSE14};
 
-use crate::{Combining, FrameResult, Terms, Version};
+use crate::evaluation::{Combining, FrameResult, Terms, Version};
 
 /// The configuration without the cameras.
 #[derive(Debug, Clone)]
@@ -106,7 +106,7 @@ impl Bench {
     /// Prepares the versions for a rig.
     ///
     /// * `cameras`: of the frames, in the order of the views.
-    /// * `footage_from_frame`: for each of them; see [`Film::footage_from_frame`](crate::Film::footage_from_frame).
+    /// * `footage_from_frame`: for each of them; see [`Film::footage_from_frame`](crate::evaluation::Film::footage_from_frame).
     ///
     /// # Errors
     ///

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use statistics::score::{Bootstrap, Changes, PcpRule, Report, Share};
 
-use crate::{FrameScore, Judgement};
+use crate::evaluation::{FrameScore, Judgement};
 
 /// Error in 3D up to which a joint counts as found, metres.
 const PCK_M: f64 = 0.15;

@@ -1,6 +1,6 @@
 //! The page of single pictures.
 
-use crate::{Pictures, number};
+use crate::evaluation::{Pictures, number};
 use statistics::score::Bootstrap;
 
 use report::parts::{about_table, begin};

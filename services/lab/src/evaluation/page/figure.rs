@@ -1,6 +1,6 @@
 //! The paper's figures as SVG: bars of every part, curves over the threshold, histograms of changes.
 
-use crate::{ChangesOf, Group};
+use crate::evaluation::{ChangesOf, Group};
 use statistics::score::SEGMENT_NAMES;
 
 use report::html::Html;

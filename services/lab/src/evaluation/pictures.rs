@@ -4,7 +4,7 @@ use statistics::score::{
     Bootstrap, Offset, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, Share, evaluate, offsets,
 };
 
-use crate::Joints;
+use crate::evaluation::Joints;
 
 /// The results on the pictures of one data set.
 #[derive(Debug, Clone, PartialEq)]
@@ -165,7 +165,7 @@ fn columns<'a>(names: impl Iterator<Item = &'a str>, last: &'a str) -> Vec<Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pictures_latex;
+    use crate::evaluation::pictures_latex;
 
     fn person(x: f64) -> Joints {
         core::array::from_fn(|it| [x + 10.0 * (it % 4) as f64, 25.0 * (it / 4) as f64])

@@ -58,7 +58,7 @@ pub fn tenth_of(joints: &[[f64; 2]]) -> f64 {
 /// The true error of every part of a pose, in tenths of the person's size: the longer side of the
 /// rectangle around the true joints.
 ///
-/// Used for [adaptive selection](crate::Terms::Adaptive) with the truth instead of a network: with thresholds
+/// Used for [adaptive selection](crate::evaluation::Terms::Adaptive) with the truth instead of a network: with thresholds
 /// of 1 a part is switched off if its error exceeds a tenth of the person's size. Where the model's left and
 /// right may be exchanged (a person seen from behind), the better of the two readings counts.
 ///

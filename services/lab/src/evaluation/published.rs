@@ -1,6 +1,6 @@
 //! The numbers published in the paper, for comparison.
 
-use crate::{Combining, Terms, Version};
+use crate::evaluation::{Combining, Terms, Version};
 
 /// Data set, subject, action; then FMP, geometric, with appearance, with adaptive selection.
 type Row = (&'static str, &'static str, &'static str, [f64; 4]);

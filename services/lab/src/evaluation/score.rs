@@ -6,7 +6,7 @@ use skeleton::SIDES;
 use statistics::score::{Point, aligned, joint_errors, segment_errors, segments};
 use training::datasets::sequences::{Frame, Sequence};
 
-use crate::{FrameResult, parse14};
+use crate::evaluation::{FrameResult, parse14};
 
 /// The errors of one version on one frame.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -2,7 +2,7 @@
 
 use statistics::score::{Bootstrap, SEGMENT_NAMES};
 
-use crate::{Group, Pictures, Summary, Version, published};
+use crate::evaluation::{Group, Pictures, Summary, Version, published};
 
 /// Tables of PCP3D: a row for each group, then a row for each version with all parts; the paper's numbers in
 /// parentheses, where it has any.
@@ -80,7 +80,7 @@ pub fn overall(summary: &Summary) -> impl Iterator<Item = &Group> {
 
 /// Ours, and the paper's in parentheses.
 fn cells(group: &Group, versions: &[Version]) -> Vec<String> {
-    let cell = |(version, it): (&Version, &crate::Numbers)| {
+    let cell = |(version, it): (&Version, &crate::evaluation::Numbers)| {
         let ours = number(it.pcp3d, 2);
         match published(&group.dataset, &group.subject, &group.action, *version) {
             Some(theirs) => format!("{ours} ({theirs:.2})"),
@@ -121,7 +121,7 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::made_up;
+    use crate::evaluation::testing::made_up;
 
     #[test]
     fn the_tables_have_our_numbers_and_the_papers() {

@@ -9,7 +9,7 @@ use nalgebra::Point3;
 use posenetwork::JointMaps;
 use statistics::score::Point;
 
-use crate::plain::{Sighting, dropping, linear};
+use crate::evaluation::plain::{Sighting, dropping, linear};
 
 /// Number of joints: those of `skeleton::PARSE14`.
 const N: usize = 14;

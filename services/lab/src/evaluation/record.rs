@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use statistics::score::Point;
 
-use crate::Predicted;
+use crate::evaluation::Predicted;
 
 /// The first line of a file of records.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,7 +3,7 @@
 
 use statistics::score::Bootstrap;
 
-use crate::{Combining, FrameScore, Measured, Summary, Terms, Version, summarise};
+use crate::evaluation::{Combining, FrameScore, Measured, Summary, Terms, Version, summarise};
 
 /// Two subjects of `HumanEva` who box, 5 frames each, by three versions, each better than the one before it.
 pub(crate) fn made_up() -> (Summary, Vec<Version>) {

@@ -2,8 +2,8 @@
 
 #![expect(clippy::print_stderr, reason = "a test reports that it is skipped")]
 
-use crate::testing::made_up;
-use crate::{Judgement, Pictures};
+use crate::evaluation::testing::made_up;
+use crate::evaluation::{Judgement, Pictures};
 use statistics::score::{Bootstrap, SEGMENT_NAMES};
 
 use super::figure::{tick, top};

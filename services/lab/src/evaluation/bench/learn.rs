@@ -8,7 +8,7 @@ use statistics::score::Point;
 use training::datasets::sequences::Sequence;
 
 use super::Bench;
-use crate::{parse14, part_errors_and_facing, projected, size};
+use crate::evaluation::{parse14, part_errors_and_facing, projected, size};
 
 impl Bench {
     /// Solves every view of an instant alone, and adds them to the learners.
