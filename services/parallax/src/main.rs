@@ -14,7 +14,7 @@
 //! | ground | [`skeleton`](../skeleton/index.html), [`kernels`](../kernels/index.html), [`formats`](../formats/index.html), [`files`](../files/index.html), [`statistics`](../statistics/index.html) |
 //! | laboratory | [`lab`](../lab/index.html), [`training`](../training/index.html) |
 //!
-//! For tests only: [`testkit`](../testkit/index.html).
+//! For tests only: `testkit`, in `tests/harness`.
 //!
 //! Start with [`pipeline`](../pipeline/index.html) for the path of a frame, [`multiview`](../multiview/index.html) for the
 //! energy, [`messages`](../messages/index.html) for the messages between processes.
