@@ -11,7 +11,6 @@ mod searches;
 
 pub mod consistency;
 pub mod eval;
-pub mod examples;
 pub mod forecast;
 pub mod joints;
 pub mod judged;
