@@ -47,7 +47,6 @@ const LAYERS: &[(&str, &[&str])] = &[
             "inputs",
             "pipeline",
             "posenetwork",
-            "report",
             "runtime",
             "stage",
             "wire",

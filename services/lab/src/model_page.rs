@@ -10,9 +10,9 @@ mod springs;
 
 use fmp::{Model, files::describe};
 
+use exports::report::html::{Html, STYLE};
+use exports::report::{html, put};
 use figure::Figure;
-use report::html::{Html, STYLE};
-use report::{html, put};
 
 /// Draws a model.
 ///

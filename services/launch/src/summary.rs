@@ -13,9 +13,9 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use exports::report::run::Verdict;
 use failure::{ExitKind, Failure};
 use messages::Refusal;
-use report::run::Verdict;
 use runfiles::{CameraFit, Doubt, LatencyReport, Summary};
 use runtime::metrics::Reading;
 use serde_json::{Value, json};

@@ -5,10 +5,10 @@ mod pictures;
 
 use crate::evaluation::{Group, Numbers, Summary, Version, number, overall, published};
 
+use exports::report::html::Html;
+use exports::report::parts::{about_table, begin};
+use exports::report::{html, put};
 use figure::{bars, colour, curves, histogram};
-use report::html::Html;
-use report::parts::{about_table, begin};
-use report::{html, put};
 
 pub use pictures::pictures_html;
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use report::curves::{self, Line, Panel};
+use exports::report::curves::{self, Line, Panel};
 use training::networks::pose::{self, About, Cost, PoseTask, Score, Settings};
 use training::networks::{Backend, Parameter, TrainError, Trainer};
 

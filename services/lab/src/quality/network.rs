@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use report::curves::{self, Line, Panel};
+use exports::report::curves::{self, Line, Panel};
 use serde_json::json;
 use training::networks::quality::judge::Judgement;
 use training::networks::quality::sample::Sample;

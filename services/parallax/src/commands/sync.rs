@@ -350,7 +350,7 @@ fn write_page(
     if arguments.by == By::Movement {
         about.extend(each.map(|(name, finder)| (format!("joints of {name}"), finder.clone())));
     }
-    let page = report::clocks::html(&report::clocks::Page {
+    let page = exports::report::clocks::html(&exports::report::clocks::Page {
         names,
         outcome,
         is_heard: arguments.by == By::Sound,

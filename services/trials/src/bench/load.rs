@@ -1,8 +1,8 @@
 //! Benchmarks of whole deployments under load.
 
+use exports::report::run::Limit;
 use failure::wording::Table;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
-use report::run::Limit;
 use serde_json::{Value, json};
 use terminal::output::{self, Verbosity};
 

@@ -4,9 +4,9 @@ use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::Path;
 
+use exports::report::run::Limit;
 use failure::Failure;
 use failure::wording::Table;
-use report::run::Limit;
 use serde_json::{Value, json};
 
 use super::provenance::Provenance;

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use exports::report::run::Limit;
 use failure::wording::Table;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
-use report::run::Limit;
 use runtime::{Policy, RealTime, Scheduling};
 use serde_json::{Value, json};
 use terminal::output::{self, Verbosity};

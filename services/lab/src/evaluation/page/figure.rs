@@ -3,8 +3,8 @@
 use crate::evaluation::{ChangesOf, Group};
 use statistics::score::SEGMENT_NAMES;
 
-use report::html::Html;
-use report::put;
+use exports::report::html::Html;
+use exports::report::put;
 
 /// One colour for each version, distinguishable with colour blindness and on light and dark backgrounds.
 const COLOURS: [&str; 8] = [

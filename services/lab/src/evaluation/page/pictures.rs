@@ -3,8 +3,8 @@
 use crate::evaluation::{Pictures, number};
 use statistics::score::Bootstrap;
 
-use report::parts::{about_table, begin};
-use report::put;
+use exports::report::parts::{about_table, begin};
+use exports::report::put;
 
 /// One page that needs no other file.
 ///

@@ -8,7 +8,7 @@ use statistics::score::{Bootstrap, SEGMENT_NAMES};
 
 use super::figure::{tick, top};
 use super::*;
-use report::html::STYLE;
+use exports::report::html::STYLE;
 
 #[test]
 fn the_page_is_self_contained_with_every_table_and_figure() {

@@ -382,6 +382,6 @@ fn write_page(
         (&outcome.cameras, &offsets_s),
         (&outcome.times_s, &outcome.skeletons),
     );
-    let page = report::walk::of_people(outcome, &walk.names(), &about, &pictures);
+    let page = exports::report::walk::of_people(outcome, &walk.names(), &about, &pictures);
     files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))
 }

@@ -98,7 +98,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         let offsets_s: Vec<f64> = outcome.changes.iter().map(|it| it.offset_s).collect();
         let skeletons = (&outcome.times_s[..], &outcome.skeletons);
         let pictures = misfits::of(&walk, (&outcome.cameras, &offsets_s), skeletons);
-        let page = report::walk::of_refinement(&outcome, &names, &about, &pictures);
+        let page = exports::report::walk::of_refinement(&outcome, &names, &about, &pictures);
         files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))?;
         output::message(format_args!("wrote {}", file.display()));
     }

@@ -1,7 +1,7 @@
 //! Who was there when: a row for every view, a tick for every result.
 
 use super::space::Space;
-use crate::html::{Html, put};
+use crate::report::html::{Html, put};
 
 /// Something that happened.
 #[derive(Debug, Clone, PartialEq)]

@@ -56,12 +56,12 @@ macro_rules! put {
         // Behind `concat!` braces cannot take variables that are not listed, which would go in unwrapped.
         $out.put_wrapped(format_args!(
             concat!($markup)
-            $(, $crate::html::Put(&$value))*
-            $(, $name = $crate::html::Put(&$name))+
+            $(, $crate::report::html::Put(&$value))*
+            $(, $name = $crate::report::html::Put(&$name))+
         ))
     };
     ($out:expr, $markup:literal $(, $value:expr)* $(,)?) => {
-        $out.put_wrapped(format_args!(concat!($markup) $(, $crate::html::Put(&$value))*))
+        $out.put_wrapped(format_args!(concat!($markup) $(, $crate::report::html::Put(&$value))*))
     };
 }
 
@@ -69,8 +69,8 @@ macro_rules! put {
 #[macro_export]
 macro_rules! html {
     ($($all:tt)+) => {{
-        let mut html = $crate::html::Html::default();
-        $crate::put!(html, $($all)+);
+        let mut html = $crate::report::html::Html::default();
+        $crate::report::put!(html, $($all)+);
         html
     }};
 }

@@ -9,7 +9,7 @@ mod timeline;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::html::{Html, STYLE, html, put};
+use crate::report::html::{Html, STYLE, html, put};
 
 pub use space::{Eye, Moment, Point, Space};
 pub use timeline::Mark;

@@ -4,8 +4,8 @@ use core::fmt::Write as _;
 
 use calibration::synchronisation::{Curve, Outcome, PairReport};
 
-use crate::html::{Html, put};
-use crate::parts::{about_table, begin, number, verdict};
+use crate::report::html::{Html, put};
+use crate::report::parts::{about_table, begin, number, verdict};
 
 const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 150.0;

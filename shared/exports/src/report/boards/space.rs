@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2x3, Point3, Vector2};
 
 use super::Page;
-use crate::html::{Html, html, put};
+use crate::report::html::{Html, html, put};
 
 /// Side of a view in the page.
 const SIDE: f64 = 300.0;

@@ -2,7 +2,7 @@
 
 use calibration::board::{CameraOutcome, Residual};
 
-use crate::html::{Html, html, put};
+use crate::report::html::{Html, html, put};
 
 /// Width of the picture in the page.
 const WIDTH: f64 = 420.0;

@@ -5,9 +5,9 @@ use calibration::refine;
 use geometry::Camera;
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-use crate::html::{Html, put};
-use crate::parts::{about_table, begin, number, verdict, worst};
-use crate::run::{Eye, Moment, SCRIPT, Space};
+use crate::report::html::{Html, put};
+use crate::report::parts::{about_table, begin, number, verdict, worst};
+use crate::report::run::{Eye, Moment, SCRIPT, Space};
 
 /// Cells of a picture along each axis, and the size of its drawing.
 const CELLS: usize = 8;

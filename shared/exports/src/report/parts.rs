@@ -3,7 +3,7 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::html::{Html, STYLE, html, put};
+use crate::report::html::{Html, STYLE, html, put};
 
 /// The beginning of a page, up to its heading.
 pub fn begin(title: &str) -> Html {

@@ -6,8 +6,8 @@ mod space;
 use calibration::board::{CameraOutcome, Outcome};
 use nalgebra::Point2;
 
-use crate::html::{Html, put};
-use crate::parts::{about_table, begin, number, verdict, worst};
+use crate::report::html::{Html, put};
+use crate::report::parts::{about_table, begin, number, verdict, worst};
 
 /// The content of the page.
 #[derive(Debug, Clone)]
