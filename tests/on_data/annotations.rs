@@ -1,6 +1,6 @@
 //! The annotated people of PARSE and LSP-extended are all read without faults.
 
-use datasets::{ReadOptions, Sample, Selection, SkeletonTable, read};
+use training::datasets::{ReadOptions, Sample, Selection, SkeletonTable, read};
 
 use crate::shared_dir;
 

@@ -10,10 +10,10 @@ use formats::trc::Trc;
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
 use nalgebra::Point3;
-use orientation::{Detector, Network};
 use pipeline::{Combine, Estimator, EstimatorSettings, Views};
 use skeleton::PARSE14;
 use statistics::Sorted;
+use viewquality::orientation::{Detector, Network};
 
 use crate::shared_dir;
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use datasets::sequences::{MarkerTable, Motion, MotionError, MotionOptions, read_motion};
 use formats::c3d::{C3d, C3dError};
+use training::datasets::sequences::{MarkerTable, Motion, MotionError, MotionOptions, read_motion};
 
 use crate::shared_dir;
 

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use fmp::{Extractor, Model, Solver};
 use rayon::prelude::*;
-use score::{PcpRule, Report, evaluate};
 use serde_json::Value;
 use skeleton::PARSE14;
+use statistics::score::{PcpRule, Report, evaluate};
 
 use crate::shared_dir;
 use crate::single_view::{Evidence, Picture, json};

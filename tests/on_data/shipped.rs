@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use datasets::{Person, Picture, ReadOptions, Selection};
 use fmp::{Extractor, Layout, Responses, Solver};
 use inputs::network::NetworkFile;
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, outline_of, overlap};
 use rayon::prelude::*;
-use score::{PcpRule, evaluate};
 use skeleton::PARSE14;
+use statistics::score::{PcpRule, evaluate};
+use training::datasets::{Person, Picture, ReadOptions, Selection};
 
 use crate::shared_dir;
 
@@ -26,7 +26,7 @@ fn the_shipped_model_has_the_accuracy_of_its_card() {
         only: Some(Selection::from_argument("101-200").unwrap()),
         ..ReadOptions::default()
     };
-    let people = datasets::read(&shared.join("data/parse"), &options).unwrap();
+    let people = training::datasets::read(&shared.join("data/parse"), &options).unwrap();
     assert_eq!(people.people.len(), 100);
     let find = |person: &Person| {
         let picture = Picture::read(&person.image).unwrap();
@@ -65,7 +65,7 @@ fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_bett
         only: Some(Selection::from_argument("101-130").unwrap()),
         ..ReadOptions::default()
     };
-    let people = datasets::read(&shared.join("data/parse"), &options).unwrap();
+    let people = training::datasets::read(&shared.join("data/parse"), &options).unwrap();
     let mut memory = LookMemory::default();
     // How much the first and the last box have in common with the true one, of every person: too large, beside it.
     let mut shares = [Vec::new(), Vec::new()];

@@ -7,7 +7,7 @@ use geometry::Camera;
 use geometry::files::ReadOptions;
 use nalgebra::{Point3, Vector3};
 use people::{Detection, Keypoint, Person, Settings, Tracker, View};
-use score::Bootstrap;
+use statistics::score::Bootstrap;
 use serde_json::Value;
 
 use crate::shared_dir;

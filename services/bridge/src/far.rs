@@ -4,9 +4,9 @@ use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use crate::hosts::{Answer, Content, Grid, Head, Hello, Outbox, Packet, Parcel, Signal, VERSION};
 use crossbeam::channel::{Receiver as ChannelReceiver, Sender, bounded};
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
-use hosts::{Answer, Content, Grid, Head, Hello, Outbox, Packet, Parcel, Signal, VERSION};
 use messages::{Cause, EvidenceHeader, FrameHeader, Stamp, Status, Timing, topic};
 use recording::{Envelope, Kind, Message};
 use runtime::{Service, SliceSubscriber, Waiter, Woken};

@@ -3,8 +3,8 @@
 use core::time::Duration;
 use std::path::PathBuf;
 
+use crate::hosts::{Fingerprint, Grid};
 use deployment::hosts::Carry;
-use hosts::{Fingerprint, Grid};
 
 use crate::address::Address;
 use crate::maps::ViewMaps;

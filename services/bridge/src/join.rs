@@ -4,8 +4,10 @@ use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use crate::hosts::{
+    Answer, Clock, Difference, Exchange, Fingerprint, Hello, Signal, VERSION, Welcome,
+};
 use failure::{Stop, now_nanos};
-use hosts::{Answer, Clock, Difference, Exchange, Fingerprint, Hello, Signal, VERSION, Welcome};
 
 use crate::address::{Address, LinkError};
 use crate::link::Link;

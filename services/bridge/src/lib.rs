@@ -6,11 +6,12 @@
 //! | with cameras | sends frames as JPEG, or poses with the maps they are from as Gaussians; the newest wins | `far` |
 //! | that fuses | publishes them for the frames of its run, and says why where one is missing | `near` |
 //!
-//! The engine is Zenoh, behind the feature `zenoh`; what crosses, and the rules for it, are in `hosts`.
+//! The engine is Zenoh, behind the feature `zenoh`; what crosses, and the rules for it, are in [`hosts`], which is pure.
 #![forbid(unsafe_code)]
 
 mod address;
 mod far;
+pub mod hosts;
 mod job;
 mod join;
 mod jpeg;

@@ -1,6 +1,6 @@
 //! The maps of a view to Gaussians and back: what of the evidence crosses with the poses.
 
-use hosts::{Gaussian, MOST_GAUSSIANS, Maps, MapsError, PersonGaussians};
+use crate::hosts::{Gaussian, MOST_GAUSSIANS, Maps, MapsError, PersonGaussians};
 use messages::{EvidenceHeader, GridMessage, MAX_CANDIDATES};
 use posenetwork::{Bump, MOST_OF_A_JOINT, MapGrid, MapSettings, bumps, fill_from_bumps};
 use recording::Kind;

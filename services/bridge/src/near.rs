@@ -10,9 +10,9 @@ use core::time::Duration;
 use std::sync::Arc;
 use std::time::Instant;
 
+use crate::hosts::{Arrivals, Gap, Place, Signal};
 use crossbeam::channel::{Receiver, RecvTimeoutError};
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
-use hosts::{Arrivals, Gap, Place, Signal};
 use messages::{Cause, Status};
 use runtime::{Service, Woken};
 use stage::Stage;

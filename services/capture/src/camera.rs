@@ -6,7 +6,7 @@ use std::rc::Rc;
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use footage::{Affine, Fill, Pacer, Size, Warp};
 use messages::{CameraCounts, Cause, FrameHeader, Stamp, Status, Timing, topic};
-use metrics::Passage;
+use runtime::metrics::Passage;
 use runtime::{Place, Service, SlicePublisher, Woken};
 use stage::Stage;
 

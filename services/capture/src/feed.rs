@@ -361,7 +361,8 @@ mod tests {
 
     #[test]
     fn a_source_that_cannot_be_opened_is_an_error_with_the_cause() {
-        let refused = |spec: &SourceSpec| wording::in_one_line(&Feed::look(spec).unwrap_err());
+        let refused =
+            |spec: &SourceSpec| failure::wording::in_one_line(&Feed::look(spec).unwrap_err());
         let path = |path: &str| SourceSpec::new(path);
         assert!(refused(&path("synth://ring:2?camera=7")).contains("only c1, c2"));
         assert!(refused(&path("synth://ring:2")).contains("names no camera"));

@@ -354,7 +354,7 @@ impl Supply {
         if self.feed.is_some() || self.cause != cause {
             tracing::error!(
                 frame = self.index(),
-                error = wording::in_one_line(error),
+                error = failure::wording::in_one_line(error),
                 "no picture from this camera"
             );
         }

@@ -1,9 +1,9 @@
 //! From the section `[paper]` of a deployment to the settings of the optimiser.
 
-use consistency::Learned;
 use deployment::Views;
 use deployment::paper::{Config, Energy, Switch, Tau, TauName};
 use deployment::person::Follow;
+use multiview::learned::Learned;
 use multiview::{EnergyKind, Settings, SwitchBy};
 use viewquality::TrainingErrors;
 

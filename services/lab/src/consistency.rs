@@ -6,8 +6,8 @@ mod work;
 
 use std::path::PathBuf;
 
-use datasets::sequences::Sequence;
 use failure::Failure;
+use training::datasets::sequences::Sequence;
 
 use crate::failures::sequence_failure;
 pub use work::{Done, Job, Learning};
@@ -39,7 +39,10 @@ impl Sequences {
     ) -> Result<Self, Failure> {
         let mut all: Vec<Sequence> = Vec::new();
         for path in paths {
-            let read = datasets::sequences::read(path, &datasets::sequences::Options::default());
+            let read = training::datasets::sequences::read(
+                path,
+                &training::datasets::sequences::Options::default(),
+            );
             for mut sequence in read.map_err(sequence_failure)? {
                 sequence.thin_out(every, frames);
                 all.push(sequence);

@@ -1,9 +1,9 @@
 //! Exit status of the errors of data sets, sequences, films and networks.
 
-use datasets::DatasetError;
-use datasets::sequences::SequenceError;
-use evaluation::FilmError;
+use crate::evaluation::FilmError;
 use failure::{ExitKind, Failure};
+use training::datasets::DatasetError;
+use training::datasets::sequences::SequenceError;
 
 /// A data set that cannot be read. A selection without people is a mistake on the command line, all else is one of
 /// the data set.

@@ -3,11 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use consistency::{JointFile, JointsLearned, LearnedSet, Marked, best_local, mean_error, try_all};
-use datasets::{Person, SkeletonTable};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Model, Search};
+use multiview::learned::{
+    JointFile, JointsLearned, LearnedSet, Marked, best_local, mean_error, try_all,
+};
 use rayon::prelude::*;
+use training::datasets::{Person, SkeletonTable};
 
 use crate::failures::dataset_failure;
 use crate::judged;
@@ -22,7 +24,7 @@ pub struct Learned {
     /// The file.
     pub file: JointFile,
     /// What was tried: reach, ridge, and the error of every data set on people that were left out.
-    pub tried: Vec<consistency::Tried>,
+    pub tried: Vec<multiview::learned::Tried>,
 }
 
 /// A data set, found.
@@ -89,7 +91,7 @@ fn found(
     let mut sets = Vec::new();
     for ((path, options), sides) in chosen.datasets.iter().zip(&options).zip(sides) {
         let sides = sides_of(&sides)?;
-        let read = datasets::read(path, options).map_err(dataset_failure)?;
+        let read = training::datasets::read(path, options).map_err(dataset_failure)?;
         for problem in &read.problems {
             console.message(&format!("left out: {problem}: {}", problem.fault));
         }

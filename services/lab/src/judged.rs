@@ -3,14 +3,16 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use datasets::{People, Person, Picture};
-use evaluation::{Joints, Pictures};
+use crate::evaluation::{Joints, Pictures};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::{Layout, Pose, Search};
 use rayon::prelude::*;
-use score::{Offset, PARSE_STICKS, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, best_covering};
 use serde_json::{Value, json};
 use skeleton::{JointMap, N_PARTS, PARSE14};
+use statistics::score::{
+    Offset, PARSE_STICKS, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, best_covering,
+};
+use training::datasets::{People, Person, Picture};
 
 /// Most detections that are looked through for the one that lies on the person.
 const MOST: usize = 10_000;

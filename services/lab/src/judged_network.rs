@@ -1,12 +1,12 @@
 //! A network on pictures of people whose joints are known: what it finds in their true boxes.
 
-use datasets::{People, Person, Picture, Sides};
-use evaluation::{Joints, Pictures};
+use crate::evaluation::{Joints, Pictures};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use keypoints::Keypoint;
 use pipeline::ViewSettings;
 use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Turn, outline_of};
+use training::datasets::{People, Person, Picture, Sides};
 
 use crate::judged::{go_on, pictures, truth};
 use inputs::pictures::{BOXES_PX, Picture as Shown, Searched};

@@ -1,16 +1,17 @@
 //! Work from files to files: trainings, evaluations, models tried on pictures, synthetic sequences.
 //!
-//! The algorithms are in crates of their own; here they are given files, threads, a [`Stop`](failure::Stop) and a
+//! The algorithms are in crates of their own, but for the [`evaluation`]; here they are given files, threads, a [`Stop`](failure::Stop) and a
 //! [`Console`](failure::Console), and their errors become a [`Failure`](failure::Failure) with an exit status and a hint.
 #![forbid(unsafe_code)]
 
+pub mod evaluation;
 mod failures;
 mod scenes;
 mod searches;
 
 pub mod consistency;
 pub mod eval;
-pub mod examples;
+pub mod forecast;
 pub mod joints;
 pub mod judged;
 pub mod judged_network;

@@ -4,18 +4,15 @@
 
 mod biases;
 mod colours;
-mod examples;
 mod figure;
 mod glyph;
 mod springs;
 
 use fmp::{Model, files::describe};
 
+use exports::report::html::{Html, STYLE};
+use exports::report::{html, put};
 use figure::Figure;
-use report::html::{Html, STYLE};
-use report::{html, put};
-
-pub use examples::Examples;
 
 /// Draws a model.
 ///
@@ -24,10 +21,8 @@ pub use examples::Examples;
 /// * The whole body twice, in an ordinary posture: as filters, and as a tree with the springs, which are ellipses at a score of [`SPRING_COST`] below the best.
 /// * Per part the springs of all types and the biases of all pairs of types.
 ///
-/// * With `examples`: under every type what it was found on.
-///
 /// Parts and types count from 1, as in everything a user sees.
-pub fn html(model: &Model, examples: Option<&Examples>) -> String {
+pub fn html(model: &Model) -> String {
     let title = &model.spec().name;
     let figure = Figure::new(model);
     let mut page = html!("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n");
@@ -53,7 +48,7 @@ pub fn html(model: &Model, examples: Option<&Examples>) -> String {
     put!(page, "{}", Html::constant(LEGEND));
     put!(page, "<h2>The parts</h2>\n");
     for part in 0..model.n_parts() {
-        put!(page, "{}", card(model, part, examples));
+        put!(page, "{}", card(model, part));
     }
     put!(page, "</body>\n</html>\n");
     page.into_page()
@@ -75,7 +70,6 @@ h3 small { font-weight: normal; margin-left: .6em; }
 .row { display: flex; flex-wrap: wrap; gap: 1.2em; align-items: flex-start; }
 .card { background: var(--card); border: 1px solid var(--line); border-radius: 8px; padding: .9em 1.1em; margin: 0 0 .9em; break-inside: avoid; }
 figure { margin: 0; max-width: 100%; overflow-x: auto; }
-.examples { display: grid; grid-template-columns: repeat(2, 42px); gap: 2px; margin-top: .3em; }
 figcaption { margin-top: .25em; text-align: center; }
 svg { display: block; }
 .hidden { position: absolute; width: 0; height: 0; }
@@ -134,7 +128,7 @@ fn numbers(model: &Model) -> Html {
 }
 
 /// Everything about one part.
-fn card(model: &Model, part: usize, examples: Option<&Examples>) -> Html {
+fn card(model: &Model, part: usize) -> Html {
     let spec = &model.spec().parts[part];
     let n_types = model.n_types(part);
     let parent = spec.edge.as_ref().map_or("the root".to_owned(), |edge| {
@@ -151,9 +145,6 @@ fn card(model: &Model, part: usize, examples: Option<&Examples>) -> Html {
     for mixture in 0..n_types {
         put!(out, "<div>\n");
         put!(out, "{}", glyph::of_type(model, part, mixture));
-        if let Some(examples) = examples {
-            put!(out, "{}", examples::of_type(examples, part, mixture));
-        }
         put!(out, "</div>\n");
     }
     if let Some(edge) = &spec.edge {

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use failure::{Console, ExitKind, Failure, Stop};
 use fmp::Model;
-use orientation::{Detector, Network, Score, Settings};
+use viewquality::orientation::{Detector, Network, Score, Settings};
 
 use crate::scenes::Scenes;
 
@@ -104,14 +104,14 @@ pub fn train(
         judged.push(("scenes".to_owned(), scenes));
     }
     console.message(&format!("{n_rendered} pictures of scenes"));
-    let watch = |pass: orientation::Pass| {
+    let watch = |pass: viewquality::orientation::Pass| {
         console.message(&format!(
             "pass {} of {}: loss {:.4}",
             pass.nth, pass.of, pass.loss
         ));
         work.go_on().is_ok()
     };
-    let network = orientation::train(&samples, &job.settings, watch);
+    let network = viewquality::orientation::train(&samples, &job.settings, watch);
     work.go_on()?;
     let network = network.ok_or_else(|| {
         let message = "nobody to learn from: no person whose direction is known";
@@ -120,7 +120,7 @@ pub fn train(
     write(out, &network)?;
     let detector = Detector::new(network);
     let judged = judged.into_iter().map(|(on, samples)| {
-        let score = orientation::score(&detector, &samples);
+        let score = viewquality::orientation::score(&detector, &samples);
         judged_on(on, &score)
     });
     Ok(Report {

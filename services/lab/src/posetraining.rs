@@ -11,8 +11,8 @@ mod train;
 use std::io::{BufReader, Read as _, Write as _};
 use std::path::Path;
 
-use networktraining::pose::{Person, SIDE};
 use posenetwork::PoseNetwork;
+use training::networks::pose::{Person, SIDE};
 
 use crate::person::Chosen;
 use crate::scenes::Scenes;

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
+use failure::wording::Table;
 use failure::{ExitKind, Failure, in_file};
 use motion::finished::{self, Run};
 use motion::judge::{self, Errors, Sum};
 use motion::live;
 use motion::{Joint, Motion, Recorded, Role, Settings, butterworth};
 use nalgebra::Vector3;
-use score::{Bootstrap, Share};
 use serde_json::{Value, json};
-use wording::Table;
+use statistics::score::{Bootstrap, Share};
 
 /// What is compared, in the order of tables.
 const METHODS: [&str; 5] = ["raw", "rts", "rts, constant bones", "butterworth", "kalman"];
@@ -83,8 +83,11 @@ fn truth(
     recorded: &Recorded,
     frames: &[u64],
 ) -> Result<Vec<Vec<Option<Vector3<f64>>>>, Failure> {
-    let sequences = datasets::sequences::read(path, &datasets::sequences::Options::default())
-        .map_err(|error| in_file(path, &error))?;
+    let sequences = training::datasets::sequences::read(
+        path,
+        &training::datasets::sequences::Options::default(),
+    )
+    .map_err(|error| in_file(path, &error))?;
     let [sequence] = &sequences[..] else {
         let what = format!(
             "{}: {} sequences, expected one",

@@ -4,7 +4,7 @@ use crate::common;
 
 use common::networks::{DETECTOR, detector_of, sides};
 use common::{Case, Ended, PLAIN};
-use onnx::{Attribute, Network};
+use inference::onnx::{Attribute, Network};
 use serde_json::Value;
 
 const CARD: &str = r#"

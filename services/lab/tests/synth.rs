@@ -291,22 +291,22 @@ fn several_sequences_have_a_folder_each_and_one_list_of_people() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let report: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(report["sequences"].as_array().unwrap().len(), 4);
-    let options = datasets::ReadOptions {
+    let options = training::datasets::ReadOptions {
         n_joints: Some(14),
-        ..datasets::ReadOptions::default()
+        ..training::datasets::ReadOptions::default()
     };
     for list in [
         "people.jsonl",
         "people-as-seen.jsonl",
         "s2-lying/people.jsonl",
     ] {
-        let read = datasets::read(&case.path("many").join(list), &options).unwrap();
+        let read = training::datasets::read(&case.path("many").join(list), &options).unwrap();
         let expected = if list.starts_with("s2") { 6 } else { 24 };
         assert_eq!(read.people.len() + read.problems.len(), expected, "{list}");
         let pictures = read
             .problems
             .iter()
-            .filter(|it| matches!(it.fault, datasets::Fault::Image(_)));
+            .filter(|it| matches!(it.fault, training::datasets::Fault::Image(_)));
         assert_eq!(pictures.count(), 0, "every picture is there");
     }
 }

@@ -217,11 +217,7 @@ fn a_trained_model_finds_other_figures_with_any_threads_and_after_kills() {
     assert!(pcp >= 80.0, "PCP {pcp}: {judged}");
 
     let shown = ["model", "show", "one/m.fmp", "--html", "m.html"];
-    let shown = drawn.start(&[&shown[..], &["--examples", "others"]].concat());
-    assert_ended(&shown.wait(), 0, &["wrote m.html"]);
-    let page = fs::read_to_string(drawn.path("m.html")).unwrap();
-    let n_examples = page.matches("<img ").count();
-    assert!((26..=26 * 2 * 4).contains(&n_examples), "{n_examples}");
+    assert_ended(&drawn.start(&shown).wait(), 0, &["wrote m.html"]);
 }
 
 #[test]

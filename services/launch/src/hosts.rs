@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use bridge::hosts::Fingerprint;
 use bridge::{Address, KeyFiles, NearHost, ViewMaps};
 use deployment::hosts::{Carry, Host};
 use deployment::paper::Errors;
 use deployment::{Deployment, network};
 use failure::{ExitKind, Failure, OrFail as _};
-use hosts::Fingerprint;
 use messages::topic;
 
 use crate::prepare::{Prepared, View};

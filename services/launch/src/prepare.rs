@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use consistency::Learned;
 use deployment::Deployment;
 use deployment::paper::Errors;
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::{Framing, OutSize, Rig, upright_roll};
 use multiview::ViewPlan;
+use multiview::learned::Learned;
 use nalgebra::UnitVector3;
 use pipeline::{
     BodySettings, EstimatorSettings, SkeletonSettings, SpaceStepSettings, ViewSettings, WhoSettings,

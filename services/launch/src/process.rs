@@ -406,18 +406,20 @@ fn replay(
     let replayed = replayed
         .ok_or("there is no such process in this deployment")
         .or_fail(ExitKind::Usage)?;
-    let output = |topic: &String| replay::Output {
+    let output = |topic: &String| record::replay::Output {
         topic: topic.clone(),
         n_receivers: topology.receivers_of(topic),
     };
-    let job = replay::Job {
+    let job = record::replay::Job {
         file: plan.file.clone(),
         outputs: replayed.outputs.iter().map(output).collect(),
-        pace: plan.speed.map_or(replay::Pace::Max, replay::Pace::Times),
+        pace: plan
+            .speed
+            .map_or(record::replay::Pace::Max, record::replay::Pace::Times),
         frame_step: resolved.deployment.capture.frame_step.max(1),
         patience: resolved.patience(),
     };
-    replay::run(service, &job)
+    record::replay::run(service, &job)
 }
 
 #[cfg(test)]

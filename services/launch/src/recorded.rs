@@ -78,7 +78,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
     {
         let bytes =
             files::read(file, files::MODEL).map_err(|error| failure::in_file(file, &error))?;
-        files.insert(file.clone(), checksum::fnv1a(&bytes));
+        files.insert(file.clone(), formats::checksum::fnv1a(&bytes));
     }
     let by_paper = deployment.method == Method::Paper;
     let of_paper = [
@@ -102,7 +102,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
         } else {
             file.to_owned()
         };
-        files.insert(name, checksum::fnv1a(&kind.read(file)?));
+        files.insert(name, formats::checksum::fnv1a(&kind.read(file)?));
     }
     Ok(files)
 }

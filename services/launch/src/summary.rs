@@ -13,11 +13,11 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use exports::report::run::Verdict;
 use failure::{ExitKind, Failure};
 use messages::Refusal;
-use metrics::Reading;
-use report::run::Verdict;
 use runfiles::{CameraFit, Doubt, LatencyReport, Summary};
+use runtime::metrics::Reading;
 use serde_json::{Value, json};
 use supervise::Outcome;
 

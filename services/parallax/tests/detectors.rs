@@ -4,7 +4,7 @@
 use crate::common;
 
 use common::{Case, Ended, PLAIN};
-use onnx::{Network, Side};
+use inference::onnx::{Network, Side};
 use serde_json::{Value, json};
 
 const CARD: &str = r#"

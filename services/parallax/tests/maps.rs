@@ -10,9 +10,9 @@ use core::fmt::Write as _;
 use common::{Case, Ended};
 use footage::{Canvas, Size};
 use geometry::{Camera, Intrinsics, Lens, LensModel, Rig};
+use inference::onnx::{Attribute, Network, Side};
 use keypoints::{HALPE_26, LSP_14};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use onnx::{Attribute, Network, Side};
 use serde_json::Value;
 
 pub(crate) const SIZE: [u32; 2] = [200, 240];

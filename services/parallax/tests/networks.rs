@@ -5,7 +5,7 @@ use crate::common;
 
 use common::started::signal;
 use common::{Case, Ended, PLAIN};
-use onnx::{Attribute, Network, Side};
+use inference::onnx::{Attribute, Network, Side};
 use serde_json::Value;
 
 /// Columns and rows of the input.

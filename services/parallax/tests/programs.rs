@@ -231,7 +231,7 @@ fn datagrams_say_where_joints_are_and_the_run_is_as_without() {
     let mut datagram = [0; 2000];
     while frames.len() < 5 {
         let n = socket.recv(&mut datagram).unwrap();
-        assert!(n <= publish::MOST_BYTES);
+        assert!(n <= client::publish::MOST_BYTES);
         let value: Value = serde_json::from_slice(&datagram[..n]).unwrap();
         assert_eq!(value["deployment"], case.name);
         for joint in value["joints"].as_object().unwrap().values() {

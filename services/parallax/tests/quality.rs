@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use common::{Case, PLAIN, planted};
 use fmp::{Layout, Scope};
+use inference::onnx::{Network, Side};
 use kernels::Rgb8View;
 use multiview::ViewPlan;
 use nalgebra::Point3;
-use onnx::{Network, Side};
 use pipeline::{BodySettings, SkeletonSettings, SkeletonStep, ViewResult, ViewSettings, ViewStep};
 use serde_json::{Value, json};
 use viewquality::{Card, ForecastInput, Forecaster, Unit, n_evidence};

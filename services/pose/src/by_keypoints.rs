@@ -23,7 +23,7 @@ impl View<'_> {
         } = state;
         if let Err(error) = keypoints.source.read(stamp.frame, people) {
             if !*has_failed {
-                let error = wording::in_one_line(&error);
+                let error = failure::wording::in_one_line(&error);
                 tracing::warn!(
                     frame = stamp.frame,
                     error,

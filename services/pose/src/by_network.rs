@@ -23,7 +23,7 @@ impl View<'_> {
         self.put_off_search(now_nanos() - begin, &mut state.memory);
         if let Err(error) = looked {
             if !state.has_failed {
-                let error = wording::in_one_line(&error);
+                let error = failure::wording::in_one_line(&error);
                 tracing::warn!(
                     frame = stamp.frame,
                     error,

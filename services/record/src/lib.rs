@@ -1,9 +1,10 @@
-//! Writes every message of a deployment into one file.
+//! Writes every message of a deployment into one file, and sends them again from there ([`replay`]).
 #![forbid(unsafe_code)]
 
 mod foxglove;
 mod onlooker;
 mod queue;
+pub mod replay;
 mod sent;
 mod service;
 mod topics;

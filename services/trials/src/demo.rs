@@ -166,7 +166,7 @@ fn conclude(
     let page = page::page(run, &report, synthetic, output);
     write_reports(
         synthetic,
-        [format!("{json:#}\n"), ::report::run::html(&page)],
+        [format!("{json:#}\n"), exports::report::run::html(&page)],
     )?;
     let mut text = [run.report.text(), report.text(&synthetic.folder)].join("\n");
     if let Some(machine) = run.machine {

@@ -101,9 +101,9 @@ fn file(path: &str) -> Answer {
     let script = |text| Answer::file("text/javascript", text);
     match path {
         "/" => Answer::file("text/html", INDEX),
-        "/look.css" => Answer::file("text/css", ::report::STYLE),
+        "/look.css" => Answer::file("text/css", exports::report::STYLE),
         "/view.css" => Answer::file("text/css", STYLE),
-        "/stage.js" => script(::report::STAGE),
+        "/stage.js" => script(exports::report::STAGE),
         _ => match MODULES.iter().find(|module| module.0 == path) {
             Some((_, text)) => script(text),
             None => Answer::text(404, "there is no such file"),

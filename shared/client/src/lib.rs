@@ -24,7 +24,7 @@
 //! joined by the number of the frame. A thread reads the deployment; what waits for the caller is bounded, and either only the
 //! newest moment or every one is given ([`Wish::every_frame`]).
 //!
-//! Nothing can be sent: neither this crate nor [`runtime::Guest`], on which it stands, has a way to. The pipeline does not wait for
+//! Nothing can be sent to the deployment: neither this crate nor [`runtime::Guest`], on which it stands, has a way to. The pipeline does not wait for
 //! a client, does not wake it, and does not count it among its receivers. A process of the deployment that is started anew
 //! is heard again without a word; when the deployment ends the client leaves it by itself, and joins the next one of that
 //! name ([`Client::state`]).
@@ -39,6 +39,7 @@ mod error;
 mod joiner;
 mod lock;
 mod moment;
+pub mod publish;
 mod reader;
 mod wish;
 

@@ -39,7 +39,7 @@ impl ConfigError {
     /// Explains what the TOML reader said.
     ///
     /// Serde says `unknown field`, the name, then what it knows, each in backticks; of its other words see
-    /// [`wording::in_words`].
+    /// [`failure::wording::in_words`].
     ///
     /// * `key`: of the value that is wrong, with its section, where it is known.
     pub(super) fn explain(place: String, message: &str, key: Option<&str>) -> Self {
@@ -54,7 +54,7 @@ impl ConfigError {
                 hint,
             };
         }
-        let said = wording::in_words(message.trim_end()).replace('\n', ", ");
+        let said = failure::wording::in_words(message.trim_end()).replace('\n', ", ");
         let message = match (key, names.first()) {
             (Some(key), _) if message.starts_with("duplicate key") => {
                 format!("`{key}` is given twice{}", of_cameras(key))

@@ -1,4 +1,4 @@
-//! What a run found, in the files of other tools: one module for each format.
+//! What was found, for others: a run in the files of other tools, one module for each format, and pages ([`report`]).
 //!
 //! [`Gathering`] takes the lines of a run one by one, and makes a [`Trial`] of them: every frame in its place on the grid of the
 //! frame rate, gaps included. [`FILES`] is the table of formats that are one file each; two formats have a file for every view and
@@ -17,6 +17,7 @@
 //! Nothing here opens a file. Nothing is smoothed or filled; what a format cannot say is said in its [`Notes`].
 #![forbid(unsafe_code)]
 
+pub mod report;
 mod trial;
 
 mod landmarks;

@@ -5,7 +5,7 @@ use core::fmt;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use wording::in_words;
+use crate::wording::in_words;
 
 /// Exit statuses, the same for the command and for all its services.
 ///
@@ -137,7 +137,7 @@ impl Failure {
     ///
     /// Those of `out`.
     pub fn report(&self, out: &mut dyn Write) -> io::Result<()> {
-        for (depth, error) in wording::chain(self.source()).enumerate() {
+        for (depth, error) in crate::wording::chain(self.source()).enumerate() {
             let label = if depth == 0 { "error" } else { "  cause" };
             writeln!(out, "{label}: {}", in_words(&error.to_string()).trim_end())?;
         }

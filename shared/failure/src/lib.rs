@@ -11,6 +11,7 @@ mod input;
 mod interrupt;
 mod log;
 mod stop;
+pub mod wording;
 
 pub use claim::{Claim, check_claim};
 pub use clock::now_nanos;

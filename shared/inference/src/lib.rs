@@ -8,6 +8,7 @@ mod direct;
 mod engine;
 mod front;
 mod nesting;
+pub mod onnx;
 #[cfg(feature = "ort")]
 mod onnx_runtime;
 mod plan;

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use onnx::Message;
+use crate::onnx::Message;
 
 use crate::front::Front;
 use crate::nesting::varint;

@@ -134,5 +134,5 @@ impl Session {
 fn check(file: &[u8]) -> Result<u32, LoadError> {
     nesting::check(file).map_err(|error| LoadError::File(Box::new(error)))?;
     sizes::check(file).map_err(|error| LoadError::File(Box::new(error)))?;
-    Ok(checksum::fnv1a_32(file))
+    Ok(formats::checksum::fnv1a_32(file))
 }

@@ -149,7 +149,7 @@ fn op(node: &NodeProto) -> &str {
 
 #[cfg(test)]
 mod tests {
-    use onnx::{Attribute, Network};
+    use crate::onnx::{Attribute, Network};
 
     use super::*;
 

@@ -123,7 +123,7 @@ fn constant(tensor: &TensorProto) -> Option<Constant> {
             .as_chunks::<2>()
             .0
             .iter()
-            .map(|bytes| onnx::value_of_half(u16::from_le_bytes(*bytes)))
+            .map(|bytes| crate::onnx::value_of_half(u16::from_le_bytes(*bytes)))
             .collect(),
         _ => return None,
     };

@@ -1,6 +1,6 @@
 //! Networks run by Parallax itself against `rten`, and those that it leaves to it.
 
-use onnx::{Attribute, Network, Side};
+use crate::onnx::{Attribute, Network, Side};
 use proptest::prelude::*;
 
 use crate::{Input, RunBy, RunError, Session, Values};

@@ -141,7 +141,7 @@ pub(crate) fn misfit(path: &Path, place: &CardPlace, error: &(dyn Error + 'stati
     let message = format!(
         "{} does not fit its card ({place}): {}",
         path.display(),
-        wording::in_one_line(error)
+        failure::wording::in_one_line(error)
     );
     let hint = "docs/networks.md says what the keys of a card mean";
     Failure::new(ExitKind::Input, message).with_hint(hint)

@@ -63,7 +63,7 @@ impl DetectorFile {
             let hint = format!(
                 "`parallax-lab model show {}` says which of the cards in configs/detectors comes nearest: give it with \
                  --detector-card, or put it beside the detector as {}; docs/networks.md says how to write one",
-                wording::shell(path.display()),
+                failure::wording::shell(path.display()),
                 path.with_extension("toml").display()
             );
             return Err(Failure::new(ExitKind::Input, message).with_hint(hint));

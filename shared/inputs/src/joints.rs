@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use consistency::{JointFile, Learned};
 use deployment::{is_none, is_shipped};
 use failure::{ExitKind, Failure, in_file, no_text};
+use multiview::learned::{JointFile, Learned};
 use skeleton::{JointMap, JointSet};
 
 use super::model_bytes;
@@ -36,7 +36,7 @@ impl Joints {
         if is_none(file) {
             return Ok(chosen(None));
         }
-        let fingerprint = format!("{:016x}", checksum::fnv1a(&model_bytes(model)?));
+        let fingerprint = format!("{:016x}", formats::checksum::fnv1a(&model_bytes(model)?));
         let read = read(file)?;
         if read.model == fingerprint {
             return Ok(chosen(Some(read)));
@@ -68,7 +68,7 @@ impl Joints {
     pub fn fingerprint(&self) -> String {
         let text = self.file.as_ref().and_then(|it| it.write().ok());
         text.map_or_else(String::new, |it| {
-            format!("{:016x}", checksum::fnv1a(it.as_bytes()))
+            format!("{:016x}", formats::checksum::fnv1a(it.as_bytes()))
         })
     }
 }

@@ -23,16 +23,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use consistency::{Appearance, Learned, Shape};
 use deployment::Deployment;
 use failure::{ExitKind, Failure, OrFail as _, no_text};
 use fmp::Model;
 use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
+use multiview::learned::{Appearance, Learned, Shape};
 use multiview::{Compatibility, TypeTables};
 use nalgebra::UnitVector3;
-use orientation::Detector;
 use pipeline::PairTables;
+use viewquality::orientation::Detector;
 use viewquality::{Network, NetworkError, Table, Tau};
 
 pub use cards::card_beside;
@@ -224,8 +224,8 @@ pub fn orientation(file: &Path, model: &Model) -> Result<Option<Arc<Detector>>, 
         return Err(Failure::new(ExitKind::Input, message));
     }
     let bytes = Shipped::Orientation.read(file)?;
-    let network =
-        orientation::Network::from_bytes(&bytes).map_err(|error| in_file(file, &error))?;
+    let network = viewquality::orientation::Network::from_bytes(&bytes)
+        .map_err(|error| in_file(file, &error))?;
     Ok(Some(Arc::new(Detector::new(network))))
 }
 

@@ -109,7 +109,7 @@ impl NetworkFile {
             let hint = format!(
                 "`parallax-lab model show {}` says which of the cards in configs/networks comes nearest: give it with --card, or \
                  put it beside the network as {}; docs/networks.md says how to write one",
-                wording::shell(path.display()),
+                failure::wording::shell(path.display()),
                 path.with_extension("toml").display()
             );
             return Err(Failure::new(ExitKind::Input, message).with_hint(hint));

@@ -7,6 +7,10 @@ use failure::{ExitKind, Failure};
 
 /// Says that a network cannot be run, and why.
 pub(crate) fn refused(path: &Path, error: &(dyn Error + 'static)) -> Failure {
-    let message = format!("{}: {}", path.display(), wording::in_one_line(error));
+    let message = format!(
+        "{}: {}",
+        path.display(),
+        failure::wording::in_one_line(error)
+    );
     Failure::new(ExitKind::Input, message)
 }

@@ -116,8 +116,8 @@ mod tests {
         let n_parts = model.parts.len();
         viewquality::Network::parse(Shipped::Network.bytes().to_vec(), n_parts).unwrap();
         let text = core::str::from_utf8(Shipped::Consistency.bytes()).unwrap();
-        consistency::Learned::parse(text).unwrap();
-        orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
+        multiview::learned::Learned::parse(text).unwrap();
+        viewquality::orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
         let library = crate::library::Library::BuiltIn;
         let network = crate::open_network((Path::new(SHIPPED), None), &library);
         network.unwrap().fitted().unwrap();
@@ -126,8 +126,8 @@ mod tests {
     #[test]
     fn the_joints_that_ship_belong_to_the_model_that_ships() {
         let text = core::str::from_utf8(Shipped::Joints.bytes()).unwrap();
-        let file = consistency::JointFile::parse(text).unwrap();
-        let model = checksum::fnv1a(Shipped::Model.bytes());
+        let file = multiview::learned::JointFile::parse(text).unwrap();
+        let model = formats::checksum::fnv1a(Shipped::Model.bytes());
         assert_eq!(file.model, format!("{model:016x}"));
     }
 }

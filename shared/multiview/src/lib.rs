@@ -105,6 +105,7 @@
 //! deployment can set one.
 #![forbid(unsafe_code)]
 
+pub mod learned;
 mod settings;
 
 mod pair;

@@ -105,10 +105,10 @@ const STATURE: [f64; 2] = [1.65, 0.20];
 ///
 /// The stature is what the joints say and what is known of people, each by its certainty.
 pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N - 1] {
-    use body::Kind::{
+    use skeleton::body::Kind::{
         Head, HipWidth, LowerArm, LowerLeg, ShoulderToNeck, Trunk, UpperArm, UpperLeg,
     };
-    const KINDS: [body::Kind; N - 1] = [
+    const KINDS: [skeleton::body::Kind; N - 1] = [
         Head,
         ShoulderToNeck,
         UpperArm,
@@ -124,7 +124,7 @@ pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N -
         LowerLeg,
     ];
     let [mean, sd] = STATURE;
-    let said = joints.and_then(body::stature);
+    let said = joints.and_then(skeleton::body::stature);
     let [own, known] = [said.map_or(0.0, |it| it.sd.powi(-2)), sd.powi(-2)];
     let stature = (own * said.map_or(0.0, |it| it.metres) + known * mean) / (own + known);
     let unsure = (own + known).powf(-0.5) / stature;

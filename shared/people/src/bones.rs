@@ -1,6 +1,6 @@
 //! How long a person's bones are, to know the person again.
 
-use body::{BONES, Joints, Kind};
+use skeleton::body::{BONES, Joints, Kind};
 
 /// A length counts as the mean of so many frames at most.
 const MOST_FRAMES: f64 = 100.0;
@@ -10,7 +10,7 @@ const LEAST_KINDS: usize = 6;
 /// Mean lengths of a person's bones, metres; both sides together.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bones {
-    /// Mean length of each kind of bone, in the order of `body::Kind::ALL`; 0 where none was seen.
+    /// Mean length of each kind of bone, in the order of `skeleton::body::Kind::ALL`; 0 where none was seen.
     pub mean_m: [f64; Kind::ALL.len()],
     /// Number of frames of each.
     pub n: [f64; Kind::ALL.len()],

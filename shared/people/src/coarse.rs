@@ -1,6 +1,6 @@
 //! A person's joints from the detections that are the person.
 
-use body::{Covariances, Joints};
+use skeleton::body::{Covariances, Joints};
 
 use crate::cluster::Member;
 use crate::distance::{LEAST_JOINTS, named, to_person};
@@ -31,7 +31,7 @@ impl Coarse {
 
     /// Whether the bones are those of a person.
     pub(crate) fn is_body(&self) -> bool {
-        body::check(&self.joints, &self.covariances, None)
+        skeleton::body::check(&self.joints, &self.covariances, None)
             .nobody
             .is_none()
     }

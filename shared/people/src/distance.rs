@@ -1,6 +1,6 @@
 //! How far apart in space two views' detections are, or a detection and a person.
 
-use body::Joints;
+use skeleton::body::Joints;
 use nalgebra::Point3;
 
 use crate::sight::{Sights, passing};

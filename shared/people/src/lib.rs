@@ -32,7 +32,7 @@ mod testing;
 #[cfg(test)]
 mod tests;
 
-use body::{Covariances, Joints};
+use skeleton::body::{Covariances, Joints};
 use nalgebra::Vector3;
 
 pub(crate) use frame::Frame;
@@ -40,7 +40,7 @@ pub use solver::{Solved, Solver};
 pub use tracker::{Memory, Remembered, Settings, Tracker};
 
 /// Number of joints, those of `skeleton::PARSE14`.
-pub(crate) const N: usize = body::N_JOINTS;
+pub(crate) const N: usize = skeleton::body::N_JOINTS;
 
 /// The joint on the other side.
 pub(crate) const MIRROR: [usize; N] = {

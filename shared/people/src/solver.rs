@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use body::{Covariances, Joints};
+use skeleton::body::{Covariances, Joints};
 use geometry::Camera;
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -145,8 +145,8 @@ impl Solver {
                 .map(|place| choice(place, priors[joint]))
                 .collect()
         });
-        let stature = body::stature(&person.joints).map_or(ANY_STATURE_M, |stature| stature.metres);
-        let expectations = Expectations::new(stature.clamp(body::STATURES[0], body::STATURES[1]));
+        let stature = skeleton::body::stature(&person.joints).map_or(ANY_STATURE_M, |stature| stature.metres);
+        let expectations = Expectations::new(stature.clamp(skeleton::body::STATURES[0], skeleton::body::STATURES[1]));
         let chosen = choose(&choices, &expectations);
         let mut solved = Solved {
             id: person.id,
@@ -164,7 +164,7 @@ impl Solver {
                 solved.n_views[joint] = n;
             }
         }
-        let refined = body::refine(&solved.joints, &solved.covariances, None);
+        let refined = skeleton::body::refine(&solved.joints, &solved.covariances, None);
         (solved.joints, solved.covariances) = (refined.joints, refined.covariances);
         remember(known, time_s, &solved);
         solved

@@ -1,6 +1,6 @@
 //! A person from frame to frame.
 
-use body::Joints;
+use skeleton::body::Joints;
 use nalgebra::{Point3, Vector3};
 
 use crate::bones::Bones;

@@ -1,6 +1,6 @@
 //! People from frame to frame, by ids that last.
 
-use body::{Covariances, Joints};
+use skeleton::body::{Covariances, Joints};
 use geometry::Camera;
 use nalgebra::Vector3;
 

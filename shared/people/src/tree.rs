@@ -1,6 +1,6 @@
 //! One place for every joint, so that the views support all of them and the bones keep their lengths.
 
-use body::BONES;
+use skeleton::body::BONES;
 use nalgebra::Point3;
 
 use crate::N;

@@ -1,8 +1,8 @@
 //! The found joints as a body: what is impossible is left out, bones keep their lengths.
 
-use body::{Covariances, Joints, Lengths, N_JOINTS, Reason};
 use geometry::{TriangulateError, Triangulated};
 use nalgebra::{Matrix3, Point3, Vector3};
+use skeleton::body::{Covariances, Joints, Lengths, N_JOINTS, Reason};
 use skeleton::{Joint, JointSet, PARSE14};
 
 use crate::skeleton_settings::BodySettings;
@@ -64,7 +64,7 @@ impl Bodies {
             return (joints, None);
         }
         let (places, covariances) = places(of_body);
-        let verdict = body::check(&places, &covariances, None);
+        let verdict = skeleton::body::check(&places, &covariances, None);
         if places.iter().flatten().count() == 0 {
             self.n_without += 1;
             return (joints, None);
@@ -82,7 +82,7 @@ impl Bodies {
         let lengths = Some(&self.lengths).filter(|_| settings.learn);
         let refined = settings
             .prior
-            .then(|| body::refine(&kept, &covariances, lengths));
+            .then(|| skeleton::body::refine(&kept, &covariances, lengths));
         let change = |joint: usize| Change {
             is_dropped: verdict.nobody.is_some() || verdict.dropped[joint],
             moved: refined.as_ref().and_then(|refined| {

@@ -25,7 +25,7 @@ pub struct BodySettings {
     /// The prior knows the lengths that this person's bones had in the frames before.
     pub learn: bool,
     /// Weight of how unlike a person a skeleton is, in the choice among assumptions: score per squared standard
-    /// deviation ([`body::deviation`]).
+    /// deviation ([`skeleton::body::deviation`]).
     pub score: f64,
 }
 

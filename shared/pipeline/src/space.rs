@@ -35,14 +35,14 @@ impl Space {
         views: &[Option<FusedView>],
     ) -> Judged {
         let parts = self.triangulate(views, skeleton::N_PARTS, Cow::from, &[]);
-        let joints: body::Joints = core::array::from_fn(|joint| {
+        let joints: skeleton::body::Joints = core::array::from_fn(|joint| {
             let part = parts[PARSE14.joints[joint].parts[0]].as_ref().ok();
             Some(part?.in_world)
         });
         let seen = self.seen(answers, views, &joints);
         // Half of the log-ratio is how much likelier the evidence is than if the views said nothing.
         let evidence = self.settings.front_score * seen.log_ratio.abs() / 2.0;
-        let unlike = self.settings.body.score * body::deviation(&joints);
+        let unlike = self.settings.body.score * skeleton::body::deviation(&joints);
         Judged {
             score: self.agreement(views, &parts) + evidence - unlike,
             seen,

@@ -9,7 +9,7 @@ use fmp::{
 };
 use kernels::Rgb8View;
 use multiview::FrontEvidence;
-use orientation::Detector;
+use viewquality::orientation::Detector;
 
 use crate::view_result::ViewResult;
 
@@ -102,7 +102,7 @@ pub struct ViewStep {
     solver: Solver,
     layout: Arc<Layout>,
     settings: ViewSettings,
-    looking: Mutex<orientation::Workspace>,
+    looking: Mutex<viewquality::orientation::Workspace>,
 }
 
 impl ViewStep {
@@ -174,7 +174,7 @@ impl ViewStep {
         let (model, layout) = (self.solver.model(), &*self.layout);
         let mut of_candidate = |pose: &Pose| {
             let bounds = pose.bounding_box(model, layout);
-            match orientation::head_of(&pose.centres(model, layout)) {
+            match viewquality::orientation::head_of(&pose.centres(model, layout)) {
                 Some(head) => detector.evidence(image, bounds, head, &mut workspace),
                 None => [0.0; 2],
             }

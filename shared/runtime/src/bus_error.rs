@@ -65,7 +65,7 @@ pub enum BusError {
     /// The wake-up of a topic cannot be created.
     #[error(
         "cannot create wake-up of topic {topic:?}: {}",
-        wording::spaced(source)
+        failure::wording::spaced(source)
     )]
     CreateWakeUp {
         /// Name of the topic.

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::{self, JoinHandle};
 
+use crate::metrics::{Meter, Passage, Rates};
 use messages::{CameraCounts, Cause, Health as HealthMessage, Metrics, Refusal, Span, topic};
-use metrics::{Meter, Passage, Rates};
 use rustix::time::{ClockId, clock_gettime};
 
 use crate::{Bus, Launch, PortError, Progress, Publisher, memory};

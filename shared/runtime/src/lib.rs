@@ -2,6 +2,7 @@
 //! operating system.
 
 mod delivery;
+pub mod metrics;
 mod namespace;
 mod preflight;
 mod topic;

@@ -202,7 +202,7 @@ impl Namespace {
 
 /// FNV-1a over the user and the root, folded to 32 bits.
 fn fingerprint(user: u32, root: &str) -> u32 {
-    let hash = checksum::fnv1a_of(user.to_le_bytes().into_iter().chain(root.bytes()));
+    let hash = formats::checksum::fnv1a_of(user.to_le_bytes().into_iter().chain(root.bytes()));
     (hash ^ (hash >> 32)) as u32
 }
 

@@ -32,7 +32,7 @@ pub enum ObserverError {
     /// Its processes cannot be listed.
     #[error(
         "cannot list the topics of deployment {name:?}: {}",
-        wording::spaced(source)
+        failure::wording::spaced(source)
     )]
     List {
         /// Its name.

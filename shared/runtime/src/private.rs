@@ -96,15 +96,15 @@ impl PrivacyError {
         match self {
             Self::Foreign { path, owner, .. } => Some(format!(
                 "run as {owner}, or have it removed: `sudo rm -r {}`; a deployment and its processes are one user's",
-                wording::shell(path.display())
+                failure::wording::shell(path.display())
             )),
             Self::Link { path, .. } | Self::NoDirectory { path } => Some(format!(
                 "remove it: `rm {}`",
-                wording::shell(path.display())
+                failure::wording::shell(path.display())
             )),
             Self::Open { path, .. } => Some(format!(
                 "have it shut: `sudo chmod go-w {}`",
-                wording::shell(path.display())
+                failure::wording::shell(path.display())
             )),
             Self::Unmarked { path, .. } => Some(format!(
                 "nothing in it was touched: see what it is, and move or remove {} yourself",

@@ -21,7 +21,7 @@ impl Random {
 
     /// Another generator for a purpose of its own, so that one more throw here changes nothing there.
     pub(crate) fn fork(self, purpose: &str) -> Self {
-        Self(mix(self.0 ^ checksum::fnv1a(purpose.as_bytes())))
+        Self(mix(self.0 ^ formats::checksum::fnv1a(purpose.as_bytes())))
     }
 
     /// Another generator, for the n-th of many.

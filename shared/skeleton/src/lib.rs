@@ -1,4 +1,4 @@
-//! The body: parts of the 26-part model, evaluated joints, and the maps between them.
+//! The body: parts of the 26-part model, evaluated joints, the maps between them, and how long bones are ([`body`]).
 //!
 //! A *part* is what the detector finds (a filter on the image); a *joint* is what is evaluated.
 //! Parts are numbered from 0 here, and from 1 in the reference programs and in everything a user
@@ -6,6 +6,7 @@
 //! faces the camera; `mirror` exchanges them for a person seen from behind.
 #![forbid(unsafe_code)]
 
+pub mod body;
 mod joints;
 mod parts;
 

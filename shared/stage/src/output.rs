@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use failure::{Failure, now_nanos};
 use messages::{Stamp, Timing};
-use metrics::Passage;
+use runtime::metrics::Passage;
 use runtime::{Element, Header, Message, Patience, Publisher, SendError, Service, SlicePublisher};
 
 use crate::receivers::Receivers;

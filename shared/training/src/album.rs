@@ -1,6 +1,6 @@
 //! Access to the training images, implemented by the caller.
 
-use datasets::Picture;
+use crate::datasets::Picture;
 
 /// Why an image cannot be read.
 pub type AlbumError = Box<dyn std::error::Error + Send + Sync>;

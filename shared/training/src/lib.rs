@@ -1,4 +1,4 @@
-//! Trains flexible mixtures of parts from people whose joints are marked (Yang & Ramanan 2013).
+//! Trains flexible mixtures of parts from people whose joints are marked (Yang & Ramanan 2013), and [`networks`].
 //!
 //! Reading order: a [`Plan`] is computed from the annotations alone (sizes, types of parts); a [`Trainer`]
 //! runs the [`Step`]s: initial filters, placing people, mining hard examples and solving the structural
@@ -8,11 +8,13 @@
 
 mod album;
 mod confuse;
+pub mod datasets;
 mod dual;
 mod example;
 mod filters;
 mod latent;
 mod mine;
+pub mod networks;
 mod origin;
 mod plan;
 mod scale;

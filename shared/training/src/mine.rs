@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use datasets::Picture;
+use crate::datasets::Picture;
 use fmp::{Extractor, Layout, Model, Pose, Responses, Solver};
 
 /// Searches images for false positives.

@@ -1,6 +1,6 @@
 //! A small model and pictures for the tests of this crate.
 
-use datasets::Picture;
+use crate::datasets::Picture;
 use footage::Size;
 
 use crate::shape::Shape;

@@ -6,8 +6,8 @@
 
 use std::hint::black_box;
 
+use inference::onnx::{Attribute, Side};
 use kernels::Rgb8View;
-use onnx::{Attribute, Side};
 use rustix::time::{ClockId, clock_gettime};
 use viewquality::{Network, Normalisation, Sampler, Tile, TileShape};
 
@@ -64,7 +64,7 @@ fn fastest(mut act: impl FnMut()) -> f64 {
 
 /// The network, batch norms folded into the convolutions.
 fn file() -> Vec<u8> {
-    let mut net = onnx::Network::default();
+    let mut net = inference::onnx::Network::default();
     let TileShape { height, width } = TileShape::SMALL;
     let tile = [
         Side::Fixed(1),
@@ -96,7 +96,7 @@ fn file() -> Vec<u8> {
 }
 
 struct Layers {
-    net: onnx::Network,
+    net: inference::onnx::Network,
     seed: u32,
     last: String,
     channels: usize,

@@ -129,7 +129,7 @@ impl Forecaster {
 #[cfg(test)]
 mod tests {
     use fmp::{Filter, ModelSpec, N_CHANNELS, PartSpec, Placement};
-    use onnx::Side;
+    use inference::onnx::Side;
 
     use super::*;
     use crate::{Card, Unit};
@@ -159,7 +159,7 @@ mod tests {
 
     /// A network with a constant output for every tile of 4 x 3 pixels.
     fn constant(sigma: f32, unit: Unit, tau: f32) -> Forecaster {
-        let mut net = onnx::Network::default();
+        let mut net = inference::onnx::Network::default();
         let sides = [1, 3, 4, 3].map(Side::Fixed);
         net.inputs.push(("tile".to_owned(), sides.to_vec()));
         let one = vec![Side::Fixed(1), Side::Fixed(1)];

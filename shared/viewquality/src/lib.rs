@@ -10,6 +10,7 @@ mod card;
 mod evidence;
 mod forecast;
 mod network;
+pub mod orientation;
 mod predictor;
 mod table;
 mod tau;

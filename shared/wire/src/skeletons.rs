@@ -334,7 +334,7 @@ mod tests {
         let mut lost = skeleton();
         lost.joints = lost.joints.split_off(1);
         let mut nobody = lost.clone();
-        nobody.body.as_mut().unwrap().nobody = Some(body::Reason::TooFewBones {
+        nobody.body.as_mut().unwrap().nobody = Some(skeleton::body::Reason::TooFewBones {
             bones: 2,
             needed: 4,
         });

@@ -2,7 +2,7 @@
 #![no_main]
 
 use messages::{Metrics, MetricsRow, Span};
-use metrics::Reading;
+use runtime::metrics::Reading;
 
 /// Whatever bytes lie in shared memory, as the numbers that they are; zeros after the last.
 struct Bytes<'a>(&'a [u8]);

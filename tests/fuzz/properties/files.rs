@@ -1,7 +1,5 @@
 //! What must hold of every reader of files, whatever is in them.
 
-use consistency::{Appearance, JointFile, Learned};
-use datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use deployment::{AnyMachine, Loaded, Stage, Topology};
 use exports::{FILES, Gathering, Trial};
 use fmp::Model;
@@ -11,6 +9,7 @@ use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisy
 use keypoints::files::{NameSet, SeenKeypoints, coco, openpose};
 use motion::{Joint, Recorded, Role};
 use multiview::Compatibility;
+use multiview::learned::{Appearance, JointFile, Learned};
 use rigs::boards::{corners_text, parse_corners};
 use runfiles::{
     FrameLine, LatencyReport, Line, RunSummary, Running, SmoothReport, TimesLine, ViewLine,
@@ -18,11 +17,12 @@ use runfiles::{
 use scene::Address;
 use scene::truth::{Frame, Header};
 use training::Checkpoint;
+use training::datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use viewquality::{Card, Network, Table, Tau};
 
 /// A payload behind our own header, of version 1.
 fn with_checksum(magic: [u8; 8], payload: &[u8]) -> Vec<u8> {
-    checksum::Envelope { magic, version: 1 }.seal(payload)
+    formats::checksum::Envelope { magic, version: 1 }.seal(payload)
 }
 /// Deployment files; the first line may be an option of the command line.
 ///

@@ -1,6 +1,8 @@
 //! What another host sends: packets, maps, signals, introductions.
 
-use ::hosts::{Answer, Clock, Content, Exchange, Expected, Head, Hello, Maps, Packet, Signal};
+use bridge::hosts::{
+    Answer, Clock, Content, Exchange, Expected, Head, Hello, Maps, Packet, Signal,
+};
 use messages::Status;
 
 const EXPECTED: Expected<'static> = Expected {
@@ -19,7 +21,7 @@ pub fn host_messages(input: &[u8]) {
     }
     if let Ok(hello) = Hello::parse(input) {
         assert_eq!(Hello::parse(&hello.to_bytes()).ok().as_ref(), Some(&hello));
-        let welcome = ::hosts::Welcome {
+        let welcome = bridge::hosts::Welcome {
             origin: 1,
             session: 2,
         };

@@ -2,12 +2,12 @@
 
 use std::sync::{Arc, Mutex};
 
+use crate::hosts::{
+    Answer, Content, Exchange, Expected, Fingerprint, Head, Hello, Packet, Signal, Welcome,
+};
 use crossbeam::channel::{Receiver, Sender, bounded};
 use deployment::hosts::Carry;
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
-use hosts::{
-    Answer, Content, Exchange, Expected, Fingerprint, Head, Hello, Packet, Signal, Welcome,
-};
 use messages::Status;
 use recording::{Kind, Message};
 use runtime::Service;

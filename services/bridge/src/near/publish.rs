@@ -1,8 +1,8 @@
 //! Writes what came from another host into the shared memory of this one.
 
+use crate::hosts::{Content, Estimate, Head};
 use deployment::hosts::Carry;
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
-use hosts::{Content, Estimate, Head};
 use messages::{EvidenceHeader, FrameHeader, Stamp, Status, Timing, topic};
 use recording::{Envelope, Kind, Message};
 use runtime::{Patience, Service, SlicePublisher};
@@ -240,7 +240,7 @@ impl Publisher {
 
 #[cfg(test)]
 mod tests {
-    use hosts::{Clock, Exchange};
+    use crate::hosts::{Clock, Exchange};
 
     use super::*;
 

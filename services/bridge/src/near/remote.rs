@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use hosts::{Clock, Difference, Estimate, Exchange};
+use crate::hosts::{Clock, Difference, Estimate, Exchange};
 
 use crate::job::NearHost;
 use crate::join::listed;

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use crate::hosts::{Estimate, Tally};
 use failure::now_nanos;
-use hosts::{Estimate, Tally};
 use serde_json::{Value, json};
 
 use super::listen::Arrived;

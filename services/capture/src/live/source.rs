@@ -202,7 +202,7 @@ impl Keeper {
                 continue;
             }
             if n_read > 0 || said != Some(status) {
-                let error = wording::in_one_line(&error);
+                let error = failure::wording::in_one_line(&error);
                 tracing::error!(camera = %self.camera.address, error, "no picture from this camera");
             }
             said = Some(status);

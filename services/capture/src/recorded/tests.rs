@@ -137,7 +137,7 @@ fn what_a_recording_does_not_hold_is_said() {
     let refused = |source: &str| {
         let spec = SourceSpec::new(source);
         let refused = crate::Feed::look(&spec).unwrap_err();
-        wording::in_one_line(&refused)
+        failure::wording::in_one_line(&refused)
     };
     let text = refused(&Recorded::address(&file, "right"));
     assert!(

@@ -11,17 +11,17 @@ use std::process::ExitCode;
 use std::sync::{Arc, Mutex};
 
 use clap::Args;
-use consistency::Learned;
-use datasets::Selection;
-use datasets::sequences::{Alignment, Sequence};
 use deployment::energy_numbers;
 use deployment::paper::{Config, Consistency};
-use evaluation::{FilmSettings, Version};
 use failure::{Claim, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use inputs::Shipped;
 use lab::eval::{Done, Fusion, Job};
+use lab::evaluation::{FilmSettings, Version};
+use multiview::learned::Learned;
 use skeleton::JointSet;
+use training::datasets::Selection;
+use training::datasets::sequences::{Alignment, Sequence};
 use viewquality::{Forecaster, Network, Table};
 
 use super::judge::selection;
@@ -331,7 +331,7 @@ fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
 }
 
 fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
-    let options = datasets::sequences::Options {
+    let options = training::datasets::sequences::Options {
         alignment: if arguments.umpm_late {
             Alignment::OneLate
         } else {
@@ -341,7 +341,7 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
     };
     let mut all: Vec<Sequence> = Vec::new();
     for path in &arguments.sequences {
-        let read = datasets::sequences::read(path, &options);
+        let read = training::datasets::sequences::read(path, &options);
         for mut sequence in read.map_err(lab::sequence_failure)? {
             sequence.thin_out(arguments.every, arguments.frames);
             if all
@@ -404,7 +404,7 @@ fn paper_section(file: Option<&Path>) -> Result<Config, Failure> {
 fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Failure> {
     let expects = arguments.sigma.is_some() || arguments.network.is_some() || arguments.oracle;
     if let [_, ..] = arguments.versions[..] {
-        let adaptive = |it: &Version| it.terms == evaluation::Terms::Adaptive;
+        let adaptive = |it: &Version| it.terms == lab::evaluation::Terms::Adaptive;
         if !expects && arguments.versions.iter().any(adaptive) {
             let message = "adaptive selection needs expected errors: --network FILE, --sigma FILE or --oracle";
             return Err(Failure::new(ExitKind::Usage, message));
@@ -436,10 +436,12 @@ fn settings_text(
     let digest = |file: &PathBuf| {
         let bytes =
             files::read(file, files::MODEL).map_err(|error| failure::in_file(file, &error))?;
-        Ok::<_, Failure>(checksum::fnv1a(&bytes))
+        Ok::<_, Failure>(formats::checksum::fnv1a(&bytes))
     };
-    let of = |kind: Shipped, file: &PathBuf| Ok::<_, Failure>(checksum::fnv1a(&kind.read(file)?));
-    let model = checksum::fnv1a(&inputs::model_bytes(arguments.model.as_deref())?);
+    let of = |kind: Shipped, file: &PathBuf| {
+        Ok::<_, Failure>(formats::checksum::fnv1a(&kind.read(file)?))
+    };
+    let model = formats::checksum::fnv1a(&inputs::model_bytes(arguments.model.as_deref())?);
     let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
     let network = arguments
         .network

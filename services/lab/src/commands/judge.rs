@@ -6,16 +6,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use datasets::{People, ReadOptions, Selection, Sides, SkeletonTable};
-use evaluation::Judged;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use inputs::Joints;
+use lab::evaluation::Judged;
 use lab::judged::{self, Reader};
-use score::Bootstrap;
 use serde_json::json;
 use skeleton::PARSE14;
+use statistics::score::Bootstrap;
 use terminal::{Globals, Terminal, output};
+use training::datasets::{People, ReadOptions, Selection, Sides, SkeletonTable};
 
 /// The progress bar.
 pub(super) const BAR: &str =
@@ -92,7 +92,7 @@ impl Arguments {
     /// The people to evaluate.
     fn people(&self) -> Result<People, Failure> {
         let options = options(self.only.as_ref(), self.without.as_ref());
-        let read = datasets::read(&self.dataset, &options);
+        let read = training::datasets::read(&self.dataset, &options);
         let mut people = read.map_err(lab::dataset_failure)?;
         let table = SkeletonTable::published();
         let sided = people.people.into_iter();

@@ -47,10 +47,6 @@ pub(crate) enum Command {
         /// the biases.
         #[arg(long, value_name = "FILE", conflicts_with = "json")]
         html: Option<PathBuf>,
-        /// With --html: images of people, or folders of them. The page then shows examples of every type of every
-        /// part, cut from these images.
-        #[arg(long, value_name = "IMAGES", num_args = 1.., requires = "html")]
-        examples: Vec<PathBuf>,
         /// Options for networks.
         #[command(flatten)]
         network: network::Arguments,
@@ -64,9 +60,8 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
         Command::Show {
             file,
             html: Some(html),
-            examples,
             ..
-        } => draw(file, html, examples),
+        } => draw(file, html),
         Command::Show {
             file,
             json,
@@ -90,16 +85,9 @@ fn import(file: &Path, out: &Path) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn draw(file: &Path, html: &Path, images: &[PathBuf]) -> Result<ExitCode, Failure> {
+fn draw(file: &Path, html: &Path) -> Result<ExitCode, Failure> {
     let model = inputs::model(file)?;
-    let examples = match images {
-        [] => None,
-        images => {
-            let listed = inputs::images::listed(images)?;
-            Some(lab::examples::gather(&model, &listed)?)
-        }
-    };
-    let page = lab::model_page::html(&model, examples.as_ref());
+    let page = lab::model_page::html(&model);
     files::replace(html, page.as_bytes()).map_err(|error| failure::in_file(html, &error))?;
     output::message(format_args!("wrote {}", html.display()));
     Ok(ExitCode::SUCCESS)

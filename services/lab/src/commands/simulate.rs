@@ -5,12 +5,12 @@ mod report;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use ::hosts::{Costs, Forecast, Load, forecast};
 use clap::{Args, Subcommand};
 use failure::Failure;
+use failure::wording::Table;
+use lab::forecast::{Costs, Forecast, Load, forecast};
 use serde_json::json;
 use terminal::output;
-use wording::Table;
 
 /// The costs of the machine that the guide names, with the network that ships.
 const DEFAULT: Costs = Costs {

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::work::Done;
-use ::consistency::{Appearance, Point};
+use multiview::learned::{Appearance, Point};
 
 /// Version of the JSON.
 const SCHEMA: u32 = 1;

@@ -1,7 +1,7 @@
 //! The sequences that are learned from, and those that are held out.
 
-use datasets::sequences::Sequence;
 use failure::{ExitKind, Failure};
+use training::datasets::sequences::Sequence;
 
 /// Those that are learned from, and those that the weights are chosen on.
 pub(super) fn split(

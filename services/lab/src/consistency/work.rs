@@ -3,14 +3,16 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use ::consistency::{Grid, Learned, Learner, Point, Settings, Shape, Tally, Weights, best};
-use datasets::sequences::{Frame, Sequence};
-use evaluation::{Bench, Combining, Film, FilmSettings, Setup, Terms, Trial, Version, score};
+use crate::evaluation::{
+    Bench, Combining, Film, FilmSettings, Setup, Terms, Trial, Version, score,
+};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
 use kernels::Rgb8View;
+use multiview::learned::{Grid, Learned, Learner, Point, Settings, Shape, Tally, Weights, best};
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
-use score::Point as Joint;
+use statistics::score::Point as Joint;
+use training::datasets::sequences::{Frame, Sequence};
 
 use crate::failures::film_failure;
 
@@ -295,7 +297,7 @@ fn fusion(weights: &Weights) -> multiview::Settings {
 /// Root mean square error of joints of people held out, by ridge; without a map first.
 fn joint_errors(learner: &Learner, other: &Learner) -> Vec<(Option<f64>, f64)> {
     let theirs = other.joints();
-    let none = ::consistency::JointFit::default();
+    let none = multiview::learned::JointFit::default();
     let mut errors = vec![(None, theirs.error_of(&none, 1.0))];
     let with = |ridge: f64| (Some(ridge), theirs.error_of(learner.joints(), ridge));
     errors.extend(RIDGES.map(with));

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use datasets::sequences::Sequence;
-use evaluation::Film;
+use crate::evaluation::Film;
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::Camera;
@@ -14,8 +13,9 @@ use pipeline::{
     SpaceStepSettings, ViewContent, ViewFrame, ViewSettings, ViewStep, WhoSettings,
 };
 use posenetwork::{Detector, PoseNetwork};
-use score::Point;
 use skeleton::PARSE14;
+use statistics::score::Point;
+use training::datasets::sequences::Sequence;
 
 /// Opens what every view has for itself.
 pub trait OpenView {

@@ -1,7 +1,6 @@
 //! Sequences judged on the keypoints of a network, undisturbed and under stress: in space, and by what everyone does.
 
-use datasets::sequences::{Frame, Sequence};
-use evaluation::{
+use crate::evaluation::{
     Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
     projected,
 };
@@ -15,8 +14,9 @@ use pipeline::ViewSettings;
 use posenetwork::{
     Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
 };
-use score::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
 use skeleton::PARSE14;
+use statistics::score::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
+use training::datasets::sequences::{Frame, Sequence};
 
 use super::as_run::{self, AsRun};
 

@@ -5,17 +5,17 @@ use std::io::{Seek as _, SeekFrom, Write as _};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use consistency::Learned;
-use datasets::sequences::{Frame, Sequence};
-use evaluation::{
+use crate::evaluation::{
     Bench, Expectation, Film, FilmSettings, Header, Predicted, Record, Setup, SingleView, Trial,
     Version, parse14, part_errors, projected, read_records, tenth_of,
 };
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop, in_file, read_text};
 use fmp::Model;
-use orientation::Detector;
+use multiview::learned::Learned;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
 use skeleton::{JointMap, JointSet, PARSE14};
+use training::datasets::sequences::{Frame, Sequence};
+use viewquality::orientation::Detector;
 use viewquality::{ForecastInput, Forecaster, Table};
 
 use super::progress::Progress;

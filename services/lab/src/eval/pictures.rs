@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use datasets::People;
-use evaluation::page::pictures_html;
-use evaluation::{Intervals, Judged, Pictures, pictures_latex};
+use crate::evaluation::page::pictures_html;
+use crate::evaluation::{Intervals, Judged, Pictures, pictures_latex};
 use failure::{ExitKind, Failure, OrFail as _, in_file};
-use score::Bootstrap;
 use serde_json::{Value, json};
+use statistics::score::Bootstrap;
+use training::datasets::People;
 
 use crate::judged;
 

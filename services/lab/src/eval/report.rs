@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
-use evaluation::page::{Page, html};
-use evaluation::{FrameScore, Group, Measured, Summary, Version, judge, latex, score, summarise};
+use crate::evaluation::page::{Page, html};
+use crate::evaluation::{
+    FrameScore, Group, Measured, Summary, Version, judge, latex, score, summarise,
+};
 use failure::{ExitKind, Failure, OrFail as _, in_file};
-use score::Bootstrap;
+use statistics::score::Bootstrap;
 
 use super::Done;
 

@@ -3,8 +3,8 @@
 use fmp::Edge;
 
 use super::colours::type_colour;
-use report::html::Html;
-use report::{html, put};
+use exports::report::html::Html;
+use exports::report::{html, put};
 
 /// Rows are the parent's types, columns those of the part; the colours span the table's own largest bias.
 pub(super) fn table(edge: &Edge) -> Html {

@@ -5,8 +5,8 @@ use fmp::Model;
 use super::colours::part_colour;
 use super::glyph::CELL;
 use super::springs::{Ellipse, ellipses, of_pair};
-use report::html::Html;
-use report::{html, put};
+use exports::report::html::Html;
+use exports::report::{html, put};
 
 /// Where every part is drawn.
 #[derive(Debug)]

@@ -2,8 +2,8 @@
 
 use fmp::{Filter, Model, N_CHANNELS};
 
-use report::html::Html;
-use report::{html, put};
+use exports::report::html::Html;
+use exports::report::{html, put};
 
 /// Undirected orientations of the features.
 const N_ORIENTATIONS: usize = 9;

@@ -4,8 +4,8 @@ use fmp::{Edge, Spring, Springs};
 
 use super::SPRING_COST;
 use super::colours::type_colour;
-use report::html::Html;
-use report::{html, put};
+use exports::report::html::Html;
+use exports::report::{html, put};
 
 /// Where a spring rests, and where it costs [`SPRING_COST`].
 #[derive(Debug, Clone, Copy, PartialEq)]

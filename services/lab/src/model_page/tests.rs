@@ -43,7 +43,7 @@ pub(crate) fn planted(name: &str) -> ModelSpec {
 }
 
 fn page(spec: ModelSpec) -> String {
-    html(&Model::new(spec).unwrap(), None)
+    html(&Model::new(spec).unwrap())
 }
 
 /// Reads the page as XML and counts the elements of a name.
@@ -70,23 +70,6 @@ fn every_filter_part_and_pair_of_types_is_drawn() {
     assert_eq!(count(&page, "td"), 8);
     assert_eq!(page.matches(">never<").count(), 2);
     testkit::chromium::check_in_browser(&page);
-}
-
-#[test]
-fn examples_stand_under_their_type() {
-    let model = Model::new(planted("person")).unwrap();
-    // Of part 2 one of the first and two of the second type, of the others none.
-    let png = vec![vec![], vec![vec![vec![1, 2, 3]], vec![vec![4], vec![5]]]];
-    let page = html(&model, Some(&Examples { png }));
-    assert_eq!(count(&page, "img"), 3);
-    let of_second = page.find("<h3>2 ").unwrap()..page.find("<h3>3 ").unwrap();
-    let card = &page[of_second];
-    let at = |text: &str| card.find(text).unwrap();
-    assert!(
-        at("base64,AQID") < at("type 2")
-            && at("type 2") < at("base64,BA==")
-            && at("base64,BA==") < at("base64,BQ==")
-    );
 }
 
 #[test]

@@ -1,11 +1,11 @@
 //! People on photographs, by their marked joints.
 
-use datasets::{Person, ReadOptions, Selection, SkeletonTable};
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::Fill;
-use orientation::{Sample, Tile};
 use rayon::prelude::*;
+use training::datasets::{Person, ReadOptions, Selection, SkeletonTable};
 use viewquality::Sampler;
+use viewquality::orientation::{Sample, Tile};
 
 use super::{Job, Work};
 use crate::failures::dataset_failure;
@@ -53,7 +53,7 @@ pub(super) fn samples(job: &Job, work: &Work) -> Result<(Vec<Sample>, Vec<Named>
     for ((path, only), judged) in all.iter().zip(only).zip(judged) {
         let judged = selection(&judged)?;
         let read = |options: ReadOptions| -> Result<Vec<Sample>, Failure> {
-            let read = datasets::read(path, &options).map_err(dataset_failure)?;
+            let read = training::datasets::read(path, &options).map_err(dataset_failure)?;
             let found: Result<Vec<_>, Failure> = read
                 .people
                 .par_iter()
@@ -97,7 +97,7 @@ fn of_person(person: &Person) -> Result<Option<Sample>, Failure> {
     if length.is_nan() || length < MIN_TRUNK_PX {
         return Ok(None);
     }
-    let mut sample = datasets::Sample::read(person).or_fail(ExitKind::Input)?;
+    let mut sample = training::datasets::Sample::read(person).or_fail(ExitKind::Input)?;
     let lean = f64::atan2(x, -y);
     if lean.abs() >= MAX_LEAN {
         let turned = sample.rotated(lean.to_degrees(), Fill::Replicate);
@@ -105,7 +105,7 @@ fn of_person(person: &Person) -> Result<Option<Sample>, Failure> {
     }
     let joints = &sample.joints;
     let parts = SkeletonTable::published().parts_of(joints);
-    let Some(head) = orientation::head_of(&parts) else {
+    let Some(head) = viewquality::orientation::head_of(&parts) else {
         return Ok(None);
     };
     let [x, y] = trunk(joints);

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use datasets::SkeletonTable;
 use failure::Failure;
 use fmp::{Model, Scope};
 use nalgebra::{Point3, Vector3};
-use orientation::{Sample, Tile};
+use training::datasets::SkeletonTable;
 use viewquality::Sampler;
+use viewquality::orientation::{Sample, Tile};
 
 use super::Work;
 use crate::scenes::{Scenes, Shown, of_pictures};
@@ -52,7 +52,7 @@ fn sample(
     if mean_error(&centres, &truth)? > MAX_ERROR * (bounds[3] - bounds[1]) {
         return None;
     }
-    let head = orientation::head_of(&centres)?;
+    let head = viewquality::orientation::head_of(&centres)?;
     Some(Sample {
         tile: Tile::around(shown.picture, bounds, head, &mut Sampler::default())?,
         front: front_in_view(shown)?,

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use datasets::Picture;
 use failure::Failure;
 use fmp::{CandidateSettings, Layout, Model, Search};
 use rayon::prelude::*;
 use serde_json::{Value, json};
+use training::datasets::Picture;
 
 use super::progress::Progress;
 

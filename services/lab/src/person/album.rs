@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use datasets::{Person, Picture, Sample, SkeletonTable};
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::Fill;
 use rayon::prelude::*;
+use training::datasets::{Person, Picture, Sample, SkeletonTable};
 use training::{Album, AlbumError};
 
 use super::data::Data;
@@ -135,5 +135,5 @@ fn stamp(files: &[&Path]) -> u64 {
         let name = file.file_name().unwrap_or_default().as_encoded_bytes();
         name.iter().copied().chain(length.to_le_bytes())
     });
-    checksum::fnv1a_of(named)
+    formats::checksum::fnv1a_of(named)
 }

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use datasets::{FaultKind, People, Person, Picture, ReadOptions, Selection, Sides, SkeletonTable};
 use failure::{ExitKind, Failure, OrFail as _};
 use rayon::prelude::*;
+use training::datasets::{
+    FaultKind, People, Person, Picture, ReadOptions, Selection, Sides, SkeletonTable,
+};
 
 use super::per_dataset::deal;
 use super::progress::Progress;
@@ -45,7 +47,11 @@ pub struct Chosen {
 /// The text is not a skeleton table.
 pub fn parse_skeleton(file: &Path, text: &str) -> Result<SkeletonTable, Failure> {
     SkeletonTable::parse(text).map_err(|error| {
-        let message = format!("{}: {}", file.display(), wording::in_one_line(&error));
+        let message = format!(
+            "{}: {}",
+            file.display(),
+            failure::wording::in_one_line(&error)
+        );
         Failure::new(ExitKind::Input, message)
     })
 }
@@ -93,7 +99,7 @@ impl Data {
             let angles = degrees(&angles)?;
             let sides = sides_of(&sides)?;
             let People { people, problems } =
-                datasets::read(path, options).map_err(dataset_failure)?;
+                training::datasets::read(path, options).map_err(dataset_failure)?;
             let people = people.into_iter();
             let people = people.map(|it| sides.of(it, table.joint_mirror()));
             for problem in problems {

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use datasets::Problem;
 use failure::{Console, ExitKind, Failure, Stop};
 use serde_json::{Map, Value, json};
+use training::datasets::Problem;
 use training::{Event, Gap, Step, Watch};
 
 /// Tells a console what is being done, and how long it will take.
@@ -58,14 +58,16 @@ impl Progress {
 
     /// Tells of a person who was left out.
     pub(super) fn left_out(&self, problem: &Problem) -> Result<(), Failure> {
-        self.console
-            .message(&format!("left out: {}", wording::in_one_line(problem)));
+        self.console.message(&format!(
+            "left out: {}",
+            failure::wording::in_one_line(problem)
+        ));
         self.console.event(&json!({
             "event": "left-out",
             "file": problem.file,
             "row": problem.row,
             "kind": problem.fault.kind().name(),
-            "message": wording::in_one_line(&problem.fault),
+            "message": failure::wording::in_one_line(&problem.fault),
         }))
     }
 
@@ -75,7 +77,7 @@ impl Progress {
         image: &Path,
         error: &(dyn Error + 'static),
     ) -> Result<(), Failure> {
-        let message = wording::in_one_line(error);
+        let message = failure::wording::in_one_line(error);
         self.console.message(&format!("left out: {message}"));
         self.console
             .event(&json!({ "event": "unreadable", "file": image, "message": message }))

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use datasets::SkeletonTable;
 use failure::{ExitKind, Failure, OrFail as _};
+use training::datasets::SkeletonTable;
 use training::{CheckpointError, Plan, Settings, TrainError, Trainer, Tree};
 
 use super::alarms;

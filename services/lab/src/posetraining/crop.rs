@@ -1,7 +1,7 @@
 //! The square picture that is kept of a person.
 
 use kernels::Rgb8View;
-use networktraining::pose::{FILL, MARGIN, SIDE, Shape, WINDOW};
+use training::networks::pose::{FILL, MARGIN, SIDE, Shape, WINDOW};
 
 /// Where the square lies in a picture.
 #[derive(Debug, Clone, Copy)]

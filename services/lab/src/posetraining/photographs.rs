@@ -2,13 +2,13 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use datasets::{Person as Annotated, Picture, ReadOptions, Sides, SkeletonTable};
 use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
-use networktraining::pose::{
+use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace};
+use training::datasets::{Person as Annotated, Picture, ReadOptions, Sides, SkeletonTable};
+use training::networks::pose::{
     MIRROR, Marks, N_JOINTS, Person, SIDE, Source, Target, exchange_sides,
 };
-use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace};
 
 use super::crop::Crop;
 use super::{People, Work};
@@ -43,7 +43,7 @@ pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Per
             outside_px: ANYWHERE_PX,
             ..options
         };
-        let read = datasets::read(path, &options).map_err(dataset_failure)?;
+        let read = training::datasets::read(path, &options).map_err(dataset_failure)?;
         for problem in &read.problems {
             let cause = &problem.fault;
             work.console

@@ -1,7 +1,7 @@
 //! People who do not exist.
 
 use failure::Failure;
-use networktraining::pose::{N_JOINTS, Person, Source, Target, exchange_sides};
+use training::networks::pose::{N_JOINTS, Person, Source, Target, exchange_sides};
 
 use super::Work;
 use super::crop::Crop;

@@ -1,6 +1,6 @@
 //! Prepared people as a file, and the card of a trained network.
 
-use networktraining::pose::{About, N_JOINTS, Source, Target};
+use training::networks::pose::{About, N_JOINTS, Source, Target};
 
 use super::*;
 
@@ -37,8 +37,8 @@ fn people_are_read_as_they_were_written_and_a_file_that_was_cut_is_refused() {
 
 #[test]
 fn the_card_that_is_written_is_one_and_says_what_the_network_takes() {
-    let shape = networktraining::pose::Shape::default();
-    let text = networktraining::pose::card(&shape, &About::default());
+    let shape = training::networks::pose::Shape::default();
+    let text = training::networks::pose::card(&shape, &About::default());
     let card = keypoints::Card::parse(&text).unwrap();
     assert_eq!(
         [card.input.width, card.input.height],
@@ -51,14 +51,14 @@ fn the_card_that_is_written_is_one_and_says_what_the_network_takes() {
 
 #[test]
 fn a_network_that_was_not_trained_fits_its_card_and_tells_front_and_errors() {
-    let shape = networktraining::pose::Shape {
+    let shape = training::networks::pose::Shape {
         channels: [8, 8, 8, 8],
         blocks: [1, 1, 1, 1],
-        ..networktraining::pose::Shape::default()
+        ..training::networks::pose::Shape::default()
     };
-    let card = networktraining::pose::card(&shape, &About::default());
-    let parameters = networktraining::pose::initial(&shape, 3);
-    let bytes = networktraining::pose::file(&shape, &parameters, &[]);
+    let card = training::networks::pose::card(&shape, &About::default());
+    let parameters = training::networks::pose::initial(&shape, 3);
+    let bytes = training::networks::pose::file(&shape, &parameters, &[]);
     let session = inference::Session::parse(bytes).unwrap();
     let card = keypoints::Card::parse(&card).unwrap();
     let network = PoseNetwork::new(session, card).unwrap();

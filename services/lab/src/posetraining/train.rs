@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use networktraining::pose::{self, About, Cost, PoseTask, Score, Settings};
-use networktraining::{Backend, Parameter, TrainError, Trainer};
-use report::curves::{self, Line, Panel};
+use exports::report::curves::{self, Line, Panel};
+use training::networks::pose::{self, About, Cost, PoseTask, Score, Settings};
+use training::networks::{Backend, Parameter, TrainError, Trainer};
 
 use super::Prepared;
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use inputs::cards::METADATA_KEY;
 
 /// The results of a hundred steps.
-pub type Pass = networktraining::Pass<Cost, Score>;
+pub type Pass = training::networks::Pass<Cost, Score>;
 
 /// A network that was trained before.
 #[derive(Debug, Clone)]

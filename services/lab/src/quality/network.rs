@@ -5,22 +5,22 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use networktraining::quality::judge::Judgement;
-use networktraining::quality::sample::Sample;
-use networktraining::quality::settings::Settings;
-use networktraining::quality::store::Samples;
-use networktraining::quality::task::{QualityTask, Validated};
-use networktraining::quality::vgg;
-use networktraining::{Backend, Parameter, TrainError};
-use report::curves::{self, Line, Panel};
+use exports::report::curves::{self, Line, Panel};
 use serde_json::json;
+use training::networks::quality::judge::Judgement;
+use training::networks::quality::sample::Sample;
+use training::networks::quality::settings::Settings;
+use training::networks::quality::store::Samples;
+use training::networks::quality::task::{QualityTask, Validated};
+use training::networks::quality::vgg;
+use training::networks::{Backend, Parameter, TrainError};
 
 use super::replace::replace;
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop, in_file};
 
 /// The results of a pass over the samples.
-type Pass = networktraining::Pass<f32, Validated>;
-type Trainer<'a> = networktraining::Trainer<QualityTask<'a>>;
+type Pass = training::networks::Pass<f32, Validated>;
+type Trainer<'a> = training::networks::Trainer<QualityTask<'a>>;
 
 /// What a network is trained on, and where to.
 #[derive(Debug, Clone)]

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use datasets::SkeletonTable;
 use fmp::{Model, Responses, Scope, local_scores};
 use kernels::Rgb8View;
-use networktraining::quality::sample::{Sample, part_errors, picture_size};
 use skeleton::N_PARTS;
+use training::datasets::SkeletonTable;
+use training::networks::quality::sample::{Sample, part_errors, picture_size};
 use viewquality::{EvidenceError, Normalisation, Sampler, Tile, TileShape, evidence};
 
 use crate::searches::Searches;

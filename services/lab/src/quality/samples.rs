@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use datasets::{Picture, ReadOptions, Selection};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Model;
-use networktraining::quality::sample::Sample;
-use networktraining::quality::store::Samples;
 use rayon::prelude::*;
+use training::datasets::{Picture, ReadOptions, Selection};
+use training::networks::quality::sample::Sample;
+use training::networks::quality::store::Samples;
 use viewquality::TileShape;
 
 use super::observer::Observer;
@@ -101,7 +101,7 @@ fn people(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
             n_joints: Some(skeleton::PARSE14.joints.len()),
             ..ReadOptions::default()
         };
-        let read = datasets::read(path, &options).map_err(dataset_failure)?;
+        let read = training::datasets::read(path, &options).map_err(dataset_failure)?;
         let name = path
             .file_name()
             .unwrap_or_default()

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use body::Joints;
 use nalgebra::{Point3, Vector3};
-use score::Share;
+use statistics::score::Share;
 
 use super::shelf::{N_TRUE, TruePerson};
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use score::{Bootstrap, Share};
+use statistics::score::{Bootstrap, Share};
 use serde::Serialize;
 use statistics::Sorted;
 

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use datasets::sequences::{MarkerTable, Motion, MotionError, MotionOptions, PRESETS, read_motion};
 use failure::{ExitKind, Failure, OrFail as _};
 use scene::{Posture, Recording};
+use training::datasets::sequences::{
+    MarkerTable, Motion, MotionError, MotionOptions, PRESETS, read_motion,
+};
 
 /// A table of how markers become joints: one that ships, by its name, or a file.
 ///

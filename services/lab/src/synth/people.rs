@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use datasets::Person;
 use failure::{ExitKind, Failure, OrFail as _};
+use training::datasets::Person;
 
 use super::files;
 
@@ -40,7 +40,7 @@ impl People {
         }
         let (mut anatomical, mut as_seen) = (String::new(), String::new());
         for (person, name, behind) in &self.0 {
-            let line = datasets::to_line(person, Some(name)).or_fail(ExitKind::Run)?;
+            let line = training::datasets::to_line(person, Some(name)).or_fail(ExitKind::Run)?;
             anatomical += &(line.clone() + "\n");
             let line = if *behind {
                 let mirrored = Person {
@@ -48,7 +48,7 @@ impl People {
                     visible: MIRROR.map(|it| person.visible[it]).to_vec(),
                     ..person.clone()
                 };
-                datasets::to_line(&mirrored, Some(name)).or_fail(ExitKind::Run)?
+                training::datasets::to_line(&mirrored, Some(name)).or_fail(ExitKind::Run)?
             } else {
                 line
             };

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use datasets::Person;
 use failure::{Console, ExitKind, Failure, Stop};
 use rayon::prelude::*;
 use scene::truth::{Frame, View as Seen};
 use scene::{Scene, SceneError, Settings, View};
+use training::datasets::Person;
 
 use super::people::People;
 use super::{Job, files, rig_failure};

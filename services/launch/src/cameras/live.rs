@@ -144,7 +144,7 @@ fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
         );
     }
     if info.is_interlaced {
-        let file = wording::shell(&camera.source);
+        let file = failure::wording::shell(&camera.source);
         tracing::warn!(
             "camera {:?}: {} is interlaced: every picture is two halves of different moments, so that whoever moves has combs for \
              edges; `ffmpeg -i {file} -vf bwdif=mode=send_frame -c:v libx264 -crf 15 progressive.mp4` makes whole pictures of them",
@@ -191,7 +191,7 @@ fn refused(error: LiveError, camera: &Camera) -> Failure {
         "this is the live camera {:?}; `parallax cameras` lists the video devices of this machine with what they offer, and \
          `parallax cameras view {}` takes a picture",
         camera.name,
-        wording::shell(footage::without_passwords(&camera.source))
+        failure::wording::shell(footage::without_passwords(&camera.source))
     );
     Failure::new(error.kind(), error).with_hint(hint)
 }

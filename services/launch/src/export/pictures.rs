@@ -138,7 +138,7 @@ fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, Str
     };
     let footage = resolved.footage.get(nth);
     let feed = Retimed::open(&spec, footage.and_then(|it| it.timeline.as_ref()));
-    let feed = feed.map_err(|error| wording::in_one_line(&error))?;
+    let feed = feed.map_err(|error| failure::wording::in_one_line(&error))?;
     let size = feed.info().size;
     let due = footage.map_or([0; 2], |it| it.size.map(|it| it as usize));
     if [size.width, size.height] != due {

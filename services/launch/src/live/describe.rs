@@ -1,7 +1,7 @@
 //! A snapshot of a deployment as JSON.
 
 use messages::{CameraCounts, Cause, UNMEASURED};
-use metrics::{Reading, Timed};
+use runtime::metrics::{Reading, Timed};
 use serde_json::{Map, Value, json};
 
 use super::snapshot::{ProcessSnapshot, Snapshot};

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use metrics::{Reading, ReadingError};
 use runtime::ObservedProcess;
+use runtime::metrics::{Reading, ReadingError};
 
 use crate::resolved::SERVICES;
 
@@ -143,7 +143,7 @@ fn sort_key(process: &str) -> (usize, usize, String) {
 #[cfg(test)]
 pub(crate) mod tests {
     use messages::{Cause, Span};
-    use metrics::{Meter, Passage};
+    use runtime::metrics::{Meter, Passage};
 
     use super::*;
 

@@ -1,8 +1,8 @@
 //! A snapshot of a deployment as text: a table of the processes, and one of their times.
 
+use failure::wording::Table;
 use messages::{Cause, UNMEASURED};
-use metrics::{Reading, Timed};
-use wording::Table;
+use runtime::metrics::{Reading, Timed};
 
 use super::snapshot::{ProcessSnapshot, Snapshot, State};
 
@@ -349,7 +349,7 @@ results  waiting     all       100   20.0  ";
     fn invalid_metrics_are_shown_with_the_reason() {
         let mut snapshot = snapshot();
         snapshot.processes[2].reading = None;
-        snapshot.processes[2].problem = Some(metrics::ReadingError::Name);
+        snapshot.processes[2].problem = Some(runtime::metrics::ReadingError::Name);
         let text = table(&snapshot);
         assert!(text.contains("pose-0 cannot be read: the name"), "{text}");
     }

@@ -1,8 +1,8 @@
 //! Text on cameras that contradict each other.
 
 use messages::{CameraCounts, TimedBy, UNMEASURED};
-use metrics::Reading;
 use runfiles::{CameraFit, Contradicted, Exchanged};
+use runtime::metrics::Reading;
 use supervise::Outcome;
 
 /// Text on two cameras whose footage seems to be exchanged.

@@ -3,10 +3,10 @@
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
+use exports::report::run::{Eye, Moment, Page, Picture, Space, Strip, Table, Verdict};
 use failure::{ExitKind, Failure, in_file};
 use geometry::Rig;
 use image::codecs::jpeg::JpegEncoder;
-use report::run::{Eye, Moment, Page, Picture, Space, Strip, Table, Verdict};
 use runfiles::{FrameLine, LatencyReport, Line as _};
 use skeleton::JointSet;
 
@@ -37,7 +37,7 @@ pub(super) struct Content<'a> {
 /// The results cannot be read, or the page cannot be written.
 pub(super) fn write(folder: &Path, content: &Content<'_>) -> Result<PathBuf, Failure> {
     let file = folder.join(FILE);
-    let page = report::run::html(&page(folder, content)?);
+    let page = exports::report::run::html(&page(folder, content)?);
     files::replace(&file, page.as_bytes()).map_err(|error| in_file(&file, &error))?;
     Ok(file)
 }

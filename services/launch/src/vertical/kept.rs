@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use checksum::fnv1a;
+use formats::checksum::fnv1a;
 use geometry::Camera;
 use serde::{Deserialize, Serialize};
 

@@ -6,10 +6,10 @@ use calibration::board::{
     BoardError, LensKind, Outcome, Sight, Task, Together, calibrate as adjust,
 };
 use calibration::boards::{Board, Kind, dictionary_names};
+use exports::report::boards::Page;
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use geometry::{Camera, Rig};
 use nalgebra::Point2;
-use report::boards::Page;
 
 use super::{CameraFootage, LookSettings, Looked, Overlay, look, read_corners, worst};
 
@@ -469,7 +469,7 @@ impl Calibrated {
             .collect();
         let [width, height] = self.board.size_metres();
         let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
-        Ok(report::boards::html(&Page {
+        Ok(exports::report::boards::html(&Page {
             names: &self.task.names,
             outcome: &self.outcome,
             has_rig: self.task.wants_rig,

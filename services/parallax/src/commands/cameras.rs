@@ -116,7 +116,7 @@ fn list(as_json: bool) -> Result<ExitCode, Failure> {
     for path in &paths {
         match look(path) {
             Ok(it) => found.push(it),
-            Err(error) => others.push((path, wording::in_one_line(&error))),
+            Err(error) => others.push((path, failure::wording::in_one_line(&error))),
         }
     }
     if as_json {

@@ -117,7 +117,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         }
     }
     if !arguments.run {
-        let deployment = wording::shell(deployment.display());
+        let deployment = failure::wording::shell(deployment.display());
         output::message(format_args!("next: parallax run {deployment}"));
     }
     Ok(ExitCode::SUCCESS)
@@ -131,7 +131,7 @@ impl Step {
 
     /// The exit code that ends everything, if it does.
     fn run(&self, arguments: &Arguments, globals: Globals) -> Result<Option<ExitCode>, Failure> {
-        let line: Vec<String> = self.words.iter().map(wording::shell).collect();
+        let line: Vec<String> = self.words.iter().map(failure::wording::shell).collect();
         if let Some(file) = self.done.as_ref().filter(|it| it.exists()) {
             output::message(format_args!("kept {}", file.display()));
             return Ok(None);

@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Args;
+use client::publish::{Companion, Target};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::live;
-use publish::{Companion, Target};
 use terminal::{Globals, output};
 
 /// Options of `parallax publish`.
@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         }
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let counts = publish::run(name, &targets, arguments.until_end, &stop)?;
+    let counts = client::publish::run(name, &targets, arguments.until_end, &stop)?;
     if arguments.json {
         output::json(&serde_json::json!({
             "frames": counts.frames, "sent": counts.sent, "unsent": counts.unsent,
@@ -82,7 +82,7 @@ fn targets(texts: &[String], beyond: bool) -> Result<Vec<Target>, Failure> {
     Ok(targets)
 }
 
-fn usage(error: &publish::TargetError) -> Failure {
+fn usage(error: &client::publish::TargetError) -> Failure {
     Failure::new(ExitKind::Usage, error.to_string())
 }
 

@@ -198,10 +198,10 @@ fn stage_of(key: &str) -> Option<Stage> {
 fn warn_of_changed_files(settings: &Settings) {
     for (file, recorded) in &settings.files {
         let now = match Shipped::of_name(file) {
-            Some(it) => Some(checksum::fnv1a(it.bytes())),
+            Some(it) => Some(formats::checksum::fnv1a(it.bytes())),
             None => files::read(file, files::MODEL)
                 .ok()
-                .map(|bytes| checksum::fnv1a(&bytes)),
+                .map(|bytes| formats::checksum::fnv1a(&bytes)),
         };
         if now != Some(*recorded) {
             let file = file.display();

@@ -8,12 +8,12 @@ use std::process::ExitCode;
 use calibration::synchronisation::{Outcome, Settings, estimate};
 use clap::{Args, Subcommand, ValueEnum};
 use deployment::{ClockKeys, Deployment, with_clocks};
+use failure::wording::Table;
 use failure::{Console as _, ExitKind, Failure, OrFail as _, Stop, in_file, unless_stopped};
 use launch::films::{Films, Part, Poses, films};
 use launch::load;
 use serde_json::{Value, json};
 use terminal::{Globals, Terminal, output};
-use wording::Table;
 
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";
@@ -350,7 +350,7 @@ fn write_page(
     if arguments.by == By::Movement {
         about.extend(each.map(|(name, finder)| (format!("joints of {name}"), finder.clone())));
     }
-    let page = report::clocks::html(&report::clocks::Page {
+    let page = exports::report::clocks::html(&exports::report::clocks::Page {
         names,
         outcome,
         is_heard: arguments.by == By::Sound,

@@ -33,109 +33,6 @@ const FILES: &[Mistake] = &[
         ],
         &["a whole number of at least 0"],
     ),
-    config(
-        "number below 0",
-        |it| capture(it, "n_frames = -1"),
-        &["`capture.n_frames`", "found -1"],
-        &["a whole number of at least 0"],
-    ),
-    config(
-        "half a frame",
-        |it| capture(it, "start_frame = 1.5"),
-        &["`capture.start_frame`", "found 1.5"],
-        &["a whole number"],
-    ),
-    config(
-        "larger than any number",
-        |it| capture(it, "n_frames = 99999999999999999999"),
-        &["`capture.n_frames`", "99999999999999999999"],
-        &["a whole number"],
-    ),
-    config(
-        "size as text",
-        |it| capture(it, "size = \"640x480\""),
-        &["`capture.size`", "found the text \"640x480\""],
-        &["a list of 2 values"],
-    ),
-    config(
-        "size of three",
-        |it| capture(it, "size = [96, 128, 3]"),
-        &["deployment.toml:16", "`capture.size` is a list of 3 values"],
-        &["expected 2"],
-    ),
-    config(
-        "1 for true",
-        |it| it.edit("deployment.toml", "upright = false", "upright = 1"),
-        &["`capture.upright`", "found 1"],
-        &["true or false"],
-    ),
-    config(
-        "word without quotes",
-        |it| capture(it, "mode = realtime"),
-        &["deployment.toml:16"],
-        &["text must stand in quotes"],
-    ),
-    config(
-        "unknown mode",
-        |it| capture(it, "mode = \"live\""),
-        &["`live`"],
-        &["one of `lossless`, `paced`, `realtime`"],
-    ),
-    config(
-        "key twice",
-        |it| capture(it, "upright = true"),
-        &["deployment.toml:16", "`upright` is given twice"],
-        &[],
-    ),
-    config(
-        "[camera] in single brackets",
-        |it| it.edit("deployment.toml", "[[camera]]", "[camera]"),
-        &["deployment.toml:10", "`camera` is given twice"],
-        &["[[camera]], in double brackets"],
-    ),
-    config(
-        "[[cameras]]",
-        |it| it.edit("deployment.toml", "[[camera]]", "[[cameras]]"),
-        &["unknown key `cameras`"],
-        &["did you mean `camera`"],
-    ),
-    config(
-        "empty file",
-        |it| it.write("deployment.toml", ""),
-        &["missing key `name`"],
-        &["a deployment file needs `name`, `rig`, `output`"],
-    ),
-    config(
-        "camera without footage",
-        |it| it.edit("deployment.toml", "source = \"b\"", ""),
-        &["`camera.source` is left out of camera \"b\""],
-        &["every [[camera]] needs", "`keypoints`"],
-    ),
-    config(
-        "footage without a name",
-        |it| it.edit("deployment.toml", "source = \"b\"", "source = \"\""),
-        &["`camera.source` is left out of camera \"b\""],
-        &["every [[camera]] needs", "`keypoints`"],
-    ),
-    config(
-        "names of keypoints that no set has",
-        |it| {
-            it.set_network("");
-            it.edit(
-                "deployment.toml",
-                "source = \"b\"",
-                "keypoints = \"b\"\nkeypoint_names = \"coco17\"",
-            );
-        },
-        &["`camera.keypoint_names` is \"coco17\""],
-        &["one of coco-17, halpe-26"],
-    ),
-    config(
-        "a name of many words",
-        |it| it.edit("deployment.toml", "name = \"oops", "name = \"My Room"),
-        &["`name` is \"My Room"],
-        &["lower-case letters"],
-    ),
     Mistake {
         what: "the rig",
         made: NOTHING,
@@ -229,22 +126,6 @@ const LINES: &[Mistake] = &[
         &["posee"],
         &["'pose'"],
     ),
-    Mistake {
-        what: "--set without a value",
-        made: NOTHING,
-        command: "config check deployment.toml --set paper.workers",
-        code: 3,
-        says: &["--set paper.workers"],
-        tries: &["expected key=value"],
-    },
-    Mistake {
-        what: "--set of another kind",
-        made: NOTHING,
-        command: "config check deployment.toml --set paper.workers=two",
-        code: 3,
-        says: &["--set", "`paper.workers`", "found the text \"two\""],
-        tries: &["a whole number"],
-    },
     Mistake {
         what: "--set of a slip",
         made: NOTHING,

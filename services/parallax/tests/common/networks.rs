@@ -1,6 +1,6 @@
 //! Networks small enough to be written here.
 
-use onnx::{Attribute, Network, Side};
+use inference::onnx::{Attribute, Network, Side};
 
 /// Card of [`detector_of`].
 pub(crate) const DETECTOR: &str = r#"

@@ -68,7 +68,7 @@ pub(crate) fn fill(base: &Path) -> ExitCode {
     );
     let preflight = preflight(core::slice::from_ref(&plan));
     print_line(&preflight.map_or_else(
-        |error| wording::in_one_line(&error),
+        |error| failure::wording::in_one_line(&error),
         |()| "it fits".to_owned(),
     ));
     match without_preflight(base, &plan) {
@@ -86,7 +86,7 @@ fn without_preflight(base: &Path, plan: &TopicPlan) -> Result<String, Failure> {
     let topics = bus.create_topics(core::slice::from_ref(plan))?;
     let text = match bus.slice_publisher::<u8, FrameHeader>(plan.topic()) {
         Ok(_) => "it fits".to_owned(),
-        Err(error) => wording::in_one_line(&error),
+        Err(error) => failure::wording::in_one_line(&error),
     };
     drop(topics);
     Ok(text)

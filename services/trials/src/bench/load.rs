@@ -1,10 +1,10 @@
 //! Benchmarks of whole deployments under load.
 
+use exports::report::run::Limit;
+use failure::wording::Table;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
-use report::run::Limit;
 use serde_json::{Value, json};
 use terminal::output::{self, Verbosity};
-use wording::Table;
 
 use super::options::Options;
 use super::provenance::Provenance;

@@ -4,10 +4,10 @@ use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::Path;
 
+use exports::report::run::Limit;
 use failure::Failure;
-use report::run::Limit;
+use failure::wording::Table;
 use serde_json::{Value, json};
-use wording::Table;
 
 use super::provenance::Provenance;
 

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
+use exports::report::run::Limit;
+use failure::wording::Table;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
-use report::run::Limit;
 use runtime::{Policy, RealTime, Scheduling};
 use serde_json::{Value, json};
 use terminal::output::{self, Verbosity};
-use wording::Table;
 
 use super::hop::{self, Measured, Series};
 use super::provenance::Provenance;

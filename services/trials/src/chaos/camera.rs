@@ -1,8 +1,8 @@
 //! The `camera-...` scenarios: a camera fails for a while.
 
+use exports::report::run::Limit;
 use failure::Failure;
 use fastrand::Rng;
-use report::run::Limit;
 use serde::Serialize;
 use serde_json::json;
 

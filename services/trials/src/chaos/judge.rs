@@ -1,6 +1,6 @@
 //! Checks the measurements of a scenario against its limits.
 
-use report::run::Limit;
+use exports::report::run::Limit;
 
 use super::options::Limits;
 use super::resources::ResourceUse;

@@ -2,8 +2,8 @@
 
 use core::ops::Range;
 
+use failure::wording::Table;
 use serde::Serialize;
-use wording::Table;
 
 use super::random_kills::Kill;
 use super::resources::{ResourceMonitor, ResourceUse};

@@ -2,8 +2,8 @@
 
 use std::io;
 
+use exports::report::run::Limit;
 use failure::Failure;
-use report::run::Limit;
 use serde::Serialize;
 use serde_json::json;
 use supervise::Event;

@@ -2,7 +2,7 @@
 
 use core::fmt::Write as _;
 
-use report::run::Limit;
+use exports::report::run::Limit;
 use serde_json::{Value, json};
 
 use super::judge::{RandomKillsOutcome, SupervisorKillOutcome};

@@ -1,7 +1,7 @@
 //! Checks the limits of the demo.
 
+use exports::report::run::Limit;
 use launch::ViewReport;
-use report::run::Limit;
 
 use super::options::Limits;
 use super::score::Score;

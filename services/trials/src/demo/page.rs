@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use exports::report::run::{Eye, Mark, Page, Picture, Space, Strip, Table};
 use image::codecs::jpeg::JpegEncoder;
 use launch::budget;
-use report::run::{Eye, Mark, Page, Picture, Space, Strip, Table};
 use skeleton::PARSE14;
 
 use super::report::Report;
@@ -98,7 +98,7 @@ fn marks(cost: Option<&Cost>, clock: &Clock) -> Vec<Mark> {
 }
 
 fn space(run: &Run<'_>, synthetic: &SyntheticDeployment) -> Space {
-    let moment = |(result, truth): (&FrameResult, &Vec<Point>)| report::run::Moment {
+    let moment = |(result, truth): (&FrameResult, &Vec<Point>)| exports::report::run::Moment {
         frame: result.frame,
         seconds: result.frame as f64 / run.rate_hz,
         found: result.joints.clone(),

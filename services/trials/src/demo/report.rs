@@ -3,7 +3,7 @@
 use core::fmt::Write as _;
 use std::path::Path;
 
-use report::run::Limit;
+use exports::report::run::Limit;
 use serde_json::{Value, json};
 
 use super::limits::{self, Measured};

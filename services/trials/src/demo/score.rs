@@ -1,8 +1,8 @@
 //! The accuracy of results: PCP3D and MPJPE.
 
-use score::{joint_errors, segment_errors, segments};
 use serde::Serialize;
 use skeleton::PARSE14;
+use statistics::score::{joint_errors, segment_errors, segments};
 
 use crate::trial::Point;
 

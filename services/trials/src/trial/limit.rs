@@ -1,6 +1,6 @@
 //! Compares measured numbers with limits.
 
-use report::run::Limit;
+use exports::report::run::Limit;
 
 /// A limit that holds if the number is at least the given one.
 pub(crate) fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {

@@ -1,9 +1,9 @@
 //! All cameras, time offsets, bones and joints at once.
 
-use body::{BONES, Kind, N_BONES};
 use geometry::Camera;
 use geometry::bundle::{Cameras, Loss, Problem, Step, Term};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
+use skeleton::body::{BONES, Kind, N_BONES};
 use statistics::Sorted;
 
 use super::bias::Biases;

@@ -1,11 +1,11 @@
 //! The whole: what is looked at, the rig, and what forbids to use it.
 
 use crate::synchronisation::Film;
-use body::N_JOINTS;
 use fastrand::Rng;
 use geometry::Camera;
 use geometry::bundle::{Covariance, clustered};
 use nalgebra::Point3;
+use skeleton::body::N_JOINTS;
 
 use super::begin::{Study, choices};
 use super::certainty::{blocks, certainty, halves, spread};

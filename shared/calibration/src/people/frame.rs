@@ -1,8 +1,8 @@
 //! The world of a rig that has none: lengths, the vertical, and the floor.
 
-use body::{BONES, Joints, N_JOINTS, stature};
 use geometry::Camera;
 use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, UnitQuaternion, UnitVector3, Vector3};
+use skeleton::body::{BONES, Joints, N_JOINTS, stature};
 use statistics::Sorted;
 
 use crate::align::{Similarity, aligned};

@@ -262,3 +262,133 @@ fn a_number_larger_than_any_is_refused_as_its_key_asks() {
         "{got}"
     );
 }
+
+/// Internal words that no user should have to read.
+const NEVER: [&str; 5] = ["u64", "usize", "f64", "invalid type", "invalid value:"];
+
+/// Lines of `[capture]`, and what is said of them.
+const LINES: &[(&str, &[&str])] = &[
+    (
+        "n_frames = \"many\"",
+        &[
+            "deployment.toml:20",
+            "`capture.n_frames`",
+            "found the text \"many\"",
+            "a whole number of at least 0",
+        ],
+    ),
+    (
+        "n_frames = -1",
+        &[
+            "`capture.n_frames`",
+            "found -1",
+            "a whole number of at least 0",
+        ],
+    ),
+    (
+        "start_frame = 1.5",
+        &["`capture.start_frame`", "found 1.5", "a whole number"],
+    ),
+    (
+        "n_frames = 99999999999999999999",
+        &[
+            "`capture.n_frames`",
+            "99999999999999999999",
+            "a whole number",
+        ],
+    ),
+    (
+        "size = \"640x480\"",
+        &[
+            "`capture.size`",
+            "found the text \"640x480\"",
+            "a list of 2 values",
+        ],
+    ),
+    (
+        "upright = 1",
+        &["`capture.upright`", "found 1", "true or false"],
+    ),
+    (
+        "mode = realtime",
+        &["deployment.toml:20", "text must stand in quotes"],
+    ),
+    (
+        "mode = \"live\"",
+        &["`live`", "one of `lossless`, `paced`, `realtime`"],
+    ),
+    (
+        "upright = true\nupright = true",
+        &["deployment.toml:21", "`upright` is given twice"],
+    ),
+];
+
+/// Replacements in the file, and what is said of them.
+const EDITS: &[(&str, &str, &[&str])] = &[
+    (
+        "[[camera]]\nname = \"a\"",
+        "[camera]\nname = \"a\"",
+        &["`camera` is given twice", "[[camera]], in double brackets"],
+    ),
+    (
+        "[[camera]]",
+        "[[cameras]]",
+        &["unknown key `cameras`", "did you mean `camera`"],
+    ),
+    (
+        SHORT,
+        "",
+        &[
+            "missing key `name`",
+            "a deployment file needs `name`, `rig`, `output`",
+        ],
+    ),
+    (
+        "source = \"/videos/b.mp4\"",
+        "",
+        &[
+            "`camera.source` is left out of camera \"b\"",
+            "every [[camera]] needs",
+            "`keypoints`",
+        ],
+    ),
+    (
+        "/videos/b.mp4",
+        "",
+        &[
+            "`camera.source` is left out of camera \"b\"",
+            "every [[camera]] needs",
+        ],
+    ),
+    (
+        "name = \"two\"",
+        "name = \"My Room\"",
+        &["`name` is \"My Room", "lower-case letters"],
+    ),
+];
+
+#[test]
+fn a_mistake_is_told_with_what_was_found_and_what_to_write() {
+    let lines = LINES
+        .iter()
+        .map(|(line, words)| (format!("{SHORT}\n[capture]\n{line}\n"), "", *words));
+    let edits = EDITS
+        .iter()
+        .map(|(from, to, words)| (SHORT.replace(from, to), "", *words));
+    let set: &[&str] = &[
+        "--set",
+        "`paper.workers`",
+        "found the text \"two\"",
+        "a whole number",
+    ];
+    let set = (SHORT.to_owned(), "paper.workers=two", set);
+    for (text, set, words) in lines.chain(edits).chain([set]) {
+        let set: &[&str] = if set.is_empty() { &[] } else { &[set] };
+        let got = refused(&text, set);
+        assert!(
+            words.iter().all(|word| got.contains(word)),
+            "{words:?}: {got}"
+        );
+        assert!(!NEVER.iter().any(|word| got.contains(word)), "{got}");
+    }
+}

@@ -8,7 +8,7 @@
 //! | 20..28 | FNV-1a (64 bit) of the payload, little-endian; it tells every change within one byte |
 //! | 28.. | payload: bincode 2, standard configuration (little-endian, variable-length integers) |
 
-use checksum::{Envelope, EnvelopeError};
+use formats::checksum::{Envelope, EnvelopeError};
 
 use super::payload;
 use crate::{Model, ModelSpec};
@@ -67,7 +67,7 @@ pub fn decode(bytes: &[u8]) -> Result<ModelSpec, OwnError> {
 
 #[cfg(test)]
 mod tests {
-    use checksum::HEADER_BYTES;
+    use formats::checksum::HEADER_BYTES;
     use proptest::prelude::*;
 
     use super::*;

@@ -99,9 +99,11 @@ pub(super) fn instead(path: &str) -> String {
         return format!("name the file without file://: {file}");
     }
     let input = match path.split_once(':') {
-        Some(("v4l2" | "video4linux", device)) => format!("-f v4l2 -i {}", wording::shell(device)),
-        _ if path.starts_with("/dev/") => format!("-f v4l2 -i {}", wording::shell(path)),
-        _ => format!("-i {}", wording::shell(path)),
+        Some(("v4l2" | "video4linux", device)) => {
+            format!("-f v4l2 -i {}", failure::wording::shell(device))
+        }
+        _ if path.starts_with("/dev/") => format!("-f v4l2 -i {}", failure::wording::shell(path)),
+        _ => format!("-i {}", failure::wording::shell(path)),
     };
     format!("record it first (`ffmpeg {input} -t 60 left.mp4`), and name that file")
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use onnx::{Network, Side};
+use inference::onnx::{Network, Side};
 
 use super::*;
 use crate::cards::METADATA_KEY;

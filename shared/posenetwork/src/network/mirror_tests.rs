@@ -1,6 +1,6 @@
 //! Networks that look at mirror images: what looks the same on both sides is seen as without them.
 
-use onnx::{Attribute, Network};
+use inference::onnx::{Attribute, Network};
 
 use super::tests::{CARD, distributions, fitted, network, sides};
 use super::*;

@@ -1,6 +1,6 @@
 //! Networks of the test's own making, and cards that fit them or not.
 
-use onnx::{Attribute, Network, Side};
+use inference::onnx::{Attribute, Network, Side};
 
 use super::*;
 use crate::maps::{JointMaps, MapSettings};

@@ -1,6 +1,6 @@
 //! Networks that see turned pictures: what does not care how a picture is turned sees the same.
 
-use onnx::Network;
+use inference::onnx::Network;
 
 use super::tests::{CARD, distributions, fitted, network, sides};
 use super::*;

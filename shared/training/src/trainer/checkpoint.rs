@@ -132,6 +132,6 @@ impl<'a> Trainer<'a> {
     fn fingerprint(&self) -> u64 {
         let n_images = self.album.n_backgrounds();
         let text = format!("{:?} {:?} {n_images}", self.settings, self.plan);
-        checksum::fnv1a(text.as_bytes())
+        formats::checksum::fnv1a(text.as_bytes())
     }
 }

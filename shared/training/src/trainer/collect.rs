@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, PoisonError};
 
-use datasets::Picture;
+use crate::datasets::Picture;
 use fmp::{FeaturePyramid, Layout, Model, Placement, Pose};
 use rayon::prelude::*;
 

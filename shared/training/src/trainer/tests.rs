@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use datasets::Picture;
+use crate::datasets::Picture;
 use fmp::{CandidateSettings, Extractor, Layout, Model, Responses, Solver};
 use rayon::ThreadPoolBuilder;
 

@@ -1,6 +1,6 @@
 //! Networks with known outputs give them, and invalid networks are rejected.
 
-use onnx::Side;
+use inference::onnx::Side;
 use proptest::prelude::*;
 use testkit::networks::of_colours;
 
@@ -14,9 +14,9 @@ const SHAPE: TileShape = TileShape {
 };
 
 /// `sigma = the first two numbers of the evidence`.
-fn of_evidence() -> onnx::Network {
+fn of_evidence() -> inference::onnx::Network {
     let k = n_evidence(N_PARTS);
-    let mut net = onnx::Network::default();
+    let mut net = inference::onnx::Network::default();
     net.inputs
         .push(("evidence".to_owned(), vec![Side::Fixed(1), Side::Fixed(k)]));
     net.outputs
@@ -30,11 +30,11 @@ fn of_evidence() -> onnx::Network {
     net
 }
 
-fn read(net: &onnx::Network) -> Result<Network, NetworkError> {
+fn read(net: &inference::onnx::Network) -> Result<Network, NetworkError> {
     Network::parse(net.file(), N_PARTS)
 }
 
-fn rejection(net: &onnx::Network) -> String {
+fn rejection(net: &inference::onnx::Network) -> String {
     read(net).unwrap_err().to_string()
 }
 
@@ -207,7 +207,7 @@ fn rejects_truncated_files_and_other_files() {
 #[test]
 fn the_fingerprint_depends_on_the_bytes_of_the_file() {
     let [first, second] = [of_colours(), of_evidence()].map(|it| read(&it).unwrap().fingerprint());
-    assert_eq!(first, checksum::fnv1a_32(&of_colours().file()));
+    assert_eq!(first, formats::checksum::fnv1a_32(&of_colours().file()));
     assert_ne!(first, second);
 }
 

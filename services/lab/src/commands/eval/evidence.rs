@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use evaluation::{FilmSettings, Stress};
 use failure::{Claim, ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use inputs::library::Library;
 use lab::eval::as_run::{AsRun, OpenView};
 use lab::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
+use lab::evaluation::{FilmSettings, Stress};
 use posenetwork::{Detector, PoseNetwork};
-use score::Bootstrap;
+use statistics::score::Bootstrap;
 use terminal::{Globals, Terminal, output};
 
 use super::Arguments;

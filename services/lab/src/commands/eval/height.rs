@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use datasets::sequences::Sequence;
 use geometry::search_size::{GOOD_PX, USABLE_PX, better_scale, search_sizes};
+use training::datasets::sequences::Sequence;
 
 /// What to set where people are too high or too low in the frames, once for sequences of the same rig.
 ///

@@ -2,15 +2,15 @@
 
 use std::process::ExitCode;
 
-use datasets::People;
-use evaluation::{Judged, Pictures};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use lab::eval::pictures;
+use lab::evaluation::{Judged, Pictures};
 use lab::judged::{self, Reader};
-use score::Bootstrap;
 use skeleton::PARSE14;
+use statistics::score::Bootstrap;
 use terminal::{Globals, Terminal, output};
+use training::datasets::People;
 
 use super::Arguments;
 use crate::commands::judge;
@@ -30,7 +30,7 @@ pub(super) fn run(
             let message = format!("{name} is given twice");
             return Err(Failure::new(ExitKind::Usage, message));
         }
-        let people = datasets::read(path, &options).map_err(lab::dataset_failure)?;
+        let people = training::datasets::read(path, &options).map_err(lab::dataset_failure)?;
         all.push((name, people));
     }
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;

@@ -3,7 +3,7 @@
 use deployment::paper::Config;
 use failure::Failure;
 use lab::eval::{self, Done, Job};
-use score::Bootstrap;
+use statistics::score::Bootstrap;
 use terminal::output;
 
 use super::Arguments;

@@ -4,14 +4,14 @@ use core::fmt;
 use std::path::Path;
 use std::process::ExitCode;
 
-use evaluation::{Intervals, Judged, Pictures};
 use failure::{Console, ExitKind, Failure, Stop};
 use fmp::Search;
 use inputs::library::Library;
+use lab::evaluation::{Intervals, Judged, Pictures};
 use lab::judged;
 use lab::judged_network::{self, JointError, NetworkReader, Seen};
-use score::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
 use serde_json::{Value, json};
+use statistics::score::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
 use terminal::output;
 
 use super::Arguments;

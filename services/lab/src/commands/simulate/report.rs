@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use ::hosts::Costs;
 use failure::{ExitKind, Failure};
+use lab::forecast::Costs;
 use serde_json::Value;
 
 use super::DEFAULT;

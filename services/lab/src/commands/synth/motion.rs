@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use datasets::sequences::MotionOptions;
 use failure::Failure;
 use lab::synth;
 use scene::Recording;
+use training::datasets::sequences::MotionOptions;
 
 /// Recorded motion; none by default.
 #[derive(Debug, Clone, Args)]

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use ::consistency::Learned;
 use clap::Args;
-use evaluation::FilmSettings;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use lab::consistency::{Done, Job, Learning, Sequences};
+use lab::evaluation::FilmSettings;
+use multiview::learned::Learned;
 
 use crate::commands::eval::size;
 use terminal::{Globals, Terminal, output};
@@ -97,7 +97,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         .num_threads(arguments.threads.map_or(0, usize::from))
         .build()
         .or_fail(ExitKind::Run)?;
-    let job = job(arguments, format!("{:016x}", checksum::fnv1a(&bytes)));
+    let job = job(
+        arguments,
+        format!("{:016x}", formats::checksum::fnv1a(&bytes)),
+    );
     let terminal = Terminal::without_bar(globals.quiet, false);
     let learning = Learning::new(&job, &terminal, model, stop);
     let save = |learned: &Learned| {

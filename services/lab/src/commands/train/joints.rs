@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let file = (!deployment::is_shipped(&arguments.model)).then_some(arguments.model.as_path());
     let model = inputs::model_or_shipped(file)?;
     lab::judged::check(&model, &arguments.model.display().to_string())?;
-    let fingerprint = checksum::fnv1a(&inputs::model_bytes(file)?);
+    let fingerprint = formats::checksum::fnv1a(&inputs::model_bytes(file)?);
     let chosen = arguments.people.chosen();
     let terminal = Terminal::without_bar(globals.quiet, arguments.json);
     let of = (&Arc::clone(&model), fingerprint);

@@ -7,8 +7,8 @@ use clap::Args;
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use lab::orientation::{Job, Report};
 use lab::quality::Scenes;
-use orientation::Settings;
 use serde_json::json;
+use viewquality::orientation::Settings;
 
 use super::subjects;
 use terminal::{Globals, Terminal, output};

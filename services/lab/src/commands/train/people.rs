@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use datasets::{FaultKind, SkeletonTable};
 use failure::Failure;
 use lab::person::{Chosen, parse_skeleton};
+use training::datasets::{FaultKind, SkeletonTable};
 
 /// The data options.
 #[derive(Debug, Args)]

@@ -4,12 +4,12 @@ use std::process::ExitCode;
 
 use calibration::people::{Doubt, Outcome, Recording, Scale, Settings, Vertical, estimate};
 use clap::Args;
+use failure::wording::Table;
 use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use launch::films::Poses;
 use launch::load;
 use serde_json::{Value, json};
 use terminal::{Globals, output};
-use wording::Table;
 
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
@@ -382,6 +382,6 @@ fn write_page(
         (&outcome.cameras, &offsets_s),
         (&outcome.times_s, &outcome.skeletons),
     );
-    let page = report::walk::of_people(outcome, &walk.names(), &about, &pictures);
+    let page = exports::report::walk::of_people(outcome, &walk.names(), &about, &pictures);
     files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))
 }

@@ -5,11 +5,11 @@ use std::process::ExitCode;
 use calibration::people::Recording;
 use calibration::refine::{Outcome, Settings, refine};
 use clap::Args;
+use failure::wording::Table;
 use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
 use launch::films::Poses;
 use serde_json::{Value, json};
 use terminal::{Globals, output};
-use wording::Table;
 
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
@@ -98,7 +98,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         let offsets_s: Vec<f64> = outcome.changes.iter().map(|it| it.offset_s).collect();
         let skeletons = (&outcome.times_s[..], &outcome.skeletons);
         let pictures = misfits::of(&walk, (&outcome.cameras, &offsets_s), skeletons);
-        let page = report::walk::of_refinement(&outcome, &names, &about, &pictures);
+        let page = exports::report::walk::of_refinement(&outcome, &names, &about, &pictures);
         files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))?;
         output::message(format_args!("wrote {}", file.display()));
     }

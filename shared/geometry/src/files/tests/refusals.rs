@@ -6,7 +6,7 @@ use super::*;
 
 /// Asserts that a text is refused with an error that holds all of `words`.
 fn refused(result: Result<Rig, ParseError>, words: &[&str]) {
-    let text = wording::in_one_line(&result.expect_err("must be refused"));
+    let text = failure::wording::in_one_line(&result.expect_err("must be refused"));
     for word in words {
         assert!(text.contains(word), "{word:?} is not in {text:?}");
     }
@@ -281,12 +281,12 @@ fn errors_name_the_file() {
     let path = folder.path().join("broken.cal");
     std::fs::write(&path, "1 2 3").expect("writable");
     let options = ReadOptions::default();
-    let text = wording::in_one_line(&read(&path, &options).expect_err("3 numbers"));
+    let text = failure::wording::in_one_line(&read(&path, &options).expect_err("3 numbers"));
     assert!(
         text.contains("broken.cal") && text.contains("3 numbers"),
         "{text}"
     );
-    let text = wording::in_one_line(
+    let text = failure::wording::in_one_line(
         &read(&folder.path().join("absent.toml"), &options).expect_err("absent"),
     );
     assert!(text.contains("absent.toml"), "{text}");
@@ -308,7 +308,7 @@ fn errors_name_the_file() {
     ));
     let twice = read_many(&[&own, &own], &options).expect_err("two of a name");
     assert!(
-        wording::in_one_line(&twice).contains("two cameras are named"),
+        failure::wording::in_one_line(&twice).contains("two cameras are named"),
         "{twice}"
     );
     let large = folder.path().join("large.toml");

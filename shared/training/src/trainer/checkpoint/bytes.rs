@@ -9,7 +9,7 @@
 //! | 28.. | payload: the stamp and the checkpoint, bincode 2, standard configuration |
 
 use bincode::config::{self, Configuration, Limit, LittleEndian, Varint};
-use checksum::{Envelope, EnvelopeError};
+use formats::checksum::{Envelope, EnvelopeError};
 
 use super::Checkpoint;
 

@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use clap::Args;
 use failure::{ExitKind, Failure, OrFail as _};
 use inputs::Shipped;
-use networktraining::Backend;
-use networktraining::pose::Settings;
 use terminal::{Globals, output};
+use training::networks::Backend;
+use training::networks::pose::Settings;
 
 const HELP: &str = "\
 PEOPLE is a file of `parallax-lab train network-people`. The network finds 14 joints as seen, the direction in which the trunk faces, and \

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use failure::{ExitKind, Failure, OrFail as _};
-use networktraining::quality::network::Kind;
-use networktraining::quality::settings::Settings;
+use training::networks::quality::network::Kind;
+use training::networks::quality::settings::Settings;
 
 use terminal::{Globals, output};
 

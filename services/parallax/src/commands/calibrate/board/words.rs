@@ -2,10 +2,10 @@
 
 use calibration::board::CameraOutcome;
 use failure::Failure;
+use failure::wording::Table;
 use rigs::boards::Calibrated;
 use serde_json::{Map, Value, json};
 use terminal::output;
-use wording::Table;
 
 use super::Arguments;
 

@@ -1,0 +1,91 @@
+//! Whether two hosts of a deployment have the same files and settings.
+
+use formats::checksum::fnv1a;
+use serde::{Deserialize, Serialize};
+
+/// Hashes of what must be the same on all hosts, by name. They tell mistakes, not attacks: those are for the keys.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Fingerprint(Vec<(String, String)>);
+
+/// Something that two hosts have differently.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[error("{what} differs: {here} here, {there} there")]
+pub struct Difference {
+    /// What it is: `rig`, `model`.
+    pub what: String,
+    /// Its hash on the host that compares.
+    pub here: String,
+    /// Its hash on the other.
+    pub there: String,
+}
+
+impl Fingerprint {
+    /// Adds the hash of a file or text.
+    pub fn add(&mut self, what: &str, bytes: &[u8]) {
+        let hash = format!("{:016x}", fnv1a(bytes));
+        self.0.push((what.to_owned(), hash));
+    }
+
+    /// Adds a short text as it is, such as a version.
+    pub fn add_text(&mut self, what: &str, text: &str) {
+        self.0.push((what.to_owned(), text.to_owned()));
+    }
+
+    /// What the other has differently, in our order; then what only the other has.
+    pub fn differences(&self, other: &Self) -> Vec<Difference> {
+        let find = |all: &Self, what: &str| {
+            let found = all.0.iter().find(|it| it.0 == what);
+            found.map_or_else(|| "nothing".to_owned(), |it| it.1.clone())
+        };
+        let only_there = other
+            .0
+            .iter()
+            .filter(|it| !self.0.iter().any(|own| own.0 == it.0));
+        let all = self.0.iter().chain(only_there);
+        let compared = all.map(|(what, _)| Difference {
+            what: what.clone(),
+            here: find(self, what),
+            there: find(other, what),
+        });
+        compared.filter(|it| it.here != it.there).collect()
+    }
+
+    /// How many things it has.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether it has nothing.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_names_both_hashes() {
+        let [mut here, mut there] = [Fingerprint::default(), Fingerprint::default()];
+        for it in [&mut here, &mut there] {
+            it.add("model", b"model");
+        }
+        assert!(here.differences(&there).is_empty());
+        here.add("rig", b"a");
+        there.add("rig", b"b");
+        there.add_text("network", "shipped");
+        let got: Vec<String> = here
+            .differences(&there)
+            .iter()
+            .map(ToString::to_string)
+            .collect();
+        assert_eq!(
+            got,
+            [
+                "rig differs: af63dc4c8601ec8c here, af63df4c8601f1a5 there",
+                "network differs: nothing here, shipped there"
+            ]
+        );
+    }
+}

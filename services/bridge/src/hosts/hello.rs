@@ -1,0 +1,177 @@
+//! How a host with cameras introduces itself, and what the host that fuses answers: JSON, short and rare.
+
+use serde::{Deserialize, Serialize};
+
+use crate::hosts::VERSION;
+use crate::hosts::fingerprint::{Difference, Fingerprint};
+
+/// The longest introduction or answer, bytes.
+const MOST_BYTES: usize = 1 << 16;
+
+/// A host that wants to take part.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hello {
+    /// [`crate::hosts::VERSION`] of its link.
+    pub version: u16,
+    /// Its name.
+    pub host: String,
+    /// The start of its bridge.
+    pub origin: u64,
+    /// What it has.
+    pub fingerprint: Fingerprint,
+}
+
+/// The answer to a [`Hello`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Answer {
+    /// It takes part.
+    Welcome(Welcome),
+    /// It does not, for these reasons; `here` is the host that fuses.
+    Refused(Vec<Difference>),
+}
+
+/// What a host with cameras needs to know of the run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Welcome {
+    /// The start of the bridge of the host that fuses.
+    pub origin: u64,
+    /// The session of its run, which is the time that its instants are counted from, by its clock, nanoseconds.
+    pub session: u64,
+}
+
+/// Bytes that are no introduction or answer.
+#[derive(Debug, thiserror::Error)]
+pub enum HelloError {
+    /// Too long.
+    #[error("{0} bytes, at most {MOST_BYTES} are read")]
+    Long(usize),
+    /// Not what is expected.
+    #[error("not an introduction")]
+    Json(#[from] serde_json::Error),
+}
+
+impl Hello {
+    /// As bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        serde_json::to_vec(self).unwrap_or_default()
+    }
+
+    /// Reads an introduction.
+    ///
+    /// # Errors
+    ///
+    /// [`HelloError`].
+    pub fn parse(bytes: &[u8]) -> Result<Self, HelloError> {
+        Ok(serde_json::from_slice(short(bytes)?)?)
+    }
+
+    /// What it is answered.
+    ///
+    /// * `is_known`: whether there is a host of that name with cameras.
+    /// * `ours`: what the host that fuses has.
+    pub fn answer(&self, is_known: bool, ours: &Fingerprint, welcome: Welcome) -> Answer {
+        let mut differences = Vec::new();
+        if self.version != VERSION {
+            differences.push(Difference {
+                what: "the version of the link".to_owned(),
+                here: VERSION.to_string(),
+                there: self.version.to_string(),
+            });
+        }
+        if !is_known {
+            differences.push(Difference {
+                what: "the list of hosts with cameras".to_owned(),
+                here: format!("without {:?}", self.host),
+                there: format!("with {:?}", self.host),
+            });
+        }
+        differences.extend(ours.differences(&self.fingerprint));
+        if differences.is_empty() {
+            Answer::Welcome(welcome)
+        } else {
+            Answer::Refused(differences)
+        }
+    }
+}
+
+impl Answer {
+    /// As bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        serde_json::to_vec(self).unwrap_or_default()
+    }
+
+    /// Reads an answer.
+    ///
+    /// # Errors
+    ///
+    /// [`HelloError`].
+    pub fn parse(bytes: &[u8]) -> Result<Self, HelloError> {
+        Ok(serde_json::from_slice(short(bytes)?)?)
+    }
+}
+
+fn short(bytes: &[u8]) -> Result<&[u8], HelloError> {
+    if bytes.len() > MOST_BYTES {
+        return Err(HelloError::Long(bytes.len()));
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hello(model: &[u8]) -> Hello {
+        let mut fingerprint = Fingerprint::default();
+        fingerprint.add("model", model);
+        Hello {
+            version: VERSION,
+            host: "far".to_owned(),
+            origin: 5,
+            fingerprint,
+        }
+    }
+
+    const WELCOME: Welcome = Welcome {
+        origin: 1,
+        session: 2,
+    };
+
+    #[test]
+    fn the_same_files_are_welcome_and_others_refused_with_both_hashes() {
+        let ours = hello(b"a").fingerprint;
+        let read = |it: &Answer| Answer::parse(&it.to_bytes()).unwrap();
+        let same = Hello::parse(&hello(b"a").to_bytes()).unwrap();
+        let answer = same.answer(true, &ours, WELCOME);
+        assert_eq!(read(&answer), Answer::Welcome(WELCOME));
+        let Answer::Refused(why) = read(&hello(b"b").answer(true, &ours, WELCOME)) else {
+            panic!("welcome");
+        };
+        assert_eq!(why[0].what, "model");
+        assert_ne!(why[0].here, why[0].there);
+    }
+
+    #[test]
+    fn an_unknown_host_and_another_version_are_refused() {
+        let ours = hello(b"a").fingerprint;
+        let Answer::Refused(why) = hello(b"a").answer(false, &ours, WELCOME) else {
+            panic!("welcome");
+        };
+        assert!(why[0].to_string().contains("far"));
+        let mut other = hello(b"a");
+        other.version = 9;
+        assert!(matches!(
+            other.answer(true, &ours, WELCOME),
+            Answer::Refused(_)
+        ));
+    }
+
+    #[test]
+    fn what_is_no_introduction_is_refused() {
+        let long = vec![b' '; 70_000];
+        for bytes in [&b""[..], b"{}", b"[1", b"\xff\xfe", &long] {
+            assert!(Hello::parse(bytes).is_err() && Answer::parse(bytes).is_err());
+        }
+    }
+}

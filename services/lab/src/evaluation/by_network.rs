@@ -1,0 +1,201 @@
+//! One frame by the keypoints of a network, in the ways that are compared.
+
+use geometry::Camera;
+use multiview::{
+    FrontEvidence, JointEvidence, SeenPerson, SpaceSettings, SpaceView, front_log_ratio_of,
+    solve_person,
+};
+use nalgebra::Point3;
+use posenetwork::JointMaps;
+use statistics::score::Point;
+
+use crate::evaluation::plain::{Sighting, dropping, linear};
+
+/// Number of joints: those of `skeleton::PARSE14`.
+const N: usize = 14;
+/// Maxima of a joint's map that may be the joint.
+const N_MAXIMA: usize = 3;
+
+/// A way from the views to the joints in space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Plain triangulation of the maxima ([`linear`]).
+    Linear,
+    /// Triangulation that leaves out cameras ([`dropping`]).
+    Dropping,
+    /// The solution in space over the maps, without springs.
+    Maps,
+    /// The solution in space over the maps ([`solve_person`]).
+    Space,
+}
+
+impl Method {
+    /// All, in the order of the table.
+    pub const ALL: [Self; 4] = [Self::Linear, Self::Dropping, Self::Maps, Self::Space];
+
+    /// Its name in tables and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "triangulated",
+            Self::Dropping => "cameras dropped",
+            Self::Maps => "maps",
+            Self::Space => "maps and bones",
+        }
+    }
+}
+
+/// What a network sees of a person in a view.
+#[derive(Debug, Clone)]
+pub struct NetworkView {
+    maps: JointMaps,
+    maxima: Vec<Vec<([f64; 2], f32)>>,
+    /// What the network tells of the direction in which the person faces.
+    front: Option<FrontEvidence>,
+}
+
+impl NetworkView {
+    /// Takes the maps of a view.
+    pub fn new(maps: JointMaps) -> Self {
+        let maxima = |joint: usize| {
+            let mut found = maps.maxima(joint, N_MAXIMA);
+            if let Some(peak) = maps.peaks()[joint] {
+                found.insert(0, (peak.at, maps.at(joint, peak.at)));
+            }
+            found
+        };
+        Self {
+            maxima: (0..N).map(maxima).collect(),
+            maps,
+            front: None,
+        }
+    }
+
+    /// The view with what the network tells of the direction in which the person faces.
+    #[must_use]
+    pub fn with_front(self, front: Option<FrontEvidence>) -> Self {
+        Self { front, ..self }
+    }
+
+    /// What the network tells of that direction.
+    pub fn front(&self) -> Option<FrontEvidence> {
+        self.front
+    }
+
+    /// The maps.
+    pub fn maps(&self) -> &JointMaps {
+        &self.maps
+    }
+
+    fn exchange_sides(&mut self) {
+        let mut maps = core::mem::take(&mut self.maps);
+        maps.exchange_sides();
+        *self = Self::new(maps).with_front(self.front);
+    }
+
+    /// The person, to be found again in other views.
+    ///
+    /// * `height`: of the box, as a share of that of the picture.
+    pub fn person(&self, height: f64) -> SeenPerson {
+        let joint = |it: &Option<keypoints::Keypoint>| it.map(|it| (it.at, it.score));
+        SeenPerson {
+            joints: self.maps.peaks().iter().map(joint).collect(),
+            height,
+        }
+    }
+}
+
+impl JointEvidence for NetworkView {
+    fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
+        self.maps.at(joint, point)
+    }
+
+    fn maxima(&self, joint: usize) -> &[([f64; 2], f32)] {
+        &self.maxima[joint]
+    }
+
+    fn floor(&self) -> f32 {
+        self.maps.floor()
+    }
+}
+
+/// Gives left and right in views that have them as seen the names of the body's own sides: which views have them exchanged against the
+/// others by the solution in space, and then all of them by what the views tell of the front, of this frame alone.
+///
+/// * Returns the log-likelihood ratio of the choice over its opposite, nats; 0 where nothing was chosen.
+pub fn name_sides(views: &mut [(Camera, NetworkView)]) -> f64 {
+    let settings = SpaceSettings {
+        as_seen: true,
+        ..SpaceSettings::default()
+    };
+    let each = views.iter().map(|(camera, view)| SpaceView {
+        camera,
+        evidence: view,
+        exchanged: [false; 2],
+        front: view.front.unwrap_or_default(),
+    });
+    let each: Vec<SpaceView<'_>> = each.collect();
+    let Some(found) = solve_person(&each, &settings) else {
+        return 0.0;
+    };
+    for ((_, view), used) in views.iter_mut().zip(&found.views) {
+        if used.is_some_and(|[arms, _]| arms) {
+            view.exchange_sides();
+        }
+    }
+    let said = views.iter();
+    let said = said.filter_map(|(camera, view)| Some((camera, view.front?)));
+    let said: Vec<(&Camera, FrontEvidence)> = said.collect();
+    let ratio = front_log_ratio_of(&found.pose.joints, &said);
+    if ratio < 0.0 {
+        for (_, view) in views {
+            view.exchange_sides();
+        }
+    }
+    ratio.abs()
+}
+
+/// The joints of `skeleton::PARSE14` in space, metres.
+///
+/// * `limit_px`: of [`dropping`].
+pub fn joints_by(
+    method: Method,
+    views: &[(&Camera, &NetworkView)],
+    limit_px: f64,
+) -> Vec<Option<Point>> {
+    let as_point = |it: Point3<f64>| [it.x, it.y, it.z];
+    let seen = |joint: usize| sightings(views, joint);
+    match method {
+        Method::Linear => (0..N).map(|it| linear(&seen(it)).map(as_point)).collect(),
+        Method::Dropping => {
+            let of_joint = |it: usize| dropping(&seen(it), limit_px).map(as_point);
+            (0..N).map(of_joint).collect()
+        }
+        Method::Maps | Method::Space => {
+            let each = views.iter().map(|(camera, view)| SpaceView {
+                camera,
+                evidence: *view,
+                exchanged: [false; 2],
+                front: view.front.unwrap_or_default(),
+            });
+            let each: Vec<SpaceView<'_>> = each.collect();
+            let mut settings = SpaceSettings::default();
+            if method == Method::Maps {
+                settings.springs = 0.0;
+            }
+            match solve_person(&each, &settings) {
+                Some(found) => found.pose.joints.map(|it| it.map(as_point)).to_vec(),
+                None => vec![None; N],
+            }
+        }
+    }
+}
+
+/// Where the views see a joint. One that is sure of nothing still tells a direction.
+fn sightings<'a>(views: &[(&'a Camera, &NetworkView)], joint: usize) -> Vec<Sighting<'a>> {
+    let peak = |view: &NetworkView| view.maps.peaks()[joint];
+    views
+        .iter()
+        .filter_map(|(camera, view)| Some((*camera, peak(view)?)))
+        .map(|(camera, it)| (camera, it.at, it.score.max(1e-3)))
+        .collect()
+}

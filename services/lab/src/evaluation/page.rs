@@ -1,0 +1,213 @@
+//! An evaluation as one HTML page: what was run, the tables with the paper's numbers beside ours, the figures.
+
+mod figure;
+mod pictures;
+
+use crate::evaluation::{Group, Numbers, Summary, Version, number, overall, published};
+
+use exports::report::html::Html;
+use exports::report::parts::{about_table, begin};
+use exports::report::{html, put};
+use figure::{bars, colour, curves, histogram};
+
+pub use pictures::pictures_html;
+
+/// The content of the page.
+#[derive(Debug, Clone)]
+pub struct Page<'a> {
+    /// The numbers.
+    pub summary: &'a Summary,
+    /// The versions of the summary.
+    pub versions: &'a [Version],
+    /// What was run: key and value.
+    pub about: &'a [(String, String)],
+}
+
+/// One self-contained page.
+pub fn html(page: &Page<'_>) -> String {
+    let titles: Vec<String> = page.versions.iter().map(|it| it.title()).collect();
+    let mut out = begin("Parallax: evaluation");
+    about_table(&mut out, page.about);
+    put!(out, "<p class=\"key\">");
+    for (version, title) in titles.iter().enumerate() {
+        put!(
+            out,
+            "<b><span style=\"background:{}\"></span>{}</b>",
+            colour(version),
+            title
+        );
+    }
+    put!(out, "</p>\n");
+    scores(&mut out, page, &titles);
+    for group in overall(page.summary) {
+        put!(
+            out,
+            "<h2>{}, {} {}</h2>\n",
+            group.dataset,
+            group.subject,
+            group.action
+        );
+        measures(&mut out, group, &titles);
+        figures(&mut out, group, &titles);
+    }
+    predictions(&mut out, page.summary);
+    put!(out, "</html>\n");
+    out.into_page()
+}
+
+/// The paper's main tables: PCP3D by group, with the published values.
+fn scores(out: &mut Html, page: &Page<'_>, titles: &[String]) {
+    let confidence = 100.0 * page.summary.confidence;
+    put!(
+        out,
+        "<h2>PCP3D at 0.5, %</h2>\n<p><small>Below: the {confidence:.0} % interval over frames, and what the \
+         paper prints.</small></p>\n<div class=\"scroll\"><table>\n<tr><th>data set<th class=\"name\">subject\
+         <th class=\"name\">sequence<th>frames",
+        [confidence]
+    );
+    for title in titles {
+        put!(out, "<th>{}", title);
+    }
+    put!(out, "</tr>\n");
+    for group in &page.summary.groups {
+        put!(
+            out,
+            "<tr><td>{}<td class=\"name\">{}<td class=\"name\">{}<td>{}",
+            group.dataset,
+            group.subject,
+            group.action,
+            group.frames
+        );
+        for (version, it) in page.versions.iter().zip(&group.versions) {
+            put!(
+                out,
+                "<td>{}{}",
+                number(it.pcp3d, 2),
+                interval(it.pcp3d_interval, 1)
+            );
+            let of = published(&group.dataset, &group.subject, &group.action, *version);
+            if let Some(theirs) = of {
+                put!(out, "<br><small>paper {theirs:.2}</small>", [theirs]);
+            }
+        }
+        put!(out, "</tr>\n");
+    }
+    put!(out, "</table></div>\n");
+}
+
+fn interval(ends: Option<[f64; 2]>, digits: usize) -> Html {
+    ends.map_or_else(Html::default, |[low, high]| {
+        let [low, high] = [low, high].map(|it| format!("{it:.digits$}"));
+        html!("<br><small>{low} to {high}</small>", [low, high])
+    })
+}
+
+/// All other measures of a group, a column for each version.
+fn measures(out: &mut Html, group: &Group, titles: &[String]) {
+    /// A number, its interval, and how many decimals both have.
+    type Cell = fn(&Numbers) -> (Option<f64>, Option<[f64; 2]>, usize);
+    let rows: [(&str, Cell); 17] = [
+        ("PCP3D at 0.5, %", |it| (it.pcp3d, it.pcp3d_interval, 2)),
+        ("gain over the first, points", |it| {
+            (it.gain, it.gain_interval, 2)
+        }),
+        ("MPJPE, mm", |it| (it.mpjpe_mm, it.mpjpe_interval, 1)),
+        ("MPJPE after alignment, mm", |it| {
+            (it.aligned_mpjpe_mm, None, 1)
+        }),
+        ("left and right exchanged, %", |it| {
+            (it.exchanged, it.exchanged_interval, 1)
+        }),
+        ("joints within 150 mm, %", |it| (it.pck3d, None, 1)),
+        ("joints not found, %", |it| (it.lost, None, 2)),
+        ("images: PCP, %", |it| (it.pcp2d, None, 1)),
+        ("images: PCK at 0.1, %", |it| {
+            (it.pck2d.map(|it| it[0]), None, 1)
+        }),
+        ("images: PCK at 0.2, %", |it| {
+            (it.pck2d.map(|it| it[1]), None, 1)
+        }),
+        ("iterations until settled", |it| (it.iterations, None, 2)),
+        ("not settled, %", |it| (it.unsettled, None, 2)),
+        ("solutions a frame", |it| (it.solutions, None, 1)),
+        ("terms switched off, %", |it| (it.off, None, 1)),
+        ("joints in images improved, %", |it| {
+            (Some(it.changes.improved), None, 1)
+        }),
+        ("deteriorated, %", |it| {
+            (Some(it.changes.deteriorated), None, 1)
+        }),
+        ("deteriorated by more than 5 px, %", |it| {
+            (Some(it.changes.deteriorated_5px), None, 2)
+        }),
+    ];
+    put!(out, "<div class=\"scroll\"><table>\n<tr><th>");
+    for title in titles {
+        put!(out, "<th>{}", title);
+    }
+    put!(out, "</tr>\n");
+    for (name, cell) in rows {
+        put!(out, "<tr><td>{name}", [name]);
+        for it in &group.versions {
+            let (value, ends, digits) = cell(it);
+            put!(
+                out,
+                "<td>{}{}",
+                number(value, digits),
+                interval(ends, digits)
+            );
+        }
+        put!(out, "</tr>\n");
+    }
+    put!(out, "</table></div>\n");
+}
+
+/// Quality of the expected errors.
+fn predictions(out: &mut Html, summary: &Summary) {
+    if summary.predictions.is_empty() {
+        return;
+    }
+    put!(
+        out,
+        "<h2>Expected errors</h2>\n<p><small>Views: those judged. Above: the true error exceeds the threshold. \
+         Area: under the ROC of that, by the expected error; 0.5 tells nothing. Correlation: of ranks \
+         (Spearman).</small></p>\n<div class=\"scroll\"><table>\n<tr><th>part<th>views<th>above, %<th>of \
+         these switched off, %<th>of the others, %<th>area<th>correlation</tr>\n"
+    );
+    for it in &summary.predictions {
+        put!(
+            out,
+            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
+            it.part,
+            it.n,
+            number(it.above, 1),
+            number(it.caught, 1),
+            number(it.wasted, 1),
+            number(it.auc, 3),
+            number(it.rank_correlation, 3)
+        );
+    }
+    put!(out, "</table></div>\n");
+}
+
+fn figures(out: &mut Html, group: &Group, titles: &[String]) {
+    put!(
+        out,
+        "<h3>PCP3D of every part</h3>\n<div class=\"scroll\">{}</div>\n\
+         <h3>PCP3D over the threshold</h3>\n{}\n",
+        bars(group, titles),
+        curves(group, titles)
+    );
+    for (title, it) in titles.iter().zip(&group.versions).skip(1) {
+        put!(
+            out,
+            "<h3>Changes in images against {}: {}</h3>\n{}\n",
+            titles[0],
+            title,
+            histogram(&it.changes)
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,157 @@
+//! Quality of the expected errors, on which adaptive selection depends.
+
+use serde::{Deserialize, Serialize};
+use skeleton::{N_PARTS, PART_NAMES};
+use statistics::score::{area_under_roc, rank_correlation};
+
+/// Expected and true errors of one view; one number per part, pixels of the frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Predicted {
+    /// Expected errors.
+    pub sigma_px: Vec<f32>,
+    /// Errors beyond which parts are switched off; empty if there are no thresholds.
+    pub tau_px: Vec<f32>,
+    /// True errors of the single-view pose.
+    pub error_px: Vec<f32>,
+}
+
+/// The quality of the predictions of a part, or of all parts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Judgement {
+    /// The part; `mean` of the parts.
+    pub part: String,
+    /// Views that were judged.
+    pub n: usize,
+    /// Of these, those in which the error is above the threshold, percent.
+    pub above: Option<f64>,
+    /// Those of them that are switched off, percent.
+    pub caught: Option<f64>,
+    /// Those below the threshold that are switched off, percent.
+    pub wasted: Option<f64>,
+    /// Area under the ROC of "error above the threshold" by the expected error per threshold.
+    pub auc: Option<f64>,
+    /// Spearman's rank correlation of expected and true error, both per threshold.
+    pub rank_correlation: Option<f64>,
+}
+
+/// Evaluates predictions: every part, and the mean over the parts with a value.
+///
+/// Errors are divided by their threshold, since thresholds may depend on the person's size.
+///
+/// * Returns nothing if no view has thresholds.
+pub fn judge(views: &[&Predicted]) -> Vec<Judgement> {
+    let parts: Vec<Judgement> = (0..N_PARTS)
+        .map(|part| {
+            of_part(
+                PART_NAMES[part],
+                views.iter().filter_map(|it| sample(it, part)),
+            )
+        })
+        .collect();
+    if parts.iter().all(|it| it.n == 0) {
+        return Vec::new();
+    }
+    let mean = |of: fn(&Judgement) -> Option<f64>| {
+        let known: Vec<f64> = parts.iter().filter_map(of).collect();
+        (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+    };
+    let all = Judgement {
+        part: "mean".to_owned(),
+        n: parts.iter().map(|it| it.n).sum::<usize>() / N_PARTS,
+        above: mean(|it| it.above),
+        caught: mean(|it| it.caught),
+        wasted: mean(|it| it.wasted),
+        auc: mean(|it| it.auc),
+        rank_correlation: mean(|it| it.rank_correlation),
+    };
+    std::iter::once(all).chain(parts).collect()
+}
+
+/// Expected and true error of a part, per threshold.
+fn sample(view: &Predicted, part: usize) -> Option<(f64, f64)> {
+    let at = |values: &[f32]| values.get(part).map(|it| f64::from(*it));
+    let tau = at(&view.tau_px).filter(|it| *it > 0.0)?;
+    let (sigma, error) = (at(&view.sigma_px)? / tau, at(&view.error_px)? / tau);
+    (sigma.is_finite() && error.is_finite()).then_some((sigma, error))
+}
+
+fn of_part(name: &str, samples: impl Iterator<Item = (f64, f64)>) -> Judgement {
+    let samples: Vec<(f64, f64)> = samples.collect();
+    let classes: Vec<(f64, bool)> = samples.iter().map(|it| (it.0, it.1 > 1.0)).collect();
+    let share = |of: &dyn Fn(&(f64, bool)) -> bool, among: &dyn Fn(&(f64, bool)) -> bool| {
+        let n = classes.iter().filter(|it| among(it)).count();
+        let hits = classes.iter().filter(|it| among(it) && of(it)).count();
+        (n > 0).then(|| 100.0 * hits as f64 / n as f64)
+    };
+    Judgement {
+        part: name.to_owned(),
+        n: samples.len(),
+        above: share(&|it| it.1, &|_| true),
+        caught: share(&|it| it.0 > 1.0, &|it| it.1),
+        wasted: share(&|it| it.0 > 1.0, &|it| !it.1),
+        auc: area_under_roc(&classes),
+        rank_correlation: rank_correlation(&samples),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A view with the same values for all parts.
+    fn view(sigma: f32, tau: f32, error: f32) -> Predicted {
+        let all = |it: f32| vec![it; N_PARTS];
+        Predicted {
+            sigma_px: all(sigma),
+            tau_px: all(tau),
+            error_px: all(error),
+        }
+    }
+
+    #[test]
+    fn predictions_are_judged_by_the_threshold_of_their_own_view() {
+        // The last person is twice as large as the others, and so is its threshold.
+        let views = [
+            view(5.0, 10.0, 4.0),
+            view(15.0, 10.0, 12.0),
+            view(11.0, 10.0, 8.0),
+            view(18.0, 20.0, 30.0),
+        ];
+        let judged = judge(&views.iter().collect::<Vec<_>>());
+        assert_eq!(judged.len(), 1 + N_PARTS);
+        let all = &judged[0];
+        assert_eq!((all.part.as_str(), all.n), ("mean", 4));
+        assert_eq!(
+            (all.above, all.caught, all.wasted),
+            (Some(50.0), Some(50.0), Some(50.0))
+        );
+        // Of four pairs, only (0.9 above, 1.1 below) is in the wrong order.
+        assert_eq!(all.auc, Some(0.75));
+        assert_eq!(judged[7].part, PART_NAMES[6]);
+        assert_eq!(judged[7].auc, Some(0.75));
+    }
+
+    #[test]
+    fn the_truth_predicts_itself() {
+        let views: Vec<Predicted> = (1..9).map(|it| view(it as f32, 4.0, it as f32)).collect();
+        let all = &judge(&views.iter().collect::<Vec<_>>())[0];
+        assert_eq!((all.auc, all.rank_correlation), (Some(1.0), Some(1.0)));
+        assert_eq!((all.caught, all.wasted), (Some(100.0), Some(0.0)));
+    }
+
+    #[test]
+    fn a_constant_is_chance_level() {
+        let views: Vec<Predicted> = (1..9).map(|it| view(3.0, 4.0, it as f32)).collect();
+        let all = &judge(&views.iter().collect::<Vec<_>>())[0];
+        assert_eq!((all.auc, all.rank_correlation), (Some(0.5), None));
+    }
+
+    #[test]
+    fn without_thresholds_nothing_is_judged() {
+        let mut alone = view(1.0, 1.0, 1.0);
+        alone.tau_px.clear();
+        assert_eq!(judge(&[&alone]), []);
+        assert_eq!(judge(&[]), []);
+    }
+}

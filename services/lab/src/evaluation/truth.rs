@@ -1,0 +1,183 @@
+//! The 14 true joints that all joint sets share, and true positions of the 26 parts.
+
+use skeleton::{JointSet, MIRROR, N_PARTS, PARSE14};
+use statistics::score::Point;
+
+/// The 14 joints of `skeleton::PARSE14`, out of those of another set.
+///
+/// * Returns `None` for a joint that is not known, or that the set does not have.
+pub fn parse14(set: &JointSet, joints: &[Option<Point>]) -> Vec<Option<Point>> {
+    let joint = |parts: &[usize]| {
+        let at = set.joints.iter().position(|it| it.parts == parts)?;
+        joints[at]
+    };
+    PARSE14.joints.iter().map(|it| joint(it.parts)).collect()
+}
+
+/// The parts of the right side that lie between two joints (as parts), and the share of the second.
+///
+/// Source: the annotation of the published models (`PARSE_data`); the left side mirrors them.
+const BETWEEN: [(usize, usize, usize, f64); 6] = [
+    (3, 2, 4, 0.5),
+    (5, 4, 6, 0.5),
+    (7, 2, 9, 1.0 / 3.0),
+    (8, 2, 9, 2.0 / 3.0),
+    (10, 9, 11, 0.5),
+    (12, 11, 13, 0.5),
+];
+
+/// True positions of the 26 parts in an image, pixels; NaN where a joint is not known.
+///
+/// * `joints`: of `skeleton::PARSE14`.
+fn parts(joints: &[[f64; 2]]) -> [[f64; 2]; N_PARTS] {
+    let mut parts = [[f64::NAN; 2]; N_PARTS];
+    for (joint, at) in PARSE14.joints.iter().zip(joints) {
+        parts[joint.parts[0]] = *at;
+    }
+    for (part, from, to, share) in BETWEEN {
+        for side in [|it: usize| it, |it: usize| MIRROR[it]] {
+            let ends = [parts[side(from)], parts[side(to)]];
+            parts[side(part)] = [0, 1].map(|it| ends[0][it] + share * (ends[1][it] - ends[0][it]));
+        }
+    }
+    parts
+}
+
+/// A tenth of the longer side of the rectangle around joints, in their unit.
+pub fn tenth_of(joints: &[[f64; 2]]) -> f64 {
+    let side = |axis: usize| {
+        let values = joints.iter().map(|it| it[axis]);
+        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
+            [low.min(it), high.max(it)]
+        });
+        high - low + 1.0
+    };
+    0.1 * side(0).max(side(1))
+}
+
+/// The true error of every part of a pose, in tenths of the person's size: the longer side of the
+/// rectangle around the true joints.
+///
+/// Used for [adaptive selection](crate::evaluation::Terms::Adaptive) with the truth instead of a network: with thresholds
+/// of 1 a part is switched off if its error exceeds a tenth of the person's size. Where the model's left and
+/// right may be exchanged (a person seen from behind), the better of the two readings counts.
+///
+/// * `centres`: of the 26 parts, pixels.
+/// * `joints`: the true ones of `skeleton::PARSE14`, pixels of the same image.
+/// * Returns `None` if a joint is not known.
+pub fn part_errors(
+    centres: &[[f64; 2]],
+    joints: &[[f64; 2]],
+    may_be_exchanged: bool,
+) -> Option<Vec<f32>> {
+    let (errors, _) = part_errors_and_facing(centres, joints, may_be_exchanged)?;
+    Some(errors)
+}
+
+/// The same, and whether left and right are exchanged.
+pub fn part_errors_and_facing(
+    centres: &[[f64; 2]],
+    joints: &[[f64; 2]],
+    may_be_exchanged: bool,
+) -> Option<(Vec<f32>, bool)> {
+    if centres.len() != N_PARTS || joints.iter().flatten().any(|it| !it.is_finite()) {
+        return None;
+    }
+    let truth = parts(joints);
+    let tenth = tenth_of(joints);
+    let errors = |exchanged: bool| -> Vec<f32> {
+        let of = |part: usize| truth[if exchanged { MIRROR[part] } else { part }];
+        let error = |(part, at): (usize, &[f64; 2])| {
+            let truth = of(part);
+            ((at[0] - truth[0]).hypot(at[1] - truth[1]) / tenth) as f32
+        };
+        centres.iter().enumerate().map(error).collect()
+    };
+    let plain = errors(false);
+    if !may_be_exchanged {
+        return Some((plain, false));
+    }
+    let other = errors(true);
+    let sum = |it: &[f32]| it.iter().sum::<f32>();
+    Some(if sum(&other) < sum(&plain) {
+        (other, true)
+    } else {
+        (plain, false)
+    })
+}
+
+/// The size of a person: the longer side of the rectangle around the joints, pixels.
+pub fn size(joints: &[[f64; 2]]) -> f64 {
+    let side = |axis: usize| {
+        let values = joints.iter().map(|it| it[axis]);
+        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
+            [low.min(it), high.max(it)]
+        });
+        high - low + 1.0
+    };
+    side(0).max(side(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Joints of a person who faces the camera, 200 px tall.
+    fn standing() -> Vec<[f64; 2]> {
+        let joint = |it: usize| [40.0 + 3.0 * it as f64, 200.0 - 200.0 * it as f64 / 13.0];
+        (0..14).map(joint).collect()
+    }
+
+    #[test]
+    fn every_set_has_the_fourteen_joints() {
+        for set in JointSet::ALL {
+            let joints: Vec<Option<Point>> = (0..set.joints.len())
+                .map(|it| Some([it as f64, 0.0, 0.0]))
+                .collect();
+            assert!(
+                parse14(set, &joints).iter().all(Option::is_some),
+                "{}",
+                set.name
+            );
+        }
+    }
+
+    #[test]
+    fn every_part_has_a_position_and_joints_coincide_with_their_parts() {
+        let joints = standing();
+        let parts = parts(&joints);
+        assert!(parts.iter().flatten().all(|it| it.is_finite()));
+        assert_eq!(PARSE14.from_parts(&parts), joints);
+        let [shoulder, hip] = [parts[14], parts[21]];
+        let third = shoulder[1] + (hip[1] - shoulder[1]) / 3.0;
+        assert!((parts[19][1] - third).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_part_off_by_a_tenth_of_the_person_is_at_one() {
+        let joints = standing();
+        let mut found = parts(&joints).to_vec();
+        found[6][0] += 20.1;
+        let got = part_errors(&found, &joints, false).unwrap();
+        assert!((got[6] - 1.0).abs() < 1e-5, "{}", got[6]);
+        assert_eq!(got.iter().filter(|it| **it > 0.0).count(), 1);
+    }
+
+    #[test]
+    fn sides_are_exchanged_where_that_may_be_and_fits_better() {
+        let joints = standing();
+        let truth = parts(&joints);
+        let found: Vec<[f64; 2]> = (0..N_PARTS).map(|it| truth[MIRROR[it]]).collect();
+        let off = |may: bool| part_errors(&found, &joints, may).unwrap();
+        assert!(off(true).iter().all(|it| *it == 0.0));
+        assert!(off(false).iter().any(|it| *it > 1.0));
+    }
+
+    #[test]
+    fn unknown_joints_give_no_errors() {
+        let mut joints = standing();
+        let found = parts(&joints);
+        joints[3] = [f64::NAN; 2];
+        assert_eq!(part_errors(&found, &joints, true), None);
+    }
+}

@@ -1,0 +1,161 @@
+//! The loop: moments of a deployment in, datagrams out.
+
+use core::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
+use core::time::Duration;
+use std::io;
+use std::net::UdpSocket;
+use std::time::Instant;
+
+use crate::{Client, State, Wish};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+
+use crate::publish::frame::Frame;
+use crate::publish::json::{json_datagram, json_names};
+use crate::publish::osc::osc_datagrams;
+use crate::publish::target::{Form, Target};
+
+/// Moments that may wait to be sent.
+const MOST_WAITING: usize = 64;
+/// Longest wait for a moment, so that a stop request is seen.
+const PATIENCE: Duration = Duration::from_millis(100);
+/// How often names are told that are left out of the lines.
+const NAMES: Duration = Duration::from_secs(1);
+
+/// What was sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Frames that were published.
+    pub frames: u64,
+    /// Datagrams that the system took.
+    pub sent: u64,
+    /// Datagrams that it did not take: nobody listens, or there was no room.
+    pub unsent: u64,
+    /// Frames that do not fit into a datagram.
+    pub too_large: u64,
+    /// Frames that are missing between those.
+    pub missed: u64,
+}
+
+/// Sends the skeletons of a deployment until a stop is requested.
+///
+/// * `until_end`: ends when the deployment has ended, instead of waiting for its next run.
+///
+/// # Errors
+///
+/// No socket can be opened; the deployment cannot be read for another reason than that it does not run.
+pub fn run(
+    deployment: &str,
+    targets: &[Target],
+    until_end: bool,
+    stop: &Stop,
+) -> Result<Counts, Failure> {
+    let mut outlets = Vec::new();
+    for target in targets {
+        outlets.push(Outlet::open(*target).or_fail(ExitKind::Run)?);
+    }
+    let wish = Wish::skeletons().every_frame(MOST_WAITING);
+    let failed = |error: crate::ClientError| {
+        let hint = error.hint();
+        let failure = Failure::new(ExitKind::Run, error.to_string());
+        match hint {
+            Some(hint) => failure.with_hint(hint),
+            None => failure,
+        }
+    };
+    let mut client = Client::wait_for(deployment, &wish).map_err(failed)?;
+    let mut counts = Counts::default();
+    let mut was_there = false;
+    while !stop.is_requested() {
+        let moment = client.next(PATIENCE).map_err(failed)?;
+        if let Some(moment) = &moment {
+            counts.frames += 1;
+            counts.missed += moment.n_missed;
+            for person in Frame::people(moment) {
+                for outlet in &mut outlets {
+                    outlet.send(&person, &mut counts);
+                }
+            }
+        } else {
+            let is_there = client.state() == State::Connected;
+            if until_end && was_there && !is_there {
+                break;
+            }
+            was_there |= is_there;
+        }
+    }
+    Ok(counts)
+}
+
+/// A socket, and what is sent through it.
+#[derive(Debug)]
+struct Outlet {
+    socket: UdpSocket,
+    form: Form,
+    named: Option<Instant>,
+    has_warned: bool,
+}
+
+impl Outlet {
+    fn open(target: Target) -> io::Result<Self> {
+        let any: SocketAddr = match target.address {
+            SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+            SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),
+        };
+        let socket = UdpSocket::bind(any)?;
+        socket.connect(target.address)?;
+        // A full queue loses the datagram.
+        socket.set_nonblocking(true)?;
+        Ok(Self {
+            socket,
+            form: target.form,
+            named: None,
+            has_warned: false,
+        })
+    }
+
+    fn send(&mut self, frame: &Frame<'_>, counts: &mut Counts) {
+        match self.form {
+            Form::Json => self.send_json(frame, counts),
+            Form::Osc => {
+                for datagram in osc_datagrams(frame) {
+                    self.give(&datagram, counts);
+                }
+            }
+        }
+    }
+
+    fn send_json(&mut self, frame: &Frame<'_>, counts: &mut Counts) {
+        let Some(line) = json_datagram(frame) else {
+            counts.too_large += 1;
+            if !self.has_warned {
+                self.has_warned = true;
+                let n_joints = frame.joints.len();
+                tracing::warn!(
+                    n_joints,
+                    "a skeleton does not fit into a datagram: it is not sent"
+                );
+            }
+            return;
+        };
+        let has_names = line.contains("\"joints\":{");
+        let is_due = self.named.is_none_or(|it| it.elapsed() >= NAMES);
+        if !has_names
+            && is_due
+            && let Some(names) = json_names(frame)
+        {
+            self.named = Some(Instant::now());
+            self.give(names.as_bytes(), counts);
+        }
+        self.give(line.as_bytes(), counts);
+    }
+
+    fn give(&self, datagram: &[u8], counts: &mut Counts) {
+        match self.socket.send(datagram) {
+            Ok(_) => counts.sent += 1,
+            Err(error) => {
+                counts.unsent += 1;
+                tracing::debug!(%error, "a datagram was not sent");
+            }
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! A calibration from a board as one HTML page: what is known how well, where in the pictures, the rig in space, the worst pictures.
+
+mod pictures;
+mod space;
+
+use calibration::board::{CameraOutcome, Outcome};
+use nalgebra::Point2;
+
+use crate::report::html::{Html, put};
+use crate::report::parts::{about_table, begin, number, verdict, worst};
+
+/// The content of the page.
+#[derive(Debug, Clone)]
+pub struct Page<'a> {
+    /// Names of the cameras.
+    pub names: &'a [String],
+    /// What came out.
+    pub outcome: &'a Outcome,
+    /// Whether the poses were wanted too.
+    pub has_rig: bool,
+    /// The corners of the board, metres: its outline in the order around it.
+    pub outline: [Point2<f64>; 4],
+    /// What was looked at: key and value.
+    pub about: &'a [(String, String)],
+    /// What speaks against it, beside the doubts of the outcome.
+    pub more_doubts: &'a [String],
+    /// The worst pictures, as JPEG with a caption.
+    pub worst: &'a [(String, Vec<u8>)],
+}
+
+/// One self-contained page.
+pub fn html(page: &Page<'_>) -> String {
+    let mut out = begin("Parallax: cameras by a board");
+    let own = page.outcome.doubts.iter().map(|it| it.text(page.names));
+    let doubts: Vec<String> = page.more_doubts.iter().cloned().chain(own).collect();
+    let said = ("calibrated", "not to be trusted as it is");
+    verdict(&mut out, said, &doubts);
+    about_table(&mut out, page.about);
+    cameras(&mut out, page);
+    put!(
+        out,
+        "<h2>Where the corners were, and how they fit</h2>\n<p><small>Left: every corner in the picture, with what it is off, 25 \
+         times as long; red: left out as wrong. Where there is no corner, the lens is not known. Right: the same from one point; the \
+         circle has a radius of 1 px. A pattern (all outward, all to one side) is a lens of another kind, or a board that is not \
+         flat.</small></p>\n"
+    );
+    for (name, camera) in page.names.iter().zip(&page.outcome.cameras) {
+        put!(out, "<h3>{}</h3>\n", name);
+        put!(out, "{}", pictures::corners(camera));
+    }
+    if page.has_rig {
+        put!(
+            out,
+            "<h2>The cameras in space</h2>\n<p><small>Obliquely, from above and from the side of the first camera; each line \
+             before a camera is where it looks; grey: the board in every frame that was used. The scale is in metres.</small></p>\n"
+        );
+        put!(out, "{}", space::views(page));
+        pairs(&mut out, page);
+    }
+    numbers(&mut out, page);
+    let drawn = "Ring: the corner as it was seen (purple: left out); line: what it is off, 20 times as long.";
+    worst(&mut out, drawn, page.worst);
+    put!(out, "</html>\n");
+    out.into_page()
+}
+
+fn focal(camera: &CameraOutcome) -> (String, String) {
+    let known = camera.numbers.iter().find(|it| it.name == "focal length");
+    let intrinsics = &camera.camera.intrinsics;
+    let sd = known.map_or("given".to_owned(), |it| number(it.sd, 2));
+    (format!("{:.1}, {:.1}", intrinsics.fx, intrinsics.fy), sd)
+}
+
+fn cameras(out: &mut Html, page: &Page<'_>) {
+    put!(
+        out,
+        "<h2>Cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>camera<th>pictures with the board<th>used<th>corners<th>left out\
+         <th>residual, px<th>with those left out<th>of the picture<th>focal lengths, px<th>standard deviation</tr>\n"
+    );
+    for (name, it) in page.names.iter().zip(&page.outcome.cameras) {
+        let (focal, sd) = focal(it);
+        let wrong = it.residuals.iter().filter(|it| it.is_wrong).count();
+        put!(
+            out,
+            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{} %<td>{}<td>{}</tr>\n",
+            name,
+            it.n_boards[0],
+            it.n_boards[1],
+            it.residuals.len() - wrong,
+            wrong,
+            number(it.rms_px, 3),
+            number(it.rms_of_all_px, 3),
+            number(100.0 * it.coverage, 0),
+            focal,
+            sd
+        );
+    }
+    put!(
+        out,
+        "</table></div>\n<p><small>Residual: root mean square of the distance between where a corner was seen and where it is by the \
+         calibration.</small></p>\n"
+    );
+}
+
+fn pairs(out: &mut Html, page: &Page<'_>) {
+    put!(
+        out,
+        "<h2>Pairs of cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>pair<th>frames together<th>of these agree<th>distance, m</tr>\n"
+    );
+    for it in &page.outcome.pairs {
+        let [a, b] = it.cameras;
+        let centre = |nth: usize| page.outcome.cameras[nth].camera.centre_in_world();
+        put!(
+            out,
+            "<tr><td>{} - {}<td>{}<td>{}<td>{}</tr>\n",
+            page.names[a],
+            page.names[b],
+            it.n,
+            it.n_agree,
+            number((centre(a) - centre(b)).norm(), 4)
+        );
+    }
+    put!(out, "</table></div>\n");
+}
+
+fn numbers(out: &mut Html, page: &Page<'_>) {
+    put!(
+        out,
+        "<h2>Every number</h2>\n<p><small>With its standard deviation, if corners are off by {} px (standard deviation along an axis) \
+         and nothing else is wrong. Places are metres in the world of the first camera, rotations degrees.</small></p>\n",
+        number(page.outcome.sigma_px, 3)
+    );
+    for (name, camera) in page.names.iter().zip(&page.outcome.cameras) {
+        if camera.numbers.is_empty() {
+            continue;
+        }
+        put!(
+            out,
+            "<h3>{}</h3>\n<div class=\"scroll\"><table>\n<tr><th>number<th>value<th>standard deviation</tr>\n",
+            name
+        );
+        for it in &camera.numbers {
+            put!(
+                out,
+                "<tr><td>{}<td>{}<td>{}</tr>\n",
+                it.name,
+                number(it.value, 5),
+                number(it.sd, 5)
+            );
+        }
+        put!(out, "</table></div>\n");
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,247 @@
+//! A run as one HTML page: limits that held or did not, the skeleton in space, who was there when, tables, pictures.
+//!
+//! The page forbids every request by its policy. The view of the skeleton is a canvas that short scripts of ours draw
+//! (`stage.js`, `space.js`): drag to turn, play, pause, step.
+
+mod space;
+mod timeline;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+
+use crate::report::html::{Html, STYLE, html, put};
+
+pub use space::{Eye, Moment, Point, Space};
+pub use timeline::Mark;
+
+/// What the page says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Page {
+    /// Its title.
+    pub title: String,
+    /// Sentences under the title.
+    pub lead: String,
+    /// What stands first; if not given, whether all limits held.
+    pub verdict: Option<Verdict>,
+    /// What was asked of the run.
+    pub limits: Vec<Limit>,
+    /// The skeleton in space.
+    pub space: Space,
+    /// What happened when.
+    pub marks: Vec<Mark>,
+    /// Numbers.
+    pub tables: Vec<Table>,
+    /// Sentences about the pictures.
+    pub legend: String,
+    /// Pictures.
+    pub strips: Vec<Strip>,
+}
+
+/// What is said of a run in one line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Verdict {
+    /// The line.
+    pub text: String,
+    /// Whether it is good.
+    pub is_good: bool,
+}
+
+/// Something that was asked of the run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Limit {
+    /// What is measured.
+    pub what: String,
+    /// What was asked.
+    pub asked: String,
+    /// What was measured.
+    pub got: String,
+    /// Whether that will do.
+    pub held: bool,
+}
+
+/// A table of words and numbers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Table {
+    /// Its heading.
+    pub heading: String,
+    /// A sentence under it; may be empty.
+    pub note: String,
+    /// The heads of its columns; all empty if there is nothing to say.
+    pub columns: Vec<String>,
+    /// Its rows.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// Pictures side by side, one for every view.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Strip {
+    /// What they have in common.
+    pub caption: String,
+    /// The pictures.
+    pub pictures: Vec<Picture>,
+}
+
+/// One picture, or why there is none.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// The view.
+    pub caption: String,
+    /// A JPEG file, or why there is none.
+    pub jpeg: Result<Vec<u8>, String>,
+}
+
+const POLICY: &str =
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+pub(crate) const SCRIPT: &str = concat!(include_str!("stage.js"), include_str!("run/space.js"));
+
+/// One page that needs no other file and asks for none.
+pub fn html(page: &Page) -> String {
+    let mut out = html!("<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n");
+    put!(
+        out,
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"{2}\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{0}</title>\n<style>\n{3}</style>\n\
+             <h1>{0}</h1>\n<p class=\"lead\">{1}</p>\n",
+        page.title,
+        page.lead,
+        Html::constant(POLICY),
+        Html::constant(STYLE)
+    );
+    verdict(&mut out, page);
+    pictures(&mut out, page);
+    space(&mut out, page);
+    if !page.limits.is_empty() {
+        limits(&mut out, &page.limits);
+    }
+    for table in &page.tables {
+        tabulate(&mut out, table);
+    }
+    put!(
+        out,
+        "<script type=\"application/json\" id=\"data\">{}</script>\n<script type=\"module\">\n{}</script>\n</html>\n",
+        Html::in_script(&page.space.json()),
+        Html::constant(SCRIPT)
+    );
+    out.into_page()
+}
+
+fn verdict(out: &mut Html, page: &Page) {
+    let n_limits = page.limits.len();
+    let n_missed = page.limits.iter().filter(|it| !it.held).count();
+    let of_limits = || Verdict {
+        text: match n_missed {
+            0 => format!("All {n_limits} limits held"),
+            n => format!("{n} of {n_limits} limits missed"),
+        },
+        is_good: n_missed == 0,
+    };
+    let Verdict { text, is_good } = page.verdict.clone().unwrap_or_else(of_limits);
+    let (class, verdict) = (if is_good { "held" } else { "missed" }, text);
+    put!(
+        out,
+        "<p class=\"verdict {class}\">{verdict}</p>\n",
+        [class, verdict]
+    );
+}
+
+fn limits(out: &mut Html, limits: &[Limit]) {
+    put!(
+        out,
+        "<h2>Limits</h2>\n<div class=\"scroll\"><table>\n<tr><th>limit<th>asked<th>measured<th>verdict</tr>\n"
+    );
+    for it in limits {
+        let (class, word) = if it.held {
+            ("held", "held")
+        } else {
+            ("missed", "missed")
+        };
+        put!(
+            out,
+            "<tr><td>{}<td>{}<td>{}<td class=\"{class}\">{word}</tr>\n",
+            [class, word],
+            it.what,
+            it.asked,
+            it.got
+        );
+    }
+    put!(out, "</table></div>\n");
+}
+
+fn space(out: &mut Html, page: &Page) {
+    let has_truth = page.space.moments.iter().any(|it| !it.truth.is_empty());
+    let hidden = Html::constant(if has_truth { "" } else { " hidden" });
+    let grey = if has_truth { "; grey: where it is" } else { "" };
+    put!(
+        out,
+        "<h2>The skeleton in space</h2>\n\
+         <canvas id=\"space\" width=\"900\" height=\"520\" role=\"img\" \
+         aria-label=\"the skeleton in space\"></canvas>\n<p class=\"bar\"><button id=\"play\">pause</button> <input id=\"at\" type=\"range\" min=\"0\" value=\"0\"> \
+         <label{}><input id=\"truth\" type=\"checkbox\" checked> truth</label> <span id=\"said\"></span></p>\n\
+         <p class=\"note\">Drag to turn, wheel to come nearer. Colours: <b class=\"right\">right</b>, \
+         <b class=\"left\">left</b>, <b class=\"centre\">middle</b> of the body as it was found{}. \
+         The squares of the floor are a metre wide; a red camera has no part in the frame.</p>\n\
+         <h2>Cameras over time</h2>\n<div class=\"scroll\">\n",
+        hidden,
+        grey
+    );
+    put!(out, "{}", timeline::svg(&page.space, &page.marks));
+    put!(
+        out,
+        "</div>\n<p class=\"note\">A tick is a result in space, green where the view has a part in it.</p>\n"
+    );
+}
+
+fn tabulate(out: &mut Html, table: &Table) {
+    put!(out, "<h2>{}</h2>\n", table.heading);
+    if !table.note.is_empty() {
+        put!(out, "<p class=\"note\">{}</p>\n", table.note);
+    }
+    put!(out, "<div class=\"scroll\"><table>\n");
+    if table.columns.iter().any(|it| !it.is_empty()) {
+        put!(out, "<tr>");
+        for column in &table.columns {
+            put!(out, "<th>{}", column);
+        }
+        put!(out, "</tr>\n");
+    }
+    for row in &table.rows {
+        put!(out, "<tr>");
+        for cell in row {
+            put!(out, "<td>{}", cell);
+        }
+        put!(out, "</tr>\n");
+    }
+    put!(out, "</table></div>\n");
+}
+
+fn pictures(out: &mut Html, page: &Page) {
+    if page.strips.is_empty() {
+        return;
+    }
+    put!(
+        out,
+        "<h2>What the cameras saw</h2>\n<p class=\"note\">{}</p>\n",
+        page.legend
+    );
+    for strip in &page.strips {
+        put!(out, "<h3>{}</h3>\n<div class=\"strip\">\n", strip.caption);
+        for picture in &strip.pictures {
+            let name = &picture.caption;
+            match &picture.jpeg {
+                Ok(bytes) => {
+                    let data = STANDARD.encode(bytes);
+                    put!(
+                        out,
+                        "<img alt=\"{name}\" src=\"data:image/jpeg;base64,{data}\">\n",
+                        [name, data]
+                    );
+                }
+                Err(why) => put!(out, "<div class=\"none\">{name}: {}</div>\n", [name], why),
+            }
+        }
+        put!(out, "</div>\n");
+    }
+}
+
+#[cfg(test)]
+mod tests;

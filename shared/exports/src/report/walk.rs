@@ -1,0 +1,329 @@
+//! A rig that people told, as one HTML page: the verdict, what is known of every camera, where in its picture people were, and the rig in space.
+
+use calibration::people;
+use calibration::refine;
+use geometry::Camera;
+use nalgebra::{Point3, UnitVector3, Vector3};
+
+use crate::report::html::{Html, put};
+use crate::report::parts::{about_table, begin, number, verdict, worst};
+use crate::report::run::{Eye, Moment, SCRIPT, Space};
+
+/// Cells of a picture along each axis, and the size of its drawing.
+const CELLS: usize = 8;
+const WIDTH: f64 = 160.0;
+/// What is said of a rig with doubts.
+const UNUSABLE: &str = "not to be used";
+/// What is said of a rig with cautions.
+const ROUGH: &str = "usable, but not known well";
+/// What is drawn into pictures.
+const DRAWN: &str =
+    "Ring: the joint as it was seen; line: to where the rig has it, from what all cameras see.";
+/// The most skeletons that are drawn.
+const MOST_MOMENTS: usize = 150;
+
+/// The page of `calibrate people`.
+///
+/// * `names`: of the cameras. `about`: what was looked at, key and value. `pictures`: those that fit worst, as JPEG with a caption.
+pub fn of_people(
+    outcome: &people::Outcome,
+    names: &[&str],
+    about: &[(String, String)],
+    pictures: &[(String, Vec<u8>)],
+) -> String {
+    let mut out = begin("Parallax: a rig from people");
+    judged(&mut out, outcome, names);
+    about_table(&mut out, about);
+    put!(
+        out,
+        "<p class=\"note\">{} instants over {} s; sides of {} views exchanged; scale to {} %.</p>\n",
+        outcome.n_instants,
+        number(outcome.span_s[1] - outcome.span_s[0], 1),
+        outcome.n_exchanged,
+        number(100.0 * outcome.scale_sd, 1)
+    );
+    put!(
+        out,
+        "<h2>Cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>camera<th>centre, m<th>joints<th>residual, px<th>fit, %\
+         <th>rotation &#177; degrees<th>centre &#177; mm<th>focal length, px<th>halves differ, degrees<th>mm<th>offset, ms</tr>\n"
+    );
+    let each = names.iter().zip(&outcome.cameras).zip(&outcome.reports);
+    for ((name, camera), it) in each {
+        let centre = camera.centre_in_world();
+        let focal = number(camera.intrinsics.fx, 1);
+        let focal = match it.focal_sd_px {
+            Some(sd) => format!("{focal} \u{b1} {}", number(sd, 1)),
+            None => format!("{focal}, given"),
+        };
+        put!(
+            out,
+            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
+            name,
+            format!("{:.3} {:.3} {:.3}", centre.x, centre.y, centre.z),
+            it.joints,
+            number(it.residual_px, 2),
+            number(100.0 * it.inliers, 0),
+            number(it.sd[0], 3),
+            number(1e3 * it.sd[1], 1),
+            focal,
+            it.halves.map_or("-".to_owned(), |it| number(it[0], 2)),
+            it.halves
+                .map_or("-".to_owned(), |it| number(1e3 * it[1], 0)),
+            format!(
+                "{} \u{b1} {}",
+                number(1e3 * it.offset_s[0], 1),
+                number(1e3 * it.offset_s[1], 1)
+            )
+        );
+    }
+    put!(
+        out,
+        "</table></div>\n<p class=\"note\">The deviations are one standard deviation, by how blocks of the recording differ, and its halves; \
+         rigs laid upon one another. Halves: each half of the recording by itself, laid upon the other.</p>\n"
+    );
+    coverage(&mut out, outcome, names);
+    in_space(
+        &mut out,
+        (&outcome.cameras, outcome.up),
+        &outcome.skeletons,
+        outcome.span_s,
+    );
+    worst(&mut out, DRAWN, pictures);
+    put!(out, "</html>\n");
+    out.into_page()
+}
+
+/// The verdict, with doubts, or else with cautions.
+fn judged(out: &mut Html, outcome: &people::Outcome, names: &[&str]) {
+    let (bad, reasons) = if outcome.doubts.is_empty() {
+        (ROUGH, &outcome.cautions)
+    } else {
+        (UNUSABLE, &outcome.doubts)
+    };
+    let reasons: Vec<String> = reasons.iter().map(|it| it.text(names)).collect();
+    verdict(out, ("determined", bad), &reasons);
+}
+
+/// The page of `calibrate refine`.
+///
+/// * `names`, `about`, `pictures`: as in [`of_people`].
+pub fn of_refinement(
+    outcome: &refine::Outcome,
+    names: &[&str],
+    about: &[(String, String)],
+    pictures: &[(String, Vec<u8>)],
+) -> String {
+    let mut out = begin("Parallax: a rig refined");
+    let mut doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
+    if doubts.is_empty() && !outcome.is_better {
+        doubts.push(
+            "the new rig is no better on what it was not fitted to: keep the one that is there"
+                .to_owned(),
+        );
+    }
+    verdict(&mut out, ("better", UNUSABLE), &doubts);
+    about_table(&mut out, about);
+    put!(
+        out,
+        "<p class=\"note\">{} instants. Held out, joints are {} px from where the other cameras see them before and {} px after; \
+         {} of {} blocks became better, {} standard errors of the mean.</p>\n",
+        outcome.n_instants,
+        number(outcome.held_out_px[0], 2),
+        number(outcome.held_out_px[1], 2),
+        outcome.blocks[1],
+        outcome.blocks[0],
+        number(outcome.certainty, 1)
+    );
+    put!(
+        out,
+        "<h2>Cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>camera<th>moved, degrees<th>mm<th>&#177; degrees<th>&#177; mm\
+         <th>held out before, px<th>after, px<th>residual, px<th>offset, ms<th></tr>\n"
+    );
+    for (name, it) in names.iter().zip(&outcome.changes) {
+        put!(
+            out,
+            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
+            name,
+            number(it.moved[0], 2),
+            number(1e3 * it.moved[1], 1),
+            number(it.sd[0], 3),
+            number(1e3 * it.sd[1], 1),
+            number(it.held_out_px[0], 2),
+            number(it.held_out_px[1], 2),
+            number(it.residual_px, 2),
+            number(1e3 * it.offset_s, 1),
+            if it.is_told {
+                ""
+            } else {
+                "held: the joints do not tell it"
+            }
+        );
+    }
+    put!(out, "</table></div>\n");
+    worst(&mut out, DRAWN, pictures);
+    put!(out, "</html>\n");
+    out.into_page()
+}
+
+/// Where in the picture of every camera the joints were.
+fn coverage(out: &mut Html, outcome: &people::Outcome, names: &[&str]) {
+    put!(
+        out,
+        "<h2>Where in the pictures people were</h2>\n<p><small>The darker, the more joints; what is empty tells nothing.</small></p>\n<div>\n"
+    );
+    for ((name, camera), it) in names.iter().zip(&outcome.cameras).zip(&outcome.reports) {
+        let [width, height] = camera.intrinsics.size.map(f64::from);
+        let cell = [WIDTH / CELLS as f64, WIDTH * height / width / CELLS as f64];
+        let total = [WIDTH, CELLS as f64 * cell[1] + 18.0];
+        put!(
+            out,
+            "<svg class=\"chart\" viewBox=\"0 0 {} {}\" width=\"{}\" height=\"{}\" role=\"img\"><text x=\"0\" y=\"12\">{}</text>",
+            total[0],
+            total[1],
+            total[0],
+            total[1],
+            name
+        );
+        let most = it.cells.iter().copied().max().unwrap_or(0).max(1) as f64;
+        for (nth, n) in it.cells.iter().enumerate() {
+            let [column, row] = [nth % CELLS, nth / CELLS].map(|it| it as f64);
+            put!(
+                out,
+                "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"#3a86c8\" fill-opacity=\"{:.2}\" stroke=\"#808894\" \
+                 stroke-width=\"0.3\"/>",
+                column * cell[0],
+                18.0 + row * cell[1],
+                cell[0],
+                cell[1],
+                (*n as f64 / most).sqrt()
+            );
+        }
+        put!(out, "</svg>\n");
+    }
+    put!(out, "</div>\n");
+}
+
+/// The rig and the skeletons, by the script of the page of a run.
+fn in_space(
+    out: &mut Html,
+    (cameras, up): (&[Camera], Option<UnitVector3<f64>>),
+    skeletons: &[Vec<Option<Point3<f64>>>],
+    span_s: [f64; 2],
+) {
+    if skeletons.is_empty() {
+        return;
+    }
+    let joints = skeleton::PARSE14.joints;
+    let step = skeletons.len().div_ceil(MOST_MOMENTS);
+    let seconds = (span_s[1] - span_s[0]) / (skeletons.len().max(2) - 1) as f64;
+    let each = skeletons.iter().enumerate().step_by(step);
+    let moments = each.map(|(nth, it)| {
+        let of = |joint: usize| {
+            it.get(joint)
+                .copied()
+                .flatten()
+                .map(|it| [it.x, it.y, it.z])
+        };
+        Moment {
+            frame: nth as u64,
+            seconds: seconds * nth as f64,
+            found: (0..joints.len()).map(of).collect(),
+            truth: Vec::new(),
+            views: vec![None; cameras.len()],
+        }
+    });
+    let up = up.unwrap_or(Vector3::z_axis());
+    let space = Space {
+        joints: joints.iter().map(|it| it.name.to_owned()).collect(),
+        limbs: skeleton::PARSE14.limbs.to_vec(),
+        eyes: cameras
+            .iter()
+            .map(|it| {
+                let (at, axis) = (it.centre_in_world(), it.axis_in_world());
+                Eye {
+                    name: it.name.clone(),
+                    at: [at.x, at.y, at.z],
+                    axis: [axis.x, axis.y, axis.z],
+                }
+            })
+            .collect(),
+        up: [up.x, up.y, up.z],
+        moments: moments.collect(),
+    };
+    let data = space.json();
+    put!(
+        out,
+        "<h2>The rig in space</h2>\n<canvas id=\"space\" width=\"900\" height=\"520\" role=\"img\" aria-label=\"the rig in space\"></canvas>\n\
+         <p class=\"bar\"><button id=\"play\">pause</button> <input id=\"at\" type=\"range\" min=\"0\" value=\"0\"> <label hidden><input id=\"truth\" type=\"checkbox\"></label> <span id=\"said\"></span></p>\n\
+         <p class=\"note\">Drag to turn, wheel to come nearer. The squares of the floor are a metre wide.</p>\n\
+         <script type=\"application/json\" id=\"data\">{}</script>\n<script type=\"module\">{}</script>\n",
+        Html::in_script(&data),
+        Html::constant(SCRIPT)
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_break_the_page_and_reasons_stand_on_it() {
+        let outcome = people::Outcome {
+            cameras: Vec::new(),
+            up: None,
+            vertical: people::Vertical::Leaning,
+            scale_sd: f64::NAN,
+            stature_m: None,
+            reports: Vec::new(),
+            doubts: vec![people::Doubt::NoPeople {
+                camera: 0,
+                seen_s: 0.0,
+                least_s: 0.5,
+            }],
+            cautions: Vec::new(),
+            clocks_are_found: false,
+            n_instants: 0,
+            span_s: [0.0; 2],
+            n_exchanged: 0,
+            times_s: Vec::new(),
+            skeletons: Vec::new(),
+        };
+        let about = [("a<b".to_owned(), "c&d\"".to_owned())];
+        let page = of_people(&outcome, &["<script>alert(1)"], &about, &[]);
+        assert!(
+            !page.contains("<script>") && page.contains("&lt;script&gt;alert"),
+            "{page}"
+        );
+        assert!(
+            page.contains("a&lt;b") && page.contains("not to be used"),
+            "{page}"
+        );
+        let rough = people::Outcome {
+            doubts: Vec::new(),
+            cautions: outcome.doubts.clone(),
+            ..outcome
+        };
+        let page = of_people(
+            &rough,
+            &["one"],
+            &about,
+            &[("one <at> 1 s".to_owned(), vec![1, 2, 3])],
+        );
+        assert!(
+            page.contains("usable, but not known well") && page.contains("one sees a person"),
+            "{page}"
+        );
+        assert!(
+            page.contains("fit worst") && page.contains("alt=\"one &lt;at&gt; 1 s\""),
+            "{page}"
+        );
+        let head = Some(Point3::new(0.0, 0.0, 1.7));
+        let walked = people::Outcome {
+            skeletons: vec![vec![head; 14]; 3],
+            ..rough
+        };
+        let page = of_people(&walked, &["one"], &about, &[]);
+        assert!(page.contains("The rig in space"));
+        testkit::chromium::check_in_browser(&page);
+    }
+}

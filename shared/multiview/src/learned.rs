@@ -1,0 +1,34 @@
+//! Learns the consistency parameters between views from people with known joints.
+//!
+//! The paper's section 5, "Consistency parameters". [`Learner`] takes single-view solutions with the truth
+//! ([`ViewObservation`]), and learns from those that are nearly right which part types occur together
+//! ([`Counts`]), the median errors of parts (tau), and the map from parts to joints. [`Learned`] is the file
+//! beside a model with the result.
+//!
+//! [`Local`] learns from single views of marked people where joints lie among the parts around them; [`JointFile`] is
+//! the file with that. Nothing here reads a file or a clock.
+
+mod counts;
+mod file;
+
+mod joint_file;
+mod joints;
+mod learn;
+mod local;
+mod model;
+mod surface;
+
+pub use counts::{Appearance, Counts, Shape, marginals};
+pub use file::{
+    FileError, JointWeights, Learned, LearnedFrom, ModelOf, NamedPair, NamedRig, Weights,
+};
+pub use joint_file::{JointFile, JointFileError, JointRow, JointsLearned, LearnedSet};
+pub use joints::{JointFit, JointSample};
+pub use learn::{LearnError, Learner, Pair, Settings, ViewObservation};
+pub use local::{Local, Marked, Tried, best as best_local, mean_error, try_all};
+pub use surface::{Grid, Point, Tally, best};
+
+#[cfg(test)]
+mod joint_tests;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,241 @@
+//! The file beside a model that says where joints lie among its parts.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use skeleton::{JointMap, JointSet, N_PARTS, PARSE14};
+
+use crate::learned::local::own;
+
+/// The format name of a file of joints.
+const FORMAT: &str = "parallax-joints";
+/// The version that is written, and the only one that is read.
+const VERSION: u32 = 1;
+/// Largest size of a weight.
+const MOST: f64 = 10.0;
+/// How far the sum of a row may be from 1.
+const SUM_TOLERANCE: f64 = 1e-6;
+
+/// Where the joints of `skeleton::PARSE14` lie among the parts of one model.
+///
+/// As a file it is one object of JSON; all fields must be there, others are refused.
+///
+/// | field | what |
+/// |---|---|
+/// | `format`, `version` | `"parallax-joints"`, 1 |
+/// | `model` | 16 hexadecimal digits: FNV-1a of the model file that it was learned with |
+/// | `joints` | the joints: `name`, in the order of `parse14`, and `weights`, one per part of the model, which sum to 1 |
+/// | `learned` | how it was learned: `reach` and `ridge`, and of every data set (`sets`) its `name`, its `people`, those `found`, and the mean error before and after (`error_before`, `error_after`): percent of the person's size, at most 10 each, of people left out in turn |
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointFile {
+    /// `parallax-joints`.
+    pub format: String,
+    /// 1.
+    pub version: u32,
+    /// Fingerprint of the model file.
+    pub model: String,
+    /// The joints.
+    pub joints: Vec<JointRow>,
+    /// How they were learned.
+    pub learned: JointsLearned,
+}
+
+/// A joint as a weighted sum of parts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointRow {
+    /// Its name.
+    pub name: String,
+    /// One number for each part.
+    pub weights: Vec<f64>,
+}
+
+/// How joints were learned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointsLearned {
+    /// Bones between a joint's own part and the farthest that tells where it lies.
+    pub reach: usize,
+    /// Cost of weights.
+    pub ridge: f64,
+    /// The data sets.
+    pub sets: Vec<LearnedSet>,
+}
+
+/// A data set that joints were learned from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LearnedSet {
+    /// Its name.
+    pub name: String,
+    /// People.
+    pub people: u64,
+    /// Those of them who were found.
+    pub found: u64,
+    /// Mean error of the parts themselves.
+    pub error_before: f64,
+    /// Mean error of the joints, of people that they were not learned from.
+    pub error_after: f64,
+}
+
+/// Why a text is not a file of joints.
+#[derive(Debug, thiserror::Error)]
+pub enum JointFileError {
+    /// It is not JSON of this layout.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// It is something else, or of another version.
+    #[error("`{format}` version {version}, expected `{FORMAT}` version {VERSION}")]
+    Version {
+        /// Its format name.
+        format: String,
+        /// Its version.
+        version: u32,
+    },
+    /// A value is out of range, or of the wrong size.
+    #[error("`{field}` is not {expected}")]
+    Value {
+        /// Where.
+        field: String,
+        /// The expected value.
+        expected: String,
+    },
+}
+
+impl JointFile {
+    /// A file of the rows that [`Local::learn`](crate::learned::Local::learn) gave.
+    ///
+    /// * `model`: fingerprint of the model file.
+    pub fn new(model: String, rows: Vec<Vec<f64>>, learned: JointsLearned) -> Self {
+        let joints = PARSE14.joints.iter().zip(rows);
+        Self {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            model,
+            joints: joints
+                .map(|(joint, weights)| JointRow {
+                    name: joint.name.to_owned(),
+                    weights,
+                })
+                .collect(),
+            learned,
+        }
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    ///
+    /// [`JointFileError`], naming the field.
+    pub fn parse(text: &str) -> Result<Self, JointFileError> {
+        let head: Head = serde_json::from_str(text)?;
+        if head.format != FORMAT || head.version != VERSION {
+            return Err(JointFileError::Version {
+                format: head.format.chars().take(32).collect(),
+                version: head.version,
+            });
+        }
+        let read: Self = serde_json::from_str(text)?;
+        read.check()?;
+        Ok(read)
+    }
+
+    /// Writes the text that [`Self::parse`] reads: a joint a line.
+    ///
+    /// # Errors
+    ///
+    /// [`JointFileError::Json`], for numbers that JSON does not have.
+    pub fn write(&self) -> Result<String, JointFileError> {
+        let joints: Result<Vec<_>, _> = self.joints.iter().map(serde_json::to_string).collect();
+        Ok(format!(
+            "{{\"format\":\"{FORMAT}\",\"version\":{VERSION},\"model\":{},\n\"learned\":{},\n\"joints\":[\n{}\n]}}\n",
+            serde_json::to_string(&self.model)?,
+            serde_json::to_string(&self.learned)?,
+            joints?.join(",\n")
+        ))
+    }
+
+    /// The map from the 26 parts to the joints of a set, all of which are made of those of `skeleton::PARSE14`.
+    ///
+    /// * Returns `None` for a set with a part that is no joint there.
+    pub fn map(&self, set: &JointSet) -> Option<Arc<JointMap>> {
+        let of_part = |part: &usize| {
+            let joint = (0..self.joints.len()).find(|it| own(*it) == *part)?;
+            Some(&self.joints[joint].weights)
+        };
+        let of_joint = |joint: &skeleton::Joint| -> Option<Vec<f64>> {
+            let rows: Option<Vec<&Vec<f64>>> = joint.parts.iter().map(of_part).collect();
+            let rows = rows?;
+            let mean =
+                |part: usize| rows.iter().map(|it| it[part]).sum::<f64>() / rows.len() as f64;
+            Some((0..N_PARTS).map(mean).collect())
+        };
+        let rows: Option<Vec<_>> = set.joints.iter().map(of_joint).collect();
+        JointMap::new(rows?).map(Arc::new)
+    }
+
+    fn check(&self) -> Result<(), JointFileError> {
+        let is_hex = |it: char| it.is_ascii_digit() || ('a'..='f').contains(&it);
+        let is_fingerprint = self.model.len() == 16 && self.model.chars().all(is_hex);
+        demand(is_fingerprint, "model", "16 hexadecimal digits")?;
+        let n = PARSE14.joints.len();
+        demand(self.joints.len() == n, "joints", &format!("{n} joints"))?;
+        for (nth, (joint, known)) in self.joints.iter().zip(PARSE14.joints).enumerate() {
+            let name = format!("joints[{nth}].name");
+            demand(
+                joint.name == known.name,
+                &name,
+                &format!("{:?}", known.name),
+            )?;
+            let (weights, field) = (&joint.weights, format!("joints[{nth}].weights"));
+            let is_row = weights.len() == N_PARTS && weights.iter().all(|it| it.abs() <= MOST);
+            let expected = format!("{N_PARTS} numbers from -{MOST} to {MOST}");
+            demand(is_row, &field, &expected)?;
+            let sum: f64 = weights.iter().sum();
+            demand(
+                (sum - 1.0).abs() <= SUM_TOLERANCE,
+                &field,
+                "a row whose sum is 1",
+            )?;
+        }
+        let it = &self.learned;
+        demand(in_range(it.ridge), "learned.ridge", "a number from 0")?;
+        demand(
+            it.reach <= N_PARTS,
+            "learned.reach",
+            &format!("at most {N_PARTS}"),
+        )?;
+        for (nth, set) in it.sets.iter().enumerate() {
+            let field = |name: &str| format!("learned.sets[{nth}].{name}");
+            demand(set.found <= set.people, &field("found"), "at most `people`")?;
+            for (name, error) in [
+                ("error_before", set.error_before),
+                ("error_after", set.error_after),
+            ] {
+                demand(in_range(error), &field(name), "a number from 0")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[derive(Deserialize)]
+struct Head {
+    format: String,
+    version: u32,
+}
+
+fn demand(holds: bool, field: &str, expected: &str) -> Result<(), JointFileError> {
+    if holds {
+        return Ok(());
+    }
+    Err(JointFileError::Value {
+        field: field.to_owned(),
+        expected: expected.to_owned(),
+    })
+}
+
+fn in_range(number: f64) -> bool {
+    number.is_finite() && number >= 0.0
+}

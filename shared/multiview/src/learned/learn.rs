@@ -1,0 +1,262 @@
+//! Learns the consistency parameters from single views and their ground truth.
+
+use std::f64::consts::PI;
+
+use skeleton::{JointSet, N_PARTS, PARENT};
+use statistics::Sorted;
+
+use crate::learned::counts::{Counts, Shape};
+use crate::learned::joints::{JointFit, JointSample};
+use crate::learned::{Learned, LearnedFrom, ModelOf, NamedPair, NamedRig, Weights};
+
+/// Settings of the learning.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Bins of half the circle.
+    pub n_bins: usize,
+    /// Error up to which the type of a part counts, its parent's too; tenths of the person's size.
+    pub max_error: f32,
+    /// Mean error of a person up to which it is used for the joint map, the same unit.
+    pub max_mean_error: f32,
+    /// Observations of independent types added to every table.
+    pub smoothing: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            n_bins: 12,
+            max_error: 0.5,
+            max_mean_error: 0.8,
+            smoothing: 20.0,
+        }
+    }
+}
+
+/// The best pose of one view together with the ground truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewObservation {
+    /// Type of every part.
+    pub types: Vec<u8>,
+    /// Centres of all parts, pixels; parts as the model names them.
+    pub centres: Vec<[f64; 2]>,
+    /// Error of every part, tenths of the person's size.
+    pub errors: Vec<f32>,
+    /// Whether left and right are exchanged according to the ground truth: the person is seen from behind.
+    pub exchanged: bool,
+    /// Size of the person, pixels.
+    pub size: f64,
+    /// The true joints of the joint set, pixels; `None` where one is not known.
+    pub joints: Vec<Option<[f64; 2]>>,
+}
+
+/// Two views of one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Pair<'a> {
+    /// What was observed in each.
+    pub views: [&'a ViewObservation; 2],
+    /// The angle from the first to the second as seen from the person (`crate::angle_between`), radians.
+    pub angle: Option<f64>,
+    /// Names of the two cameras, if their pair is also learned by name.
+    pub cameras: Option<[&'a str; 2]>,
+}
+
+/// Why nothing was learned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum LearnError {
+    /// No view was close enough to the truth.
+    #[error("of {views} views none is near the truth: nothing can be learned of them")]
+    Nothing {
+        /// Views seen.
+        views: u64,
+    },
+}
+
+/// Learns from one instant after the other; their order only affects rounding in the joints.
+#[derive(Debug, Clone)]
+pub struct Learner {
+    settings: Settings,
+    shape: Shape,
+    ring: Vec<Counts>,
+    named: Vec<NamedPair>,
+    /// Of every part.
+    errors: Vec<Vec<f32>>,
+    joints: JointFit,
+    from: LearnedFrom,
+}
+
+impl Learner {
+    /// A learner without data.
+    pub fn new(shape: Shape, settings: Settings) -> Self {
+        Self {
+            ring: vec![Counts::new(&shape); settings.n_bins.max(1)],
+            errors: vec![Vec::new(); shape.n_types.len()],
+            named: Vec::new(),
+            joints: JointFit::default(),
+            from: LearnedFrom::default(),
+            settings,
+            shape,
+        }
+    }
+
+    /// Adds one view.
+    ///
+    /// * `set`: of its joints.
+    pub fn add_view(&mut self, view: &ViewObservation, set: &'static JointSet) {
+        self.from.views += 1;
+        for (all, error) in self.errors.iter_mut().zip(&view.errors) {
+            all.push(*error);
+        }
+        let mean = view.errors.iter().sum::<f32>() / view.errors.len().max(1) as f32;
+        if view.centres.len() != N_PARTS || mean > self.settings.max_mean_error {
+            return;
+        }
+        let part = |it: usize| view.centres[self.shape.partner(it, view.exchanged)];
+        let centres: Vec<[f64; 2]> = (0..N_PARTS).map(part).collect();
+        for (joint, at) in set.joints.iter().zip(&view.joints) {
+            if let Some(at) = at {
+                self.joints.add(&JointSample {
+                    centres: &centres,
+                    joint: *at,
+                    parts: joint.parts,
+                    size: view.size,
+                });
+            }
+        }
+    }
+
+    /// Adds two views of one instant.
+    pub fn add_pair(&mut self, pair: &Pair<'_>) {
+        let [first, second] = pair.views;
+        let exchanged = first.exchanged != second.exchanged;
+        for part in 0..self.shape.n_types.len() {
+            let partner = self.shape.partner(part, exchanged);
+            if !self.is_right(first, part) || !self.is_right(second, partner) {
+                continue;
+            }
+            let types = [first.types[part], second.types[partner]].map(usize::from);
+            if let Some(angle) = pair.angle {
+                let n = self.ring.len();
+                let bin = ((angle.abs() / PI * n as f64) as usize).min(n - 1);
+                if angle >= 0.0 {
+                    self.ring[bin].add(&self.shape, part, types, exchanged);
+                } else {
+                    let types = [types[1], types[0]];
+                    self.ring[bin].add(&self.shape, partner, types, exchanged);
+                }
+            }
+            if let Some(cameras) = pair.cameras {
+                self.add_named(cameras, part, types, exchanged);
+            }
+        }
+    }
+
+    fn add_named(&mut self, cameras: [&str; 2], part: usize, types: [usize; 2], exchanged: bool) {
+        let at = self.named.iter().position(|it| it.cameras == cameras);
+        let at = at.unwrap_or_else(|| {
+            self.named.push(NamedPair {
+                cameras: cameras.map(str::to_owned),
+                counts: Counts::new(&self.shape),
+            });
+            self.named.len() - 1
+        });
+        self.named[at]
+            .counts
+            .add(&self.shape, part, types, exchanged);
+    }
+
+    /// A type counts if its part and the parent, to which it is relative, are right.
+    fn is_right(&self, view: &ViewObservation, part: usize) -> bool {
+        let parent = PARENT.get(part).copied().flatten().unwrap_or(part);
+        let right = |it: usize| {
+            view.errors
+                .get(it)
+                .is_some_and(|it| *it <= self.settings.max_error)
+        };
+        right(part) && right(parent)
+    }
+
+    /// Counts an instant whose views were added.
+    pub fn end_instant(&mut self) {
+        self.from.instants += 1;
+    }
+
+    /// The regression of the joints.
+    pub fn joints(&self) -> &JointFit {
+        &self.joints
+    }
+
+    /// Mean lift of another learner's types under the tables of this one: the mean over all parts of `ln p(a,
+    /// b) / (p(a) p(b))`; above 0 if the tables are informative.
+    pub fn lift_on(&self, other: &Self) -> Option<f64> {
+        let marginals =
+            crate::learned::marginals(&self.shape, &self.ring.iter().collect::<Vec<_>>());
+        let (mut sum, mut n) = (0.0, 0.0);
+        for (own, theirs) in self.ring.iter().zip(&other.ring) {
+            for exchanged in [false, true] {
+                let joint = own.joint(&self.shape, &marginals, self.settings.smoothing, exchanged);
+                for (part, cells) in theirs.of(exchanged).iter().enumerate() {
+                    let (rows, cols) = (joint[part].column_sum(), joint[part].row_sum());
+                    for (cell, count) in cells.iter().enumerate().filter(|it| *it.1 > 0) {
+                        let at = (cell / cols.len(), cell % cols.len());
+                        let lift = joint[part][at] / (rows[at.0] * cols[at.1]);
+                        sum += f64::from(*count) * lift.ln();
+                        n += f64::from(*count);
+                    }
+                }
+            }
+        }
+        (n > 0.0).then(|| sum / n)
+    }
+
+    /// The learned parameters.
+    ///
+    /// * `rig`: the rig of the pairs of cameras that were learned by name.
+    ///
+    /// # Errors
+    ///
+    /// [`LearnError::Nothing`].
+    pub fn learned(
+        &self,
+        fingerprint: String,
+        weights: Weights,
+        rig: Option<&str>,
+        ridge: Option<f64>,
+    ) -> Result<Learned, LearnError> {
+        if self.ring.iter().all(|it| it.total() == 0) {
+            return Err(LearnError::Nothing {
+                views: self.from.views,
+            });
+        }
+        let (format, version) = Learned::head();
+        let rigs = rig.map(|name| NamedRig {
+            name: name.to_owned(),
+            pairs: self.named.clone(),
+        });
+        let sets = JointSet::ALL.into_iter();
+        Ok(Learned {
+            format,
+            version,
+            model: ModelOf {
+                fingerprint,
+                shape: self.shape.clone(),
+            },
+            learned: self.from,
+            weights,
+            tau_tenths: self.errors.iter().map(|it| median(it)).collect(),
+            smoothing: self.settings.smoothing,
+            ring: self.ring.clone(),
+            rigs: rigs.into_iter().collect(),
+            joints: ridge.map_or_else(Vec::new, |ridge| {
+                sets.map(|it| self.joints.solve(it, ridge)).collect()
+            }),
+        })
+    }
+}
+
+/// The median; of an even number of values the lower one.
+fn median(values: &[f32]) -> f32 {
+    let median = Sorted::new(values).lower_median();
+    // Four digits are more than pictures tell.
+    median.map_or(0.0, |it| (it * 1e4).round() / 1e4)
+}

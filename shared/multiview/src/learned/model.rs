@@ -1,0 +1,17 @@
+//! What of a person model the tables depend on.
+
+use fmp::Model;
+
+use crate::learned::Shape;
+
+impl Shape {
+    /// The number of types of every part of a model, and the parts on the other side.
+    pub fn of(model: &Model) -> Self {
+        let parts = 0..model.n_parts();
+        let mirror = model.spec().mirror.clone();
+        Self {
+            n_types: parts.clone().map(|part| model.n_types(part)).collect(),
+            mirror: mirror.unwrap_or_else(|| parts.collect()),
+        }
+    }
+}

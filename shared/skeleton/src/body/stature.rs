@@ -1,0 +1,127 @@
+//! How tall a person is, from the bones that are there.
+
+use crate::body::Joints;
+use crate::body::bone::{self, BONES, N_BONES};
+use crate::body::proportion::{Kind, MEASUREMENT_SD};
+
+/// The statures that a person can have, metres.
+///
+/// Our own choice: below, a child of one or two years, which hardly stands (WHO Child Growth Standards 2006: at
+/// two years the median is about 0.86 m); above, men taller than all but a handful alive (ANSUR II: men
+/// 1.756 ± 0.069 m, women 1.629 ± 0.064 m).
+pub const STATURES: [f64; 2] = [0.80, 2.30];
+
+/// The least number of bones that say anything about a person.
+pub const MIN_BONES: usize = 4;
+
+/// A standing height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stature {
+    /// The height, metres.
+    pub metres: f64,
+    /// Its standard deviation, metres.
+    pub sd: f64,
+}
+
+/// Standing height of the person with these joints, in whatever posture; `None` if there are fewer than [`MIN_BONES`]
+/// bones.
+///
+/// The median of what every bone says, weighted by how well it can tell: one limb that is wrong changes little. The
+/// uncertainty is that of a weighted median of independent bones, or of the disagreement that is seen, whichever is
+/// larger.
+pub fn stature(joints: &Joints) -> Option<Stature> {
+    of_lengths(&bone::lengths(&bone::clean(joints)))
+}
+
+/// The same, from the lengths of the bones, metres.
+pub(crate) fn of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<Stature> {
+    let mut sorted = Votes::new(lengths)?;
+    let metres = sorted.median();
+    let model = 1.0
+        / sorted
+            .votes()
+            .iter()
+            .map(|it| it[1] * it[1])
+            .sum::<f64>()
+            .sqrt();
+    let n = sorted.n as f64;
+    for vote in sorted.votes_mut() {
+        vote[0] = (vote[0] - metres).abs();
+    }
+    sorted.sort();
+    // A sample's deviation from its median absolute one, and that of a median from the sample's, both normal.
+    let seen = 1.4826 * sorted.median() / n.sqrt();
+    let sd = 1.2533 * (model * metres).max(seen);
+    Some(Stature { metres, sd })
+}
+
+/// The median alone: what is needed many times a frame.
+pub(crate) fn median_of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<f64> {
+    Votes::new(lengths).map(|votes| votes.median())
+}
+
+/// What the bones say, ascending, each with its weight: the inverse of its relative deviation.
+struct Votes {
+    votes: [[f64; 2]; N_BONES],
+    n: usize,
+}
+
+impl Votes {
+    fn new(lengths: &[Option<f64>; N_BONES]) -> Option<Self> {
+        let mut it = Self {
+            votes: [[0.0; 2]; N_BONES],
+            n: 0,
+        };
+        for (bone, length) in BONES.iter().zip(lengths) {
+            if let Some(length) = length {
+                it.votes[it.n] = [bone.kind.proportion().stature(*length), weight(bone.kind)];
+                it.n += 1;
+            }
+        }
+        if it.n < MIN_BONES {
+            return None;
+        }
+        it.sort();
+        Some(it)
+    }
+
+    fn votes(&self) -> &[[f64; 2]] {
+        &self.votes[..self.n]
+    }
+
+    fn votes_mut(&mut self) -> &mut [[f64; 2]] {
+        &mut self.votes[..self.n]
+    }
+
+    fn sort(&mut self) {
+        self.votes_mut()
+            .sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+    }
+
+    /// The value at half of the weight, linear between the middles of the weights.
+    fn median(&self) -> f64 {
+        let half = 0.5 * self.votes().iter().map(|it| it[1]).sum::<f64>();
+        let [mut last, mut at_last] = [self.votes[0][0], 0.0];
+        let mut sum = 0.0;
+        for &[value, weight] in self.votes() {
+            let at = sum + 0.5 * weight;
+            if at >= half {
+                let share = (half - at_last) / (at - at_last);
+                return last + share * (value - last);
+            }
+            sum += weight;
+            [last, at_last] = [value, at];
+        }
+        last
+    }
+}
+
+/// How well a kind of bone tells the stature: the inverse of its relative deviation, for a person of 1.7 m.
+fn weight(kind: Kind) -> f64 {
+    let it = kind.proportion();
+    let measured = MEASUREMENT_SD / (it.adult * 1.7);
+    1.0 / (it.variance() + measured * measured).sqrt()
+}
+
+#[cfg(test)]
+mod tests;

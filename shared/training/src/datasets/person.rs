@@ -1,0 +1,232 @@
+//! Annotated people, and the faults of annotations.
+
+use std::path::PathBuf;
+
+use footage::{FootageError, Size};
+
+/// One annotated person.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Person {
+    /// The image.
+    pub image: PathBuf,
+    /// The place in the data set, for messages.
+    pub row: String,
+    /// The joints, `[x, y]` in pixels, the centre of the top-left pixel at `(0, 0)`. Unknown joints
+    /// are NaN; there are none unless [`ReadOptions::unknown_joints`](crate::datasets::ReadOptions) is set.
+    pub joints: Vec<[f64; 2]>,
+    /// Whether the joint is visible according to the annotation.
+    pub visible: Vec<bool>,
+}
+
+/// The valid people of a data set, and the problems of the others.
+#[derive(Debug, Default)]
+pub struct People {
+    /// In the order of the data set.
+    pub people: Vec<Person>,
+    /// One for each person that was left out because of a fault, in the order of the data set.
+    pub problems: Vec<Problem>,
+}
+
+impl People {
+    /// The number of problems of every kind that occurs.
+    pub fn counts(&self) -> Vec<(FaultKind, usize)> {
+        FaultKind::ALL
+            .into_iter()
+            .map(|kind| {
+                let of_kind = |problem: &&Problem| problem.fault.kind() == kind;
+                (kind, self.problems.iter().filter(of_kind).count())
+            })
+            .filter(|(_, count)| *count > 0)
+            .collect()
+    }
+
+    /// Adds the people and the problems of another data set.
+    pub fn append(&mut self, mut other: Self) {
+        self.people.append(&mut other.people);
+        self.problems.append(&mut other.problems);
+    }
+}
+
+/// A person with a fault.
+#[derive(Debug, thiserror::Error)]
+#[error("{}, {row}", file.display())]
+pub struct Problem {
+    /// The annotation file.
+    pub file: PathBuf,
+    /// The place of the person in the file.
+    pub row: String,
+    /// The fault.
+    #[source]
+    pub fault: Fault,
+}
+
+/// The fault of a person. Joints count from 1.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault {
+    /// The line does not describe a person.
+    #[error("not a person: {message}")]
+    Syntax {
+        /// Message of the JSON parser.
+        message: String,
+    },
+    /// More or fewer joints than the skeleton has.
+    #[error("{got} {what}, expected {expected}")]
+    Count {
+        /// What is counted: joints, or marks of visibility.
+        what: &'static str,
+        /// The number found.
+        got: usize,
+        /// The number expected.
+        expected: usize,
+    },
+    /// A joint is unknown: `null` in JSON lines, both coordinates NaN in other files.
+    #[error("joint {joint} is not known")]
+    Unknown {
+        /// Which, from 1.
+        joint: usize,
+    },
+    /// A coordinate is infinite, or one of the two is NaN.
+    #[error("joint {joint} lies at ({}, {})", at[0], at[1])]
+    NotFinite {
+        /// Which, from 1.
+        joint: usize,
+        /// Its coordinates.
+        at: [f64; 2],
+    },
+    /// All joints lie at one place.
+    #[error("all joints lie within {extent_px:.3} px of ({:.1}, {:.1})", at[0], at[1])]
+    ZeroSize {
+        /// Where, pixels.
+        at: [f64; 2],
+        /// Longer side of the rectangle around the joints, pixels.
+        extent_px: f64,
+    },
+    /// The image is absent, empty or damaged.
+    #[error("the image cannot be used")]
+    Image(#[from] FootageError),
+    /// A joint lies outside the image.
+    #[error(
+        "joint {joint} at ({:.1}, {:.1}) lies {by_px:.1} px outside the image of {size}, more than {limit_px}",
+        at[0], at[1]
+    )]
+    Outside {
+        /// Which, from 1: the one that lies farthest outside.
+        joint: usize,
+        /// Where, pixels.
+        at: [f64; 2],
+        /// Size of the image.
+        size: Size,
+        /// How far beyond the border, pixels.
+        by_px: f64,
+        /// How far is accepted, pixels.
+        limit_px: f64,
+    },
+    /// The same joints on the same image.
+    #[error("the same image and joints as {before}")]
+    Twice {
+        /// Place of the first occurrence.
+        before: String,
+    },
+    /// Another person has the same name.
+    #[error("the name {name:?} is that of {before}")]
+    SameName {
+        /// The name.
+        name: String,
+        /// Place of the first person with that name.
+        before: String,
+    },
+}
+
+impl Fault {
+    /// Its kind.
+    pub fn kind(&self) -> FaultKind {
+        match self {
+            Self::Syntax { .. } => FaultKind::Syntax,
+            Self::Count { .. } => FaultKind::Count,
+            Self::Unknown { .. } => FaultKind::Unknown,
+            Self::NotFinite { .. } => FaultKind::NotFinite,
+            Self::ZeroSize { .. } => FaultKind::ZeroSize,
+            Self::Image(_) => FaultKind::Image,
+            Self::Outside { .. } => FaultKind::Outside,
+            Self::Twice { .. } => FaultKind::Twice,
+            Self::SameName { .. } => FaultKind::SameName,
+        }
+    }
+}
+
+/// Kinds of [`Fault`], to count them and to choose the fatal ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FaultKind {
+    /// [`Fault::Syntax`]
+    Syntax,
+    /// [`Fault::Count`]
+    Count,
+    /// [`Fault::Unknown`]
+    Unknown,
+    /// [`Fault::NotFinite`]
+    NotFinite,
+    /// [`Fault::ZeroSize`]
+    ZeroSize,
+    /// [`Fault::Image`]
+    Image,
+    /// [`Fault::Outside`]
+    Outside,
+    /// [`Fault::Twice`]
+    Twice,
+    /// [`Fault::SameName`]
+    SameName,
+}
+
+impl FaultKind {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Syntax,
+        Self::Count,
+        Self::Unknown,
+        Self::NotFinite,
+        Self::ZeroSize,
+        Self::Image,
+        Self::Outside,
+        Self::Twice,
+        Self::SameName,
+    ];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Syntax => "syntax",
+            Self::Count => "count",
+            Self::Unknown => "unknown",
+            Self::NotFinite => "not-finite",
+            Self::ZeroSize => "zero-size",
+            Self::Image => "image",
+            Self::Outside => "outside",
+            Self::Twice => "twice",
+            Self::SameName => "same-name",
+        }
+    }
+
+    /// The kind of that name, if there is one.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|it| it.name() == name)
+    }
+}
+
+impl std::fmt::Display for FaultKind {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_is_found_by_its_name() {
+        for kind in FaultKind::ALL {
+            assert_eq!(FaultKind::by_name(kind.name()), Some(kind));
+        }
+        assert_eq!(FaultKind::by_name("other"), None);
+    }
+}

@@ -1,0 +1,65 @@
+//! Files of trainings: a checked header, and what it is about behind it.
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 0..8 | kind of file: `PLXTILES` (samples), `PLXTRAIN` (checkpoint) |
+//! | 8..12 | version, u32, little-endian: 1 |
+//! | 12..20 | length of the payload, u64, little-endian |
+//! | 20..28 | FNV-1a (64 bit) of the payload, little-endian |
+//! | 28.. | payload: bincode 2, standard configuration |
+
+use bincode::config::{self, Configuration, Limit, LittleEndian, Varint};
+use formats::checksum::{Envelope, EnvelopeError};
+use serde::{Serialize, de::DeserializeOwned};
+
+/// Kind of a file that holds the state of a training.
+pub(crate) const CHECKPOINT: [u8; 8] = *b"PLXTRAIN";
+/// Most bytes of a payload.
+const MAX_BYTES: usize = 16 << 30;
+
+/// Why bytes cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// Another kind or version of file, or a damaged one.
+    #[error(transparent)]
+    Envelope(#[from] EnvelopeError),
+    /// The checksum is right, but what it is of is not what the header says.
+    #[error("the payload is not what it should be")]
+    Payload(#[source] Box<bincode::error::DecodeError>),
+    /// Too large for the format.
+    #[error("it cannot be written")]
+    Encode(#[source] Box<bincode::error::EncodeError>),
+    /// Something follows the content in the payload.
+    #[error("its content ends {left} bytes before its payload")]
+    Left {
+        /// Bytes that follow.
+        left: usize,
+    },
+}
+
+const fn configuration() -> Configuration<LittleEndian, Varint, Limit<MAX_BYTES>> {
+    config::standard().with_limit::<MAX_BYTES>()
+}
+
+const fn envelope(magic: [u8; 8]) -> Envelope {
+    Envelope { magic, version: 1 }
+}
+
+/// A payload with its header.
+pub(crate) fn wrap<T: Serialize>(magic: [u8; 8], payload: &T) -> Result<Vec<u8>, StoreError> {
+    let payload = bincode::serde::encode_to_vec(payload, configuration());
+    let payload = payload.map_err(|error| StoreError::Encode(Box::new(error)))?;
+    Ok(envelope(magic).seal(&payload))
+}
+
+/// The payload behind a header that fits it.
+pub(crate) fn unwrap<T: DeserializeOwned>(magic: [u8; 8], bytes: &[u8]) -> Result<T, StoreError> {
+    let payload = envelope(magic).open(bytes)?;
+    let decoded = bincode::serde::decode_from_slice(payload, configuration());
+    let (decoded, n_read): (T, usize) =
+        decoded.map_err(|error| StoreError::Payload(Box::new(error)))?;
+    match payload.len() - n_read {
+        0 => Ok(decoded),
+        left => Err(StoreError::Left { left }),
+    }
+}

@@ -1,0 +1,195 @@
+//! What learning changes, and how a step changes it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::networks::lesson::Lesson;
+use crate::networks::parameters::{Parameter, Role};
+
+/// Decay of the running means of gradients and of their squares (`AdamW`: Loshchilov and Hutter 2019).
+const DECAYS: [f32; 2] = [0.9, 0.999];
+/// Added to the root of the mean square of a gradient.
+const EPSILON: f32 = 1e-8;
+/// Share of a running statistic that every batch replaces.
+const MOMENTUM_OF_STATISTICS: f32 = 0.05;
+
+/// The direction of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Rule {
+    /// Against the gradient, and a share of the last step again.
+    Momentum(f32),
+    /// Against the mean gradient over the root of the mean square (`AdamW`).
+    Adam,
+}
+
+/// How one step changes the parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Its direction.
+    pub rule: Rule,
+    /// Its length.
+    pub rate: f32,
+    /// Share of every weight that is taken away, times the rate.
+    pub decay: f32,
+    /// Longer gradients are scaled to this length.
+    pub longest: f32,
+    /// Share of the mean of the parameters that every step replaces.
+    pub averaged: f32,
+}
+
+/// Everything that learning changes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Memory {
+    pub(crate) parameters: Vec<Parameter>,
+    /// Their mean over the last steps.
+    pub(crate) averages: Vec<Parameter>,
+    /// The last step, or the running mean of the gradients; empty before the first step.
+    first: Vec<Vec<f32>>,
+    /// The running mean of their squares; empty where no step asked for it.
+    second: Vec<Vec<f32>>,
+    /// Steps done.
+    steps: u64,
+}
+
+impl Memory {
+    /// At the beginning.
+    pub(crate) fn new(parameters: Vec<Parameter>) -> Self {
+        let nothing = vec![Vec::new(); parameters.len()];
+        Self {
+            averages: parameters.clone(),
+            first: nothing.clone(),
+            second: nothing,
+            parameters,
+            steps: 0,
+        }
+    }
+
+    /// Begins anew from the averaged parameters.
+    #[must_use]
+    pub(crate) fn restarted(self) -> Self {
+        Self::new(self.averages)
+    }
+
+    /// Changes the parameters; a gradient that is not finite changes nothing.
+    pub(crate) fn change(&mut self, lesson: &Lesson, step: Step) {
+        let all = lesson.gradients.iter().flatten().flatten();
+        let squared: f64 = all.map(|value| f64::from(*value).powi(2)).sum();
+        let length = squared.sqrt() as f32;
+        if !length.is_finite() {
+            return;
+        }
+        let shorten = (step.longest / length).min(1.0);
+        self.steps += 1;
+        for (at, gradient) in lesson.gradients.iter().enumerate() {
+            if let Some(gradient) = gradient {
+                self.change_one(at, (gradient, shorten), step);
+            }
+        }
+        for seen in &lesson.statistics {
+            for (at, seen) in [(seen.at, &seen.mean), (seen.at + 1, &seen.variance)] {
+                let values = self.parameters[at].values.iter_mut();
+                for (value, seen) in values.zip(seen) {
+                    *value += MOMENTUM_OF_STATISTICS * (seen - *value);
+                }
+                self.average(at, step.averaged);
+            }
+        }
+    }
+
+    fn change_one(&mut self, at: usize, (gradient, shorten): (&[f32], f32), step: Step) {
+        let parameter = &mut self.parameters[at];
+        let decay = match parameter.role {
+            Role::Weight => step.decay,
+            Role::Bias | Role::Fixed => 0.0,
+        };
+        self.first[at].resize(gradient.len(), 0.0);
+        let values = parameter.values.iter_mut().zip(&mut self.first[at]);
+        match step.rule {
+            Rule::Momentum(share) => {
+                for ((value, speed), gradient) in values.zip(gradient) {
+                    let gradient = gradient * shorten + decay * *value;
+                    *speed = share * *speed - step.rate * gradient;
+                    *value += *speed;
+                }
+            }
+            Rule::Adam => {
+                self.second[at].resize(gradient.len(), 0.0);
+                let nth = self.steps.min(1_000_000) as i32;
+                let [first, second] = DECAYS.map(|decay| 1.0 - decay.powi(nth));
+                let keep = 1.0 - step.rate * decay;
+                let values = values.zip(&mut self.second[at]);
+                for (((value, mean), square), gradient) in values.zip(gradient) {
+                    let gradient = gradient * shorten;
+                    *mean += (1.0 - DECAYS[0]) * (gradient - *mean);
+                    *square += (1.0 - DECAYS[1]) * (gradient * gradient - *square);
+                    let direction = (*mean / first) / ((*square / second).sqrt() + EPSILON);
+                    *value = *value * keep - step.rate * direction;
+                }
+            }
+        }
+        self.average(at, step.averaged);
+    }
+
+    fn average(&mut self, at: usize, share: f32) {
+        let (averages, values) = (&mut self.averages[at].values, &self.parameters[at].values);
+        if share >= 1.0 {
+            averages.clone_from(values);
+            return;
+        }
+        for (average, value) in averages.iter_mut().zip(values) {
+            *average += share * (value - *average);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn memory() -> Memory {
+        let parameter = |role| Parameter {
+            name: "layer".to_owned(),
+            dims: vec![2],
+            role,
+            values: vec![1.0, -1.0],
+        };
+        Memory::new(vec![parameter(Role::Weight), parameter(Role::Bias)])
+    }
+
+    const STEP: Step = Step {
+        rule: Rule::Momentum(0.5),
+        rate: 0.1,
+        decay: 0.1,
+        longest: 1.0,
+        averaged: 1.0,
+    };
+
+    #[test]
+    fn a_long_gradient_is_shortened_and_only_weights_decay() {
+        let mut memory = memory();
+        let lesson = Lesson {
+            gradients: vec![Some(vec![3.0, 0.0]), Some(vec![0.0, 4.0])],
+            statistics: Vec::new(),
+        };
+        memory.change(&lesson, STEP);
+        let expected = [[1.0 - 0.1 * (0.6 + 0.1), -1.0 + 0.1 * 0.1], [1.0, -1.08]];
+        for (parameter, expected) in memory.parameters.iter().zip(expected) {
+            for (value, expected) in parameter.values.iter().zip(expected) {
+                assert!((value - expected).abs() < 1e-6, "{value}, {expected}");
+            }
+        }
+        assert_eq!(memory.averages, memory.parameters);
+    }
+
+    #[test]
+    fn a_gradient_that_is_not_finite_changes_nothing() {
+        for rule in [Rule::Momentum(0.9), Rule::Adam] {
+            let mut changed = memory();
+            let lesson = Lesson {
+                gradients: vec![Some(vec![f32::NAN, 0.0]), None],
+                statistics: Vec::new(),
+            };
+            changed.change(&lesson, Step { rule, ..STEP });
+            assert_eq!(changed, memory());
+        }
+    }
+}

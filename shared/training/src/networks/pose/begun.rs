@@ -1,0 +1,151 @@
+//! The parameters of a network that was trained before: what a training goes on from.
+
+use inference::onnx::value_of_half;
+use rten_onnx::onnx::{DataType, ModelProto, TensorProto};
+
+use super::network::Shape;
+use super::task::initial;
+use crate::networks::parameters::{GAIN_OF_RELU, Parameter};
+
+/// Why a training cannot go on from a network.
+#[derive(Debug, thiserror::Error)]
+pub enum BeginError {
+    /// The file is no ONNX file.
+    #[error("it is no ONNX file")]
+    Read(#[from] rten_onnx::protobuf::ProtobufError),
+    /// A layer is missing: the network is another kind's, or smaller.
+    #[error("it has no constant {name}; the network of the settings needs it, {expected:?}")]
+    Missing {
+        /// The layer and its role.
+        name: String,
+        /// The dimensions that it should have.
+        expected: Vec<usize>,
+    },
+    /// A layer has another size.
+    #[error("its {name} has the dimensions {got:?}, the network of the settings has {expected:?}")]
+    Size {
+        /// The layer and its role.
+        name: String,
+        /// Its dimensions.
+        got: Vec<i64>,
+        /// Those that it should have.
+        expected: Vec<usize>,
+    },
+    /// A number is not finite, or the bytes of a constant are too few or too many, or of another type.
+    #[error("the numbers of its {name} are not {n} finite ones of half or single precision")]
+    Numbers {
+        /// The layer and its role.
+        name: String,
+        /// How many there should be.
+        n: usize,
+    },
+}
+
+/// The parameters of a network that [`file()`](super::file()) wrote, in the order of [`initial`].
+///
+/// The weights in the file are standardised ones: every channel gets its length as gain, and weights of the length that they have
+/// at the beginning of a training. The network gives what the file gives, but for roundings.
+///
+/// * `shape`: its size. Width and height of the input may be others than those of the file.
+/// * `seed`: of the weights of channels that are 0 in the file.
+///
+/// # Errors
+///
+/// [`BeginError`]
+pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Vec<Parameter>, BeginError> {
+    let graph = ModelProto::parse_buf(file)?.graph.unwrap_or_default();
+    let constants = graph.initializer;
+    let mut all = initial(shape, seed);
+    for at in 0..all.len() {
+        if is_gain(&all[at]) {
+            continue;
+        }
+        let values = numbers(&constants, &all[at])?;
+        let (these, next) = all.split_at_mut(at + 1);
+        let own = &mut these[at].values;
+        match next.first_mut().filter(|next| is_gain(next)) {
+            // The gains of a convolution follow its weights.
+            Some(gains) => split(&values, own, &mut gains.values),
+            None => *own = values,
+        }
+    }
+    Ok(all)
+}
+
+fn is_gain(parameter: &Parameter) -> bool {
+    parameter
+        .name
+        .rsplit_once('.')
+        .is_some_and(|name| name.1 == "gain")
+}
+
+/// Standardised weights as weights and gains.
+fn split(standardised: &[f32], weights: &mut [f32], gains: &mut [f32]) {
+    let n_inputs = standardised.len() / gains.len();
+    let channels = standardised.chunks_exact(n_inputs);
+    let begun = weights.chunks_exact_mut(n_inputs);
+    for ((channel, weights), gain) in channels.zip(begun).zip(gains) {
+        let length = length(channel);
+        *gain = length / GAIN_OF_RELU;
+        if length > 0.0 {
+            let factor = core::f32::consts::SQRT_2 / length;
+            for (weight, value) in weights.iter_mut().zip(channel) {
+                *weight = value * factor;
+            }
+        }
+    }
+}
+
+fn length(of: &[f32]) -> f32 {
+    of.iter().map(|value| value * value).sum::<f32>().sqrt()
+}
+
+/// The numbers of a parameter in the file.
+fn numbers(constants: &[TensorProto], of: &Parameter) -> Result<Vec<f32>, BeginError> {
+    let Parameter { name, dims, .. } = of;
+    let half = format!("{name}.half");
+    let named = |tensor: &&TensorProto| {
+        tensor
+            .name
+            .as_ref()
+            .is_some_and(|own| *own == *name || *own == half)
+    };
+    let constant = constants
+        .iter()
+        .find(named)
+        .ok_or_else(|| BeginError::Missing {
+            name: name.clone(),
+            expected: dims.clone(),
+        })?;
+    let fits = |(got, expected): (&i64, &usize)| usize::try_from(*got) == Ok(*expected);
+    if constant.dims.len() != dims.len() || !constant.dims.iter().zip(dims).all(fits) {
+        return Err(BeginError::Size {
+            name: name.clone(),
+            got: constant.dims.clone(),
+            expected: dims.clone(),
+        });
+    }
+    let bytes = constant.raw_data.as_ref().map(|bytes| bytes.borrow());
+    let bytes = bytes.as_deref().map_or(&[][..], Vec::as_slice);
+    let values: Vec<f32> = match constant.data_type {
+        Some(DataType::FLOAT16) => {
+            let (each, _) = bytes.as_chunks::<2>();
+            each.iter()
+                .map(|half| value_of_half(u16::from_le_bytes(*half)))
+                .collect()
+        }
+        Some(DataType::FLOAT) => {
+            let (each, _) = bytes.as_chunks::<4>();
+            each.iter()
+                .map(|value| f32::from_le_bytes(*value))
+                .collect()
+        }
+        _ => Vec::new(),
+    };
+    let n = of.values.len();
+    if values.len() != n || !values.iter().all(|value| value.is_finite()) {
+        let name = name.clone();
+        return Err(BeginError::Numbers { name, n });
+    }
+    Ok(values)
+}

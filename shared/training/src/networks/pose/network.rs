@@ -1,0 +1,222 @@
+//! The network that finds joints.
+//!
+//! One picture of a person goes in; three things come out: a map of log-odds for every joint, the evidence for the
+//! direction in which the trunk faces, and the expected error of every joint.
+//!
+//! Convolutions are followed by no normalisation over the batch. Their weights are standardised instead (Brock et al. 2021,
+//! "Characterizing signal propagation to close the performance gap in unnormalized `ResNets`"), and every residual block begins
+//! as the identity.
+
+use skeleton::PARSE14;
+
+use crate::networks::ops::{Conv, Dims, Network, Ops, Output, Scaling};
+
+/// Joints that have a map: those of [`PARSE14`], in its order.
+pub const N_JOINTS: usize = PARSE14.joints.len();
+
+/// Pixels of the input for a cell of the maps.
+pub const STRIDE: usize = 4;
+
+/// What sides of the input must be multiples of.
+pub(crate) const MULTIPLE: usize = 32;
+
+/// How much the logits of a map are sharpened where features are looked up at its maximum.
+const SHARPNESS: f32 = 2.0;
+/// How much they are sharpened where lower maxima should count, too.
+const WIDE: f32 = 1.0;
+
+/// The sizes of the network.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Shape {
+    /// Width of the input, pixels: a multiple of 32.
+    pub width: usize,
+    /// Its height.
+    pub height: usize,
+    /// Channels of the first layer.
+    pub stem: usize,
+    /// Channels at strides 4, 8, 16 and 32.
+    pub channels: [usize; 4],
+    /// Residual blocks at these strides.
+    pub blocks: [usize; 4],
+    /// Values of the hidden layers of the direction and of the expected error.
+    pub hidden: usize,
+}
+
+impl Default for Shape {
+    fn default() -> Self {
+        Self {
+            width: 128,
+            height: 160,
+            stem: 32,
+            channels: [64, 128, 192, 256],
+            blocks: [2, 3, 6, 4],
+            hidden: 96,
+        }
+    }
+}
+
+impl Shape {
+    /// The same network for a smaller input, by 32 pixels across and down where that leaves anything.
+    #[must_use]
+    pub fn smaller(&self) -> Self {
+        let less = |side: usize| side.saturating_sub(MULTIPLE).max(MULTIPLE);
+        Self {
+            width: less(self.width),
+            height: less(self.height),
+            ..self.clone()
+        }
+    }
+
+    /// Columns and rows of the maps.
+    pub fn cells(&self) -> [usize; 2] {
+        [self.width / STRIDE, self.height / STRIDE]
+    }
+}
+
+/// Name of the input, `[n, 3, height, width]`.
+pub const PICTURE: &str = "picture";
+/// Name of the output with the log-odds of every joint in every cell, `[n, joints, rows, columns]`.
+pub const MAPS: &str = "maps";
+/// Name of the output with the evidence for the direction of the trunk, `[n, 2]`: towards the right of the picture and towards
+/// the camera.
+///
+/// Twice its scalar product with a direction is the log-likelihood ratio of facing there over facing away from there.
+pub const FRONT: &str = "front";
+/// Name of the output with the expected errors of the joints in heights of the input, `[n, joints]`.
+pub const ERROR: &str = "error";
+
+impl Network for Shape {
+    fn inputs(&self) -> Vec<(&'static str, Dims)> {
+        vec![(PICTURE, vec![3, self.height, self.width])]
+    }
+
+    fn outputs(&self) -> Vec<Output> {
+        let output = |name, is_logarithm| Output { name, is_logarithm };
+        vec![
+            output(MAPS, false),
+            output(FRONT, false),
+            output(ERROR, true),
+        ]
+    }
+
+    fn run<O: Ops>(&self, ops: &mut O) -> Vec<O::Value> {
+        run(ops, self)
+    }
+}
+
+/// Runs the network: maps, evidence for the direction, logarithms of expected errors.
+fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
+    let picture = ops.input(PICTURE);
+    let stem = ops.conv(&picture, "stem1", plain(shape.stem, 3, 2));
+    let stem = ops.relu(&stem);
+    let mut at = ops.conv(&stem, "stem2", plain(shape.channels[0], 3, 2));
+    let mut levels = Vec::new();
+    for (level, (&channels, &blocks)) in shape.channels.iter().zip(&shape.blocks).enumerate() {
+        if level > 0 {
+            let active = ops.relu(&at);
+            at = ops.conv(&active, &format!("down{level}"), plain(channels, 3, 2));
+        }
+        for nth in 0..blocks {
+            at = block(
+                ops,
+                &at,
+                &format!("level{level}.{nth}"),
+                [channels, channels / 2],
+            );
+        }
+        levels.push(at.clone());
+    }
+    let deepest = ops.relu(&at);
+    for level in (0..shape.channels.len() - 1).rev() {
+        let channels = shape.channels[level];
+        let active = ops.relu(&at);
+        let narrowed = ops.conv(&active, &format!("up{level}"), plain(channels, 1, 1));
+        let enlarged = ops.doubled(&narrowed);
+        at = ops.add(&levels[level], &enlarged);
+        let hidden = if level == 0 { channels } else { channels / 2 };
+        for nth in 0..if level == 0 { 2 } else { 1 } {
+            at = block(
+                ops,
+                &at,
+                &format!("refine{level}.{nth}"),
+                [channels, hidden],
+            );
+        }
+    }
+    let features = ops.relu(&at);
+    let head = with_gain(0.1, plain(N_JOINTS, 1, 1));
+    let maps = ops.conv(&features, "maps", head);
+    let places = ops.fixed(&maps);
+    let overall = ops.mean(&deepest);
+    let front = front(ops, shape, [&features, &places, &overall]);
+    let error = error(ops, shape, [&features, &places, &overall]);
+    vec![maps, front, error]
+}
+
+fn plain(channels: usize, kernel: usize, stride: usize) -> Conv {
+    Conv {
+        channels,
+        kernel,
+        stride,
+        by_channel: false,
+        scaling: Scaling::Standardised { gain: 1.0 },
+    }
+}
+
+fn with_gain(gain: f32, conv: Conv) -> Conv {
+    Conv {
+        scaling: Scaling::Standardised { gain },
+        ..conv
+    }
+}
+
+/// A residual block: narrowed, convolved, widened, added.
+fn block<O: Ops>(
+    ops: &mut O,
+    at: &O::Value,
+    name: &str,
+    [channels, hidden]: [usize; 2],
+) -> O::Value {
+    let x = ops.relu(at);
+    let x = ops.conv(&x, &format!("{name}.narrow"), plain(hidden, 1, 1));
+    let x = ops.relu(&x);
+    let x = ops.conv(&x, &format!("{name}.inner"), plain(hidden, 3, 1));
+    let x = ops.relu(&x);
+    let widen = with_gain(0.0, plain(channels, 1, 1));
+    let x = ops.conv(&x, &format!("{name}.widen"), widen);
+    ops.add(at, &x)
+}
+
+/// By the features at the joints and the deepest features of the whole picture.
+fn front<O: Ops>(
+    ops: &mut O,
+    shape: &Shape,
+    [features, places, overall]: [&O::Value; 3],
+) -> O::Value {
+    let weights = ops.softmax(places, SHARPNESS);
+    let seen = ops.look(features, &weights);
+    let all = ops.join(&[&seen, overall]);
+    let hidden = ops.dense(&all, "front1", shape.hidden);
+    let hidden = ops.relu(&hidden);
+    ops.dense(&hidden, "front2", 2)
+}
+
+/// The same, from which the features learn nothing, and how high the maps are, where, and how far their heat is spread.
+fn error<O: Ops>(
+    ops: &mut O,
+    shape: &Shape,
+    [features, places, overall]: [&O::Value; 3],
+) -> O::Value {
+    let features = ops.fixed(features);
+    let overall = ops.fixed(overall);
+    let [near, wide] = [SHARPNESS, WIDE].map(|sharpness| ops.softmax(places, sharpness));
+    let seen = ops.look(&features, &near);
+    let heights = ops.highest(places);
+    let near = ops.place(&near);
+    let wide = ops.place(&wide);
+    let all = ops.join(&[&seen, &heights, &near, &wide, &overall]);
+    let hidden = ops.dense(&all, "error1", shape.hidden);
+    let hidden = ops.relu(&hidden);
+    ops.dense(&hidden, "error2", N_JOINTS)
+}

@@ -1,0 +1,427 @@
+//! The training of the network that finds joints: steps of Adam with growing pictures, then some for the expected error alone.
+
+use rayon::prelude::*;
+
+use super::cost::{Cost, Truth};
+use super::network::{N_JOINTS, Shape};
+use super::peak;
+use super::person::Person;
+use super::score::{Judged, Score};
+use super::settings::Settings;
+use super::vary::{NetworkSample, plain, varied};
+use crate::networks::lesson::Shown;
+use crate::networks::onnx::{self, Document};
+use crate::networks::optimiser::{Rule, Step};
+use crate::networks::order;
+use crate::networks::parameters::{self, Parameter};
+use crate::networks::settings::Precision;
+use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
+
+/// People in a row that belong together.
+const RUN: usize = 16;
+/// People that are judged at once.
+const JUDGED_AT_ONCE: usize = 32;
+/// Share of the steps in which their length rises.
+const RISING: f32 = 0.1;
+/// Length of the steps that learn the expected error alone.
+const ERROR_RATE: f32 = 3e-4;
+/// Steps of a pass.
+const STEPS: usize = 100;
+/// Passes between two looks at the people who are kept apart.
+const JUDGED: usize = 10;
+/// The log-odds of an untrained map.
+const MAP_BIAS: f32 = -4.0;
+/// The logarithm of the expected error before training: a tenth of the input's height.
+const ERROR_BIAS: f32 = -2.3;
+
+/// The parameters of an untrained network; the last dense layers give what is likely for everybody.
+pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
+    let mut all = parameters::initial(shape, seed);
+    for parameter in &mut all {
+        match parameter.name.as_str() {
+            "maps.bias" => parameter.values.fill(MAP_BIAS),
+            "error2.bias" => parameter.values.fill(ERROR_BIAS),
+            "error2.weight" | "front2.weight" => parameter.values.fill(0.0),
+            _ => (),
+        }
+    }
+    all
+}
+
+/// Writes a network as an ONNX file, with weights in half precision.
+///
+/// * `parameters`: in the order of [`initial`].
+/// * `metadata`: keys and values that the file carries.
+///
+/// # Panics
+///
+/// If the parameters are another network's.
+pub fn file(shape: &Shape, parameters: &[Parameter], metadata: &[(String, String)]) -> Vec<u8> {
+    let document = Document {
+        name: "pose".to_owned(),
+        metadata: metadata.to_vec(),
+        has_half_weights: true,
+    };
+    onnx::write(shape, parameters, document)
+}
+
+/// What the network finds in pictures.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Found {
+    /// Log-odds: `[n, joints, rows, columns]`.
+    pub maps: Vec<f32>,
+    /// `[n, 2]`
+    pub fronts: Vec<f32>,
+    /// Natural logarithms of expected errors, heights of the input: `[n, joints]`.
+    pub errors: Vec<f32>,
+}
+
+impl Found {
+    fn new(outputs: Vec<Vec<f32>>) -> Self {
+        let mut outputs = outputs.into_iter();
+        let mut next = || outputs.next().unwrap_or_default();
+        Self {
+            maps: next(),
+            fronts: next(),
+            errors: next(),
+        }
+    }
+}
+
+/// People who are kept apart: the expected error is learned on some of them and judged on the others, with everything else.
+#[derive(Debug)]
+struct KeptApart<'a> {
+    calibrating: Vec<&'a Person>,
+    judged: Vec<&'a Person>,
+}
+
+impl<'a> KeptApart<'a> {
+    /// In turn [`RUN`] for the one and for the other: neighbours in a list can be pictures of one person. All for both where
+    /// they are too few.
+    fn new(people: &'a [Person]) -> Self {
+        let (calibrating, judged): (Vec<_>, Vec<_>) = people
+            .iter()
+            .enumerate()
+            .partition(|(at, _)| (at / RUN).is_multiple_of(2));
+        let people_of = |numbered: Vec<(usize, &'a Person)>| -> Vec<&'a Person> {
+            numbered.into_iter().map(|(_, person)| person).collect()
+        };
+        if judged.len() < RUN {
+            let all: Vec<&Person> = people.iter().collect();
+            return Self {
+                calibrating: all.clone(),
+                judged: all,
+            };
+        }
+        Self {
+            calibrating: people_of(calibrating),
+            judged: people_of(judged),
+        }
+    }
+}
+
+/// There is nobody to learn from, or nobody is kept apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{learnt} people to learn from and {kept} kept apart are too few")]
+pub struct TooFew {
+    /// To learn from.
+    pub learnt: usize,
+    /// Kept apart.
+    pub kept: usize,
+}
+
+/// The training of the network that finds joints.
+#[derive(Debug)]
+pub struct PoseTask<'a> {
+    settings: &'a Settings,
+    learnt: Vec<&'a Person>,
+    kept: KeptApart<'a>,
+    from: Option<Vec<Parameter>>,
+    stamp: u64,
+}
+
+impl<'a> PoseTask<'a> {
+    /// Prepares a training.
+    ///
+    /// * `learnt`, `kept`: people to learn from, and others, on whom it is judged and on whom the expected error is learned.
+    /// * `from`: the parameters of [`begun`](super::begun) to begin with, in place of random ones.
+    ///
+    /// # Errors
+    ///
+    /// [`TooFew`]
+    pub fn new(
+        settings: &'a Settings,
+        [learnt, kept]: [&'a [Person]; 2],
+        from: Option<Vec<Parameter>>,
+    ) -> Result<Self, TooFew> {
+        if learnt.is_empty() || kept.is_empty() {
+            let [learnt, kept] = [learnt.len(), kept.len()];
+            return Err(TooFew { learnt, kept });
+        }
+        Ok(Self {
+            settings,
+            stamp: stamp(settings, [learnt, kept], from.as_deref()),
+            learnt: learnt.iter().collect(),
+            kept: KeptApart::new(kept),
+            from,
+        })
+    }
+
+    /// The network with the size of the input at a step.
+    fn shape_at(&self, nth: usize) -> Shape {
+        let settings = self.settings;
+        if (nth as f32) < settings.small * settings.steps as f32 {
+            settings.shape.smaller()
+        } else {
+            settings.shape.clone()
+        }
+    }
+
+    /// Whether a step learns the expected error alone.
+    fn is_for_error(&self, nth: usize) -> bool {
+        nth >= self.settings.steps
+    }
+
+    /// The sample of a number.
+    fn sample(&self, people: &[&Person], at: usize, shape: &Shape) -> Option<NetworkSample> {
+        let (settings, seed) = (self.settings, self.settings.seed);
+        let person = people[order::shown(at, people.len(), seed)];
+        let mut dice = order::dice(at, seed);
+        let other = people[dice.usize(0..people.len())];
+        varied(person, other, (shape, &settings.vary), &mut dice)
+    }
+
+    /// The length of a step rises, then falls to 0 as a cosine.
+    fn rate(&self, nth: usize) -> f32 {
+        if self.is_for_error(nth) {
+            return ERROR_RATE;
+        }
+        let settings = self.settings;
+        let done = (nth as f32 + 0.5) / settings.steps as f32;
+        if done < RISING {
+            return settings.rate * done / RISING;
+        }
+        let falling = (done - RISING) / (1.0 - RISING);
+        settings.rate * 0.5 * (1.0 + (core::f32::consts::PI * falling).cos())
+    }
+}
+
+impl Task for PoseTask<'_> {
+    type Network = Shape;
+    type Truth = Truth;
+    type Cost = Cost;
+    type Score = Score;
+
+    const LEARNED_FROM: &'static str = "people";
+
+    fn stamp(&self) -> u64 {
+        self.stamp
+    }
+
+    fn network(&self) -> Shape {
+        self.settings.shape.clone()
+    }
+
+    fn precision(&self) -> Precision {
+        self.settings.precision
+    }
+
+    fn begin(&self) -> Vec<Parameter> {
+        let begin = || initial(&self.settings.shape, self.settings.seed);
+        self.from.clone().unwrap_or_else(begin)
+    }
+
+    fn seed(&self) -> u64 {
+        self.settings.seed
+    }
+
+    fn n_steps(&self) -> usize {
+        self.settings.steps + self.settings.error_steps
+    }
+
+    /// What learns everything and what learns the expected error alone have passes of their own, both judged at the end.
+    fn plan(&self, steps: usize, passes: usize) -> Plan {
+        let end = if self.is_for_error(steps) {
+            self.n_steps()
+        } else {
+            self.settings.steps
+        };
+        let left = end.saturating_sub(steps);
+        Plan {
+            steps: left.min(STEPS),
+            is_judged: left <= STEPS || (passes + 1).is_multiple_of(JUDGED),
+        }
+    }
+
+    fn restarts(&self, nth: usize) -> bool {
+        nth == self.settings.steps
+    }
+
+    fn learned(&self, nth: usize, parameters: &[Parameter]) -> Vec<bool> {
+        let is_learned =
+            |parameter: &Parameter| !self.is_for_error(nth) || parameter.name.starts_with("error");
+        parameters.iter().map(is_learned).collect()
+    }
+
+    fn step(&self, nth: usize) -> Step {
+        let settings = self.settings;
+        Step {
+            rule: Rule::Adam,
+            rate: self.rate(nth),
+            decay: settings.decay,
+            longest: settings.longest,
+            // At the beginning a mean over few steps.
+            averaged: settings.averaged.max(1.0 / (nth as f32 + 2.0)),
+        }
+    }
+
+    fn batch(&self, nth: usize) -> Batch<Shape, Truth> {
+        let people = if self.is_for_error(nth) {
+            &self.kept.calibrating
+        } else {
+            &self.learnt
+        };
+        let n = self.settings.batch;
+        let network = self.shape_at(nth);
+        let seen: Vec<NetworkSample> = (0..n)
+            .into_par_iter()
+            .filter_map(|at| self.sample(people, nth * n + at, &network))
+            .collect();
+        Batch {
+            shown: shown(&seen),
+            truth: truth(&seen, &network),
+            network,
+        }
+    }
+
+    fn cost(&self, nth: usize, truth: &Truth, outputs: &[Vec<f32>]) -> Costed<Cost> {
+        let [maps, front, error] = outputs else {
+            return Costed {
+                cost: Cost::default(),
+                gradients: Vec::new(),
+            };
+        };
+        let of_error = truth.of_error(error, maps);
+        let of_maps = truth.of_maps(maps);
+        let of_front = truth.of_front(front);
+        let cost = Cost {
+            maps: of_maps.cost,
+            front: of_front.cost,
+            error: of_error.cost,
+        };
+        let settings = self.settings;
+        let scaled = |gradient: Vec<f32>, factor: f32| -> Vec<f32> {
+            gradient.into_iter().map(|value| value * factor).collect()
+        };
+        let everything = f32::from(u8::from(!self.is_for_error(nth)));
+        let gradients = vec![
+            scaled(of_maps.gradient, everything),
+            scaled(of_front.gradient, everything * settings.front),
+            scaled(of_error.gradient, settings.error),
+        ];
+        Costed { cost, gradients }
+    }
+
+    fn mean(&self, costs: &[(usize, Cost)]) -> Cost {
+        let n = costs.len().max(1) as f32;
+        let mean =
+            |part: &dyn Fn(&Cost) -> f32| costs.iter().map(|(_, cost)| part(cost)).sum::<f32>() / n;
+        Cost {
+            maps: mean(&|cost| cost.maps),
+            front: mean(&|cost| cost.front),
+            error: mean(&|cost| cost.error),
+        }
+    }
+
+    fn score(&self, find: &dyn Fn(&Shown) -> Vec<Vec<f32>>) -> Score {
+        score(find, &self.settings.shape, &self.kept.judged)
+    }
+}
+
+impl Trainer<PoseTask<'_>> {
+    /// How good the trained network is on people.
+    pub fn judge(&self, people: &[Person]) -> Score {
+        let people: Vec<&Person> = people.iter().collect();
+        score(
+            &|shown| self.find(shown),
+            &self.task().settings.shape,
+            &people,
+        )
+    }
+
+    /// What the trained network finds in pictures, `[n, 3, height, width]`.
+    pub fn find_in(&self, n: usize, pictures: &[f32]) -> Found {
+        let inputs = vec![pictures.to_vec()];
+        Found::new(self.find(&Shown { n, inputs }))
+    }
+
+    /// The trained network as an ONNX file.
+    ///
+    /// * `metadata`: keys and values that the file carries.
+    pub fn onnx(&self, metadata: &[(String, String)]) -> Vec<u8> {
+        file(&self.task().settings.shape, self.trained(), metadata)
+    }
+}
+
+fn shown(seen: &[NetworkSample]) -> Shown {
+    let pictures = seen.iter().flat_map(|sample| &sample.picture);
+    Shown {
+        n: seen.len(),
+        inputs: vec![pictures.copied().collect()],
+    }
+}
+
+fn truth(seen: &[NetworkSample], shape: &Shape) -> Truth {
+    let maps = seen.iter().flat_map(|sample| &sample.maps);
+    let places = seen.iter().flat_map(|sample| sample.places);
+    Truth {
+        cells: Truth::cells([shape.width, shape.height]),
+        maps: maps.copied().collect(),
+        weights: seen.iter().flat_map(|sample| sample.weights).collect(),
+        fronts: seen.iter().flat_map(|sample| sample.front).collect(),
+        places: places.flatten().collect(),
+    }
+}
+
+fn score(find: &dyn Fn(&Shown) -> Vec<Vec<f32>>, shape: &Shape, people: &[&Person]) -> Score {
+    let judged = people.chunks(JUDGED_AT_ONCE).flat_map(|people| {
+        let seen: Vec<NetworkSample> = people
+            .par_iter()
+            .filter_map(|person| plain(person, shape))
+            .collect();
+        let found = Found::new(find(&shown(&seen)));
+        let each = seen.iter().enumerate();
+        let each = each.map(|(at, seen)| judged(&found, seen, (at, shape.cells())));
+        each.collect::<Vec<Judged>>()
+    });
+    Score::new(&judged.collect::<Vec<Judged>>())
+}
+
+fn judged(found: &Found, seen: &NetworkSample, (at, cells): (usize, [usize; 2])) -> Judged {
+    let [columns, rows] = cells;
+    let size = columns * rows;
+    let map = |joint: usize| {
+        let from = (at * N_JOINTS + joint) * size;
+        &found.maps[from..from + size]
+    };
+    Judged {
+        found: core::array::from_fn(|joint| peak(map(joint), columns)),
+        expected: core::array::from_fn(|joint| found.errors[at * N_JOINTS + joint]),
+        front: core::array::from_fn(|axis| found.fronts[at * 2 + axis]),
+        truth: seen.places,
+        facing: seen.front,
+    }
+}
+
+/// A hash of everything that the result depends on.
+fn stamp(settings: &Settings, people: [&[Person]; 2], from: Option<&[Parameter]>) -> u64 {
+    let mut bytes = format!("{settings:?}").into_bytes();
+    for person in people.into_iter().flatten() {
+        bytes.extend(formats::checksum::fnv1a(&person.rgb).to_le_bytes());
+        bytes.extend(format!("{:?}{:?}", person.targets, person.front).into_bytes());
+    }
+    for value in from.into_iter().flatten().flat_map(|list| &list.values) {
+        bytes.extend(value.to_bits().to_le_bytes());
+    }
+    formats::checksum::fnv1a(&bytes)
+}

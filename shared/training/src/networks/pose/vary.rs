@@ -1,0 +1,392 @@
+//! What the network is shown of a person, and what it should find.
+
+use fastrand::Rng;
+
+use super::network::{N_JOINTS, STRIDE, Shape};
+use super::person::{Person, SIDE, Target};
+use super::settings::Vary;
+use super::{MIRROR, exchange_sides};
+use crate::networks::parameters::normal;
+
+/// The box around the joints is enlarged by it: what [`Shape`]'s card says to the program that uses the network.
+pub const MARGIN: f32 = 1.25;
+/// By how much hands, feet and hair reach beyond the joints: share of the longer side, on each side.
+const BEYOND: f32 = 0.05;
+/// Where there is no picture.
+pub const FILL: f32 = 110.0;
+/// What is subtracted from a colour, and what it is divided by then.
+pub const MEAN: f32 = 110.0;
+/// See [`MEAN`].
+pub const DEVIATION: f32 = 60.0;
+/// Longest shift that is made, deviations.
+const MOST: f32 = 2.5;
+
+/// What the network is shown, and what it should find.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NetworkSample {
+    /// `[3, height, width]`
+    pub picture: Vec<f32>,
+    /// Heat of every joint, 0 to 1: `[joints, rows, columns]`.
+    pub maps: Vec<f32>,
+    /// How much the map of every joint counts.
+    pub weights: [f32; N_JOINTS],
+    /// Direction of the trunk, towards the right of the picture and towards the camera; its length is its certainty.
+    pub front: [f32; 2],
+    /// Where the joints are, cells; NaN where that is not certain.
+    pub places: [[f32; 2]; N_JOINTS],
+}
+
+/// How a picture becomes the input: turned, moved, scaled, mirrored.
+#[derive(Debug, Clone, Copy)]
+struct View {
+    /// Cosine and sine of the angle by which the picture is turned.
+    turn: [f32; 2],
+    /// Middle of the window in the turned picture, whose origin is the middle of the picture, pixels.
+    centre: [f32; 2],
+    /// Pixels of the picture for a pixel of the input.
+    step: f32,
+    size: [usize; 2],
+    is_mirrored: bool,
+}
+
+impl View {
+    fn turned(&self, at: [f32; 2]) -> [f32; 2] {
+        turned(at, self.turn)
+    }
+
+    /// The point of the input at a point of the picture.
+    fn in_input(&self, at: [f32; 2]) -> [f32; 2] {
+        let at = self.turned(at);
+        let [x, y] = [0, 1]
+            .map(|axis| (at[axis] - self.centre[axis]) / self.step + 0.5 * self.size[axis] as f32);
+        if self.is_mirrored {
+            [(self.size[0] - 1) as f32 - x, y]
+        } else {
+            [x, y]
+        }
+    }
+
+    /// The point of the picture at a point of the input.
+    fn in_picture(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        let x = if self.is_mirrored {
+            (self.size[0] - 1) as f32 - x
+        } else {
+            x
+        };
+        let at = [x, y];
+        let [x, y] = [0, 1]
+            .map(|axis| self.centre[axis] + (at[axis] - 0.5 * self.size[axis] as f32) * self.step);
+        let [cosine, sine] = self.turn;
+        let middle = middle();
+        [
+            cosine * x + sine * y + middle,
+            -sine * x + cosine * y + middle,
+        ]
+    }
+}
+
+fn middle() -> f32 {
+    0.5 * (SIDE - 1) as f32
+}
+
+/// A point of the picture after the picture was turned about its middle, which becomes the origin.
+fn turned(at: [f32; 2], [cosine, sine]: [f32; 2]) -> [f32; 2] {
+    let [x, y] = at.map(|side| side - middle());
+    [cosine * x - sine * y, sine * x + cosine * y]
+}
+
+/// A person as the network sees one in use: in the box around the joints, upright or not.
+pub fn plain(person: &Person, shape: &Shape) -> Option<NetworkSample> {
+    let view = view(person, shape, [1.0, 0.0], (1.0, [0.0; 2], false))?;
+    Some(sample(person, shape, &view, &pixels(person, &view)))
+}
+
+/// A person, varied at random.
+///
+/// * `other`: somebody else, parts of whom may cover this one.
+pub fn varied(
+    person: &Person,
+    other: &Person,
+    (shape, vary): (&Shape, &Vary),
+    rng: &mut Rng,
+) -> Option<NetworkSample> {
+    let lean = lean(person);
+    let degrees = if rng.f32() < vary.upright {
+        vary.turn_upright * normal(rng) - lean.to_degrees()
+    } else {
+        vary.turn * normal(rng)
+    };
+    let angle = degrees.to_radians();
+    let scale = (vary.scale * normal(rng).clamp(-MOST, MOST)).exp();
+    let shift = [0; 2].map(|_| vary.shift * normal(rng).clamp(-MOST, MOST));
+    let is_mirrored = rng.bool();
+    let view = view(
+        person,
+        shape,
+        [angle.cos(), angle.sin()],
+        (scale, shift, is_mirrored),
+    )?;
+    let mut rgb = pixels(person, &view);
+    if rng.f32() < vary.covered {
+        cover(&mut rgb, other, view.size, rng);
+    }
+    if rng.f32() < vary.coarse {
+        coarsen(&mut rgb, view.size, rng.usize(2..=3));
+    }
+    recolour(&mut rgb, vary, rng);
+    Some(sample(person, shape, &view, &rgb))
+}
+
+/// The angle between the trunk and upright, clockwise in the picture, radians; 0 where the trunk is not known.
+fn lean(person: &Person) -> f32 {
+    let [x, y] = person.trunk();
+    let angle = x.atan2(-y);
+    if angle.is_finite() { angle } else { 0.0 }
+}
+
+/// The window around the joints; nothing if they have no extent.
+fn view(
+    person: &Person,
+    shape: &Shape,
+    turn: [f32; 2],
+    (scale, shift, is_mirrored): (f32, [f32; 2], bool),
+) -> Option<View> {
+    let mut low = [f32::INFINITY; 2];
+    let mut high = [f32::NEG_INFINITY; 2];
+    for at in person.places() {
+        let at = turned(at, turn);
+        for axis in 0..2 {
+            low[axis] = low[axis].min(at[axis]);
+            high[axis] = high[axis].max(at[axis]);
+        }
+    }
+    let longer = (high[0] - low[0]).max(high[1] - low[1]);
+    if !(longer.is_finite() && longer > 8.0) {
+        return None;
+    }
+    let size = [shape.width, shape.height];
+    let sides = [0, 1].map(|axis| (high[axis] - low[axis] + 2.0 * BEYOND * longer) * MARGIN);
+    let steps = [0, 1].map(|axis| sides[axis] / size[axis] as f32);
+    let step = steps[0].max(steps[1]) * scale;
+    let height = step * size[1] as f32;
+    let centre = [0, 1].map(|axis| f32::midpoint(low[axis], high[axis]) + shift[axis] * height);
+    Some(View {
+        turn,
+        centre,
+        step,
+        size,
+        is_mirrored,
+    })
+}
+
+/// The window, bilinear: `[height][width]`, red first, 0 to 255.
+fn pixels(person: &Person, view: &View) -> Vec<[f32; 3]> {
+    let [width, height] = view.size;
+    let mut all = Vec::with_capacity(width * height);
+    for row in 0..height {
+        for column in 0..width {
+            let at = view.in_picture([column as f32, row as f32]);
+            all.push(colour(&person.rgb, at));
+        }
+    }
+    all
+}
+
+/// The colour between four pixels.
+fn colour(rgb: &[u8], [x, y]: [f32; 2]) -> [f32; 3] {
+    let (left, top) = (x.floor(), y.floor());
+    let [right, below] = [x - left, y - top];
+    let mut sum = [0.0; 3];
+    for (dy, of_row) in [(0, 1.0 - below), (1, below)] {
+        for (dx, of_column) in [(0, 1.0 - right), (1, right)] {
+            let [column, row] = [left as i32 + dx, top as i32 + dy];
+            let weight = of_row * of_column;
+            let side = 0..SIDE as i32;
+            let is_inside = side.contains(&column) && side.contains(&row);
+            let at = 3 * (row.max(0) as usize * SIDE + column.max(0) as usize);
+            for (channel, sum) in sum.iter_mut().enumerate() {
+                let value = if is_inside {
+                    f32::from(rgb[at + channel])
+                } else {
+                    FILL
+                };
+                *sum += weight * value;
+            }
+        }
+    }
+    sum
+}
+
+/// Covers a rectangle with one colour, or with a part of somebody else.
+fn cover(rgb: &mut [[f32; 3]], other: &Person, [width, height]: [usize; 2], rng: &mut Rng) {
+    let sides = [
+        rng.usize(width / 8..=width / 3),
+        rng.usize(height / 8..=height / 3),
+    ];
+    let corner = [
+        rng.usize(0..width - sides[0]),
+        rng.usize(0..height - sides[1]),
+    ];
+    let one_colour: [f32; 3] = [0; 3].map(|_| rng.f32() * 255.0);
+    let is_other = rng.bool();
+    let from = [0; 2].map(|_| rng.usize(SIDE / 4..SIDE / 2) as f32);
+    for row in 0..sides[1] {
+        for column in 0..sides[0] {
+            let at = (corner[1] + row) * width + corner[0] + column;
+            rgb[at] = if is_other {
+                colour(&other.rgb, [from[0] + column as f32, from[1] + row as f32])
+            } else {
+                one_colour
+            };
+        }
+    }
+}
+
+/// Lowers the resolution: means of squares of pixels, enlarged again between their centres.
+fn coarsen(rgb: &mut [[f32; 3]], [width, height]: [usize; 2], factor: usize) {
+    let [columns, rows] = [width / factor, height / factor];
+    let mut small = vec![[0.0f32; 3]; columns * rows];
+    let share = 1.0 / (factor * factor) as f32;
+    for row in 0..rows * factor {
+        for column in 0..columns * factor {
+            let to = &mut small[row / factor * columns + column / factor];
+            for (to, from) in to.iter_mut().zip(rgb[row * width + column]) {
+                *to += share * from;
+            }
+        }
+    }
+    let place = |at: usize, n: usize| {
+        let at = ((at as f32 + 0.5) / factor as f32 - 0.5).clamp(0.0, (n - 1) as f32);
+        let first = (at as usize).min(n.saturating_sub(2));
+        (first, at - first as f32, (first + 1).min(n - 1))
+    };
+    for row in 0..height {
+        let (top, below, bottom) = place(row, rows);
+        for column in 0..width {
+            let (left, beyond, right) = place(column, columns);
+            let at = |row: usize, column: usize| small[row * columns + column];
+            let to = &mut rgb[row * width + column];
+            for (channel, to) in to.iter_mut().enumerate() {
+                let between = |row: usize| {
+                    let [a, b] = [at(row, left)[channel], at(row, right)[channel]];
+                    a + beyond * (b - a)
+                };
+                let [a, b] = [between(top), between(bottom)];
+                *to = a + below * (b - a);
+            }
+        }
+    }
+}
+
+/// Changes contrast, brightness and colours, adds noise.
+fn recolour(rgb: &mut [[f32; 3]], vary: &Vary, rng: &mut Rng) {
+    let contrast = (0.2 * normal(rng)).exp();
+    let brightness = 15.0 * normal(rng);
+    let tint: [f32; 3] = [0; 3].map(|_| 8.0 * normal(rng));
+    let is_grey = rng.f32() < vary.grey;
+    let noise = if rng.f32() < 0.3 {
+        10.0 * rng.f32()
+    } else {
+        0.0
+    };
+    for colour in rgb {
+        if is_grey {
+            *colour = [colour.iter().sum::<f32>() / 3.0; 3];
+        }
+        for (value, tint) in colour.iter_mut().zip(tint) {
+            // Uniform noise of the deviation asked for.
+            let noise = noise * 3.46 * (rng.f32() - 0.5);
+            let changed = (*value - MEAN) * contrast + MEAN + brightness + tint + noise;
+            *value = changed.clamp(0.0, 255.0);
+        }
+    }
+}
+
+fn sample(person: &Person, shape: &Shape, view: &View, rgb: &[[f32; 3]]) -> NetworkSample {
+    let picture = (0..3).flat_map(|channel| {
+        rgb.iter()
+            .map(move |pixel| (pixel[channel] - MEAN) / DEVIATION)
+    });
+    let picture = picture.collect();
+    let targets = if view.is_mirrored {
+        exchange_sides(&person.targets)
+    } else {
+        person.targets
+    };
+    let [columns, rows] = shape.cells();
+    let in_cells = |at: [f32; 2]| {
+        let half = 0.5 * (STRIDE - 1) as f32;
+        view.in_input(at).map(|side| (side - half) / STRIDE as f32)
+    };
+    let is_inside = |[x, y]: [f32; 2]| {
+        (-0.5..columns as f32 - 0.5).contains(&x) && (-0.5..rows as f32 - 0.5).contains(&y)
+    };
+    let mut maps = Vec::with_capacity(N_JOINTS * columns * rows);
+    let mut weights = [0.0; N_JOINTS];
+    let mut places = [[f32::NAN; 2]; N_JOINTS];
+    for (joint, target) in targets.iter().enumerate() {
+        let at = in_cells(target.at);
+        let or = target.or.map(in_cells);
+        let is_known = target.weight > 0.0 && at.iter().all(|side| side.is_finite());
+        if is_known {
+            weights[joint] = target.weight;
+            if is_inside(at) && target.is_marked && or.is_none() {
+                places[joint] = at;
+            }
+        }
+        let Some(known) = is_known.then_some([Some(at), or]) else {
+            maps.resize(maps.len() + columns * rows, 0.0);
+            continue;
+        };
+        let known: Vec<[f32; 2]> = known.into_iter().flatten().collect();
+        let share = 1.0 / known.len() as f32;
+        let heats = |axis: usize, n: usize| -> Vec<Vec<f32>> {
+            let of = |at: &[f32; 2]| {
+                let heat = |cell: usize| (-0.5 * (at[axis] - cell as f32).powi(2)).exp();
+                (0..n).map(heat).collect()
+            };
+            known.iter().map(of).collect()
+        };
+        let [across, down] = [heats(0, columns), heats(1, rows)];
+        for row in 0..rows {
+            for column in 0..columns {
+                let each = across.iter().zip(&down);
+                let sum: f32 = each.map(|(across, down)| across[column] * down[row]).sum();
+                maps.push(share * sum);
+            }
+        }
+    }
+    NetworkSample {
+        picture,
+        maps,
+        weights,
+        front: front(person.front, view),
+        places,
+    }
+}
+
+/// The direction in the picture that is shown.
+fn front([x, y, towards]: [f32; 3], view: &View) -> [f32; 2] {
+    let [cosine, sine] = view.turn;
+    let x = cosine * x - sine * y;
+    [if view.is_mirrored { -x } else { x }, towards]
+}
+
+/// The joints that are each other's mirror image, checked: a joint's mirror image has it as its own.
+const _: () = {
+    let mut joint = 0;
+    while joint < N_JOINTS {
+        assert!(MIRROR[MIRROR[joint]] == joint, "pairs");
+        joint += 1;
+    }
+};
+
+impl Target {
+    /// Nothing is known of it.
+    pub const UNKNOWN: Self = Self {
+        at: [f32::NAN; 2],
+        or: None,
+        weight: 0.0,
+        is_marked: false,
+    };
+}

@@ -1,0 +1,234 @@
+//! Settings of the training of a network that predicts errors.
+
+use serde::{Deserialize, Serialize};
+
+use super::network::{Kind, Shape};
+use crate::networks::settings::{SettingsError, check, count, from_zero};
+
+/// The loss of the difference between prediction and truth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Loss {
+    /// Half the squared length of the vector of differences, as in the paper.
+    L2,
+    /// The same for small differences, growing linearly for those of more than 1 (Huber).
+    Robust,
+}
+
+impl Loss {
+    /// The loss of one difference.
+    pub(super) fn cost(self, off: f32) -> f32 {
+        match self {
+            Self::L2 => 0.5 * off * off,
+            Self::Robust => {
+                let capped = off.abs().min(1.0);
+                capped * off.abs() - 0.5 * capped * capped
+            }
+        }
+    }
+
+    /// Its change with the difference.
+    pub(super) fn slope(self, off: f32) -> f32 {
+        match self {
+            Self::L2 => off,
+            Self::Robust => off.clamp(-1.0, 1.0),
+        }
+    }
+}
+
+/// The unit of the network's output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Unit {
+    /// The error as a share of the height that the tile shows.
+    Relative,
+    /// The logarithm of it, see [`viewquality::Unit::LogRelative`].
+    LogRelative,
+}
+
+impl From<Unit> for viewquality::Unit {
+    fn from(unit: Unit) -> Self {
+        match unit {
+            Unit::Relative => Self::Relative,
+            Unit::LogRelative => Self::LogRelative,
+        }
+    }
+}
+
+/// How a network is trained; the defaults are those of the network that ships.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// Which network.
+    pub network: Kind,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Unit of the output.
+    pub unit: Unit,
+    /// Loss.
+    pub loss: Loss,
+    /// Most passes over the samples.
+    pub epochs: u32,
+    /// Passes without improvement of the validation after which it ends.
+    pub patience: u32,
+    /// Samples of one step.
+    pub batch: usize,
+    /// Initial learning rate; decreases to 0 as a cosine.
+    pub rate: f32,
+    /// Share of the last step that is made again.
+    pub momentum: f32,
+    /// Weight decay.
+    pub decay: f32,
+    /// Gradients longer than this are shortened to it.
+    pub longest: f32,
+    /// Share of the groups (subjects, images) for validation.
+    pub validation: f32,
+    /// Channels of the small network's first layer.
+    pub width: usize,
+    /// Values of the hidden layer.
+    pub hidden: usize,
+    /// Share of them that is dropped.
+    pub dropout: f32,
+    /// VGG-16: passes in which only the top is trained.
+    pub frozen_epochs: u32,
+    /// VGG-16: blocks of convolutions, counted from the last, that are trained after these.
+    pub unfrozen_blocks: usize,
+    /// Augmentation of the samples.
+    pub vary: Vary,
+}
+
+/// Augmentation of the training samples; validation and test samples are not changed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Vary {
+    /// Share that is mirrored, left and right exchanged.
+    pub mirror: f32,
+    /// Most that the tile is moved, heights of the tile.
+    pub shift: f32,
+    /// Most that the tile is enlarged or reduced, as a share.
+    pub scale: f32,
+    /// Share that is blurred.
+    pub blur: f32,
+    /// Largest deviation of the blur, pixels of the tile.
+    pub blur_px: f32,
+    /// Share that gets noise.
+    pub noise: f32,
+    /// Largest deviation of the noise, of colours from 0 to 1.
+    pub noise_level: f32,
+}
+
+impl Default for Vary {
+    fn default() -> Self {
+        Self {
+            mirror: 0.5,
+            shift: 0.03,
+            scale: 0.08,
+            blur: 0.3,
+            blur_px: 1.2,
+            noise: 0.3,
+            noise_level: 0.05,
+        }
+    }
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            network: Kind::Small,
+            seed: 1,
+            unit: Unit::LogRelative,
+            loss: Loss::Robust,
+            epochs: 25,
+            patience: 25,
+            batch: 16,
+            rate: 0.007,
+            momentum: 0.9,
+            decay: 0.002,
+            longest: 20.0,
+            validation: 0.15,
+            width: 16,
+            hidden: 256,
+            dropout: 0.5,
+            frozen_epochs: 5,
+            unfrozen_blocks: 1,
+            vary: Vary::default(),
+        }
+    }
+}
+
+impl Settings {
+    /// Checks that all settings are in range.
+    ///
+    /// # Errors
+    ///
+    /// The first that is not.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let vary = &self.vary;
+        let numbers = [
+            from_zero("rate", self.rate, 10.0),
+            from_zero("momentum", self.momentum, 0.999),
+            from_zero("decay", self.decay, 1.0),
+            from_zero("longest", self.longest, 1e9),
+            from_zero("validation", self.validation, 0.9),
+            from_zero("dropout", self.dropout, 0.95),
+            from_zero("vary.mirror", vary.mirror, 1.0),
+            from_zero("vary.shift", vary.shift, 0.05),
+            from_zero("vary.scale", vary.scale, 0.1),
+            from_zero("vary.blur", vary.blur, 1.0),
+            from_zero("vary.blur_px", vary.blur_px, 4.0),
+            from_zero("vary.noise", vary.noise, 1.0),
+            from_zero("vary.noise_level", vary.noise_level, 1.0),
+        ];
+        let counts = [
+            count("epochs", self.epochs as usize, 100_000),
+            count("batch", self.batch, 4096),
+            count("width", self.width, 256),
+            count("hidden", self.hidden, 8192),
+        ];
+        check(&numbers, &counts)
+    }
+
+    /// The sizes of the network.
+    pub fn shape(&self) -> Shape {
+        Shape {
+            kind: self.network,
+            width: self.width,
+            hidden: self.hidden,
+            dropout: self.dropout,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Change = fn(&mut Settings);
+
+    #[test]
+    fn the_defaults_are_valid_and_invalid_settings_are_named() {
+        assert_eq!(Settings::default().check(), Ok(()));
+        let change: [(&str, Change); 5] = [
+            ("batch", |settings| settings.batch = 0),
+            ("dropout", |settings| settings.dropout = 1.0),
+            ("rate", |settings| settings.rate = f32::NAN),
+            ("vary.shift", |settings| settings.vary.shift = 0.5),
+            ("validation", |settings| settings.validation = -0.1),
+        ];
+        for (name, change) in change {
+            let mut settings = Settings::default();
+            change(&mut settings);
+            assert_eq!(settings.check().unwrap_err().setting, name);
+        }
+    }
+
+    #[test]
+    fn the_slope_of_a_loss_is_its_change() {
+        for loss in [Loss::L2, Loss::Robust] {
+            for off in [-3.0, -0.7, 0.0, 0.2, 0.9, 1.1, 5.0] {
+                let change = (loss.cost(off + 1e-2) - loss.cost(off - 1e-2)) / 2e-2;
+                assert!((change - loss.slope(off)).abs() < 1e-3, "{loss:?} {off}");
+            }
+        }
+    }
+}

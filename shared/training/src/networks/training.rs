@@ -1,0 +1,341 @@
+//! A training: steps over samples, a look at those that are kept apart now and then, a state that can be kept.
+
+use core::fmt::Debug;
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use crate::networks::checkpoint::{CHECKPOINT, StoreError, unwrap, wrap};
+use crate::networks::compute::Computer;
+use crate::networks::lesson::{Running, Shown};
+use crate::networks::onnx::{self, Document};
+use crate::networks::ops::Network;
+use crate::networks::optimiser::{Memory, Step};
+use crate::networks::order;
+use crate::networks::parameters::Parameter;
+use crate::networks::settings::{Backend, Precision};
+
+/// A batch of samples.
+#[derive(Debug)]
+pub struct Batch<N, T> {
+    /// The network, for the size of the inputs of this step.
+    pub network: N,
+    /// What it is shown.
+    pub shown: Shown,
+    /// What it should find.
+    pub truth: T,
+}
+
+/// The cost of a batch.
+#[derive(Debug)]
+pub struct Costed<C> {
+    /// The cost.
+    pub cost: C,
+    /// Its gradients by the outputs of the network.
+    pub gradients: Vec<Vec<f32>>,
+}
+
+/// The next pass of a training.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Plan {
+    /// Its steps.
+    pub steps: usize,
+    /// Whether the network is judged after it.
+    pub is_judged: bool,
+}
+
+/// Numbers that a training reports and keeps.
+pub trait Kept: Copy + Debug + PartialEq + Serialize + DeserializeOwned {}
+
+impl<T: Copy + Debug + PartialEq + Serialize + DeserializeOwned> Kept for T {}
+
+/// What is learned, from whom, and how: everything that tells one training from another.
+///
+/// All that it says of a step follows from the number of the step alone.
+pub trait Task: Sync {
+    /// The network that learns.
+    type Network: Network;
+    /// What it should find in a batch.
+    type Truth;
+    /// The cost of a batch.
+    type Cost: Kept;
+    /// How good the network is.
+    type Score: Kept;
+
+    /// Who is learned from, for messages: `people`.
+    const LEARNED_FROM: &'static str;
+
+    /// A hash of everything that the result depends on.
+    fn stamp(&self) -> u64;
+    /// The network at the size at which it is used.
+    fn network(&self) -> Self::Network;
+    /// The numbers between layers.
+    fn precision(&self) -> Precision {
+        Precision::F32
+    }
+    /// The parameters to begin with.
+    fn begin(&self) -> Vec<Parameter>;
+    /// Seed of everything random.
+    fn seed(&self) -> u64;
+    /// Steps of the whole training.
+    fn n_steps(&self) -> usize;
+    /// The pass after some steps and passes.
+    fn plan(&self, steps: usize, passes: usize) -> Plan;
+    /// Whether the averaged parameters begin a training of their own with a step.
+    fn restarts(&self, _nth: usize) -> bool {
+        false
+    }
+    /// Of every parameter, whether a step learns it.
+    fn learned(&self, nth: usize, parameters: &[Parameter]) -> Vec<bool>;
+    /// How a step changes the parameters.
+    fn step(&self, nth: usize) -> Step;
+    /// The samples of a step.
+    fn batch(&self, nth: usize) -> Batch<Self::Network, Self::Truth>;
+    /// The cost of the outputs of the network at a step.
+    fn cost(&self, nth: usize, truth: &Self::Truth, outputs: &[Vec<f32>]) -> Costed<Self::Cost>;
+    /// The mean of the costs of steps, each with its number of samples.
+    fn mean(&self, costs: &[(usize, Self::Cost)]) -> Self::Cost;
+    /// How good a network is on samples that are kept apart.
+    fn score(&self, find: &dyn Fn(&Shown) -> Vec<Vec<f32>>) -> Self::Score;
+    /// By what the network of the best pass is kept: lower is better. Nothing where the last one counts.
+    fn rank(&self, _score: &Self::Score) -> Option<f32> {
+        None
+    }
+    /// Whether a training ends early.
+    ///
+    /// * `since`: passes since the best one.
+    fn is_enough(&self, _since: usize) -> bool {
+        false
+    }
+}
+
+/// The results of some steps of a training.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Pass<C, S> {
+    /// Steps done after them.
+    pub step: usize,
+    /// Their mean cost.
+    pub cost: C,
+    /// How good the network is on those that are kept apart.
+    pub score: Option<S>,
+}
+
+/// The best network so far.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Best {
+    /// The number of its pass.
+    pass: usize,
+    rank: f32,
+    parameters: Vec<Parameter>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct State<C, S> {
+    /// Hash of everything that the result depends on.
+    stamp: u64,
+    memory: Memory,
+    step: usize,
+    passes: Vec<Pass<C, S>>,
+    best: Option<Best>,
+}
+
+/// Why a training cannot start or resume.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// The checkpoint is not one, or was changed.
+    #[error("the checkpoint cannot be used")]
+    Checkpoint(#[from] StoreError),
+    /// It is of another training.
+    #[error(
+        "the checkpoint is of a training with other {learned_from} or settings, or from another network"
+    )]
+    Other {
+        /// Who is learned from.
+        learned_from: &'static str,
+    },
+    /// The settings ask for numbers that only `LibTorch` computes with.
+    #[error("precision is \"bf16\", which only the backend libtorch can compute with")]
+    Precision,
+}
+
+/// A training.
+#[derive(Debug)]
+pub struct Trainer<T: Task> {
+    task: T,
+    computer: Computer,
+    state: State<T::Cost, T::Score>,
+}
+
+impl<T: Task> Trainer<T> {
+    /// Prepares a training, from the start or from a checkpoint.
+    ///
+    /// * `checkpoint`: bytes of [`Self::checkpoint`].
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError`]
+    pub fn new(task: T, backend: Backend, checkpoint: Option<&[u8]>) -> Result<Self, TrainError> {
+        let computer = Computer {
+            backend,
+            precision: task.precision(),
+        };
+        if computer.precision == Precision::Bf16 && backend == Backend::BuiltIn {
+            return Err(TrainError::Precision);
+        }
+        let stamp = task.stamp();
+        let state = if let Some(bytes) = checkpoint {
+            let state: State<T::Cost, T::Score> = unwrap(CHECKPOINT, bytes)?;
+            if state.stamp != stamp {
+                let learned_from = T::LEARNED_FROM;
+                return Err(TrainError::Other { learned_from });
+            }
+            state
+        } else {
+            State {
+                stamp,
+                memory: Memory::new(task.begin()),
+                step: 0,
+                passes: Vec::new(),
+                best: None,
+            }
+        };
+        Ok(Self {
+            task,
+            computer,
+            state,
+        })
+    }
+
+    /// What is learned.
+    pub fn task(&self) -> &T {
+        &self.task
+    }
+
+    /// Steps done.
+    pub fn step(&self) -> usize {
+        self.state.step
+    }
+
+    /// The results so far.
+    pub fn passes(&self) -> &[Pass<T::Cost, T::Score>] {
+        &self.state.passes
+    }
+
+    /// The number of the best pass, where the network of the best one is kept.
+    pub fn best(&self) -> Option<usize> {
+        self.state.best.as_ref().map(|best| best.pass)
+    }
+
+    /// Whether the training has finished.
+    pub fn is_done(&self) -> bool {
+        let since = self.best().map_or(0, |best| self.passes().len() - 1 - best);
+        self.step() >= self.task.n_steps() || self.task.is_enough(since)
+    }
+
+    /// The parameters after the last step.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.state.memory.parameters
+    }
+
+    /// The parameters that the network is used with: those of the best pass, or the mean over the last steps.
+    pub fn trained(&self) -> &[Parameter] {
+        let best = self.state.best.as_ref();
+        best.map_or(&self.state.memory.averages, |best| &best.parameters)
+    }
+
+    /// The state as bytes.
+    ///
+    /// # Errors
+    ///
+    /// [`StoreError::Encode`]
+    pub fn checkpoint(&self) -> Result<Vec<u8>, StoreError> {
+        wrap(CHECKPOINT, &self.state)
+    }
+
+    /// The next pass.
+    ///
+    /// * `go_on`: called before every step, with the steps done; `false` aborts.
+    /// * Returns whether it was finished; if not, nothing has changed.
+    pub fn pass(&mut self, go_on: &mut dyn FnMut(usize) -> bool) -> bool {
+        let plan = self.task.plan(self.state.step, self.state.passes.len());
+        self.run(plan, go_on)
+    }
+
+    /// Some steps, as another plan says.
+    ///
+    /// * See [`Self::pass`].
+    pub fn run(&mut self, plan: Plan, go_on: &mut dyn FnMut(usize) -> bool) -> bool {
+        let from = self.state.step;
+        let until = (from + plan.steps).min(self.task.n_steps());
+        let mut memory = self.state.memory.clone();
+        let mut costs = Vec::new();
+        for nth in from..until {
+            if !go_on(nth) {
+                return false;
+            }
+            if self.task.restarts(nth) {
+                memory = memory.restarted();
+            }
+            costs.extend(self.learn(&mut memory, nth));
+        }
+        let score = plan.is_judged.then(|| self.score(&memory.averages));
+        let rank = score.and_then(|score| self.task.rank(&score));
+        let best = self.state.best.as_ref().map(|best| best.rank);
+        if let Some(rank) = rank.filter(|rank| best.is_none_or(|best| *rank < best)) {
+            self.state.best = Some(Best {
+                pass: self.state.passes.len(),
+                rank,
+                parameters: memory.averages.clone(),
+            });
+        }
+        self.state.memory = memory;
+        self.state.step = until;
+        self.state.passes.push(Pass {
+            step: until,
+            cost: self.task.mean(&costs),
+            score,
+        });
+        true
+    }
+
+    /// One step: the number of samples, and their cost before it.
+    fn learn(&self, memory: &mut Memory, nth: usize) -> Option<(usize, T::Cost)> {
+        let Batch {
+            network,
+            shown,
+            truth,
+        } = self.task.batch(nth);
+        let learned = self.task.learned(nth, &memory.parameters);
+        let running = Running {
+            parameters: &memory.parameters,
+            learned: &learned,
+            dice: order::dice(nth, !self.task.seed()),
+        };
+        let mut cost = None;
+        let lesson = self
+            .computer
+            .learn(&network, running, &shown, &mut |outputs| {
+                let costed = self.task.cost(nth, &truth, outputs);
+                cost = Some((shown.n, costed.cost));
+                costed.gradients
+            });
+        memory.change(&lesson, self.task.step(nth));
+        cost
+    }
+
+    fn score(&self, parameters: &[Parameter]) -> T::Score {
+        let network = self.task.network();
+        let find = |shown: &Shown| self.computer.find(&network, parameters, shown);
+        self.task.score(&find)
+    }
+
+    /// The outputs of the trained network.
+    pub fn find(&self, shown: &Shown) -> Vec<Vec<f32>> {
+        let network = self.task.network();
+        self.computer.find(&network, self.trained(), shown)
+    }
+
+    /// The trained network as an ONNX file.
+    pub fn file(&self, document: Document) -> Vec<u8> {
+        onnx::write(&self.task.network(), self.trained(), document)
+    }
+}

@@ -1,0 +1,77 @@
+//! The evidence for a pose of a frame.
+
+use crate::Sampler;
+use kernels::Rgb8View;
+use multiview::FrontEvidence;
+
+use crate::orientation::features::{Buffers, features};
+use crate::orientation::network::Network;
+use crate::orientation::tile::{Crop, Tile};
+
+/// Tells from the picture in which direction a person faces.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detector {
+    network: Network,
+}
+
+/// Buffers of a [`Detector`].
+#[derive(Debug, Default)]
+pub struct Workspace {
+    sampler: Sampler,
+    buffers: Buffers,
+    features: Vec<f32>,
+}
+
+/// The middle of head and neck, `[x, y]` in the unit of the parts: parts 0 and 1 of the published model.
+///
+/// * Returns `None` for a model with another number of parts than the 26 of the published one.
+pub fn head_of(parts: &[[f64; 2]]) -> Option<[f64; 2]> {
+    const N_PARTS: usize = 26;
+    let ([head, neck, ..], N_PARTS) = (parts, parts.len()) else {
+        return None;
+    };
+    Some([0, 1].map(|axis| f64::midpoint(head[axis], neck[axis])))
+}
+
+impl Detector {
+    /// A detector with the numbers of a network.
+    pub fn new(network: Network) -> Self {
+        Self { network }
+    }
+
+    /// What the picture says about the person of a pose.
+    ///
+    /// * `bounds`: the pose's box in the frame, `[x1, y1, x2, y2]`, pixels.
+    /// * `head`: the middle of its head and neck in the frame, `[x, y]`, pixels.
+    /// * Returns zeros, which say nothing, for a pose that is not finite.
+    pub fn evidence(
+        &self,
+        frame: Rgb8View<'_>,
+        bounds: [f64; 4],
+        head: [f64; 2],
+        workspace: &mut Workspace,
+    ) -> FrontEvidence {
+        match Tile::around(frame, bounds, head, &mut workspace.sampler) {
+            Some(tile) => self.of_tile(&tile, workspace),
+            None => [0.0; 2],
+        }
+    }
+
+    /// What a tile says: the mean of what it and its mirror image say.
+    pub fn of_tile(&self, tile: &Tile, workspace: &mut Workspace) -> FrontEvidence {
+        let mut look = |mirrored: bool| {
+            let crop = Crop {
+                mirrored,
+                ..Crop::default()
+            };
+            features(tile, &crop, &mut workspace.buffers, &mut workspace.features);
+            self.network.standardise(&mut workspace.features);
+            self.network.run(&workspace.features)
+        };
+        let [plain, mirrored] = [look(false), look(true)];
+        [
+            (plain[0] - mirrored[0]) / 2.0,
+            f32::midpoint(plain[1], mirrored[1]),
+        ]
+    }
+}
