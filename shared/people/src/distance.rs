@@ -1,7 +1,7 @@
 //! How far apart in space two views' detections are, or a detection and a person.
 
-use skeleton::body::Joints;
 use nalgebra::Point3;
+use skeleton::body::Joints;
 
 use crate::sight::{Sights, passing};
 use crate::{MIRROR, N};

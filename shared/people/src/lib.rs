@@ -32,8 +32,8 @@ mod testing;
 #[cfg(test)]
 mod tests;
 
-use skeleton::body::{Covariances, Joints};
 use nalgebra::Vector3;
+use skeleton::body::{Covariances, Joints};
 
 pub(crate) use frame::Frame;
 pub use solver::{Solved, Solver};

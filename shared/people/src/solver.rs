@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use skeleton::body::{Covariances, Joints};
 use geometry::Camera;
 use nalgebra::{Matrix3, Point3, Vector3};
+use skeleton::body::{Covariances, Joints};
 
 use crate::distance::named;
 use crate::hypotheses::{Candidate, Hypothesis, hypotheses};
@@ -145,8 +145,11 @@ impl Solver {
                 .map(|place| choice(place, priors[joint]))
                 .collect()
         });
-        let stature = skeleton::body::stature(&person.joints).map_or(ANY_STATURE_M, |stature| stature.metres);
-        let expectations = Expectations::new(stature.clamp(skeleton::body::STATURES[0], skeleton::body::STATURES[1]));
+        let stature =
+            skeleton::body::stature(&person.joints).map_or(ANY_STATURE_M, |stature| stature.metres);
+        let expectations = Expectations::new(
+            stature.clamp(skeleton::body::STATURES[0], skeleton::body::STATURES[1]),
+        );
         let chosen = choose(&choices, &expectations);
         let mut solved = Solved {
             id: person.id,

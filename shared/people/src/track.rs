@@ -1,7 +1,7 @@
 //! A person from frame to frame.
 
-use skeleton::body::Joints;
 use nalgebra::{Point3, Vector3};
+use skeleton::body::Joints;
 
 use crate::bones::Bones;
 use crate::cluster::Member;

@@ -1,8 +1,8 @@
 //! People from frame to frame, by ids that last.
 
-use skeleton::body::{Covariances, Joints};
 use geometry::Camera;
 use nalgebra::Vector3;
+use skeleton::body::{Covariances, Joints};
 
 use crate::assignment::{NEVER, assign};
 use crate::bones::Bones;

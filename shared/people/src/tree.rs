@@ -1,7 +1,7 @@
 //! One place for every joint, so that the views support all of them and the bones keep their lengths.
 
-use skeleton::body::BONES;
 use nalgebra::Point3;
+use skeleton::body::BONES;
 
 use crate::N;
 

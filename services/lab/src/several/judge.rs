@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use body::Joints;
 use nalgebra::{Point3, Vector3};
+use skeleton::body::Joints;
 use statistics::score::Share;
 
 use super::shelf::{N_TRUE, TruePerson};

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use statistics::score::{Bootstrap, Share};
 use serde::Serialize;
 use statistics::Sorted;
+use statistics::score::{Bootstrap, Share};
 
 use super::Run;
 use super::judge::{ACTORS, Actor, PartsOfFrame};
