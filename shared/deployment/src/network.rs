@@ -20,7 +20,7 @@ pub struct Config {
     pub find_every: Option<u64>,
     /// Least mean heat of the joints of a person who is seen, 0 to 1.
     pub least_heat: f64,
-    /// Most people of a view that the network looks at.
+    /// Most people: of a view, and of a frame.
     pub people: usize,
     /// Look at the mirror image of every person as well and use the mean, which is more exact and takes twice the time.
     pub mirror: bool,

@@ -20,6 +20,7 @@ use crate::placed::{N, PartView, Places, joints_at, of_set, shown_in};
 use crate::sighting::{Sighting, Sightings};
 use crate::skeleton_step::{Kept, Skeleton};
 use crate::space_settings::SpaceStepSettings;
+use crate::who::FramePeople;
 
 /// Least number of joints that two views see well of a person: half of it is often hidden. Of what was seen in six empty rooms the
 /// seventh best joint had a heat of 0.41 in two views at most, of people who stood, sat or ran before three cameras or four 0.58 at least.
@@ -33,6 +34,16 @@ pub(crate) struct Rig {
     pub(crate) plans: Vec<Arc<ViewPlan>>,
     pub(crate) up_in_world: Option<UnitVector3<f64>>,
     pub(crate) settings: SpaceStepSettings,
+}
+
+/// What there is of a frame.
+#[derive(Clone, Copy)]
+pub(crate) struct FrameViews<'f, 'a> {
+    /// By view.
+    pub(crate) answers: &'f [Option<Sightings>],
+    /// By view the maps of its people. A view without either has no part.
+    pub(crate) evidence: &'f [Vec<PersonMaps<'a>>],
+    pub(crate) people: &'f FramePeople,
 }
 
 /// The step of one person; keeps sides, bone lengths and motion of the frames before.
@@ -81,17 +92,14 @@ impl PersonStep {
 
     /// Solves for the person in a frame.
     ///
-    /// * `answers`: by view; `evidence`: by view the maps of its people. A view without either has no part.
-    /// * `candidates`: by view, which of its people is the person; `n_seen`: number of people of the frame.
+    /// * `nth`: which of the people of the frame it is.
     /// * Returns a skeleton without joints if fewer than two views show the person: what networks see in an empty room is nowhere the
     ///   same in two.
-    pub(crate) fn run(
-        &mut self,
-        answers: &[Option<Sightings>],
-        evidence: &[Vec<PersonMaps<'_>>],
-        (candidates, n_seen): (&[Option<usize>], usize),
-    ) -> Skeleton {
-        let shown = self.shown(answers, evidence, candidates);
+    pub(crate) fn run(&mut self, frame: &FrameViews<'_, '_>, nth: usize) -> Skeleton {
+        let FrameViews {
+            answers, people, ..
+        } = *frame;
+        let shown = self.shown(frame, nth);
         let rig = Arc::clone(&self.rig);
         let Rig {
             plans, settings, ..
@@ -122,7 +130,7 @@ impl PersonStep {
             joints: settled,
             body,
             views: self.views(answers, solution),
-            n_people: n_seen,
+            n_people: people.n_seen,
             n_pairs: pairs_of(takes_part.iter().filter(|takes_part| **takes_part).count()),
             facing_margin: f64::INFINITY,
             sides: solution.and_then(|it| it.sides),
@@ -131,14 +139,15 @@ impl PersonStep {
     }
 
     /// The views that show the person by a candidate, at the instant of the frame.
-    fn shown<'a>(
-        &mut self,
-        answers: &[Option<Sightings>],
-        evidence: &[Vec<PersonMaps<'a>>],
-        candidates: &[Option<usize>],
-    ) -> Vec<Shown<'a>> {
+    fn shown<'a>(&mut self, frame: &FrameViews<'_, 'a>, nth: usize) -> Vec<Shown<'a>> {
+        let FrameViews {
+            answers,
+            evidence,
+            people,
+        } = *frame;
+        let maps_settings = self.rig.settings.maps;
         let mut shown = Vec::new();
-        for (view, candidate) in candidates.iter().enumerate() {
+        for (view, candidate) in people.people[nth].candidates.iter().enumerate() {
             let (Some(candidate), Some(Some(answer)), Some(maps)) =
                 (*candidate, answers.get(view), evidence.get(view))
             else {
@@ -152,7 +161,12 @@ impl PersonStep {
             ) else {
                 continue;
             };
-            let Some(mut evidence) = PersonEvidence::new(*maps, sighting) else {
+            let others = people.people.iter().enumerate();
+            let others = others.filter(|(other, _)| *other != nth);
+            let others =
+                others.filter_map(|(_, it)| answer.people.get((*it.candidates.get(view)?)?));
+            let evidence = PersonEvidence::new(*maps, sighting, others, maps_settings);
+            let Some(mut evidence) = evidence else {
                 continue;
             };
             let found = sighting.places(false).map(Point2::from);

@@ -6,7 +6,7 @@ use multiview::ViewPlan;
 use nalgebra::UnitVector3;
 use posenetwork::PersonMaps;
 
-use crate::person_step::{PersonStep, Rig};
+use crate::person_step::{FrameViews, PersonStep, Rig};
 use crate::sighting::Sightings;
 use crate::skeleton_step::Skeleton;
 use crate::space_settings::SpaceStepSettings;
@@ -81,15 +81,19 @@ impl SpaceStep {
         evidence: &[Vec<PersonMaps<'_>>],
         people: &FramePeople,
     ) -> Vec<PersonSkeleton> {
+        let frame = FrameViews {
+            answers,
+            evidence,
+            people,
+        };
         let mut solved = Vec::with_capacity(people.people.len());
-        for person in &people.people {
+        for (nth, person) in people.people.iter().enumerate() {
             let instant_s = self.instant_s;
             let step = self.remembered(person.id);
             step.begin(instant_s);
-            let who = (&person.candidates[..], people.n_seen);
             solved.push(PersonSkeleton {
                 id: person.id,
-                skeleton: step.run(answers, evidence, who),
+                skeleton: step.run(&frame, nth),
             });
         }
         solved
