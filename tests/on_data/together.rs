@@ -6,7 +6,7 @@ use fastrand::Rng;
 use geometry::Camera;
 use geometry::files::ReadOptions;
 use nalgebra::{Point3, Vector3};
-use people::{Detection, Keypoint, Settings, Tracker, View};
+use people::{Detection, Keypoint, Person, Settings, Tracker, View};
 use score::Bootstrap;
 use serde_json::Value;
 
@@ -220,6 +220,26 @@ struct Shown<'a> {
     id: Option<u64>,
 }
 
+/// The detections of every view.
+///
+/// * `who`: the person of each.
+fn shown<'a>(views: &'a [View], who: &[Vec<usize>], found: &[Person]) -> Vec<Vec<Shown<'a>>> {
+    let id = |view: usize, nth: usize| {
+        let is_it = |person: &&Person| person.detections[view] == Some(nth);
+        found.iter().find(is_it).map(|person| person.id)
+    };
+    let of_view = |(view, seen): (usize, &'a View)| {
+        let each = seen.detections.iter().enumerate();
+        let each = each.map(|(nth, detection)| Shown {
+            detection,
+            person: who[view][nth],
+            id: id(view, nth),
+        });
+        each.collect()
+    };
+    views.iter().enumerate().map(of_view).collect()
+}
+
 impl Pairs {
     fn add(&mut self, views: &[Vec<Shown<'_>>]) {
         for (nth, view) in views.iter().enumerate() {
@@ -283,21 +303,8 @@ fn pairs(motion: &Motion, setting: Setting, n_draws: u64) -> Vec<Pairs> {
                 who.push(order);
             }
             let found = tracker.step(instant as f64 * STEP_S, &views);
-            let id = |view: usize, nth: usize| {
-                let is_it = |person: &&people::Person| person.detections[view] == Some(nth);
-                found.iter().find(is_it).map(|person| person.id)
-            };
-            let shown = |(view, detections): (usize, &View)| {
-                let each = detections.detections.iter().enumerate();
-                let each = each.map(|(nth, detection)| Shown {
-                    detection,
-                    person: who[view][nth],
-                    id: id(view, nth),
-                });
-                each.collect::<Vec<Shown<'_>>>()
-            };
             if instant >= FIRST {
-                pairs.add(&views.iter().enumerate().map(shown).collect::<Vec<_>>());
+                pairs.add(&shown(&views, &who, &found));
             }
         }
         pairs

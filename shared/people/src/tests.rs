@@ -117,7 +117,7 @@ proptest! {
         let mut tracker = Tracker::new(ring(4), settings());
         for (nth, views) in frames.iter().enumerate() {
             let time_s = nth as f64 / RATE_HZ;
-            let mut other = Tracker::resume(ring(4), settings(), tracker.memory());
+            let mut other = Tracker::resume(ring(4), settings(), &tracker.memory());
             let expected: Vec<Person> = tracker.step(time_s, views);
             if nth > 3 {
                 let got = other.step(time_s, views);

@@ -93,7 +93,13 @@ impl Track {
     }
 
     /// Takes the joints of this frame.
-    pub(crate) fn place(&mut self, time_s: f64, frame: &Frame, members: Vec<Member>, seen: Coarse) {
+    pub(crate) fn place(
+        &mut self,
+        time_s: f64,
+        frame: &Frame,
+        members: Vec<Member>,
+        seen: &Coarse,
+    ) {
         let expected = self.expected(time_s);
         let step_s = time_s - self.placed_s;
         if let Some(moved) = moved(&self.coarse.joints, &seen.joints).filter(|_| step_s > 0.0) {
@@ -101,8 +107,8 @@ impl Track {
         }
         // A joint that was not seen goes with the others.
         let shift = moved(&expected, &seen.joints).unwrap_or_else(Vector3::zeros);
-        for joint in 0..N {
-            let unseen = expected[joint].map(|point| point + shift);
+        for (joint, expected) in expected.iter().enumerate() {
+            let unseen = expected.map(|point| point + shift);
             self.coarse.joints[joint] = seen.joints[joint].or(unseen);
             if seen.covariances[joint].is_some() {
                 self.coarse.covariances[joint] = seen.covariances[joint];

@@ -99,16 +99,23 @@ pub struct Tracker {
     last_id: u64,
 }
 
+/// The frame that is looked at, and where the people of the frames before are expected in it.
+struct Now<'a> {
+    frame: &'a Frame,
+    time_s: f64,
+    expected: &'a [Joints],
+}
+
 impl Tracker {
     /// Begins without anybody.
     ///
     /// * `cameras`: of the views, in the order in which views will be given.
     pub fn new(cameras: Vec<Camera>, settings: Settings) -> Self {
-        Self::resume(cameras, settings, Memory::default())
+        Self::resume(cameras, settings, &Memory::default())
     }
 
     /// Takes up the work of a tracker that has ended.
-    pub fn resume(cameras: Vec<Camera>, settings: Settings, memory: Memory) -> Self {
+    pub fn resume(cameras: Vec<Camera>, settings: Settings, memory: &Memory) -> Self {
         let mut order: Vec<usize> = (0..cameras.len()).collect();
         order.sort_by(|a, b| cameras[*a].name.cmp(&cameras[*b].name));
         let last_id = memory.people.iter().map(|person| person.id).max();
@@ -116,7 +123,7 @@ impl Tracker {
             cameras,
             order,
             settings,
-            tracks: memory.people.into_iter().map(revived).collect(),
+            tracks: memory.people.iter().map(revived).collect(),
             gone: Vec::new(),
             last_id: memory.last_id.max(last_id.unwrap_or(0)),
         }
@@ -146,20 +153,20 @@ impl Tracker {
         let mut free: Vec<Vec<Place>> = (0..frame.n_views())
             .map(|view| frame.places(view).collect())
             .collect();
+        let now = Now {
+            frame: &frame,
+            time_s,
+            expected: &expected,
+        };
         self.tracks.iter_mut().for_each(Track::wait);
         let mut members = vec![Vec::new(); self.tracks.len()];
         for is_known in [true, false] {
-            self.follow(
-                &frame,
-                time_s,
-                (&expected, &mut free, &mut members),
-                is_known,
-            );
+            self.follow(&now, &mut free, &mut members, is_known);
         }
-        self.place(&frame, time_s, &expected, members, &mut free);
+        self.place(&now, members, &mut free);
         // What contradicts a group goes back once.
         for _ in 0..2 {
-            self.group(&frame, time_s, &expected, &mut free);
+            self.group(&now, &mut free);
         }
         self.bury(time_s);
         let births = self.births(&frame, time_s, was_empty);
@@ -170,19 +177,24 @@ impl Tracker {
     /// Assigns the detections of every view to the people.
     fn follow(
         &self,
-        frame: &Frame,
-        time_s: f64,
-        (expected, free, members): (&[Joints], &mut [Vec<Place>], &mut [Vec<Member>]),
+        now: &Now<'_>,
+        free: &mut [Vec<Place>],
+        members: &mut [Vec<Member>],
         is_known: bool,
     ) {
+        let frame = now.frame;
         let rows: Vec<usize> = (0..self.tracks.len())
             .filter(|nth| self.tracks[*nth].id.is_some() == is_known)
             .collect();
         for free in free.iter_mut() {
             let fit = |row: usize, column: usize| {
                 let track = rows[row];
-                let fit = to_person(frame.sights(free[column]), &expected[track], frame.as_seen);
-                fit.filter(|fit| fit.distance < self.tracks[track].reach(time_s))
+                let fit = to_person(
+                    frame.sights(free[column]),
+                    &now.expected[track],
+                    frame.as_seen,
+                );
+                fit.filter(|fit| fit.distance < self.tracks[track].reach(now.time_s))
             };
             let fits: Vec<_> = (0..rows.len())
                 .map(|row| {
@@ -212,20 +224,15 @@ impl Tracker {
     }
 
     /// Places the people who were expected.
-    fn place(
-        &mut self,
-        frame: &Frame,
-        time_s: f64,
-        expected: &[Joints],
-        members: Vec<Vec<Member>>,
-        free: &mut [Vec<Place>],
-    ) {
-        for ((track, members), expected) in self.tracks.iter_mut().zip(members).zip(expected) {
+    fn place(&mut self, now: &Now<'_>, members: Vec<Vec<Member>>, free: &mut [Vec<Place>]) {
+        let &Now { frame, time_s, .. } = now;
+        let each = self.tracks.iter_mut().zip(members).zip(now.expected);
+        for ((track, members), expected) in each {
             let agreed = agree(frame, members, Some(expected));
             give_back(free, &agreed.refused);
             let n = agreed.members.len();
             if n >= self.settings.min_views.max(2) && agreed.person.n_core() >= LEAST_SEEN {
-                track.place(time_s, frame, agreed.members, agreed.person);
+                track.place(time_s, frame, agreed.members, &agreed.person);
             } else if n >= 1 && track.id.is_some() {
                 track.glimpse(time_s, frame, agreed.members);
             } else {
@@ -235,7 +242,8 @@ impl Tracker {
     }
 
     /// Makes people of the detections that are nobody's.
-    fn group(&mut self, frame: &Frame, time_s: f64, expected: &[Joints], free: &mut [Vec<Place>]) {
+    fn group(&mut self, now: &Now<'_>, free: &mut [Vec<Place>]) {
+        let frame = now.frame;
         let all: Vec<Place> = free.iter().flatten().copied().collect();
         for members in clusters(frame, &all) {
             let agreed = agree(frame, members, None);
@@ -249,19 +257,13 @@ impl Tracker {
             for member in &agreed.members {
                 free[member.at.view].retain(|at| *at != member.at);
             }
-            self.take(frame, time_s, expected, agreed.members, person);
+            self.take(now, agreed.members, &person);
         }
     }
 
     /// Gives a group to the person whom it shows: one who was placed, one who was missed, or a new one.
-    fn take(
-        &mut self,
-        frame: &Frame,
-        time_s: f64,
-        expected: &[Joints],
-        members: Vec<Member>,
-        person: Coarse,
-    ) {
+    fn take(&mut self, now: &Now<'_>, members: Vec<Member>, person: &Coarse) {
+        let &Now { frame, time_s, .. } = now;
         let is_placed = |track: &Track| track.state == State::Tracked;
         let twin = self.tracks.iter_mut().find(|track| {
             let distance = of_people(&track.coarse.joints, &person.joints);
@@ -285,7 +287,7 @@ impl Tracker {
             }
             return;
         }
-        let missed = self.tracks.iter().zip(expected).enumerate();
+        let missed = self.tracks.iter().zip(now.expected).enumerate();
         let missed = missed.filter(|(_, (track, _))| !is_placed(track));
         let near = missed.filter_map(|(nth, (track, expected))| {
             let distance = of_people(expected, &person.joints)?;
@@ -435,7 +437,7 @@ fn remembered(track: &Track) -> Option<Remembered> {
     })
 }
 
-fn revived(person: Remembered) -> Track {
+fn revived(person: &Remembered) -> Track {
     let mut track = Track::new(person.seen_s);
     track.id = Some(person.id);
     track.coarse.joints = person.joints;
