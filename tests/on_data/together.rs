@@ -98,8 +98,12 @@ impl Motion {
             });
             let instants: Vec<Vec<(u64, Body)>> = instants.collect();
             for (id, _) in &instants[0] {
-                let of_id =
-                    |people: &Vec<(u64, Body)>| people.iter().find(|(other, _)| other == id).map(|(_, body)| *body);
+                let of_id = |people: &Vec<(u64, Body)>| {
+                    people
+                        .iter()
+                        .find(|(other, _)| other == id)
+                        .map(|(_, body)| *body)
+                };
                 let clip: Vec<Body> = instants.iter().filter_map(of_id).collect();
                 if clip.len() == N_INSTANTS {
                     clips.push(clip);

@@ -225,7 +225,9 @@ fn refined(
     for _ in 0..2 {
         let views = candidates.chunk_by(|a, b| a.view == b.view);
         let best = views.filter_map(|view| {
-            let near = view.iter().filter(|candidate| candidate.sight.deviations(&at) < OUTLYING);
+            let near = view
+                .iter()
+                .filter(|candidate| candidate.sight.deviations(&at) < OUTLYING);
             near.max_by(|a, b| a.support(&at).total_cmp(&b.support(&at)))
         });
         let weighted = best.map(|candidate| Sight {
@@ -248,7 +250,11 @@ fn candidates(
     (order, rays): (&[usize], &[Rays]),
 ) -> Vec<Candidate> {
     let mut all = Vec::new();
-    for (nth, view) in order.iter().enumerate().filter(|(_, view)| **view < rays.len()) {
+    for (nth, view) in order
+        .iter()
+        .enumerate()
+        .filter(|(_, view)| **view < rays.len())
+    {
         let first = all.len();
         let name = named(joint, person.is_exchanged[*view]);
         let mut add = |sight: Option<Sight>, trust: f64| {
@@ -262,7 +268,9 @@ fn candidates(
             if person.detections[*view] == Some(index) {
                 add(sights[name], 1.0);
             } else {
-                let is_anybodys = people.iter().any(|other| other.detections[*view] == Some(index));
+                let is_anybodys = people
+                    .iter()
+                    .any(|other| other.detections[*view] == Some(index));
                 add(
                     sights[name],
                     if is_anybodys {

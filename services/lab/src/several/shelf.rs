@@ -277,7 +277,10 @@ fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> View {
     for (field, strengths) in fields.iter().enumerate() {
         let [from, to] = [FIELDS[0][field], FIELDS[1][field]];
         let n_to = candidates[to].len().max(1);
-        let each = strengths.iter().enumerate().filter(|(_, strength)| **strength > 0.0);
+        let each = strengths
+            .iter()
+            .enumerate()
+            .filter(|(_, strength)| **strength > 0.0);
         edges.extend(each.map(|(nth, strength)| Edge {
             strength: *strength,
             ends: [(from, nth / n_to), (to, nth % n_to)],
