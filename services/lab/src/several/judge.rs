@@ -39,7 +39,7 @@ pub struct Put {
 
 impl Put {
     /// By the rule of 4D Association: the bottom of the head is the middle of the shoulders and of the ears, its top 0.125 m along the face
-    /// and 0.145 m up. The ears are [`EARS`] of the way from the neck to the top of the head.
+    /// and 0.145 m up. The ears lie at 1 / 1.8 of the way from the neck to the top of the head.
     pub fn new(id: u64, joints: &Joints) -> Self {
         let middle = |a: usize, b: usize| Some(nalgebra::center(&joints[a]?, &joints[b]?));
         let [shoulders, hips] = [middle(8, 9), middle(2, 3)];
