@@ -7,8 +7,8 @@ use geometry::Camera;
 use geometry::files::ReadOptions;
 use nalgebra::{Point3, Vector3};
 use people::{Detection, Keypoint, Person, Settings, Tracker, View};
-use serde_json::Value;
 use statistics::score::Bootstrap;
+use serde_json::Value;
 
 use crate::shared_dir;
 
@@ -98,8 +98,12 @@ impl Motion {
             });
             let instants: Vec<Vec<(u64, Body)>> = instants.collect();
             for (id, _) in &instants[0] {
-                let of_id =
-                    |people: &Vec<(u64, Body)>| people.iter().find(|it| it.0 == *id).map(|it| it.1);
+                let of_id = |people: &Vec<(u64, Body)>| {
+                    people
+                        .iter()
+                        .find(|(other, _)| other == id)
+                        .map(|(_, body)| *body)
+                };
                 let clip: Vec<Body> = instants.iter().filter_map(of_id).collect();
                 if clip.len() == N_INSTANTS {
                     clips.push(clip);
@@ -140,14 +144,14 @@ impl Motion {
     }
 }
 
-/// Whether another's trunk is before a joint.
+/// Says if another's trunk is before a joint.
 fn is_hidden(camera: &Camera, joint: &Point3<f64>, nth: usize, people: &[Body]) -> bool {
     let from = camera.centre_in_world();
-    let ray = (joint - from).normalize();
+    let ray = (joint - from).try_normalize(1e-9).unwrap();
     people
         .iter()
         .enumerate()
-        .filter(|it| it.0 != nth)
+        .filter(|(other, _)| *other != nth)
         .any(|(_, other)| {
             let [Some(neck), Some(right), Some(left)] =
                 [other[NECK], other[HIPS[0]], other[HIPS[1]]]
@@ -165,7 +169,7 @@ fn is_hidden(camera: &Camera, joint: &Point3<f64>, nth: usize, people: &[Body]) 
         })
 }
 
-/// What a view sees of each person; nothing of one who is hidden.
+/// Shows each person to a view; nothing of one who is hidden.
 fn seen(
     camera: &Camera,
     people: &[Body],
@@ -199,7 +203,7 @@ fn seen(
     detections
 }
 
-/// Whether two detections have so many joints in common that they can be compared.
+/// Says if two detections have so many joints in common that they can be compared.
 fn can_be_compared(a: &Detection, b: &Detection) -> bool {
     let both = a.joints.iter().zip(&b.joints);
     both.filter(|(a, b)| a.is_some() && b.is_some()).count() >= 4
@@ -213,7 +217,7 @@ struct Pairs {
     right: usize,
 }
 
-/// What a view shows: who each detection is, and whom it was taken for.
+/// A detection that a view shows: who each detection is, and whom it was taken for.
 struct Shown<'a> {
     detection: &'a Detection,
     person: usize,
@@ -332,15 +336,15 @@ fn two_to_eight_people_are_told_apart_in_the_views_of_real_cameras() {
         };
         let draws: Vec<Vec<Pairs>> = pairs(&motion, setting, 60)
             .into_iter()
-            .map(|it| vec![it])
+            .map(|pairs| vec![pairs])
             .collect();
         let of = |nth: usize| {
             move |pairs: &[Pairs]| {
                 let sum = |of: fn(&Pairs) -> usize| pairs.iter().map(of).sum();
                 let all = Pairs {
-                    true_ones: sum(|it| it.true_ones),
-                    found: sum(|it| it.found),
-                    right: sum(|it| it.right),
+                    true_ones: sum(|pairs| pairs.true_ones),
+                    found: sum(|pairs| pairs.found),
+                    right: sum(|pairs| pairs.right),
                 };
                 Some(all.scores()[nth])
             }

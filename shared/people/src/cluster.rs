@@ -2,22 +2,16 @@
 
 use crate::Frame;
 use crate::distance::between;
+use crate::frame::Place;
 
 /// Detections whose rays pass each other farther away, on the mean, are not one person: metres beyond the deviation that is stated.
 const GATE_M: f64 = 0.12;
-
-/// A detection of a view.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Place {
-    pub(crate) view: usize,
-    pub(crate) index: usize,
-}
 
 /// A detection of a person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Member {
     pub(crate) at: Place,
-    /// Whether the view calls left what is the person's right.
+    /// Set if the view calls left what is the person's right.
     pub(crate) is_exchanged: bool,
 }
 
@@ -87,7 +81,7 @@ pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
     groups
 }
 
-/// Whether two groups have no view in common, and a mean distance below the gate.
+/// Says if two groups have no view in common, and a mean distance below the gate.
 fn may_join(
     free: &[Place],
     distances: &[Option<f64>],

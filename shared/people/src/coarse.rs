@@ -29,7 +29,7 @@ impl Coarse {
         self.joints[..N - 1].iter().flatten().count()
     }
 
-    /// Whether the bones are those of a person.
+    /// Says if the bones are those of a person.
     pub(crate) fn is_body(&self) -> bool {
         skeleton::body::check(&self.joints, &self.covariances, None)
             .nobody

@@ -18,7 +18,7 @@ pub(crate) struct Fit {
     pub(crate) distance: f64,
     /// Standard deviation of these distances by what the detector states, metres.
     pub(crate) unknown: f64,
-    /// Whether it fits with left and right exchanged.
+    /// Set if it fits with left and right exchanged.
     pub(crate) is_exchanged: bool,
 }
 

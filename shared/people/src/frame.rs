@@ -4,9 +4,15 @@ use core::cmp::Ordering;
 
 use geometry::Camera;
 
-use crate::cluster::Place;
 use crate::sight::{Sights, sights};
 use crate::{Detection, View};
+
+/// A detection of a view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Place {
+    pub(crate) view: usize,
+    pub(crate) index: usize,
+}
 
 /// A detection as rays.
 struct Prepared {
@@ -23,7 +29,7 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// Of what the views saw.
+    /// Takes what the views saw.
     ///
     /// * `order`: the views in the order in which they are taken.
     pub(crate) fn new(cameras: &[Camera], order: &[usize], views: &[View], as_seen: bool) -> Self {

@@ -44,7 +44,10 @@ pub(crate) struct Hypothesis {
 pub(crate) fn support(candidates: &[Candidate], place: &Point3<f64>) -> f64 {
     let views = candidates.chunk_by(|a, b| a.view == b.view);
     views
-        .map(|view| view.iter().map(|it| it.support(place)).fold(0.0, f64::max))
+        .map(|view| {
+            let each = view.iter().map(|candidate| candidate.support(place));
+            each.fold(0.0, f64::max)
+        })
         .sum()
 }
 

@@ -79,7 +79,7 @@ pub struct Detection {
     pub colour: Option<[f64; 3]>,
 }
 
-/// What a detector found in a view.
+/// Everything that a detector found in a view.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct View {
     /// The people.
@@ -110,7 +110,7 @@ pub struct Person {
     pub state: State,
     /// Index of the person among the detections of every view; `None` where the view does not show the person.
     pub detections: Vec<Option<usize>>,
-    /// Whether a view calls left what is the person's right; only where views call the sides as they see them.
+    /// Set if a view calls left what is the person's right; only where views call the sides as they see them.
     pub is_exchanged: Vec<bool>,
     /// The joints, coarsely, metres in the world.
     pub joints: Joints,

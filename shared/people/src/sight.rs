@@ -1,4 +1,4 @@
-//! What a view says of one joint: a ray, and how far the joint may be from it.
+//! One joint as a view sees it: a ray, and how far the joint may be from it.
 
 use geometry::Camera;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
@@ -14,7 +14,7 @@ const LEAST_SINE: f64 = 0.05;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sight {
     pub(crate) origin: Point3<f64>,
-    /// Of length 1.
+    /// The direction, of length 1.
     pub(crate) direction: Vector3<f64>,
     /// Standard deviation across the ray, metres for every metre of distance.
     pub(crate) spread: f64,
@@ -23,7 +23,7 @@ pub(crate) struct Sight {
 }
 
 impl Sight {
-    /// Of a keypoint; `None` where the lens has no ray.
+    /// Takes a keypoint; `None` where the lens has no ray.
     pub(crate) fn new(camera: &Camera, keypoint: &Keypoint) -> Option<Self> {
         let usable = keypoint.sd_px.is_finite() && keypoint.sd_px > 0.0 && keypoint.heat > 0.0;
         let ray = camera
@@ -169,7 +169,7 @@ pub(crate) fn agreement(deviations: f64) -> f64 {
     (-0.5 * deviations * deviations).exp()
 }
 
-/// What is known of a joint before it is looked at.
+/// Knowledge of a joint before it is looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Prior {
     pub(crate) point: Point3<f64>,

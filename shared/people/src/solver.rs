@@ -44,7 +44,7 @@ pub struct Solved {
     pub n_views: [usize; N],
 }
 
-/// What is known of a joint from the frames before.
+/// Knowledge of a joint from the frames before.
 #[derive(Debug, Clone, Copy)]
 struct Past {
     point: Point3<f64>,
@@ -54,7 +54,7 @@ struct Past {
     seen_s: f64,
 }
 
-/// What is known of a person from the frames before.
+/// Knowledge of a person from the frames before.
 #[derive(Debug, Clone, Default)]
 struct Knowledge {
     joints: [Option<Past>; N],
@@ -174,7 +174,7 @@ impl Solver {
     }
 }
 
-/// What a place is worth for a joint.
+/// Weighs what a place is worth for a joint.
 fn choice(place: &Hypothesis, prior: Option<Prior>) -> Choice {
     let moved = prior.map_or(0.0, |prior| {
         let z = (place.place - prior.point).norm() / prior.sd;
@@ -201,7 +201,7 @@ fn remember(known: &mut Knowledge, time_s: f64, solved: &Solved) {
         let before = past.map_or_else(Vector3::zeros, |past| past.velocity);
         let velocity = before + NEW_VELOCITY * (measured.unwrap_or(before) - before);
         let is_seen = solved.n_views[joint] > 0;
-        let variance = solved.covariances[joint].map_or(0.0, |it| it.trace() / 3.0);
+        let variance = solved.covariances[joint].map_or(0.0, |covariance| covariance.trace() / 3.0);
         let seen_s = if is_seen {
             time_s
         } else {
@@ -228,12 +228,14 @@ fn refined(
     for _ in 0..2 {
         let views = candidates.chunk_by(|a, b| a.view == b.view);
         let best = views.filter_map(|view| {
-            let near = view.iter().filter(|it| it.sight.deviations(&at) < OUTLYING);
+            let near = view
+                .iter()
+                .filter(|candidate| candidate.sight.deviations(&at) < OUTLYING);
             near.max_by(|a, b| a.support(&at).total_cmp(&b.support(&at)))
         });
-        let weighted = best.map(|it| Sight {
-            heat: it.sight.heat * it.trust,
-            ..it.sight
+        let weighted = best.map(|candidate| Sight {
+            heat: candidate.sight.heat * candidate.trust,
+            ..candidate.sight
         });
         let rays: Vec<Sight> = weighted.collect();
         let met = settle(&rays, &at, prior)?;
@@ -251,7 +253,11 @@ fn candidates(
     (order, rays): (&[usize], &[Rays]),
 ) -> Vec<Candidate> {
     let mut all = Vec::new();
-    for (nth, view) in order.iter().enumerate().filter(|it| *it.1 < rays.len()) {
+    for (nth, view) in order
+        .iter()
+        .enumerate()
+        .filter(|(_, view)| **view < rays.len())
+    {
         let first = all.len();
         let name = named(joint, person.is_exchanged[*view]);
         let mut add = |sight: Option<Sight>, trust: f64| {
@@ -265,7 +271,9 @@ fn candidates(
             if person.detections[*view] == Some(index) {
                 add(sights[name], 1.0);
             } else {
-                let is_anybodys = people.iter().any(|it| it.detections[*view] == Some(index));
+                let is_anybodys = people
+                    .iter()
+                    .any(|other| other.detections[*view] == Some(index));
                 add(
                     sights[name],
                     if is_anybodys {
@@ -279,7 +287,10 @@ fn candidates(
         for sight in rays[*view].loose.get(name).into_iter().flatten() {
             add(Some(*sight), TRUST_LOOSE);
         }
-        let by_ray = |it: &Candidate| [it.sight.direction.x, it.sight.direction.y, it.trust];
+        let by_ray = |candidate: &Candidate| {
+            let direction = candidate.sight.direction;
+            [direction.x, direction.y, candidate.trust]
+        };
         all[first..].sort_by(|a, b| {
             let (a, b) = (by_ray(a), by_ray(b));
             let each = a.iter().zip(&b).map(|(a, b)| a.total_cmp(b));
@@ -300,7 +311,7 @@ fn rays(camera: &Camera, view: &View) -> Rays {
         detections: view
             .detections
             .iter()
-            .map(|it| sights(camera, it))
+            .map(|detection| sights(camera, detection))
             .collect(),
         loose: loose.collect(),
     }

@@ -65,7 +65,7 @@ pub(crate) fn ring(n: usize) -> Vec<Camera> {
     (0..n).map(camera).collect()
 }
 
-/// What the cameras see of people: some joints are missed, all are off.
+/// Shows people to the cameras: some joints are missed, all are off.
 ///
 /// * `noise_px`: standard deviation, pixels.
 pub(crate) fn seen(

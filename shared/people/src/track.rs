@@ -31,7 +31,7 @@ pub(crate) struct Track {
     /// `None` until it is clear that this is somebody.
     pub(crate) id: Option<u64>,
     pub(crate) coarse: Coarse,
-    /// Of the trunk, metres a second.
+    /// Velocity of the trunk, metres a second.
     pub(crate) velocity: Vector3<f64>,
     /// When the joints were last seen, and when any view last saw the person.
     pub(crate) placed_s: f64,
@@ -82,12 +82,12 @@ impl Track {
         self.state = State::Lost;
     }
 
-    /// Whether this may still become somebody.
+    /// Says if this may still become somebody.
     pub(crate) fn is_possible(&self) -> bool {
         self.history & 0b111 != 0
     }
 
-    /// Whether it was seen in enough of the last frames.
+    /// Says if it was seen in enough of the last frames.
     pub(crate) fn is_somebody(&self) -> bool {
         (self.history & RECENT).count_ones() >= FRAMES_OF_BIRTH
     }

@@ -6,9 +6,10 @@ use skeleton::body::{Covariances, Joints};
 
 use crate::assignment::{NEVER, assign};
 use crate::bones::Bones;
-use crate::cluster::{Member, Place, clusters};
+use crate::cluster::{Member, clusters};
 use crate::coarse::{Coarse, agree};
 use crate::distance::{of_people, to_person};
+use crate::frame::Place;
 use crate::track::Track;
 use crate::{Frame, Person, State, View};
 
@@ -32,14 +33,14 @@ const SAME_COLOUR: f64 = 0.2;
 /// Where nobody was known before, those are somebody at once whom so many views see.
 const VIEWS_AT_ONCE: usize = 3;
 
-/// What is to be tracked.
+/// Whom to track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// The most people at once.
     pub max: usize,
     /// The least number of views that see a person, 2 or more.
     pub min_views: usize,
-    /// Whether left and right follow the picture, so that two views may have them exchanged.
+    /// Set if left and right follow the picture, so that two views may have them exchanged.
     pub as_seen: bool,
 }
 
@@ -72,7 +73,7 @@ pub struct Remembered {
     pub colour: Option<[f64; 3]>,
 }
 
-/// What a tracker that takes up the work of another has to know.
+/// Everything that a tracker has to know to take up the work of another.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Memory {
     /// The id of the next new person is one more, or more.
@@ -129,7 +130,7 @@ impl Tracker {
         }
     }
 
-    /// What another tracker has to know to go on from here.
+    /// Returns what another tracker has to know to go on from here.
     pub fn memory(&self) -> Memory {
         let known = self.tracks.iter().filter_map(remembered);
         Memory {

@@ -39,7 +39,7 @@ pub struct Put {
 
 impl Put {
     /// By the rule of 4D Association: the bottom of the head is the middle of the shoulders and of the ears, its top 0.125 m along the face
-    /// and 0.145 m up. The ears are [`EARS`] of the way from the neck to the top of the head.
+    /// and 0.145 m up. The ears lie at 1 / 1.8 of the way from the neck to the top of the head.
     pub fn new(id: u64, joints: &Joints) -> Self {
         let middle = |a: usize, b: usize| Some(nalgebra::center(&joints[a]?, &joints[b]?));
         let [shoulders, hips] = [middle(8, 9), middle(2, 3)];
@@ -54,7 +54,7 @@ impl Put {
             .map(|(shoulders, ears)| nalgebra::center(&shoulders, &ears));
         let face = || {
             let across = joints[8]? - joints[9]?;
-            Some((shoulders? - hips?).cross(&across).normalize())
+            (shoulders? - hips?).cross(&across).try_normalize(1e-9)
         };
         let face = face().unwrap_or_else(Vector3::zeros);
         all[13] = all[12].map(|bottom| bottom + face * 0.125 + Vector3::new(0.0, 0.0, 0.145));
@@ -84,7 +84,8 @@ pub struct Actor {
     pub n_found: usize,
     /// How often the id changed.
     pub switches: usize,
-    last_id: Option<u64>,
+    /// The id in the last frame in which the person was found.
+    pub last_id: Option<u64>,
 }
 
 /// The score of a run.

@@ -1,4 +1,4 @@
-//! What came of a run, as numbers.
+//! A run, summed up in numbers.
 
 use std::collections::BTreeMap;
 

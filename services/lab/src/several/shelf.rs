@@ -50,7 +50,7 @@ pub enum ShelfError {
     Calibration {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The reason.
         reason: String,
     },
     /// A text file of numbers is not what it should be.
@@ -60,7 +60,7 @@ pub enum ShelfError {
         path: PathBuf,
         /// Which number of the file, from 1.
         number: usize,
-        /// What it should be.
+        /// A description of what it should be.
         expected: &'static str,
     },
 }
@@ -74,7 +74,7 @@ pub struct TruePerson {
     pub joints: [Point3<f64>; N_TRUE],
 }
 
-/// Whether a folder has this layout.
+/// Says if a folder has this layout.
 pub fn is_one(folder: &Path) -> bool {
     ["calibration.json", "gt.txt", "detection/0.txt"]
         .iter()
@@ -86,7 +86,7 @@ pub fn is_one(folder: &Path) -> bool {
 pub struct Shelf {
     /// The cameras.
     pub cameras: Vec<Camera>,
-    /// What was found, frame by frame, view by view.
+    /// Detections, frame by frame, view by view.
     pub frames: Vec<Vec<View>>,
     /// Who was there, frame by frame.
     pub truth: Vec<Vec<TruePerson>>,
@@ -277,7 +277,10 @@ fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> View {
     for (field, strengths) in fields.iter().enumerate() {
         let [from, to] = [FIELDS[0][field], FIELDS[1][field]];
         let n_to = candidates[to].len().max(1);
-        let each = strengths.iter().enumerate().filter(|it| *it.1 > 0.0);
+        let each = strengths
+            .iter()
+            .enumerate()
+            .filter(|(_, strength)| **strength > 0.0);
         edges.extend(each.map(|(nth, strength)| Edge {
             strength: *strength,
             ends: [(from, nth / n_to), (to, nth % n_to)],

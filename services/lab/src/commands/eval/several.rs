@@ -56,15 +56,11 @@ fn chosen(asked: &[usize], n_views: usize) -> Result<Vec<usize>, Failure> {
 
 fn in_lines(report: &Report) -> String {
     let number = |measured: &Option<Measured>| {
-        measured.map_or_else(
-            || "-".to_owned(),
-            |it| {
-                format!(
-                    "{:.2} ({:.2} to {:.2})",
-                    it.value, it.interval[0], it.interval[1]
-                )
-            },
-        )
+        let Some(Measured { value, interval }) = measured else {
+            return "-".to_owned();
+        };
+        let [low, high] = interval;
+        format!("{value:.2} ({low:.2} to {high:.2})")
     };
     let actor = |actor: &ActorReport| {
         let parts: Vec<String> = actor
