@@ -7,8 +7,8 @@ use geometry::Camera;
 use geometry::files::ReadOptions;
 use nalgebra::{Point3, Vector3};
 use people::{Detection, Keypoint, Person, Settings, Tracker, View};
-use statistics::score::Bootstrap;
 use serde_json::Value;
+use statistics::score::Bootstrap;
 
 use crate::shared_dir;
 

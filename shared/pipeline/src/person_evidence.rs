@@ -37,10 +37,10 @@ impl<'a> PersonEvidence<'a> {
     ///
     /// * `others`: the other people in the view. Of a joint of theirs that they show more clearly than these maps show it there, nothing is
     ///   left in these maps: the network saw it in the window of this person as well.
-    pub(crate) fn new<'b>(
+    pub(crate) fn new(
         maps: PersonMaps<'a>,
         sighting: &Sighting,
-        others: impl Iterator<Item = &'b Sighting>,
+        others: &[&Sighting],
         settings: MapSettings,
     ) -> Option<Self> {
         let [left, top, right, bottom] = sighting.outline()?;
@@ -200,8 +200,7 @@ mod tests {
         let maps = PersonMaps::new(GRID, &values, settings.floor());
         let me = sighting(others, 0.6);
         let seen = |other: &Sighting| {
-            let others = core::iter::once(other);
-            let evidence = PersonEvidence::new(maps, &me, others, settings).unwrap();
+            let evidence = PersonEvidence::new(maps, &me, &[other], settings).unwrap();
             let heat = |cell: [f64; 2]| settings.heat(evidence.at(KNEE, GRID.place(cell)));
             let best = evidence.maxima(KNEE)[0].0;
             ([heat(own), heat(others)], GRID.cell(best).map(f64::round))

@@ -165,7 +165,8 @@ impl PersonStep {
             let others = others.filter(|(other, _)| *other != nth);
             let others =
                 others.filter_map(|(_, it)| answer.people.get((*it.candidates.get(view)?)?));
-            let evidence = PersonEvidence::new(*maps, sighting, others, maps_settings);
+            let others: Vec<&Sighting> = others.collect();
+            let evidence = PersonEvidence::new(*maps, sighting, &others, maps_settings);
             let Some(mut evidence) = evidence else {
                 continue;
             };
