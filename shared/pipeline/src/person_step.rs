@@ -145,7 +145,6 @@ impl PersonStep {
             evidence,
             people,
         } = *frame;
-        let maps_settings = self.rig.settings.maps;
         let mut shown = Vec::new();
         for (view, candidate) in people.people[nth].candidates.iter().enumerate() {
             let (Some(candidate), Some(Some(answer)), Some(maps)) =
@@ -161,12 +160,7 @@ impl PersonStep {
             ) else {
                 continue;
             };
-            let others = people.people.iter().enumerate();
-            let others = others.filter(|(other, _)| *other != nth);
-            let others =
-                others.filter_map(|(_, it)| answer.people.get((*it.candidates.get(view)?)?));
-            let others: Vec<&Sighting> = others.collect();
-            let evidence = PersonEvidence::new(*maps, sighting, &others, maps_settings);
+            let evidence = PersonEvidence::new(*maps, sighting);
             let Some(mut evidence) = evidence else {
                 continue;
             };

@@ -40,11 +40,6 @@ impl MapSettings {
         ((f64::from(evidence) / self.lambda).exp() - self.eps).clamp(0.0, 1.0)
     }
 
-    /// The evidence of a heat, as maps have it.
-    pub fn evidence(&self, heat: f64) -> f32 {
-        self.of_heat(heat, self.floor())
-    }
-
     /// The evidence of a heat. One below a hundred-thousandth counts as none, which spares most cells the logarithm.
     ///
     /// * `floor`: [`Self::floor`].
