@@ -55,7 +55,6 @@ enum Port {
 /// The evidence of a view, which crosses as Gaussians with its poses.
 struct Evidence {
     port: SliceSubscriber<f32, EvidenceHeader>,
-    maps: ViewMaps,
     /// The frame of the newest, and its bytes.
     newest: Option<(u64, Vec<u8>)>,
 }
@@ -68,7 +67,7 @@ impl Evidence {
             if header.stamp.session != session || header.status != Status::OK {
                 continue;
             }
-            match self.maps.pack(header, sample.payload()) {
+            match ViewMaps::pack(header, sample.payload()) {
                 Ok(bytes) => self.newest = Some((header.stamp.frame, bytes)),
                 Err(error) => tracing::warn!(%error, "evidence that does not cross"),
             }
@@ -193,13 +192,9 @@ fn lanes(
             deployment::hosts::Carry::Poses => {
                 let name = topic::view_pose(view);
                 let port = Receiver::open(bus, Kind::ViewPose, &name, waiter, false)?;
-                let evidence = job.maps.get(view).map(|maps| {
+                let evidence = job.maps.get(view).map(|_| {
                     let port = bus.slice_subscriber(&topic::evidence(view), waiter)?;
-                    Ok::<_, Failure>(Evidence {
-                        port,
-                        maps: maps.clone(),
-                        newest: None,
-                    })
+                    Ok::<_, Failure>(Evidence { port, newest: None })
                 });
                 add(
                     Port::Message(Content::ViewPose, port),

@@ -51,11 +51,7 @@ impl ViewMaps {
     /// # Errors
     ///
     /// It is not that of a view.
-    pub(crate) fn pack(
-        &self,
-        header: &EvidenceHeader,
-        values: &[f32],
-    ) -> Result<Vec<u8>, WireError> {
+    pub(crate) fn pack(header: &EvidenceHeader, values: &[f32]) -> Result<Vec<u8>, WireError> {
         let gaussian = |bump: Bump| Gaussian {
             joint: bump.joint as u32,
             at: bump.at,
@@ -206,7 +202,9 @@ mod tests {
         let checked = view.unpack(&maps().to_bytes()).unwrap();
         let mut values = vec![0.0; checked.n_values()];
         let header = checked.fill(&mut values);
-        let again = view.unpack(&view.pack(&header, &values).unwrap()).unwrap();
+        let again = view
+            .unpack(&ViewMaps::pack(&header, &values).unwrap())
+            .unwrap();
         let mut others = vec![0.0; again.n_values()];
         assert_eq!(again.fill(&mut others), header);
         let settings = MapSettings::default();

@@ -48,9 +48,8 @@ fn assert_one_process_gives_the_same(case: &Case, pictures: &[Vec<Canvas>; 4]) {
             })
             .collect();
         let estimate = one.estimate(&sent).unwrap();
-        let [person] = &estimate.skeletons[..] else {
-            panic!("{} people", estimate.skeletons.len());
-        };
+        assert_eq!(estimate.skeletons.len(), 1, "frame {frame}");
+        let person = &estimate.skeletons[0];
         assert_same_skeleton(line, frame, &person.skeleton);
         n_joints += person.skeleton.joints.iter().flatten().count();
     }

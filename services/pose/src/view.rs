@@ -66,7 +66,7 @@ impl View<'_> {
         if let Ok(found) = outcome
             && let Some(loan) = found.evidence
         {
-            send_evidence(&turn, found.header, loan)?;
+            send_evidence(&turn, &found.header, loan)?;
             let n_bytes = message.evidence_bytes;
             self.service.health().sent_evidence(n_bytes);
         }
@@ -153,12 +153,11 @@ impl View<'_> {
         };
         let n_values = step.layout().n_values(&scope);
         let (loan_nanos, mut loan) = self.loan(n_values)?;
-        let estimate = match &mut loan {
-            Some(loan) => step.run(image, scope, loan.payload_mut()),
-            None => {
-                responses.resize(responses.len().max(n_values), 0.0);
-                step.run(image, scope, responses)
-            }
+        let estimate = if let Some(loan) = &mut loan {
+            step.run(image, scope, loan.payload_mut())
+        } else {
+            responses.resize(responses.len().max(n_values), 0.0);
+            step.run(image, scope, responses)
         };
         let is_there = !estimate.candidates.is_empty();
         Ok(Searching {
@@ -210,7 +209,7 @@ impl<'a> Searching<'a> {
 
 fn send_evidence(
     turn: &Turn,
-    header: EvidenceHeader,
+    header: &EvidenceHeader,
     mut loan: Loan<'_, f32, EvidenceHeader>,
 ) -> Result<(), Failure> {
     *loan.header_mut() = EvidenceHeader {
@@ -219,7 +218,7 @@ fn send_evidence(
             received_at_nanos: turn.received_at(),
             sent_at_nanos: now_nanos(),
         },
-        ..header
+        ..*header
     };
     loan.send()?;
     Ok(())

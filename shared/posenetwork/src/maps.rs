@@ -90,7 +90,10 @@ pub const MOST_CELLS: usize = 1 << 15;
 /// By how many cells two that are kept lie apart, so that at most [`MOST_CELLS`] are.
 fn coarseness([rows, columns]: [usize; 2]) -> usize {
     let area = |every: &usize| rows.div_ceil(*every) * columns.div_ceil(*every);
-    (1..).find(|every| area(every) <= MOST_CELLS).unwrap_or(1)
+    let most = rows.max(columns).max(1);
+    (1..=most)
+        .find(|every| area(every) <= MOST_CELLS)
+        .unwrap_or(most)
 }
 
 /// Cells between two columns or rows of a grid that is made for a codec without maps.

@@ -85,7 +85,7 @@ pub(super) fn listen(
                 remote: index,
                 down: topics.down(&host.name),
                 size: job.sizes.get(view).copied().unwrap_or_default(),
-                maps: job.maps.get(view).cloned(),
+                maps: job.maps.get(view).copied(),
                 arrived: sender.clone(),
             };
             let thread = std::thread::Builder::new().name(format!("decode-{view}"));
