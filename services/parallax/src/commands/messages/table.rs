@@ -3,10 +3,10 @@
 use core::mem::offset_of;
 
 use messages::{
-    CameraCounts, EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, Kept, LocalMessage,
-    Metrics, MetricsRow, PairHypothesis, PairPose, People, PersonMessage, PictureHeader,
-    PoseMessage, Searched, Sides, SkeletonMessage, Skeletons, Span, Stamp, Status, TimedBy, Timing,
-    ViewPose, ViewQuality, topic,
+    CameraCounts, EvidenceHeader, FrameHeader, FusedView, GridMessage, Health, Joint3d, Kept,
+    LocalMessage, Metrics, MetricsRow, PairHypothesis, PairPose, People, PersonMessage,
+    PictureHeader, PoseMessage, Searched, Sides, SkeletonMessage, Skeletons, Span, Stamp, Status,
+    TimedBy, Timing, ViewPose, ViewQuality, topic,
 };
 
 /// The type of a field.
@@ -160,11 +160,12 @@ structs! {
         connection name reserved;
     PoseMessage, "PoseMessage.v1": score level n_parts x y mixture;
     LocalMessage, "LocalMessage.v1": response contrast margin;
-    ViewPose, "ViewPose.v7":
-        stamp timing status n_candidates width height evidence_bytes skew_nanos searched n_keypoints candidates local
-        front heats keypoints;
-    EvidenceHeader, "EvidenceHeader.v3":
-        stamp timing width height status n_levels x y scope_levels levels best size reserved;
+    ViewPose, "ViewPose.v8":
+        stamp timing status n_candidates width height evidence_bytes skew_nanos searched n_keypoints candidates joints
+        local front heats keypoints;
+    GridMessage, "GridMessage.v1": first_px cell_px size;
+    EvidenceHeader, "EvidenceHeader.v4":
+        stamp timing width height status n_levels n_people padding people x y scope_levels levels best size reserved;
     ViewQuality, "ViewQuality.v2":
         stamp timing status n_parts sigma_px n_thresholds network tau_px tile took_nanos;
     PairHypothesis, "PairHypothesis.v1":
