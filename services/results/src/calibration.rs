@@ -230,7 +230,15 @@ mod tests {
             has_maps: true,
             ..scene
         };
-        assert_eq!(parts(&maps, &record, 0).unwrap().len(), 1);
+        let seen = pipeline::Sighting {
+            joints: [Some([9.0, 7.0]); 14],
+            heats: [0.9; 14],
+            score: 0.5,
+            front: [0.0; 2],
+            extras: Vec::new(),
+        };
+        record.views[0].pose = wire::sightings_to_message(&[seen], 0, [80, 60]).ok();
+        assert_eq!(parts(&maps, &record, 0).unwrap().len(), skeleton::N_PARTS);
     }
 
     #[test]

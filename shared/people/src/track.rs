@@ -19,6 +19,9 @@ const NEW_VELOCITY: f64 = 0.5;
 const REACH_M: f64 = 0.25;
 const REACH_M_PER_S: f64 = 0.5;
 const LONGEST_S: f64 = 1.0;
+/// Frames that are farther apart show who runs elsewhere, and how far for every second.
+const SOON_S: f64 = 0.1;
+const FAST_M_PER_S: f64 = 4.0;
 /// A glimpse keeps this share of the velocity, and makes the time since the joints were seen shorter by it.
 const GLIMPSED: f64 = 0.5;
 /// A person is somebody who was seen in this many of the last five frames.
@@ -71,8 +74,12 @@ impl Track {
     }
 
     /// How far away a detection may be, metres.
-    pub(crate) fn reach(&self, time_s: f64) -> f64 {
-        REACH_M + REACH_M_PER_S * (time_s - self.placed_s).clamp(0.0, LONGEST_S)
+    ///
+    /// * `gap_s`: since the frame before.
+    pub(crate) fn reach(&self, time_s: f64, gap_s: f64) -> f64 {
+        let unseen_s = (time_s - self.placed_s).clamp(0.0, LONGEST_S);
+        let rare_s = (gap_s - SOON_S).clamp(0.0, LONGEST_S);
+        REACH_M + REACH_M_PER_S * unseen_s + FAST_M_PER_S * rare_s
     }
 
     /// Begins a frame without having been seen in it.

@@ -30,7 +30,7 @@ const REMEMBERED_S: f64 = 60.0;
 const SAME_BONES: f64 = 0.06;
 const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
-/// Where nobody was known before, those are somebody at once whom so many views see.
+/// Somebody new is seen by so many views, or by all of fewer.
 const VIEWS_AT_ONCE: usize = 3;
 
 /// Whom to track.
@@ -86,8 +86,8 @@ pub struct Memory {
 ///
 /// 1. Everybody is expected where they go. 2. In every view detections are assigned to people, those whose rays pass nearest. 3. Of what
 ///    is left, detections of different views whose rays pass near each other are one person. 4. A detection that contradicts its person
-///    goes back to 3, once; what has no bones of a person is nobody. 5. Somebody new is given after three of five frames, and at once where
-///    nobody was known and three views agree. Who was not seen for a second is gone, and known again by the bones and the colour of the
+///    goes back to 3, once; what has no bones of a person is nobody. 5. Somebody new is given whom three views see, or all of fewer: after three of
+///    five frames, and at once where nobody who is known is seen. Who was not seen for a second is gone, and known again by the bones and the colour of the
 ///    trunk within a minute.
 #[derive(Debug, Clone)]
 pub struct Tracker {
@@ -98,12 +98,16 @@ pub struct Tracker {
     tracks: Vec<Track>,
     gone: Vec<Remembered>,
     last_id: u64,
+    /// When the last frame was taken, seconds.
+    last_s: Option<f64>,
 }
 
 /// The frame that is looked at, and where the people of the frames before are expected in it.
 struct Now<'a> {
     frame: &'a Frame,
     time_s: f64,
+    /// Since the frame before, seconds.
+    gap_s: f64,
     expected: &'a [Joints],
 }
 
@@ -127,6 +131,7 @@ impl Tracker {
             tracks: memory.people.iter().map(revived).collect(),
             gone: Vec::new(),
             last_id: memory.last_id.max(last_id.unwrap_or(0)),
+            last_s: None,
         }
     }
 
@@ -145,7 +150,6 @@ impl Tracker {
     /// * `views`: in the order of the cameras; a view that is missing sees nobody.
     pub fn step(&mut self, time_s: f64, views: &[View]) -> Vec<Person> {
         let frame = Frame::new(&self.cameras, &self.order, views, self.settings.as_seen);
-        let was_empty = self.tracks.iter().all(|track| track.id.is_none());
         let expected: Vec<Joints> = self
             .tracks
             .iter()
@@ -157,6 +161,7 @@ impl Tracker {
         let now = Now {
             frame: &frame,
             time_s,
+            gap_s: self.last_s.map_or(0.0, |last| time_s - last),
             expected: &expected,
         };
         self.tracks.iter_mut().for_each(Track::wait);
@@ -170,7 +175,8 @@ impl Tracker {
             self.group(&now, &mut free);
         }
         self.bury(time_s);
-        let births = self.births(&frame, time_s, was_empty);
+        let births = self.births(&frame, time_s);
+        self.last_s = Some(time_s);
         self.mark_near();
         self.people(&frame, &births)
     }
@@ -195,7 +201,7 @@ impl Tracker {
                     &now.expected[track],
                     frame.as_seen,
                 );
-                fit.filter(|fit| fit.distance < self.tracks[track].reach(now.time_s))
+                fit.filter(|fit| fit.distance < self.tracks[track].reach(now.time_s, now.gap_s))
             };
             let fits: Vec<_> = (0..rows.len())
                 .map(|row| {
@@ -264,7 +270,12 @@ impl Tracker {
 
     /// Gives a group to the person whom it shows: one who was placed, one who was missed, or a new one.
     fn take(&mut self, now: &Now<'_>, members: Vec<Member>, person: &Coarse) {
-        let &Now { frame, time_s, .. } = now;
+        let &Now {
+            frame,
+            time_s,
+            gap_s,
+            ..
+        } = now;
         let is_placed = |track: &Track| track.state == State::Tracked;
         let twin = self.tracks.iter_mut().find(|track| {
             let distance = of_people(&track.coarse.joints, &person.joints);
@@ -292,7 +303,7 @@ impl Tracker {
         let missed = missed.filter(|(_, (track, _))| !is_placed(track));
         let near = missed.filter_map(|(nth, (track, expected))| {
             let distance = of_people(expected, &person.joints)?;
-            let is_near = distance < track.reach(time_s) + TAKEN_UP_M;
+            let is_near = distance < track.reach(time_s, gap_s) + TAKEN_UP_M;
             is_near.then_some((track.id.is_none(), distance, nth))
         });
         let nearest = near.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -321,12 +332,15 @@ impl Tracker {
     }
 
     /// Gives ids to those who are somebody by now.
-    fn births(&mut self, frame: &Frame, time_s: f64, was_empty: bool) -> Vec<u64> {
+    fn births(&mut self, frame: &Frame, time_s: f64) -> Vec<u64> {
+        let is_known = |track: &Track| track.id.is_some() && track.state != State::Lost;
+        let is_empty = !self.tracks.iter().any(is_known);
         let needed = VIEWS_AT_ONCE.min(frame.n_seeing()).max(2);
         let mut births = Vec::new();
         for nth in 0..self.tracks.len() {
             let track = &self.tracks[nth];
-            let is_clear = was_empty && track.members.len() >= needed;
+            // What two views of many see is often nobody: rays of two people meet as well.
+            let is_clear = track.members.len() >= needed;
             let n_known = self
                 .tracks
                 .iter()
@@ -334,7 +348,8 @@ impl Tracker {
                 .count();
             let is_born = track.id.is_none()
                 && track.state == State::Tracked
-                && (is_clear || track.is_somebody())
+                && is_clear
+                && (is_empty || track.is_somebody())
                 && n_known < self.settings.max;
             if !is_born {
                 continue;

@@ -100,7 +100,8 @@ impl<'a> PersonMaps<'a> {
         between(self.map(joint), columns, &down, &across)
     }
 
-    /// The highest maxima of a joint's map, at cells: pixels of the picture, and the evidence there; the best first.
+    /// The highest maxima of a joint's map: pixels of the picture, and the evidence of their cells; the best first. Each lies where the
+    /// parabolas through its cell and the neighbours are highest: the logarithm of a Gaussian is one.
     ///
     /// * `n`: at most so many.
     /// * `is_wanted`: whether a place counts, pixels of the picture.
@@ -127,7 +128,14 @@ impl<'a> PersonMaps<'a> {
                 if !is_highest {
                     continue;
                 }
-                let at = self.grid.place([column as f64, row as f64]);
+                let above = row.checked_sub(1).map(|row| map[row * columns + column]);
+                let below = map.get((row + 1) * columns + column).copied();
+                let left = column.checked_sub(1).map(|column| line[column]);
+                let right = line.get(column + 1).copied();
+                let away = [vertex(left, *here, right), vertex(above, *here, below)];
+                let at = self
+                    .grid
+                    .place([column as f64 + away[0], row as f64 + away[1]]);
                 if is_wanted(at) {
                     found.push((at, *here));
                 }
@@ -136,5 +144,19 @@ impl<'a> PersonMaps<'a> {
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         found.truncate(n);
         found
+    }
+}
+
+/// Where the parabola through a maximum and its neighbours is highest, cells from the maximum; 0 at an edge.
+fn vertex(before: Option<f32>, here: f32, after: Option<f32>) -> f64 {
+    let (Some(before), Some(after)) = (before, after) else {
+        return 0.0;
+    };
+    let [before, here, after] = [before, here, after].map(f64::from);
+    let bend = before - 2.0 * here + after;
+    if bend < 0.0 {
+        (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
+    } else {
+        0.0
     }
 }

@@ -29,9 +29,10 @@ pub enum Kind {
 }
 
 /// The types that a schema may refer to.
-const PARTS: [(&str, &str); 9] = [
+const PARTS: [(&str, &str); 10] = [
     ("Stamp", include_str!("../msg/Stamp.msg")),
     ("Timing", include_str!("../msg/Timing.msg")),
+    ("Grid", include_str!("../msg/Grid.msg")),
     ("Pose", include_str!("../msg/Pose.msg")),
     ("Local", include_str!("../msg/Local.msg")),
     ("PairHypothesis", include_str!("../msg/PairHypothesis.msg")),
