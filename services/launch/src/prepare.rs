@@ -14,7 +14,6 @@ use nalgebra::UnitVector3;
 use pipeline::{
     BodySettings, EstimatorSettings, SkeletonSettings, SpaceStepSettings, ViewSettings, WhoSettings,
 };
-use posenetwork::MapSettings;
 use skeleton::JointSet;
 use viewquality::Predictor;
 
@@ -282,6 +281,7 @@ pub(crate) fn who_settings(resolved: &Resolved, prepared: &Prepared) -> WhoSetti
     WhoSettings {
         follow: prepared.settings.follow,
         as_seen: resolved.sides_as_seen,
+        least_heat: least_heat(&resolved.deployment),
         n_people: resolved.deployment.network.people,
         n_restarts: 0,
     }
@@ -304,11 +304,7 @@ pub(crate) fn frame_scale(framing: &Framing) -> f64 {
     1.0 / (a * d - b * c).abs().sqrt()
 }
 
-/// Least score of somebody whom a view sees well; none with the filters, which have scores of their own.
-pub(crate) fn least_score(deployment: &Deployment) -> f32 {
-    if deployment.has_maps() {
-        MapSettings::default().score_of_heat(deployment.network.least_heat)
-    } else {
-        f32::NEG_INFINITY
-    }
+/// Heat that half of the joints of somebody whom a view sees well have, 0 to 1.
+pub(crate) fn least_heat(deployment: &Deployment) -> f64 {
+    2.0 * deployment.network.least_heat
 }

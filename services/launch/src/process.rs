@@ -19,7 +19,7 @@ use viewquality::Forecaster;
 
 use crate::find_every::{self, FOLLOWED_S};
 use crate::hosts;
-use crate::prepare::{Prepared, frame_scale, framing, least_score, space_settings, who_settings};
+use crate::prepare::{Prepared, frame_scale, framing, least_heat, space_settings, who_settings};
 use crate::recorded;
 use crate::resolved::Resolved;
 
@@ -341,7 +341,7 @@ fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         views: views.collect(),
         model: prepared.model,
         has_maps: deployment.has_maps(),
-        least_score: least_score(deployment),
+        least_heat: least_heat(deployment),
         joints: prepared.settings.skeleton.joints,
         extra_keypoints: resolved.extra_keypoints.clone(),
         frame_rate_hz: resolved.frame_rate_hz(),

@@ -239,6 +239,11 @@ mod tests {
         };
         record.views[0].pose = wire::sightings_to_message(&[seen], 0, [80, 60]).ok();
         assert_eq!(parts(&maps, &record, 0).unwrap().len(), skeleton::N_PARTS);
+        let strict = Scene {
+            least_heat: 0.95,
+            ..maps
+        };
+        assert_eq!(parts(&strict, &record, 0), None);
     }
 
     #[test]
@@ -248,11 +253,6 @@ mod tests {
         assert_eq!(parts(&scene, &record, 0).unwrap().len(), 1);
         record.skeletons.people[0].views[0].status = Status::NO_DETECTION;
         assert_eq!(parts(&scene, &record, 0), None);
-        let strict = Scene {
-            least_score: f32::INFINITY,
-            ..scene.clone()
-        };
-        assert_eq!(parts(&strict, &record, 1), None);
         record.views[1].pose = None;
         assert_eq!(parts(&scene, &record, 1), None);
         record.skeletons.people[0].n_views = 0;

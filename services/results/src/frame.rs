@@ -119,7 +119,9 @@ impl FrameRecord {
         let read = if scene.has_maps {
             wire::sightings_from_message(message, message.n_keypoints as usize).map(|seen| {
                 let people = seen.into_iter().flat_map(|seen| seen.people);
-                people.map(|person| Own::seen(&person)).collect()
+                people
+                    .map(|person| Own::seen(&person, scene.least_heat))
+                    .collect()
             })
         } else {
             let layout = &scene.views[view].layout;
@@ -181,15 +183,18 @@ pub(crate) struct Own {
     /// The parts of the body, pixels of the frame, by the names of the view; NaN for one that is not seen.
     pub(crate) centres_px: Vec<[f64; 2]>,
     pub(crate) score: f32,
+    /// Whether the view is sure that it is a person.
+    pub(crate) is_clear: bool,
     /// By the paper's method.
     pub(crate) pose: Option<Pose>,
 }
 
 impl Own {
-    fn seen(person: &Sighting) -> Self {
+    fn seen(person: &Sighting, least_heat: f64) -> Self {
         Self {
             centres_px: pipeline::parts_of(&person.places(false)),
             score: person.score,
+            is_clear: person.is_clear(least_heat),
             pose: None,
         }
     }
@@ -198,6 +203,7 @@ impl Own {
         Self {
             centres_px: pose.centres(&scene.model, &scene.views[view].layout),
             score: pose.score,
+            is_clear: true,
             pose: Some(pose),
         }
     }

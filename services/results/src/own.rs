@@ -19,9 +19,7 @@ pub(crate) fn readings(
     record: &FrameRecord,
     view: usize,
 ) -> Option<[Vec<[f64; 2]>; 2]> {
-    let best = record
-        .own(scene, view)
-        .filter(|own| own.score >= scene.least_score)?;
+    let best = record.own(scene, view).filter(|own| own.is_clear)?;
     let named = best.centres_px;
     let mirror = scene.model.spec().mirror.as_deref();
     let exchanged = mirror.map(|it| it.iter().map(|part| named[*part]).collect());

@@ -28,8 +28,8 @@ pub struct Scene {
     pub views: Vec<View>,
     /// Whether the candidates of a view are the people that a network sees: which of them is the person is fusion's to say.
     pub has_maps: bool,
-    /// Least score of a candidate that tells whether the cameras stand where they should; with a lower one a view sees nobody.
-    pub least_score: f32,
+    /// Heat that half of the joints of a person have who tells whether the cameras stand where they should, 0 to 1.
+    pub least_heat: f64,
     /// The joints of the result.
     pub joints: &'static JointSet,
     /// Names of the extra keypoints of the result.

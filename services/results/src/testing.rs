@@ -44,7 +44,7 @@ pub(crate) fn scene() -> Scene {
         frame_rate_hz: Some(60.0),
         frame_step: 2,
         has_maps: false,
-        least_score: f32::NEG_INFINITY,
+        least_heat: 0.0,
         follow: deployment::person::Follow::default(),
         up_in_world: Some(Vector3::z_axis()),
     }

@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 mod assignment;
+mod settings;
 mod sight;
 
 mod distance;
@@ -36,8 +37,9 @@ use nalgebra::Vector3;
 use skeleton::body::{Covariances, Joints};
 
 pub(crate) use frame::Frame;
+pub use settings::Settings;
 pub use solver::{Solved, Solver};
-pub use tracker::{Memory, Remembered, Settings, Tracker};
+pub use tracker::{Memory, Remembered, Tracker};
 
 /// Number of joints, those of `skeleton::PARSE14`.
 pub(crate) const N: usize = skeleton::body::N_JOINTS;
@@ -77,6 +79,14 @@ pub struct Detection {
     pub joints: [Option<Keypoint>; N],
     /// The colour of the trunk, each channel from 0 to 1; tells people apart who leave and come back.
     pub colour: Option<[f64; 3]>,
+}
+
+impl Detection {
+    /// Whether half of the joints are seen well.
+    pub(crate) fn is_clear(&self, least_heat: f64) -> bool {
+        let joints = self.joints.iter().flatten();
+        joints.filter(|joint| joint.heat >= least_heat).count() >= N / 2
+    }
 }
 
 /// Everything that a detector found in a view.

@@ -10,6 +10,7 @@ use crate::cluster::{Member, clusters};
 use crate::coarse::{Coarse, agree};
 use crate::distance::{of_people, to_person};
 use crate::frame::Place;
+use crate::settings::Settings;
 use crate::track::Track;
 use crate::{Frame, Person, State, View};
 
@@ -32,27 +33,6 @@ const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
 /// Somebody new is seen by so many views, or by all of fewer.
 const VIEWS_AT_ONCE: usize = 3;
-
-/// Whom to track.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Settings {
-    /// The most people at once.
-    pub max: usize,
-    /// The least number of views that see a person, 2 or more.
-    pub min_views: usize,
-    /// Set if left and right follow the picture, so that two views may have them exchanged.
-    pub as_seen: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            max: 4,
-            min_views: 2,
-            as_seen: false,
-        }
-    }
-}
 
 /// A person as a [`Memory`] holds it.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,7 +129,7 @@ impl Tracker {
     /// * `time_s`: when the frame was taken; not before the last one.
     /// * `views`: in the order of the cameras; a view that is missing sees nobody.
     pub fn step(&mut self, time_s: f64, views: &[View]) -> Vec<Person> {
-        let frame = Frame::new(&self.cameras, &self.order, views, self.settings.as_seen);
+        let frame = Frame::new(&self.cameras, &self.order, views, &self.settings);
         let expected: Vec<Joints> = self
             .tracks
             .iter()
@@ -340,7 +320,8 @@ impl Tracker {
         for nth in 0..self.tracks.len() {
             let track = &self.tracks[nth];
             // What two views of many see is often nobody: rays of two people meet as well.
-            let is_clear = track.members.len() >= needed;
+            let clear = track.members.iter().filter(|it| frame.is_clear(it.at));
+            let is_clear = track.members.len() >= needed && clear.count() >= 2;
             let n_known = self
                 .tracks
                 .iter()

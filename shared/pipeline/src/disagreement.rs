@@ -27,9 +27,9 @@ pub(crate) struct FoundByViews<'a> {
     pub(crate) answers: &'a [Option<Sightings>],
     /// Whether a view has a part in the result.
     pub(crate) takes_part: &'a [bool],
-    /// Least score of a candidate of a view without a part in the result, for which the view counts as one that sees the person
-    /// elsewhere.
-    pub(crate) least_score: f32,
+    /// Heat of half of the joints of a candidate of a view without a part in the result, for which the view counts as one that sees the
+    /// person elsewhere.
+    pub(crate) least_heat: f64,
     pub(crate) joints: &'static JointSet,
 }
 
@@ -155,14 +155,11 @@ fn readings<'a>(
     view: usize,
     answer: &'a Sightings,
 ) -> impl Iterator<Item = Vec<[f64; 2]>> + 'a {
-    let least_score = if found_by.takes_part.get(view) == Some(&true) {
-        f32::NEG_INFINITY
-    } else {
-        found_by.least_score
-    };
+    let has_part = found_by.takes_part.get(view) == Some(&true);
+    let least_heat = found_by.least_heat;
     let joints = found_by.joints;
     let seen = answer.people.iter();
-    let seen = seen.filter(move |sighting| sighting.score >= least_score);
+    let seen = seen.filter(move |sighting| has_part || sighting.is_clear(least_heat));
     let each = seen.flat_map(|sighting| [(sighting, false), (sighting, true)]);
     each.map(move |(sighting, is_exchanged)| sighting.joints_of_set(joints, is_exchanged))
 }

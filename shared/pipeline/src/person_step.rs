@@ -122,7 +122,7 @@ impl PersonStep {
             plans,
             answers,
             takes_part: &takes_part,
-            least_score: settings.least_score,
+            least_heat: settings.least_heat,
             joints: settings.joints,
         };
         disagreement::measure(&found_by, &mut self.solved, &mut settled);

@@ -53,6 +53,17 @@ impl Sighting {
         }
     }
 
+    /// Whether half of the joints are seen well: what networks see in an empty room has fewer.
+    ///
+    /// * `least_heat`: of a joint that is seen well, 0 to 1.
+    pub fn is_clear(&self, least_heat: f64) -> bool {
+        let well = self
+            .heats
+            .iter()
+            .filter(|heat| f64::from(**heat) >= least_heat);
+        well.count() >= N / 2
+    }
+
     /// Where a joint is seen, pixels of the frame.
     pub fn joint(&self, joint: usize) -> Option<[f64; 2]> {
         self.joints[joint].map(|at| at.map(f64::from))

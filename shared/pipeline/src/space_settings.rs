@@ -16,9 +16,6 @@ pub struct SpaceStepSettings {
     pub maps: MapSettings,
     /// Heat that half of a person's joints have in two views each, 0 to 1.
     pub least_heat: f64,
-    /// Least score of a candidate of a view that has no part in a solution, for which the view counts as one that sees the person
-    /// elsewhere.
-    pub least_score: f32,
     /// Joints of the result.
     pub joints: &'static JointSet,
     /// Knowledge about bodies.
@@ -43,7 +40,6 @@ impl SpaceStepSettings {
             },
             maps,
             least_heat: 2.0 * least_heat,
-            least_score: maps.score_of_heat(least_heat),
             joints: &PARSE14,
             body: BodySettings::default(),
             sides: as_seen.then(SidesSettings::default),

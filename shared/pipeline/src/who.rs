@@ -5,6 +5,7 @@ use geometry::Camera;
 use posenetwork::expected_error;
 
 use crate::following::Follow;
+use crate::network_step::NetworkSettings;
 use crate::sighting::{Sighting, Sightings};
 
 /// The window of a network about a person, as a multiple of the longer side of the box around the joints.
@@ -31,12 +32,14 @@ pub struct FramePeople {
 }
 
 /// Settings of the step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WhoSettings {
     /// Which of several people comes first.
     pub follow: Follow,
     /// Whether left and right follow the picture, so that two views may have them exchanged.
     pub as_seen: bool,
+    /// Heat that half of the joints of somebody new have in two views, 0 to 1.
+    pub least_heat: f64,
     /// Most people at once.
     pub n_people: usize,
     /// How often the process was restarted.
@@ -48,7 +51,8 @@ impl Default for WhoSettings {
         Self {
             follow: Follow::default(),
             as_seen: false,
-            n_people: crate::network_step::NetworkSettings::default().n_people,
+            least_heat: 2.0 * NetworkSettings::default().least_heat,
+            n_people: NetworkSettings::default().n_people,
             n_restarts: 0,
         }
     }
@@ -71,6 +75,7 @@ impl WhoStep {
         let of_tracker = Settings {
             max: settings.n_people,
             as_seen: settings.as_seen,
+            least_heat: settings.least_heat,
             ..Settings::default()
         };
         let memory = Memory {
