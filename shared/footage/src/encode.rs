@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 
 use crate::source::log::Log;
-use crate::source::probe::missing;
+use crate::source::program::missing;
 use crate::{FootageError, Size};
 
 /// Quality of H.264, of 0 (lossless) to 51; and of MPEG-4, of 1 (best) to 31.

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use crate::programs::version_of;
 use crate::source::log::Log;
-use crate::source::probe::missing;
+use crate::source::program::missing;
 use crate::stream::{SHARE, outputs};
 use crate::{FootageError, Size, StreamEnd};
 

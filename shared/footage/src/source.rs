@@ -10,6 +10,7 @@ pub(crate) mod log;
 mod numbers;
 pub(crate) mod password;
 pub(crate) mod probe;
+pub(crate) mod program;
 mod sound;
 mod video;
 

@@ -18,7 +18,8 @@ use crate::sender::{SenderClock, inherited_pipe, times_of_sender};
 use crate::source::LiveAddress;
 use crate::source::log::{Log, summary};
 use crate::source::password::without_password_of;
-use crate::source::probe::{fraction, is_5_1, missing};
+use crate::source::probe::{fraction, is_5_1};
+use crate::source::program::missing;
 use crate::{FootageError, Pieces, Size};
 
 /// How long a stream may be silent before it counts as gone, seconds.

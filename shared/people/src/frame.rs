@@ -4,7 +4,6 @@ use core::cmp::Ordering;
 
 use geometry::Camera;
 
-use crate::settings::Settings;
 use crate::sight::{Sights, sights};
 use crate::{Detection, View};
 
@@ -19,8 +18,6 @@ pub(crate) struct Place {
 struct Prepared {
     sights: Sights,
     colour: Option<[f64; 3]>,
-    /// Whether half of the joints are seen well.
-    is_clear: bool,
     /// Index among the detections as they were given.
     given: usize,
 }
@@ -35,12 +32,7 @@ impl Frame {
     /// Takes what the views saw.
     ///
     /// * `order`: the views in the order in which they are taken.
-    pub(crate) fn new(
-        cameras: &[Camera],
-        order: &[usize],
-        views: &[View],
-        settings: &Settings,
-    ) -> Self {
+    pub(crate) fn new(cameras: &[Camera], order: &[usize], views: &[View], as_seen: bool) -> Self {
         let prepare = |view: &usize| {
             let given = views.get(*view).map_or(&[][..], |view| &view.detections);
             let mut indices: Vec<usize> = (0..given.len()).collect();
@@ -48,20 +40,14 @@ impl Frame {
             let prepared = indices.into_iter().map(|index| Prepared {
                 sights: sights(&cameras[*view], &given[index]),
                 colour: given[index].colour,
-                is_clear: given[index].is_clear(settings.least_heat),
                 given: index,
             });
             prepared.collect()
         };
         Self {
             views: order.iter().map(prepare).collect(),
-            as_seen: settings.as_seen,
+            as_seen,
         }
-    }
-
-    /// Whether half of the joints of a detection are seen well.
-    pub(crate) fn is_clear(&self, at: Place) -> bool {
-        self.views[at.view][at.index].is_clear
     }
 
     pub(crate) fn n_views(&self) -> usize {

@@ -81,14 +81,6 @@ pub struct Detection {
     pub colour: Option<[f64; 3]>,
 }
 
-impl Detection {
-    /// Whether half of the joints are seen well.
-    pub(crate) fn is_clear(&self, least_heat: f64) -> bool {
-        let joints = self.joints.iter().flatten();
-        joints.filter(|joint| joint.heat >= least_heat).count() >= N / 2
-    }
-}
-
 /// Everything that a detector found in a view.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct View {

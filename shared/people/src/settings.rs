@@ -9,7 +9,7 @@ pub struct Settings {
     pub min_views: usize,
     /// Set if left and right follow the picture, so that two views may have them exchanged.
     pub as_seen: bool,
-    /// Half of the joints of somebody new have this heat in two views, 0 to 1.
+    /// Half of the joints of somebody new have this heat in two views that agree on them, 0 to 1.
     pub least_heat: f64,
 }
 

@@ -19,6 +19,8 @@ const NEW_VELOCITY: f64 = 0.5;
 const REACH_M: f64 = 0.25;
 const REACH_M_PER_S: f64 = 0.5;
 const LONGEST_S: f64 = 1.0;
+/// Rays that pass a joint nearer show it at the same place, metres.
+const SAME_PLACE_M: f64 = 0.15;
 /// Frames that are farther apart show who runs elsewhere, and how far for every second.
 const SOON_S: f64 = 0.1;
 const FAST_M_PER_S: f64 = 4.0;
@@ -80,6 +82,25 @@ impl Track {
         let unseen_s = (time_s - self.placed_s).clamp(0.0, LONGEST_S);
         let rare_s = (gap_s - SOON_S).clamp(0.0, LONGEST_S);
         REACH_M + REACH_M_PER_S * unseen_s + FAST_M_PER_S * rare_s
+    }
+
+    /// Number of joints that two views see well, and at the same place.
+    ///
+    /// * `least_heat`: of a joint that is seen well, 0 to 1.
+    pub(crate) fn n_well_seen(&self, frame: &Frame, least_heat: f64) -> usize {
+        let is_well_seen = |joint: &usize| {
+            let Some(place) = self.coarse.joints[*joint] else {
+                return false;
+            };
+            let views = self.members.iter().filter(|member| {
+                let sight = &frame.sights(member.at)[named(*joint, member.is_exchanged)];
+                sight.as_ref().is_some_and(|sight| {
+                    sight.heat >= least_heat && sight.distance(&place) < SAME_PLACE_M
+                })
+            });
+            views.count() >= 2
+        };
+        (0..N).filter(is_well_seen).count()
     }
 
     /// Begins a frame without having been seen in it.

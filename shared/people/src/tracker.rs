@@ -12,7 +12,7 @@ use crate::distance::{of_people, to_person};
 use crate::frame::Place;
 use crate::settings::Settings;
 use crate::track::Track;
-use crate::{Frame, Person, State, View};
+use crate::{Frame, N, Person, State, View};
 
 /// People of fewer joints, the head not counted, are not taken for new ones.
 const LEAST_CORE: usize = 6;
@@ -129,7 +129,7 @@ impl Tracker {
     /// * `time_s`: when the frame was taken; not before the last one.
     /// * `views`: in the order of the cameras; a view that is missing sees nobody.
     pub fn step(&mut self, time_s: f64, views: &[View]) -> Vec<Person> {
-        let frame = Frame::new(&self.cameras, &self.order, views, &self.settings);
+        let frame = Frame::new(&self.cameras, &self.order, views, self.settings.as_seen);
         let expected: Vec<Joints> = self
             .tracks
             .iter()
@@ -320,8 +320,8 @@ impl Tracker {
         for nth in 0..self.tracks.len() {
             let track = &self.tracks[nth];
             // What two views of many see is often nobody: rays of two people meet as well.
-            let clear = track.members.iter().filter(|it| frame.is_clear(it.at));
-            let is_clear = track.members.len() >= needed && clear.count() >= 2;
+            let is_clear = track.members.len() >= needed
+                && track.n_well_seen(frame, self.settings.least_heat) >= N / 2;
             let n_known = self
                 .tracks
                 .iter()

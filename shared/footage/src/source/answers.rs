@@ -10,7 +10,7 @@ use std::time::SystemTime;
 
 use serde_json::{Value, json};
 
-use super::probe::{input_name, input_options, missing};
+use super::program::{input_name, input_options, missing};
 use crate::{FootageError, SourceSpec};
 
 /// Asks `ffprobe` about a stream of a file; once, as long as the file stays as it is: a start of it takes longer than its answer.

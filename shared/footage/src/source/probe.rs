@@ -1,6 +1,5 @@
 //! The properties of a video, from `ffprobe`.
 
-use std::io;
 use std::path::Path;
 
 use serde_json::Value;
@@ -274,32 +273,6 @@ pub(super) fn key_frames(
         .filter(|it| it.1.1.contains('K'))
         .map(|it| it.0)
         .collect())
-}
-
-/// What ffmpeg must know to read a file: pictures one behind the other are no picture, whatever the file is called.
-pub(super) fn input_options(path: &Path) -> &'static [&'static str] {
-    use std::io::Read as _;
-    let mut head = [0; 3];
-    let read = std::fs::File::open(path).and_then(|mut it| it.read_exact(&mut head));
-    if read.is_ok() && head == [0xff, 0xd8, 0xff] {
-        return &["-f", "mjpeg"];
-    }
-    &[]
-}
-
-/// The name of a file for ffmpeg, protected against names such as `concat:x` and `-x`.
-pub(super) fn input_name(path: &Path) -> std::ffi::OsString {
-    let mut name = std::ffi::OsString::from("file:");
-    name.push(path);
-    name
-}
-
-pub(crate) fn missing(executable: &Path, path: &Path, source: io::Error) -> FootageError {
-    FootageError::FfmpegMissing {
-        executable: executable.to_path_buf(),
-        path: path.to_path_buf(),
-        source,
-    }
 }
 
 pub(super) fn number(value: &Value) -> Option<f64> {

@@ -8,7 +8,8 @@ use serde_json::Value;
 use super::answers::run_ffprobe;
 use super::listing::{self, Listing};
 use super::log::summary;
-use super::probe::{input_name, missing, number, probe};
+use super::probe::{number, probe};
+use super::program::{input_name, missing};
 use crate::{FootageError, SourceSpec, is_image};
 
 /// The sound of a video, all channels mixed.

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
 use super::log::{Complaints, Log};
-use super::probe::{Probe, input_name, input_options, key_frames, missing, probe};
+use super::probe::{Probe, key_frames, probe};
+use super::program::{input_name, input_options, missing};
 use crate::{FootageError, Size, SourceSpec};
 
 /// A running decoder. It is killed when this is dropped. If this process dies without dropping it,

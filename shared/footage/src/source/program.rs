@@ -1,0 +1,32 @@
+//! How ffmpeg and ffprobe are told of a file.
+
+use std::io;
+use std::path::Path;
+
+use crate::FootageError;
+
+/// What ffmpeg must know to read a file: pictures one behind the other are no picture, whatever the file is called.
+pub(crate) fn input_options(path: &Path) -> &'static [&'static str] {
+    use std::io::Read as _;
+    let mut head = [0; 3];
+    let read = std::fs::File::open(path).and_then(|mut it| it.read_exact(&mut head));
+    if read.is_ok() && head == [0xff, 0xd8, 0xff] {
+        return &["-f", "mjpeg"];
+    }
+    &[]
+}
+
+/// The name of a file for ffmpeg, protected against names such as `concat:x` and `-x`.
+pub(crate) fn input_name(path: &Path) -> std::ffi::OsString {
+    let mut name = std::ffi::OsString::from("file:");
+    name.push(path);
+    name
+}
+
+pub(crate) fn missing(executable: &Path, path: &Path, source: io::Error) -> FootageError {
+    FootageError::FfmpegMissing {
+        executable: executable.to_path_buf(),
+        path: path.to_path_buf(),
+        source,
+    }
+}
