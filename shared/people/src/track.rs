@@ -84,6 +84,17 @@ impl Track {
         REACH_M + REACH_M_PER_S * unseen_s + FAST_M_PER_S * rare_s
     }
 
+    /// Number of views that see half of the joints well.
+    ///
+    /// * `least_heat`: of a joint that is seen well, 0 to 1.
+    pub(crate) fn n_clear(&self, frame: &Frame, least_heat: f64) -> usize {
+        let is_clear = |member: &&Member| {
+            let sights = frame.sights(member.at).iter().flatten();
+            sights.filter(|sight| sight.heat >= least_heat).count() >= N / 2
+        };
+        self.members.iter().filter(is_clear).count()
+    }
+
     /// Number of joints that two views see well, and at the same place.
     ///
     /// * `least_heat`: of a joint that is seen well, 0 to 1.

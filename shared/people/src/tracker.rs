@@ -316,11 +316,14 @@ impl Tracker {
         let is_known = |track: &Track| track.id.is_some() && track.state != State::Lost;
         let is_empty = !self.tracks.iter().any(is_known);
         let needed = VIEWS_AT_ONCE.min(frame.n_seeing()).max(2);
+        let is_rich = frame.n_seeing() > VIEWS_AT_ONCE;
+        let clear = if is_rich { VIEWS_AT_ONCE } else { 2 };
         let mut births = Vec::new();
         for nth in 0..self.tracks.len() {
             let track = &self.tracks[nth];
             // What two views of many see is often nobody: rays of two people meet as well.
             let is_clear = track.members.len() >= needed
+                && track.n_clear(frame, self.settings.least_heat) >= clear
                 && track.n_well_seen(frame, self.settings.least_heat) >= N / 2;
             let n_known = self
                 .tracks

@@ -1,7 +1,8 @@
 //! The maps of one person where they lie in a picture.
 
+use skeleton::PARSE14;
+
 use crate::between::{Tap, between};
-use crate::maps::N_JOINTS;
 
 /// Evidence above the floor from which a cell may be a maximum.
 const LEAST_ABOVE: f32 = 1e-3;
@@ -25,7 +26,7 @@ impl MapGrid {
 
     /// Number of values of the maps of all joints.
     pub fn n_values(&self) -> usize {
-        N_JOINTS * self.area()
+        PARSE14.joints.len() * self.area()
     }
 
     /// The cell at a point of the picture, with fractions.
