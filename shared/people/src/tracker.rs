@@ -316,6 +316,8 @@ impl Tracker {
         let is_known = |track: &Track| track.id.is_some() && track.state != State::Lost;
         let is_empty = !self.tracks.iter().any(is_known);
         let needed = VIEWS_AT_ONCE.min(frame.n_seeing()).max(2);
+        // What sees somebody everywhere has to be sure of somebody new.
+        let is_doubtful = self.settings.least_heat > 0.0;
         let is_rich = frame.n_seeing() > VIEWS_AT_ONCE;
         let clear = if is_rich { VIEWS_AT_ONCE } else { 2 };
         let mut births = Vec::new();
@@ -332,8 +334,8 @@ impl Tracker {
                 .count();
             let is_born = track.id.is_none()
                 && track.state == State::Tracked
-                && is_clear
-                && (is_empty || track.is_somebody())
+                && (is_clear || !is_doubtful)
+                && (is_empty && is_clear || track.is_somebody())
                 && n_known < self.settings.max;
             if !is_born {
                 continue;
