@@ -6,7 +6,7 @@ use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use geometry::Camera;
 use messages::{Span, ViewPose, topic};
 use pipeline::{Sightings, WhoSettings, WhoStep, time_s};
-use runtime::Service;
+use runtime::{Place, Service};
 use stage::{Frame, Stage};
 
 /// The process's work by the method of networks.
@@ -47,7 +47,9 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
         n_restarts: u64::from(service.epoch()),
         ..job.settings
     };
-    let mut step = WhoStep::new(job.cameras.clone(), settings);
+    let mut place = Place::of(service.bus());
+    let mut step = begin(service, job, settings, &mut place);
+    let mut is_noted = true;
     stage.run(|frame| {
         let answers: Vec<Option<Sightings>> = (0..n_views)
             .map(|view| answer(service, frame, view))
@@ -57,9 +59,25 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
         let present = present.fold(0, |mask, (view, _)| mask | 1_u32 << view);
         frame.turn().restart(now_nanos());
         let found = step.run(time_s(frame.number(), job.frame_rate_hz), &answers);
+        // Before they are sent: an identity that others know is never forgotten.
+        let noted = place.note_bytes(bytemuck::cast_slice(&step.memory()));
+        if let Err(error) = noted.as_ref() && is_noted {
+            tracing::warn!(%error, "cannot note who is there: after a death of this process people have new identities");
+        }
+        is_noted = noted.is_ok();
         let message = wire::people_to_message(&found, present).or_fail(ExitKind::Run)?;
         people.send_and_account(frame.turn(), 0, message)
     })
+}
+
+/// The step; after a restart with the people and identities of the process before.
+fn begin(service: &Service, job: &WhoJob, settings: WhoSettings, place: &mut Place) -> WhoStep {
+    let memory = place.last().filter(|_| service.epoch() > 0);
+    let resumed = memory.and_then(|bytes| {
+        let numbers: Vec<f64> = bytemuck::pod_collect_to_vec(&bytes);
+        WhoStep::resume(job.cameras.clone(), settings, &numbers)
+    });
+    resumed.unwrap_or_else(|| WhoStep::new(job.cameras.clone(), settings))
 }
 
 /// The candidates of a view; `None` if it has none.

@@ -11,6 +11,7 @@ mod demo;
 mod detect;
 mod detectors;
 mod entering;
+mod everybody;
 mod export;
 mod faults;
 mod full;

@@ -16,7 +16,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde_json::Value;
 
 pub(crate) const SIZE: [u32; 2] = [200, 240];
-const N: usize = 14;
+pub(crate) const N: usize = 14;
 pub(crate) const N_FRAMES: usize = 40;
 const RIGHT_WRIST: usize = 6;
 /// The box of the detector, pixels of its input.
@@ -120,7 +120,7 @@ fn joints(frame: usize) -> [Point3<f64>; N] {
 }
 
 /// The joints at a time in frames, metres.
-fn joints_at(frame: f64) -> [Point3<f64>; N] {
+pub(crate) fn joints_at(frame: f64) -> [Point3<f64>; N] {
     let by = Vector3::new(0.005 * frame, 0.15 * (0.5 * frame).sin(), 0.0);
     STANDING.map(|it| Point3::from(it) + by)
 }

@@ -186,7 +186,7 @@ impl Ports {
             }
         }
         for (view, poses) in self.poses.iter().enumerate() {
-            gather.note_ports(view, [self.frames[view].publishers(), poses.publishers()]);
+            gather.note_ports(view, [self.frames[view].publishers(), poses.senders()]);
             while let Some(pose) = poses.receive(context)? {
                 gather.pose(view, &pose);
             }

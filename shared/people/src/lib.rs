@@ -22,6 +22,8 @@ mod coarse;
 mod bones;
 mod track;
 
+mod memory;
+
 mod tracker;
 
 mod hypotheses;
@@ -37,9 +39,10 @@ use nalgebra::Vector3;
 use skeleton::body::{Covariances, Joints};
 
 pub(crate) use frame::Frame;
+pub use memory::{Memory, Remembered};
 pub use settings::Settings;
 pub use solver::{Solved, Solver};
-pub use tracker::{Memory, Remembered, Tracker};
+pub use tracker::Tracker;
 
 /// Number of joints, those of `skeleton::PARSE14`.
 pub(crate) const N: usize = skeleton::body::N_JOINTS;

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use fastrand::Rng;
 use proptest::prelude::*;
 
+use crate::Memory;
 use crate::testing::{Actor, ring, seen};
 use crate::{Person, Settings, Solver, State, Tracker, View};
 
@@ -117,7 +118,9 @@ proptest! {
         let mut tracker = Tracker::new(ring(4), settings());
         for (nth, views) in frames.iter().enumerate() {
             let time_s = nth as f64 / RATE_HZ;
-            let mut other = Tracker::resume(ring(4), settings(), &tracker.memory());
+            let memory = Memory::from_numbers(&tracker.memory().to_numbers()).unwrap();
+            prop_assert_eq!(memory.people.len(), tracker.memory().people.len());
+            let mut other = Tracker::resume(ring(4), settings(), &memory);
             let expected: Vec<Person> = tracker.step(time_s, views);
             if nth > 3 {
                 let got = other.step(time_s, views);

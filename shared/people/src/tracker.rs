@@ -2,14 +2,14 @@
 
 use geometry::Camera;
 use nalgebra::Vector3;
-use skeleton::body::{Covariances, Joints};
+use skeleton::body::Joints;
 
 use crate::assignment::{NEVER, assign};
-use crate::bones::Bones;
 use crate::cluster::{Member, clusters};
 use crate::coarse::{Coarse, agree};
 use crate::distance::{of_people, to_person};
 use crate::frame::Place;
+use crate::memory::{Memory, Remembered, remembered, revived};
 use crate::settings::Settings;
 use crate::track::Track;
 use crate::{Frame, N, Person, State, View};
@@ -33,34 +33,6 @@ const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
 /// Somebody new is seen by so many views, or by all of fewer.
 const VIEWS_AT_ONCE: usize = 3;
-
-/// A person as a [`Memory`] holds it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Remembered {
-    /// Identity.
-    pub id: u64,
-    /// The joints, metres in the world.
-    pub joints: Joints,
-    /// Their covariances, square metres.
-    pub covariances: Covariances,
-    /// Velocity of the trunk, metres a second.
-    pub velocity: Vector3<f64>,
-    /// When the joints were seen, seconds.
-    pub seen_s: f64,
-    /// Lengths of the bones.
-    pub bones: Bones,
-    /// Colour of the trunk.
-    pub colour: Option<[f64; 3]>,
-}
-
-/// Everything that a tracker has to know to take up the work of another.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Memory {
-    /// The id of the next new person is one more, or more.
-    pub last_id: u64,
-    /// The people, also those who are gone.
-    pub people: Vec<Remembered>,
-}
 
 /// Tells who is who, frame by frame.
 ///
@@ -425,28 +397,4 @@ fn give_back(free: &mut [Vec<Place>], members: &[Member]) {
         free.push(member.at);
         free.sort_unstable();
     }
-}
-
-fn remembered(track: &Track) -> Option<Remembered> {
-    Some(Remembered {
-        id: track.id?,
-        joints: track.coarse.joints,
-        covariances: track.coarse.covariances,
-        velocity: track.velocity,
-        seen_s: track.seen_s,
-        bones: track.bones,
-        colour: track.colour,
-    })
-}
-
-fn revived(person: &Remembered) -> Track {
-    let mut track = Track::new(person.seen_s);
-    track.id = Some(person.id);
-    track.coarse.joints = person.joints;
-    track.coarse.covariances = person.covariances;
-    track.velocity = person.velocity;
-    track.bones = person.bones;
-    track.colour = person.colour;
-    track.state = State::Lost;
-    track
 }

@@ -1,6 +1,6 @@
 //! Who is in a frame: the candidates of every view that are one person, by identities that last.
 
-use ::people::{Detection, Keypoint, Memory, Person, Settings, State, Tracker, View};
+use ::people::{Detection, Keypoint, Memory, Person, Remembered, Settings, State, Tracker, View};
 use geometry::Camera;
 use posenetwork::expected_error;
 
@@ -10,7 +10,7 @@ use crate::sighting::{Sighting, Sightings};
 
 /// The window of a network about a person, as a multiple of the longer side of the box around the joints.
 const WINDOW: f64 = 1.25;
-/// Identities of a process that was restarted begin after as many for each restart: none is used twice.
+/// Identities of a process that was restarted, and has no memory, begin after as many for each restart: none is used twice.
 const IDS_OF_A_PROCESS: u64 = 1000;
 
 /// A person of a frame.
@@ -72,20 +72,47 @@ impl WhoStep {
     ///
     /// * `cameras`: of the views, in the rig's order.
     pub fn new(cameras: Vec<Camera>, settings: WhoSettings) -> Self {
+        let memory = Memory {
+            last_id: settings.n_restarts * IDS_OF_A_PROCESS,
+            people: Vec::new(),
+        };
+        Self::remembering(cameras, settings, &memory, 0)
+    }
+
+    /// Prepares the step to go on where another one ended, with its people and their identities; `None` if the numbers are not those of
+    /// [`memory`](Self::memory).
+    pub fn resume(cameras: Vec<Camera>, settings: WhoSettings, memory: &[f64]) -> Option<Self> {
+        let (followed, memory) = memory.split_first()?;
+        let memory = Memory::from_numbers(memory)?;
+        let is_known = |person: &&Remembered| person.id as f64 == *followed;
+        let followed = memory.people.iter().find(is_known);
+        let followed = followed.map_or(0, |person| person.id);
+        Some(Self::remembering(cameras, settings, &memory, followed))
+    }
+
+    /// Returns everything that another step has to know to go on from here, as plain numbers.
+    pub fn memory(&self) -> Vec<f64> {
+        let mut numbers = self.tracker.memory().to_numbers();
+        numbers.insert(0, self.followed as f64);
+        numbers
+    }
+
+    fn remembering(
+        cameras: Vec<Camera>,
+        settings: WhoSettings,
+        memory: &Memory,
+        followed: u64,
+    ) -> Self {
         let of_tracker = Settings {
             max: settings.n_people,
             as_seen: settings.as_seen,
             least_heat: settings.least_heat,
             ..Settings::default()
         };
-        let memory = Memory {
-            last_id: settings.n_restarts * IDS_OF_A_PROCESS,
-            people: Vec::new(),
-        };
         Self {
-            tracker: Tracker::resume(cameras, of_tracker, &memory),
+            tracker: Tracker::resume(cameras, of_tracker, memory),
             follow: settings.follow,
-            followed: 0,
+            followed,
         }
     }
 

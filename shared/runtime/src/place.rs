@@ -1,26 +1,35 @@
-//! Progress of a process in a file beside the deployment's sockets, so that it survives the process.
+//! Notes of a process in a file beside the deployment's sockets, so that it survives the process.
 
-use std::fs::{self, File};
-use std::io::{self, Write as _};
+use std::fs::File;
+use std::io;
 use std::os::unix::fs::FileExt as _;
 use std::path::PathBuf;
 
+use formats::checksum::fnv1a;
+
 use crate::Bus;
 
-/// Digits of the largest `u64`.
-const WIDTH: usize = 20;
+/// Two notes have room in the file, and are written in turn: of a process that is killed while it writes one, the other is left.
+const SLOT_BYTES: u64 = 1 << 18;
+/// Before each note: its number, its length, its checksum.
+const HEADER_BYTES: usize = 3 * size_of::<u64>();
 
-/// A few numbers that a process saves, and reads back after a restart.
+/// Notes of a process, which it reads back after a restart.
 #[derive(Debug)]
 pub struct Place {
     path: PathBuf,
     file: Option<File>,
+    n_noted: u64,
 }
 
 impl Place {
-    /// Keeps the numbers in a file, which is created when something is saved.
+    /// Keeps notes in a file, which is created by the first one.
     pub fn new(path: PathBuf) -> Self {
-        Self { path, file: None }
+        Self {
+            path,
+            file: None,
+            n_noted: 0,
+        }
     }
 
     /// The place of the process that a bus belongs to.
@@ -29,35 +38,77 @@ impl Place {
         Self::new(bus.namespace().root().join(file))
     }
 
-    /// The numbers that were saved last, possibly before a restart; `None` if there are none.
-    pub fn noted<const N: usize>(&self) -> Option<[u64; N]> {
-        let text = fs::read_to_string(&self.path).ok()?;
-        let numbers: Result<Vec<u64>, _> = text.split_whitespace().map(str::parse).collect();
-        numbers.ok()?.try_into().ok()
+    /// The bytes that were noted last, possibly before a restart; `None` if there are none. What is noted next follows them.
+    pub fn last(&mut self) -> Option<Vec<u8>> {
+        let file = File::open(&self.path).ok()?;
+        let notes = [0, 1].into_iter().filter_map(|slot| read(&file, slot));
+        let (number, bytes) = notes.max_by_key(|(number, _)| *number)?;
+        self.n_noted = number;
+        Some(bytes)
     }
 
-    /// Saves numbers; always the same count.
-    ///
-    /// A single write replaces the old ones, so that a killed process leaves either the old or the new ones.
+    /// The numbers that were noted last; `None` if there are none, or another number of them.
+    pub fn noted<const N: usize>(&mut self) -> Option<[u64; N]> {
+        let bytes = self.last()?;
+        let (numbers, []) = bytes.as_chunks() else {
+            return None;
+        };
+        let numbers: Vec<u64> = numbers
+            .iter()
+            .map(|number| u64::from_le_bytes(*number))
+            .collect();
+        numbers.try_into().ok()
+    }
+
+    /// Notes bytes in place of those before.
     ///
     /// # Errors
     ///
-    /// The file cannot be written; after a restart the numbers saved before are read.
-    pub fn note<const N: usize>(&mut self, numbers: [u64; N]) -> io::Result<()> {
-        let mut line = Vec::with_capacity(N * (WIDTH + 1));
-        for number in numbers {
-            writeln!(line, "{number:WIDTH$}")?;
+    /// The file cannot be written, or the bytes are more than 262 120; after a restart those noted before are read.
+    pub fn note_bytes(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if bytes.len() > SLOT_BYTES as usize - HEADER_BYTES {
+            return Err(io::ErrorKind::FileTooLarge.into());
         }
+        let number = self.n_noted + 1;
+        let header = [number, bytes.len() as u64, fnv1a(bytes)];
+        let note = [header.map(u64::to_le_bytes).as_flattened(), bytes].concat();
         let file = match self.file.take() {
             Some(file) => file,
             None => File::options()
                 .create(true)
-                .truncate(false)
+                .truncate(self.n_noted == 0)
                 .write(true)
                 .open(&self.path)?,
         };
-        self.file.insert(file).write_all_at(&line, 0)
+        let file = self.file.insert(file);
+        file.write_all_at(&note, number % 2 * SLOT_BYTES)?;
+        self.n_noted = number;
+        Ok(())
     }
+
+    /// Notes numbers in place of those before.
+    ///
+    /// # Errors
+    ///
+    /// As those of [`note_bytes`](Self::note_bytes).
+    pub fn note<const N: usize>(&mut self, numbers: [u64; N]) -> io::Result<()> {
+        self.note_bytes(numbers.map(u64::to_le_bytes).as_flattened())
+    }
+}
+
+/// The number and the bytes of a note; `None` if there is none, or not a whole one.
+fn read(file: &File, slot: u64) -> Option<(u64, Vec<u8>)> {
+    let begin = slot * SLOT_BYTES;
+    let mut header = [[0; size_of::<u64>()]; 3];
+    file.read_exact_at(header.as_flattened_mut(), begin).ok()?;
+    let [number, len, checksum] = header.map(u64::from_le_bytes);
+    if number == 0 || number % 2 != slot || len > SLOT_BYTES - HEADER_BYTES as u64 {
+        return None;
+    }
+    let mut bytes = vec![0; len as usize];
+    file.read_exact_at(&mut bytes, begin + HEADER_BYTES as u64)
+        .ok()?;
+    (fnv1a(&bytes) == checksum).then_some((number, bytes))
 }
 
 #[cfg(test)]
@@ -75,11 +126,26 @@ mod tests {
             assert_eq!(Place::new(path.clone()).noted(), Some(numbers));
         }
         let mut next = Place::new(path.clone());
+        assert_eq!(next.noted(), Some([3, 4]));
         next.note([5, 6]).unwrap();
         assert_eq!(place.noted(), Some([5, 6]));
         assert_eq!(place.noted::<3>(), None, "another number of numbers");
-        fs::write(&path, "5 six").unwrap();
-        assert_eq!(place.noted::<2>(), None);
+    }
+
+    #[test]
+    fn of_a_note_that_was_not_written_to_its_end_the_one_before_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.place");
+        let mut place = Place::new(path.clone());
+        place.note_bytes(&[1; 9000]).unwrap();
+        place.note_bytes(&[2; 9000]).unwrap();
+        assert_eq!(place.last(), Some(vec![2; 9000]));
+        let file = File::options().write(true).open(&path).unwrap();
+        file.write_all_at(&[3; 500], 5000).unwrap();
+        assert_eq!(place.last(), Some(vec![1; 9000]));
+        file.write_all_at(&[3; 500], SLOT_BYTES + 5000).unwrap();
+        assert_eq!(place.last(), None);
+        place.note_bytes(&[0; SLOT_BYTES as usize]).unwrap_err();
     }
 
     #[test]

@@ -20,6 +20,8 @@ pub(crate) struct Typed<M, R, D> {
     pub(crate) port: Port<R>,
     pub(crate) slots: Slots,
     pub(crate) decode: D,
+    /// The ports that could send when it was last looked.
+    pub(crate) senders: Vec<u128>,
     pub(crate) message: core::marker::PhantomData<fn() -> M>,
 }
 
@@ -30,9 +32,18 @@ where
     D: FnMut(&M) -> Result<T, WireError>,
 {
     fn poll(&mut self, context: &Context<'_>, joins: &mut Joins<T>) -> Result<(), ReceiveError> {
-        if self.port.n_senders() > 0 {
-            let now = context.now();
+        let senders = self.port.senders();
+        let now = context.now();
+        if !senders.is_empty() {
             self.slots.all().for_each(|slot| joins.alive(slot, now));
+        }
+        let is_new = |sender: &u128| !self.senders.contains(sender);
+        let is_restarted = !self.senders.is_empty() && senders.iter().any(is_new);
+        if is_restarted && self.port.forgets() {
+            self.slots.all().for_each(|slot| joins.restarted(slot, now));
+        }
+        if !senders.is_empty() {
+            self.senders = senders;
         }
         while let Some(message) = self.port.receive(context)? {
             let stamp = *message.stamp();

@@ -34,6 +34,8 @@ pub enum Push {
 
 /// Most pending frames: more would be hours of frames, or a sender with wrong frame numbers.
 const MAX_PENDING: usize = 1 << 16;
+/// A restarted sender that forgets has sent by then what it will send of the frames that had begun.
+const TAKEN_UP_NANOS: u64 = 1_000_000_000;
 
 /// Collects messages by frame, and returns frames in order.
 #[derive(Debug)]
@@ -55,9 +57,17 @@ struct Input {
     down: bool,
     /// How long a frame waits for it at most.
     deadline: Option<u64>,
+    /// When its sender was restarted.
+    restarted_at: Option<u64>,
 }
 
 impl Input {
+    /// Says if its sender was restarted after a frame began, and had time to send what it still knows of the frame.
+    fn has_forgotten(&self, began_at: u64, now: u64) -> bool {
+        self.restarted_at
+            .is_some_and(|at| began_at < at && now.saturating_sub(at) >= TAKEN_UP_NANOS)
+    }
+
     /// Whether it has been silent for too long.
     ///
     /// * `patience`: without a living sender, and with one.
@@ -105,6 +115,14 @@ impl<T> Joiner<T> {
     pub fn set_deadline(&mut self, input: usize, deadline_nanos: u64) {
         if let Some(input) = self.inputs.get_mut(input) {
             input.deadline = Some(deadline_nanos);
+        }
+    }
+
+    /// Notes that the sender of an input was restarted, and has forgotten what it had received: frames that have begun wait for it for a
+    /// second more.
+    pub fn restarted(&mut self, input: usize, now: u64) {
+        if let Some(input) = self.inputs.get_mut(input) {
+            input.restarted_at = Some(now);
         }
     }
 
@@ -161,6 +179,7 @@ impl<T> Joiner<T> {
         let patience = [self.patience_nanos, self.alive_patience_nanos];
         for (input, item) in self.inputs.iter_mut().zip(&slot.items) {
             let is_past = input.last_frame.is_some_and(|last| last > frame);
+            let is_past = is_past || input.has_forgotten(slot.began_at, now);
             if item.is_some() || input.ended || input.down || is_past {
                 continue;
             }
@@ -363,6 +382,21 @@ mod tests {
         assert_eq!(joiner.push(1, 5, (), 1), Push::Late);
         assert_eq!(joiner.push(1, 6, (), 1), Push::Late);
         assert_eq!(joiner.push(7, 9, (), 1), Push::Late);
+    }
+
+    #[test]
+    fn no_frame_waits_for_what_a_restarted_sender_has_forgotten() {
+        let mut joiner = Joiner::lossless(2, 100 * TAKEN_UP_NANOS);
+        joiner.push(0, 0, (), 10);
+        joiner.push(0, 1, (), 20);
+        joiner.restarted(1, 50);
+        joiner.push(0, 2, (), 60);
+        assert_eq!(frames(&mut joiner, 49 + TAKEN_UP_NANOS), []);
+        let both = [(0, vec![true, false]), (1, vec![true, false])];
+        assert_eq!(frames(&mut joiner, 50 + TAKEN_UP_NANOS), both);
+        joiner.push(1, 2, (), 51 + TAKEN_UP_NANOS);
+        let got = frames(&mut joiner, 51 + TAKEN_UP_NANOS);
+        assert_eq!(got, [(2, vec![true, true])]);
     }
 
     #[test]

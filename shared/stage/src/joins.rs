@@ -23,6 +23,10 @@ impl<T> Joins<T> {
         self.joiner.alive(slot, now);
     }
 
+    pub(crate) fn restarted(&mut self, slot: usize, now: u64) {
+        self.joiner.restarted(slot, now);
+    }
+
     pub(crate) fn end(&mut self, slots: Slots, stamp: Stamp) {
         slots.all().for_each(|slot| self.joiner.end(slot));
         self.end = Some(stamp);

@@ -16,8 +16,8 @@ pub trait Receive<M> {
     /// [`ReceiveError`].
     fn receive(&self) -> Result<Option<M>, ReceiveError>;
 
-    /// Number of connected senders.
-    fn n_senders(&self) -> usize;
+    /// The identifiers of the ports that may send; a restarted sender has a new one.
+    fn senders(&self) -> Vec<u128>;
 }
 
 impl<M: Message> Receive<M> for Subscriber<M> {
@@ -25,8 +25,8 @@ impl<M: Message> Receive<M> for Subscriber<M> {
         Self::receive(self)
     }
 
-    fn n_senders(&self) -> usize {
-        self.n_publishers()
+    fn senders(&self) -> Vec<u128> {
+        self.publishers()
     }
 }
 
@@ -105,11 +105,6 @@ impl<M: Message + Stamped> Port<Subscriber<M>> {
         }
         Ok(None)
     }
-
-    /// The identifiers of the ports that may send; a restarted sender has a new one.
-    pub fn publishers(&self) -> Vec<u128> {
-        self.receiver.publishers()
-    }
 }
 
 impl<R> Port<R> {
@@ -136,12 +131,18 @@ impl<R> Port<R> {
         Ok(None)
     }
 
-    /// Number of connected senders.
-    pub fn n_senders<M>(&self) -> usize
+    /// Says if the sender, once it is restarted, has forgotten frames that others have received: it answers what views send. A process of a
+    /// view is given the frame again, and a fusion worker holds what the others wait for.
+    pub(crate) fn forgets(&self) -> bool {
+        self.sender == Sender::All
+    }
+
+    /// The identifiers of the ports that may send; a restarted sender has a new one.
+    pub fn senders<M>(&self) -> Vec<u128>
     where
         R: Receive<M>,
     {
-        self.receiver.n_senders()
+        self.receiver.senders()
     }
 
     /// Discards all waiting messages, so that no sender waits for room.

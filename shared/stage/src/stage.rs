@@ -178,6 +178,7 @@ impl<'a, T: 'a> Stage<'a, T> {
             port,
             slots,
             decode,
+            senders: Vec::new(),
             message: PhantomData,
         }));
         Ok(())

@@ -145,3 +145,18 @@ fn a_restarted_process_gives_no_identity_again() {
     let found = step.run(0.0, &seen(&[([0.0, 0.0], 0.9)]));
     assert_eq!(ids(&found), [2001]);
 }
+
+#[test]
+fn a_step_that_goes_on_where_another_ended_knows_the_people_and_who_is_followed() {
+    let cameras = || (0..N_VIEWS).map(camera).collect();
+    let both: &[([f64; 2], f32)] = &[([-0.6, 0.0], 0.7), ([0.9, 0.4], 0.9)];
+    let mut first = WhoStep::new(cameras(), WhoSettings::default());
+    let before = (0..4).map(|frame| first.run(f64::from(frame) / RATE_HZ, &seen(both)));
+    let before = before.last().unwrap();
+    assert_eq!(before.people.len(), 2);
+    let mut next = WhoStep::resume(cameras(), WhoSettings::default(), &first.memory()).unwrap();
+    // Nothing was seen for half a second.
+    assert_eq!(next.run(0.6, &seen(both)), before);
+    let nobody = WhoStep::resume(cameras(), WhoSettings::default(), &first.memory()[..7]);
+    assert!(nobody.is_none());
+}

@@ -20,14 +20,14 @@ const PATIENCE: Duration = Duration::from_nanos(100);
 #[derive(Debug)]
 struct Topic<M> {
     waiting: Rc<RefCell<VecDeque<M>>>,
-    n_senders: usize,
+    senders: Vec<u128>,
 }
 
 impl<M> Clone for Topic<M> {
     fn clone(&self) -> Self {
         Self {
             waiting: Rc::clone(&self.waiting),
-            n_senders: self.n_senders,
+            senders: self.senders.clone(),
         }
     }
 }
@@ -36,7 +36,7 @@ impl<M> Topic<M> {
     fn new() -> Self {
         Self {
             waiting: Rc::default(),
-            n_senders: 0,
+            senders: Vec::new(),
         }
     }
 
@@ -50,8 +50,8 @@ impl<M> Receive<M> for Topic<M> {
         Ok(self.waiting.borrow_mut().pop_front())
     }
 
-    fn n_senders(&self) -> usize {
-        self.n_senders
+    fn senders(&self) -> Vec<u128> {
+        self.senders.clone()
     }
 }
 
@@ -108,6 +108,7 @@ fn input<M: Stamped + 'static>(
             }),
             frame => Ok(frame),
         },
+        senders: Vec::new(),
         message: PhantomData,
     })
 }
@@ -173,7 +174,7 @@ fn a_frame_is_complete_at_its_deadline_and_a_later_message_is_counted_as_late() 
 #[test]
 fn a_connected_sender_has_more_time_with_lossless_delivery() {
     let connected = Topic {
-        n_senders: 1,
+        senders: vec![1],
         ..Topic::<ViewPose>::new()
     };
     let other = Topic::<ViewPose>::new();

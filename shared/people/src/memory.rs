@@ -1,0 +1,154 @@
+//! Everything that a tracker has to know to take up the work of another, also as plain numbers.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use skeleton::body::{Covariances, Joints, Kind};
+
+use crate::bones::Bones;
+use crate::track::Track;
+use crate::{N, State};
+
+/// Bones of a body by kind, numbers.
+const KINDS: usize = Kind::ALL.len();
+/// Id, joints, covariances, velocity, time, lengths and counts of the bones, colour.
+const NUMBERS_OF_PERSON: usize = 1 + 3 * N + 9 * N + 3 + 1 + 2 * KINDS + 3;
+
+/// A person as a [`Memory`] holds it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Remembered {
+    /// Identity.
+    pub id: u64,
+    /// The joints, metres in the world.
+    pub joints: Joints,
+    /// Their covariances, square metres.
+    pub covariances: Covariances,
+    /// Velocity of the trunk, metres a second.
+    pub velocity: Vector3<f64>,
+    /// When the joints were seen, seconds.
+    pub seen_s: f64,
+    /// Lengths of the bones.
+    pub bones: Bones,
+    /// Colour of the trunk.
+    pub colour: Option<[f64; 3]>,
+}
+
+/// Everything that a tracker has to know to take up the work of another.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Memory {
+    /// The id of the next new person is one more, or more.
+    pub last_id: u64,
+    /// The people, also those who are gone.
+    pub people: Vec<Remembered>,
+}
+
+impl Memory {
+    /// Returns the memory as plain numbers, for a file or a message: the last id, then the people.
+    pub fn to_numbers(&self) -> Vec<f64> {
+        let mut numbers = vec![self.last_id as f64];
+        for person in &self.people {
+            person.push_to(&mut numbers);
+        }
+        numbers
+    }
+
+    /// Reads what [`to_numbers`](Self::to_numbers) gave; `None` if these are other numbers.
+    pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
+        let (last_id, people) = numbers.split_first()?;
+        let (people, []) = people.as_chunks::<NUMBERS_OF_PERSON>() else {
+            return None;
+        };
+        let people = people.iter().map(|numbers| Remembered::read(numbers));
+        Some(Self {
+            last_id: id(*last_id)?,
+            people: people.collect::<Option<_>>()?,
+        })
+    }
+}
+
+impl Remembered {
+    /// Appends the person; a place, covariance or colour that is not known as numbers that are none.
+    fn push_to(&self, numbers: &mut Vec<f64>) {
+        numbers.push(self.id as f64);
+        for joint in self.joints {
+            numbers.extend(joint.map_or([f64::NAN; 3], |point| point.coords.into()));
+        }
+        for covariance in &self.covariances {
+            match covariance {
+                Some(covariance) => numbers.extend(covariance),
+                None => numbers.extend([f64::NAN; 9]),
+            }
+        }
+        numbers.extend(&self.velocity);
+        numbers.push(self.seen_s);
+        numbers.extend(self.bones.mean_m);
+        numbers.extend(self.bones.n);
+        numbers.extend(self.colour.unwrap_or([f64::NAN; 3]));
+    }
+
+    fn read(numbers: &[f64; NUMBERS_OF_PERSON]) -> Option<Self> {
+        let mut rest = &numbers[..];
+        let mut take = |n: usize| -> Option<&[f64]> { rest.split_off(..n) };
+        let known = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
+        let person = Self {
+            id: id(take(1)?[0])?,
+            joints: joints(take(3 * N)?),
+            covariances: covariances(take(9 * N)?),
+            velocity: Vector3::from_column_slice(take(3)?),
+            seen_s: take(1)?[0],
+            bones: Bones {
+                mean_m: take(KINDS)?.try_into().ok()?,
+                n: take(KINDS)?.try_into().ok()?,
+            },
+            colour: <[f64; 3]>::try_from(take(3)?)
+                .ok()
+                .filter(|colour| known(colour)),
+        };
+        let is_sound = known(person.velocity.as_slice()) && person.seen_s.is_finite();
+        is_sound.then_some(person)
+    }
+}
+
+/// An identity; `None` if the number is none.
+fn id(number: f64) -> Option<u64> {
+    let is_id = number.fract() == 0.0 && (0.0..=2.0_f64.powi(53)).contains(&number);
+    is_id.then_some(number as u64)
+}
+
+fn joints(numbers: &[f64]) -> Joints {
+    core::array::from_fn(|joint| {
+        let place = &numbers[3 * joint..][..3];
+        let is_known = place.iter().all(|number| number.is_finite());
+        is_known.then(|| Point3::from_slice(place))
+    })
+}
+
+fn covariances(numbers: &[f64]) -> Covariances {
+    core::array::from_fn(|joint| {
+        let covariance = &numbers[9 * joint..][..9];
+        let is_known = covariance.iter().all(|number| number.is_finite());
+        is_known.then(|| Matrix3::from_column_slice(covariance))
+    })
+}
+
+pub(crate) fn remembered(track: &Track) -> Option<Remembered> {
+    Some(Remembered {
+        id: track.id?,
+        joints: track.coarse.joints,
+        covariances: track.coarse.covariances,
+        velocity: track.velocity,
+        seen_s: track.seen_s,
+        bones: track.bones,
+        colour: track.colour,
+    })
+}
+
+pub(crate) fn revived(person: &Remembered) -> Track {
+    let mut track = Track::new(person.seen_s);
+    track.id = Some(person.id);
+    track.coarse.joints = person.joints;
+    track.coarse.covariances = person.covariances;
+    track.velocity = person.velocity;
+    track.bones = person.bones;
+    track.colour = person.colour;
+    track.state = State::Lost;
+    track
+}
