@@ -1,5 +1,5 @@
 // The pictures of all cameras, with the poses found in them and epipolar lines.
-import { COLOURS, sideOf } from "./stage.js";
+import { COLOURS, colourOf, sideOf } from "./stage.js";
 
 // Pictures that wait for the result of their frame, and results that are remembered.
 const MOST_WAITING = 8;
@@ -200,20 +200,26 @@ export class Pictures {
   }
 
   drawPose(pen, moment, nth, scale, isSame) {
-    const joints = moment?.views[nth]?.joints;
-    if (!joints || !this.poses) return;
+    if (!moment || !this.poses) return;
     pen.globalAlpha = isSame || !this.isLive ? 1 : 0.45;
     pen.lineCap = "round";
+    for (const it of moment.others) this.drawLimbs(pen, it.views[nth], scale, colourOf(it.id));
+    const { joints } = moment.views[nth] ?? {};
+    this.drawLimbs(pen, joints, scale);
+    if (this.joint !== null && joints?.[this.joint]) this.ring(pen, joints[this.joint].map((v) => v * scale));
+    pen.globalAlpha = 1;
+  }
+
+  drawLimbs(pen, joints, scale, colour) {
+    if (!joints) return;
     for (const [from, to] of this.scene.limbs) {
-      pen.strokeStyle = COLOURS[sideOf(this.scene.joints[from], this.scene.joints[to])];
+      pen.strokeStyle = colour || COLOURS[sideOf(this.scene.joints[from], this.scene.joints[to])];
       pen.lineWidth = Math.max(2, 0.006 * pen.canvas.width);
       pen.beginPath();
       pen.moveTo(...joints[from].map((v) => v * scale));
       pen.lineTo(...joints[to].map((v) => v * scale));
       pen.stroke();
     }
-    if (this.joint !== null && joints[this.joint]) this.ring(pen, joints[this.joint].map((v) => v * scale));
-    pen.globalAlpha = 1;
   }
 
   ring(pen, at) {

@@ -1,5 +1,5 @@
 // The page of `parallax view`: a running deployment, or a finished one with a time line.
-import { Stage } from "./stage.js";
+import { Stage, colourOf } from "./stage.js";
 import { Link } from "./link.js";
 import { Pictures } from "./pictures.js";
 import { showEvent, showFacts, showLine, showProcesses } from "./panels.js";
@@ -20,6 +20,8 @@ let feet = [];
 let floor = null;
 // Of a finished run: the frame that was asked for and is not there yet, and the next to ask for.
 let asked = null;
+// Identity of the person who is shown in full; none: the one who is followed.
+let chosen = null;
 let next = null;
 let clock = null;
 let drawn = 0;
@@ -81,7 +83,7 @@ function begin(value) {
 }
 
 function show(value) {
-  moment = null;
+  [moment, chosen] = [null, null];
   [feet, floor, clock] = [[], null, null];
   scene = { ...value.scene, eyes: value.scene.views.filter((it) => it.at) };
   stage.show(scene);
@@ -107,8 +109,34 @@ function beginFinished(value, isSame) {
   go(isSame && moment ? moment.at : 0);
 }
 
+// Puts the person who was chosen in the place of the one who is followed, if both are there.
+function choose(value) {
+  const nth = value.others.findIndex((it) => it.id === chosen);
+  if (nth < 0) return;
+  const [other] = value.others.splice(nth, 1);
+  const followed = { id: value.id, joints: value.joints, stature: value.stature, views: value.views.map((it) => it.joints) };
+  if (followed.id !== null) value.others.push(followed);
+  Object.assign(value, { id: other.id, joints: other.joints, stature: other.stature, spread: [] });
+  value.views.forEach((it, k) => { it.joints = other.views[k] ?? null; it.behind = false; });
+}
+
+// Names the people to choose from; somebody who was chosen stays there while nobody sees them.
+function name(value) {
+  const ids = [value.id, ...value.others.map((it) => it.id), chosen].filter((id) => id !== null);
+  const all = [...new Set(ids)].sort((a, b) => a - b);
+  element("whom").hidden = all.length < 2;
+  const who = element("who");
+  const known = [...who.options].slice(1).map((it) => Number(it.value));
+  if (known.join() !== all.join()) {
+    who.replaceChildren(who.options[0], ...all.map((id) => new Option(String(id), id)));
+    who.value = chosen === null ? "" : String(chosen);
+  }
+}
+
 function arrive(value) {
   counts.moments++;
+  name(value);
+  choose(value);
   if (hello?.mode === "finished") {
     asked = null;
     element("at").value = next ?? value.at;
@@ -163,7 +191,12 @@ function draw() {
         if (it && moment.joints[k]) stage.drawSpread(moment.joints[k], it, "#c6d0de");
       });
     }
+    for (const it of moment.others) {
+      stage.drawSkeleton(it.joints, 3, colourOf(it.id));
+      stage.drawName(it.joints, it.id, colourOf(it.id));
+    }
     stage.drawSkeleton(moment.joints, 4);
+    if (moment.others.length) stage.drawName(moment.joints, moment.id, "#e6ebf2");
     const words = [`frame ${moment.frame}`, moment.seconds !== null && `${moment.seconds.toFixed(2)} s`, moment.why,
       moment.people > 1 && `${moment.people} people`, moment.stature && `${moment.stature.toFixed(2)} m tall`];
     say(words.filter(Boolean).join(", "));
@@ -257,17 +290,32 @@ element("spread").onchange = redraw;
 element("poses").onchange = () => { pictures.poses = element("poses").checked; redraw(); };
 element("shots").onchange = askForPictures;
 element("part").onchange = () => choosePart(element("part").value === "" ? null : Number(element("part").value));
+element("who").onchange = () => choosePerson(element("who").value === "" ? null : Number(element("who").value));
 element("at").oninput = () => { hold(true); go(Number(element("at").value)); };
 window.addEventListener("resize", redraw);
 
 const keys = {
   " ": playOrHold, ",": () => step(-1), ".": () => step(1), Home: () => step(-Infinity), End: () => step(Infinity),
   "+": () => stage.near(0.9), "=": () => stage.near(0.9), "-": () => stage.near(1.1),
-  u: () => flip("spread"), o: () => flip("poses"), p: () => flip("shots"), r: record,
+  n: nextPerson, u: () => flip("spread"), o: () => flip("poses"), p: () => flip("shots"), r: record,
   "?": () => element("keys").showModal(),
   "[": () => nextPart(-1), "]": () => nextPart(1),
   Escape: () => { pictures.point = null; choosePart(null); if (pictures.large !== null) enlarge(null); },
 };
+
+// What has been drawn stays until the next frame; a finished run is asked for its frame again.
+function choosePerson(id) {
+  chosen = id;
+  element("who").value = id === null ? "" : String(id);
+  if (hello?.mode === "finished" && moment) go(moment.at);
+}
+
+function nextPerson() {
+  const all = [...element("who").options].map((it) => it.value);
+  const at = all.indexOf(element("who").value);
+  const then = all[(at + 1) % all.length];
+  choosePerson(then === "" ? null : Number(then));
+}
 
 function nextPart(by) {
   const n = scene.joints.length + 1;

@@ -1,6 +1,6 @@
-//! One frame as the page draws it: of several people the one who is followed.
+//! One frame as the page draws it: the person who is followed, and the others.
 
-use messages::{Joint3d, MAX_PARTS, SkeletonMessage, Skeletons, Status};
+use messages::{FusedView, Joint3d, MAX_PARTS, SkeletonMessage, Skeletons, Status};
 use serde::Serialize;
 
 use crate::scene::Scene;
@@ -20,6 +20,10 @@ pub(crate) struct Moment {
     pub seconds: Option<f64>,
     /// Why there is no skeleton; none if there is one.
     pub why: Option<String>,
+    /// Identity of the person who is followed; none without one.
+    pub id: Option<u64>,
+    /// The other people.
+    pub others: Vec<Other>,
     /// Every joint in the world, metres.
     pub joints: Vec<Option<[f64; 3]>>,
     /// Covariance of every joint, square metres: xx, xy, xz, yy, yz, zz.
@@ -32,6 +36,19 @@ pub(crate) struct Moment {
     pub stature: Option<f64>,
     /// From the capture to the result, milliseconds, where known.
     pub latency_ms: Option<f64>,
+}
+
+/// A person beside the one who is followed.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct Other {
+    /// Identity.
+    pub id: u64,
+    /// As in [`Moment`].
+    pub joints: Vec<Option<[f64; 3]>>,
+    /// As in [`Moment`].
+    pub stature: Option<f64>,
+    /// The joints in every view, pixels; none without a pose.
+    pub views: Vec<Option<Vec<[f64; 2]>>>,
 }
 
 /// The pose in one view.
@@ -55,8 +72,8 @@ impl Moment {
         // Of nobody no joint is anywhere.
         let nowhere = vec![Joint3d::default(); scene.joints.joints.len()];
         let joints = person.map_or(&nowhere[..], SkeletonMessage::listed_joints);
-        let stature_m = person.map_or(0.0, |person| person.stature_m);
         let found = |it: &&Joint3d| person.is_some() && it.status == Status::OK;
+        let others = message.listed().iter().skip(1);
         let views = scene.views.iter().enumerate();
         let latency = message.timing.sent_at_nanos;
         let latency = latency.checked_sub(message.stamp.captured_at_nanos);
@@ -68,17 +85,18 @@ impl Moment {
                 .frame_rate_hz
                 .map(|rate| rounded(message.stamp.frame as f64 / rate, 1e3)),
             why: (message.status != Status::OK).then(|| message.status.reason().to_owned()),
-            joints: joints
-                .iter()
-                .map(|it| Some(it).filter(found).map(|it| in_world(it.in_world)))
+            id: person.map(|person| person.id),
+            others: others
+                .map(|other| Other::of_message(scene, other))
                 .collect(),
+            joints: places(joints, person.is_some()),
             spread: joints
                 .iter()
                 .map(|it| Some(it).filter(found).and_then(|it| spread(it.covariance)))
                 .collect(),
             views: views.map(|(view, _)| seen(scene, message, view)).collect(),
             people: Some(message.n_seen).filter(|n_seen| *n_seen > 0),
-            stature: Some(rounded(stature_m, 1e3)).filter(|metres| *metres > 0.0),
+            stature: person.and_then(stature),
             latency_ms: latency.map(|nanos| rounded(nanos as f64 / 1e6, 10.0)),
         }
     }
@@ -88,6 +106,43 @@ impl Moment {
         // Numbers that are not finite become null; there is no other error.
         serde_json::to_string(self).unwrap_or_default()
     }
+}
+
+impl Other {
+    fn of_message(scene: &Scene, person: &SkeletonMessage) -> Self {
+        let views = person.listed_views().iter();
+        let pose = |fused: &FusedView| {
+            let is_seen = fused.status == Status::OK;
+            is_seen.then(|| in_pixels(scene, fused)).flatten()
+        };
+        Self {
+            id: person.id,
+            joints: places(person.listed_joints(), true),
+            stature: stature(person),
+            views: views.map(pose).collect(),
+        }
+    }
+}
+
+/// Every joint in the world; `None` where it is not known.
+fn places(joints: &[Joint3d], is_somebody: bool) -> Vec<Option<[f64; 3]>> {
+    let place = |joint: &Joint3d| {
+        let is_known = is_somebody && joint.status == Status::OK;
+        is_known.then(|| in_world(joint.in_world))
+    };
+    joints.iter().map(place).collect()
+}
+
+/// The height of a person, metres; `None` where it is not known.
+fn stature(person: &SkeletonMessage) -> Option<f64> {
+    Some(rounded(person.stature_m, 1e3)).filter(|metres| *metres > 0.0)
+}
+
+/// The joints in a view, pixels.
+fn in_pixels(scene: &Scene, fused: &FusedView) -> Option<Vec<[f64; 2]>> {
+    let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
+    let joints = scene.joints_of(&fused.centres_px[..n_parts])?;
+    Some(joints.into_iter().map(in_view).collect())
 }
 
 fn seen(scene: &Scene, message: &Skeletons, view: usize) -> Seen {
@@ -106,10 +161,8 @@ fn seen(scene: &Scene, message: &Skeletons, view: usize) -> Seen {
             ..Seen::default()
         };
     };
-    let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
-    let joints = scene.joints_of(&fused.centres_px[..n_parts]);
     Seen {
-        joints: joints.map(|it| it.into_iter().map(in_view).collect()),
+        joints: in_pixels(scene, fused),
         why: None,
         behind: scene.tells_facing && fused.exchanged == 1,
     }
@@ -161,7 +214,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn of_several_people_the_one_who_is_followed_is_shown() {
+    fn of_several_people_the_one_who_is_followed_is_shown_first() {
         let mut message = Box::<Skeletons>::default();
         (message.n_people, message.n_seen) = (2, 3);
         for (nth, person) in message.people[..2].iter_mut().enumerate() {
@@ -175,6 +228,9 @@ pub(crate) mod tests {
             (moment.people, moment.stature, moment.why),
             (Some(3), Some(1.7), None)
         );
+        assert_eq!((moment.id, moment.others.len()), (Some(5), 1));
+        let other = &moment.others[0];
+        assert_eq!((other.id, other.joints[0]), (4, Some([2.0, 0.0, 0.0])));
         (message.n_people, message.status) = (0, Status::TOO_FEW_VIEWS);
         let moment = Moment::of_message(&scene(), &message);
         assert_eq!((moment.joints, moment.stature), (vec![None; 14], None));

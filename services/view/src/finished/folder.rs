@@ -8,12 +8,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use failure::{ExitKind, Failure};
 use launch::Resolved;
-use runfiles::{FrameLine, Line as _, Missing, ViewLine};
+use runfiles::{FrameLine, Line as _, Missing, PersonLine, PlacedJoint, ViewLine};
 use serde::Deserialize;
 use skeleton::PARSE14;
 
 use super::Frame;
-use crate::moment::{Moment, Seen, in_view, in_world, spread};
+use crate::moment::{Moment, Other, Seen, in_view, in_world, spread};
 use crate::picture;
 use crate::scene::Scene;
 
@@ -270,11 +270,24 @@ fn pictures(folder: &Path, camera: &str) -> (PathBuf, Vec<u64>) {
 /// A frame by its line, with the person who is followed, without the poses of its views.
 fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
     let person = line.followed();
-    let placed = scene.joints.joints.iter().map(|it| {
-        let joint = person.and_then(|person| person.joints.get(it.name));
-        joint.and_then(|it| it.placed())
+    let placed = |person: Option<&PersonLine>| -> Vec<Option<PlacedJoint>> {
+        let joints = scene.joints.joints.iter();
+        let joint = |name: &str| person?.joints.get(name)?.placed().cloned();
+        joints.map(|named| joint(named.name)).collect()
+    };
+    let places = |placed: &[Option<PlacedJoint>]| {
+        let places = placed.iter();
+        places
+            .map(|it| it.as_ref().map(|it| in_world(it.position_m)))
+            .collect()
+    };
+    let others = line.people.iter().skip(1).map(|other| Other {
+        id: other.id,
+        joints: places(&placed(Some(other))),
+        stature: other.stature_m,
+        views: Vec::new(),
     });
-    let placed: Vec<_> = placed.collect();
+    let followed = placed(person);
     let views = scene.views.iter().map(|it| Seen {
         why: line
             .views_missing
@@ -289,13 +302,12 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
         frame: line.frame,
         seconds: line.time_s,
         why: (!line.has_pose()).then_some(why),
-        joints: placed
+        id: person.map(|person| person.id),
+        others: others.collect(),
+        joints: places(&followed),
+        spread: followed
             .iter()
-            .map(|it| it.map(|it| in_world(it.position_m)))
-            .collect(),
-        spread: placed
-            .iter()
-            .map(|it| it.and_then(|it| spread(it.covariance_m2)))
+            .map(|it| it.as_ref().and_then(|it| spread(it.covariance_m2)))
             .collect(),
         views: views.collect(),
         people: line.seen,
@@ -324,7 +336,7 @@ mod tests {
     use crate::moment::tests::scene;
 
     #[test]
-    fn of_several_people_the_one_who_is_followed_is_shown() {
+    fn of_several_people_the_one_who_is_followed_is_shown_first() {
         let person = |id: u64| {
             format!(
                 r#"{{"facing_margin":null,"id":{id},"joints":{{"head":{{"covariance_m2":[1,0,0,1,0,1],"position_m":[{id},2,3],"reprojection_px":1,"views":["a"]}}}},"pairs":1,"stature_m":1.7,"status":"ok","views_used":["a"]}}"#
@@ -340,5 +352,7 @@ mod tests {
         assert_eq!(moment.joints[13], Some([7.0, 2.0, 3.0]));
         assert_eq!(moment.joints.iter().flatten().count(), 1);
         assert_eq!((moment.people, moment.stature), (Some(2), Some(1.7)));
+        assert_eq!((moment.id, moment.others[0].id), (Some(7), 2));
+        assert_eq!(moment.others[0].joints[13], Some([2.0, 2.0, 3.0]));
     }
 }

@@ -8,6 +8,10 @@ const unit = (a) => a.map((it) => it / Math.hypot(...a));
 // Colours on the stage, which is dark in both tones of a page, and on pictures.
 export const COLOURS = { right: "#e69f00", left: "#56b4e9", centre: "#45c9b6", truth: "#9aa5b5", accent: "#ff5c5c", eye: "#8fa3bd", floor: "#27303d" };
 
+// Colours of people beside the one who is shown in full, by their numbers.
+const PEOPLE = ["#c58bff", "#ffd166", "#7ee081", "#ff9f8a", "#8ab4ff", "#f48fd0"];
+export const colourOf = (id) => PEOPLE[(id - 1) % PEOPLE.length];
+
 // The side of the body of a line between two joints, by their names.
 export function sideOf(...names) {
   for (const name of names) {
@@ -112,6 +116,18 @@ export class Stage {
       if (!points[from] || !points[to]) continue;
       this.line(points[from], points[to], colour || COLOURS[sideOf(joints[from], joints[to])], width);
     }
+  }
+
+  // The number of a person above the head, or above the highest joint that is known.
+  drawName(points, name, colour) {
+    const known = points.filter(Boolean);
+    if (!known.length) return;
+    const top = known.reduce((a, b) => (this.along(b)[2] > this.along(a)[2] ? b : a));
+    const at = this.project(top);
+    if (!at) return;
+    this.pen.fillStyle = colour;
+    this.pen.font = `${15 * this.sharp}px system-ui, sans-serif`;
+    this.pen.fillText(String(name), at[0] + 4, at[1] - 10);
   }
 
   // Where a point lies with 95 %: the outline of its ellipsoid; covariance as xx, xy, xz, yy, yz, zz in square metres.
