@@ -82,6 +82,7 @@ fn settings(scenes: &Scenes, nth: u32) -> Settings {
         rig,
         subject: from + rng.u64(0..=to - from),
         others: 0,
+        passers: 0,
         action: Action::ALL[rng.usize(0..Action::ALL.len())],
         seed: rng.u64(1..1 << 32),
         // One frame in three quarters of a second: no two show the same pose.

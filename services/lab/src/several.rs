@@ -1,5 +1,6 @@
 //! Several people: who is who and where, from what a detector found, judged by the truth.
 
+mod everybody;
 mod judge;
 mod report;
 mod shelf;
@@ -8,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use people::{Person, Settings, Solver, Tracker};
 
+pub use everybody::{Everybody, everybody};
 pub use judge::{Put, Score};
 pub use report::{ActorReport, Measured, Report};
 pub use shelf::{Shelf, ShelfError, TruePerson, is_one};

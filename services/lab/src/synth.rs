@@ -28,6 +28,8 @@ pub struct Job {
     pub subjects: Vec<u64>,
     /// How many other people stand around.
     pub others: u64,
+    /// How many people walk and pass the subject.
+    pub passers: u64,
     /// What they do, one after the other; of no meaning with `recording`.
     pub actions: Vec<Action>,
     /// What was recorded and is done in the place of an action.
@@ -165,6 +167,7 @@ impl Job {
             rig: absolute(&self.rig),
             subject,
             others: self.others,
+            passers: self.passers,
             action,
             seed: self.seed,
             rate_hz: self.rate_hz,

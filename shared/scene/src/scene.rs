@@ -120,7 +120,7 @@ impl Scene {
             .fork("scene")
             .nth(settings.subject)
             .fork(&performance.name);
-        let others = (0..settings.others).map(|it| Bystander::new(settings, it));
+        let others = others(settings, &performance);
         let stage_from_world = world_from_stage.inverse();
         let eyes = rig
             .cameras()
@@ -134,7 +134,7 @@ impl Scene {
             world_from_stage,
             performance,
             figure: Figure { mesh, wear },
-            others: others.collect(),
+            others,
             room,
             random,
         })
@@ -192,6 +192,17 @@ impl Scene {
         joints.map(|it| (self.world_from_stage * it).coords.into())
     }
 
+    /// The same of every other person.
+    pub fn other_joints(&self, seconds: f64) -> Vec<[[f64; 3]; N_JOINTS]> {
+        let in_world = |joints: [Point3<f64>; N_JOINTS]| {
+            joints.map(|joint| (self.world_from_stage * joint).coords.into())
+        };
+        let others = self.others.iter();
+        others
+            .map(|other| in_world(other.joints(seconds)))
+            .collect()
+    }
+
     /// Number of a camera by its name in the rig or its number.
     ///
     /// # Errors
@@ -216,6 +227,25 @@ impl Scene {
             .map_or(0.0, |it| it * 1e-3);
         (self.seconds(shown) + skew + late, shown != frame)
     }
+}
+
+/// Those who stand around, then those who pass.
+fn others(settings: &Settings, performance: &Performance) -> Vec<Bystander> {
+    let standing = 0..settings.others;
+    let mut others: Vec<Bystander> = standing
+        .map(|nth| Bystander::standing(settings, nth))
+        .collect();
+    for nth in 0..settings.passers {
+        let trunk = |frames: [Isometry3<f64>; N_BONES]| frames[PELVIS].translation.vector;
+        let trunks = |seconds: f64| {
+            let others = others.iter().map(|other| trunk(other.frames(seconds)));
+            let all = core::iter::once(trunk(performance.frames(seconds))).chain(others);
+            all.collect()
+        };
+        let passer = Bystander::passing(settings, nth, &trunks);
+        others.push(passer);
+    }
+    others
 }
 
 /// Number of a camera of a rig by its name or its number, from 0.

@@ -17,6 +17,8 @@ pub struct Settings {
     pub action: Action,
     /// How many other people stand around, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
     pub others: u64,
+    /// How many other people walk and pass the subject, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
+    pub passers: u64,
     /// Seed of the random choices: the performance, the room, the lamps.
     pub seed: u64,
     /// Frames a second.
@@ -31,7 +33,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Most other people.
+    /// Most other people of each kind.
     pub const MOST_OTHERS: u64 = 4;
     /// Most milliseconds that a picture is taken before or after the instant of its frame.
     pub const MOST_SKEW_MS: f64 = 1000.0;
@@ -53,6 +55,7 @@ impl Default for Settings {
             rig: RigChoice::HumanEva,
             subject: 1,
             others: 0,
+            passers: 0,
             action: Action::Walking,
             seed: 1,
             rate_hz: 30.0,
@@ -124,11 +127,12 @@ const SCHEME: &str = "synth://";
 
 impl Address {
     /// Keys of an address, those of the flaws last; `camera` is required.
-    pub const KEYS: [&'static str; 16] = [
+    pub const KEYS: [&'static str; 17] = [
         "camera",
         "action",
         "subject",
         "others",
+        "passers",
         "seed",
         "rate",
         "frames",
@@ -217,9 +221,14 @@ impl Address {
                 settings.action = Action::by_name(value).ok_or_else(|| wrong(&names))?;
             }
             "subject" => settings.subject = count()?,
-            "others" => {
-                let others = Some(count()?).filter(|it| *it <= Settings::MOST_OTHERS);
-                settings.others = others.ok_or_else(|| wrong("0 to 4"))?;
+            "others" | "passers" => {
+                let people = Some(count()?).filter(|people| *people <= Settings::MOST_OTHERS);
+                let people = people.ok_or_else(|| wrong("0 to 4"))?;
+                if key == "others" {
+                    settings.others = people;
+                } else {
+                    settings.passers = people;
+                }
             }
             "seed" => settings.seed = count()?,
             "frames" => self.n_frames = count()?.max(1),
@@ -254,6 +263,7 @@ impl std::fmt::Display for Address {
             rig,
             subject,
             others,
+            passers,
             action,
             seed,
             rate_hz,
@@ -269,6 +279,9 @@ impl std::fmt::Display for Address {
         write!(out, "&rate={rate_hz}&frames={n_frames}")?;
         if others > 0 {
             write!(out, "&others={others}")?;
+        }
+        if passers > 0 {
+            write!(out, "&passers={passers}")?;
         }
         if let Some(folder) = backdrop {
             write!(out, "&backdrop={}", folder.display())?;
@@ -363,13 +376,14 @@ mod tests {
         #[test]
         fn a_written_address_is_read_back(
             subject: u64, seed: u64, action in 0..10_usize, n_frames in 1..u64::MAX,
-            noise in 0.0..50.0, desync in 0.0..1.0, others in 0..5_u64, n in 1_usize..60, radius in 2.0..50.0,
+            noise in 0.0..50.0, desync in 0.0..1.0, others in 0..5_u64, passers in 0..5_u64, n in 1_usize..60, radius in 2.0..50.0,
         ) {
             let it = Address {
                 settings: Settings {
                     rig: RigChoice::Ring { n, radius, height: 1.5 },
                     subject,
                     others,
+                    passers,
                     action: Action::ALL[action],
                     seed,
                     rate_hz: 29.97,

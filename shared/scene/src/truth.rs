@@ -7,7 +7,7 @@ use skeleton::JointSet;
 
 /// The format name in the first line of a file.
 const FORMAT: &str = "parallax-truth";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Number of joints, those of `skeleton::PARSE14`.
 pub const N_JOINTS: usize = 14;
@@ -18,7 +18,7 @@ pub const N_JOINTS: usize = 14;
 pub struct Header {
     /// `"parallax-truth"`.
     pub format: String,
-    /// 1.
+    /// 2.
     pub version: u32,
     /// Number of the subject.
     pub subject: u64,
@@ -46,6 +46,8 @@ pub struct Frame {
     pub seconds: f64,
     /// The joints of `skeleton::PARSE14` at that time, metres in the world.
     pub joints: [[f64; 3]; N_JOINTS],
+    /// The same of every other person.
+    pub others: Vec<[[f64; 3]; N_JOINTS]>,
     /// One for every camera of the header.
     pub views: Vec<View>,
 }
@@ -233,6 +235,7 @@ mod tests {
             frame: 2,
             seconds: 0.1,
             joints: core::array::from_fn(|it| [it as f64, 0.5, -1.0]),
+            others: vec![[[0.5; 3]; N_JOINTS]],
             views: vec![View {
                 camera: "a".to_owned(),
                 seconds: 0.1,
@@ -283,7 +286,7 @@ mod tests {
         assert_eq!(Header::parse(&line).unwrap(), header());
         for (from, to) in [
             ("parallax-truth", "other"),
-            ("\"version\":1", "\"version\":2"),
+            ("\"version\":2", "\"version\":1"),
             ("right knee", "right hip"),
             ("\"seed\"", "\"sede\""),
         ] {

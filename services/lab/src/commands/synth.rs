@@ -82,9 +82,13 @@ pub(crate) struct Arguments {
     /// Numbers of the subjects: 3, or 1-20,25.
     #[arg(long, value_name = "LIST", default_value = "1", value_parser = subjects)]
     subjects: Subjects,
-    /// Other people who stand around the subject, at most 4; the truth is of the subject alone.
+    /// Other people who stand around the subject, at most 4.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     others: u64,
+    /// Other people who walk and pass the subject and each other, at most 4. The truth has the joints of everybody; masks and visible
+    /// joints are the subject's alone.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
+    passers: u64,
     /// Their actions: names separated by commas, or all.
     #[arg(long, value_name = "LIST", default_value = "walking", value_parser = actions)]
     actions: Actions,
@@ -203,6 +207,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         rig: arguments.rig.clone(),
         subjects: arguments.subjects.clone(),
         others: arguments.others,
+        passers: arguments.passers,
         actions: arguments.actions.clone(),
         seed: arguments.seed,
         flaws: arguments.flaws.flaws()?,

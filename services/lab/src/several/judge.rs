@@ -38,6 +38,16 @@ pub struct Put {
 }
 
 impl Put {
+    /// The joints as they are: the head from the neck to its top.
+    pub fn plain(id: u64, joints: &Joints) -> Self {
+        let mut all = [None; N_TRUE];
+        all[..14].copy_from_slice(joints);
+        all[14] = joints[2]
+            .zip(joints[3])
+            .map(|(a, b)| nalgebra::center(&a, &b));
+        Self { id, joints: all }
+    }
+
     /// By the rule of 4D Association: the bottom of the head is the middle of the shoulders and of the ears, its top 0.125 m along the face
     /// and 0.145 m up. The ears lie at 1 / 1.8 of the way from the neck to the top of the head.
     pub fn new(id: u64, joints: &Joints) -> Self {

@@ -21,6 +21,16 @@ pub struct Measured {
     pub interval: [f64; 2],
 }
 
+impl Measured {
+    /// Mean of numbers; `None` of none.
+    ///
+    /// * `scale`: factor of the mean and of the interval.
+    pub(super) fn mean(numbers: &[f64], scale: f64) -> Option<Self> {
+        let each: Vec<Share> = numbers.iter().map(|number| Share::of([*number])).collect();
+        measured(&each, scale)
+    }
+}
+
 /// The score of a person.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ActorReport {
@@ -92,7 +102,7 @@ impl Report {
     }
 }
 
-fn of_actor(id: usize, actor: &Actor) -> ActorReport {
+pub(super) fn of_actor(id: usize, actor: &Actor) -> ActorReport {
     let parts = actor
         .by_part
         .iter()

@@ -138,6 +138,7 @@ impl<'a> Sequence<'a> {
                 frame,
                 seconds,
                 joints: self.scene.joints(seconds),
+                others: self.scene.other_joints(seconds),
                 views: (0..n_cameras).map(of_camera).collect(),
             }
         };

@@ -255,3 +255,42 @@ fn others_stand_around_and_are_not_the_subject() {
         assert!(places[..nth].iter().all(far), "{places:?}");
     }
 }
+
+#[test]
+fn people_who_pass_walk_about_and_keep_a_distance() {
+    let settings = Settings {
+        rig: RigChoice::parse("ring:3:6:1.6").unwrap(),
+        passers: 3,
+        ..Settings::default()
+    };
+    let scene = Scene::new(&settings).unwrap();
+    let hips =
+        |joints: &[[f64; 3]; N_JOINTS]| Vector3::from(joints[2]).lerp(&joints[3].into(), 0.5);
+    let (mut nearest, mut closest) = (f64::INFINITY, f64::INFINITY);
+    let mut paths = vec![Vec::new(); 3];
+    for nth in 0..150 {
+        let seconds = 0.1 * f64::from(nth);
+        let others: Vec<Vector3<f64>> = scene.other_joints(seconds).iter().map(hips).collect();
+        let all: Vec<Vector3<f64>> = core::iter::once(hips(&scene.joints(seconds)))
+            .chain(others.iter().copied())
+            .collect();
+        for (a, place) in all.iter().enumerate() {
+            let apart = all[..a].iter().map(|other| (other - place).norm());
+            nearest = apart.fold(nearest, f64::min);
+        }
+        for (path, place) in paths.iter_mut().zip(&others) {
+            path.push(*place);
+        }
+    }
+    for path in &paths {
+        let from = path[0];
+        let farthest = path.iter().map(|place| (place - from).norm());
+        assert!(farthest.fold(0.0, f64::max) > 1.0, "somebody does not walk");
+        closest = path
+            .iter()
+            .map(|place| place.xy().norm())
+            .fold(closest, f64::min);
+    }
+    assert!(nearest > 0.35, "two are {nearest} m apart");
+    assert!(closest < 0.8, "nobody comes near the middle: {closest}");
+}

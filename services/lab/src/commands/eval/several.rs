@@ -4,7 +4,11 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use failure::{ExitKind, Failure, OrFail as _, in_file};
-use lab::several::{ActorReport, Measured, Report, Shelf, ShelfError, run as follow};
+use lab::several::{
+    ActorReport, Everybody, Measured, Report, Shelf, ShelfError, everybody, run as follow,
+};
+use runfiles::FrameLine;
+use scene::truth::{Frame, Header, TruthError};
 use terminal::output;
 
 use super::Arguments;
@@ -35,6 +39,90 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<ExitCode, Fail
     )
 }
 
+/// Judges a finished run against the truth of its scene.
+///
+/// * `run`: the folder of its results.
+pub(super) fn run_of_scene(arguments: &Arguments, run: &Path) -> Result<ExitCode, Failure> {
+    let [folder] = &arguments.sequences[..] else {
+        let what = "--run judges one run against the truth of one sequence";
+        return Err(Failure::new(ExitKind::Usage, what));
+    };
+    let file = folder.join("truth.jsonl");
+    let text = failure::read_text(&file)?;
+    let refuse = |line: usize, error: &TruthError| {
+        let what = format!("{}, line {line}: {error}", file.display());
+        Failure::new(ExitKind::Input, what)
+            .with_hint("--run judges a run of a folder that `parallax-lab synth` wrote")
+    };
+    let mut lines = text.lines();
+    let header = Header::parse(lines.next().unwrap_or_default());
+    let header = header.map_err(|error| refuse(1, &error))?;
+    let frames = lines
+        .enumerate()
+        .map(|(nth, line)| Frame::parse(line, &header).map_err(|error| refuse(nth + 2, &error)));
+    let truth: Vec<Frame> = frames.collect::<Result<_, Failure>>()?;
+    let file = run.join("pose3d.jsonl");
+    let text = failure::read_text(&file)?;
+    let lines: Result<Vec<FrameLine>, _> = runfiles::lines(&text).collect();
+    let lines = lines.map_err(|error| in_file(&file, &error))?;
+    let report = everybody(&truth, &lines, header.frame_rate_hz);
+    inputs::make_folder(&arguments.out)?;
+    let text = serde_json::to_string_pretty(&report).or_fail(ExitKind::Run)?;
+    let file = arguments.out.join("people.json");
+    files::replace(&file, text.as_bytes()).map_err(|error| in_file(&file, &error))?;
+    if arguments.json {
+        output::json(&report)?;
+    } else {
+        output::line(everybody_in_lines(&report))?;
+    }
+    failure::require_results(
+        report.frames > 0,
+        "the run has no frame of the truth: are they of the same scene?",
+    )
+}
+
+fn everybody_in_lines(report: &Everybody) -> String {
+    let people = report.people.iter().map(|person| {
+        format!(
+            "person {}: found in {} of {} frames, PCP3D {} %, limbs off by {} mm, {} changes of the id\n",
+            person.actor,
+            person.found,
+            person.frames,
+            number(&person.pcp3d),
+            number(&person.mpjpe_mm),
+            person.switches
+        )
+    });
+    let people: String = people.collect();
+    let ap = report
+        .ap
+        .iter()
+        .map(|(mm, ap)| format!("{ap:.1} at {mm} mm"));
+    format!(
+        "{people}everybody: mean of 14 joints {} mm, recall at 500 mm {:.1} %, average precision {} %\n\
+         {} changes of an id ({:.2} a minute), {} ids given, {:.2} people put out a frame, {:.2} there, {} frames; intervals: 95 %, over \
+         blocks of 25 frames",
+        number(&report.mpjpe_mm),
+        report.recall,
+        ap.collect::<Vec<_>>().join(", "),
+        report.switches,
+        report.switches_a_minute,
+        report.ids,
+        report.put_out,
+        report.there,
+        report.frames
+    )
+}
+
+/// A number with its interval.
+fn number(measured: &Option<Measured>) -> String {
+    let Some(Measured { value, interval }) = measured else {
+        return "-".to_owned();
+    };
+    let [low, high] = interval;
+    format!("{value:.2} ({low:.2} to {high:.2})")
+}
+
 /// The views that were asked for; all if none was.
 fn chosen(asked: &[usize], n_views: usize) -> Result<Vec<usize>, Failure> {
     let is_twice = |nth: usize| asked[..nth].contains(&asked[nth]);
@@ -55,13 +143,6 @@ fn chosen(asked: &[usize], n_views: usize) -> Result<Vec<usize>, Failure> {
 }
 
 fn in_lines(report: &Report) -> String {
-    let number = |measured: &Option<Measured>| {
-        let Some(Measured { value, interval }) = measured else {
-            return "-".to_owned();
-        };
-        let [low, high] = interval;
-        format!("{value:.2} ({low:.2} to {high:.2})")
-    };
     let actor = |actor: &ActorReport| {
         let parts: Vec<String> = actor
             .parts

@@ -1,0 +1,274 @@
+//! A finished run of several people against the truth of its scene: who was found, where, and by which name.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Point3;
+use runfiles::{FrameLine, PersonLine};
+use scene::truth::{Frame, N_JOINTS};
+use serde::Serialize;
+use skeleton::PARSE14;
+use skeleton::body::Joints;
+
+use super::Measured;
+use super::judge::{Put, Score};
+use super::report::{ActorReport, of_actor};
+use super::shelf::{N_TRUE, TruePerson};
+
+/// A person who was put out is right at these mean distances of the joints, millimetres; as VoxelPose judges Panoptic.
+const RIGHT_MM: [u32; 6] = [25, 50, 75, 100, 125, 150];
+/// And found, at this one.
+const FOUND_M: f64 = 0.5;
+
+/// The score of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Everybody {
+    /// Frames of the truth that the run has a line for.
+    pub frames: usize,
+    /// The people who were there.
+    pub people: Vec<ActorReport>,
+    /// Mean distance of the fourteen joints of those who were found, millimetres.
+    pub mpjpe_mm: Option<Measured>,
+    /// Average precision, percent, by the distance at which a person is right, millimetres. People are ordered by the deviations that the
+    /// run states.
+    pub ap: BTreeMap<u32, f64>,
+    /// Share of the people who were put out within half a metre, percent.
+    pub recall: f64,
+    /// How often an id changed, and that in a minute.
+    pub switches: usize,
+    /// See [`switches`](Self::switches).
+    pub switches_a_minute: f64,
+    /// Number of ids that were given.
+    pub ids: usize,
+    /// People put out in each frame, mean; and people who were there.
+    pub put_out: f64,
+    /// See [`put_out`](Self::put_out).
+    pub there: f64,
+}
+
+/// A person who was put out.
+struct Candidate {
+    frame: usize,
+    /// Mean of the stated deviations, metres.
+    sd_m: f64,
+    /// Mean distance to every person who was there, metres.
+    distances_m: Vec<f64>,
+}
+
+/// Judges a run.
+///
+/// * `rate_hz`: frames of the truth a second.
+/// * `lines`: of `pose3d.jsonl`; frames that the truth does not have are passed over, as are frames of the truth without a line.
+pub fn everybody(truth: &[Frame], lines: &[FrameLine], rate_hz: f64) -> Everybody {
+    let by_number: BTreeMap<u64, &Frame> = truth.iter().map(|frame| (frame.frame, frame)).collect();
+    let mut score = Score::default();
+    let (mut candidates, mut n_true, mut n_frames) = (Vec::new(), 0, 0);
+    let mut errors = Vec::new();
+    for line in lines {
+        let Some(frame) = by_number.get(&line.frame) else {
+            continue;
+        };
+        let there: Vec<Joints> = core::iter::once(&frame.joints)
+            .chain(&frame.others)
+            .map(|joints| joints.map(|joint| Some(Point3::from(joint))))
+            .collect();
+        let put: Vec<(u64, Joints)> = line
+            .people
+            .iter()
+            .map(|person| (person.id, joints(person)))
+            .collect();
+        let people = there.iter().enumerate();
+        let people: Vec<TruePerson> = people
+            .filter_map(|(id, joints)| true_person(id, joints))
+            .collect();
+        let each: Vec<Put> = put
+            .iter()
+            .map(|(id, joints)| Put::plain(*id, joints))
+            .collect();
+        score.add(&people, &each);
+        for (person, (_, put)) in line.people.iter().zip(&put) {
+            candidates.push(Candidate {
+                frame: n_frames,
+                sd_m: deviation(person),
+                distances_m: there.iter().map(|there| distance(put, there)).collect(),
+            });
+        }
+        for there in &there {
+            let nearest = put.iter().map(|(_, put)| distance(put, there));
+            let nearest = nearest.fold(f64::INFINITY, f64::min);
+            errors.push((nearest < FOUND_M).then_some(nearest));
+        }
+        n_true += there.len();
+        n_frames += 1;
+    }
+    candidates.sort_by(|a, b| a.sd_m.total_cmp(&b.sd_m));
+    let ap = RIGHT_MM.map(|mm| {
+        (
+            mm,
+            average_precision(&candidates, n_true, f64::from(mm) / 1e3),
+        )
+    });
+    let people: Vec<ActorReport> = score
+        .actors
+        .iter()
+        .map(|(id, actor)| of_actor(*id, actor))
+        .collect();
+    let switches = people.iter().map(|person| person.switches).sum();
+    let found: Vec<f64> = errors.iter().flatten().copied().collect();
+    let share = |n: f64, of: usize| n / of.max(1) as f64;
+    Everybody {
+        frames: n_frames,
+        mpjpe_mm: Measured::mean(&found, 1e3),
+        ap: ap.into(),
+        recall: 100.0 * share(found.len() as f64, n_true),
+        switches,
+        switches_a_minute: 60.0 * rate_hz * share(switches as f64, n_frames),
+        ids: score.ids.len(),
+        put_out: share(score.n_put as f64, n_frames),
+        there: share(n_true as f64, n_frames),
+        people,
+    }
+}
+
+/// A person who was there; `None` if a joint is not known.
+fn true_person(id: usize, joints: &Joints) -> Option<TruePerson> {
+    let put = Put::plain(0, joints);
+    let mut all = [Point3::origin(); N_TRUE];
+    for (joint, place) in all.iter_mut().zip(put.joints) {
+        *joint = place?;
+    }
+    Some(TruePerson { id, joints: all })
+}
+
+/// The joints of a person of a run.
+fn joints(person: &PersonLine) -> Joints {
+    core::array::from_fn(|joint| {
+        let placed = person.joints.get(PARSE14.joints[joint].name)?.placed()?;
+        let is_known = placed.position_m.iter().all(|number| number.is_finite());
+        is_known.then(|| Point3::from(placed.position_m))
+    })
+}
+
+/// Mean of the deviations that a run states, metres; infinite of nobody.
+fn deviation(person: &PersonLine) -> f64 {
+    let placed = person.joints.values().filter_map(|joint| joint.placed());
+    let (mut sum, mut n) = (0.0, 0.0);
+    for joint in placed {
+        let [xx, _, _, yy, _, zz] = joint.covariance_m2;
+        let sd = ((xx + yy + zz) / 3.0).sqrt();
+        if sd.is_finite() {
+            sum += sd;
+            n += 1.0;
+        }
+    }
+    if n > 0.0 { sum / n } else { f64::INFINITY }
+}
+
+/// Mean distance of the joints, metres; infinite if half of them are unknown.
+fn distance(put: &Joints, there: &Joints) -> f64 {
+    let both = put.iter().zip(there);
+    let each: Vec<f64> = both
+        .filter_map(|(a, b)| Some(((*a)? - (*b)?).norm()))
+        .collect();
+    if 2 * each.len() <= N_JOINTS {
+        return f64::INFINITY;
+    }
+    each.iter().sum::<f64>() / each.len() as f64
+}
+
+/// Area under the precision over the recall, percent: the surest people first, each right if the nearest person who was there is near and
+/// nobody surer is that person.
+fn average_precision(candidates: &[Candidate], n_true: usize, right_m: f64) -> f64 {
+    let mut taken = std::collections::BTreeSet::new();
+    let (mut n_right, mut points) = (0.0, Vec::new());
+    for (nth, candidate) in candidates.iter().enumerate() {
+        let each = candidate.distances_m.iter().enumerate();
+        let nearest = each.min_by(|a, b| a.1.total_cmp(b.1));
+        let is_right = nearest.is_some_and(|(person, distance)| {
+            *distance < right_m && taken.insert((candidate.frame, person))
+        });
+        n_right += f64::from(is_right);
+        points.push((n_right / n_true.max(1) as f64, n_right / (nth + 1) as f64));
+    }
+    // The precision at a recall is the best at that or a higher one.
+    let (mut area, mut best, mut last) = (0.0, 0.0_f64, points.last().map_or(0.0, |point| point.0));
+    for (recall, precision) in points.iter().rev() {
+        area += (last - recall) * best;
+        best = best.max(*precision);
+        last = *recall;
+    }
+    100.0 * (area + last * best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE_HZ: f64 = 30.0;
+
+    fn standing(x: f64) -> [[f64; 3]; N_JOINTS] {
+        core::array::from_fn(|joint| [x + 0.1 * (joint % 2) as f64, 0.0, 0.12 * joint as f64])
+    }
+
+    fn frames(n: u64) -> Vec<Frame> {
+        let frame = |frame| Frame {
+            frame,
+            seconds: frame as f64 / RATE_HZ,
+            joints: standing(0.0),
+            others: vec![standing(2.0)],
+            views: Vec::new(),
+        };
+        (0..n).map(frame).collect()
+    }
+
+    /// A line in which people stand at places, by their ids.
+    fn line(frame: u64, people: &[(u64, f64)]) -> FrameLine {
+        let person = |(id, x): &(u64, f64)| {
+            let joints = PARSE14.joints.iter().zip(standing(*x));
+            let joints: serde_json::Map<String, serde_json::Value> = joints
+                .map(|(joint, place)| {
+                    let placed = serde_json::json!({ "covariance_m2": [1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4],
+                        "position_m": place, "reprojection_px": 1.0, "views": ["a", "b"] });
+                    (joint.name.to_owned(), placed)
+                })
+                .collect();
+            serde_json::json!({ "facing_margin": null, "id": id, "joints": joints, "pairs": 1, "status": "ok",
+                "views_used": ["a", "b"] })
+        };
+        let people: Vec<serde_json::Value> = people.iter().map(person).collect();
+        let line = serde_json::json!({ "frame": frame, "people": people, "seen": 2, "status": "ok", "time_s": null,
+            "views_missing": {}, "views_present": ["a", "b"] });
+        serde_json::from_value(line).unwrap()
+    }
+
+    #[test]
+    fn everybody_where_they_are_is_everything() {
+        let truth = frames(60);
+        let lines: Vec<FrameLine> = (0..60)
+            .map(|nth| line(nth, &[(1, 0.01), (2, 2.01)]))
+            .collect();
+        let score = everybody(&truth, &lines, RATE_HZ);
+        assert_eq!(score.ap.values().copied().collect::<Vec<_>>(), [100.0; 6]);
+        assert_eq!((score.recall, score.switches, score.ids), (100.0, 0, 2));
+        assert!((score.mpjpe_mm.unwrap().value - 10.0).abs() < 1e-6);
+        assert_eq!((score.put_out, score.there), (2.0, 2.0));
+    }
+
+    #[test]
+    fn a_phantom_somebody_missing_and_exchanged_names_are_told() {
+        let truth = frames(60);
+        let lines: Vec<FrameLine> = (0..60)
+            .map(|nth| match nth {
+                0..20 => line(nth, &[(1, 0.06), (2, 2.06), (3, 8.0)]),
+                20..40 => line(nth, &[(1, 0.06)]),
+                _ => line(nth, &[(2, 0.06), (1, 2.06)]),
+            })
+            .collect();
+        let score = everybody(&truth, &lines, RATE_HZ);
+        assert_eq!(score.switches, 2);
+        assert_eq!(score.switches_a_minute, 60.0);
+        assert_eq!(score.ids, 3);
+        assert!((score.recall - 100.0 * 100.0 / 120.0).abs() < 1e-9);
+        assert_eq!(score.ap[&50], 0.0);
+        assert!((70.0..84.0).contains(&score.ap[&75]), "{:?}", score.ap);
+    }
+}
