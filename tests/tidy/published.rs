@@ -1,4 +1,4 @@
-//! Which crates and packages are published, and under which version.
+//! Crates that are published, and the versions of what is.
 
 use std::fs;
 use std::path::Path;

@@ -60,7 +60,7 @@ impl Shipped {
         format!("{SHIPPED}:{kind}").into()
     }
 
-    /// What shipped files may be used for.
+    /// Terms of use of the shipped files.
     pub const TERMS: &str = "for research only: learned from photographs that are for research (PARSE, LSP-extended, INRIA Person)";
 
     /// Returns the shipped file that has the content of a user's file; `shipped` stands for the person model.
