@@ -9,6 +9,8 @@
 mod circles;
 #[path = "tidy/dialect.rs"]
 mod dialect;
+#[path = "tidy/published.rs"]
+mod published;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -112,6 +114,19 @@ fn only_the_runtime_knows_the_transport() {
             "{name} may not depend on iceoryx2: go through `runtime`"
         );
     }
+}
+
+#[test]
+fn only_the_client_and_what_it_needs_are_published() {
+    for (name, dir) in crates() {
+        assert_eq!(published::fault(&name, &dir, &dependencies(&dir)), None);
+    }
+}
+
+#[test]
+fn the_python_package_has_the_version_of_the_workspace() {
+    let [workspace, project, module] = published::versions(&root());
+    assert_eq!([&project, &module], [&workspace; 2]);
 }
 
 #[test]

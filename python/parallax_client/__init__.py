@@ -21,4 +21,4 @@ __all__ = [
     "STATUSES",
     "Skeleton", "TOPICS", "VersionMismatch", "connect", "dtype", "read_folder", "read_recording", "reason", "running_deployments",
 ]
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -8,16 +8,16 @@
 //! |---|---|
 //! | whole runs | [`launch`](../launch/index.html), [`trials`](../trials/index.html), [`view`](../view/index.html) |
 //! | processes | [`bridge`](../bridge/index.html), [`capture`](../capture/index.html), [`pose`](../pose/index.html), [`quality`](../quality/index.html), [`fuse`](../fuse/index.html), [`triangulate`](../triangulate/index.html), [`results`](../results/index.html), [`record`](../record/index.html), [`supervise`](../supervise/index.html) |
-//! | frame | [`stage`](../stage/index.html), [`wire`](../wire/index.html), [`runtime`](../runtime/index.html), [`client`](../client/index.html), [`pipeline`](../pipeline/index.html), [`posenetwork`](../posenetwork/index.html), [`inputs`](../inputs/index.html) |
+//! | frame | [`stage`](../stage/index.html), [`wire`](../wire/index.html), [`runtime`](../runtime/index.html), [`client`](../parallax_client/index.html), [`pipeline`](../pipeline/index.html), [`posenetwork`](../posenetwork/index.html), [`inputs`](../inputs/index.html) |
 //! | paper | [`fmp`](../fmp/index.html), [`multiview`](../multiview/index.html), [`viewquality`](../viewquality/index.html) |
-//! | tools | [`geometry`](../geometry/index.html), [`calibration`](../calibration/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`recording`](../recording/index.html), [`runfiles`](../runfiles/index.html), [`exports`](../exports/index.html), [`motion`](../motion/index.html), [`people`](../people/index.html), [`keypoints`](../keypoints/index.html), [`inference`](../inference/index.html), [`deployment`](../deployment/index.html), [`failure`](../failure/index.html), [`terminal`](../terminal/index.html) |
+//! | tools | [`geometry`](../geometry/index.html), [`calibration`](../calibration/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../parallax_messages/index.html), [`recording`](../recording/index.html), [`runfiles`](../runfiles/index.html), [`exports`](../exports/index.html), [`motion`](../motion/index.html), [`people`](../people/index.html), [`keypoints`](../keypoints/index.html), [`inference`](../inference/index.html), [`deployment`](../deployment/index.html), [`failure`](../failure/index.html), [`terminal`](../terminal/index.html) |
 //! | ground | [`skeleton`](../skeleton/index.html), [`kernels`](../kernels/index.html), [`formats`](../formats/index.html), [`files`](../files/index.html), [`statistics`](../statistics/index.html) |
 //! | laboratory | [`lab`](../lab/index.html), [`training`](../training/index.html) |
 //!
 //! For tests only: `testkit`, in `tests/harness`.
 //!
 //! Start with [`pipeline`](../pipeline/index.html) for the path of a frame, [`multiview`](../multiview/index.html) for the
-//! energy, [`messages`](../messages/index.html) for the messages between processes.
+//! energy, [`messages`](../parallax_messages/index.html) for the messages between processes.
 #![forbid(unsafe_code)]
 
 mod cli;

@@ -1,11 +1,11 @@
 //! Moves a bar by the right wrist of whoever a running deployment sees.
 //!
-//! `cargo run -p client --example wrist -- demo "right wrist"`
+//! `cargo run -p parallax-client --example wrist -- demo "right wrist"`
 #![expect(clippy::print_stdout, reason = "an example shows something")]
 
 use std::time::Duration;
 
-use client::{Client, ClientError, State, Wish};
+use parallax_client::{Client, ClientError, State, Wish};
 
 /// Half of the room that the bar shows, metres.
 const REACH_M: f64 = 2.0;

@@ -3,9 +3,9 @@
 //! ```no_run
 //! use std::time::Duration;
 //!
-//! use client::{Client, Wish};
+//! use parallax_client::{Client, Wish};
 //!
-//! fn main() -> Result<(), client::ClientError> {
+//! fn main() -> Result<(), parallax_client::ClientError> {
 //!     let mut client = Client::open("demo", &Wish::skeletons())?;
 //!     while let Some(moment) = client.next(Duration::from_secs(5))? {
 //!         let Some(wrist) = moment.followed().and_then(|person| person.joint("right wrist")) else {

@@ -60,6 +60,18 @@ impl Shipped {
         format!("{SHIPPED}:{kind}").into()
     }
 
+    /// Terms of use of the shipped files.
+    pub const TERMS: &str = "for research only: learned from photographs that are for research (PARSE, LSP-extended, INRIA Person)";
+
+    /// Returns the shipped file that has the content of a user's file; `shipped` stands for the person model.
+    pub fn of_file(file: &Path) -> Option<Self> {
+        if is_shipped(file) {
+            return Some(Self::Model);
+        }
+        let bytes = files::read(file, files::MODEL).ok()?;
+        Self::ALL.into_iter().find(|kind| kind.bytes() == bytes)
+    }
+
     /// The file with the given unique name.
     pub fn of_name(name: &Path) -> Option<Self> {
         Self::ALL.into_iter().find(|it| it.name() == name)
@@ -121,6 +133,14 @@ mod tests {
         let library = crate::library::Library::BuiltIn;
         let network = crate::open_network((Path::new(SHIPPED), None), &library);
         network.unwrap().fitted().unwrap();
+    }
+
+    #[test]
+    fn shipped_files_are_known_by_their_content() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+        let network = folder.join("models/person.pose.onnx");
+        assert_eq!(Shipped::of_file(&network), Some(Shipped::PoseNetwork));
+        assert_eq!(Shipped::of_file(&folder.join("synthetic.toml")), None);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Subcommand;
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::{Model, Springs};
+use inputs::Shipped;
 use serde_json::{Value, json};
 use terminal::output;
 
@@ -67,8 +68,17 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
             json,
             network,
             ..
-        } if network.is_given() || is_network(file) => network::show(file, *json, network),
-        Command::Show { file, json, .. } => show(file, *json),
+        } => {
+            let status = if network.is_given() || is_network(file) {
+                network::show(file, *json, network)?
+            } else {
+                show(file, *json)?
+            };
+            if !json && Shipped::of_file(file).is_some() {
+                output::line(format_args!("  {}", Shipped::TERMS))?;
+            }
+            Ok(status)
+        }
     }
 }
 
