@@ -7,7 +7,7 @@ use geometry::{Camera, Rig, RigError};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::backdrop::Backdrop;
-use crate::body::{Bones, CHEST, N_BONES, PELVIS};
+use crate::body::{Bones, CHEST, N_BONES, N_EXTRAS, PELVIS};
 use crate::bystander::Bystander;
 use crate::mesh;
 use crate::motion::Motion;
@@ -190,6 +190,13 @@ impl Scene {
         let frames = self.performance.frames(seconds);
         let joints = self.performance.bones.joints(&frames);
         joints.map(|it| (self.world_from_stage * it).coords.into())
+    }
+
+    /// Nose, left and right heel, left and right big toe at a time, metres in the world.
+    pub fn extras(&self, seconds: f64) -> [[f64; 3]; N_EXTRAS] {
+        let frames = self.performance.frames(seconds);
+        let extras = self.performance.bones.extras(&frames);
+        extras.map(|it| (self.world_from_stage * it).coords.into())
     }
 
     /// Number of a camera by its name in the rig or its number.

@@ -138,7 +138,7 @@ impl<'a> Record<'a> {
     }
 
     /// Sizes of a value, without the batch.
-    pub(super) fn dims(&self, At(at): At) -> &[usize] {
+    pub(super) fn dims(&self, At(at): At) -> &Dims {
         &self.values[at].dims
     }
 
