@@ -1,6 +1,6 @@
 //! Prepared people as a file, and the card of a trained network.
 
-use training::networks::pose::{About, N_KEYPOINTS, Source, Target};
+use training::networks::pose::{About, N_JOINTS, N_KEYPOINTS, Source, Target};
 
 use super::*;
 
@@ -80,4 +80,6 @@ fn a_network_that_was_not_trained_fits_its_card_and_tells_front_and_errors() {
         .unwrap();
     let expected = maps.expected_px(0).unwrap();
     assert!((expected - 8.0).abs() < 0.1, "along one axis: {expected}");
+    let (_, of_nose) = maps.keypoint(N_JOINTS).unwrap();
+    assert!((of_nose - 8.0).abs() < 0.1, "as the network tells it");
 }

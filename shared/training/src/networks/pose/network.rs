@@ -177,7 +177,7 @@ fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
     let extras = ops.conv(&own, "extra_maps", head);
     let places = ops.fixed(&extras);
     let values = [shape.hidden, EXTRAS.len()];
-    let of_extras = error(ops, (OF_EXTRAS, values), [&own, &places, &overall]);
+    let of_extras = error(ops, (OF_EXTRAS, values), [&features, &places, &overall]);
     let maps = ops.join(&[&maps, &extras]);
     let errors = ops.join(&[&errors, &of_extras]);
     vec![maps, front, errors]
