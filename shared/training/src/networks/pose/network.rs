@@ -122,6 +122,30 @@ impl Network for Shape {
 
 /// Runs the network: maps, evidence for the direction, logarithms of expected errors.
 fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
+    let [at, deepest] = trunk(ops, shape);
+    let features = ops.relu(&at);
+    let head = with_gain(0.1, plain(N_JOINTS, 1, 1));
+    let maps = ops.conv(&features, "maps", head);
+    let places = ops.fixed(&maps);
+    let overall = ops.mean(&deepest);
+    let front = front(ops, shape, [&features, &places, &overall]);
+    let joints = ("", [shape.hidden, N_JOINTS]);
+    let errors = error(ops, joints, [&features, &places, &overall]);
+    let channels = shape.channels[0];
+    let own = block(ops, &at, "extra_refine", [channels, channels / 2]);
+    let own = ops.relu(&own);
+    let head = with_gain(0.1, plain(EXTRAS.len(), 1, 1));
+    let extras = ops.conv(&own, "extra_maps", head);
+    let places = ops.fixed(&extras);
+    let keypoints = (OF_EXTRAS, [shape.hidden, EXTRAS.len()]);
+    let of_extras = error(ops, keypoints, [&own, &places, &overall]);
+    let maps = ops.join(&[&maps, &extras]);
+    let errors = ops.join(&[&errors, &of_extras]);
+    vec![maps, front, errors]
+}
+
+/// Features at stride 4, and the deepest ones, which are positive.
+fn trunk<O: Ops>(ops: &mut O, shape: &Shape) -> [O::Value; 2] {
     let picture = ops.input(PICTURE);
     let stem = ops.conv(&picture, "stem1", plain(shape.stem, 3, 2));
     let stem = ops.relu(&stem);
@@ -159,28 +183,7 @@ fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
             );
         }
     }
-    let features = ops.relu(&at);
-    let head = with_gain(0.1, plain(N_JOINTS, 1, 1));
-    let maps = ops.conv(&features, "maps", head);
-    let places = ops.fixed(&maps);
-    let overall = ops.mean(&deepest);
-    let front = front(ops, shape, [&features, &places, &overall]);
-    let errors = error(
-        ops,
-        ("", [shape.hidden, N_JOINTS]),
-        [&features, &places, &overall],
-    );
-    let channels = shape.channels[0];
-    let own = block(ops, &at, "extra_refine", [channels, channels / 2]);
-    let own = ops.relu(&own);
-    let head = with_gain(0.1, plain(EXTRAS.len(), 1, 1));
-    let extras = ops.conv(&own, "extra_maps", head);
-    let places = ops.fixed(&extras);
-    let values = [shape.hidden, EXTRAS.len()];
-    let of_extras = error(ops, (OF_EXTRAS, values), [&features, &places, &overall]);
-    let maps = ops.join(&[&maps, &extras]);
-    let errors = ops.join(&[&errors, &of_extras]);
-    vec![maps, front, errors]
+    [at, deepest]
 }
 
 fn plain(channels: usize, kernel: usize, stride: usize) -> Conv {
