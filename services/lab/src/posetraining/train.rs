@@ -36,12 +36,21 @@ pub struct Job {
     pub backend: Backend,
 }
 
-/// The parameters of a network that was trained before.
-fn begun(from: &Earlier, settings: &Settings) -> Result<Begun, Failure> {
-    pose::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
+/// What the training goes on from; nothing for random parameters.
+fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
+    let Some(from) = &job.from else {
+        if settings.extras_alone {
+            let message = "extras_alone = true keeps all but the extra keypoints of a network, and none is named";
+            let hint = "name the network with --from, or take extras_alone out of the settings";
+            return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
+        }
+        return Ok(None);
+    };
+    let begun = pose::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
         let hint = "--from takes a network of `train network` that has the `shape` of the settings";
         failure::in_file(&from.file, &error).with_hint(hint)
-    })
+    })?;
+    Ok(Some(begun))
 }
 
 /// A file beside the one that is written.
@@ -109,15 +118,9 @@ pub fn train(
         }
         Err(_) => None,
     };
-    if settings.extras_alone && job.from.is_none() {
-        let message =
-            "extras_alone = true keeps all but the extra keypoints of a network, and none is named";
-        let hint = "name the network with --from, or take extras_alone out of the settings";
-        return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
-    }
     let learnt = [people.learnt.as_slice(), people.kept.as_slice()];
-    let from = job.from.as_ref().map(|it| begun(it, settings));
-    let task = PoseTask::new(settings, learnt, from.transpose()?).or_fail(ExitKind::Input)?;
+    let from = begun(job, settings)?;
+    let task = PoseTask::new(settings, learnt, from).or_fail(ExitKind::Input)?;
     let trainer = Trainer::new(task, job.backend, kept.as_deref());
     let mut trainer = trainer.map_err(|error| {
         let kind = match error {

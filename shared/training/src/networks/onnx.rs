@@ -339,7 +339,7 @@ impl Ops for Writer<'_> {
 
     fn join(&mut self, lists: &[&Value]) -> Value {
         let names: Vec<&str> = lists.iter().map(|list| list.name.as_str()).collect();
-        let dims: Vec<&Dims> = lists.iter().map(|list| &list.dims).collect();
+        let dims: Vec<&[usize]> = lists.iter().map(|list| list.dims.as_slice()).collect();
         let dims = joined(&dims);
         self.node("Concat", &names, vec![("axis", Attribute::Int(1))], dims)
     }

@@ -164,10 +164,8 @@ pub(crate) fn convolved(map: &[usize], conv: Conv) -> Dims {
 }
 
 /// Dimensions of what is concatenated.
-pub(crate) fn joined(parts: &[&Dims]) -> Dims {
-    let mut dims = parts
-        .first()
-        .map_or_else(Dims::new, |first| (*first).clone());
+pub(crate) fn joined(parts: &[&[usize]]) -> Dims {
+    let mut dims = parts.first().map_or_else(Dims::new, |first| first.to_vec());
     if let Some(channels) = dims.first_mut() {
         *channels = parts.iter().map(|part| part[0]).sum();
     }

@@ -190,7 +190,8 @@ impl Ops for Plan {
     }
 
     fn join(&mut self, lists: &[&Dims]) -> Dims {
-        joined(lists)
+        let dims: Vec<&[usize]> = lists.iter().map(|list| list.as_slice()).collect();
+        joined(&dims)
     }
 
     fn dense(&mut self, list: &Dims, name: &str, values: usize) -> Dims {

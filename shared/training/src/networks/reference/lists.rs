@@ -2,7 +2,7 @@
 
 use super::matrix::{Matrix, add_product};
 use super::record::{At, Back, Record, each};
-use crate::networks::ops::{Dims, joined};
+use crate::networks::ops::joined;
 
 impl<'a> Record<'a> {
     pub(super) fn centre(&mut self, list: At, name: &str) -> At {
@@ -22,7 +22,7 @@ impl<'a> Record<'a> {
     }
 
     pub(super) fn concatenate(&mut self, lists: &[At]) -> At {
-        let dims: Vec<&Dims> = lists.iter().map(|list| self.dims(*list)).collect();
+        let dims: Vec<&[usize]> = lists.iter().map(|list| self.dims(*list)).collect();
         let dims = joined(&dims);
         let sizes: Vec<usize> = lists.iter().map(|list| self.size(*list)).collect();
         let size: usize = sizes.iter().sum();

@@ -138,7 +138,7 @@ impl<'a> Record<'a> {
     }
 
     /// Sizes of a value, without the batch.
-    pub(super) fn dims(&self, At(at): At) -> &Dims {
+    pub(super) fn dims(&self, At(at): At) -> &[usize] {
         &self.values[at].dims
     }
 
