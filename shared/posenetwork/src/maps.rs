@@ -318,7 +318,7 @@ impl JointMaps {
         self.window?;
         let [_, top, _, bottom] = self.extent();
         let by_heat = || expected_error(found.score) * (bottom - top);
-        let told = self.errors.get(keypoint).map(|it| it * ALONG_AN_AXIS);
+        let told = self.errors.get(keypoint).map(|error| error * ALONG_AN_AXIS);
         Some((found, self.sigma_px.or(told).unwrap_or_else(by_heat)))
     }
 

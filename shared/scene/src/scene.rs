@@ -196,7 +196,7 @@ impl Scene {
     pub fn extras(&self, seconds: f64) -> [[f64; 3]; N_EXTRAS] {
         let frames = self.performance.frames(seconds);
         let extras = self.performance.bones.extras(&frames);
-        extras.map(|it| (self.world_from_stage * it).coords.into())
+        extras.map(|extra| (self.world_from_stage * extra).coords.into())
     }
 
     /// Number of a camera by its name in the rig or its number.

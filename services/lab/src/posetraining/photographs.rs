@@ -307,8 +307,10 @@ fn find(
         let peak = match keypoint.checked_sub(N_JOINTS) {
             None => maps.peaks().get(keypoint).copied().flatten(),
             Some(extra) => {
-                let at = teacher.names().iter().position(|it| it == EXTRAS[extra]);
-                at.and_then(|at| maps.keypoint(at)).map(|it| it.0)
+                let mut names = teacher.names().iter();
+                let at = names.position(|name| name == EXTRAS[extra]);
+                let found = at.and_then(|at| maps.keypoint(at));
+                found.map(|(keypoint, _)| keypoint)
             }
         };
         peak.map_or(UNKNOWN, |it| (it.at.map(|it| it as f32), it.score as f32))

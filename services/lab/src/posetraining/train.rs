@@ -36,7 +36,7 @@ pub struct Job {
     pub backend: Backend,
 }
 
-/// What the training goes on from; nothing for random parameters.
+/// Reads the network that the training goes on from; nothing for random parameters.
 fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
     let Some(from) = &job.from else {
         if settings.extras_alone {
@@ -87,7 +87,7 @@ fn drawn(passes: &[Pass]) -> String {
                 score("limbs, both ends", &|it| it.both_ends),
                 score("direction", &|it| it.front),
                 score("area of errors", &|it| it.area),
-                score("extra keypoints", &|it| it.extras),
+                score("extra keypoints", &|score| score.extras),
             ],
         ),
     ];

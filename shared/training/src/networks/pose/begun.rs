@@ -43,7 +43,7 @@ pub enum BeginError {
     },
 }
 
-/// What a training goes on from.
+/// A network that a training goes on from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Begun {
     /// In the order of [`initial`].

@@ -15,7 +15,7 @@ pub struct About {
     pub samples: usize,
     /// Whether it went on from a network that was trained before.
     pub goes_on: bool,
-    /// Whether it learned the extra keypoints alone.
+    /// Set where it learned the extra keypoints alone.
     pub extras_alone: bool,
     /// How good it is on those who were kept apart.
     pub score: Score,
@@ -84,7 +84,7 @@ error = \"{ERROR}\"
     )
 }
 
-/// What a card calls the keypoints.
+/// Names of the keypoints in a card.
 fn names() -> impl Iterator<Item = &'static str> {
     let of_cards = |name| if name == "head" { "head top" } else { name };
     let joints = PARSE14.joints.iter().map(|joint| joint.name);
