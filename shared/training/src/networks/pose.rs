@@ -28,11 +28,13 @@ pub use begun::{BeginError, Begun, begun};
 pub use card::{About, card};
 pub use cost::{Cost, Truth};
 pub use marks::{Marks, exchange_sides};
-pub use network::{ERROR, EXTRAS, FRONT, MAPS, N_JOINTS, N_KEYPOINTS, PICTURE, STRIDE, Shape};
+pub use network::{
+    ERROR, EXTRAS, FRONT, MAPS, N_JOINTS, N_KEYPOINTS, PICTURE, STRIDE, Shape, initial,
+};
 pub use person::{Person, SIDE, Source, Target, WINDOW};
 pub use score::{Judged, Score};
 pub use settings::{Settings, Vary};
-pub use task::{Found, PoseTask, TooFew, file, initial};
+pub use task::{Found, PoseTask, TooFew, file};
 pub use vary::{DEVIATION, FILL, MARGIN, MEAN, NetworkSample, plain, varied};
 
 /// The keypoint that is the mirror image of another.

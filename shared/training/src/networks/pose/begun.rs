@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use inference::onnx::value_of_half;
 use rten_onnx::onnx::{DataType, ModelProto, TensorProto};
 
-use super::network::{OF_EXTRAS, Shape};
-use super::task::initial;
+use super::network::{OF_EXTRAS, Shape, initial};
 use crate::networks::parameters::{GAIN_OF_RELU, Parameter};
 
 /// Why a training cannot go on from a network.

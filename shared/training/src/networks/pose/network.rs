@@ -13,6 +13,7 @@
 use skeleton::PARSE14;
 
 use crate::networks::ops::{Conv, Dims, Network, Ops, Output, Scaling};
+use crate::networks::parameters::{self, Parameter};
 
 /// Joints that have a map: those of [`PARSE14`], in its order.
 pub const N_JOINTS: usize = PARSE14.joints.len();
@@ -39,6 +40,11 @@ pub(crate) const MULTIPLE: usize = 32;
 const SHARPNESS: f32 = 2.0;
 /// How much they are sharpened where lower maxima should count, too.
 const WIDE: f32 = 1.0;
+
+/// The log-odds of an untrained map.
+const MAP_BIAS: f32 = -4.0;
+/// The logarithm of the expected error before training: a tenth of the input's height.
+const ERROR_BIAS: f32 = -2.3;
 
 /// The sizes of the network.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -118,6 +124,22 @@ impl Network for Shape {
     fn run<O: Ops>(&self, ops: &mut O) -> Vec<O::Value> {
         run(ops, self)
     }
+}
+
+/// The parameters of an untrained network; the last dense layers give what is likely for everybody.
+pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
+    let mut all = parameters::initial(shape, seed);
+    for parameter in &mut all {
+        match parameter.name.as_str() {
+            "maps.bias" | "extra_maps.bias" => parameter.values.fill(MAP_BIAS),
+            "error2.bias" | "extra_error2.bias" => parameter.values.fill(ERROR_BIAS),
+            "error2.weight" | "extra_error2.weight" | "front2.weight" => {
+                parameter.values.fill(0.0);
+            }
+            _ => (),
+        }
+    }
+    all
 }
 
 /// Runs the network: maps, evidence for the direction, logarithms of expected errors.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::begun::Begun;
 use super::cost::{Cost, Truth};
-use super::network::{N_KEYPOINTS, OF_EXTRAS, Shape};
+use super::network::{N_KEYPOINTS, OF_EXTRAS, Shape, initial};
 use super::peak;
 use super::person::Person;
 use super::score::{Judged, Score};
@@ -14,7 +14,7 @@ use crate::networks::lesson::Shown;
 use crate::networks::onnx::{self, Document};
 use crate::networks::optimiser::{Rule, Step};
 use crate::networks::order;
-use crate::networks::parameters::{self, Parameter};
+use crate::networks::parameters::Parameter;
 use crate::networks::settings::Precision;
 use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
 
@@ -30,26 +30,6 @@ const ERROR_RATE: f32 = 3e-4;
 const STEPS: usize = 100;
 /// Passes between two looks at the people who are kept apart.
 const JUDGED: usize = 10;
-/// The log-odds of an untrained map.
-const MAP_BIAS: f32 = -4.0;
-/// The logarithm of the expected error before training: a tenth of the input's height.
-const ERROR_BIAS: f32 = -2.3;
-
-/// The parameters of an untrained network; the last dense layers give what is likely for everybody.
-pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
-    let mut all = parameters::initial(shape, seed);
-    for parameter in &mut all {
-        match parameter.name.as_str() {
-            "maps.bias" | "extra_maps.bias" => parameter.values.fill(MAP_BIAS),
-            "error2.bias" | "extra_error2.bias" => parameter.values.fill(ERROR_BIAS),
-            "error2.weight" | "extra_error2.weight" | "front2.weight" => {
-                parameter.values.fill(0.0);
-            }
-            _ => (),
-        }
-    }
-    all
-}
 
 /// Writes a network as an ONNX file, with weights in half precision.
 ///
