@@ -6,7 +6,7 @@ use std::sync::Arc;
 use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
 use rayon::prelude::*;
-use scene::{Action, Flaws, RigChoice, Scene, Settings, View};
+use scene::{Action, Flaws, N_EXTRAS, RigChoice, Scene, Settings, View};
 
 /// Which scenes.
 #[derive(Debug, Clone)]
@@ -33,6 +33,8 @@ pub(crate) struct Shown<'a> {
     pub(crate) picture: Rgb8View<'a>,
     /// The joints in it, `skeleton::PARSE14`, pixels; not finite where they are not seen.
     pub(crate) joints: Vec<[f64; 2]>,
+    /// Nose, heels and big toes in it, as [`Scene::extras`] orders them, pixels; not finite behind the camera.
+    pub(crate) extras: [[f64; 2]; N_EXTRAS],
     /// The joints in the world, metres.
     pub(crate) in_world: Vec<[f64; 3]>,
     /// The camera.
@@ -120,6 +122,10 @@ fn of_scene<T>(
                 ),
                 picture: Rgb8View::new(size.width, size.height, &rgb).or_fail(ExitKind::Run)?,
                 joints: joints.to_vec(),
+                extras: scene.extras(truth.seconds).map(|at| {
+                    let pixel = camera.project(&at.into());
+                    pixel.map_or([f64::NAN; 2], Into::into)
+                }),
                 in_world: scene.joints(truth.seconds).to_vec(),
                 camera,
             };

@@ -80,6 +80,8 @@ pub struct JointMaps {
     keypoints: Vec<Option<Keypoint>>,
     /// The expected error of each joint as the network tells it, pixels of the picture; empty if it tells nothing of it.
     told: Vec<Option<f64>>,
+    /// The same of each keypoint.
+    errors: Vec<f64>,
     /// Standard deviation of a keypoint whose score is 1 on the maps themselves; `None` where the heat tells it.
     sigma_px: Option<f64>,
 }
@@ -149,11 +151,12 @@ impl JointMaps {
         self.keypoints.clear();
         self.sigma_px = None;
         self.told.clear();
+        self.errors.clear();
         if let Some(errors) = sight.errors() {
-            let errors: Vec<f64> = errors.collect();
+            self.errors.extend(errors);
             let of_row = |row: &Vec<(usize, f64)>| {
                 row.iter()
-                    .map(|(it, share)| share.abs() * errors[*it])
+                    .map(|(it, share)| share.abs() * self.errors[*it])
                     .sum()
             };
             self.told
@@ -208,6 +211,7 @@ impl JointMaps {
         self.peaks.clear();
         self.peaks.resize(N_JOINTS, None);
         self.told.clear();
+        self.errors.clear();
         self.keypoints.clear();
         self.keypoints.extend_from_slice(keypoints);
         let Some(window) = self.window else {
@@ -305,8 +309,8 @@ impl JointMaps {
     }
 
     /// A keypoint as the network or the other program found it, and the standard deviation of its place along one axis, both pixels of
-    /// the picture: by the score as of the joints ([`expected_error`]), or by the `sigma` of [`Self::of_keypoints`]. `None` for one that
-    /// was not found, and where nobody was looked at.
+    /// the picture: by the `sigma` of [`Self::of_keypoints`], as the network tells it, or by the score ([`expected_error`]). `None` for
+    /// one that was not found, and where nobody was looked at.
     ///
     /// * `keypoint`: its number in the order of the card or of the file.
     pub fn keypoint(&self, keypoint: usize) -> Option<(Keypoint, f64)> {
@@ -314,7 +318,8 @@ impl JointMaps {
         self.window?;
         let [_, top, _, bottom] = self.extent();
         let by_heat = || expected_error(found.score) * (bottom - top);
-        Some((found, self.sigma_px.unwrap_or_else(by_heat)))
+        let told = self.errors.get(keypoint).map(|error| error * ALONG_AN_AXIS);
+        Some((found, self.sigma_px.or(told).unwrap_or_else(by_heat)))
     }
 
     /// How far off a joint's peak may be: the standard deviation along one axis, pixels of the picture. As the network tells it, else

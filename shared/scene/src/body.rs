@@ -182,6 +182,24 @@ impl Bones {
         soles.chain(joints).fold(f64::INFINITY, f64::min)
     }
 
+    /// Tip of the nose, left and right heel, left and right big toe, where annotators of feet mark them: on the skin or shoe, at
+    /// half the height of the toes.
+    pub(crate) fn extras(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Point3<f64>; N_EXTRAS] {
+        let at = |bone: usize, place: Vector3<f64>| frames[bone] * Point3::from(place);
+        let [toe, heel] = self.sole;
+        let h = -heel.x / 0.036;
+        let heel = heel + Vector3::new(0.0, 0.0, 0.015 * h);
+        // Towards the other foot.
+        let toe = |aside: f64| toe + Vector3::new(-0.008, aside * 0.010, 0.013) * h;
+        [
+            at(HEAD, Vector3::new(0.068, 0.0, 0.008) * h),
+            at(FOOT[LEFT], heel),
+            at(FOOT[RIGHT], heel),
+            at(FOOT[LEFT], toe(-1.0)),
+            at(FOOT[RIGHT], toe(1.0)),
+        ]
+    }
+
     /// The 14 joints of `skeleton::PARSE14`, in its order.
     pub(crate) fn joints(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Point3<f64>; 14] {
         let joint = |bone: usize| Point3::from(frames[bone].translation.vector);
@@ -204,6 +222,9 @@ impl Bones {
         ]
     }
 }
+
+/// Keypoints beside the joints: see [`Scene::extras`](crate::Scene::extras).
+pub const N_EXTRAS: usize = 5;
 
 /// The rotation of a joint: twist about the bone first, then abduction, then flexion.
 fn rotation(bone: usize, degrees: [f64; 3]) -> UnitQuaternion<f64> {

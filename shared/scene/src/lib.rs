@@ -48,6 +48,7 @@ mod settings;
 mod scene;
 pub mod truth;
 
+pub use body::N_EXTRAS;
 pub use flaws::{FlawError, Flaws};
 pub use motion::Action;
 pub use photo::photos_in;

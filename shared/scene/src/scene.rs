@@ -7,7 +7,7 @@ use geometry::{Camera, Rig, RigError};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::backdrop::Backdrop;
-use crate::body::{Bones, CHEST, N_BONES, PELVIS};
+use crate::body::{Bones, CHEST, N_BONES, N_EXTRAS, PELVIS};
 use crate::bystander::Bystander;
 use crate::mesh;
 use crate::motion::Motion;
@@ -201,6 +201,13 @@ impl Scene {
         others
             .map(|other| in_world(other.joints(seconds)))
             .collect()
+    }
+
+    /// Nose, left and right heel, left and right big toe at a time, metres in the world.
+    pub fn extras(&self, seconds: f64) -> [[f64; 3]; N_EXTRAS] {
+        let frames = self.performance.frames(seconds);
+        let extras = self.performance.bones.extras(&frames);
+        extras.map(|extra| (self.world_from_stage * extra).coords.into())
     }
 
     /// Number of a camera by its name in the rig or its number.

@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use training::networks::pose::{
-    N_JOINTS, Person, PoseTask, Settings, Shape, Source, Target, peak, plain,
+    N_JOINTS, N_KEYPOINTS, Person, PoseTask, Settings, Shape, Source, Target, peak, plain,
 };
 use training::networks::{Backend, Plan, Precision, TrainError, Trainer};
 
@@ -15,7 +15,7 @@ fn people(n: usize, seed: u64) -> Vec<Person> {
 }
 
 fn person(nth: usize, rng: &mut fastrand::Rng) -> Person {
-    let standing: [[f32; 2]; N_JOINTS] = [
+    let standing: [[f32; 2]; N_KEYPOINTS] = [
         [-9.0, 40.0],
         [-9.0, 20.0],
         [-8.0, 0.0],
@@ -30,12 +30,17 @@ fn person(nth: usize, rng: &mut fastrand::Rng) -> Person {
         [22.0, 2.0],
         [0.0, -33.0],
         [0.0, -45.0],
+        [0.0, -39.0],
+        [14.0, 46.0],
+        [-14.0, 46.0],
+        [5.0, 47.0],
+        [-5.0, 47.0],
     ];
     let places = standing.map(|at| at.map(|side| 128.0 + 1.6 * side + 8.0 * (rng.f32() - 0.5)));
     let mut rgb = vec![110u8; 3 * SIDE * SIDE];
     for (joint, [x, y]) in places.iter().enumerate() {
         let colour =
-            [37 * joint % 256, 91 * joint % 256, 255 - 17 * joint].map(|value| value as u8);
+            [37 * joint % 256, 91 * joint % 256, 255 - 13 * joint].map(|value| value as u8);
         for row in -5i32..=5 {
             for column in -5i32..=5 {
                 let at = (*y as i32 + row) as usize * SIDE + (*x as i32 + column) as usize;
@@ -198,23 +203,7 @@ fn the_file_that_is_written_finds_what_the_trained_network_found() {
     assert!(trainer.run(steps(30), &mut |_| true));
     let sample = plain(&people[0], &settings.shape).unwrap();
     let found = trainer.find_in(1, &sample.picture);
-    let session = inference::Session::parse(trainer.onnx(&[])).unwrap();
-    let input = inference::Input {
-        name: training::networks::pose::PICTURE,
-        shape: &[1, 3, settings.shape.height, settings.shape.width],
-        values: inference::Values::F32(&sample.picture),
-    };
-    let names = [
-        training::networks::pose::MAPS,
-        training::networks::pose::FRONT,
-        training::networks::pose::ERROR,
-    ];
-    let mut outputs = vec![Vec::new(); names.len()];
-    session
-        .run(&[input], &names, &mut |output| {
-            outputs[output.index] = output.values.unwrap().to_vec();
-        })
-        .unwrap();
+    let outputs = found_by(trainer.onnx(&[]), &settings.shape, &sample.picture);
     let expected = [
         found.maps,
         found.fronts,
@@ -225,6 +214,7 @@ fn the_file_that_is_written_finds_what_the_trained_network_found() {
             .collect(),
     ];
     // Weights are stored in half precision.
+    let names = ["maps", "direction", "errors"];
     for ((name, got), expected) in names.iter().zip(&outputs).zip(&expected) {
         assert_eq!(got.len(), expected.len(), "{name}");
         let scale = expected
@@ -340,4 +330,64 @@ fn numbers_that_only_another_backend_has_are_refused() {
     let task = PoseTask::new(&settings, [&people[..1], &people[1..]], None).unwrap();
     let refused = Trainer::new(task, Backend::BuiltIn, None);
     assert!(matches!(refused, Err(TrainError::Precision)));
+}
+
+/// Maps, direction and errors that a file finds in a picture.
+fn found_by(file: Vec<u8>, shape: &Shape, picture: &[f32]) -> Vec<Vec<f32>> {
+    use training::networks::pose::{ERROR, FRONT, MAPS, PICTURE};
+
+    let session = inference::Session::parse(file).unwrap();
+    let input = inference::Input {
+        name: PICTURE,
+        shape: &[1, 3, shape.height, shape.width],
+        values: inference::Values::F32(picture),
+    };
+    let names = [MAPS, FRONT, ERROR];
+    let mut outputs = vec![Vec::new(); names.len()];
+    session
+        .run(&[input], &names, &mut |output| {
+            outputs[output.index] = output.values.unwrap().to_vec();
+        })
+        .unwrap();
+    outputs
+}
+
+#[test]
+fn extra_keypoints_are_learned_alone_and_everything_else_keeps_its_bits() {
+    let people = people(10, 6);
+    let shown = [&people[..8], &people[8..]];
+    let settings = small();
+    let mut whole = trainer(&settings, shown, None);
+    assert!(whole.run(steps(20), &mut |_| true));
+    let before = whole.onnx(&[]);
+    let alone = Settings {
+        extras_alone: true,
+        ..small()
+    };
+    // A network without the extra keypoints: their layers are called something else.
+    let mut without = before.clone();
+    for at in 0..without.len() - 6 {
+        if &without[at..at + 6] == b"extra_" {
+            without[at..at + 6].copy_from_slice(b"other_");
+        }
+    }
+    let from = training::networks::pose::begun(&alone.shape, 7, &without).unwrap();
+    let task = PoseTask::new(&alone, shown, Some(from)).unwrap();
+    let mut trainer = Trainer::new(task, Backend::BuiltIn, None).unwrap();
+    assert!(trainer.run(steps(16), &mut |_| true));
+    assert!(trainer.run(steps(48), &mut |_| true));
+    let passes = trainer.passes();
+    assert!(
+        passes[1].cost.maps < 0.9 * passes[0].cost.maps,
+        "the head learns: {passes:?}"
+    );
+    let sample = plain(&people[9], &alone.shape).unwrap();
+    let files = [before, trainer.onnx(&[])];
+    let [before, after] = files.map(|file| found_by(file, &alone.shape, &sample.picture));
+    let [columns, rows] = alone.shape.cells();
+    let joints = N_JOINTS * columns * rows;
+    assert_eq!(before[0][..joints], after[0][..joints], "maps of joints");
+    assert_ne!(before[0][joints..], after[0][joints..], "extra maps");
+    assert_eq!(before[1], after[1], "direction");
+    assert_eq!(before[2][..N_JOINTS], after[2][..N_JOINTS], "errors");
 }

@@ -7,7 +7,7 @@ use kernels::Rgb8View;
 use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace};
 use training::datasets::{Person as Annotated, Picture, ReadOptions, Sides, SkeletonTable};
 use training::networks::pose::{
-    MIRROR, Marks, N_JOINTS, Person, SIDE, Source, Target, exchange_sides,
+    EXTRAS, MIRROR, Marks, N_JOINTS, N_KEYPOINTS, Person, SIDE, Source, Target, exchange_sides,
 };
 
 use super::crop::Crop;
@@ -29,6 +29,9 @@ const SAME: f32 = 0.05;
 const ANYWHERE_PX: f64 = 1e5;
 
 type Point = [f32; 2];
+
+/// A keypoint that the teacher does not find.
+const UNKNOWN: (Point, f32) = ([f32::NAN; 2], 0.0);
 
 /// Everybody, with the place in the data set.
 pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Person)>, Failure> {
@@ -134,10 +137,12 @@ fn of_person(
     }
     let taught = match teacher {
         Some(teacher) => taught(teacher, &upright.rgb(picture.view()), &marked)?,
-        None => [([f32::NAN; 2], 0.0); N_JOINTS],
+        None => [UNKNOWN; N_KEYPOINTS],
     };
+    let mut of_all = [[f32::NAN; 2]; N_KEYPOINTS];
+    of_all[..N_JOINTS].copy_from_slice(&marked);
     let mut marks = Marks {
-        marked,
+        marked: of_all,
         taught,
         trunk,
     };
@@ -182,7 +187,9 @@ fn visible(person: &Annotated) -> [[f64; 2]; N_JOINTS] {
 /// The direction in which somebody faces, by marks in the upright picture; 0 where the hips and shoulders say something else than how
 /// wide they are.
 fn front(marks: &Marks, across: f32, lean: f32) -> [f32; 3] {
-    let [aside, towards] = facing(&marks.marked.map(|at| at.map(f64::from)));
+    let marked = |joint: usize| marks.marked[joint].map(f64::from);
+    let joints: [[f64; 2]; N_JOINTS] = core::array::from_fn(marked);
+    let [aside, towards] = facing(&joints);
     if (towards > 0.0) == (across > 0.0) {
         in_picture([aside, towards], lean)
     } else {
@@ -251,14 +258,14 @@ fn taught(
     teacher: &PoseNetwork,
     rgb: &[u8],
     marked: &[Point; N_JOINTS],
-) -> Result<[(Point, f32); N_JOINTS], Failure> {
+) -> Result<[(Point, f32); N_KEYPOINTS], Failure> {
     let last = (SIDE - 1) as f64;
     let known = marked
         .iter()
         .filter(|it| it[0].is_finite())
         .map(|at| at.map(f64::from));
     let Some([left, top, right, bottom]) = posenetwork::outline_of(known) else {
-        return Ok([([f32::NAN; 2], 0.0); N_JOINTS]);
+        return Ok([UNKNOWN; N_KEYPOINTS]);
     };
     let plain = find(teacher, rgb, [left, top, right, bottom])?;
     let rows = rgb.chunks_exact(3 * SIDE);
@@ -286,20 +293,27 @@ fn find(
     teacher: &PoseNetwork,
     rgb: &[u8],
     outline: [f64; 4],
-) -> Result<[(Point, f32); N_JOINTS], Failure> {
-    let unknown = ([f32::NAN; 2], 0.0);
+) -> Result<[(Point, f32); N_KEYPOINTS], Failure> {
     let picture = Rgb8View::new(SIDE, SIDE, rgb).or_fail(ExitKind::Run)?;
     let mut workspace = Workspace::default();
     let sight = teacher.look(picture, outline, &mut workspace);
     let Some(sight) = sight.or_fail(ExitKind::Input)? else {
-        return Ok([unknown; N_JOINTS]);
+        return Ok([UNKNOWN; N_KEYPOINTS]);
     };
     let mut maps = JointMaps::default();
     maps.read(&sight, &MapSettings::default())
         .or_fail(ExitKind::Input)?;
-    Ok(core::array::from_fn(|joint| {
-        let peak = maps.peaks().get(joint).copied().flatten();
-        peak.map_or(unknown, |it| (it.at.map(|it| it as f32), it.score as f32))
+    Ok(core::array::from_fn(|keypoint| {
+        let peak = match keypoint.checked_sub(N_JOINTS) {
+            None => maps.peaks().get(keypoint).copied().flatten(),
+            Some(extra) => {
+                let mut names = teacher.names().iter();
+                let at = names.position(|name| name == EXTRAS[extra]);
+                let found = at.and_then(|at| maps.keypoint(at));
+                found.map(|(keypoint, _)| keypoint)
+            }
+        };
+        peak.map_or(UNKNOWN, |it| (it.at.map(|it| it as f32), it.score as f32))
     }))
 }
 

@@ -1,7 +1,9 @@
 //! People who do not exist.
 
 use failure::Failure;
-use training::networks::pose::{N_JOINTS, Person, Source, Target, exchange_sides};
+use training::networks::pose::{
+    EXTRAS, N_JOINTS, N_KEYPOINTS, Person, Source, Target, exchange_sides,
+};
 
 use super::Work;
 use super::crop::Crop;
@@ -41,7 +43,11 @@ fn person(shown: &Shown<'_>) -> Option<(u64, Person)> {
     }
     let crop = Crop::around(&joints, 0.0)?;
     let [right, towards] = front_in_view(shown)?;
-    let targets = joints.map(|at| {
+    let keypoints: [[f64; 2]; N_KEYPOINTS] = core::array::from_fn(|keypoint| {
+        let extra = keypoint.checked_sub(N_JOINTS);
+        extra.map_or_else(|| joints[keypoint], |extra| shown.extras[extra])
+    });
+    let targets = keypoints.map(|at| {
         if !at[0].is_finite() {
             return Target::UNKNOWN;
         }
@@ -66,3 +72,6 @@ fn person(shown: &Shown<'_>) -> Option<(u64, Person)> {
     };
     Some((subject, person))
 }
+
+/// The extra keypoints of scenes and of the network are the same.
+const _: () = assert!(EXTRAS.len() == scene::N_EXTRAS);

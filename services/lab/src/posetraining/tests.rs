@@ -1,6 +1,6 @@
 //! Prepared people as a file, and the card of a trained network.
 
-use training::networks::pose::{About, N_JOINTS, Source, Target};
+use training::networks::pose::{About, N_JOINTS, N_KEYPOINTS, Source, Target};
 
 use super::*;
 
@@ -9,7 +9,7 @@ fn person(name: &str) -> Person {
         source: Source::Photograph,
         name: name.to_owned(),
         rgb: vec![7; 3 * SIDE * SIDE],
-        targets: [Target::UNKNOWN; N_JOINTS],
+        targets: [Target::UNKNOWN; N_KEYPOINTS],
         front: [0.0, 0.0, 1.0],
     }
 }
@@ -45,7 +45,7 @@ fn the_card_that_is_written_is_one_and_says_what_the_network_takes() {
         [shape.width, shape.height]
     );
     assert_eq!(card.keypoints.sides, keypoints::Sides::Seen);
-    assert_eq!(card.names().len(), N_JOINTS);
+    assert_eq!(card.names().len(), N_KEYPOINTS);
     assert_eq!(card.also.front.as_deref(), Some("front"));
 }
 
@@ -70,7 +70,7 @@ fn a_network_that_was_not_trained_fits_its_card_and_tells_front_and_errors() {
     assert!(sight.front().is_some());
     // A tenth of the window's height, which is the box and a margin.
     let errors: Vec<f64> = sight.errors().unwrap().collect();
-    assert_eq!(errors.len(), N_JOINTS);
+    assert_eq!(errors.len(), N_KEYPOINTS);
     assert!(
         errors.iter().all(|it| (it - 10.0).abs() < 0.1),
         "{errors:?}"
@@ -80,4 +80,6 @@ fn a_network_that_was_not_trained_fits_its_card_and_tells_front_and_errors() {
         .unwrap();
     let expected = maps.expected_px(0).unwrap();
     assert!((expected - 8.0).abs() < 0.1, "along one axis: {expected}");
+    let (_, of_nose) = maps.keypoint(N_JOINTS).unwrap();
+    assert!((of_nose - 8.0).abs() < 0.1, "as the network tells it");
 }

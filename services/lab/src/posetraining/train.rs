@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use exports::report::curves::{self, Line, Panel};
-use training::networks::pose::{self, About, Cost, PoseTask, Score, Settings};
-use training::networks::{Backend, Parameter, TrainError, Trainer};
+use training::networks::pose::{self, About, Begun, Cost, PoseTask, Score, Settings};
+use training::networks::{Backend, TrainError, Trainer};
 
 use super::Prepared;
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
@@ -36,12 +36,21 @@ pub struct Job {
     pub backend: Backend,
 }
 
-/// The parameters of a network that was trained before.
-fn begun(from: &Earlier, settings: &Settings) -> Result<Vec<Parameter>, Failure> {
-    pose::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
+/// Reads the network that the training goes on from; nothing for random parameters.
+fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
+    let Some(from) = &job.from else {
+        if settings.extras_alone {
+            let message = "extras_alone = true keeps all but the extra keypoints of a network, and none is named";
+            let hint = "name the network with --from, or take extras_alone out of the settings";
+            return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
+        }
+        return Ok(None);
+    };
+    let begun = pose::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
         let hint = "--from takes a network of `train network` that has the `shape` of the settings";
         failure::in_file(&from.file, &error).with_hint(hint)
-    })
+    })?;
+    Ok(Some(begun))
 }
 
 /// A file beside the one that is written.
@@ -78,6 +87,7 @@ fn drawn(passes: &[Pass]) -> String {
                 score("limbs, both ends", &|it| it.both_ends),
                 score("direction", &|it| it.front),
                 score("area of errors", &|it| it.area),
+                score("extra keypoints", &|score| score.extras),
             ],
         ),
     ];
@@ -109,8 +119,8 @@ pub fn train(
         Err(_) => None,
     };
     let learnt = [people.learnt.as_slice(), people.kept.as_slice()];
-    let from = job.from.as_ref().map(|it| begun(it, settings));
-    let task = PoseTask::new(settings, learnt, from.transpose()?).or_fail(ExitKind::Input)?;
+    let from = begun(job, settings)?;
+    let task = PoseTask::new(settings, learnt, from).or_fail(ExitKind::Input)?;
     let trainer = Trainer::new(task, job.backend, kept.as_deref());
     let mut trainer = trainer.map_err(|error| {
         let kind = match error {
@@ -145,6 +155,7 @@ pub fn train(
         people: learnt.map(<[_]>::len),
         samples: settings.steps * settings.batch,
         goes_on: job.from.is_some(),
+        extras_alone: settings.extras_alone,
         score: score.unwrap_or_default(),
     };
     let card = pose::card(&settings.shape, &about);
@@ -164,11 +175,12 @@ fn line(pass: &Pass, of: usize, minutes: f64) -> String {
         return learnt;
     };
     format!(
-        "{learnt}; {} people kept apart: limbs {:.1} / {:.1} %, direction {:.1} %, errors told by {:.3}",
+        "{learnt}; {} people kept apart: limbs {:.1} / {:.1} %, direction {:.1} %, errors told by {:.3}, extra keypoints {:.1} %",
         score.people,
         100.0 * score.mean_of_ends,
         100.0 * score.both_ends,
         100.0 * score.front,
-        score.area
+        score.area,
+        100.0 * score.extras
     )
 }

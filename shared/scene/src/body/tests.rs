@@ -51,6 +51,20 @@ fn left_joints_are_on_the_left() {
 }
 
 #[test]
+fn heels_lie_behind_the_ankles_and_toes_before_them_towards_the_other_foot() {
+    let frames = bones().frames(&standing());
+    let [nose, heels @ .., left_toe, right_toe] = bones().extras(&frames);
+    let top = frames[HEAD] * Point3::from(bones().head_top);
+    assert!(nose.x > top.x + 0.05 && nose.z < top.z - 0.1);
+    for (side, (heel, toe)) in heels.into_iter().zip([left_toe, right_toe]).enumerate() {
+        let ankle = frames[FOOT[side]].translation.vector;
+        assert!(heel.x < ankle.x - 0.05 && toe.x > ankle.x + 0.15);
+        assert!(heel.z < ankle.z - 0.03 && toe.z < ankle.z - 0.03);
+        assert!(toe.y.abs() < ankle.y.abs() && toe.y.signum() == ankle.y.signum());
+    }
+}
+
+#[test]
 fn positive_angles_turn_joints_in_the_documented_direction() {
     for side in [LEFT, RIGHT] {
         let out = [1.0, -1.0][side];

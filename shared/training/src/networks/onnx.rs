@@ -1,8 +1,12 @@
 //! A trained network as an ONNX file.
 
+use std::collections::BTreeMap;
+
 use inference::onnx::{Attribute, Network as Graph, Side};
 
-use crate::networks::ops::{Along, Conv, Dims, Network, Ops, Places, Scaling, convolved, grid};
+use crate::networks::ops::{
+    Along, Conv, Dims, Network, Ops, Places, Scaling, convolved, grid, joined,
+};
 use crate::networks::parameters::{EPSILON_OF_BATCH, Parameter, standardised};
 
 /// How a network is written.
@@ -14,6 +18,8 @@ pub struct Document {
     pub metadata: Vec<(String, String)>,
     /// Whether weights are stored in half precision.
     pub has_half_weights: bool,
+    /// Weights of layers, by their names, that are written in place of those that follow from the parameters.
+    pub kept: BTreeMap<String, Vec<f32>>,
 }
 
 /// Writes a network: standardised weights become plain ones, batch normalisations a part of the convolutions, dropout goes.
@@ -37,6 +43,7 @@ pub fn write(network: &impl Network, parameters: &[Parameter], document: Documen
             ..Graph::default()
         },
         has_half_weights: document.has_half_weights,
+        kept: document.kept,
         inputs,
         parameters: parameters.iter(),
         n: 0,
@@ -83,6 +90,7 @@ struct Folded {
 struct Writer<'a> {
     graph: Graph,
     has_half_weights: bool,
+    kept: BTreeMap<String, Vec<f32>>,
     inputs: Vec<(&'static str, Dims)>,
     parameters: core::slice::Iter<'a, Parameter>,
     n: usize,
@@ -107,6 +115,7 @@ impl<'a> Writer<'a> {
     }
 
     fn weights(&mut self, name: &str, dims: &[usize], values: Vec<f32>) {
+        let values = self.kept.remove(name).unwrap_or(values);
         if self.has_half_weights {
             self.graph.halves(name, dims, &values);
         } else {
@@ -330,7 +339,8 @@ impl Ops for Writer<'_> {
 
     fn join(&mut self, lists: &[&Value]) -> Value {
         let names: Vec<&str> = lists.iter().map(|list| list.name.as_str()).collect();
-        let dims = vec![lists.iter().map(|list| list.dims[0]).sum()];
+        let dims: Vec<&[usize]> = lists.iter().map(|list| list.dims.as_slice()).collect();
+        let dims = joined(&dims);
         self.node("Concat", &names, vec![("axis", Attribute::Int(1))], dims)
     }
 

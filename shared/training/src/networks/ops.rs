@@ -88,7 +88,7 @@ pub trait Ops {
     /// The means of places with the weights of maps: a list of x, y and x² + y² by the first map, by the second, and so on; x
     /// and y as `grid` says.
     fn place(&mut self, weights: &Self::Value) -> Self::Value;
-    /// Concatenates lists.
+    /// Concatenates lists, or the channels of maps of one size.
     fn join(&mut self, lists: &[&Self::Value]) -> Self::Value;
     /// A dense layer with bias.
     fn dense(&mut self, list: &Self::Value, name: &str, values: usize) -> Self::Value;
@@ -161,4 +161,13 @@ impl Along {
 pub(crate) fn convolved(map: &[usize], conv: Conv) -> Dims {
     let side = |length: usize| (length - 1) / conv.stride + 1;
     vec![conv.channels, side(map[1]), side(map[2])]
+}
+
+/// Dimensions of what is concatenated.
+pub(crate) fn joined(parts: &[&[usize]]) -> Dims {
+    let mut dims = parts.first().map_or_else(Dims::new, |first| first.to_vec());
+    if let Some(channels) = dims.first_mut() {
+        *channels = parts.iter().map(|part| part[0]).sum();
+    }
+    dims
 }

@@ -3,7 +3,7 @@
 use fastrand::Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::networks::ops::{Conv, Dims, Network, Ops, Places, Scaling, convolved};
+use crate::networks::ops::{Conv, Dims, Network, Ops, Places, Scaling, convolved, joined};
 
 /// What keeps the variance of a positive part of a normal variable: `sqrt(2 / (1 - 1 / pi))`.
 pub(crate) const GAIN_OF_RELU: f32 = 1.712_858_6;
@@ -190,7 +190,8 @@ impl Ops for Plan {
     }
 
     fn join(&mut self, lists: &[&Dims]) -> Dims {
-        vec![lists.iter().map(|list| list[0]).sum()]
+        let dims: Vec<&[usize]> = lists.iter().map(|list| list.as_slice()).collect();
+        joined(&dims)
     }
 
     fn dense(&mut self, list: &Dims, name: &str, values: usize) -> Dims {

@@ -24,19 +24,23 @@ mod settings;
 mod task;
 mod vary;
 
-pub use begun::{BeginError, begun};
+pub use begun::{BeginError, Begun, begun};
 pub use card::{About, card};
 pub use cost::{Cost, Truth};
 pub use marks::{Marks, exchange_sides};
-pub use network::{ERROR, FRONT, MAPS, N_JOINTS, PICTURE, STRIDE, Shape};
+pub use network::{
+    ERROR, EXTRAS, FRONT, MAPS, N_JOINTS, N_KEYPOINTS, PICTURE, STRIDE, Shape, initial,
+};
 pub use person::{Person, SIDE, Source, Target, WINDOW};
 pub use score::{Judged, Score};
 pub use settings::{Settings, Vary};
-pub use task::{Found, PoseTask, TooFew, file, initial};
+pub use task::{Found, PoseTask, TooFew, file};
 pub use vary::{DEVIATION, FILL, MARGIN, MEAN, NetworkSample, plain, varied};
 
-/// The joint that is the mirror image of another.
-pub const MIRROR: [usize; N_JOINTS] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
+/// The keypoint that is the mirror image of another.
+pub const MIRROR: [usize; N_KEYPOINTS] = [
+    5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13, 14, 16, 15, 18, 17,
+];
 
 /// Where a map is highest, cells: between cells by a quarter towards the higher neighbour.
 ///

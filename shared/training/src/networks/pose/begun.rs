@@ -1,10 +1,11 @@
 //! The parameters of a network that was trained before: what a training goes on from.
 
+use std::collections::BTreeMap;
+
 use inference::onnx::value_of_half;
 use rten_onnx::onnx::{DataType, ModelProto, TensorProto};
 
-use super::network::Shape;
-use super::task::initial;
+use super::network::{OF_EXTRAS, Shape, initial};
 use crate::networks::parameters::{GAIN_OF_RELU, Parameter};
 
 /// Why a training cannot go on from a network.
@@ -41,7 +42,18 @@ pub enum BeginError {
     },
 }
 
-/// The parameters of a network that [`file()`](super::file()) wrote, in the order of [`initial`].
+/// A network that a training goes on from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Begun {
+    /// In the order of [`initial`].
+    pub parameters: Vec<Parameter>,
+    /// The numbers of the constants of the file, by the names of the parameters that they stand for.
+    pub constants: BTreeMap<String, Vec<f32>>,
+}
+
+/// Reads the parameters of a network that [`file()`](super::file()) wrote.
+///
+/// A network without the layers of the [extra keypoints](super::EXTRAS) gets untrained ones.
 ///
 /// The weights in the file are standardised ones: every channel gets its length as gain, and weights of the length that they have
 /// at the beginning of a training. The network gives what the file gives, but for roundings.
@@ -52,15 +64,20 @@ pub enum BeginError {
 /// # Errors
 ///
 /// [`BeginError`]
-pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Vec<Parameter>, BeginError> {
+pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Begun, BeginError> {
     let graph = ModelProto::parse_buf(file)?.graph.unwrap_or_default();
     let constants = graph.initializer;
     let mut all = initial(shape, seed);
+    let mut kept = BTreeMap::new();
     for at in 0..all.len() {
         if is_gain(&all[at]) {
             continue;
         }
-        let values = numbers(&constants, &all[at])?;
+        let values = match numbers(&constants, &all[at]) {
+            Err(BeginError::Missing { name, .. }) if name.starts_with(OF_EXTRAS) => continue,
+            read => read?,
+        };
+        kept.insert(all[at].name.clone(), values.clone());
         let (these, next) = all.split_at_mut(at + 1);
         let own = &mut these[at].values;
         match next.first_mut().filter(|next| is_gain(next)) {
@@ -69,7 +86,10 @@ pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Vec<Parameter>, Be
             None => *own = values,
         }
     }
-    Ok(all)
+    Ok(Begun {
+        parameters: all,
+        constants: kept,
+    })
 }
 
 fn is_gain(parameter: &Parameter) -> bool {

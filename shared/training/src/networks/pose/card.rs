@@ -1,6 +1,8 @@
 //! The card of a trained network: what Parallax has to know to use it.
 
-use super::network::{ERROR, FRONT, MAPS, PICTURE, Shape};
+use skeleton::PARSE14;
+
+use super::network::{ERROR, EXTRAS, FRONT, MAPS, PICTURE, Shape};
 use super::score::Score;
 use super::vary::{DEVIATION, FILL, MARGIN, MEAN};
 
@@ -13,6 +15,8 @@ pub struct About {
     pub samples: usize,
     /// Whether it went on from a network that was trained before.
     pub goes_on: bool,
+    /// Set where it learned the extra keypoints alone.
+    pub extras_alone: bool,
     /// How good it is on those who were kept apart.
     pub score: Score,
 }
@@ -26,24 +30,30 @@ pub fn card(shape: &Shape, about: &About) -> String {
         both_ends,
         front,
         area,
+        extras,
     } = about.score;
-    let [mean_of_ends, both_ends, front] =
-        [mean_of_ends, both_ends, front].map(|share| 100.0 * share);
+    let [mean_of_ends, both_ends, front, extras] =
+        [mean_of_ends, both_ends, front, extras].map(|share| 100.0 * share);
     let Shape { width, height, .. } = shape;
-    let before = if about.goes_on {
-        ", after those of another network that it began with"
-    } else {
-        ""
+    let before = match (about.goes_on, about.extras_alone) {
+        (true, true) => {
+            ", for the extra keypoints alone; all else is that of the network that it began with"
+        }
+        (true, false) => ", after those of another network that it began with",
+        (false, _) => "",
     };
+    let names: Vec<String> = names().map(|name| format!("{name:?}")).collect();
+    let names = names.join(", ");
     let fill = FILL as u8;
     format!(
         "\
 # A network of `parallax-lab train network`: {learnt} people, {samples} samples{before}. Of {judged} of {kept} people who were kept apart it finds
 # {mean_of_ends:.1} % of the limbs by the mean of both ends and {both_ends:.1} % by both, and tells {front:.1} % of the directions from their
-# opposites; joints that are off by more than half a head are told from others with an area under the curve of {area:.3}.
+# opposites; joints that are off by more than half a head are told from others with an area under the curve of {area:.3};
+# {extras:.1} % of the extra keypoints lie within a fifth of the trunk.
 format = \"parallax-keypoint-network\"
 version = 1
-name = \"Parallax, LSP-14 as seen, {height}x{width}\"
+name = \"Parallax, LSP-14, nose and feet as seen, {height}x{width}\"
 
 [input]
 name = \"{PICTURE}\"
@@ -63,7 +73,7 @@ centred = true
 score = \"log-odds\"
 
 [keypoints]
-set = \"lsp-14\"
+names = [{names}]
 sides = \"seen\"
 
 [also]
@@ -72,4 +82,11 @@ error = \"{ERROR}\"
 ",
         samples = about.samples
     )
+}
+
+/// Names of the keypoints in a card.
+fn names() -> impl Iterator<Item = &'static str> {
+    let of_cards = |name| if name == "head" { "head top" } else { name };
+    let joints = PARSE14.joints.iter().map(|joint| joint.name);
+    joints.map(of_cards).chain(EXTRAS)
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::network::STRIDE;
+use super::network::{N_JOINTS, N_KEYPOINTS, STRIDE};
 use super::peak;
 
 /// Where the logarithm of an expected error counts as it is.
@@ -17,13 +17,13 @@ const CELLS: f32 = 40.0;
 pub struct Truth {
     /// Columns and rows of the maps.
     pub cells: [usize; 2],
-    /// Heat of every joint, 0 to 1: `[n, joints, rows, columns]`.
+    /// Heat of every keypoint, 0 to 1: `[n, keypoints, rows, columns]`.
     pub maps: Vec<f32>,
-    /// How much the map of every joint counts: `[n, joints]`.
+    /// How much the map of every keypoint counts: `[n, keypoints]`.
     pub weights: Vec<f32>,
     /// The direction of the trunk, of a length from 0 to 1, its certainty: `[n, 2]`.
     pub fronts: Vec<f32>,
-    /// Where the joints are, cells of the maps, NaN where that is not certain: `[n, joints, 2]`.
+    /// Where the keypoints are, cells of the maps, NaN where that is not certain: `[n, keypoints, 2]`.
     pub places: Vec<f32>,
 }
 
@@ -57,6 +57,16 @@ impl Truth {
     /// Columns and rows for an input of some width and height.
     pub(super) fn cells([width, height]: [usize; 2]) -> [usize; 2] {
         [width, height].map(|side| side / STRIDE)
+    }
+
+    /// Makes nothing of the joints count, so that the extra keypoints are learned alone.
+    pub(super) fn forget_joints(&mut self) {
+        for weights in self.weights.as_chunks_mut::<N_KEYPOINTS>().0 {
+            weights[..N_JOINTS].fill(0.0);
+        }
+        for places in self.places.as_chunks_mut::<{ 2 * N_KEYPOINTS }>().0 {
+            places[..2 * N_JOINTS].fill(f32::NAN);
+        }
     }
 
     /// Cross-entropy of the maps, heat counting tenfold: the mean over joints, a cell of heat 1 worth.
@@ -136,7 +146,6 @@ impl Truth {
 mod tests {
     use fastrand::Rng;
 
-    use super::super::N_JOINTS;
     use super::*;
 
     /// The gradient of a part is its change with every output.
@@ -165,10 +174,10 @@ mod tests {
         let mut numbers = |n: usize| -> Vec<f32> { (0..n).map(|_| rng.f32()).collect() };
         let mut truth = Truth {
             cells,
-            maps: numbers(n * N_JOINTS * 12),
-            weights: numbers(n * N_JOINTS),
+            maps: numbers(n * N_KEYPOINTS * 12),
+            weights: numbers(n * N_KEYPOINTS),
             fronts: numbers(n * 2),
-            places: numbers(n * N_JOINTS * 2),
+            places: numbers(n * N_KEYPOINTS * 2),
         };
         truth.places[4] = f32::NAN;
         let maps: Vec<f32> = numbers(truth.maps.len())
@@ -177,7 +186,7 @@ mod tests {
             .collect();
         check(&maps, &|maps| truth.of_maps(maps));
         check(&numbers(n * 2), &|front| truth.of_front(front));
-        let logarithms: Vec<f32> = numbers(n * N_JOINTS).iter().map(|x| x - 2.0).collect();
+        let logarithms: Vec<f32> = numbers(n * N_KEYPOINTS).iter().map(|x| x - 2.0).collect();
         check(&logarithms, &|logarithms| truth.of_error(logarithms, &maps));
     }
 

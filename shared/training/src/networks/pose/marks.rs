@@ -1,7 +1,7 @@
 //! What should be found of a person, by the marks of an annotator and by a teacher: another network.
 
 use super::person::Target;
-use super::{MIRROR, N_JOINTS};
+use super::{MIRROR, N_JOINTS, N_KEYPOINTS};
 
 /// Peak of the teacher above which a joint of a pair counts in the question of its sides.
 const SURE_OF_SIDES: f32 = 0.55;
@@ -18,23 +18,33 @@ const APART: f32 = 0.23;
 /// An exchanged limb must be nearer to the teacher than this share of the distance as it is.
 const NEARER: f32 = 0.6;
 
+/// Certainty of the teacher above which its extra keypoints are used.
+const SURE_OF_EXTRAS: f32 = 0.6;
+/// Distance up to which mark and teacher agree about the joint beside an extra keypoint, lengths of the trunk.
+const AGREED_BESIDE: f32 = 0.18;
+/// The joint beside every extra keypoint: neck, then the ankles.
+const BESIDE: [usize; N_KEYPOINTS - N_JOINTS] = [12, 5, 0, 5, 0];
+
 /// Both legs, both arms.
 const LIMBS: [[usize; 6]; 2] = [[0, 1, 2, 3, 4, 5], [6, 7, 8, 9, 10, 11]];
 
-/// What is known of the joints of a person, in the order of `skeleton::PARSE14`; not finite where nothing is.
+/// What is known of the keypoints of a person, as [`Person::targets`](super::Person::targets) are ordered; not finite where nothing
+/// is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marks {
     /// By the annotator, left and right as the person would call them, pixels.
-    pub marked: [[f32; 2]; N_JOINTS],
+    pub marked: [[f32; 2]; N_KEYPOINTS],
     /// By the teacher, and the height of its peak, 0 to 1.
-    pub taught: [([f32; 2], f32); N_JOINTS],
+    pub taught: [([f32; 2], f32); N_KEYPOINTS],
     /// Length of the trunk, pixels.
     pub trunk: f32,
 }
 
-/// The same joints with left and right exchanged.
-pub fn exchange_sides<T: Copy>(of: &[T; N_JOINTS]) -> [T; N_JOINTS] {
-    core::array::from_fn(|joint| of[MIRROR[joint]])
+/// The same keypoints with left and right exchanged.
+///
+/// * `of`: all of them, or the joints alone.
+pub fn exchange_sides<T: Copy, const N: usize>(of: &[T; N]) -> [T; N] {
+    core::array::from_fn(|keypoint| of[MIRROR[keypoint]])
 }
 
 fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
@@ -87,8 +97,9 @@ impl Marks {
     /// What the network should find.
     ///
     /// The mean of both where they agree; both places where they differ and the teacher is sure; the teacher's, weighted by its
-    /// peak, where nothing is marked.
-    pub fn targets(&self) -> [Target; N_JOINTS] {
+    /// peak, where nothing is marked. An extra keypoint that is not marked is the teacher's, if the teacher is sure of it and finds
+    /// the joint beside it where it is marked.
+    pub fn targets(&self) -> [Target; N_KEYPOINTS] {
         core::array::from_fn(|joint| {
             let marked = self.marked[joint];
             let (taught, peak) = self.taught[joint];
@@ -99,6 +110,9 @@ impl Marks {
                 weight: 1.0,
                 is_marked,
             };
+            if !is_marked && joint >= N_JOINTS {
+                return self.extra(joint);
+            }
             if !is_marked {
                 let weight = if peak > ALONE { peak.min(1.0) } else { 0.0 };
                 return Target {
@@ -120,5 +134,56 @@ impl Marks {
                 target
             }
         })
+    }
+
+    /// An extra keypoint of the teacher.
+    fn extra(&self, keypoint: usize) -> Target {
+        let (at, peak) = self.taught[keypoint];
+        let beside = BESIDE[keypoint - N_JOINTS];
+        let off = distance(self.marked[beside], self.taught[beside].0);
+        if peak > SURE_OF_EXTRAS && off < AGREED_BESIDE * self.trunk {
+            Target {
+                at,
+                or: None,
+                weight: 1.0,
+                is_marked: true,
+            }
+        } else {
+            Target::UNKNOWN
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_extra_keypoint_counts_where_the_teacher_is_sure_of_it_and_finds_the_joint_beside_it() {
+        let heel = N_JOINTS + 2;
+        let ankle = BESIDE[2];
+        let mut marks = Marks {
+            marked: [[f32::NAN; 2]; N_KEYPOINTS],
+            taught: [([f32::NAN; 2], 0.0); N_KEYPOINTS],
+            trunk: 50.0,
+        };
+        marks.marked[ankle] = [10.0, 80.0];
+        marks.taught[ankle] = ([12.0, 81.0], 0.9);
+        marks.taught[heel] = ([8.0, 90.0], 0.9);
+        let target = marks.targets()[heel];
+        assert_eq!((target.at, target.weight), ([8.0, 90.0], 1.0));
+        marks.taught[heel].1 = 0.4;
+        assert_eq!(marks.targets()[heel].weight, 0.0, "it is not sure");
+        marks.taught[heel].1 = 0.9;
+        marks.taught[ankle].0 = [30.0, 80.0];
+        assert_eq!(marks.targets()[heel].weight, 0.0, "another foot");
+    }
+
+    #[test]
+    fn the_joint_beside_a_keypoint_has_its_side() {
+        for extra in 0..BESIDE.len() {
+            let mirrored = MIRROR[N_JOINTS + extra] - N_JOINTS;
+            assert_eq!(MIRROR[BESIDE[extra]], BESIDE[mirrored], "{extra}");
+        }
     }
 }

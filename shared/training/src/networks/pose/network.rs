@@ -1,7 +1,10 @@
 //! The network that finds joints.
 //!
-//! One picture of a person goes in; three things come out: a map of log-odds for every joint, the evidence for the
-//! direction in which the trunk faces, and the expected error of every joint.
+//! One picture of a person goes in; three things come out: a map of log-odds for every keypoint, the evidence for the
+//! direction in which the trunk faces, and the expected error of every keypoint.
+//!
+//! The maps of the [extra keypoints](EXTRAS) have a small head of their own over the features of the joints, so that it can be
+//! trained alone.
 //!
 //! Convolutions are followed by no normalisation over the batch. Their weights are standardised instead (Brock et al. 2021,
 //! "Characterizing signal propagation to close the performance gap in unnormalized `ResNets`"), and every residual block begins
@@ -10,9 +13,22 @@
 use skeleton::PARSE14;
 
 use crate::networks::ops::{Conv, Dims, Network, Ops, Output, Scaling};
+use crate::networks::parameters::{self, Parameter};
 
 /// Joints that have a map: those of [`PARSE14`], in its order.
 pub const N_JOINTS: usize = PARSE14.joints.len();
+/// Names of the keypoints whose maps follow those of the joints.
+pub const EXTRAS: [&str; 5] = [
+    "nose",
+    "left heel",
+    "right heel",
+    "left big toe",
+    "right big toe",
+];
+/// Keypoints that have a map: the joints, then [`EXTRAS`].
+pub const N_KEYPOINTS: usize = N_JOINTS + EXTRAS.len();
+/// How the names of the layers begin that only the extra keypoints have.
+pub(crate) const OF_EXTRAS: &str = "extra_";
 
 /// Pixels of the input for a cell of the maps.
 pub const STRIDE: usize = 4;
@@ -24,6 +40,11 @@ pub(crate) const MULTIPLE: usize = 32;
 const SHARPNESS: f32 = 2.0;
 /// How much they are sharpened where lower maxima should count, too.
 const WIDE: f32 = 1.0;
+
+/// The log-odds of an untrained map.
+const MAP_BIAS: f32 = -4.0;
+/// The logarithm of the expected error before training: a tenth of the input's height.
+const ERROR_BIAS: f32 = -2.3;
 
 /// The sizes of the network.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -76,14 +97,14 @@ impl Shape {
 
 /// Name of the input, `[n, 3, height, width]`.
 pub const PICTURE: &str = "picture";
-/// Name of the output with the log-odds of every joint in every cell, `[n, joints, rows, columns]`.
+/// Name of the output with the log-odds of every keypoint in every cell, `[n, keypoints, rows, columns]`.
 pub const MAPS: &str = "maps";
 /// Name of the output with the evidence for the direction of the trunk, `[n, 2]`: towards the right of the picture and towards
 /// the camera.
 ///
 /// Twice its scalar product with a direction is the log-likelihood ratio of facing there over facing away from there.
 pub const FRONT: &str = "front";
-/// Name of the output with the expected errors of the joints in heights of the input, `[n, joints]`.
+/// Name of the output with the expected errors of the keypoints in heights of the input, `[n, keypoints]`.
 pub const ERROR: &str = "error";
 
 impl Network for Shape {
@@ -105,8 +126,48 @@ impl Network for Shape {
     }
 }
 
+/// The parameters of an untrained network; the last dense layers give what is likely for everybody.
+pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
+    let mut all = parameters::initial(shape, seed);
+    for parameter in &mut all {
+        match parameter.name.as_str() {
+            "maps.bias" | "extra_maps.bias" => parameter.values.fill(MAP_BIAS),
+            "error2.bias" | "extra_error2.bias" => parameter.values.fill(ERROR_BIAS),
+            "error2.weight" | "extra_error2.weight" | "front2.weight" => {
+                parameter.values.fill(0.0);
+            }
+            _ => (),
+        }
+    }
+    all
+}
+
 /// Runs the network: maps, evidence for the direction, logarithms of expected errors.
 fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
+    let [at, deepest] = trunk(ops, shape);
+    let features = ops.relu(&at);
+    let head = with_gain(0.1, plain(N_JOINTS, 1, 1));
+    let maps = ops.conv(&features, "maps", head);
+    let places = ops.fixed(&maps);
+    let overall = ops.mean(&deepest);
+    let front = front(ops, shape, [&features, &places, &overall]);
+    let joints = ("", [shape.hidden, N_JOINTS]);
+    let errors = error(ops, joints, [&features, &places, &overall]);
+    let channels = shape.channels[0];
+    let own = block(ops, &at, "extra_refine", [channels, channels / 2]);
+    let own = ops.relu(&own);
+    let head = with_gain(0.1, plain(EXTRAS.len(), 1, 1));
+    let extras = ops.conv(&own, "extra_maps", head);
+    let places = ops.fixed(&extras);
+    let keypoints = (OF_EXTRAS, [shape.hidden, EXTRAS.len()]);
+    let of_extras = error(ops, keypoints, [&own, &places, &overall]);
+    let maps = ops.join(&[&maps, &extras]);
+    let errors = ops.join(&[&errors, &of_extras]);
+    vec![maps, front, errors]
+}
+
+/// Features at stride 4, and the deepest ones, which are positive.
+fn trunk<O: Ops>(ops: &mut O, shape: &Shape) -> [O::Value; 2] {
     let picture = ops.input(PICTURE);
     let stem = ops.conv(&picture, "stem1", plain(shape.stem, 3, 2));
     let stem = ops.relu(&stem);
@@ -144,14 +205,7 @@ fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
             );
         }
     }
-    let features = ops.relu(&at);
-    let head = with_gain(0.1, plain(N_JOINTS, 1, 1));
-    let maps = ops.conv(&features, "maps", head);
-    let places = ops.fixed(&maps);
-    let overall = ops.mean(&deepest);
-    let front = front(ops, shape, [&features, &places, &overall]);
-    let error = error(ops, shape, [&features, &places, &overall]);
-    vec![maps, front, error]
+    [at, deepest]
 }
 
 fn plain(channels: usize, kernel: usize, stride: usize) -> Conv {
@@ -203,9 +257,13 @@ fn front<O: Ops>(
 }
 
 /// The same, from which the features learn nothing, and how high the maps are, where, and how far their heat is spread.
+///
+/// * `name`: how the names of its layers begin.
+/// * `hidden`, `n`: values of the hidden layer, and keypoints.
+/// * `places`: the maps of the keypoints.
 fn error<O: Ops>(
     ops: &mut O,
-    shape: &Shape,
+    (name, [hidden, n]): (&str, [usize; 2]),
     [features, places, overall]: [&O::Value; 3],
 ) -> O::Value {
     let features = ops.fixed(features);
@@ -216,7 +274,7 @@ fn error<O: Ops>(
     let near = ops.place(&near);
     let wide = ops.place(&wide);
     let all = ops.join(&[&seen, &heights, &near, &wide, &overall]);
-    let hidden = ops.dense(&all, "error1", shape.hidden);
+    let hidden = ops.dense(&all, &format!("{name}error1"), hidden);
     let hidden = ops.relu(&hidden);
-    ops.dense(&hidden, "error2", N_JOINTS)
+    ops.dense(&hidden, &format!("{name}error2"), n)
 }

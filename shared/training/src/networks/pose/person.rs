@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::N_JOINTS;
+use super::{N_JOINTS, N_KEYPOINTS};
 
 /// Side of the square picture that is kept of a person, pixels.
 pub const SIDE: usize = 256;
@@ -18,7 +18,7 @@ pub enum Source {
     Scene,
 }
 
-/// What the network should find of a joint.
+/// What the network should find of a keypoint.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Target {
     /// Where it is, pixels; not finite if nobody knows.
@@ -27,11 +27,11 @@ pub struct Target {
     pub or: Option<[f32; 2]>,
     /// How much it counts, 0 to 1.
     pub weight: f32,
-    /// Whether it was marked, or is exact.
+    /// Whether it was marked, is exact, or is an extra keypoint that the teacher is sure of.
     pub is_marked: bool,
 }
 
-/// A picture of a person, and where the joints are: as seen.
+/// A picture of a person, and where the keypoints are: as seen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Person {
     /// Where it comes from.
@@ -40,8 +40,8 @@ pub struct Person {
     pub name: String,
     /// The picture: [`SIDE`] pixels square, red first.
     pub rgb: Vec<u8>,
-    /// The joints, in the order of `skeleton::PARSE14`.
-    pub targets: [Target; N_JOINTS],
+    /// The joints, in the order of `skeleton::PARSE14`, then [`EXTRAS`](super::EXTRAS).
+    pub targets: [Target; N_KEYPOINTS],
     /// In which direction the person faces: towards the right of the picture, downwards, towards the camera; its length is the
     /// certainty, 0 to 1.
     pub front: [f32; 3],
@@ -52,7 +52,8 @@ impl Person {
     pub fn places(&self) -> impl Iterator<Item = [f32; 2]> {
         let is_known =
             |target: &&Target| target.weight > 0.0 && target.at.iter().all(|side| side.is_finite());
-        self.targets.iter().filter(is_known).map(|target| target.at)
+        let joints = self.targets[..N_JOINTS].iter();
+        joints.filter(is_known).map(|target| target.at)
     }
 
     /// From the middle of the hips to the neck, pixels; not finite if one of them is not known.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::N_JOINTS;
+use super::{N_JOINTS, N_KEYPOINTS};
 
 /// The limbs whose ends are judged (PCP): joints whose mean is one end, and the other.
 const STICKS: [(&[usize], &[usize]); 10] = [
@@ -24,14 +24,14 @@ const HEAD: [usize; 2] = [12, 13];
 /// What was found of one person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
-    /// Where the joints were found, cells.
-    pub found: [[f32; 2]; N_JOINTS],
+    /// Where the keypoints were found, cells.
+    pub found: [[f32; 2]; N_KEYPOINTS],
     /// Their expected errors, any unit that all people share.
-    pub expected: [f32; N_JOINTS],
+    pub expected: [f32; N_KEYPOINTS],
     /// Evidence for the direction.
     pub front: [f32; 2],
     /// Where they are; NaN where that is not known.
-    pub truth: [[f32; 2]; N_JOINTS],
+    pub truth: [[f32; 2]; N_KEYPOINTS],
     /// The direction; its length is its certainty.
     pub facing: [f32; 2],
 }
@@ -50,13 +50,15 @@ pub struct Score {
     /// Area under the curve: the probability that a joint that is off by more than half a head is expected to be farther off
     /// than one that is not.
     pub area: f32,
+    /// Share of extra keypoints that are at most a fifth of the trunk off.
+    pub extras: f32,
 }
 
 fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-fn end(of: &[[f32; 2]; N_JOINTS], joints: &[usize]) -> [f32; 2] {
+fn end(of: &[[f32; 2]], joints: &[usize]) -> [f32; 2] {
     let n = joints.len() as f32;
     [0, 1].map(|axis| joints.iter().map(|joint| of[*joint][axis]).sum::<f32>() / n)
 }
@@ -66,6 +68,7 @@ impl Score {
     pub fn new(people: &[Judged]) -> Self {
         let mut limbs = [0.0f32; 3];
         let mut fronts = [0.0f32; 2];
+        let mut extras = [0.0f32; 2];
         let mut joints: Vec<(f32, bool)> = Vec::new();
         for person in people {
             for (a, b) in STICKS {
@@ -86,6 +89,14 @@ impl Score {
                 fronts[0] += 1.0;
                 fronts[1] += f32::from(u8::from(along > 0.0));
             }
+            let trunk = distance(end(&person.truth, &[2, 3]), person.truth[HEAD[0]]);
+            for extra in N_JOINTS..N_KEYPOINTS {
+                let off = distance(person.found[extra], person.truth[extra]) / trunk;
+                if off.is_finite() {
+                    extras[0] += 1.0;
+                    extras[1] += f32::from(u8::from(off <= 0.2));
+                }
+            }
             let head = distance(person.truth[HEAD[0]], person.truth[HEAD[1]]);
             for joint in 0..N_JOINTS {
                 let heads = distance(person.found[joint], person.truth[joint]) / head;
@@ -100,6 +111,7 @@ impl Score {
             both_ends: limbs[2] / limbs[0],
             front: fronts[1] / fronts[0],
             area: area(joints),
+            extras: extras[1] / extras[0],
         }
     }
 }
@@ -125,7 +137,7 @@ fn area(mut joints: Vec<(f32, bool)>) -> f32 {
 mod tests {
     use super::*;
 
-    fn standing() -> [[f32; 2]; N_JOINTS] {
+    fn standing() -> [[f32; 2]; N_KEYPOINTS] {
         [
             [0.0, 40.0],
             [0.0, 30.0],
@@ -141,6 +153,11 @@ mod tests {
             [8.0, 20.0],
             [2.0, 6.0],
             [2.0, 0.0],
+            [2.0, 3.0],
+            [5.0, 42.0],
+            [-1.0, 42.0],
+            [3.0, 43.0],
+            [1.0, 43.0],
         ]
     }
 
@@ -148,7 +165,7 @@ mod tests {
     fn a_perfect_network_scores_one_and_a_moved_foot_costs_a_limb() {
         let mut person = Judged {
             found: standing(),
-            expected: [0.1; N_JOINTS],
+            expected: [0.1; N_KEYPOINTS],
             front: [0.0, 2.0],
             truth: standing(),
             facing: [0.0, 1.0],
@@ -159,12 +176,18 @@ mod tests {
             [1.0; 3]
         );
         person.found[0] = [0.0, 32.0];
+        person.found[N_JOINTS] = [2.0, 7.0];
         person.expected[0] = 0.5;
         person.front = [0.0, -0.1];
         let score = Score::new(&[person]);
         assert_eq!(
-            [score.mean_of_ends, score.both_ends, score.front],
-            [1.0, 0.9, 0.0]
+            [
+                score.mean_of_ends,
+                score.both_ends,
+                score.front,
+                score.extras
+            ],
+            [1.0, 0.9, 0.0, 0.8]
         );
         assert_eq!(
             score.area, 1.0,

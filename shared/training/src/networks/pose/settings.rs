@@ -32,6 +32,8 @@ pub struct Settings {
     pub longest: f32,
     /// Share of the mean of the parameters that every step replaces.
     pub averaged: f32,
+    /// Learn the extra keypoints alone: everything else stays in the file as it is in the network that the training goes on from.
+    pub extras_alone: bool,
     /// What the direction counts beside the maps.
     pub front: f32,
     /// What the expected error counts beside the maps.
@@ -91,6 +93,7 @@ impl Default for Settings {
             decay: 0.05,
             longest: 1.0,
             averaged: 0.002,
+            extras_alone: false,
             front: 0.3,
             error: 0.1,
             vary: Vary::default(),

@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::begun::Begun;
 use super::cost::{Cost, Truth};
-use super::network::{N_JOINTS, Shape};
+use super::network::{N_KEYPOINTS, OF_EXTRAS, Shape, initial};
 use super::peak;
 use super::person::Person;
 use super::score::{Judged, Score};
@@ -13,7 +14,7 @@ use crate::networks::lesson::Shown;
 use crate::networks::onnx::{self, Document};
 use crate::networks::optimiser::{Rule, Step};
 use crate::networks::order;
-use crate::networks::parameters::{self, Parameter};
+use crate::networks::parameters::Parameter;
 use crate::networks::settings::Precision;
 use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
 
@@ -29,24 +30,6 @@ const ERROR_RATE: f32 = 3e-4;
 const STEPS: usize = 100;
 /// Passes between two looks at the people who are kept apart.
 const JUDGED: usize = 10;
-/// The log-odds of an untrained map.
-const MAP_BIAS: f32 = -4.0;
-/// The logarithm of the expected error before training: a tenth of the input's height.
-const ERROR_BIAS: f32 = -2.3;
-
-/// The parameters of an untrained network; the last dense layers give what is likely for everybody.
-pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
-    let mut all = parameters::initial(shape, seed);
-    for parameter in &mut all {
-        match parameter.name.as_str() {
-            "maps.bias" => parameter.values.fill(MAP_BIAS),
-            "error2.bias" => parameter.values.fill(ERROR_BIAS),
-            "error2.weight" | "front2.weight" => parameter.values.fill(0.0),
-            _ => (),
-        }
-    }
-    all
-}
 
 /// Writes a network as an ONNX file, with weights in half precision.
 ///
@@ -57,22 +40,26 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
 ///
 /// If the parameters are another network's.
 pub fn file(shape: &Shape, parameters: &[Parameter], metadata: &[(String, String)]) -> Vec<u8> {
-    let document = Document {
+    onnx::write(shape, parameters, document(metadata))
+}
+
+fn document(metadata: &[(String, String)]) -> Document {
+    Document {
         name: "pose".to_owned(),
         metadata: metadata.to_vec(),
         has_half_weights: true,
-    };
-    onnx::write(shape, parameters, document)
+        ..Document::default()
+    }
 }
 
 /// What the network finds in pictures.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Found {
-    /// Log-odds: `[n, joints, rows, columns]`.
+    /// Log-odds: `[n, keypoints, rows, columns]`.
     pub maps: Vec<f32>,
     /// `[n, 2]`
     pub fronts: Vec<f32>,
-    /// Natural logarithms of expected errors, heights of the input: `[n, joints]`.
+    /// Natural logarithms of expected errors, heights of the input: `[n, keypoints]`.
     pub errors: Vec<f32>,
 }
 
@@ -136,7 +123,7 @@ pub struct PoseTask<'a> {
     settings: &'a Settings,
     learnt: Vec<&'a Person>,
     kept: KeptApart<'a>,
-    from: Option<Vec<Parameter>>,
+    from: Option<Begun>,
     stamp: u64,
 }
 
@@ -144,7 +131,7 @@ impl<'a> PoseTask<'a> {
     /// Prepares a training.
     ///
     /// * `learnt`, `kept`: people to learn from, and others, on whom it is judged and on whom the expected error is learned.
-    /// * `from`: the parameters of [`begun`](super::begun) to begin with, in place of random ones.
+    /// * `from`: what [`begun`](super::begun) read, to begin with in place of random parameters.
     ///
     /// # Errors
     ///
@@ -152,7 +139,7 @@ impl<'a> PoseTask<'a> {
     pub fn new(
         settings: &'a Settings,
         [learnt, kept]: [&'a [Person]; 2],
-        from: Option<Vec<Parameter>>,
+        from: Option<Begun>,
     ) -> Result<Self, TooFew> {
         if learnt.is_empty() || kept.is_empty() {
             let [learnt, kept] = [learnt.len(), kept.len()];
@@ -160,7 +147,7 @@ impl<'a> PoseTask<'a> {
         }
         Ok(Self {
             settings,
-            stamp: stamp(settings, [learnt, kept], from.as_deref()),
+            stamp: stamp(settings, [learnt, kept], from.as_ref()),
             learnt: learnt.iter().collect(),
             kept: KeptApart::new(kept),
             from,
@@ -228,7 +215,8 @@ impl Task for PoseTask<'_> {
 
     fn begin(&self) -> Vec<Parameter> {
         let begin = || initial(&self.settings.shape, self.settings.seed);
-        self.from.clone().unwrap_or_else(begin)
+        let from = self.from.as_ref().map(|from| from.parameters.clone());
+        from.unwrap_or_else(begin)
     }
 
     fn seed(&self) -> u64 {
@@ -258,8 +246,12 @@ impl Task for PoseTask<'_> {
     }
 
     fn learned(&self, nth: usize, parameters: &[Parameter]) -> Vec<bool> {
-        let is_learned =
-            |parameter: &Parameter| !self.is_for_error(nth) || parameter.name.starts_with("error");
+        let is_learned = |parameter: &Parameter| {
+            let of_extras = parameter.name.strip_prefix(OF_EXTRAS);
+            let layer = of_extras.unwrap_or(&parameter.name);
+            let is_now = !self.is_for_error(nth) || layer.starts_with("error");
+            is_now && (of_extras.is_some() || !self.settings.extras_alone)
+        };
         parameters.iter().map(is_learned).collect()
     }
 
@@ -287,9 +279,13 @@ impl Task for PoseTask<'_> {
             .into_par_iter()
             .filter_map(|at| self.sample(people, nth * n + at, &network))
             .collect();
+        let mut truth = truth(&seen, &network);
+        if self.settings.extras_alone {
+            truth.forget_joints();
+        }
         Batch {
             shown: shown(&seen),
-            truth: truth(&seen, &network),
+            truth,
             network,
         }
     }
@@ -359,7 +355,13 @@ impl Trainer<PoseTask<'_>> {
     ///
     /// * `metadata`: keys and values that the file carries.
     pub fn onnx(&self, metadata: &[(String, String)]) -> Vec<u8> {
-        file(&self.task().settings.shape, self.trained(), metadata)
+        let mut document = document(metadata);
+        let PoseTask { settings, from, .. } = self.task();
+        if let Some(from) = from.as_ref().filter(|_| settings.extras_alone) {
+            document.kept.clone_from(&from.constants);
+            document.kept.retain(|name, _| !name.starts_with(OF_EXTRAS));
+        }
+        self.file(document)
     }
 }
 
@@ -401,12 +403,12 @@ fn judged(found: &Found, seen: &NetworkSample, (at, cells): (usize, [usize; 2]))
     let [columns, rows] = cells;
     let size = columns * rows;
     let map = |joint: usize| {
-        let from = (at * N_JOINTS + joint) * size;
+        let from = (at * N_KEYPOINTS + joint) * size;
         &found.maps[from..from + size]
     };
     Judged {
         found: core::array::from_fn(|joint| peak(map(joint), columns)),
-        expected: core::array::from_fn(|joint| found.errors[at * N_JOINTS + joint]),
+        expected: core::array::from_fn(|joint| found.errors[at * N_KEYPOINTS + joint]),
         front: core::array::from_fn(|axis| found.fronts[at * 2 + axis]),
         truth: seen.places,
         facing: seen.front,
@@ -414,13 +416,14 @@ fn judged(found: &Found, seen: &NetworkSample, (at, cells): (usize, [usize; 2]))
 }
 
 /// A hash of everything that the result depends on.
-fn stamp(settings: &Settings, people: [&[Person]; 2], from: Option<&[Parameter]>) -> u64 {
+fn stamp(settings: &Settings, people: [&[Person]; 2], from: Option<&Begun>) -> u64 {
     let mut bytes = format!("{settings:?}").into_bytes();
     for person in people.into_iter().flatten() {
         bytes.extend(formats::checksum::fnv1a(&person.rgb).to_le_bytes());
         bytes.extend(format!("{:?}{:?}", person.targets, person.front).into_bytes());
     }
-    for value in from.into_iter().flatten().flat_map(|list| &list.values) {
+    let from = from.into_iter().flat_map(|from| &from.parameters);
+    for value in from.flat_map(|list| &list.values) {
         bytes.extend(value.to_bits().to_le_bytes());
     }
     formats::checksum::fnv1a(&bytes)

@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 
-use super::network::{N_JOINTS, STRIDE, Shape};
+use super::network::{N_KEYPOINTS, STRIDE, Shape};
 use super::person::{Person, SIDE, Target};
 use super::settings::Vary;
 use super::{MIRROR, exchange_sides};
@@ -26,14 +26,14 @@ const MOST: f32 = 2.5;
 pub struct NetworkSample {
     /// `[3, height, width]`
     pub picture: Vec<f32>,
-    /// Heat of every joint, 0 to 1: `[joints, rows, columns]`.
+    /// Heat of every keypoint, 0 to 1: `[keypoints, rows, columns]`.
     pub maps: Vec<f32>,
-    /// How much the map of every joint counts.
-    pub weights: [f32; N_JOINTS],
+    /// How much the map of every keypoint counts.
+    pub weights: [f32; N_KEYPOINTS],
     /// Direction of the trunk, towards the right of the picture and towards the camera; its length is its certainty.
     pub front: [f32; 2],
-    /// Where the joints are, cells; NaN where that is not certain.
-    pub places: [[f32; 2]; N_JOINTS],
+    /// Where the keypoints are, cells; NaN where that is not certain.
+    pub places: [[f32; 2]; N_KEYPOINTS],
 }
 
 /// How a picture becomes the input: turned, moved, scaled, mirrored.
@@ -321,9 +321,9 @@ fn sample(person: &Person, shape: &Shape, view: &View, rgb: &[[f32; 3]]) -> Netw
     let is_inside = |[x, y]: [f32; 2]| {
         (-0.5..columns as f32 - 0.5).contains(&x) && (-0.5..rows as f32 - 0.5).contains(&y)
     };
-    let mut maps = Vec::with_capacity(N_JOINTS * columns * rows);
-    let mut weights = [0.0; N_JOINTS];
-    let mut places = [[f32::NAN; 2]; N_JOINTS];
+    let mut maps = Vec::with_capacity(N_KEYPOINTS * columns * rows);
+    let mut weights = [0.0; N_KEYPOINTS];
+    let mut places = [[f32::NAN; 2]; N_KEYPOINTS];
     for (joint, target) in targets.iter().enumerate() {
         let at = in_cells(target.at);
         let or = target.or.map(in_cells);
@@ -372,10 +372,10 @@ fn front([x, y, towards]: [f32; 3], view: &View) -> [f32; 2] {
     [if view.is_mirrored { -x } else { x }, towards]
 }
 
-/// The joints that are each other's mirror image, checked: a joint's mirror image has it as its own.
+/// The keypoints that are each other's mirror image, checked: a keypoint's mirror image has it as its own.
 const _: () = {
     let mut joint = 0;
-    while joint < N_JOINTS {
+    while joint < N_KEYPOINTS {
         assert!(MIRROR[MIRROR[joint]] == joint, "pairs");
         joint += 1;
     }

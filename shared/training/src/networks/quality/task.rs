@@ -354,6 +354,7 @@ impl Trainer<QualityTask<'_>> {
                 .map(|(key, value)| (key.to_owned(), value))
                 .collect(),
             has_half_weights: false,
+            ..Document::default()
         })
     }
 }

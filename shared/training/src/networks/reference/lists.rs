@@ -2,6 +2,7 @@
 
 use super::matrix::{Matrix, add_product};
 use super::record::{At, Back, Record, each};
+use crate::networks::ops::joined;
 
 impl<'a> Record<'a> {
     pub(super) fn centre(&mut self, list: At, name: &str) -> At {
@@ -21,6 +22,8 @@ impl<'a> Record<'a> {
     }
 
     pub(super) fn concatenate(&mut self, lists: &[At]) -> At {
+        let dims: Vec<&[usize]> = lists.iter().map(|list| self.dims(*list)).collect();
+        let dims = joined(&dims);
         let sizes: Vec<usize> = lists.iter().map(|list| self.size(*list)).collect();
         let size: usize = sizes.iter().sum();
         let mut values = Vec::with_capacity(self.n * size);
@@ -44,7 +47,7 @@ impl<'a> Record<'a> {
                 }
             })
         });
-        self.record(vec![size], values, back)
+        self.record(dims, values, back)
     }
 
     pub(super) fn connect(&mut self, list: At, name: &str, n_values: usize) -> At {

@@ -29,6 +29,7 @@ enum One {
     Around,
     Place,
     Join,
+    JoinMaps,
     Centred,
     Prelu,
     Dropout,
@@ -56,6 +57,7 @@ fn all() -> Vec<One> {
         One::Around,
         One::Place,
         One::Join,
+        One::JoinMaps,
         One::Centred,
         One::Prelu,
         One::Dropout,
@@ -125,6 +127,10 @@ impl Network for One {
                 ops.place(&weights)
             }
             Self::Join => ops.join(&[&list, &hidden, &hidden]),
+            Self::JoinMaps => {
+                let positive = ops.relu(&map);
+                ops.join(&[&map, &positive])
+            }
             Self::Centred => ops.centred(&hidden, "centred"),
             Self::Prelu => ops.prelu(&hidden, "slope"),
             Self::Dropout => ops.dropout(&hidden, 0.3),

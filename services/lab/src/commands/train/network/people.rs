@@ -24,7 +24,7 @@ right follow the picture. In which direction somebody faces follows from the mar
 themselves (LSP; for PARSE say --sides PARSE=seen).
 
 A teacher, another network with a card, helps: its joints stand in for those without a mark, sides that it surely contradicts are \
-exchanged, and where it agrees with a mark the mean of both is learned.
+exchanged, and where it agrees with a mark the mean of both is learned. Nose, heels and big toes are its own, if its card names them.
 
 One in twelve is kept apart: the training is watched on them, and the expected error is learned on them. Who is judged on must be left \
 out with --without.
