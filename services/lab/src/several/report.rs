@@ -21,16 +21,6 @@ pub struct Measured {
     pub interval: [f64; 2],
 }
 
-impl Measured {
-    /// Mean of numbers; `None` of none.
-    ///
-    /// * `scale`: factor of the mean and of the interval.
-    pub(super) fn mean(numbers: &[f64], scale: f64) -> Option<Self> {
-        let each: Vec<Share> = numbers.iter().map(|number| Share::of([*number])).collect();
-        measured(&each, scale)
-    }
-}
-
 /// The score of a person.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ActorReport {
@@ -118,7 +108,7 @@ pub(super) fn of_actor(id: usize, actor: &Actor) -> ActorReport {
     }
 }
 
-fn measured(frames: &[Share], scale: f64) -> Option<Measured> {
+pub(super) fn measured(frames: &[Share], scale: f64) -> Option<Measured> {
     let bootstrap = Bootstrap {
         block: BLOCK,
         ..Bootstrap::default()

@@ -38,9 +38,9 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
     let (_, first) = lines.next().ok_or_else(|| invalid(&path, 1, "no header"))?;
     let header: Header =
         serde_json::from_str(first).map_err(|error| invalid(&path, 1, error.to_string()))?;
-    if (header.format.as_str(), header.version) != ("parallax-truth", 1) {
+    if (header.format.as_str(), header.version) != ("parallax-truth", 2) {
         let (format, version) = (header.format, header.version);
-        let what = format!("{format:?} {version}, expected \"parallax-truth\" 1");
+        let what = format!("{format:?} {version}, expected \"parallax-truth\" 2");
         return Err(invalid(&path, 1, what));
     }
     if !header

@@ -124,7 +124,7 @@ fn synthetic(folder: &Path, lines: &[String]) {
 fn truth_lines() -> Vec<String> {
     let names: Vec<&str> = PARSE14.joints.iter().map(|it| it.name).collect();
     let header = serde_json::json!({
-        "format": "parallax-truth", "version": 1, "subject": 3, "action": "walking", "seed": 1,
+        "format": "parallax-truth", "version": 2, "subject": 3, "action": "walking", "seed": 1,
         "frame_rate_hz": 30.0, "up": [0.0, 0.0, 1.0], "joints": names, "cameras": ["A", "B"],
     });
     let frame = |nth: u64| {
