@@ -56,7 +56,7 @@ impl Memory {
         let (people, []) = people.as_chunks::<NUMBERS_OF_PERSON>() else {
             return None;
         };
-        let people = people.iter().map(|numbers| Remembered::read(numbers));
+        let people = people.iter().map(Remembered::read);
         Some(Self {
             last_id: id(*last_id)?,
             people: people.collect::<Option<_>>()?,

@@ -145,7 +145,7 @@ mod tests {
         assert_eq!(place.last(), Some(vec![1; 9000]));
         file.write_all_at(&[3; 500], SLOT_BYTES + 5000).unwrap();
         assert_eq!(place.last(), None);
-        place.note_bytes(&[0; SLOT_BYTES as usize]).unwrap_err();
+        place.note_bytes(&vec![0; SLOT_BYTES as usize]).unwrap_err();
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::judge::{Put, Score};
 use super::report::{ActorReport, measured, of_actor};
 use super::shelf::{N_TRUE, TruePerson};
 
-/// A person who was put out is right at these mean distances of the joints, millimetres; as VoxelPose judges Panoptic.
+/// A person who was put out is right at these mean distances of the joints, millimetres; as `VoxelPose` judges Panoptic.
 const RIGHT_MM: [u32; 6] = [25, 50, 75, 100, 125, 150];
 /// And found, at this one.
 const FOUND_M: f64 = 0.5;
@@ -61,72 +61,83 @@ struct Candidate {
 /// * `lines`: of `pose3d.jsonl`; frames that the truth does not have are passed over, as are frames of the truth without a line.
 pub fn everybody(truth: &[Frame], lines: &[FrameLine], rate_hz: f64) -> Everybody {
     let by_number: BTreeMap<u64, &Frame> = truth.iter().map(|frame| (frame.frame, frame)).collect();
-    let mut score = Score::default();
-    let (mut candidates, mut n_true, mut n_frames) = (Vec::new(), 0, 0);
-    let mut errors = Vec::new();
+    let mut tally = Tally::default();
     for line in lines {
-        let Some(frame) = by_number.get(&line.frame) else {
-            continue;
-        };
+        if let Some(frame) = by_number.get(&line.frame) {
+            tally.add(frame, line);
+        }
+    }
+    tally.sum_up(rate_hz)
+}
+
+/// The frames so far.
+#[derive(Default)]
+struct Tally {
+    score: Score,
+    candidates: Vec<Candidate>,
+    n_true: usize,
+    /// Distances of those who were found, metres, frame by frame.
+    errors_m: Vec<Share>,
+}
+
+impl Tally {
+    fn add(&mut self, frame: &Frame, line: &FrameLine) {
         let there: Vec<Joints> = core::iter::once(&frame.joints)
             .chain(&frame.others)
             .map(|joints| joints.map(|joint| Some(Point3::from(joint))))
             .collect();
-        let put: Vec<(u64, Joints)> = line
-            .people
-            .iter()
-            .map(|person| (person.id, joints(person)))
-            .collect();
+        let put: Vec<Joints> = line.people.iter().map(joints).collect();
         let people = there.iter().enumerate();
-        let people: Vec<TruePerson> = people
-            .filter_map(|(id, joints)| true_person(id, joints))
-            .collect();
-        let each: Vec<Put> = put
-            .iter()
-            .map(|(id, joints)| Put::plain(*id, joints))
-            .collect();
-        score.add(&people, &each);
-        for (person, (_, put)) in line.people.iter().zip(&put) {
-            candidates.push(Candidate {
-                frame: n_frames,
+        let people = people.filter_map(|(id, joints)| true_person(id, joints));
+        let each = line.people.iter().zip(&put);
+        let each = each.map(|(person, joints)| Put::plain(person.id, joints));
+        self.score.add(
+            &people.collect::<Vec<TruePerson>>(),
+            &each.collect::<Vec<Put>>(),
+        );
+        for (person, put) in line.people.iter().zip(&put) {
+            self.candidates.push(Candidate {
+                frame: self.errors_m.len(),
                 sd_m: deviation(person),
                 distances_m: there.iter().map(|there| distance(put, there)).collect(),
             });
         }
         let nearest = there.iter().map(|there| {
-            let each = put.iter().map(|(_, put)| distance(put, there));
+            let each = put.iter().map(|put| distance(put, there));
             each.fold(f64::INFINITY, f64::min)
         });
-        errors.push(Share::of(nearest.filter(|nearest| *nearest < FOUND_M)));
-        n_true += there.len();
-        n_frames += 1;
+        self.errors_m
+            .push(Share::of(nearest.filter(|nearest| *nearest < FOUND_M)));
+        self.n_true += there.len();
     }
-    candidates.sort_by(|a, b| a.sd_m.total_cmp(&b.sd_m));
-    let ap = RIGHT_MM.map(|mm| {
-        (
-            mm,
-            average_precision(&candidates, n_true, f64::from(mm) / 1e3),
-        )
-    });
-    let people: Vec<ActorReport> = score
-        .actors
-        .iter()
-        .map(|(id, actor)| of_actor(*id, actor))
-        .collect();
-    let switches = people.iter().map(|person| person.switches).sum();
-    let n_found: f64 = errors.iter().map(|found| found.n).sum();
-    let share = |n: f64, of: usize| n / of.max(1) as f64;
-    Everybody {
-        frames: n_frames,
-        mpjpe_mm: measured(&errors, 1e3),
-        ap: ap.into(),
-        recall: 100.0 * share(n_found, n_true),
-        switches,
-        switches_a_minute: 60.0 * rate_hz * share(switches as f64, n_frames),
-        ids: score.ids.len(),
-        put_out: share(score.n_put as f64, n_frames),
-        there: share(n_true as f64, n_frames),
-        people,
+
+    fn sum_up(mut self, rate_hz: f64) -> Everybody {
+        self.candidates.sort_by(|a, b| a.sd_m.total_cmp(&b.sd_m));
+        let ap = RIGHT_MM.map(|mm| {
+            let right_m = f64::from(mm) / 1e3;
+            (
+                mm,
+                average_precision(&self.candidates, self.n_true, right_m),
+            )
+        });
+        let people = self.score.actors.iter();
+        let people: Vec<ActorReport> = people.map(|(id, actor)| of_actor(*id, actor)).collect();
+        let switches = people.iter().map(|person| person.switches).sum();
+        let n_found: f64 = self.errors_m.iter().map(|found| found.n).sum();
+        let n_frames = self.errors_m.len();
+        let share = |n: f64, of: usize| n / of.max(1) as f64;
+        Everybody {
+            frames: n_frames,
+            mpjpe_mm: measured(&self.errors_m, 1e3),
+            ap: ap.into(),
+            recall: 100.0 * share(n_found, self.n_true),
+            switches,
+            switches_a_minute: 60.0 * rate_hz * share(switches as f64, n_frames),
+            ids: self.score.ids.len(),
+            put_out: share(self.score.n_put as f64, n_frames),
+            there: share(self.n_true as f64, n_frames),
+            people,
+        }
     }
 }
 

@@ -88,8 +88,8 @@ fn everybody_in_lines(report: &Everybody) -> String {
             person.actor,
             person.found,
             person.frames,
-            number(&person.pcp3d),
-            number(&person.mpjpe_mm),
+            number(person.pcp3d),
+            number(person.mpjpe_mm),
             person.switches
         )
     });
@@ -102,7 +102,7 @@ fn everybody_in_lines(report: &Everybody) -> String {
         "{people}everybody: mean of 14 joints {} mm, recall at 500 mm {:.1} %, average precision {} %\n\
          {} changes of an id ({:.2} a minute), {} ids given, {:.2} people put out a frame, {:.2} there, {} frames; intervals: 95 %, over \
          blocks of 25 frames",
-        number(&report.mpjpe_mm),
+        number(report.mpjpe_mm),
         report.recall,
         ap.collect::<Vec<_>>().join(", "),
         report.switches,
@@ -115,7 +115,7 @@ fn everybody_in_lines(report: &Everybody) -> String {
 }
 
 /// A number with its interval.
-fn number(measured: &Option<Measured>) -> String {
+fn number(measured: Option<Measured>) -> String {
     let Some(Measured { value, interval }) = measured else {
         return "-".to_owned();
     };
@@ -154,8 +154,8 @@ fn in_lines(report: &Report) -> String {
             actor.actor,
             actor.found,
             actor.frames,
-            number(&actor.pcp3d),
-            number(&actor.mpjpe_mm),
+            number(actor.pcp3d),
+            number(actor.mpjpe_mm),
             parts.join(", ")
         )
     };
@@ -165,7 +165,7 @@ fn in_lines(report: &Report) -> String {
         "{actors}mean of actors 1 to 3: PCP3D {} %\n{} changes of an id, {} ids given, {:.2} people put out a frame of {}\n\
          association: median {median:.2} ms, 99th percentile {slow:.2} ms a frame\n\
          by the protocol and the head rule of 4D Association; intervals: 95 %, over blocks of a second",
-        number(&report.mean_pcp3d),
+        number(report.mean_pcp3d),
         report.switches,
         report.ids,
         report.put_out,
