@@ -9,6 +9,7 @@ use lab::several::{
 };
 use runfiles::FrameLine;
 use scene::truth::{Frame, Header, TruthError};
+use serde::Serialize;
 use terminal::output;
 
 use super::Arguments;
@@ -24,15 +25,7 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<ExitCode, Fail
     })?;
     let views = chosen(&arguments.views, set.cameras.len())?;
     let report = Report::new(&follow(&set.with_views(&views)), &views);
-    inputs::make_folder(&arguments.out)?;
-    let text = serde_json::to_string_pretty(&report).or_fail(ExitKind::Run)?;
-    let file = arguments.out.join("people.json");
-    files::replace(&file, text.as_bytes()).map_err(|error| in_file(&file, &error))?;
-    if arguments.json {
-        output::json(&report)?;
-    } else {
-        output::line(in_lines(&report))?;
-    }
+    leave(arguments, &report, &in_lines(&report))?;
     failure::require_results(
         !report.actors.is_empty(),
         "no frame has anybody in its truth",
@@ -66,19 +59,24 @@ pub(super) fn run_of_scene(arguments: &Arguments, run: &Path) -> Result<ExitCode
     let lines: Result<Vec<FrameLine>, _> = runfiles::lines(&text).collect();
     let lines = lines.map_err(|error| in_file(&file, &error))?;
     let report = everybody(&truth, &lines, header.frame_rate_hz);
-    inputs::make_folder(&arguments.out)?;
-    let text = serde_json::to_string_pretty(&report).or_fail(ExitKind::Run)?;
-    let file = arguments.out.join("people.json");
-    files::replace(&file, text.as_bytes()).map_err(|error| in_file(&file, &error))?;
-    if arguments.json {
-        output::json(&report)?;
-    } else {
-        output::line(everybody_in_lines(&report))?;
-    }
+    leave(arguments, &report, &everybody_in_lines(&report))?;
     failure::require_results(
         report.frames > 0,
         "the run has no frame of the truth: are they of the same scene?",
     )
+}
+
+/// Writes a report to the folder for it, and prints it.
+fn leave(arguments: &Arguments, report: &impl Serialize, lines: &str) -> Result<(), Failure> {
+    inputs::make_folder(&arguments.out)?;
+    let text = serde_json::to_string_pretty(report).or_fail(ExitKind::Run)?;
+    let file = arguments.out.join("people.json");
+    files::replace(&file, text.as_bytes()).map_err(|error| in_file(&file, &error))?;
+    if arguments.json {
+        output::json(report)
+    } else {
+        output::line(lines)
+    }
 }
 
 fn everybody_in_lines(report: &Everybody) -> String {
