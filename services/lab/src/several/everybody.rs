@@ -11,14 +11,12 @@ use skeleton::body::Joints;
 use statistics::score::Share;
 
 use super::Measured;
-use super::judge::{Put, Score};
+use super::judge::{FOUND_M, Put, Score};
 use super::report::{ActorReport, measured, of_actor};
 use super::shelf::{N_TRUE, TruePerson};
 
 /// A person who was put out is right at these mean distances of the joints, millimetres; as `VoxelPose` judges Panoptic.
 const RIGHT_MM: [u32; 6] = [25, 50, 75, 100, 125, 150];
-/// And found, at this one.
-const FOUND_M: f64 = 0.5;
 
 /// The score of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -22,7 +22,7 @@ const PARTS: [(&str, [usize; 2]); 10] = [
     ("torso", [12, 14]),
 ];
 /// A truth is found by nothing that is farther away, mean over the joints, metres.
-const FOUND_M: f64 = 0.5;
+pub(super) const FOUND_M: f64 = 0.5;
 /// Where the ears are between the neck and the top of the head, as `keypoints::joint_ways` has it.
 const EARS: f64 = 1.0 / 1.8;
 /// The average is over the first three actors.
