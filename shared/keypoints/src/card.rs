@@ -309,7 +309,7 @@ pub enum CardError {
 
 impl Input {
     /// A colour of a picture (red first, 0 to 255) as the network takes it, in its own order.
-    pub(crate) fn prepared(&self, colour: [f32; 3]) -> [f32; 3] {
+    pub fn prepared(&self, colour: [f32; 3]) -> [f32; 3] {
         core::array::from_fn(|channel| {
             let source = match self.colour {
                 Colour::Rgb => channel,

@@ -1,15 +1,19 @@
 //! Looks for the people of a frame with a network, and keeps whom it sees well.
 
 use kernels::Rgb8View;
-use posenetwork::{JointMaps, Look, LookError, Looker, outline_of, overlap};
+use posenetwork::{JointMaps, Look, LookError, Looker, Turn, outline_of, overlap};
 
 use crate::network_memory::{NetworkMemory, Seen, is_known, shift};
 use crate::tracks::{Track, moved, wider};
 
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
+/// Boxes of a detector that overlap by more are of one person.
+const SAME_BOX: f64 = 0.85;
+/// Least number of joints of a person behind others that these do not cover.
+const LEAST_BEHIND: usize = 7;
 /// Somebody new who is seen so much worse than the best one of the frame, as a share of the heat, is a chair or a poster.
-const FAINT: f64 = 0.6;
+const FAINT: f64 = 0.7;
 /// Least heat of a joint that says where its person is, 0 to 1.
 const SURE: f64 = 0.2;
 
@@ -121,6 +125,92 @@ impl Looks<'_> {
         Ok(outlines.len())
     }
 
+    /// Looks into the boxes of a detector, each of which is of one person.
+    ///
+    /// * `outlines`: the nearest person first.
+    pub(crate) fn see_boxes(
+        &self,
+        outlines: &[[f64; 4]],
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        for outline in outlines {
+            let is_same = |seen: &Seen| overlap(seen.outline, *outline) > SAME_BOX;
+            if memory.n_seen == self.n_most || memory.people().iter().any(is_same) {
+                continue;
+            }
+            self.see_box(*outline, memory)?;
+        }
+        Ok(())
+    }
+
+    /// Looks at the person in a box; where that is somebody who is known, at the one behind.
+    fn see_box(&self, outline: [f64; 4], memory: &mut NetworkMemory) -> Result<(), LookError> {
+        let boxed = (outline, Turn::Up);
+        let Some(look) = self.see_in(boxed, memory)? else {
+            return Ok(());
+        };
+        if is_known(&memory.seen, memory.n_seen) {
+            return self.see_behind(boxed, None, memory);
+        }
+        self.keep_look(&look, None, memory);
+        Ok(())
+    }
+
+    /// Looks at the person in a box behind those who are known: these are painted over.
+    ///
+    /// * `usual_score`: of somebody of the frame before.
+    fn see_behind(
+        &self,
+        boxed: ([f64; 4], Turn),
+        usual_score: Option<f32>,
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        let mut bars = core::mem::take(&mut memory.bars);
+        bars.clear();
+        for seen in memory.people() {
+            if overlap(seen.outline, boxed.0) > 0.0 {
+                seen.maps.add_bars(&mut bars);
+            }
+        }
+        memory.look.workspace().cover(&bars);
+        let look = self.see_in(boxed, memory);
+        memory.look.workspace().cover(&[]);
+        let (_, seen) = memory.next();
+        let is_somebody =
+            seen.maps.n_outside(&bars) >= LEAST_BEHIND && seen.maps.heat() >= self.faint(memory);
+        memory.bars = bars;
+        if let Some(look) = look?.filter(|_| is_somebody) {
+            self.keep_look(&look, usual_score, memory);
+        }
+        Ok(())
+    }
+
+    /// The least heat of somebody new.
+    fn faint(&self, memory: &NetworkMemory) -> f64 {
+        let heats = memory.people().iter().map(|known| known.heat);
+        FAINT * heats.fold(0.0, f64::max)
+    }
+
+    /// Looks into a box, with the picture turned where the person is not upright; the maps are those of the next person.
+    fn see_in(
+        &self,
+        (outline, turn): ([f64; 4], Turn),
+        memory: &mut NetworkMemory,
+    ) -> Result<Option<Look>, LookError> {
+        let (look, seen) = memory.next();
+        let boxed = (outline, turn);
+        let network = self.looker.network;
+        let Some(sight) = network.look_turned(self.image, boxed, look.workspace())? else {
+            return Ok(None);
+        };
+        seen.maps.read(&sight, self.looker.settings)?;
+        let first = (outline, turn, sight.front());
+        let first = self.looker.judge(first, &seen.maps);
+        let what = (self.image, first);
+        let best = self.looker.look_upright(what, look, &mut seen.maps)?;
+        Ok(Some(best))
+    }
+
     /// Takes a person of the frame before who has hardly moved as the last look saw them, where nobody is known yet.
     ///
     /// * `n_held`: frames since that look.
@@ -208,7 +298,9 @@ impl Looks<'_> {
         before: Option<&Seen>,
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
-        if !self.is_unknown(track.outline, memory) {
+        let most = if memory.has_searched { SAME } else { SAME_BOX };
+        let is_same = |seen: &Seen| overlap(seen.outline, track.outline) > most;
+        if memory.n_seen == self.n_most || memory.people().iter().any(is_same) {
             return Ok(());
         }
         let is_soon = memory.is_soon;
@@ -219,10 +311,15 @@ impl Looks<'_> {
         let Some(sight) = network.look_turned(self.image, boxed, look.workspace())? else {
             return Ok(());
         };
+        let front = sight.front();
         seen.maps.read(&sight, self.looker.settings)?;
+        if is_known(&memory.seen, memory.n_seen) {
+            return self.see_behind(boxed, Some(track.usual_score), memory);
+        }
+        let (look, seen) = memory.next();
         seen.outline = track.outline;
         seen.turn = track.turn;
-        seen.front = sight.front();
+        seen.front = front;
         seen.usual_score = Some(track.usual_score);
         seen.is_to_widen = track.is_to_widen;
         let moved = before.and_then(|before| shift(&before.maps, &seen.maps));
@@ -269,9 +366,8 @@ impl Looks<'_> {
         if !seen.judge(self.size, self.least_heat) {
             return false;
         }
-        let (known, last) = memory.seen.split_at(memory.n_seen);
-        let best = known.iter().map(|known| known.heat).fold(0.0, f64::max);
-        if last[0].usual_score.is_none() && last[0].heat < FAINT * best {
+        let last = &memory.seen[memory.n_seen];
+        if last.usual_score.is_none() && last.heat < self.faint(memory) {
             return false;
         }
         let is_new = !is_known(&memory.seen, memory.n_seen);

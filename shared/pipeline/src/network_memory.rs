@@ -1,13 +1,16 @@
 //! What the step with a network keeps from frame to frame.
 
 use multiview::FrontEvidence;
-use posenetwork::{JointMaps, LookMemory, Turn};
+use posenetwork::{Bar, JointMaps, LookMemory, Turn};
+use skeleton::MIRRORED;
 use statistics::Sorted;
 
 use crate::tracks::Track;
 
-/// People half of whose joints are nearer to each other, as a share of the height of the network's window, are one.
-const TWIN: f64 = 0.05;
+/// Joints that are nearer to each other, as a share of the height of the network's window, are the same; and sights that have this share
+/// of the joints in common, with sides as they are or exchanged, are of one person.
+const SAME_JOINT: f64 = 0.05;
+const TWIN: f64 = 0.3;
 /// Nobody leaves the box of the last frame within this share of the time for which people can be followed without a frame: a person
 /// who runs moves 0.2 m in 0.07 s.
 const SOON: f64 = 1.0 / 6.0;
@@ -21,6 +24,8 @@ pub const LOST: f64 = 5.0;
 pub struct NetworkMemory {
     pub(crate) look: LookMemory,
     pub(crate) values: Vec<f32>,
+    /// Parts of people whom others are behind.
+    pub(crate) bars: Vec<Bar>,
     /// Where the people of this frame are looked for in the next one.
     pub(crate) tracks: Vec<Track>,
     /// The people of this frame; those beyond `n_seen` are memory for more.
@@ -177,7 +182,25 @@ pub(crate) fn is_known(seen: &[Seen], n: usize) -> bool {
     let (before, last) = seen[..=n].split_at(n);
     before
         .iter()
-        .any(|known| distance(&known.maps, &last[0].maps).is_some_and(|apart| apart < TWIN))
+        .any(|known| in_common(&known.maps, &last[0].maps) >= TWIN)
+}
+
+/// The share of the joints that two sights have in common, with sides as they are or exchanged.
+fn in_common(first: &JointMaps, second: &JointMaps) -> f64 {
+    let [_, top, _, bottom] = first.extent();
+    let near = SAME_JOINT * (bottom - top);
+    let [first, second] = [first, second].map(JointMaps::peaks);
+    let share = |mirror: &dyn Fn(usize) -> usize| {
+        let both = first.iter().enumerate().filter_map(|(joint, peak)| {
+            let [a, b] = [peak.as_ref()?.at, second.get(mirror(joint))?.as_ref()?.at];
+            Some((a[0] - b[0]).hypot(a[1] - b[1]) < near)
+        });
+        let (n, n_near) = both.fold((0_u32, 0_u32), |(n, n_near), is_near| {
+            (n + 1, n_near + u32::from(is_near))
+        });
+        f64::from(n_near) / f64::from(n.max(1))
+    };
+    share(&|joint| joint).max(share(&|joint| MIRRORED[joint]))
 }
 
 /// Steps from the joints of one sight to those of another.
@@ -191,14 +214,6 @@ fn steps(first: &JointMaps, second: &JointMaps) -> impl Iterator<Item = [f64; 2]
 
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Sorted::new(values.collect::<Vec<f64>>()).upper_median()
-}
-
-/// How far the joints of two sights lie from each other, their median, share of the height of the first one's window; `None` if no joint is
-/// seen in both.
-fn distance(first: &JointMaps, second: &JointMaps) -> Option<f64> {
-    let [_, top, _, bottom] = first.extent();
-    let distances = steps(first, second).map(|[x, y]| x.hypot(y));
-    median(distances).map(|middle| middle / (bottom - top))
 }
 
 /// How far a whole person has moved from one sight to another: the median over the joints along each axis, which the errors of single

@@ -178,7 +178,7 @@ impl NetworkStep {
         }
         if is_due && matches!(boxes, Boxes::Detector(_)) {
             let found = core::mem::take(&mut memory.found);
-            looks.see_all(&found, usize::MAX, memory)?;
+            looks.see_boxes(&found, memory)?;
             for track in &tracks {
                 looks.see_again(track, before.get(track.index), memory)?;
             }

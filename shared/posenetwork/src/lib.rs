@@ -8,6 +8,7 @@ mod alone;
 mod between;
 mod bumps;
 mod closer;
+mod cover;
 mod detector;
 mod expected;
 mod found;
@@ -18,6 +19,7 @@ mod person_maps;
 
 pub use bumps::{Bump, MOST_OF_A_JOINT, bumps, fill_from_bumps};
 pub use closer::{Look, LookMemory, Looker};
+pub use cover::Bar;
 pub use detector::Detector;
 pub use expected::expected_error;
 pub use maps::{JointMaps, MOST_CELLS, MapSettings};

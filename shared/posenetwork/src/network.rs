@@ -19,6 +19,7 @@ use keypoints::{
 
 use self::mirror::Mirror;
 use self::ports::outputs_of;
+use crate::cover::{Bar, paint};
 
 /// A network that fits its card.
 #[derive(Debug)]
@@ -42,6 +43,16 @@ pub struct Workspace {
     mirrored: Vec<Tensor>,
     /// Of the input, while it is turned.
     turned: Vec<f32>,
+    /// What is painted over.
+    covers: Vec<Bar>,
+}
+
+impl Workspace {
+    /// Paints over parts of the picture in what is looked at from now on: people who are known, so that the one behind them is seen.
+    pub fn cover(&mut self, bars: &[Bar]) {
+        self.covers.clear();
+        self.covers.extend_from_slice(bars);
+    }
 }
 
 /// An output.
@@ -218,6 +229,12 @@ impl PoseNetwork {
         workspace.values.resize(self.n_values(), 0.0);
         let size = [image.width(), image.height()];
         window.fill(&self.card, image.data(), size, &mut workspace.values);
+        paint(
+            &workspace.covers,
+            &window,
+            &self.card,
+            &mut workspace.values,
+        );
         if turn != Turn::Up {
             let Workspace { values, turned, .. } = workspace;
             turn.turn_input(&self.card, window.input(), values, turned);

@@ -134,6 +134,23 @@ pub static PARSE14: JointSet = JointSet {
 /// Joints of [`PARSE14`] on the right side, each with the same of the left.
 pub const SIDES: [[usize; 2]; 6] = [[0, 5], [1, 4], [2, 3], [6, 11], [7, 10], [8, 9]];
 
+/// The same joint of [`PARSE14`] on the other side; itself for one in the middle.
+pub const MIRRORED: [usize; crate::body::N_JOINTS] = {
+    let mut mirror = [0; crate::body::N_JOINTS];
+    let mut joint = 0;
+    while joint < mirror.len() {
+        mirror[joint] = joint;
+        joint += 1;
+    }
+    let mut side = 0;
+    while side < SIDES.len() {
+        let [right, left] = SIDES[side];
+        (mirror[right], mirror[left]) = (left, right);
+        side += 1;
+    }
+    mirror
+};
+
 /// The 15 joints of UMPM; the pelvis is the middle of the hips.
 pub static UMPM15: JointSet = JointSet {
     name: "umpm15",

@@ -10,5 +10,5 @@ pub mod body;
 mod joints;
 mod parts;
 
-pub use joints::{HUMANEVA20, Joint, JointMap, JointSet, PARSE14, SIDES, UMPM15};
+pub use joints::{HUMANEVA20, Joint, JointMap, JointSet, MIRRORED, PARSE14, SIDES, UMPM15};
 pub use parts::{MIRROR, N_PARTS, PARENT, PART_NAMES};

@@ -1,0 +1,159 @@
+//! Painting over people who are known, so that a network sees who is behind them.
+
+use keypoints::{Card, Layout, Window};
+use skeleton::PARSE14;
+
+use crate::maps::JointMaps;
+
+/// Least heat of a joint at the end of a part that is painted over, 0 to 1.
+const SURE: f64 = 0.2;
+/// Half the width of a limb, share of the longer side of the box around the person.
+const HALF_WIDTH: f64 = 0.0375;
+/// Of the head, which reaches from the neck to its top, likewise.
+const HALF_HEAD: f64 = 0.06;
+/// The edges and diagonals of the trunk: hips and shoulders by their places in [`PARSE14`].
+const TRUNK: [(usize, usize); 6] = [(2, 8), (3, 9), (8, 9), (2, 3), (2, 9), (3, 8)];
+/// The neck and the top of the head.
+const HEAD: (usize, usize) = (12, 13);
+
+/// A part of a person as a bar with round ends, pixels of the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bar {
+    /// Where it begins and ends.
+    pub ends: [[f64; 2]; 2],
+    /// Half its width.
+    pub radius: f64,
+}
+
+impl Bar {
+    /// Whether a point lies in it.
+    fn holds(&self, at: [f64; 2]) -> bool {
+        let [from, to] = self.ends;
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let off = [at[0] - from[0], at[1] - from[1]];
+        let squared = along[0] * along[0] + along[1] * along[1];
+        let share = if squared > 0.0 {
+            ((off[0] * along[0] + off[1] * along[1]) / squared).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let [x, y] = [0, 1].map(|axis| off[axis] - share * along[axis]);
+        x * x + y * y <= self.radius * self.radius
+    }
+}
+
+impl JointMaps {
+    /// Adds the parts of the person, between joints that are seen.
+    pub fn add_bars(&self, bars: &mut Vec<Bar>) {
+        let Some([left, top, right, bottom]) = self.around() else {
+            return;
+        };
+        let longer = (right - left).max(bottom - top);
+        let sure = |joint: usize| self.peaks().get(joint)?.filter(|peak| peak.score >= SURE);
+        let limbs = PARSE14.limbs.iter().chain(&TRUNK);
+        bars.extend(limbs.filter_map(|&(from, to)| {
+            let half = if (from, to) == HEAD {
+                HALF_HEAD
+            } else {
+                HALF_WIDTH
+            };
+            Some(Bar {
+                ends: [sure(from)?.at, sure(to)?.at],
+                radius: half * longer,
+            })
+        }));
+    }
+
+    /// The number of joints that are seen outside of bars.
+    pub fn n_outside(&self, bars: &[Bar]) -> usize {
+        let seen = self.peaks().iter().flatten();
+        seen.filter(|peak| peak.score >= SURE && !bars.iter().any(|bar| bar.holds(peak.at)))
+            .count()
+    }
+}
+
+/// Paints bars over the input of a network, in the colour that it has beyond the picture.
+///
+/// * `values`: the input in the window.
+pub(crate) fn paint(bars: &[Bar], window: &Window, card: &Card, values: &mut [f32]) {
+    let [width, height] = window.input();
+    let plane = width * height;
+    let colour = card.input.prepared([f32::from(card.crop.fill); 3]);
+    let step = window.step();
+    for bar in bars {
+        let ends = bar.ends.map(|end| window.in_input(end));
+        let [columns, rows] = [(0, width), (1, height)].map(|(axis, n)| {
+            let reach = bar.radius / step[axis];
+            let low = ends[0][axis].min(ends[1][axis]) - reach;
+            let high = ends[0][axis].max(ends[1][axis]) + reach;
+            let side = |at: f64| at.clamp(0.0, n as f64) as usize;
+            side(low.ceil())..side(high.floor() + 1.0)
+        });
+        for row in rows {
+            for column in columns.clone() {
+                if !bar.holds(window.in_picture([column as f64, row as f64])) {
+                    continue;
+                }
+                let pixel = row * width + column;
+                for (channel, value) in colour.into_iter().enumerate() {
+                    values[match card.input.layout {
+                        Layout::Planes => channel * plane + pixel,
+                        Layout::Pixels => 3 * pixel + channel,
+                    }] = value;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bar_ends_in_half_circles() {
+        let bar = Bar {
+            ends: [[10.0, 10.0], [30.0, 10.0]],
+            radius: 4.0,
+        };
+        for (at, is_held) in [
+            ([20.0, 13.9], true),
+            ([20.0, 14.1], false),
+            ([6.1, 10.0], true),
+            ([33.0, 13.0], false),
+        ] {
+            assert_eq!(bar.holds(at), is_held, "{at:?}");
+        }
+        let point = Bar {
+            ends: [[5.0, 5.0]; 2],
+            radius: 1.0,
+        };
+        assert!(point.holds([5.5, 5.5]) && !point.holds([f64::NAN, 5.0]));
+    }
+
+    #[test]
+    fn what_is_painted_has_the_colour_beyond_the_picture_and_all_else_stays() {
+        let card = Card::parse(
+            "format = \"parallax-keypoint-network\"\nversion = 1\nname = \"n\"\n\
+             [input]\nwidth = 32\nheight = 40\nmean = [110.0, 110.0, 110.0]\nstd = [60.0, 60.0, 60.0]\n\
+             [crop]\nmargin = 1.25\nfill = 20\n[output]\ncodec = \"heat-map\"\n[keypoints]\nset = \"lsp-14\"\n",
+        )
+        .unwrap();
+        let outline = [100.0, 50.0, 150.0, 130.0];
+        let window = Window::new(&card, outline).unwrap();
+        let [width, height] = window.input();
+        let mut values = vec![f32::MAX; 3 * width * height];
+        let middle = [125.0, 90.0];
+        let bar = Bar {
+            ends: [[125.0, 60.0], [125.0, 120.0]],
+            radius: 5.0,
+        };
+        paint(&[bar], &window, &card, &mut values);
+        let painted = card.input.prepared([f32::from(card.crop.fill); 3]);
+        let [column, row] = window.in_input(middle).map(|side| side.round() as usize);
+        let at = |channel: usize, column: usize| values[(channel * height + row) * width + column];
+        for (channel, expected) in painted.into_iter().enumerate() {
+            assert_eq!((at(channel, column), at(channel, 0)), (expected, f32::MAX));
+        }
+    }
+}
