@@ -47,22 +47,7 @@ pub use tracker::Tracker;
 /// Number of joints, those of `skeleton::PARSE14`.
 pub(crate) const N: usize = skeleton::body::N_JOINTS;
 
-/// The joint on the other side.
-pub(crate) const MIRROR: [usize; N] = {
-    let mut mirror = [0; N];
-    let mut joint = 0;
-    while joint < N {
-        mirror[joint] = joint;
-        joint += 1;
-    }
-    let mut side = 0;
-    while side < skeleton::SIDES.len() {
-        let [right, left] = skeleton::SIDES[side];
-        (mirror[right], mirror[left]) = (left, right);
-        side += 1;
-    }
-    mirror
-};
+pub(crate) use skeleton::MIRRORED as MIRROR;
 
 /// A joint in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]

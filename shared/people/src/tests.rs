@@ -296,3 +296,55 @@ fn joints_are_found_by_what_the_detector_gave_to_nobody() {
         "{distance}"
     );
 }
+
+#[test]
+fn whom_two_of_four_views_see_is_somebody_after_six_frames() {
+    let mut random = Rng::with_seed(7);
+    let [one, other] = [[-0.8, 0.0], [0.8, 0.0]].map(|at| Actor {
+        at,
+        turn: 0.0,
+        stature: 1.7,
+    });
+    let doubtful = Settings {
+        least_heat: 0.5,
+        ..settings()
+    };
+    let mut tracker = Tracker::new(ring(4), doubtful);
+    let n: Vec<usize> = (0..12)
+        .map(|nth| {
+            let mut views = seen(&ring(4), &[one, other], 2.0, &mut random);
+            for view in &mut views[2..] {
+                view.detections.truncate(1);
+            }
+            tracker.step(f64::from(nth) / RATE_HZ, &views).len()
+        })
+        .collect();
+    assert_eq!(n[..5], [1; 5], "rays of two people meet as well");
+    assert_eq!(n[9..], [2; 3]);
+}
+
+#[test]
+fn who_turns_up_where_somebody_is_missed_is_that_person() {
+    let mut random = Rng::with_seed(8);
+    let at = |x: f64| Actor {
+        at: [x, 0.0],
+        turn: 0.0,
+        stature: 1.7,
+    };
+    let frames: Vec<_> = (0..50)
+        .map(|nth| {
+            let people = match nth {
+                0..25 => vec![at(-0.6)],
+                25..33 => Vec::new(),
+                _ => vec![at(0.6)],
+            };
+            seen(&ring(4), &people, 2.0, &mut random)
+        })
+        .collect();
+    let people = follow(4, &frames);
+    let mut ids: Vec<u64> = ids(&people).into_iter().flatten().collect();
+    ids.dedup();
+    assert_eq!(ids, [1]);
+    let last = people[49][0].joints[12].unwrap();
+    assert!((last.x - 0.6).abs() < 0.1, "{last}");
+}

@@ -26,9 +26,14 @@ const SOON_S: f64 = 0.1;
 const FAST_M_PER_S: f64 = 4.0;
 /// A glimpse keeps this share of the velocity, and makes the time since the joints were seen shorter by it.
 const GLIMPSED: f64 = 0.5;
+/// And moves the person by no more, metres: one ray does not tell how far away somebody is.
+const GLIMPSED_M: f64 = 0.1;
 /// A person is somebody who was seen in this many of the last five frames.
 const FRAMES_OF_BIRTH: u32 = 3;
 const RECENT: u32 = 0b1_1111;
+/// And who was seen in so many of the last eight is no meeting of the rays of two people, who move.
+const FRAMES_OF_TWO_VIEWS: u32 = 6;
+const LONG: u32 = 0b1111_1111;
 
 /// A person from frame to frame.
 #[derive(Debug, Clone)]
@@ -131,6 +136,16 @@ impl Track {
         (self.history & RECENT).count_ones() >= FRAMES_OF_BIRTH
     }
 
+    /// Says if detections are given to it as to somebody who is known.
+    pub(crate) fn is_established(&self) -> bool {
+        self.id.is_some() || self.is_somebody()
+    }
+
+    /// Says if it was seen for so long that two views are enough.
+    pub(crate) fn is_lasting(&self) -> bool {
+        (self.history & LONG).count_ones() >= FRAMES_OF_TWO_VIEWS
+    }
+
     /// Takes the joints of this frame.
     pub(crate) fn place(
         &mut self,
@@ -175,7 +190,8 @@ impl Track {
                 }
             }
         }
-        let shift = if n > 0.0 { sum / n } else { sum };
+        let shift: Vector3<f64> = if n > 0.0 { sum / n } else { sum };
+        let shift = shift.cap_magnitude(GLIMPSED_M);
         self.coarse.joints = expected.map(|joint| joint.map(|point| point + shift));
         self.velocity *= GLIMPSED;
         self.placed_s += GLIMPSED * (time_s - self.placed_s);

@@ -22,6 +22,10 @@ const LEAST_SEEN: usize = 5;
 const ONE_M: f64 = 0.3;
 /// Somebody who was not seen is looked for as far away, metres, beyond the reach of single detections.
 const TAKEN_UP_M: f64 = 0.25;
+/// Somebody new who is as near to somebody who is missed, metres, is who was missed, if the bones do not differ by more, mean of the
+/// logarithms.
+const MISSED_M: f64 = 1.5;
+const OTHER_BONES: f64 = 0.15;
 /// Nobody is kept for longer without being seen, seconds.
 const DEATH_S: f64 = 1.0;
 /// Nobody is known again after longer, seconds.
@@ -143,7 +147,7 @@ impl Tracker {
     ) {
         let frame = now.frame;
         let rows: Vec<usize> = (0..self.tracks.len())
-            .filter(|nth| self.tracks[*nth].id.is_some() == is_known)
+            .filter(|nth| self.tracks[*nth].is_established() == is_known)
             .collect();
         for free in free.iter_mut() {
             let fit = |row: usize, column: usize| {
@@ -190,9 +194,13 @@ impl Tracker {
             let agreed = agree(frame, members, Some(expected));
             give_back(free, &agreed.refused);
             let n = agreed.members.len();
-            if n >= self.settings.min_views.max(2) && agreed.person.n_core() >= LEAST_SEEN {
+            let is_placed = n >= self.settings.min_views.max(2)
+                && agreed.person.n_core() >= LEAST_SEEN
+                && (n > 2 || agreed.person.is_body());
+            if is_placed {
                 track.place(time_s, frame, agreed.members, &agreed.person);
-            } else if n >= 1 && track.id.is_some() {
+            } else if (n == 1 || n > 1 && agreed.person.n_core() < LEAST_SEEN) && track.id.is_some()
+            {
                 track.glimpse(time_s, frame, agreed.members);
             } else {
                 give_back(free, &agreed.members);
@@ -296,14 +304,16 @@ impl Tracker {
         for nth in 0..self.tracks.len() {
             let track = &self.tracks[nth];
             // What two views of many see is often nobody: rays of two people meet as well.
+            let (needed, clear) = if track.is_lasting() {
+                (2, 2)
+            } else {
+                (needed, clear)
+            };
             let is_clear = track.members.len() >= needed
                 && track.n_clear(frame, self.settings.least_heat) >= clear
                 && track.n_well_seen(frame, self.settings.least_heat) >= N / 2;
-            let n_known = self
-                .tracks
-                .iter()
-                .filter(|track| track.id.is_some())
-                .count();
+            let is_there = |track: &&Track| track.id.is_some() && track.is_possible();
+            let n_known = self.tracks.iter().filter(is_there).count();
             let is_born = track.id.is_none()
                 && track.state == State::Tracked
                 && (is_clear || !is_doubtful)
@@ -312,17 +322,43 @@ impl Tracker {
             if !is_born {
                 continue;
             }
+            let missed = self.missed(track);
             let known = self.known_again(track, time_s);
-            let id = known.map_or(self.last_id + 1, |known| {
+            let id = if let Some(missed) = missed {
+                let (id, bones) = (
+                    self.tracks[missed].id.take(),
+                    self.tracks[missed].bones.clone(),
+                );
+                self.tracks[nth].bones = bones;
+                id.unwrap_or_default()
+            } else if let Some(known) = known {
                 let known = self.gone.remove(known);
                 self.tracks[nth].bones = known.bones;
                 known.id
-            });
+            } else {
+                self.last_id + 1
+            };
             self.last_id = self.last_id.max(id);
             self.tracks[nth].id = Some(id);
             births.push(id);
         }
         births
+    }
+
+    /// The nearest of those who have been missed for some time, in whose reach somebody new has turned up.
+    fn missed(&self, new: &Track) -> Option<usize> {
+        let trunk = new.trunk()?;
+        let each = self.tracks.iter().enumerate().filter_map(|(nth, track)| {
+            let is_missed = track.id.is_some() && !track.is_possible();
+            let distance = (track.trunk()? - trunk).norm();
+            let is_another = track
+                .bones
+                .difference(&new.bones)
+                .is_some_and(|by| by > OTHER_BONES);
+            (is_missed && distance < MISSED_M && !is_another).then_some((nth, distance))
+        });
+        each.min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|nearest| nearest.0)
     }
 
     /// The one of those who are gone who has the same bones, and the same colour.
