@@ -57,14 +57,14 @@ pub(crate) enum Command {
     Model(model::Command),
     /// Make synthetic sequences of people, with the truth.
     Synth(Box<synth::Arguments>),
-    /// Compare the ways to smooth a finished run with the truth.
+    /// Compare the methods that smooth a finished run with the truth.
     Smooth(smooth::Arguments),
-    /// Work out what a deployment will take, before there is one.
+    /// Predict the cores, the network and the latency that a deployment needs.
     #[command(subcommand)]
     Simulate(simulate::Command),
     /// Print the completion script of a shell.
     Completions(completions::Arguments),
-    /// Write manual pages, one a command.
+    /// Write manual pages, one for each command.
     Man(completions::ManArguments),
 }
 

@@ -92,14 +92,14 @@ pub(crate) enum Command {
     /// Read, show, check and convert calibrations.
     #[command(subcommand)]
     Calib(calib::Command),
-    /// Find where cameras stand, from what they see.
+    /// Find the places of cameras from their footage.
     #[command(subcommand)]
     Calibrate(calibrate::Command),
     /// List the video devices of this machine, and take pictures of live cameras.
     Cameras(cameras::Arguments),
     /// Smooth the trajectories of a finished run, and compute joint angles.
     Smooth(Box<smooth::Arguments>),
-    /// Find by how much the clocks of the cameras of recorded footage differ.
+    /// Find the clock offsets of the cameras of recorded footage.
     #[command(subcommand)]
     Sync(sync::Command),
     /// Show and check deployment files.
@@ -112,19 +112,19 @@ pub(crate) enum Command {
     /// Deployments of several machines: their state, and their keys.
     #[command(subcommand)]
     Hosts(hosts::Command),
-    /// List running deployments, and what dead ones have left in shared memory; or show the processes of one.
+    /// List running deployments and the leftovers of dead ones in shared memory, or show the processes of one.
     Status(deployments::StatusArguments),
     /// Watch the processes of a running deployment: rates, times, losses, memory.
     Top(top::Arguments),
     /// Watch a running deployment, a finished run or a recording in the browser: skeleton, pictures, processes.
     View(view::Arguments),
-    /// Remove what dead deployments have left in shared memory.
+    /// Remove the leftovers of dead deployments from shared memory.
     Clean(deployments::CleanArguments),
-    /// Check whether this machine has what Parallax needs, and say what to do where it has not.
+    /// Check this machine for everything that Parallax needs, and say what to do about each problem.
     Doctor(doctor::Arguments),
     /// Print the completion script of a shell.
     Completions(completions::Arguments),
-    /// Write manual pages, one a command.
+    /// Write manual pages, one for each command.
     Man(completions::ManArguments),
     /// Run one process of a deployment; started by `run`.
     #[command(hide = true)]

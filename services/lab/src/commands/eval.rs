@@ -97,8 +97,8 @@ pub(crate) struct Arguments {
     /// Learned consistency (`train consistency`), instead of that of --paper; "shipped": the one that ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
-    /// What tells in which direction a person faces, for left and right (`train orientation`); "shipped": the one that
-    /// ships; "none": nothing.
+    /// Network of directions in which people face, for left and right (`train orientation`); "shipped": the one that ships;
+    /// "none": nothing.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     orientation: PathBuf,
     /// Table of expected errors, in the authors' format.
@@ -107,8 +107,8 @@ pub(crate) struct Arguments {
     /// Network that predicts the expected errors, an ONNX file; "shipped": the one that ships.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["sigma", "oracle"])]
     network: Option<PathBuf>,
-    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
-    /// "none": a joint is the centre of its part, as for other models.
+    /// Places of joints among the parts: a file of `train joints`; "shipped": the one for the model that ships; "none": a joint
+    /// is the centre of its part, as for other models.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     joint_map: PathBuf,
     /// Use the true errors: a part is switched off if its error exceeds a tenth of the person's size.
@@ -144,7 +144,7 @@ pub(crate) struct Arguments {
     /// Several people: the views to use, from 0, separated by commas; all if not given.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     views: Vec<usize>,
-    /// Judge everybody in a finished run of the sequence: the folder of the run's results.
+    /// Judge all people in a finished run of the sequence: the folder of its results.
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
     /// UMPM: compare every frame with the pose of the frame before, as the released tools do.

@@ -67,8 +67,8 @@ pub(crate) struct Arguments {
     /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
     #[arg(long, value_name = "SIDES", default_value = "marked")]
     sides: Sides,
-    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
-    /// "none": a joint is the centre of its part, as for other models.
+    /// Places of joints among the parts: a file of `train joints`; "shipped": the one for the model that ships; "none": a joint
+    /// is the centre of its part, as for other models.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     joint_map: PathBuf,
     /// Also print the mean offset of every joint along and across its bone, with 95 % intervals.
@@ -77,10 +77,10 @@ pub(crate) struct Arguments {
     /// The card of a network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
     #[arg(long, value_name = "CARD")]
     card: Option<PathBuf>,
-    /// A network is told nothing but the picture: it looks into the box of the best pose that the filters find.
+    /// Give a network only the picture: it looks into the boxes that the filters find.
     #[arg(long)]
     find_boxes: bool,
-    /// A network looks at the mirror image of every person as well: more exact, and takes its time twice.
+    /// Also show the mirror image of every person to a network, and use the mean: more exact, twice the time.
     #[arg(long)]
     mirror: bool,
     /// Print JSON.

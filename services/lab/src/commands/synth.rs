@@ -82,11 +82,11 @@ pub(crate) struct Arguments {
     /// Numbers of the subjects: 3, or 1-20,25.
     #[arg(long, value_name = "LIST", default_value = "1", value_parser = subjects)]
     subjects: Subjects,
-    /// Other people who stand around the subject, at most 4.
+    /// Number of other people who stand around the subject, at most 4.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     others: u64,
-    /// Other people who walk and pass the subject and each other, at most 4. The truth has the joints of everybody; masks and visible
-    /// joints are the subject's alone.
+    /// Number of other people who walk past the subject and each other, at most 4. The truth has the joints of all people; masks
+    /// and visible joints are the subject's alone.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     passers: u64,
     /// Their actions: names separated by commas, or all.
@@ -116,8 +116,8 @@ pub(crate) struct Arguments {
     /// Write no pictures: the capture processes of the deployment render them during the run.
     #[arg(long)]
     live: bool,
-    /// How long after the instants of the frames each camera takes its pictures, milliseconds, in the order of the rig: 0,5,11,16;
-    /// negative for before. The deployment says so too, and a run moves the joints to the instants.
+    /// Time from the instants of the frames to the pictures of each camera, milliseconds, in the order of the rig: 0,5,11,16;
+    /// negative for earlier pictures. The deployment says so too, and a run moves the joints to the instants.
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = parse::skews)]
     skew_ms: Skews,
     /// Recorded motion.

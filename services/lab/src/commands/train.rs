@@ -68,13 +68,13 @@ pub(crate) enum Command {
     Fmp(Box<Arguments>),
     /// Learn the consistency of several views of a person: part types, weights, thresholds, joints.
     Consistency(Box<consistency::Arguments>),
-    /// Train the network that tells from the picture in which direction a person faces, for left and right.
+    /// Train the network that sees in which direction a person faces, for left and right.
     Orientation(Box<orientation::Arguments>),
     /// Learn where joints lie among the parts of a model, on photographs of marked people.
     Joints(Box<joints::Arguments>),
     /// Prepare people for training the network that finds joints.
     NetworkPeople(Box<network::people::Arguments>),
-    /// Train the network that finds joints, the direction of the trunk, and how far off it may be.
+    /// Train the network that finds joints, the direction of the trunk, and expected errors.
     Network(Box<network::learn::Arguments>),
     /// Train a network that predicts the error of every part in a single view.
     Quality(Box<quality::network::Arguments>),

@@ -59,7 +59,7 @@ Examples:
 pub(crate) struct Arguments {
     /// The deployment file; four synthetic cameras if not given.
     deployment: Option<PathBuf>,
-    /// The scenarios, separated by commas; if not given, all that are possible with the processes of the deployment.
+    /// The scenarios, separated by commas; if not given, all that the deployment's processes allow.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Scenario::by_name)]
     scenario: Vec<Scenario>,
     /// List the scenarios and exit.
@@ -92,11 +92,11 @@ pub(crate) struct Arguments {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 struct Limits {
-    /// Longest time from the fault until the process contributes to a result again, milliseconds; for processes that
-    /// results do not name: until it reports that it has worked.
+    /// Longest time from the fault until the process contributes to a result again, milliseconds; for a process that results do
+    /// not name, until it reports work.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest pause between results while a process is away that the others do not depend on, milliseconds.
+    /// Longest pause between results while a process is missing that the others do not need, milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
 }

@@ -82,7 +82,7 @@ pub(crate) struct Arguments {
     /// Name of the deployment, unique among those that run at the same time.
     #[arg(long, value_name = "NAME", default_value = "demo")]
     name: String,
-    /// Serve a page about the run on the loopback while it runs; `parallax view --help` says what it shows.
+    /// Serve a page about the run on the loopback while it runs; `parallax view --help` describes it.
     #[arg(long)]
     view: bool,
     /// Print the report as JSON.

@@ -18,7 +18,7 @@ const UNMARKED: &str = "not a deployment: left alone";
 With a DEPLOYMENT, it is that of `parallax top --once`: every process, its state, and the percentiles of its stages
 (`parallax top --help` explains them). Times are in milliseconds, memory in bytes with --json.")]
 pub(crate) struct StatusArguments {
-    /// Name of a running deployment, or its file: show its processes and where their time goes.
+    /// Name of a running deployment, or its file: show its processes and their times.
     deployment: Option<String>,
     /// Print JSON.
     #[arg(long)]

@@ -81,11 +81,11 @@ pub(crate) struct Arguments {
     /// The model file; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Least heat of a person whom a network sees in a box of the filters: the mean over the joints, from 0 to 1.
+    /// Least heat of a person in a box of the filters: the mean over the joints, from 0 to 1.
     #[arg(long, value_name = "HEAT", default_value_t = LEAST_HEAT, value_parser = heat)]
     heat: f64,
-    /// Lowest score of a detection of the filters; if not given, for the model that ships -1.28 where a network looks into its box, else
-    /// -0.5, and for another model the trained threshold, but at most -1.
+    /// Lowest score of a detection of the filters; if not given: for the model that ships -1.28 with a network and -0.5 without
+    /// one, for another model the trained threshold, but at most -1.
     #[arg(long, value_name = "SCORE", allow_hyphen_values = true)]
     threshold: Option<f64>,
     /// Non-maximum suppression: the largest share of a better detection's boxes that a worse one may cover.
@@ -119,8 +119,8 @@ pub(crate) struct Arguments {
     /// Joints of the filters: parse14 (if not given), umpm15 or humaneva20.
     #[arg(long, value_name = "NAME", value_parser = describe::joint_set)]
     joints: Option<&'static JointSet>,
-    /// Where joints lie among the filters' parts: a file that `train joints` made; "shipped" (if not given): the one for the
-    /// model that ships; "none": a joint is the centre of its part, as for other models.
+    /// Places of joints among the filters' parts: a file of `train joints`; "shipped" (if not given): the one for the model that
+    /// ships; "none": a joint is the centre of its part, as for other models.
     #[arg(long, value_name = "FILE")]
     joint_map: Option<PathBuf>,
     /// Keypoints by this network (.onnx); "shipped": the one that ships; "none": parts by the filters. If not given, the one that
@@ -133,7 +133,7 @@ pub(crate) struct Arguments {
     /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the filters find it.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, allow_hyphen_values = true)]
     outline: Option<Outline>,
-    /// The network looks at the mirror image of every person as well: more exact, and takes its time twice.
+    /// Also show the mirror image of every person to the network, and use the mean: more exact, twice the time.
     #[arg(long)]
     mirror: bool,
     /// Boxes by this detector of people (.onnx) in place of the filters.

@@ -56,29 +56,28 @@ pub(crate) struct Arguments {
     /// The formats, separated by commas; or all.
     #[arg(long, value_name = "LIST", value_parser = formats)]
     to: Formats,
-    /// Which trajectories of the run: as they were found, or as `parallax smooth` has smoothed them.
+    /// Trajectories of the run: as found, or as smoothed by `parallax smooth`.
     #[arg(long, value_enum, default_value_t = Trajectories::Raw)]
     from: Trajectories,
     /// The folder for the files; if not given, `export` in the folder of the run, or the name of the recording with `-export` appended.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// What the files are called.
+    /// Name of the files.
     #[arg(long, default_value = "pose3d", value_parser = name)]
     name: String,
-    /// What the joints are called in the files: `right_ankle` as in the run, or `RAnkle` as OpenSim models with markers for keypoints
-    /// have it (those of Pose2Sim).
+    /// Names of the joints in the files: `right_ankle` as in the run, or `RAnkle` as in Pose2Sim's OpenSim models.
     #[arg(long, value_enum, default_value_t = Names::Own)]
     names: Names,
-    /// Frames of the footage per second, for a run that does not know.
+    /// Frames of the footage per second, for a run without a frame rate.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
-    /// Which way is up in the world of the rig, instead of what the calibration says: 0,0,1.
+    /// Upward direction in the world of the rig, in place of the calibration's: 0,0,1.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = up)]
     up: Option<UnitVector3<f64>>,
     /// Replace files that exist.
     #[arg(long)]
     force: bool,
-    /// Print what was written as JSON.
+    /// Print the written files as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -86,7 +85,7 @@ pub(crate) struct Arguments {
 /// Which trajectories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Trajectories {
-    /// As they were found.
+    /// As found.
     Raw,
     /// Smoothed: pose3d-smooth.jsonl.
     Smooth,

@@ -19,7 +19,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Show the hosts of a running deployment: who answers, how well clocks are known, what became of every view.
+    /// Show the hosts of a running deployment: which answer, how well clocks are known, what became of every view.
     Status(StatusArguments),
     /// Make the keys of all hosts: an authority, and a certificate with its key for each.
     Keys(KeysArguments),
@@ -38,7 +38,7 @@ Examples:
 pub(crate) struct StatusArguments {
     /// The deployment file.
     config: PathBuf,
-    /// The host that this machine is; without it the one with the name of the machine.
+    /// The host of this machine; if not given, the one with the machine's name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Print the state as JSON.

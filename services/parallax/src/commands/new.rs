@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
     /// A calibration of any format that has these cameras.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["board", "show"], required_unless_present = "board")]
     rig: Option<PathBuf>,
-    /// The board that is shown.
+    /// The board in the footage.
     #[arg(long, value_name = "BOARD", requires = "show")]
     board: Option<Board>,
     /// Footage of a camera with the board moved about; once for each.
@@ -56,14 +56,14 @@ pub(crate) struct Arguments {
     /// Footage of a camera with the board lying on the floor.
     #[arg(long, value_name = "NAME=PATH", requires = "board")]
     floor: Vec<String>,
-    /// Find where the cameras stand from a person of this height, metres, who walks about in their footage.
+    /// Find the places of the cameras from a person of this height, metres, who walks about in their footage.
     #[arg(long, value_name = "METRES", conflicts_with = "floor", value_parser = height)]
     people: Option<f64>,
-    /// Where the upper left pixel of the footage of a camera lies in the picture that was calibrated (`source_offset_px`), for footage
-    /// that was cut to a part; once for each.
+    /// Place of the upper left pixel of a camera's footage in the calibrated picture (`source_offset_px`), for cropped footage;
+    /// once for each.
     #[arg(long, value_name = "NAME=X,Y", value_parser = offset)]
     offset: Vec<Offset>,
-    /// Which way is up in the world of the rig, for example 0,0,1.
+    /// Upward direction in the world of the rig, for example 0,0,1.
     #[arg(long, value_name = "X,Y,Z", value_parser = super::export::up, allow_hyphen_values = true)]
     up: Option<UnitVector3<f64>>,
     /// Find offset and drift of the cameras' clocks.
@@ -72,7 +72,7 @@ pub(crate) struct Arguments {
     /// Run the deployment.
     #[arg(long)]
     run: bool,
-    /// Go on where an answer is not to be trusted.
+    /// Continue after an answer with doubts.
     #[arg(long)]
     go_on: bool,
     /// Print the commands only.

@@ -23,7 +23,7 @@ Examples:
 pub(crate) struct Arguments {
     /// Name of the deployment, or its file. It need not run yet.
     deployment: String,
-    /// Where to send: udp://HOST:PORT (JSON lines), udp://HOST:PORT?format=osc, osc://HOST:PORT.
+    /// The target: udp://HOST:PORT (JSON lines), udp://HOST:PORT?format=osc, osc://HOST:PORT.
     #[arg(required = true, value_name = "TARGET")]
     targets: Vec<String>,
     /// Allow targets that are not this machine: skeletons leave it unencrypted.

@@ -67,7 +67,7 @@ pub(crate) struct Arguments {
     /// Replace a value, for example `--set capture.scale=0.5`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The host that this machine is, of a deployment with several `[[host]]`; without it the one with the name of the machine.
+    /// The host of this machine, in a deployment with several `[[host]]`; if not given, the one with the machine's name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Print the summary as JSON.
@@ -84,7 +84,7 @@ enum Bulk {
     Evidence,
     /// The pictures of live cameras as they came; without them a replay from capture is impossible.
     Camera,
-    /// What Foxglove shows: skeletons, cameras, and their pictures as JPEG.
+    /// The topics for Foxglove: skeletons, cameras, and their pictures as JPEG.
     Foxglove,
 }
 

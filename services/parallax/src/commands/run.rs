@@ -50,18 +50,18 @@ pub(crate) struct Arguments {
     /// Replace a value, for example `--set capture.scale=0.5`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The host that this machine is, of a deployment with several `[[host]]`; without it the one with the name of the machine.
+    /// The host of this machine, in a deployment with several `[[host]]`; if not given, the one with the machine's name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Fail with exit code 6 if 1 frame in 100 takes longer than this from capture to result, milliseconds; the same
     /// as `--set supervise.latency_budget_ms=N`.
     #[arg(long, value_name = "N", value_parser = above_zero, allow_negative_numbers = true)]
     latency_budget_ms: Option<f64>,
-    /// Serve a page about the run on the loopback while it runs; `parallax view --help` says what it shows.
+    /// Serve a page about the run on the loopback while it runs; `parallax view --help` describes it.
     #[arg(long, conflicts_with = "dry_run")]
     view: bool,
     /// Send the skeletons as datagrams to udp://HOST:PORT (JSON lines) or osc://HOST:PORT while it runs; may be given several
-    /// times; `parallax publish --help` says what is sent.
+    /// times; `parallax publish --help` describes the datagrams.
     #[arg(long, value_name = "TARGET", conflicts_with = "dry_run")]
     publish: Vec<String>,
     /// Allow --publish to other machines than this: skeletons leave it unencrypted.

@@ -40,14 +40,14 @@ Examples:
 pub(crate) struct Arguments {
     /// The results of a run.
     folder: PathBuf,
-    /// How: `rts` looks ahead, on the measured covariances; `butterworth` is a zero-phase low-pass filter; `kalman` is what
-    /// would have been seen live; `none` only computes angles.
+    /// The method: `rts` looks ahead, on the measured covariances; `butterworth` is a zero-phase low-pass filter; `kalman` is the
+    /// live method; `none` only computes angles.
     #[arg(long, value_name = "METHOD", value_parser = method)]
     method: Option<Method>,
-    /// Cutoff of `butterworth`, Hz; 6 if nothing says otherwise.
+    /// Cutoff of `butterworth`, Hz; 6 if not given.
     #[arg(long, value_name = "HZ", value_parser = cutoff)]
     cutoff_hz: Option<f64>,
-    /// The longest time between two measurements that is filled, seconds; 0.25 if nothing says otherwise.
+    /// Longest gap to fill, seconds; 0.25 if not given.
     #[arg(long, value_name = "SECONDS", value_parser = fill)]
     fill_s: Option<f64>,
     /// Keep the lengths of the limbs' bones constant (`rts`).

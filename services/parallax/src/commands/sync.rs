@@ -55,28 +55,28 @@ Examples:
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
-    /// What is compared.
+    /// The signal to compare.
     #[arg(long, value_enum, default_value_t = By::Movement)]
     by: By,
-    /// How far the clocks of two cameras may be apart, seconds; 10 for footage that was started by hand.
+    /// Largest clock offset of two cameras, seconds; use 10 for footage that was started by hand.
     #[arg(long, value_name = "SECONDS", default_value_t = 2.0, value_parser = window)]
     window: f64,
-    /// The camera whose clock is that of all; the first of the deployment if not given.
+    /// The camera with the reference clock; the first of the deployment if not given.
     #[arg(long, value_name = "CAMERA")]
     reference: Option<String>,
     /// Look at every n-th picture.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     every: u64,
-    /// Where to begin in the footage of each camera, seconds.
+    /// Start in the footage of each camera, seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     from: f64,
-    /// How much of the footage to look at, seconds; all of it if not given.
+    /// Length of the footage to look at, seconds; all of it if not given.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<f64>,
     /// Write a page with the costs of all pairs over their offset.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write `offset_ms` and `drift_ppm` into the deployment file, and leave everything else there as it is.
+    /// Write `offset_ms` and `drift_ppm` into the deployment file, and change nothing else there.
     #[arg(long)]
     write: bool,
     /// Replace a value of the deployment, for example `--set network.file=other.onnx`; may be given several times.

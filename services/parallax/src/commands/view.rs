@@ -47,13 +47,13 @@ pub(crate) struct Arguments {
     /// The name of a deployment, also if there is a folder of that name.
     #[arg(long, value_name = "NAME", conflicts_with = "subject")]
     deployment: Option<String>,
-    /// Port of the page; 0 for any free one. Without it 7878, or a free one if that is in use.
+    /// Port of the page, 0 for any free one; if not given, 7878, or a free one if that is in use.
     #[arg(long, value_name = "N")]
     port: Option<u16>,
     /// Address to listen on; any but the loopback needs a token.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     listen: IpAddr,
-    /// Ask pages for a token, which is made at random and is part of the address.
+    /// Ask pages for a random token, which is part of the address.
     #[arg(long, conflicts_with = "token_file")]
     token: bool,
     /// File with the token that pages must know: at least 16 letters, digits, '-' or '_'.

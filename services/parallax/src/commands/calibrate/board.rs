@@ -57,16 +57,16 @@ pub(crate) struct Arguments {
     /// The board.
     #[arg(long, value_name = "BOARD", required_unless_present = "print")]
     board: Option<Board>,
-    /// Find the intrinsics of every camera by itself, not where they stand.
+    /// Find only the intrinsics, of every camera alone.
     #[arg(long)]
     intrinsics: bool,
     /// Intrinsics to keep: a calibration of any format that has cameras of these names.
     #[arg(long, value_name = "FILE")]
     known: Option<PathBuf>,
-    /// What is found of a lens.
+    /// The lens model.
     #[arg(long, value_enum, default_value_t = Lens::Five)]
     lens: Lens,
-    /// Which pictures were taken together: a table with the columns `sync_index` and `cam_id`.
+    /// Table of the pictures that were taken together, with the columns `sync_index` and `cam_id`.
     #[arg(long, value_name = "FILE")]
     timestamps: Option<PathBuf>,
     /// Look at every n-th frame; chosen by the length of the footage if not given.
@@ -81,14 +81,14 @@ pub(crate) struct Arguments {
     /// Read the corners from a table, in the columns of Caliscope, instead.
     #[arg(long, value_name = "FILE")]
     corners: Option<PathBuf>,
-    /// Write the corners that were found as such a table.
+    /// Write the corners as such a table.
     #[arg(long, value_name = "FILE")]
     save_corners: Option<PathBuf>,
-    /// The footage is mirrored, in all recordings alike.
+    /// Treat all footage as mirrored.
     #[arg(long)]
     mirrored: bool,
-    /// What is on the back of the board: `mirrored` is the mirror image of the front, corner on corner, for cameras on both sides; `blank`
-    /// is nothing. Found by itself where cameras tell.
+    /// The back of the board: `mirrored`, the mirror image of the front, corner on corner, for cameras on both sides; or `blank`.
+    /// If not given, found from the pictures where possible.
     #[arg(long, value_enum, conflicts_with = "mirrored")]
     back: Option<BackName>,
     /// Write the calibration; with --print the board (.pdf or .svg; both if not given).
@@ -111,7 +111,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What is found of a lens.
+/// The lens model.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum Lens {
     /// Pinhole with k1, k2, k3, p1, p2.

@@ -39,7 +39,7 @@ pub(crate) struct Arguments {
     /// The board.
     #[arg(long, value_name = "BOARD", requires = "footage")]
     board: Option<Board>,
-    /// How many frames, from the first, show the board lying still.
+    /// Number of frames, from the first, in which the board lies still.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     frames: u64,
     /// The origin, as a camera sees it; once for each camera.
@@ -51,10 +51,10 @@ pub(crate) struct Arguments {
     /// Any other point of the floor.
     #[arg(long, value_name = "CAMERA=X,Y")]
     floor: Vec<String>,
-    /// The folder of a finished run of this rig in which somebody walks about.
+    /// The folder of a finished run of this rig in which a person walks about.
     #[arg(long, value_name = "RUN", conflicts_with_all = ["board", "at"])]
     people: Option<PathBuf>,
-    /// Frames per second, for a run that does not know.
+    /// Frames per second, for a run without a frame rate.
     #[arg(long, value_name = "HZ", requires = "people", value_parser = rate)]
     rate: Option<f64>,
     /// The rig file to write.

@@ -67,10 +67,10 @@ pub(crate) struct Arguments {
     /// Estimate focal lengths, too: less certain.
     #[arg(long)]
     focal: bool,
-    /// How far the clocks of two cameras may be apart, seconds. A few pictures are found without.
+    /// Largest clock offset of two cameras, seconds. Offsets of a few pictures are found without it.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = window)]
     window: f64,
-    /// Number of the random samples; another one shows how much depends on them.
+    /// Seed of the random samples; another seed shows their influence.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }

@@ -42,7 +42,7 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     walk: WalkArguments,
-    /// Standard deviation of the rotations of the rig that is there, degrees.
+    /// Standard deviation of the rotations of the given rig, degrees.
     #[arg(long, value_name = "DEGREES", default_value_t = 1.0, value_parser = deviation)]
     sd_degrees: f64,
     /// Standard deviation of the places of its cameras, millimetres.

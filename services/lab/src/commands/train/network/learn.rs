@@ -51,10 +51,10 @@ pub(crate) struct Arguments {
     /// Random seed, instead of that of the settings.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// What computes: `built-in`, or `libtorch`, if this executable was built with it.
+    /// Backend: `built-in`, or `libtorch`, if this executable was built with it.
     #[arg(long, value_name = "NAME", default_value = "built-in", value_parser = ["built-in", "libtorch"])]
     backend: String,
-    /// A network of this command to go on from, in place of random weights: more steps, or people of your own.
+    /// Network of this command to start from, in place of random weights: for more steps, or your own people.
     #[arg(long, value_name = "NETWORK")]
     from: Option<PathBuf>,
     /// Continue from the checkpoint of an interrupted training; start anew if there is none.

@@ -56,7 +56,7 @@ pub(crate) struct Arguments {
     /// Frames per camera of a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
-    /// Photographs without people, used as the background of every third scene instead of a room.
+    /// Photographs without people, as the background of every third scene instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
     /// Random seed of the scenes.
