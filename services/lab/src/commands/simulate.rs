@@ -35,9 +35,9 @@ pub(crate) enum Command {
 /// Options of `parallax-lab simulate hosts`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A model, no measurement: costs of one frame of one view are multiplied. Without --report they are those of the machine that the guide names.
-With it they are those of a run on your machine, of a minute or more: processor time of every stage, and, of a run with hosts, bytes
-and codec. What is given by its own option counts first.
+This is a model, not a measurement: it multiplies the costs of one frame of one view. Without --report they are those of the machine in the guide.
+With --report they are those of your run, of a minute or more: processor time of every stage, and for a run with hosts bytes
+and codec. Values of single options take precedence.
 
 Examples:
     parallax run my.toml --json > run.json

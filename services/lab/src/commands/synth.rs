@@ -17,11 +17,11 @@ use motion::MotionArguments;
 use parse::{actions, rig, subjects};
 
 const HELP: &str = "\
-OUT holds what a recording would, and more: deployment.toml (`parallax run OUT/deployment.toml`), rig.toml, the pictures \
+OUT holds a recording with its truth: deployment.toml (`parallax run OUT/deployment.toml`), rig.toml, the pictures \
 (cameras/NAME/000000.png), masks, and the truth: truth.jsonl (joints in 3D and in every picture, visibility, capture \
 times) and people.jsonl (the same as annotated people, for `train fmp` and `judge`; people-as-seen.jsonl with left \
-and right as published models define them). The format is in shared/scene/TRUTH.md. Several subjects or actions have a \
-folder each, OUT/s1-walking, and a people.jsonl of all.
+and right as published models define them). The format is in shared/scene/TRUTH.md. For several subjects or actions, each has a \
+folder, OUT/s1-walking, and people.jsonl has all.
 
 The same options give the same files, bit for bit, on any number of threads. A subject is a person by number: shape, \
 clothes, way of moving. The seed determines the motion, the room and the lighting.
@@ -30,12 +30,12 @@ RIG is humaneva (3 cameras, 640x480), umpm (4, 644x486), ring:N[:RADIUS[:HEIGHT]
 given), or a rig file. Actions: walking, jogging, boxing, gestures, throw-catch, chair, grab, lean, table, lying.
 
 With --motion the subjects move as recorded in a C3D or TRC file: limbs have the recorded directions and the lengths of \
-the subject, and the path is moved to the middle of the room. Joints are not kept within limits. A table (--markers) maps \
-markers to joints. Gaps are interpolated up to --motion-gap seconds; longer ones are refused, with their frames, and so \
+the subject, and the path is moved to the middle of the room. Joints have no limits. A table (--markers) maps \
+markers to joints. Gaps up to --motion-gap seconds are interpolated. Longer ones are refused, with their frames, and so \
 are impossible motions: implausible lengths of the legs, a head below the feet, knees that bend forward.
 
-With --live no pictures are written: the cameras of the deployment are addresses, synth://RIG?camera=C1&action=..., \
-from which each capture process renders its pictures during the run, and the truth is that of the same pictures.
+With --live no pictures are written: the sources of the deployment's cameras are synth://RIG?camera=C1&action=..., \
+each capture process renders its pictures during the run, and the truth is that of the same pictures.
 
 With --json one object: {\"schema_version\", \"sequences\": [{\"folder\", \"subject\", \"action\", \"seed\", \
 \"pictures\", \"people\"}], \"seconds\", \"pictures_per_second\"}.

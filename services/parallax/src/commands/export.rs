@@ -17,32 +17,32 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
 /// Options of `parallax export`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Formats, what they are for, and what they hold:
+Formats, their use and content:
     c3d        motion capture        points, mm, z up; residual: standard deviation, mm; a gap: residual -1
     trc        OpenSim               points, m, y up; a gap: NaN
-    glb        viewers, Blender      skinned skeleton and animation, m, y up; a gap: a bone that is not there
+    glb        viewers, Blender      skinned skeleton and animation, m, y up; a gap: a missing bone
     bvh        animation             bones of fixed length (medians), cm, y up; in a gap the last rotation stays
     csv        tables                a row for each frame, m, axes of the rig; standard deviations
-    csv-long   tables                a row for each joint of each frame: covariance, views, the reason of a gap
+    csv-long   tables                a row for each joint of each frame: covariance, views, the reason for a gap
     parquet    tables                the same, for builds with `--features parquet`
     openpose   other pipelines       BODY_25 of the reprojected pose: a JSON file for each view and frame
-    mp4        people                every camera's pictures with the pose and its uncertainty; needs ffmpeg
+    mp4        video players         every camera's pictures with the pose and its uncertainty; needs ffmpeg
     all        all of these
 
-With --from raw nothing is filled or smoothed: a joint that was not found or was refused is a gap, and BVH, which knows none, says where it \
-holds. Frames stand on the grid of the frame rate; frames that were dropped are gaps. NAME.export.json says all of this \
-of what was written, with the gaps of every joint. Files take their names when they are whole.
+With --from raw nothing is filled or smoothed: a joint that was not found or was refused is a gap. BVH has no gaps, and the command names the frames in which it \
+holds a bone. Frames are on the grid of the frame rate; dropped frames are gaps. NAME.export.json describes the \
+files, with the gaps of every joint. Files get their names when they are complete.
 
-A run of several people has a file for each in every format of one file: NAME-person2.trc for the person with id 2. Keypoints and videos \
-hold everybody. Where never two people are in a frame, the files have whoever was followed, and `ids` says who.
+For several people every format of one file has a file for each: NAME-person2.trc for the person with id 2. Keypoints and videos \
+hold all people. If no frame has two people, the files hold the followed person, and `ids` says who.
 
 With --json one object, that of NAME.export.json: {\"schema_version\", \"source\", \"trajectories\", \"frames\", \"first_frame\", \
 \"frame_step\", \"rate_hz\", \"irregular_times\", \"repeated_frames\", \"up_in_world\", \"points\", \"people\": [{\"ids\", \
 \"frames_with_points\", \"gaps\", \"filled\"}], \"flaws\", \"files\": [{\"format\", \"path\", \"unit\", \"axes\", \"gaps\", \"uncertainty\", \"notes\"}]}.
 
-Exit codes: 0 done; 2 the command line is wrong, or a file exists; 4 the run cannot be read, does not have what a format needs, \
-or the folder cannot be written; 5 the calibration does not fit; 7 no frame has a joint, or the run is not whole: cut off, \
-damaged, not ended; 130 stopped by Ctrl-C.
+Exit codes: 0 done; 2 the command line is wrong, or a file exists; 4 the run cannot be read, lacks data that a format needs, \
+or the folder cannot be written; 5 the calibration does not fit; 7 no frame has a joint, or the run is truncated, \
+damaged or not ended; 130 stopped by Ctrl-C.
 
 Examples:
     parallax export out/my --to c3d,glb

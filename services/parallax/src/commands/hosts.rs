@@ -28,9 +28,9 @@ pub(crate) enum Command {
 /// Options of `parallax hosts status`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Asks the host that fuses over the link, so it works from every host that has keys.
+Asks the fusing host over the link, so it works from every host that has keys.
 
-Exit codes: 0 all hosts answer; 7 some do not; 4 the host that fuses does not answer.
+Exit codes: 0 all hosts answer; 7 some do not; 4 the fusing host does not answer.
 
 Examples:
     parallax hosts status my.toml
@@ -50,7 +50,7 @@ pub(crate) struct StatusArguments {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Writes ca.pem, ca.key, and HOST.pem and HOST.key of every host into `link.keys` of the deployment. Every host needs ca.pem and its
-own two files there; ca.key is needed for further hosts alone, and belongs on none of them. Nothing is replaced.
+own two files there. ca.key is needed only to add hosts; keep it off all of them. Nothing is replaced.
 
 Example:
     parallax hosts keys my.toml")]

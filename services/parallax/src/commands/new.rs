@@ -16,14 +16,14 @@ use crate::commands::calibrate::height;
 /// Options of `parallax new`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every step is a command of its own, which is printed before it runs; what a step has already written is kept, so that `new` goes on
-where it ended. A step that fails ends it, with its exit code; one whose answer is not to be trusted (7) too, unless --go-on.
+Every step is a command, which is printed before it runs. Files of finished steps are kept, so that `new` continues
+where it ended. A step that fails ends it, with its exit code; so does an answer with doubts (7), unless --go-on is given.
 
     1  the rig: --rig converts one; --board with --show finds it (`parallax calibrate board`)
     2  the floor: --floor puts the rig on it (`parallax calibrate origin`)
     3  ROOM/deployment.toml, which is yours from then on (`parallax config check`)
-    4  with --people where the cameras stand is found from the person who walks about in their footage (`parallax calibrate people`),
-       and the floor; of --rig, or of the board, the lenses count alone, and nothing needs to lie on the floor
+    4  with --people: the places of the cameras from the person who walks about in their footage (`parallax calibrate people`),
+       and the floor; only the lenses of --rig, or of the board, are used, and no board is needed on the floor
     5  clocks: --sync finds offsets of recorded cameras from people (`parallax sync estimate --write`)
     6  a first run: --run (`parallax run`)
 

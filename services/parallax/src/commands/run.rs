@@ -17,10 +17,10 @@ use super::{hosts, publish, view};
 #[command(after_help = "\
 A second Ctrl-C, half a second or more after the first, ends the run at once. The output folder holds
 pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and
-overlays/, all for their user alone, called *.part until they are whole. Results of an earlier run are replaced with --force
-only, when the new ones are whole; a file that no run has written is never replaced. Every frame has one line of pose3d.jsonl,
-in order: its result, or with status \"no result\" the reason why it has none; in pose3d.trc its row is NaN then, and that file
-is only written where the frame rate is known. The folder belongs to one run at a time. A run without
+overlays/. Only the user can read them; they are called *.part until they are complete. --force replaces the results of an earlier run
+when the new ones are complete; a file that no run has written is never replaced. Every frame has one line of pose3d.jsonl,
+in order: its result, or status \"no result\" and the reason. pose3d.trc has a row of NaN then; it is written only if
+the frame rate is known. The folder belongs to one run at a time. A run without
 any result is degraded, and says why.
 
 Examples:
@@ -29,9 +29,9 @@ Examples:
     parallax run my.toml --latency-budget-ms 150
     parallax run my.toml --publish udp://127.0.0.1:9000
     parallax run my.toml --dry-run
-    parallax run my.toml --host left        the part of one of several machines
+    parallax run my.toml --host left        one of several machines
 
-While it runs, `parallax top` and `parallax status NAME --json` show every process and where its time goes. With a
+During the run, `parallax top` and `parallax status NAME --json` show every process and its times. With a
 latency budget the run ends with exit code 6 if the 99th percentile from capture to result exceeds it, or if no frame
 was measured (unless it was stopped by Ctrl-C before any was).")]
 #[expect(

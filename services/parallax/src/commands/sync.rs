@@ -28,18 +28,18 @@ pub(crate) enum Command {
 /// Options of `parallax sync estimate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The people are those of the `keypoints` of a camera where the deployment names some, else what its network finds in the footage, \
-else what the filters find. The calibration has to fit; nobody needs to be told from anybody else. A joint that two cameras see at \
-one instant fulfils their epipolar constraint: the offset of a pair is where that holds best, and all cameras together have to \
-agree. Offsets are against the first camera (--reference), and are found whatever `offset_ms` and `drift_ppm` the file has.
+People come from the `keypoints` of a camera, otherwise from its network, otherwise from the filters. The calibration must fit; identities \
+are not needed. A joint that two cameras see at \
+one instant satisfies their epipolar constraint: the offset of a pair is where this holds best, and all cameras must \
+agree. Offsets are against the first camera (--reference), and do not depend on `offset_ms` and `drift_ppm` in the file.
 
-An answer is refused, with exit code 7 and the reason, where another offset is nearly as good (people on a treadmill), the minimum \
+An answer is refused, with exit code 7 and the reason, if another offset is nearly as good (people on a treadmill), the minimum \
 is flat (nobody moves), a pair or a part of the footage contradicts the rest, the views do not fit each other, or a camera sees \
-nobody. Nothing is written then. A drift is told apart from none only in footage that is long enough; the table says so.
+nobody. Nothing is written then. Short footage gives no drift; the table says so.
 
-With --by sound the times at which sounds begin are compared instead: steps, voices, doors, claps. Nobody needs to be seen. Sound \
-needs 2.9 ms for a metre, so that offsets are right to about the distance of two cameras divided by 343 m/s: +- says how much for \
-this rig; in JSON `joints` counts sounds then, and pixels are null. What is refused: too few sounds, sounds that only one camera has, a beat, pairs and parts that contradict each other.
+--by sound compares the times at which sounds begin instead: steps, voices, doors, claps. Nobody needs to be visible. Sound \
+travels a metre in 2.9 ms, so offsets are uncertain by the distance of two cameras divided by 343 m/s: +- includes this. \
+In JSON `joints` then counts sounds, and pixels are null. Refused are: too few sounds, sounds that only one camera has, a beat, pairs and parts that contradict each other.
 
 With --json one object:
     {\"is_determined\", \"doubts\": [text], \"reference\", \"length_s\", \"second_best\",

@@ -31,12 +31,12 @@ A board is KIND:COLUMNSxROWS:SIDE, with options after further colons:
     chessboard:9x6:25mm               9 x 6 inner corners
     aprilgrid:6x6:88mm:36h11:gap=0.3  6 x 6 tags with gaps of 0.3 of a tag
 
-Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, into the corners of every picture. Two cameras at
-a time have to see it, never all. Which pictures belong together is told by timestamps.csv beside the first video (Caliscope's:
-the n-th row of a camera is its n-th picture) or --timestamps, else by their number, or by time where frame rates differ.
+Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, into the corners of every picture. At least two \
+cameras at a time must see it. Pictures belong together by timestamps.csv beside the first video (Caliscope's: \
+the n-th row of a camera is its n-th picture) or --timestamps, otherwise by their number, or by time if frame rates differ.
 
 The world is the frame of the first camera; `parallax calibrate origin` puts it on the floor. With doubts the files are written,
-the report and the rig say so, and the exit code is 7; where there is no answer it is 5, or 4 without a board in the pictures.
+the report and the rig say so, and the exit code is 7; without an answer it is 5, or 4 without a board in the pictures.
 
 With --json one object:
     {\"is_trusted\", \"doubts\", \"notes\", \"board\", \"sigma_px\",

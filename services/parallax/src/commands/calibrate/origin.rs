@@ -21,9 +21,9 @@ use terminal::{Globals, Terminal, output};
 #[command(after_help = "\
 With a board on the floor, its print up: the origin is its upper left corner, x along its rows, y against its columns, z up.
 With three points on the floor: the origin, one along x, and any other; each as pixels of at least two cameras.
-With --people the floor is found: it is below the ankles of people who stand, in a run of this rig that has ended. The origin is in \
-the middle of where they stood, x as near to the old x as can be. Where somebody walked about, the plane in which the feet stood \
-tells the vertical; if not, people who stand upright do, less surely: the file is written, and the exit code is 7.
+With --people the floor is below the feet of people who stand, in a finished run of this rig. The origin is in \
+the middle of their places, and x is as near to the old x as possible. If a person walked about, the plane of the standing feet \
+gives the vertical. Otherwise upright people do, less surely: the file is written, and the exit code is 7.
 
 Examples:
     parallax calibrate origin rig.toml --board charuco:7x5:40mm cam0.mp4 cam1.mp4 --frames 1 --out room.toml
