@@ -251,7 +251,7 @@ fn keys(it: &Deployment) -> Result<(), Complaint> {
         it.link.insecure || it.link.keys.is_some(),
         "link.keys",
         "left out",
-        "the folder that `parallax hosts keys` makes; or link.insecure = true, and everybody on the network can look on",
+        "the folder that `parallax hosts keys` makes; or link.insecure = true, which lets anybody on the network look on",
     )?;
     demand(
         !(it.link.insecure && it.link.keys.is_some()),

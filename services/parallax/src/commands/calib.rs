@@ -165,7 +165,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
             up.x, up.y, up.z
         ))?,
         None => output::line(
-            "which way is up is not known: a run finds it, or is told by `up` in its deployment",
+            "which way is up is not known: a run finds it, or `up` in its deployment sets it",
         )?,
     }
     for camera in rig.cameras() {

@@ -119,7 +119,7 @@ fn document(entries: &[Entry]) -> Vec<String> {
         lines.push(match &entry.value {
             Some(value) => format!("{name} = {value}  # {}", entry.origin.name()),
             None if entry.key == "capture.scale" && is_by_itself => {
-                format!("# {name} is by itself: `run --dry-run` shows it")
+                format!("# {name} is chosen by the run: `run --dry-run` shows it")
             }
             None => format!("# {name} is not set"),
         });

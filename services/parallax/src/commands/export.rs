@@ -114,7 +114,10 @@ fn formats(text: &str) -> Result<Formats, String> {
             return Err(NO_PARQUET.to_owned());
         }
         if chosen.is_empty() {
-            return Err(format!("{wanted:?} is none of {}, all", names.join(", ")));
+            return Err(format!(
+                "{wanted:?} is not one of {}, all",
+                names.join(", ")
+            ));
         }
         for format in chosen {
             if !found.iter().any(|it| it.name() == format.name()) {
@@ -265,7 +268,7 @@ mod tests {
         assert_eq!(names("all,csv").unwrap().len(), Format::all().len());
         let error = names("c3d,fbx").unwrap_err();
         assert!(
-            error.contains("\"fbx\" is none of c3d, trc, glb"),
+            error.contains("\"fbx\" is not one of c3d, trc, glb"),
             "{error}"
         );
         names("").unwrap_err();

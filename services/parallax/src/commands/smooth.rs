@@ -176,7 +176,7 @@ fn tell(request: &Request, outcome: &Outcome) -> Result<(), Failure> {
     let breaks = report.people.iter().map(|person| &person.frames_of_breaks);
     for frames in breaks.filter(|frames| !frames.is_empty()) {
         output::line(format_args!(
-            "somebody else begins in {} frames: {frames:?}",
+            "another person begins in {} frames: {frames:?}",
             frames.len()
         ))?;
     }

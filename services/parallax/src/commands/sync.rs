@@ -257,11 +257,11 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
     if outcome.cameras.iter().all(|it| it.drift_error.is_none()) {
         output::line("drift: the footage does not determine it, 0 is taken")?;
     } else if outcome.cameras.iter().any(|it| it.drift == 0.0) {
-        output::line("drift: one that is not told from none is 0")?;
+        output::line("drift: one that is not significant is 0")?;
     }
     output::line(format_args!(
         "{:<25} {:>9} {:>15} {:>12} {:>8}",
-        "pair by itself", "best, ms", "second best, ms", "as good, %", "samples"
+        "pair alone", "best, ms", "second best, ms", "as good, %", "samples"
     ))?;
     for it in &outcome.pairs {
         let [a, b] = it.cameras.map(|it| names[it]);

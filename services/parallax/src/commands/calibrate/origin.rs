@@ -115,7 +115,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     match below {
         None if by_bodies => {
             let message = "the vertical is that of people who stand upright, some degrees sure: their feet stood on one spot";
-            let hint = "a run in which somebody walks about tells it by the feet";
+            let hint = "a run in which a person walks about gives it by the feet";
             Err(Failure::new(ExitKind::Degraded, message).with_hint(hint))
         }
         None => Ok(ExitCode::SUCCESS),
