@@ -62,7 +62,8 @@ pub enum RecordedError {
 
 fn others(known: &[String]) -> String {
     if known.is_empty() {
-        "it holds none of any camera: only `parallax record` of live cameras keeps them".to_owned()
+        "it holds pictures of no camera: only `parallax record` of live cameras keeps them"
+            .to_owned()
     } else {
         format!("it holds those of {}", known.join(", "))
     }

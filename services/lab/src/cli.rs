@@ -8,17 +8,17 @@ use crate::commands::{eval, judge, model, simulate, smooth, synth, train};
 const LONG_ABOUT: &str = "\
 The laboratory of Parallax: trainings, evaluations, and synthetic sequences with their truth.
 
-`parallax` runs the rigs; what is trained here is named by its deployments.";
+`parallax` runs the rigs; its deployments use the models that are trained here.";
 
 const EXAMPLES: &str = "\
 Examples:
-    parallax-lab train fmp PARSE --only 1-100 --negatives neg/ --out person.fmp   a model of one's own
-    parallax-lab judge person.fmp PARSE --only 101-200  how good it is
-    parallax-lab model import parse.mat --out parse.plx converts another format's model
-    parallax-lab model show pose.onnx                   what a network takes and gives, by its card
-    parallax-lab eval HumanEva_I --model he.txt --out out/he    the paper's evaluation
-    parallax-lab synth out/walk --actions walking       synthetic pictures, with the truth
-    parallax-lab simulate hosts --cameras 8 --hosts 2   what a deployment of several machines will take
+    parallax-lab train fmp PARSE --only 1-100 --negatives neg/ --out person.fmp   train your own model
+    parallax-lab judge person.fmp PARSE --only 101-200  measure its accuracy
+    parallax-lab model import parse.mat --out parse.plx convert another format's model
+    parallax-lab model show pose.onnx                   explain a network by its card
+    parallax-lab eval HumanEva_I --model he.txt --out out/he    repeat the paper's evaluation
+    parallax-lab synth out/walk --actions walking       make synthetic pictures, with the truth
+    parallax-lab simulate hosts --cameras 8 --hosts 2   predict the needs of a deployment of several machines
 ";
 
 /// Trains and judges models, evaluates the method, makes synthetic sequences.
@@ -57,14 +57,14 @@ pub(crate) enum Command {
     Model(model::Command),
     /// Make synthetic sequences of people, with the truth.
     Synth(Box<synth::Arguments>),
-    /// Compare the ways to smooth a finished run with the truth.
+    /// Compare the methods that smooth a finished run with the truth.
     Smooth(smooth::Arguments),
-    /// Work out what a deployment will take, before there is one.
+    /// Predict the cores, the network and the latency that a deployment needs.
     #[command(subcommand)]
     Simulate(simulate::Command),
     /// Print the completion script of a shell.
     Completions(completions::Arguments),
-    /// Write manual pages, one a command.
+    /// Write manual pages, one for each command.
     Man(completions::ManArguments),
 }
 

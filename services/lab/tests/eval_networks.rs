@@ -130,7 +130,7 @@ fn what_cannot_be_judged_is_refused() {
     refused(
         &["--stress", "dirty"],
         2,
-        "\"dirty\" is none of clean, covered:N",
+        "\"dirty\" is not one of clean, covered:N",
     );
     // What only the versions of the method have is not passed over.
     refused(&["--versions", "geometry"], 2, "--versions");

@@ -43,7 +43,7 @@ pub fn choose<'a>(
     let name = named.unwrap_or(short);
     let Some(host) = deployment.host(name) else {
         let message = format!(
-            "{name:?} is none of the hosts of the deployment: {}",
+            "{name:?} is not one of the hosts of the deployment: {}",
             known.join(", ")
         );
         let failure = Failure::new(ExitKind::Usage, message);

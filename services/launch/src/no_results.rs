@@ -32,7 +32,7 @@ pub fn reason(summary: &Summary, views: &[ViewReport]) -> Option<String> {
     }
     if views.len() > 1 {
         return Some(format!(
-            "views show somebody, but none of {} results has a joint in space that a person can have: nobody may be \
+            "views show a person, but none of {} results has a joint in space that a person can have: nobody may be \
              there; else see `calib check`, whether the unit of the calibration is right (`unit`: m, mm, ft, or 30mm for squares of \
              the board), whether the footage is of one moment, and whether people are large enough",
             summary.frames

@@ -101,11 +101,11 @@ impl Name {
 /// The arguments of a process; the deployment itself is in its standard input.
 #[derive(Debug, Clone)]
 pub struct ProcessArguments {
-    /// The file of the resolved deployment, which is read if standard input is empty.
+    /// The file of the resolved deployment, read if standard input is empty.
     pub plan: PathBuf,
     /// The number of its view or worker, from 0.
     pub index: usize,
-    /// The stage that a replay process stands in for.
+    /// The stage that a replay process replaces.
     pub stage: Option<Stage>,
     /// Enter an endless loop in epoch 0, once a message about a later frame has been sent; for tests.
     pub spin_after: Option<u64>,

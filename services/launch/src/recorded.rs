@@ -257,7 +257,7 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
         let n = extent.n_malformed;
         write!(
             text,
-            "\n  {n} messages are none of their topic's, and were passed over"
+            "\n  {n} messages do not belong to their topic, and were skipped"
         )?;
     }
     for (topic, it) in recording.counts.iter().filter(|it| it.1.lost > 0) {

@@ -11,8 +11,8 @@ use terminal::{EXIT_CODES, Globals, completions};
 const LONG_ABOUT: &str = "\
 Calibrated, synchronised cameras in, 3D human skeletons out.
 
-A run is described by a deployment file (ten lines: the cameras, their calibration, a model) and
-consists of one process per stage and camera, all started and watched by `parallax run`:
+A deployment file (ten lines: the cameras, their calibration, an output folder) describes a run. A run
+has one process per stage and camera; `parallax run` starts and watches all of them:
 
     capture -> pose -> (quality) -> fuse -> triangulate -> results
 
@@ -20,30 +20,30 @@ Training, evaluation and synthetic sequences are in `parallax-lab`.";
 
 const EXAMPLES: &str = "\
 Examples:
-    parallax doctor                                     whether this machine has what is needed
-    parallax demo                                       a whole deployment of synthetic cameras, and a report
-    parallax run my.toml                                its cameras to 3D
+    parallax doctor                                     check this machine
+    parallax demo                                       run four synthetic cameras, and write a report
+    parallax run my.toml                                run a deployment: from its cameras to 3D
     parallax run my.toml --set capture.n_frames=20      the same, with one value replaced
-    parallax run my.toml --dry-run                      what would be started, and its memory
-    parallax run my.toml --latency-budget-ms 150        fails if 1 frame in 100 takes longer
-    parallax demo --view                                the same, watched in the browser
+    parallax run my.toml --dry-run                      show the processes and their memory, and start nothing
+    parallax run my.toml --latency-budget-ms 150        fail if 1 frame in 100 takes longer
+    parallax demo --view                                the demo, watched in the browser
     parallax view my.toml                               a page about a deployment, while it runs
     parallax publish my.toml udp://127.0.0.1:9000       its skeletons as datagrams, for programs of any language
-    parallax top                                        where the time of a running deployment goes
-    parallax record my.toml --out run.mcap              like run, and records every message
-    parallax replay run.mcap --from fuse --set paper.alpha=2     runs the later stages again, with another value
-    parallax export out/my --to c3d,glb,bvh             the run in the files of other tools
-    parallax chaos                                      faults injected into a deployment, and what held
-    parallax bench transport                            how long a message takes from process to process
-    parallax config show my.toml                        every value, and where it comes from
+    parallax top                                        the times of a running deployment
+    parallax record my.toml --out run.mcap              run, and record every message
+    parallax replay run.mcap --from fuse --set paper.alpha=2     run the later stages again, with another value
+    parallax export out/my --to c3d,glb,bvh             write the run in formats of other tools
+    parallax chaos                                      inject faults into a deployment, and check limits
+    parallax bench transport                            measure the time of a message between processes
+    parallax config show my.toml                        every value and its origin
     parallax config schema > parallax.schema.json       completion and checks in an editor
     parallax detect photo.jpg --model parse.mat --json  people in single images
     parallax smooth out/run                             smoothed trajectories and joint angles of a run
     parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
-    parallax sync estimate my.toml --write              how far the clocks of recorded cameras are apart
-    parallax calibrate people my.toml --height-m 1.78 --out rig.toml   where the cameras stand, from someone who walks about
+    parallax sync estimate my.toml --write              find the clock offsets of recorded cameras
+    parallax calibrate people my.toml --height-m 1.78 --out rig.toml   a rig from a person who walks about
     parallax calibrate board --board charuco:7x5:40mm a.mp4 b.mp4 --out rig.toml    a rig from a board
-    parallax calib show Calib.toml                      what a calibration file says
+    parallax calib show Calib.toml                      the content of a calibration file
 ";
 
 /// Calibrated cameras in, 3D human skeletons out.
@@ -92,14 +92,14 @@ pub(crate) enum Command {
     /// Read, show, check and convert calibrations.
     #[command(subcommand)]
     Calib(calib::Command),
-    /// Find where cameras stand, from what they see.
+    /// Find the places of cameras from their footage.
     #[command(subcommand)]
     Calibrate(calibrate::Command),
     /// List the video devices of this machine, and take pictures of live cameras.
     Cameras(cameras::Arguments),
     /// Smooth the trajectories of a finished run, and compute joint angles.
     Smooth(Box<smooth::Arguments>),
-    /// Find by how much the clocks of the cameras of recorded footage differ.
+    /// Find the clock offsets of the cameras of recorded footage.
     #[command(subcommand)]
     Sync(sync::Command),
     /// Show and check deployment files.
@@ -112,19 +112,19 @@ pub(crate) enum Command {
     /// Deployments of several machines: their state, and their keys.
     #[command(subcommand)]
     Hosts(hosts::Command),
-    /// List running deployments, and what dead ones have left in shared memory; or show the processes of one.
+    /// List running deployments and the leftovers of dead ones in shared memory, or show the processes of one.
     Status(deployments::StatusArguments),
     /// Watch the processes of a running deployment: rates, times, losses, memory.
     Top(top::Arguments),
     /// Watch a running deployment, a finished run or a recording in the browser: skeleton, pictures, processes.
     View(view::Arguments),
-    /// Remove what dead deployments have left in shared memory.
+    /// Remove the leftovers of dead deployments from shared memory.
     Clean(deployments::CleanArguments),
-    /// Check whether this machine has what Parallax needs, and say what to do where it has not.
+    /// Check this machine for everything that Parallax needs, and say what to do about each problem.
     Doctor(doctor::Arguments),
     /// Print the completion script of a shell.
     Completions(completions::Arguments),
-    /// Write manual pages, one a command.
+    /// Write manual pages, one for each command.
     Man(completions::ManArguments),
     /// Run one process of a deployment; started by `run`.
     #[command(hide = true)]

@@ -75,7 +75,7 @@ fn with_nothing_set_the_size_follows_from_the_calibration_in_any_unit() {
     deployment(&case, &[[1088, 1920]; 4], 1800.0, 1.0);
     let text = said(&case);
     for words in [
-        "by itself: 0.25, a person is 7",
+        "is chosen: 0.25, a person is 7",
         "px in 272x480; 4 cameras share the space in which a person of 1.70 m stands",
         "capture.scale or capture.size sets it",
     ] {
@@ -87,7 +87,11 @@ fn with_nothing_set_the_size_follows_from_the_calibration_in_any_unit() {
     for set in ["capture.scale=0.5", "capture.size=[544,960]"] {
         let ended = case.start(&[DRY, &["--set", set]].concat()).wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-        assert!(!ended.stdout.contains("by itself"), "{}", ended.stdout);
+        assert!(
+            !ended.stdout.contains("scale is chosen"),
+            "{}",
+            ended.stdout
+        );
     }
 }
 

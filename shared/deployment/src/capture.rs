@@ -12,45 +12,45 @@ pub use crate::fault::{Fault, FaultError, FaultKind, Faults};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
-    /// The camera of the rig, by its name there.
+    /// Name of the camera in the rig.
     pub name: String,
     /// A video, an image, a folder or pattern of images, a camera (`/dev/video0`, `rtsp://...`), a scene (`synth://...`), or a camera of a recording
     /// (`run.mcap#left`).
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub source: String,
-    /// Keypoints that another program found, in place of footage or beside it: a folder with a JSON file for every frame, or one JSON file.
+    /// Keypoints from another program, in place of footage or beside it: a folder with a JSON file for every frame, or one JSON file.
     pub keypoints: Option<PathBuf>,
-    /// What the keypoints are called: `coco-17`, `halpe-26`, `body-25`, `body-25b`, `openpose-18`, `mpii-16`, `lsp-14`, `coco-wholebody-133`, `halpe-136` or
-    /// `body-135`; without it by their number, or as the file says.
+    /// Names of the keypoints: `coco-17`, `halpe-26`, `body-25`, `body-25b`, `openpose-18`, `mpii-16`, `lsp-14`, `coco-wholebody-133`, `halpe-136` or
+    /// `body-135`; by default by their number, or as the file says.
     pub keypoint_names: Option<String>,
-    /// A network of this camera's own, in place of `network.file`.
+    /// Network of this camera, in place of `network.file`.
     pub network: Option<PathBuf>,
-    /// Place of the source's top-left pixel on the calibrated image, `[x, y]` pixels, for a source that lacks rows or columns of it.
+    /// Place of the source's top-left pixel in the calibrated image, `[x, y]` pixels, for a cropped source.
     pub source_offset_px: Option<[u32; 2]>,
-    /// Turn of the pictures, degrees to the right (`0`, `90`, `180`, `270`), or `"tag"`, as the file asks; without it as the calibration is.
+    /// Clockwise turn of the pictures, degrees (`0`, `90`, `180`, `270`), or `"tag"`, as the file says; by default to match the calibration.
     pub rotate: Option<Rotate>,
-    /// Numbered pictures: the number of frame 0, and the step from frame to frame; without it by the numbers of all cameras.
+    /// Numbered pictures: the number of frame 0, and the step from frame to frame; by default from the numbers of all cameras.
     pub numbers: Option<[u64; 2]>,
-    /// Time to add to those of the footage, milliseconds, so that all cameras have the same clock (`parallax sync estimate`).
+    /// Time to add to the times of the footage, milliseconds, so that all cameras share one clock (`parallax sync estimate`).
     pub offset_ms: Option<f64>,
-    /// Millionths by which a second of the camera's clock is too long (`parallax sync estimate`).
+    /// Excess length of a second of the camera's clock, millionths (`parallax sync estimate`).
     pub drift_ppm: Option<f64>,
-    /// Format of a video device's pictures, such as `MJPG` or `YUYV`; without it the first that can be read.
+    /// Format of a video device's pictures, such as `MJPG` or `YUYV`; by default the first supported one.
     pub format: Option<String>,
-    /// Size of a live camera's pictures, `[width, height]` pixels; without it as the camera is set.
+    /// Size of a live camera's pictures, `[width, height]` pixels; by default as the camera is set.
     pub size: Option<[u32; 2]>,
-    /// Pictures per second of a live camera; without it as the camera says.
+    /// Pictures per second of a live camera; by default as the camera is set.
     pub frame_rate_hz: Option<f64>,
     /// Controls of a video device to set before the run, by the names that `parallax cameras` lists.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub controls: BTreeMap<String, i64>,
-    /// How the packets of an RTSP camera travel; without it as camera and reader agree.
+    /// Transport of the packets of an RTSP camera; by default as camera and reader agree.
     pub transport: Option<Transport>,
-    /// Clock that tells when an RTSP camera took its pictures: its own (`camera`), or that of their `arrival`; without it `camera`.
+    /// Clock for the times of an RTSP camera's pictures: its own (`camera`, the default), or this machine's at their `arrival`.
     pub clock: Option<CameraClock>,
-    /// Time from the instants of the frames to when footage was taken, milliseconds, negative for before.
+    /// Time from the instants of the frames to the pictures of the footage, milliseconds, negative for earlier pictures.
     pub skew_ms: Option<f64>,
-    /// Fault of the camera on purpose, for a test, such as `freeze@30+20`.
+    /// Fault on purpose, for a test, such as `freeze@30+20`.
     #[serde(default, skip_serializing_if = "Faults::is_empty")]
     #[schemars(with = "String")]
     pub fault: Faults,
@@ -139,23 +139,23 @@ pub enum Pace {
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Capture")]
 pub struct Config {
-    /// `lossless`, nothing is dropped; `paced`, the same at the frame rate; `realtime`, the latest frame wins, as always with a live camera.
+    /// `lossless`, nothing is dropped; `paced`, the same at the frame rate; `realtime`, the latest frame wins (always with live cameras).
     pub mode: Mode,
-    /// Size of the frames that the pipeline sees, `[width, height]` pixels, in place of `scale`.
+    /// Size of the frames in the pipeline, `[width, height]` pixels, in place of `scale`.
     pub size: Option<[usize; 2]>,
-    /// Size of the frames as a share of the camera's image; without it, and without `size`, so that people are about 200 pixels high.
+    /// Size of the frames as a share of the camera's image; without it and `size`, people become about 200 pixels high.
     pub scale: Option<f64>,
     /// Turn frames until the world's up points up.
     pub upright: bool,
-    /// Frames per second of images, of a video that does not tell, and of live cameras together.
+    /// Frames per second of images, of a video without a rate, and of live cameras together.
     pub frame_rate_hz: Option<f64>,
     /// First frame to use, from 0.
     pub start_frame: u64,
     /// Use every n-th frame.
     pub frame_step: u64,
-    /// Most frames to use; without it all, and of live cameras until the run is stopped.
+    /// Most frames to use; by default all, or with live cameras until the run is stopped.
     pub n_frames: Option<u64>,
-    /// Repetitions of a picture, bit for bit, from which on its camera counts as frozen; 0: never.
+    /// Number of repetitions of a picture, bit for bit, after which a camera counts as frozen; 0: never.
     pub frozen_after: u32,
 }
 

@@ -13,15 +13,15 @@ use crate::{Deployment, Views};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Host {
-    /// Name of the host, for `--host` and reports; a machine of that name takes it by itself.
+    /// Name of the host, for `--host` and reports; without `--host` a machine takes the host with its name.
     pub name: String,
-    /// The cameras that are connected to the host, by name.
+    /// Cameras that are connected to the host, by name.
     #[serde(default)]
     pub views: Vec<String>,
-    /// Whether the views are fused here, as on exactly one host.
+    /// Fuse the views on this host; exactly one does.
     #[serde(default)]
     pub fuses: bool,
-    /// Where the host that fuses listens, and the others connect to: `"192.168.1.5:7447"`, or a name with a port.
+    /// Address on which the fusing host listens: `"192.168.1.5:7447"`, or a name with a port.
     pub address: Option<String>,
 }
 
@@ -41,13 +41,13 @@ pub enum Carry {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Link {
-    /// What crosses to the host that fuses: `frames` as JPEG, or `poses` that were found where the camera is, which is less data.
+    /// Data sent to the fusing host: `frames` as JPEG, or `poses` found at the camera, which is less data.
     pub carry: Carry,
     /// Quality of the JPEG, 1 to 100.
     pub jpeg_quality: u8,
     /// Folder with `ca.pem`, and `HOST.pem` and `HOST.key` of this host, as `parallax hosts keys` makes them.
     pub keys: Option<PathBuf>,
-    /// Connect without keys, so that anybody on the network can read the pictures and send others.
+    /// Connect without keys; anybody on the network can then read the pictures and send others.
     pub insecure: bool,
 }
 
@@ -251,7 +251,7 @@ fn keys(it: &Deployment) -> Result<(), Complaint> {
         it.link.insecure || it.link.keys.is_some(),
         "link.keys",
         "left out",
-        "the folder that `parallax hosts keys` makes; or link.insecure = true, and everybody on the network can look on",
+        "the folder that `parallax hosts keys` makes; or link.insecure = true, which lets anybody on the network look on",
     )?;
     demand(
         !(it.link.insecure && it.link.keys.is_some()),

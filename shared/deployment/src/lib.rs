@@ -70,21 +70,22 @@ pub struct Deployment {
     pub name: String,
     /// Calibration of the cameras.
     pub rig: PathBuf,
-    /// Unit of the lengths in the calibration, where its format tells another: `"m"`, `"cm"`, `"mm"`, `"ft"`, `"in"`, or the side of a square such as `"30mm"`.
+    /// Unit of the lengths in the calibration, in place of its format's: `"m"`, `"cm"`, `"mm"`, `"ft"`, `"in"`, or the side of a square such as
+    /// `"30mm"`.
     pub unit: Option<String>,
-    /// Direction against gravity in the world of the calibration, `[x, y, z]`; without it that of the file, else it is found in the pictures.
+    /// Direction against gravity in the world of the calibration, `[x, y, z]`; by default that of the file, or found in the pictures.
     pub up: Option<[f64; 3]>,
     /// How skeletons are found: by a `network`, or by the filters and the energy of the `paper`.
     #[serde(default)]
     pub method: Method,
     /// Folder for the results.
     pub output: PathBuf,
-    /// Where the footage comes from, which is shown where a file is missing.
+    /// Origin of the footage, shown if a file is missing.
     pub data: Option<String>,
-    /// The cameras, each a `[[camera]]` of its own, in the order in which views are numbered.
+    /// The cameras, each a `[[camera]]`, in the order of the views.
     #[serde(rename = "camera")]
     pub cameras: Vec<capture::Camera>,
-    /// The machines, each a `[[host]]` of its own, where one is not enough.
+    /// The machines, each a `[[host]]`, if there are several.
     #[serde(rename = "host", default, skip_serializing_if = "Vec::is_empty")]
     pub hosts: Vec<hosts::Host>,
     /// How pixels get in.
@@ -117,15 +118,15 @@ pub struct Deployment {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Supervision {
-    /// How long a stage waits for a late view, milliseconds; without it 10000, or 200 in realtime.
+    /// How long a stage waits for a late view, milliseconds; by default 10000, or 200 in realtime.
     pub deadline_ms: Option<u64>,
-    /// How long a process may stand still before it is killed, seconds; without it 120, or 10 in realtime.
+    /// How long a process may stand still before it is killed, seconds; by default 120, or 10 in realtime.
     pub hang_limit_s: Option<u64>,
-    /// Signs of life, one every 150 ms, that a process may miss before it is killed.
+    /// Heartbeats, one every 150 ms, that a process may miss before it is killed.
     pub missed_beats: u32,
-    /// Restarts of one process within a minute before it is given up.
+    /// Restarts of one process within a minute before the supervisor gives up.
     pub max_restarts: u32,
-    /// Time from capture to result, milliseconds, that at most 1 frame in 100 may exceed, else the run fails.
+    /// Limit for the 99th percentile of the time from capture to result, milliseconds; above it the run fails.
     pub latency_budget_ms: Option<f64>,
 }
 

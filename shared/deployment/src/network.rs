@@ -14,17 +14,17 @@ use crate::shipped::{SHIPPED, relative_to};
 pub struct Config {
     /// The network that finds joints: an ONNX file with its card beside it (`.toml` for `.onnx`) or in its metadata, or `"shipped"`.
     pub file: PathBuf,
-    /// The detector of people that says where the network looks, an ONNX file with its card beside it; without it filters say so.
+    /// The detector of people that finds boxes for the network, an ONNX file with its card beside it; by default filters find them.
     pub detector: Option<PathBuf>,
-    /// People are looked for in every n-th frame; without it twice a second with a `detector`, once without.
+    /// Search for people in every n-th frame; by default twice a second with a `detector`, once without.
     pub find_every: Option<u64>,
-    /// Least mean heat of the joints of a person who is seen, 0 to 1.
+    /// Least mean heat of the joints of a visible person, 0 to 1.
     pub least_heat: f64,
-    /// Most people: of a view, and of a frame.
+    /// Most people in a view, and in a frame.
     pub people: usize,
-    /// Look at the mirror image of every person as well and use the mean, which is more exact and takes twice the time.
+    /// Use the mean with the mirror image of every person, which is more exact and takes twice the time.
     pub mirror: bool,
-    /// The library of ONNX Runtime (`libonnxruntime.so`) that runs network and detector in place of what is built in.
+    /// The library of ONNX Runtime (`libonnxruntime.so`) that runs network and detector in place of the built-in runtime.
     pub onnx_runtime: Option<PathBuf>,
 }
 

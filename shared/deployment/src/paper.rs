@@ -24,43 +24,43 @@ pub const ERRORS_MAX_AGE: Duration = Duration::from_millis(500);
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Paper")]
 pub struct Config {
-    /// The trained model of a person; without it the one that ships.
+    /// The trained model of a person; by default the one that ships.
     pub model: Option<PathBuf>,
-    /// Where a view is searched: `full`, every frame everywhere; `tracked`, near the last pose, which is faster and approximate.
+    /// Search of a view: `full`, everywhere in every frame; `tracked`, near the last pose, faster and approximate.
     pub search: Search,
-    /// Most distinct candidates that a view offers to fusion.
+    /// Most distinct candidates of a view for fusion.
     pub candidates: usize,
-    /// What tells from the picture in which direction a person faces: a file of `parallax-lab train orientation`, `"shipped"` or `"none"`.
+    /// The network that sees in which direction a person faces: a file of `parallax-lab train orientation`, `"shipped"` or `"none"`.
     pub orientation: PathBuf,
-    /// What is solved: `pairs` of views, whose poses are combined, as published; or `all` views at once, 8 at most.
+    /// Views that are solved together: `pairs`, whose poses are combined, as published; or `all`, 8 at most.
     pub views: Views,
-    /// The pairs of cameras that are fused, by name; all if it is empty.
+    /// Pairs of cameras to fuse, by name; all if empty.
     pub pairs: Vec<[String; 2]>,
-    /// Most fusion processes that pairs of views are dealt to.
+    /// Most fusion processes for the pairs of views.
     pub workers: usize,
-    /// How a view gets one pose out of those of its pairs: `mean`, as published, or `consensus`, what all views can mean together.
+    /// How the poses of a view's pairs are combined: `mean`, as published, or `consensus`, the pose that most views support.
     pub combine: Combine,
-    /// The energy that ties two views together: the `paper`'s, or the one that the authors' `released` program computes.
+    /// The energy that ties two views together: the `paper`'s, or that of the authors' `released` program.
     pub energy: Energy,
-    /// Weight of the geometric term; without it as learned, else 0.002 per squared cell (`paper`) or 0.07 (`released`).
+    /// Weight of the geometric term; by default as learned, or 0.002 per squared cell (`paper`) or 0.07 (`released`).
     pub alpha: Option<f64>,
-    /// Weight of the part-type term; without it as learned, else 0.03.
+    /// Weight of the part-type term; by default as learned, or 0.03.
     pub beta: Option<f64>,
-    /// What `parallax-lab train consistency` learned: a file, `"shipped"`, or `{ file = FILE, rig = NAME }` with the tables of a named rig.
+    /// Result of `parallax-lab train consistency`: a file, `"shipped"`, or `{ file = FILE, rig = NAME }` with the tables of a named rig.
     pub consistency: Option<Consistency>,
     /// Part-type tables of pairs of cameras, each `{ views = [a, b], files = [a wrt b, b wrt a] }`.
     pub compatibility: Vec<Compatibility>,
     /// Expected errors of the parts: a network (ONNX, or `"shipped"`), or `{ table = FILE, subject, action, views, frame_offset, frame_step }`.
     pub errors: Option<Errors>,
-    /// Expected error from which a part is switched off: `none`, `learned`, the name of a data set, pixels of each part, or `{ file = FILE }`.
+    /// Expected error above which a part is switched off: `none`, `learned`, the name of a data set, pixels of each part, or `{ file = FILE }`.
     pub tau: Tau,
-    /// Whose expected error switches a part off: `either` view's, as published, the `support`'s, or the support's where it is the `worse`.
+    /// View whose expected error switches a part off: `either`, as published, the `support`, or the support if it is the `worse`.
     pub switch: Switch,
     /// Decide for every view whether it sees the person from behind.
     pub facing: bool,
-    /// Where joints lie among the parts: a file of `parallax-lab train joints`, `"shipped"`, or `"none"` for the centres of parts.
+    /// Places of joints among the parts: a file of `parallax-lab train joints`, `"shipped"`, or `"none"` for the centres of parts.
     pub joint_map: PathBuf,
-    /// Whether the model is of a human body, whose bones keep their lengths and what no body can do is left out.
+    /// Treat the model as a human body: bones keep their lengths, and impossible joints are left out.
     pub bodies: bool,
 }
 

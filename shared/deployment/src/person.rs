@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Person")]
 pub struct Config {
-    /// Which of several people comes first: `last`, the one of the frame before; `largest` or `clearest` in every frame anew.
+    /// Which of several people comes first: `last`, the one of the frame before; `largest` or `clearest`, chosen anew in every frame.
     pub follow: Follow,
     /// The set of joints: `parse14`, `umpm15` or `humaneva20`.
     pub joints: String,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Runtime {
-    /// Look for messages without pause: least latency, a whole core for each stage.
+    /// Poll for messages without sleeping: least latency, a whole core for each stage.
     pub spin: bool,
     /// Cores that a service or one of its processes may run on, `{ pose = [0, 1], fuse-0 = [2] }`.
     pub cores: BTreeMap<String, Vec<usize>>,
@@ -18,7 +18,7 @@ pub struct Runtime {
     pub priority: BTreeMap<String, u8>,
     /// Threads of one pose process.
     pub threads: usize,
-    /// Keep in memory what processes have once used.
+    /// Keep memory that processes have used from being swapped out.
     pub lock_memory: bool,
 }
 

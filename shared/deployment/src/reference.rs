@@ -10,11 +10,11 @@ use crate::{ConfigError, Entry, Key, Loaded, keys};
 const INTRODUCTION: &str = "\
 # Settings
 
-Every key of a deployment file, each in a sentence, as `parallax config keys --markdown` prints it. A file needs `name`, `rig`, `output` and
-a `[[camera]]` for each camera; everything else has a default. `--set section.key=value` replaces a value for one run,
-`parallax config show FILE` prints all values and where each comes from, and `parallax config schema` prints a JSON schema
-for editors. Relative paths are relative to the file. `[network]` has the keys that only `method = \"network\"` has, `[paper]` those of
-`method = \"paper\"`: a key of the other method is refused.
+All keys of a deployment file, as `parallax config keys --markdown` prints them. A file needs `name`, `rig`, `output` and
+a `[[camera]]` for each camera; everything else has a default. Relative paths are relative to the file. `--set section.key=value`
+replaces a value for one run, `parallax config show FILE` prints all values and their origin, and `parallax config schema` prints a JSON
+schema for editors. `[network]` has the keys of `method = \"network\"`, `[paper]` those of `method = \"paper\"`; a key of the other method
+is refused.
 ";
 
 /// Every key with what it takes, its default and its meaning.

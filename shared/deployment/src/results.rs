@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Config {
     /// Draw every n-th frame of every view; 0 draws none.
     pub overlay_every: u64,
-    /// Write smoothed joints while the run lasts, into `pose3d-smooth.jsonl`.
+    /// Write smoothed joints during the run, into `pose3d-smooth.jsonl`.
     pub smooth: bool,
 }
 

@@ -42,7 +42,7 @@ pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
     let path = match error {
         RigFileError::Read { path, source } if source.kind() == ErrorKind::PermissionDenied => {
             return Some(format!(
-                "whoever runs Parallax needs to read {}",
+                "the user of Parallax must be able to read {}",
                 path.display()
             ));
         }

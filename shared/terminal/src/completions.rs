@@ -42,7 +42,7 @@ pub fn run(arguments: &Arguments, mut command: Command) -> Result<ExitCode, Fail
 Examples:
     parallax man ~/.local/share/man/man1        then `man parallax`, `man parallax-run`")]
 pub struct ManArguments {
-    /// Folder for the pages, one a command.
+    /// Folder for the pages, one for each command.
     folder: PathBuf,
 }
 

@@ -128,7 +128,7 @@ impl Gate {
         let came_at = now_nanos();
         let name = host_of(key);
         let Some(remote) = self.remotes.iter().find(|it| it.name == name) else {
-            tracing::debug!(key, "from a host that is none of the deployment's");
+            tracing::debug!(key, "from a host that is not in the deployment");
             return;
         };
         let expected = Expected {
@@ -343,7 +343,7 @@ fn hear_hellos(
         match (remote, &answer) {
             (Some(remote), Answer::Welcome(_)) => remote.welcomed(hello.origin, now_nanos()),
             (Some(remote), Answer::Refused(why)) => remote.refused(why),
-            (None, _) => tracing::warn!(name, "a host that is none of the deployment's is refused"),
+            (None, _) => tracing::warn!(name, "a host that is not in the deployment is refused"),
         }
         if let Some(link) = back.upgrade() {
             link.send(&own.answer(name), answer.to_bytes(), true);

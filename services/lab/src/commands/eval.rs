@@ -32,36 +32,36 @@ const BAR: &str = "{elapsed_precise} {bar:30} {pos}/{len} frames, {msg}";
 
 const HELP: &str = "\
 SEQUENCE is a folder of HumanEva-I (the whole, or a subject), UMPM, `parallax-lab synth`, or a description \
-(configs/sequences/); or single pictures (below). Every frame is solved on its own: once in every view, then by each version.
+(configs/sequences/); or single pictures (below). Every frame is solved separately: every view alone, then by each version.
 
-Versions: fmp (every view alone, then triangulation), geometry, appearance (part types too), adaptive \
-(parts of large expected error switched off). They combine pairs of views by their mean, as the paper does; \
-geometry+consensus by what all views can mean; geometry+all-views supports each view by all others at \
-once, geometry+all-views-mean by the mean of their terms. Without --versions: all for which there is what \
-they need (tables of part types, or --consistency, for appearance; --network, --sigma or --oracle for adaptive), pairs and all views.
+Versions: fmp (every view alone, then triangulation), geometry, appearance (also part types), adaptive \
+(parts of large expected error switched off). They combine pairs of views by their mean, as in the paper. \
+geometry+consensus takes the poses that most views support; geometry+all-views supports each view by all others at \
+once, geometry+all-views-mean by the mean of their terms. Without --versions: all whose inputs are given \
+(tables of part types, or --consistency, for appearance; --network, --sigma or --oracle for adaptive), pairs and all views.
 
---network FILE predicts the errors of the same single views as the service does; the report then says how \
-well: area under the ROC and rank correlation, part by part. Its thresholds count where --paper sets no tau; \
+--network FILE predicts the errors of the same single views as the service does. The report then has its accuracy: \
+area under the ROC and rank correlation, part by part. Its thresholds are used if --paper sets no tau; \
 without any, a tenth of the person's size.
 
 --paper FILE is the [paper] section of a deployment: energy, alpha, beta, compatibility, tau, facing ...
 
-Single pictures of people with 14 joints (the folders of PARSE and LSP, JSON lines) are judged as `judge` \
-does, with the same numbers: PCP and PCK of the best detection of a picture, and of the best one on the person, with \
-intervals; --only and --without choose among them. They and sequences are not judged in one run.
+Single pictures of people with 14 joints (the folders of PARSE and LSP, JSON lines) are judged like in `judge`, \
+with the same numbers: PCP and PCK of the best detection of a picture, and of the best one on the person, with \
+intervals. --only and --without select pictures. Pictures and sequences cannot be mixed in one run.
 
-OUT holds report.html, report.json, report.tex, and poses/ with what was found in every frame. With \
---resume frames that are there are not solved again; other settings are refused. --json prints the report's \
+OUT holds report.html, report.json, report.tex, and poses/ with the poses of every frame. \
+--resume keeps solved frames; other settings are refused. --json prints the report's \
 numbers.
 
-A folder of several people in the layout of Shelf (calibration.json, detection/, gt.txt) is judged for who is who: what the detector \
-found is made people, followed and solved, and compared by PCP3D as 4D Association does, its rule for the head included. --views \
-chooses cameras. --run RUN judges everybody in a finished run of a folder of `parallax-lab synth`: PCP3D by person, mean error, average precision at \
-25 to 150 mm, recall, changes of ids, people put out against people there. OUT then holds people.json.
+A folder of several people in the layout of Shelf (calibration.json, detection/, gt.txt) is judged for who is who: detections \
+are grouped into people, followed and solved, and compared by PCP3D as in 4D Association, with its rule for the head. --views \
+selects cameras. --run RUN judges all people in a finished run of a folder of `parallax-lab synth`: PCP3D by person, mean error, average precision at \
+25 to 150 mm, recall, changes of ids, people found against people present. OUT then holds people.json.
 
 --network-evidence FILE [--detector FILE] judges the keypoints of a network (docs/networks.md): by plain \
 triangulation, with cameras left out, and in space over its maps, without and with the bones of a body. \
---stress makes what goes wrong in real rooms. OUT then holds evidence.txt and evidence.json.
+--stress adds problems of real rooms. OUT then holds evidence.txt and evidence.json.
 
 Exit codes: 0 done; 2 the command line, 3 a setting is wrong; 4 a sequence or a model; 5 a calibration; \
 7 done, but footage ended before the truth; 130 interrupted.
@@ -97,8 +97,8 @@ pub(crate) struct Arguments {
     /// Learned consistency (`train consistency`), instead of that of --paper; "shipped": the one that ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
-    /// What tells in which direction a person faces, for left and right (`train orientation`); "shipped": the one that
-    /// ships; "none": nothing.
+    /// Network of directions in which people face, for left and right (`train orientation`); "shipped": the one that ships;
+    /// "none": nothing.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     orientation: PathBuf,
     /// Table of expected errors, in the authors' format.
@@ -107,8 +107,8 @@ pub(crate) struct Arguments {
     /// Network that predicts the expected errors, an ONNX file; "shipped": the one that ships.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["sigma", "oracle"])]
     network: Option<PathBuf>,
-    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
-    /// "none": a joint is the centre of its part, as for other models.
+    /// Places of joints among the parts: a file of `train joints`; "shipped": the one for the model that ships; "none": a joint
+    /// is the centre of its part, as for other models.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     joint_map: PathBuf,
     /// Use the true errors: a part is switched off if its error exceeds a tenth of the person's size.
@@ -144,7 +144,7 @@ pub(crate) struct Arguments {
     /// Several people: the views to use, from 0, separated by commas; all if not given.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     views: Vec<usize>,
-    /// Judge everybody in a finished run of the sequence: the folder of the run's results.
+    /// Judge all people in a finished run of the sequence: the folder of its results.
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
     /// UMPM: compare every frame with the pose of the frame before, as the released tools do.

@@ -24,26 +24,26 @@ pub(super) const BAR: &str =
 /// Options of `parallax-lab judge`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-DATASET and SELECTION are those of `parallax-lab train fmp`. Two detections of an image are judged: the \
-best one of the image, which is how PCP is published, and the best one that covers 30 % of the box \
-around the person's joints, which is how PCK is (Yang & Ramanan). Bad labels are reported and left out.
+DATASET and SELECTION are those of `parallax-lab train fmp`. Two detections of an image are judged: for PCP the \
+best one of the image, as published, and for PCK the best one that covers 30 % of the box \
+around the person's joints (Yang & Ramanan). Bad labels are reported and left out.
 
-On a terminal a bar shows how many people are done. Ctrl-C ends the command after the person that it is at (exit code 130); nothing \
-is printed then.
+On a terminal a bar shows the progress. Ctrl-C ends the command after the current person (exit code 130), and nothing \
+is printed.
 
 With --json one object:
     {\"images\", \"left_out\", \"best\" | \"on_person\":
      {\"missed\", \"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}}
 Percentages, of every stick or joint and in \"total\".
 
-\"joints\" says where they lie among the parts. With --offsets also \"offsets\": of every joint of the best detection on the
+\"joints\" has the places of joints among the parts. With --offsets also \"offsets\": for every joint of the best detection on the
 person, found within 0.2 of the person's size, the mean along its bone (positive beyond the mark, seen from the trunk) and
 across it (positive outwards), percent of the height of the person, and their intervals.
 
-A network that finds keypoints (.onnx, docs/networks.md) is asked for every person in the box around the marked joints, widened
-by 5 % on each side: \"peaks\" are the joints at the maxima of its maps. With --json they stand in place of \"best\" and \"on_person\", also with \"intervals\": of the totals, 95 %
+A network that finds keypoints (.onnx, docs/networks.md) looks at every person in the box around the marked joints, widened
+by 5 % on each side. \"peaks\" are the joints at the maxima of its maps. With --json they replace \"best\" and \"on_person\", also with \"intervals\": of the totals, 95 %
 over the people, {\"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}. \"expected_errors\" says how well the \
-height of the maxima tells how far off the joints are: {\"joints\", \"off_by_half_a_head\", \"auc\" (of telling these), \
+height of the maxima predicts errors of the joints: {\"joints\", \"off_by_half_a_head\", \"auc\" (of predicting these), \
 \"auc_interval\", \"rank_correlation\"}.
 
 Examples:
@@ -67,8 +67,8 @@ pub(crate) struct Arguments {
     /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
     #[arg(long, value_name = "SIDES", default_value = "marked")]
     sides: Sides,
-    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
-    /// "none": a joint is the centre of its part, as for other models.
+    /// Places of joints among the parts: a file of `train joints`; "shipped": the one for the model that ships; "none": a joint
+    /// is the centre of its part, as for other models.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     joint_map: PathBuf,
     /// Also print the mean offset of every joint along and across its bone, with 95 % intervals.
@@ -77,10 +77,10 @@ pub(crate) struct Arguments {
     /// The card of a network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
     #[arg(long, value_name = "CARD")]
     card: Option<PathBuf>,
-    /// A network is told nothing but the picture: it looks into the box of the best pose that the filters find.
+    /// Give a network only the picture: it looks into the boxes that the filters find.
     #[arg(long)]
     find_boxes: bool,
-    /// A network looks at the mirror image of every person as well: more exact, and takes its time twice.
+    /// Also show the mirror image of every person to a network, and use the mean: more exact, twice the time.
     #[arg(long)]
     mirror: bool,
     /// Print JSON.

@@ -14,9 +14,9 @@ use super::network;
 
 /// What `show` says of networks.
 const NETWORKS: &str = "\
-Of a network (.onnx) it prints inputs and outputs, and, by its card, what they mean: preparation, codec, keypoints, the joints \
-that follow from them, licence. Of a detector of people: which boxes it keeps, and with --image those that it finds. A network that \
-does not fit its card is named with what differs, and the exit code is 4. Without a card the nearest of configs/networks and \
+For a network (.onnx) it prints inputs and outputs and, by its card, their meaning: preparation, codec, keypoints, the resulting \
+joints, licence. For a detector of people it prints the rule for boxes, and with --image the boxes. A network that \
+does not fit its card is refused with the differences, and the exit code is 4. Without a card the nearest of configs/networks and \
 configs/detectors is named. Cards: docs/networks.md.
 
 Examples:

@@ -21,11 +21,11 @@ use terminal::{Outline, outline, output};
 /// Options of `model show` for networks.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Of a network (.onnx): its card; if not given, the file beside the network whose ending is .toml, or the entry
-    /// `parallax.card` of the network.
+    /// Card of a network (.onnx); if not given, the file beside the network whose ending is .toml, or the entry `parallax.card`
+    /// of the network.
     #[arg(long, value_name = "CARD", conflicts_with = "html")]
     card: Option<PathBuf>,
-    /// Of a network: a picture of a person that it shall look at; of a detector, of people.
+    /// Picture of a person to show to a network, or of people to show to a detector.
     #[arg(
         long,
         value_name = "PICTURE",
@@ -36,7 +36,7 @@ pub(crate) struct Arguments {
     /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the whole picture.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, requires = "image", allow_hyphen_values = true)]
     outline: Option<Outline>,
-    /// Draw the joints, and the map of each, into this PNG file; of a detector, the boxes.
+    /// Draw the joints and their maps, or the boxes of a detector, into this PNG file.
     #[arg(long, value_name = "FILE", requires = "image")]
     out: Option<PathBuf>,
 }

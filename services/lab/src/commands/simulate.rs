@@ -35,9 +35,9 @@ pub(crate) enum Command {
 /// Options of `parallax-lab simulate hosts`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A model, no measurement: costs of one frame of one view are multiplied. Without --report they are those of the machine that the guide names.
-With it they are those of a run on your machine, of a minute or more: processor time of every stage, and, of a run with hosts, bytes
-and codec. What is given by its own option counts first.
+This is a model, not a measurement: it multiplies the costs of one frame of one view. Without --report they are those of the machine in the guide.
+With --report they are those of your run, of a minute or more: processor time of every stage, and for a run with hosts bytes
+and codec. Values of single options take precedence.
 
 Examples:
     parallax run my.toml --json > run.json
@@ -47,10 +47,10 @@ pub(crate) struct Arguments {
     /// Numbers of cameras, separated by commas.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "8,16,32,64", value_parser = clap::value_parser!(u16).range(1..=1024))]
     cameras: Vec<u16>,
-    /// Numbers of hosts, separated by commas; the one that fuses is among them.
+    /// Numbers of hosts, separated by commas, including the fusing one.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1,2,3,4", value_parser = clap::value_parser!(u16).range(1..=256))]
     hosts: Vec<u16>,
-    /// Views of the host that fuses; without it they are spread so that no host has more to do than it must.
+    /// Views of the fusing host; if not given, views are spread evenly by work.
     #[arg(long, value_name = "N")]
     near: Option<u16>,
     /// Cores of each host.
@@ -59,10 +59,10 @@ pub(crate) struct Arguments {
     /// Frames per second.
     #[arg(long, value_name = "HZ", default_value_t = 30.0)]
     rate: f64,
-    /// What the network carries, megabits per second.
+    /// Capacity of the network, megabits per second.
     #[arg(long, value_name = "MBIT", default_value_t = 1000.0)]
     network: f64,
-    /// The costs of a run: what `parallax run --json` printed, on the host that fuses if there are several.
+    /// The costs of a run: the output of `parallax run --json`, of the fusing host if there are several.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// `capture` for a frame of a view, milliseconds.

@@ -13,8 +13,8 @@ use terminal::output;
 /// Options of `parallax-lab smooth`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-All methods of `parallax smooth` are compared with the true joints, at the instants that all of them have; nothing is written. What
-`parallax-lab eval` takes is a TRUTH: a folder of `parallax-lab synth`, or a file as configs/sequences/pose2sim-balancing.toml.
+This compares all methods of `parallax smooth` with the true joints, at the instants that all of them have; it writes nothing.
+TRUTH is a sequence for `parallax-lab eval`: a folder of `parallax-lab synth`, or a file like configs/sequences/pose2sim-balancing.toml.
 docs/guide/smooth.md explains.
 
 Exit codes: 0 done; 4 the folder or the truth cannot be read, or the truth is of none of the frames or joints of the run.

@@ -17,11 +17,11 @@ use motion::MotionArguments;
 use parse::{actions, rig, subjects};
 
 const HELP: &str = "\
-OUT holds what a recording would, and more: deployment.toml (`parallax run OUT/deployment.toml`), rig.toml, the pictures \
+OUT holds a recording with its truth: deployment.toml (`parallax run OUT/deployment.toml`), rig.toml, the pictures \
 (cameras/NAME/000000.png), masks, and the truth: truth.jsonl (joints in 3D and in every picture, visibility, capture \
 times) and people.jsonl (the same as annotated people, for `train fmp` and `judge`; people-as-seen.jsonl with left \
-and right as published models define them). The format is in shared/scene/TRUTH.md. Several subjects or actions have a \
-folder each, OUT/s1-walking, and a people.jsonl of all.
+and right as published models define them). The format is in shared/scene/TRUTH.md. For several subjects or actions, each has a \
+folder, OUT/s1-walking, and people.jsonl has all.
 
 The same options give the same files, bit for bit, on any number of threads. A subject is a person by number: shape, \
 clothes, way of moving. The seed determines the motion, the room and the lighting.
@@ -30,12 +30,12 @@ RIG is humaneva (3 cameras, 640x480), umpm (4, 644x486), ring:N[:RADIUS[:HEIGHT]
 given), or a rig file. Actions: walking, jogging, boxing, gestures, throw-catch, chair, grab, lean, table, lying.
 
 With --motion the subjects move as recorded in a C3D or TRC file: limbs have the recorded directions and the lengths of \
-the subject, and the path is moved to the middle of the room. Joints are not kept within limits. A table (--markers) maps \
-markers to joints. Gaps are interpolated up to --motion-gap seconds; longer ones are refused, with their frames, and so \
+the subject, and the path is moved to the middle of the room. Joints have no limits. A table (--markers) maps \
+markers to joints. Gaps up to --motion-gap seconds are interpolated. Longer ones are refused, with their frames, and so \
 are impossible motions: implausible lengths of the legs, a head below the feet, knees that bend forward.
 
-With --live no pictures are written: the cameras of the deployment are addresses, synth://RIG?camera=C1&action=..., \
-from which each capture process renders its pictures during the run, and the truth is that of the same pictures.
+With --live no pictures are written: the sources of the deployment's cameras are synth://RIG?camera=C1&action=..., \
+each capture process renders its pictures during the run, and the truth is that of the same pictures.
 
 With --json one object: {\"schema_version\", \"sequences\": [{\"folder\", \"subject\", \"action\", \"seed\", \
 \"pictures\", \"people\"}], \"seconds\", \"pictures_per_second\"}.
@@ -82,11 +82,11 @@ pub(crate) struct Arguments {
     /// Numbers of the subjects: 3, or 1-20,25.
     #[arg(long, value_name = "LIST", default_value = "1", value_parser = subjects)]
     subjects: Subjects,
-    /// Other people who stand around the subject, at most 4.
+    /// Number of other people who stand around the subject, at most 4.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     others: u64,
-    /// Other people who walk and pass the subject and each other, at most 4. The truth has the joints of everybody; masks and visible
-    /// joints are the subject's alone.
+    /// Number of other people who walk past the subject and each other, at most 4. The truth has the joints of all people; masks
+    /// and visible joints are the subject's alone.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     passers: u64,
     /// Their actions: names separated by commas, or all.
@@ -116,8 +116,8 @@ pub(crate) struct Arguments {
     /// Write no pictures: the capture processes of the deployment render them during the run.
     #[arg(long)]
     live: bool,
-    /// How long after the instants of the frames each camera takes its pictures, milliseconds, in the order of the rig: 0,5,11,16;
-    /// negative for before. The deployment says so too, and a run moves the joints to the instants.
+    /// Time from the instants of the frames to the pictures of each camera, milliseconds, in the order of the rig: 0,5,11,16;
+    /// negative for earlier pictures. The deployment says so too, and a run moves the joints to the instants.
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = parse::skews)]
     skew_ms: Skews,
     /// Recorded motion.

@@ -31,17 +31,17 @@ JSON lines, one person each, image paths relative to the file:
 says otherwise the joints are the 14 of PARSE and LSP: right ankle, knee, hip, left hip, knee, \
 ankle, right wrist, elbow, shoulder, left shoulder, elbow, wrist, neck, top of the head.
 
-The model knows left and right by the side of the picture. PARSE is marked so; in LSP and \
-LSP-extended people who are seen from behind are marked by their own sides, which --sides LSP=seen \
-undoes.
+The model knows left and right by the side of the picture, as PARSE is marked. LSP and \
+LSP-extended mark people seen from behind by their own sides; --sides LSP=seen \
+corrects that.
 
 Rows of a data set count from 1. With several data sets, --only, --without, --rotate and --sides name \
-the one they mean, as it was written: --only PARSE=1-100. A selection is a list of rows (1-100,150), or \
-a file with a row, a range of rows or the file name of an image a line; what it names must be there.
+one of them, as it was written: --only PARSE=1-100. A selection is a list of rows (1-100,150), or \
+a file with a row, a range of rows or the file name of an image on each line; all of these must exist.
 
-The training is a list of steps. After each one everything it knows is in OUT.checkpoint, so that \
-what is stopped by Ctrl-C, or killed, goes on with --resume from the last step that was done, and \
-ends with the same model, bit for bit, as if it had not been interrupted, on any number of threads.
+The training is a list of steps. After each one its state is in OUT.checkpoint. After Ctrl-C or a kill, \
+--resume continues from the last finished step, and \
+ends with the same model, bit for bit, on any number of threads.
 
 Kinds of bad labels, for --fatal: syntax, count, unknown, not-finite, zero-size, image, outside, \
 twice, same-name. People with others are reported with file and row, and left out.
@@ -68,13 +68,13 @@ pub(crate) enum Command {
     Fmp(Box<Arguments>),
     /// Learn the consistency of several views of a person: part types, weights, thresholds, joints.
     Consistency(Box<consistency::Arguments>),
-    /// Train the network that tells from the picture in which direction a person faces, for left and right.
+    /// Train the network that sees in which direction a person faces, for left and right.
     Orientation(Box<orientation::Arguments>),
     /// Learn where joints lie among the parts of a model, on photographs of marked people.
     Joints(Box<joints::Arguments>),
     /// Prepare people for training the network that finds joints.
     NetworkPeople(Box<network::people::Arguments>),
-    /// Train the network that finds joints, the direction of the trunk, and how far off it may be.
+    /// Train the network that finds joints, the direction of the trunk, and expected errors.
     Network(Box<network::learn::Arguments>),
     /// Train a network that predicts the error of every part in a single view.
     Quality(Box<quality::network::Arguments>),

@@ -36,7 +36,7 @@ pub struct Job<'a> {
     pub joint_map: &'a (dyn Fn(&JointSet) -> Option<Arc<JointMap>> + Sync),
     /// What was learned about several views.
     pub learned: Option<&'a Learned>,
-    /// What is compared.
+    /// The signal to compare.
     pub versions: Vec<Version>,
     /// All settings that what is found depends on: a run goes on only with the same.
     pub settings: String,

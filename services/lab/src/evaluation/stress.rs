@@ -109,7 +109,7 @@ impl fmt::Display for Stress {
 /// The text names no stress.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{0:?} is none of clean, covered:N, views:N (N from 2), turned:DEGREES, bystander, exchanged"
+    "{0:?} is not one of clean, covered:N, views:N (N from 2), turned:DEGREES, bystander, exchanged"
 )]
 pub struct UnknownStress(String);
 
@@ -158,7 +158,10 @@ mod tests {
             "clean:1",
         ] {
             let refused = text.parse::<Stress>().unwrap_err();
-            assert!(refused.to_string().contains("is none of clean"), "{text}");
+            assert!(
+                refused.to_string().contains("is not one of clean"),
+                "{text}"
+            );
         }
     }
 

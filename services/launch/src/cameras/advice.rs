@@ -20,7 +20,7 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
             if source.kind() == ErrorKind::PermissionDenied =>
         {
             format!(
-                "this is the `source` of {camera}: whoever runs Parallax needs to read it, and to enter (x) every folder above it"
+                "this is the `source` of {camera}: the user of Parallax must be able to read it, and to enter (x) every folder above it"
             )
         }
         FeedError::Footage(

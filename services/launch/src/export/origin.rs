@@ -19,7 +19,7 @@ use crate::resolved::Resolved;
 /// Which trajectories of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Lines {
-    /// As they were found.
+    /// As found.
     #[default]
     Raw,
     /// As `parallax smooth` has smoothed them.

@@ -24,12 +24,12 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Check units, handedness and image sizes; with detections, whether what every view found by itself agrees with the rig.
+    /// Check units, handedness and image sizes; with detections, check that each view's own poses agree with the rig.
     #[command(after_help = "Ends with 5 if something is probably wrong.")]
     Check {
         #[command(flatten)]
         input: Input,
-        /// What each view found by itself of one person: `pose2d.jsonl` of a run on uncropped footage. Poses after fusion do not count:
+        /// Each view's own poses of one person: `pose2d.jsonl` of a run on uncropped footage. Poses after fusion are not used:
         /// they are projections of one solution, and agree with any rig.
         #[arg(long, value_name = "FILE")]
         detections: Option<PathBuf>,
@@ -56,7 +56,7 @@ Examples:
     },
 }
 
-/// The files to read, and values that they may lack.
+/// The files to read, and values that may be missing in them.
 #[derive(Debug, Args)]
 pub(crate) struct Input {
     /// The calibration file, or one file per camera.
@@ -165,7 +165,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
             up.x, up.y, up.z
         ))?,
         None => output::line(
-            "which way is up is not known: a run finds it, or is told by `up` in its deployment",
+            "which way is up is not known: a run finds it, or `up` in its deployment sets it",
         )?,
     }
     for camera in rig.cameras() {

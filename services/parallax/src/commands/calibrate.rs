@@ -18,13 +18,13 @@ use terminal::Globals;
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Find lenses, and where cameras stand, from a board that is moved around; draw boards to print.
+    /// Find lenses and places of cameras from a board that is moved about; draw boards to print.
     Board(Box<board::Arguments>),
     /// Put the origin of a rig on the floor, by a board, three points, or people who stand.
     Origin(Box<origin::Arguments>),
-    /// Find where the cameras of a deployment stand, from people walking about.
+    /// Find the places of a deployment's cameras from people who walk about.
     People(Box<people::Arguments>),
-    /// Make a rig better by a recording, or put it right after a camera was moved.
+    /// Improve a rig by a recording, or correct it after a camera was moved.
     Refine(Box<refine::Arguments>),
 }
 

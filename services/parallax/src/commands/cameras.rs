@@ -36,13 +36,13 @@ enum Command {
 struct ViewArguments {
     /// The camera: a source such as `/dev/video0` or `rtsp://...`, or with --deployment its name there.
     camera: String,
-    /// The deployment file whose camera it is, with its format, size, rate and controls.
+    /// The deployment file of the camera, with its format, size, rate and controls.
     #[arg(long, value_name = "FILE")]
     deployment: Option<PathBuf>,
-    /// Where the picture goes, a PNG file.
+    /// The PNG file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Pictures before it that are passed over, so that exposure settles.
+    /// Number of pictures to skip first, so that exposure settles.
     #[arg(long, value_name = "N", default_value_t = 5)]
     skip: usize,
 }

@@ -9,34 +9,43 @@ use terminal::{Globals, output};
 use trials::chaos::{self, Options, Scenario};
 
 const HELP: &str = "\
-Every scenario is a run of its own, with real processes and a real fault; --list names them. Without a DEPLOYMENT the \
-cameras are those of `parallax demo`, four synthetic ones. A DEPLOYMENT keeps its mode, pace, deadline and hang limit. \
-Its own results are not touched: the results of a scenario go to OUT/<scenario>. It may run at the same time, because its \
+Every scenario is a separate run with real processes and a real fault; --list names them. Without a DEPLOYMENT the \
+cameras are the four synthetic ones of `parallax demo`. A DEPLOYMENT keeps its mode, pace, deadline and hang limit. \
+Its own results stay: those of a scenario go to OUT/<scenario>. It may run at the same time, because its \
 name becomes <name>-chaos.
 
 Limits when a process is killed: its death is noticed within a second; it is back within --max-return-ms; if the others \
 do not depend on it, no pause between two results is longer than --max-pause-ms; every frame of every view is accounted \
-for, except two that the process may have held; no other process failed; the run ends by itself; nothing is left in \
-shared memory. A process that is stopped (hang-...) is noticed within three heartbeats (450 ms, or \
-supervise.missed_beats of the deployment) plus a second, and may be away longer by that limit. A process in an endless loop \
-(spin-...) sends heartbeats but makes no progress. With realtime delivery it is noticed once an iteration has taken as \
-much processor time as that limit, and three times that of any frame before; with lossless delivery, once its main loop \
-has made no progress for three seconds, which the scenario sets (supervise.hang_limit_s). With kill-random every killed \
-process comes back (--max-return-ms for 99 of 100); if the run is long enough (nine samples, a second apart, at which all \
-processes worked), memory (at equal ages of the processes), descriptors and files at the end exceed those at the start by \
-at most a tenth, 32 MB and 8 files; a run longer than --part-seconds is also reported in parts. With kill-supervisor its processes end by themselves \
-within a second, and the next start of the same deployment removes what is left, and works.
+for, except two that the process may have held; no other process failed; the run ends without help; nothing is left in \
+shared memory.
 
-With camera-... a camera fails for a fifth of the footage (its source does what `fault` in a deployment describes): its \
+hang-...: a stopped process is noticed within three heartbeats (450 ms, or \
+supervise.missed_beats of the deployment) plus a second, and may be away longer by that limit.
+
+spin-...: a process in an endless loop sends heartbeats but makes no progress. With realtime delivery it is noticed once an iteration has taken as \
+much processor time as that limit, and three times that of any frame before; with lossless delivery, once its main loop \
+has made no progress for three seconds, which the scenario sets (supervise.hang_limit_s).
+
+kill-random: every killed \
+process comes back (--max-return-ms for 99 of 100). In a long run (nine samples, a second apart, at which all \
+processes worked), memory (at equal ages of the processes), descriptors and files at the end exceed those at the start by \
+at most a tenth, 32 MB and 8 files. A run longer than --part-seconds is also reported in parts.
+
+kill-supervisor: its processes end \
+within a second, and the next start of the same deployment removes the leftovers, and works.
+
+camera-...: a camera fails for a fifth of the footage (as by `fault` in a deployment): its \
 frames have the status of the fault, the results of the other cameras go on (--max-pause-ms), and the camera is used in \
-results again within --max-return-ms. With camera-moved one camera of the rig is turned by two degrees: it must be \
-identified, and no other, which takes four cameras and some seconds of results. With stall-results the process `results` \
+results again within --max-return-ms. camera-moved: one camera of the rig is turned by two degrees: it must be \
+identified, and no other, which takes four cameras and some seconds of results.
+
+stall-results: the process `results` \
 is stopped for three seconds and then resumed: with realtime delivery, results continue at half the rate at least; with \
 lossless delivery, nothing is lost.
 
-With cut-link and kill-host (builds with the feature hosts) the deployment runs as two hosts on this machine, each with half of the cameras, and a relay \
-between them: it is cut for three seconds, or the host with cameras is killed and started again. The other must notice it, its views must be used again \
-within --max-return-ms, and every frame of them be accounted for. They need a DEPLOYMENT in real time with a rate, and four cameras.
+cut-link and kill-host (builds with the feature hosts): the deployment runs as two hosts on this machine, each with half of the cameras, and a relay \
+between them. The relay is cut for three seconds, or the host with cameras is killed and restarted. The other host must notice it, use the views again \
+within --max-return-ms, and account for every frame of them. They need a DEPLOYMENT in real time with a rate, and four cameras.
 
 A process is back when it has sent its first message that contributes to a result. Results do not name fuse, quality and \
 results; these are back when they report that they have worked. The number of restarts is not limited here \
@@ -59,7 +68,7 @@ Examples:
 pub(crate) struct Arguments {
     /// The deployment file; four synthetic cameras if not given.
     deployment: Option<PathBuf>,
-    /// The scenarios, separated by commas; if not given, all that are possible with the processes of the deployment.
+    /// The scenarios, separated by commas; if not given, all that the deployment's processes allow.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Scenario::by_name)]
     scenario: Vec<Scenario>,
     /// List the scenarios and exit.
@@ -92,11 +101,11 @@ pub(crate) struct Arguments {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 struct Limits {
-    /// Longest time from the fault until the process contributes to a result again, milliseconds; for processes that
-    /// results do not name: until it reports that it has worked.
+    /// Longest time from the fault until the process contributes to a result again, milliseconds; for a process that results do
+    /// not name, until it reports work.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest pause between results while a process is away that the others do not depend on, milliseconds.
+    /// Longest pause between results while a process is missing that the others do not need, milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
 }

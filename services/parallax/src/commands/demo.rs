@@ -12,19 +12,19 @@ use trials::demo::{self, Options};
 use super::view;
 
 const HELP: &str = "\
-Nothing is needed but this program: the capture processes render pictures of a synthetic person during the run (see \
-`parallax-lab synth --help`), and the network that ships looks at them. Four cameras around the person, 320x240 pixels, capture in \
-real time. Their frame rate is chosen by a measurement: for about two seconds frames are rendered and looked at on all \
-cores, beside whatever else runs. Computing may take half of the time between two frames, up to 5 frames a second; a slow \
-or busy machine is reported with numbers. Below 2.5 frames a second the person is looked for in every frame, which takes \
-longer. Every stage and camera is a process of its own, as in `parallax run`. After two \
-fifths of the frames, the process of camera c3 is killed (SIGKILL), as a crash would: the other three go on, the \
+The demo needs nothing but this program: the capture processes render pictures of a synthetic person during the run (see \
+`parallax-lab synth --help`), and the network that ships finds the joints. Four cameras around the person, 320x240 pixels, capture in \
+real time. A measurement of about two seconds chooses the frame rate: frames are rendered and searched on all \
+cores, beside any other load. Computing may take half of the time between two frames, up to 5 frames a second; a slow \
+or busy machine is reported with numbers. Below 2.5 frames a second every frame is searched for the person, which takes \
+longer. Every stage and camera is a separate process, as in `parallax run`. After two \
+fifths of the frames, the process of camera c3 is killed (SIGKILL), like a crash: the other three go on, the \
 supervisor restarts it, and it continues with the current frame.
 
-OUT holds report.html (open it in a browser: a skeleton in space that can be turned, beside the truth; the views of every \
+OUT holds report.html (open it in a browser: the skeleton in space, beside the truth; the views of every \
 result; the cost of the kill; latency of every stage; the account of all frames; pictures with skeletons), report.json \
-(the same numbers), deployment.toml and rig.toml (`parallax run OUT/deployment.toml` runs them again), and run/, the \
-results as of any run. Files of an earlier demo are replaced.
+(the same numbers), deployment.toml and rig.toml (`parallax run OUT/deployment.toml` runs them again), and run/ with the \
+results of the run. Files of an earlier demo are replaced.
 
 The demo checks limits that a broken pipeline would miss: --min-results of the frames have a result, --min-skeletons of \
 these a skeleton, and PCP3D over all of them is at least --min-pcp3d; the killed camera is back within --max-return-ms; \
@@ -82,7 +82,7 @@ pub(crate) struct Arguments {
     /// Name of the deployment, unique among those that run at the same time.
     #[arg(long, value_name = "NAME", default_value = "demo")]
     name: String,
-    /// Serve a page about the run on the loopback while it runs; `parallax view --help` says what it shows.
+    /// Serve a page about the run on the loopback while it runs; `parallax view --help` describes it.
     #[arg(long)]
     view: bool,
     /// Print the report as JSON.

@@ -15,10 +15,10 @@ const UNMARKED: &str = "not a deployment: left alone";
 /// Options of `parallax status`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-With a DEPLOYMENT, it is that of `parallax top --once`: every process, its state, and the percentiles of its stages
+With a DEPLOYMENT it prints the table of `parallax top --once`: every process, its state, and the percentiles of its stages
 (`parallax top --help` explains them). Times are in milliseconds, memory in bytes with --json.")]
 pub(crate) struct StatusArguments {
-    /// Name of a running deployment, or its file: show its processes and where their time goes.
+    /// Name of a running deployment, or its file: show its processes and their times.
     deployment: Option<String>,
     /// Print JSON.
     #[arg(long)]

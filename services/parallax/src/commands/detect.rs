@@ -36,26 +36,19 @@ const LEAST_HEAT: f64 = 0.58;
 /// Options of `parallax detect`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A picture is searched as people see it: turned as its orientation tag (EXIF) says. One with a side longer than \
---size is searched at that size, and the line says so: \"searched at 1280x960 of 4000x3000\". People smaller than about \
-150 pixels there are not found; --full searches all pixels, at about 460 bytes of memory for each. Of a video every \
-frame is searched, or every n-th with --every. What cannot be read is named, the rest goes on, and the exit code is 7 \
+Pictures are turned as their orientation tag (EXIF) says. One with a side longer than \
+--size is reduced to that size, and the line says so: \"searched at 1280x960 of 4000x3000\". People smaller than about \
+150 pixels there are not found; --full searches all pixels, with about 460 bytes of memory for each. Of a video every \
+frame is searched, or every n-th with --every. Unreadable pictures are named, the others are searched, and the exit code is 7 \
 (4 if nothing could be read).
 
-The filters propose boxes, and the network decides: who is seen with less heat than --heat (mean over the joints) is left out. By the \
-search at the full size alone, on pictures that both were trained on (PARSE 1-100, 150 of INRIA without people), the default keeps 93 % of \
-the people, with 0.23 false alarms a picture. By the filters alone the threshold is that of the model that ships, by \
-measurement: of 50 pictures of one \
-person each (PARSE, every second of 101-200) it finds something in 48, and exactly one person in 47; with -1 in 50 and 41, with \
-0 in 31 and 31. Pictures without people that the model was trained on (100 of INRIA) have 0.16 false alarms each, with -1 3.1, \
-with 0 none; others about three times as many. Of \
-another model it is the trained one, but at most -1.
+The filters propose boxes, and the network that ships finds the joints in them: in every box, widened by 10 %, and then in the \
+box around the person that it sees, as in a deployment. People with less heat than --heat (mean over the joints) are left out. \
+Each person is printed once, in order of heat. --network names your own network (docs/networks.md). \
+--box and --detector give other boxes, used as they are, at most --max.
 
-The filters find who is there, and the network that ships says where the joints are, better than their parts do \
-(`judge` on PARSE 101-200: 80.6 % of the limbs, by the parts 73.9 %). It looks into every box of the filters, widened by 10 %, and then into the \
-box around who is seen there, as a deployment does; each person is told once, those who are seen best first. --network names a network of your own (docs/networks.md). \
-Into a box that --box gives, or those that --detector finds, it looks as they are, at most --max of them.
-With --network none the parts of the filters are told, as with --model, --joints and --joint-map.
+With --network none, and with --model, --joints or --joint-map, the parts of the filters are printed. \
+The card configs/models/person.md has the false alarms for each --threshold.
 
 With --json one line per image, best detection first:
     {\"image\", \"frame\" (of videos), \"width\", \"height\", \"network\", \"searched\": [width, height], \"detections\": [{\"score\": the
@@ -81,11 +74,11 @@ pub(crate) struct Arguments {
     /// The model file; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Least heat of a person whom a network sees in a box of the filters: the mean over the joints, from 0 to 1.
+    /// Least heat of a person in a box of the filters: the mean over the joints, from 0 to 1.
     #[arg(long, value_name = "HEAT", default_value_t = LEAST_HEAT, value_parser = heat)]
     heat: f64,
-    /// Lowest score of a detection of the filters; if not given, for the model that ships -1.28 where a network looks into its box, else
-    /// -0.5, and for another model the trained threshold, but at most -1.
+    /// Lowest score of a detection of the filters; if not given: for the model that ships -1.28 with a network and -0.5 without
+    /// one, for another model the trained threshold, but at most -1.
     #[arg(long, value_name = "SCORE", allow_hyphen_values = true)]
     threshold: Option<f64>,
     /// Non-maximum suppression: the largest share of a better detection's boxes that a worse one may cover.
@@ -119,8 +112,8 @@ pub(crate) struct Arguments {
     /// Joints of the filters: parse14 (if not given), umpm15 or humaneva20.
     #[arg(long, value_name = "NAME", value_parser = describe::joint_set)]
     joints: Option<&'static JointSet>,
-    /// Where joints lie among the filters' parts: a file that `train joints` made; "shipped" (if not given): the one for the
-    /// model that ships; "none": a joint is the centre of its part, as for other models.
+    /// Places of joints among the filters' parts: a file of `train joints`; "shipped" (if not given): the one for the model that
+    /// ships; "none": a joint is the centre of its part, as for other models.
     #[arg(long, value_name = "FILE")]
     joint_map: Option<PathBuf>,
     /// Keypoints by this network (.onnx); "shipped": the one that ships; "none": parts by the filters. If not given, the one that
@@ -133,7 +126,7 @@ pub(crate) struct Arguments {
     /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the filters find it.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, allow_hyphen_values = true)]
     outline: Option<Outline>,
-    /// The network looks at the mirror image of every person as well: more exact, and takes its time twice.
+    /// Also show the mirror image of every person to the network, and use the mean: more exact, twice the time.
     #[arg(long)]
     mirror: bool,
     /// Boxes by this detector of people (.onnx) in place of the filters.

@@ -20,7 +20,7 @@ const STACK: u64 = 1 << 20;
 /// Options of `parallax doctor`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit code 0 if everything that is needed is there, 3 if something is missing; what is only good to know does not count.
+Exit code 0 if everything needed is there, 3 if something is missing; optional things do not count.
 
 Examples:
     parallax doctor

@@ -17,32 +17,32 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
 /// Options of `parallax export`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Formats, what they are for, and what they hold:
+Formats, their use and content:
     c3d        motion capture        points, mm, z up; residual: standard deviation, mm; a gap: residual -1
     trc        OpenSim               points, m, y up; a gap: NaN
-    glb        viewers, Blender      skinned skeleton and animation, m, y up; a gap: a bone that is not there
+    glb        viewers, Blender      skinned skeleton and animation, m, y up; a gap: a missing bone
     bvh        animation             bones of fixed length (medians), cm, y up; in a gap the last rotation stays
     csv        tables                a row for each frame, m, axes of the rig; standard deviations
-    csv-long   tables                a row for each joint of each frame: covariance, views, the reason of a gap
+    csv-long   tables                a row for each joint of each frame: covariance, views, the reason for a gap
     parquet    tables                the same, for builds with `--features parquet`
     openpose   other pipelines       BODY_25 of the reprojected pose: a JSON file for each view and frame
-    mp4        people                every camera's pictures with the pose and its uncertainty; needs ffmpeg
+    mp4        video players         every camera's pictures with the pose and its uncertainty; needs ffmpeg
     all        all of these
 
-With --from raw nothing is filled or smoothed: a joint that was not found or was refused is a gap, and BVH, which knows none, says where it \
-holds. Frames stand on the grid of the frame rate; frames that were dropped are gaps. NAME.export.json says all of this \
-of what was written, with the gaps of every joint. Files take their names when they are whole.
+With --from raw nothing is filled or smoothed: a joint that was not found or was refused is a gap. BVH has no gaps, and the command names the frames in which it \
+holds a bone. Frames are on the grid of the frame rate; dropped frames are gaps. NAME.export.json describes the \
+files, with the gaps of every joint. Files get their names when they are complete.
 
-A run of several people has a file for each in every format of one file: NAME-person2.trc for the person with id 2. Keypoints and videos \
-hold everybody. Where never two people are in a frame, the files have whoever was followed, and `ids` says who.
+For several people every format of one file has a file for each: NAME-person2.trc for the person with id 2. Keypoints and videos \
+hold all people. If no frame has two people, the files hold the followed person, and `ids` says who.
 
 With --json one object, that of NAME.export.json: {\"schema_version\", \"source\", \"trajectories\", \"frames\", \"first_frame\", \
 \"frame_step\", \"rate_hz\", \"irregular_times\", \"repeated_frames\", \"up_in_world\", \"points\", \"people\": [{\"ids\", \
 \"frames_with_points\", \"gaps\", \"filled\"}], \"flaws\", \"files\": [{\"format\", \"path\", \"unit\", \"axes\", \"gaps\", \"uncertainty\", \"notes\"}]}.
 
-Exit codes: 0 done; 2 the command line is wrong, or a file exists; 4 the run cannot be read, does not have what a format needs, \
-or the folder cannot be written; 5 the calibration does not fit; 7 no frame has a joint, or the run is not whole: cut off, \
-damaged, not ended; 130 stopped by Ctrl-C.
+Exit codes: 0 done; 2 the command line is wrong, or a file exists; 4 the run cannot be read, lacks data that a format needs, \
+or the folder cannot be written; 5 the calibration does not fit; 7 no frame has a joint, or the run is truncated, \
+damaged or not ended; 130 stopped by Ctrl-C.
 
 Examples:
     parallax export out/my --to c3d,glb
@@ -56,29 +56,28 @@ pub(crate) struct Arguments {
     /// The formats, separated by commas; or all.
     #[arg(long, value_name = "LIST", value_parser = formats)]
     to: Formats,
-    /// Which trajectories of the run: as they were found, or as `parallax smooth` has smoothed them.
+    /// Trajectories of the run: as found, or as smoothed by `parallax smooth`.
     #[arg(long, value_enum, default_value_t = Trajectories::Raw)]
     from: Trajectories,
     /// The folder for the files; if not given, `export` in the folder of the run, or the name of the recording with `-export` appended.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// What the files are called.
+    /// Name of the files.
     #[arg(long, default_value = "pose3d", value_parser = name)]
     name: String,
-    /// What the joints are called in the files: `right_ankle` as in the run, or `RAnkle` as OpenSim models with markers for keypoints
-    /// have it (those of Pose2Sim).
+    /// Names of the joints in the files: `right_ankle` as in the run, or `RAnkle` as in Pose2Sim's OpenSim models.
     #[arg(long, value_enum, default_value_t = Names::Own)]
     names: Names,
-    /// Frames of the footage per second, for a run that does not know.
+    /// Frames of the footage per second, for a run without a frame rate.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
-    /// Which way is up in the world of the rig, instead of what the calibration says: 0,0,1.
+    /// Upward direction in the world of the rig, in place of the calibration's: 0,0,1.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = up)]
     up: Option<UnitVector3<f64>>,
     /// Replace files that exist.
     #[arg(long)]
     force: bool,
-    /// Print what was written as JSON.
+    /// Print the written files as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -86,7 +85,7 @@ pub(crate) struct Arguments {
 /// Which trajectories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Trajectories {
-    /// As they were found.
+    /// As found.
     Raw,
     /// Smoothed: pose3d-smooth.jsonl.
     Smooth,
@@ -115,7 +114,10 @@ fn formats(text: &str) -> Result<Formats, String> {
             return Err(NO_PARQUET.to_owned());
         }
         if chosen.is_empty() {
-            return Err(format!("{wanted:?} is none of {}, all", names.join(", ")));
+            return Err(format!(
+                "{wanted:?} is not one of {}, all",
+                names.join(", ")
+            ));
         }
         for format in chosen {
             if !found.iter().any(|it| it.name() == format.name()) {
@@ -266,7 +268,7 @@ mod tests {
         assert_eq!(names("all,csv").unwrap().len(), Format::all().len());
         let error = names("c3d,fbx").unwrap_err();
         assert!(
-            error.contains("\"fbx\" is none of c3d, trc, glb"),
+            error.contains("\"fbx\" is not one of c3d, trc, glb"),
             "{error}"
         );
         names("").unwrap_err();

@@ -19,7 +19,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Show the hosts of a running deployment: who answers, how well clocks are known, what became of every view.
+    /// Show the hosts of a running deployment: which answer, how well clocks are known, what became of every view.
     Status(StatusArguments),
     /// Make the keys of all hosts: an authority, and a certificate with its key for each.
     Keys(KeysArguments),
@@ -28,9 +28,9 @@ pub(crate) enum Command {
 /// Options of `parallax hosts status`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Asks the host that fuses over the link, so it works from every host that has keys.
+Asks the fusing host over the link, so it works from every host that has keys.
 
-Exit codes: 0 all hosts answer; 7 some do not; 4 the host that fuses does not answer.
+Exit codes: 0 all hosts answer; 7 some do not; 4 the fusing host does not answer.
 
 Examples:
     parallax hosts status my.toml
@@ -38,7 +38,7 @@ Examples:
 pub(crate) struct StatusArguments {
     /// The deployment file.
     config: PathBuf,
-    /// The host that this machine is; without it the one with the name of the machine.
+    /// The host of this machine; if not given, the one with the machine's name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Print the state as JSON.
@@ -50,7 +50,7 @@ pub(crate) struct StatusArguments {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Writes ca.pem, ca.key, and HOST.pem and HOST.key of every host into `link.keys` of the deployment. Every host needs ca.pem and its
-own two files there; ca.key is needed for further hosts alone, and belongs on none of them. Nothing is replaced.
+own two files there. ca.key is needed only to add hosts; keep it off all of them. Nothing is replaced.
 
 Example:
     parallax hosts keys my.toml")]

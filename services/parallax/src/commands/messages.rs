@@ -12,7 +12,7 @@ use terminal::output;
 /// Options of `parallax messages`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Messages lie in shared memory, and in recordings, as these structs. Python needs no layout of its own: see python/README.md.
+Messages are these structs in shared memory and in recordings. Python users do not need the layout: see python/README.md.
 
 Examples:
     parallax messages --json                        structs, topics, versions, limits: for programs in other languages

@@ -16,14 +16,14 @@ use crate::commands::calibrate::height;
 /// Options of `parallax new`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every step is a command of its own, which is printed before it runs; what a step has already written is kept, so that `new` goes on
-where it ended. A step that fails ends it, with its exit code; one whose answer is not to be trusted (7) too, unless --go-on.
+Every step is a command, which is printed before it runs. Files of finished steps are kept, so that `new` continues
+where it ended. A step that fails ends it, with its exit code; so does an answer with doubts (7), unless --go-on is given.
 
     1  the rig: --rig converts one; --board with --show finds it (`parallax calibrate board`)
     2  the floor: --floor puts the rig on it (`parallax calibrate origin`)
     3  ROOM/deployment.toml, which is yours from then on (`parallax config check`)
-    4  with --people where the cameras stand is found from the person who walks about in their footage (`parallax calibrate people`),
-       and the floor; of --rig, or of the board, the lenses count alone, and nothing needs to lie on the floor
+    4  with --people: the places of the cameras from the person who walks about in their footage (`parallax calibrate people`),
+       and the floor; only the lenses of --rig, or of the board, are used, and no board is needed on the floor
     5  clocks: --sync finds offsets of recorded cameras from people (`parallax sync estimate --write`)
     6  a first run: --run (`parallax run`)
 
@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
     /// A calibration of any format that has these cameras.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["board", "show"], required_unless_present = "board")]
     rig: Option<PathBuf>,
-    /// The board that is shown.
+    /// The board in the footage.
     #[arg(long, value_name = "BOARD", requires = "show")]
     board: Option<Board>,
     /// Footage of a camera with the board moved about; once for each.
@@ -56,14 +56,14 @@ pub(crate) struct Arguments {
     /// Footage of a camera with the board lying on the floor.
     #[arg(long, value_name = "NAME=PATH", requires = "board")]
     floor: Vec<String>,
-    /// Find where the cameras stand from a person of this height, metres, who walks about in their footage.
+    /// Find the places of the cameras from a person of this height, metres, who walks about in their footage.
     #[arg(long, value_name = "METRES", conflicts_with = "floor", value_parser = height)]
     people: Option<f64>,
-    /// Where the upper left pixel of the footage of a camera lies in the picture that was calibrated (`source_offset_px`), for footage
-    /// that was cut to a part; once for each.
+    /// Place of the upper left pixel of a camera's footage in the calibrated picture (`source_offset_px`), for cropped footage;
+    /// once for each.
     #[arg(long, value_name = "NAME=X,Y", value_parser = offset)]
     offset: Vec<Offset>,
-    /// Which way is up in the world of the rig, for example 0,0,1.
+    /// Upward direction in the world of the rig, for example 0,0,1.
     #[arg(long, value_name = "X,Y,Z", value_parser = super::export::up, allow_hyphen_values = true)]
     up: Option<UnitVector3<f64>>,
     /// Find offset and drift of the cameras' clocks.
@@ -72,7 +72,7 @@ pub(crate) struct Arguments {
     /// Run the deployment.
     #[arg(long)]
     run: bool,
-    /// Go on where an answer is not to be trusted.
+    /// Continue after an answer with doubts.
     #[arg(long)]
     go_on: bool,
     /// Print the commands only.

@@ -11,19 +11,19 @@ use terminal::{Globals, output};
 /// Options of `parallax publish`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Reads the deployment as any other program does: no process of it waits, and it may come and go at any time. Every frame is
-one datagram of at most 1400 bytes, JSON on one line, or OSC bundles. A joint without a position is sent with the reason,
-never as zeros. What nobody receives is lost. The manual describes both forms (docs/guide/programs.md).
+Reads the deployment like any other program: no process of it waits, and this command may come and go at any time. Every person of
+a frame is one datagram of at most 1400 bytes, JSON on one line, or OSC bundles. A joint without a position is sent with the reason,
+never as zeros. Datagrams that nobody receives are lost. docs/guide/programs.md describes both forms.
 
 Examples:
     parallax publish demo udp://127.0.0.1:9000
     parallax publish demo osc://127.0.0.1:9001 udp://127.0.0.1:9000
     parallax publish demo udp://192.168.1.20:9000 --beyond-this-machine
-    nc -klu 127.0.0.1 9000                              shows what arrives")]
+    nc -klu 127.0.0.1 9000                              print the datagrams")]
 pub(crate) struct Arguments {
     /// Name of the deployment, or its file. It need not run yet.
     deployment: String,
-    /// Where to send: udp://HOST:PORT (JSON lines), udp://HOST:PORT?format=osc, osc://HOST:PORT.
+    /// The target: udp://HOST:PORT (JSON lines), udp://HOST:PORT?format=osc, osc://HOST:PORT.
     #[arg(required = true, value_name = "TARGET")]
     targets: Vec<String>,
     /// Allow targets that are not this machine: skeletons leave it unencrypted.

@@ -21,31 +21,31 @@ const MAX_EPOCHS: u32 = 64;
 /// Options of `parallax record`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The file is MCAP: chunked, indexed, not compressed, its messages CDR with ROS 2 schemas; its metadata holds
-the settings of the run and fingerprints of the files that it read. The run leaves its results as `run` does.
+The file is MCAP: chunked, indexed, not compressed, with messages as CDR with ROS 2 schemas. Its metadata holds
+the settings of the run and fingerprints of the files that it read. The run leaves its results like `run`.
 
 With lossless delivery (capture.mode = \"lossless\") a slow disk makes the run slower. With realtime delivery it does
 not: messages that do not fit into the queue are left out, counted by topic in the file, and reported at the end.
-A file whose end was not written, because of a full disk or a crash, contains everything up to there; a recording
-process that was restarted continues in FILE.1.mcap. If anything was lost the exit code is 7.
+A file whose end is missing, because of a full disk or a crash, is valid up to there; a restarted recording
+process continues in FILE.1.mcap. If anything was lost, the exit code is 7.
 
-Of a live camera the file also holds the pictures as they came, at the full rate of the camera: JPEG files, raw pixels,
+For live cameras the file also holds the pictures as they came, at the full rate of the camera: JPEG files, raw pixels,
 or the packets of a stream. `parallax replay FILE --from capture`, or `source = \"FILE#NAME\"` in a deployment, searches
-them later. No camera ever waits for the disk. Results go to the file's `output`; `--set output=DIR` names another folder.
+them later. No camera waits for the disk. Results go to the deployment's `output`; `--set output=DIR` names another folder.
 
 Foxglove opens the file as it is, and shows skeletons with their uncertainty, cameras and pictures: beside its own topics it
 holds `foxglove.SceneUpdate`, `foxglove.FrameTransforms`, `foxglove.CameraCalibration` and `foxglove.CompressedImage`.
 
-Of several hosts (`[[host]]`) the one that fuses records what comes to it: all messages but frames that do not cross. One with
-cameras records what its own cameras and processes give, which `source = \"FILE#NAME\"` of a deployment takes later.
+With several hosts (`[[host]]`) the fusing one records what arrives: all messages but frames that are not sent. One with
+cameras records the output of its own cameras and processes, for `source = \"FILE#NAME\"` of a deployment.
 
-Before the run it prints how much a frame and a second will take at most, and how much is free; it does not start
-if there is no space for ten frames (or for all, if they are fewer).
+Before the run it prints the largest size of a frame and of a second, and the free space; it does not start
+without room for ten frames (or for all, if they are fewer).
 
 Examples:
     parallax record my.toml --out run.mcap
-    parallax record my.toml --out run.mcap --without pixels --without evidence   small: poses and results,
-                                                                                 and what live cameras sent")]
+    parallax record my.toml --out run.mcap --without pixels --without evidence   small: poses, results,
+                                                                                 and pictures of live cameras")]
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
@@ -67,7 +67,7 @@ pub(crate) struct Arguments {
     /// Replace a value, for example `--set capture.scale=0.5`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The host that this machine is, of a deployment with several `[[host]]`; without it the one with the name of the machine.
+    /// The host of this machine, in a deployment with several `[[host]]`; if not given, the one with the machine's name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Print the summary as JSON.
@@ -84,7 +84,7 @@ enum Bulk {
     Evidence,
     /// The pictures of live cameras as they came; without them a replay from capture is impossible.
     Camera,
-    /// What Foxglove shows: skeletons, cameras, and their pictures as JPEG.
+    /// The topics for Foxglove: skeletons, cameras, and their pictures as JPEG.
     Foxglove,
 }
 

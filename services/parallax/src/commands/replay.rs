@@ -26,9 +26,9 @@ The stages before --from are not run: processes with their names send the record
 stages run with the settings of the recorded run, except those that --set replaces. With lossless delivery, and with
 the same settings and files, their results are those of the recorded run, bit for bit.
 
-A truncated file is replayed as far as it goes. Every chunk, a frame or 4 MiB, has a checksum; the messages of a damaged
+A truncated file is replayed up to its end. Every chunk, a frame or 4 MiB, has a checksum; the messages of a damaged
 one are named, counted and left out. In both cases the exit code is 7. End-to-end latency is meaningful at --speed 1 only; the times of the
-stages that run always are.
+stages that run are always meaningful.
 
 Examples:
     parallax replay run.mcap                                         from pose on, with the recorded frames

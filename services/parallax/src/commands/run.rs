@@ -17,10 +17,10 @@ use super::{hosts, publish, view};
 #[command(after_help = "\
 A second Ctrl-C, half a second or more after the first, ends the run at once. The output folder holds
 pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and
-overlays/, all for their user alone, called *.part until they are whole. Results of an earlier run are replaced with --force
-only, when the new ones are whole; a file that no run has written is never replaced. Every frame has one line of pose3d.jsonl,
-in order: its result, or with status \"no result\" the reason why it has none; in pose3d.trc its row is NaN then, and that file
-is only written where the frame rate is known. The folder belongs to one run at a time. A run without
+overlays/. Only the user can read them; they are called *.part until they are complete. --force replaces the results of an earlier run
+when the new ones are complete; a file that no run has written is never replaced. Every frame has one line of pose3d.jsonl,
+in order: its result, or status \"no result\" and the reason. pose3d.trc has a row of NaN then; it is written only if
+the frame rate is known. The folder belongs to one run at a time. A run without
 any result is degraded, and says why.
 
 Examples:
@@ -29,9 +29,9 @@ Examples:
     parallax run my.toml --latency-budget-ms 150
     parallax run my.toml --publish udp://127.0.0.1:9000
     parallax run my.toml --dry-run
-    parallax run my.toml --host left        the part of one of several machines
+    parallax run my.toml --host left        one of several machines
 
-While it runs, `parallax top` and `parallax status NAME --json` show every process and where its time goes. With a
+During the run, `parallax top` and `parallax status NAME --json` show every process and its times. With a
 latency budget the run ends with exit code 6 if the 99th percentile from capture to result exceeds it, or if no frame
 was measured (unless it was stopped by Ctrl-C before any was).")]
 #[expect(
@@ -50,18 +50,18 @@ pub(crate) struct Arguments {
     /// Replace a value, for example `--set capture.scale=0.5`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The host that this machine is, of a deployment with several `[[host]]`; without it the one with the name of the machine.
+    /// The host of this machine, in a deployment with several `[[host]]`; if not given, the one with the machine's name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Fail with exit code 6 if 1 frame in 100 takes longer than this from capture to result, milliseconds; the same
     /// as `--set supervise.latency_budget_ms=N`.
     #[arg(long, value_name = "N", value_parser = above_zero, allow_negative_numbers = true)]
     latency_budget_ms: Option<f64>,
-    /// Serve a page about the run on the loopback while it runs; `parallax view --help` says what it shows.
+    /// Serve a page about the run on the loopback while it runs; `parallax view --help` describes it.
     #[arg(long, conflicts_with = "dry_run")]
     view: bool,
     /// Send the skeletons as datagrams to udp://HOST:PORT (JSON lines) or osc://HOST:PORT while it runs; may be given several
-    /// times; `parallax publish --help` says what is sent.
+    /// times; `parallax publish --help` describes the datagrams.
     #[arg(long, value_name = "TARGET", conflicts_with = "dry_run")]
     publish: Vec<String>,
     /// Allow --publish to other machines than this: skeletons leave it unencrypted.

@@ -28,13 +28,13 @@ pub(crate) struct Arguments {
 #[derive(Debug, Parser)]
 #[command(no_binary_name = true)]
 struct ServiceArguments {
-    /// The file of the resolved deployment, which is read if standard input is empty.
+    /// The file of the resolved deployment, read if standard input is empty.
     #[arg(long)]
     plan: PathBuf,
     /// View or worker, from 0.
     #[arg(long, default_value_t = 0)]
     index: usize,
-    /// The stage that a replay process stands in for.
+    /// The stage that a replay process replaces.
     #[arg(long, value_parser = stage::parser())]
     stage: Option<Stage>,
     /// Enter an endless loop in epoch 0, once a message about a later frame has been sent; for tests.

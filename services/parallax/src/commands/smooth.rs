@@ -16,22 +16,22 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} motions{left} {prefix}
 /// Options of `parallax smooth`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-FOLDER holds the results of a run; nothing in it is changed. Beside them are written
-    pose3d-smooth.jsonl   as pose3d.jsonl; `states` says of every joint whether it is measured, exchanged, filled or rejected
+FOLDER holds the results of a run, which stay unchanged. The command adds
+    pose3d-smooth.jsonl   like pose3d.jsonl; `states` says whether a joint is measured, exchanged, filled or rejected
     angles.csv            hips, knees, ankles, shoulders, elbows and trunk, degrees, with standard deviations
-    smooth.json           the method and its numbers, and what became of how many measurements
+    smooth.json           the method and its numbers, and counts of measurements by their fate
 
-Everything has a default: how restless each joint is, and how far its covariances can be believed, is found from the measurements.
+Everything has a default: process noise and scale of the covariances of each joint are estimated from the measurements.
 docs/guide/smooth.md explains.
 
-How far the result is from the truth, where that is known: `parallax-lab smooth`.
+`parallax-lab smooth` compares the result with the truth, if you have it.
 
-Exit codes: 0 done; 7 done, but something speaks against the result (`doubts`: the file is cut off, nothing was measured, many
+Exit codes: 0 done; 7 done with doubts (`doubts`: the file is truncated, nothing was measured, many
 measurements contradict each other); 2 an option is wrong, or a cutoff too high for the rate; 4 the folder cannot be read, a line is
 wrong, times do not ascend.
 
 With --json one object:
-    {\"report\": what smooth.json holds, \"files\": [path], \"has_up\"}
+    {\"report\": the content of smooth.json, \"files\": [path], \"has_up\"}
 
 Examples:
     parallax smooth out/run
@@ -40,14 +40,14 @@ Examples:
 pub(crate) struct Arguments {
     /// The results of a run.
     folder: PathBuf,
-    /// How: `rts` looks ahead, on the measured covariances; `butterworth` is a zero-phase low-pass filter; `kalman` is what
-    /// would have been seen live; `none` only computes angles.
+    /// The method: `rts` looks ahead, on the measured covariances; `butterworth` is a zero-phase low-pass filter; `kalman` is the
+    /// live method; `none` only computes angles.
     #[arg(long, value_name = "METHOD", value_parser = method)]
     method: Option<Method>,
-    /// Cutoff of `butterworth`, Hz; 6 if nothing says otherwise.
+    /// Cutoff of `butterworth`, Hz; 6 if not given.
     #[arg(long, value_name = "HZ", value_parser = cutoff)]
     cutoff_hz: Option<f64>,
-    /// The longest time between two measurements that is filled, seconds; 0.25 if nothing says otherwise.
+    /// Longest gap to fill, seconds; 0.25 if not given.
     #[arg(long, value_name = "SECONDS", value_parser = fill)]
     fill_s: Option<f64>,
     /// Keep the lengths of the limbs' bones constant (`rts`).
@@ -176,7 +176,7 @@ fn tell(request: &Request, outcome: &Outcome) -> Result<(), Failure> {
     let breaks = report.people.iter().map(|person| &person.frames_of_breaks);
     for frames in breaks.filter(|frames| !frames.is_empty()) {
         output::line(format_args!(
-            "somebody else begins in {} frames: {frames:?}",
+            "another person begins in {} frames: {frames:?}",
             frames.len()
         ))?;
     }

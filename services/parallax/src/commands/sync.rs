@@ -28,18 +28,18 @@ pub(crate) enum Command {
 /// Options of `parallax sync estimate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The people are those of the `keypoints` of a camera where the deployment names some, else what its network finds in the footage, \
-else what the filters find. The calibration has to fit; nobody needs to be told from anybody else. A joint that two cameras see at \
-one instant fulfils their epipolar constraint: the offset of a pair is where that holds best, and all cameras together have to \
-agree. Offsets are against the first camera (--reference), and are found whatever `offset_ms` and `drift_ppm` the file has.
+People come from the `keypoints` of a camera, otherwise from its network, otherwise from the filters. The calibration must fit; identities \
+are not needed. A joint that two cameras see at \
+one instant satisfies their epipolar constraint: the offset of a pair is where this holds best, and all cameras must \
+agree. Offsets are against the first camera (--reference), and do not depend on `offset_ms` and `drift_ppm` in the file.
 
-An answer is refused, with exit code 7 and the reason, where another offset is nearly as good (people on a treadmill), the minimum \
+An answer is refused, with exit code 7 and the reason, if another offset is nearly as good (people on a treadmill), the minimum \
 is flat (nobody moves), a pair or a part of the footage contradicts the rest, the views do not fit each other, or a camera sees \
-nobody. Nothing is written then. A drift is told apart from none only in footage that is long enough; the table says so.
+nobody. Nothing is written then. Short footage gives no drift; the table says so.
 
-With --by sound the times at which sounds begin are compared instead: steps, voices, doors, claps. Nobody needs to be seen. Sound \
-needs 2.9 ms for a metre, so that offsets are right to about the distance of two cameras divided by 343 m/s: +- says how much for \
-this rig; in JSON `joints` counts sounds then, and pixels are null. What is refused: too few sounds, sounds that only one camera has, a beat, pairs and parts that contradict each other.
+--by sound compares the times at which sounds begin instead: steps, voices, doors, claps. Nobody needs to be visible. Sound \
+travels a metre in 2.9 ms, so offsets are uncertain by the distance of two cameras divided by 343 m/s: +- includes this. \
+In JSON `joints` then counts sounds, and pixels are null. Refused are: too few sounds, sounds that only one camera has, a beat, pairs and parts that contradict each other.
 
 With --json one object:
     {\"is_determined\", \"doubts\": [text], \"reference\", \"length_s\", \"second_best\",
@@ -55,28 +55,28 @@ Examples:
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
-    /// What is compared.
+    /// The signal to compare.
     #[arg(long, value_enum, default_value_t = By::Movement)]
     by: By,
-    /// How far the clocks of two cameras may be apart, seconds; 10 for footage that was started by hand.
+    /// Largest clock offset of two cameras, seconds; use 10 for footage that was started by hand.
     #[arg(long, value_name = "SECONDS", default_value_t = 2.0, value_parser = window)]
     window: f64,
-    /// The camera whose clock is that of all; the first of the deployment if not given.
+    /// The camera with the reference clock; the first of the deployment if not given.
     #[arg(long, value_name = "CAMERA")]
     reference: Option<String>,
     /// Look at every n-th picture.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     every: u64,
-    /// Where to begin in the footage of each camera, seconds.
+    /// Start in the footage of each camera, seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     from: f64,
-    /// How much of the footage to look at, seconds; all of it if not given.
+    /// Length of the footage to look at, seconds; all of it if not given.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<f64>,
     /// Write a page with the costs of all pairs over their offset.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write `offset_ms` and `drift_ppm` into the deployment file, and leave everything else there as it is.
+    /// Write `offset_ms` and `drift_ppm` into the deployment file, and change nothing else there.
     #[arg(long)]
     write: bool,
     /// Replace a value of the deployment, for example `--set network.file=other.onnx`; may be given several times.
@@ -257,11 +257,11 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
     if outcome.cameras.iter().all(|it| it.drift_error.is_none()) {
         output::line("drift: the footage does not determine it, 0 is taken")?;
     } else if outcome.cameras.iter().any(|it| it.drift == 0.0) {
-        output::line("drift: one that is not told from none is 0")?;
+        output::line("drift: one that is not significant is 0")?;
     }
     output::line(format_args!(
         "{:<25} {:>9} {:>15} {:>12} {:>8}",
-        "pair by itself", "best, ms", "second best, ms", "as good, %", "samples"
+        "pair alone", "best, ms", "second best, ms", "as good, %", "samples"
     ))?;
     for it in &outcome.pairs {
         let [a, b] = it.cameras.map(|it| names[it]);

@@ -23,7 +23,7 @@ States: runs; done (has sent the end of its footage, and waits for the stop requ
 start it again). The last values of a dead process stay in the table.
 
 Stages: waiting, from the sending of a message until work on it begins (transport, a busy receiver, other views);
-computing; publishing, until the result is sent (with lossless delivery slow receivers too); since capture, from the
+computing; publishing, until the result is sent (with lossless delivery including slow receivers); since capture, from the
 capture of the frame to this process's message; end to end, from the capture to the result. Percentiles are over the
 lifetime of the process; rates are over the last five seconds.")]
 pub(crate) struct Arguments {

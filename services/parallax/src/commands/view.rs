@@ -21,17 +21,17 @@ const SHORTEST_TOKEN: usize = 16;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The page shows the skeleton in space with its uncertainty, every camera's picture with the pose found in it, epipolar \
-lines of a joint or a point, rates and latency, who is missing, and what happens; a button records what runs into the \
-folder of its results. It is an onlooker: no process of the deployment waits for it, and what it has no time for it leaves \
-out. It may be opened and closed at any time, several times at once; it waits for a deployment that does not run yet, and \
-for the next run when one ends. Of a finished run it shows a time line.
+lines of a joint or a point, rates and latency, missing processes, and events; a button records into the \
+results folder. It only listens: no process of the deployment waits for it, and it skips frames when it is slow. \
+Open and close it at any time, also several at once. It waits for a deployment that does not run yet, and \
+for the next run when one ends. A finished run has a time line.
 
-The page is for this machine: it is served on the loopback alone, and pages of other sites cannot read it. Users of this \
-machine can, unless a token is asked for; only your own pages, or those with the token, begin a recording, and it ends with \
-the page that began it. With --listen 0.0.0.0 other machines can, and need a token, which is made if none \
-is given. Nothing is encrypted: over a network that others use, prefer a tunnel (`ssh -L 7878:localhost:7878 HOST`).
+The page is served on the loopback only, and pages of other sites cannot read it. Users of this \
+machine can, unless you ask for a token; only your own pages, or those with the token, can record, and a recording ends with \
+the page that began it. With --listen 0.0.0.0 other machines can too, with a token, which is made if none \
+is given. Nothing is encrypted: over a shared network, prefer a tunnel (`ssh -L 7878:localhost:7878 HOST`).
 
-Keys in the page: ? lists them. Ctrl-C ends the view, and nothing else.
+Keys in the page: ? lists them. Ctrl-C ends the view only.
 
 Examples:
     parallax view                        the deployment that runs
@@ -47,13 +47,13 @@ pub(crate) struct Arguments {
     /// The name of a deployment, also if there is a folder of that name.
     #[arg(long, value_name = "NAME", conflicts_with = "subject")]
     deployment: Option<String>,
-    /// Port of the page; 0 for any free one. Without it 7878, or a free one if that is in use.
+    /// Port of the page, 0 for any free one; if not given, 7878, or a free one if that is in use.
     #[arg(long, value_name = "N")]
     port: Option<u16>,
     /// Address to listen on; any but the loopback needs a token.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     listen: IpAddr,
-    /// Ask pages for a token, which is made at random and is part of the address.
+    /// Ask pages for a random token, which is part of the address.
     #[arg(long, conflicts_with = "token_file")]
     token: bool,
     /// File with the token that pages must know: at least 16 letters, digits, '-' or '_'.

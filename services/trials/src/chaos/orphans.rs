@@ -77,7 +77,7 @@ fn wait_for_results(testbed: &Testbed, supervisor: &mut Child, file: &Path) -> R
             return Ok(());
         }
         if let Some(status) = supervisor.try_wait().or_fail(ExitKind::Run)? {
-            let message = format!("the run that was to be killed ended by itself: {status}");
+            let message = format!("the run ended before it was killed: {status}");
             return Err(Failure::new(ExitKind::Run, message));
         }
         if begin.elapsed() > PATIENCE {

@@ -54,7 +54,7 @@ impl Scenario {
     /// There is no scenario of that name; the message is for the user.
     pub fn by_name(name: &str) -> Result<Self, String> {
         let found = Self::all().into_iter().find(|it| it.name() == name);
-        found.ok_or_else(|| "there is none of this name; --list names them all".to_owned())
+        found.ok_or_else(|| "there is no scenario of this name; --list names them all".to_owned())
     }
 
     /// Its name.

@@ -20,7 +20,7 @@ pub enum C3dError {
         got: u8,
     },
     /// The processor type is none of the three.
-    #[error("processor {code} is none of 84 (Intel), 85 (DEC) and 86 (MIPS)")]
+    #[error("processor {code} is not 84 (Intel), 85 (DEC) or 86 (MIPS)")]
     Processor {
         /// The code in the file.
         code: u8,

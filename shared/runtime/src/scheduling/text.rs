@@ -7,7 +7,7 @@ use super::{Policy, RealTime, Scheduling};
 
 /// A text that is not a scheduling option.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{option:?} is none of cores=0,1 fifo=1 round-robin=1 lock-memory spin")]
+#[error("{option:?} is not one of cores=0,1 fifo=1 round-robin=1 lock-memory spin")]
 pub struct SchedulingError {
     /// The text.
     pub option: String,

@@ -51,7 +51,7 @@ pub enum SelectError {
         data: PathBuf,
     },
     /// A range of rows has no people.
-    #[error("the rows {first}-{last} of the selection are none of {}", data.display())]
+    #[error("the rows {first}-{last} of the selection are not in {}", data.display())]
     NoSuchRows {
         /// First row.
         first: usize,

@@ -29,15 +29,14 @@ pub(super) struct Options {
     /// The card of the network; if not given, the one beside it, or in its metadata.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     card: Option<PathBuf>,
-    /// The network (ONNX) that finds the boxes of people; without it the filters find them.
+    /// Detector (ONNX) that finds the boxes of people; if not given, the filters find them.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     pub(super) detector: Option<PathBuf>,
     /// The card of the detector; if not given, the one beside it, or in its metadata.
     #[arg(long, value_name = "FILE", requires = "detector")]
     detector_card: Option<PathBuf>,
-    /// What goes wrong, separated by commas: clean, covered:N (half of the person in N views), views:N (only so many),
-    /// turned:DEGREES (a camera), bystander, exchanged (sides in a view); all: the whole set. Only with
-    /// --network-evidence.
+    /// Problems to add, separated by commas: clean, covered:N (half of the person in N views), views:N (only so many),
+    /// turned:DEGREES (a camera), bystander, exchanged (sides in a view); all: the whole set. Only with --network-evidence.
     #[arg(
         long,
         value_name = "LIST",

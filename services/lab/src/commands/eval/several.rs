@@ -28,7 +28,7 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<ExitCode, Fail
     leave(arguments, &report, &in_lines(&report))?;
     failure::require_results(
         !report.actors.is_empty(),
-        "no frame has anybody in its truth",
+        "no frame has a person in its truth",
     )
 }
 

@@ -13,17 +13,17 @@ use crate::commands::eval::size;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
-SEQUENCE is what `parallax-lab eval` takes: a folder of HumanEva-I, of UMPM, of `parallax-lab synth`, or a description. \
-Every view is solved alone; of the parts that are near the truth it is learned which types come together in \
-two views, by the angle between the cameras as seen from the person, and with --rig NAME for the pairs of \
-that rig by the cameras' names too. The median error of every part is its threshold (tau); joints are a linear \
-map of the parts by least squares. Then alpha, the cap on distances and beta are chosen on subjects that \
-were held out: those of the largest area under the curve of PCP3D.
+SEQUENCE is a sequence for `parallax-lab eval`: a folder of HumanEva-I, of UMPM, of `parallax-lab synth`, or a description. \
+Every view is solved alone. From the parts near the truth it learns which types occur together in \
+two views, by the angle between the cameras as seen from the person, and with --rig NAME also for the pairs of \
+that rig by the cameras' names. The median error of every part is its threshold (tau); joints are a linear \
+map of the parts by least squares. Then it chooses alpha, the cap on distances and beta on \
+held-out subjects, by the largest area under the curve of PCP3D.
 
 The file belongs beside the model it was learned with: `consistency = \"person.consistency\"` in the [paper] section \
 of a deployment, or --consistency of `eval`. Its format: cargo doc -p consistency, `Learned`.
 
-With --json one object: the weights, every choice that was tried and how it did, tau, what the tables know of held-out \
+With --json one object: the weights, every choice that was tried and its score, tau, the score of the tables on held-out \
 people by the number of bins, the error of joints with and without the map.
 
 Exit codes: 0 done; 2 the command line; 4 a sequence or a model, or nothing could be learned; 5 a calibration; 130 \

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use lab::person::Chosen;
 
-/// Data sets, and who of them.
+/// Data sets, and the people of them.
 #[derive(Debug, Args)]
 pub(super) struct Marked {
     /// Annotated people: folders or files, as for `train fmp`.

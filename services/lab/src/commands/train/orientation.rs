@@ -14,12 +14,12 @@ use super::subjects;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
-Exchanging left and right in all views changes no energy: which side is which follows from whether the person is seen \
+Exchanging left and right in all views changes no energy, so the sides must follow from seeing the person \
 from the front or from behind. The network learns that from two sources, together or alone: DATASETs of annotated \
-people as for `parallax-lab train fmp`, whose left and right are marked as their owner would call them (LSP; not PARSE), \
-and scenes that do not exist (--scenes N), searched as the pipeline does.
+people as for `parallax-lab train fmp`, with the person's own left and right (LSP; not PARSE), \
+and synthetic scenes (--scenes N), searched as in the pipeline.
 
-Who is judged on is left out of the training: people by --judge, scenes by --judge-scenes, of other subjects.
+--judge and --judge-scenes name people and scenes to judge on, which are left out of the training.
 
 The network is the same, bit for bit, on any number of threads of one kind of machine.
 
@@ -56,7 +56,7 @@ pub(crate) struct Arguments {
     /// Frames per camera of a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
-    /// Photographs without people, used as the background of every third scene instead of a room.
+    /// Photographs without people, as the background of every third scene instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
     /// Passes through all people.

@@ -10,10 +10,10 @@ use super::{EXITS, Output};
 use terminal::rate;
 
 const HELP: &str = "\
-Every run is a deployment of real processes, as `parallax run` starts it. Without a deployment file its cameras are \
-synthetic, 320x240 pixels, `--rate` frames a second; their pictures are rendered in advance, into OUT/pictures \
-(with --live by the capture processes during the run, which then compete with the others for the cores). They are \
-searched near the last pose, as the demo's are (`--set paper.search=full`: everywhere).
+Every run is a deployment of real processes, started like `parallax run`. Without a deployment file its cameras are \
+synthetic, 320x240 pixels, `--rate` frames a second. Their pictures are rendered in advance into OUT/pictures; \
+with --live the capture processes render them during the run, and compete with the others for the cores. They are \
+searched near the last pose (`--set paper.search=full`: everywhere).
 
 latency     --views cameras in real time; then the same with the process of the last camera killed
 throughput  --views cameras, every frame, as fast as possible
@@ -21,8 +21,8 @@ scale       as latency with 1, 2, ... --views cameras; then all of them with the
 
 The table shows for every run the number of results and their rate, the latency from the capture of \
 the first picture to the result (end to end) and that of every stage, milliseconds, and the processor \
-time per result, all processes together. The camera is killed at the first result and not restarted; only what \
-follows its death is measured.
+time per result, all processes together. The camera is killed at the first result and not restarted; only results \
+after its death are measured.
 
 The results of a run are in its folder, OUT/<run>.";
 

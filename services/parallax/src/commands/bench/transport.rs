@@ -8,7 +8,7 @@ use super::{EXITS, Output};
 const HELP: &str = "\
 One process writes messages into shared memory at a fixed interval, another receives them. A hop is the time from just \
 before sending to just after receiving, by the clock of the machine. It includes the wake-up of the receiver, and \
-excludes the writing of the message. Measured are a small message and a frame of pixels, each with a receiver that sleeps until \
+excludes the writing of the message. It measures a small message and a frame of pixels, each with a receiver that sleeps until \
 an event wakes it (the default of a deployment) and with one that polls (`runtime.spin`), which occupies a \
 core.
 

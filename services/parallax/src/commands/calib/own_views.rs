@@ -30,7 +30,7 @@ pub(super) fn agreement(rig: &Rig, file: &Path) -> Result<Agreement, Failure> {
     let n_seen = |views: &&Vec<Option<Points>>| views.iter().flatten().count();
     if !frames.iter().any(|views| n_seen(&views) > 1) {
         let message = format!(
-            "{}: in no frame did two cameras of the rig find somebody by themselves (`single`), and poses after fusion agree with any rig",
+            "{}: no frame has own poses (`single`) of two cameras of the rig, and poses after fusion agree with any rig",
             file.display()
         );
         let hint = "name `pose2d.jsonl` of a run whose cameras have the names of the rig";

@@ -31,12 +31,12 @@ A board is KIND:COLUMNSxROWS:SIDE, with options after further colons:
     chessboard:9x6:25mm               9 x 6 inner corners
     aprilgrid:6x6:88mm:36h11:gap=0.3  6 x 6 tags with gaps of 0.3 of a tag
 
-Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, into the corners of every picture. Two cameras at
-a time have to see it, never all. Which pictures belong together is told by timestamps.csv beside the first video (Caliscope's:
-the n-th row of a camera is its n-th picture) or --timestamps, else by their number, or by time where frame rates differ.
+Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, into the corners of every picture. At least two \
+cameras at a time must see it. Pictures belong together by timestamps.csv beside the first video (Caliscope's: \
+the n-th row of a camera is its n-th picture) or --timestamps, otherwise by their number, or by time if frame rates differ.
 
 The world is the frame of the first camera; `parallax calibrate origin` puts it on the floor. With doubts the files are written,
-the report and the rig say so, and the exit code is 7; where there is no answer it is 5, or 4 without a board in the pictures.
+the report and the rig say so, and the exit code is 7; without an answer it is 5, or 4 without a board in the pictures.
 
 With --json one object:
     {\"is_trusted\", \"doubts\", \"notes\", \"board\", \"sigma_px\",
@@ -57,16 +57,16 @@ pub(crate) struct Arguments {
     /// The board.
     #[arg(long, value_name = "BOARD", required_unless_present = "print")]
     board: Option<Board>,
-    /// Find the intrinsics of every camera by itself, not where they stand.
+    /// Find only the intrinsics, of every camera alone.
     #[arg(long)]
     intrinsics: bool,
     /// Intrinsics to keep: a calibration of any format that has cameras of these names.
     #[arg(long, value_name = "FILE")]
     known: Option<PathBuf>,
-    /// What is found of a lens.
+    /// The lens model.
     #[arg(long, value_enum, default_value_t = Lens::Five)]
     lens: Lens,
-    /// Which pictures were taken together: a table with the columns `sync_index` and `cam_id`.
+    /// Table of the pictures that were taken together, with the columns `sync_index` and `cam_id`.
     #[arg(long, value_name = "FILE")]
     timestamps: Option<PathBuf>,
     /// Look at every n-th frame; chosen by the length of the footage if not given.
@@ -81,14 +81,14 @@ pub(crate) struct Arguments {
     /// Read the corners from a table, in the columns of Caliscope, instead.
     #[arg(long, value_name = "FILE")]
     corners: Option<PathBuf>,
-    /// Write the corners that were found as such a table.
+    /// Write the corners as such a table.
     #[arg(long, value_name = "FILE")]
     save_corners: Option<PathBuf>,
-    /// The footage is mirrored, in all recordings alike.
+    /// Treat all footage as mirrored.
     #[arg(long)]
     mirrored: bool,
-    /// What is on the back of the board: `mirrored` is the mirror image of the front, corner on corner, for cameras on both sides; `blank`
-    /// is nothing. Found by itself where cameras tell.
+    /// The back of the board: `mirrored`, the mirror image of the front, corner on corner, for cameras on both sides; or `blank`.
+    /// If not given, found from the pictures where possible.
     #[arg(long, value_enum, conflicts_with = "mirrored")]
     back: Option<BackName>,
     /// Write the calibration; with --print the board (.pdf or .svg; both if not given).
@@ -111,7 +111,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What is found of a lens.
+/// The lens model.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum Lens {
     /// Pinhole with k1, k2, k3, p1, p2.

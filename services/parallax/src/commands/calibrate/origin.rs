@@ -21,9 +21,9 @@ use terminal::{Globals, Terminal, output};
 #[command(after_help = "\
 With a board on the floor, its print up: the origin is its upper left corner, x along its rows, y against its columns, z up.
 With three points on the floor: the origin, one along x, and any other; each as pixels of at least two cameras.
-With --people the floor is found: it is below the ankles of people who stand, in a run of this rig that has ended. The origin is in \
-the middle of where they stood, x as near to the old x as can be. Where somebody walked about, the plane in which the feet stood \
-tells the vertical; if not, people who stand upright do, less surely: the file is written, and the exit code is 7.
+With --people the floor is below the feet of people who stand, in a finished run of this rig. The origin is in \
+the middle of their places, and x is as near to the old x as possible. If a person walked about, the plane of the standing feet \
+gives the vertical. Otherwise upright people do, less surely: the file is written, and the exit code is 7.
 
 Examples:
     parallax calibrate origin rig.toml --board charuco:7x5:40mm cam0.mp4 cam1.mp4 --frames 1 --out room.toml
@@ -39,7 +39,7 @@ pub(crate) struct Arguments {
     /// The board.
     #[arg(long, value_name = "BOARD", requires = "footage")]
     board: Option<Board>,
-    /// How many frames, from the first, show the board lying still.
+    /// Number of frames, from the first, in which the board lies still.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     frames: u64,
     /// The origin, as a camera sees it; once for each camera.
@@ -51,10 +51,10 @@ pub(crate) struct Arguments {
     /// Any other point of the floor.
     #[arg(long, value_name = "CAMERA=X,Y")]
     floor: Vec<String>,
-    /// The folder of a finished run of this rig in which somebody walks about.
+    /// The folder of a finished run of this rig in which a person walks about.
     #[arg(long, value_name = "RUN", conflicts_with_all = ["board", "at"])]
     people: Option<PathBuf>,
-    /// Frames per second, for a run that does not know.
+    /// Frames per second, for a run without a frame rate.
     #[arg(long, value_name = "HZ", requires = "people", value_parser = rate)]
     rate: Option<f64>,
     /// The rig file to write.
@@ -115,7 +115,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     match below {
         None if by_bodies => {
             let message = "the vertical is that of people who stand upright, some degrees sure: their feet stood on one spot";
-            let hint = "a run in which somebody walks about tells it by the feet";
+            let hint = "a run in which a person walks about gives it by the feet";
             Err(Failure::new(ExitKind::Degraded, message).with_hint(hint))
         }
         None => Ok(ExitCode::SUCCESS),

@@ -26,21 +26,21 @@ space are off on account of it, a run with this rig tells by its residuals";
 /// Options of `parallax calibrate people`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The people are those of the `keypoints` of a camera where the deployment names some, else what its network finds in the footage, \
-else what the filters find: the same as `parallax sync estimate` looks at. One person is enough; the one that is seen longest is \
-used. Of the deployment's rig the intrinsics and the names count; its poses are used with `--scale rig` alone.
+People come from the `keypoints` of a camera, otherwise from its network, otherwise from the filters, as in `parallax sync estimate`. \
+The person whom the cameras see longest together is used; one person alone is better. The deployment's rig gives intrinsics and \
+names; its poses are used only with `--scale rig`.
 
-Pictures tell no lengths. The scale is that of a person's standing height by the lengths of the bones (--height-m, right to 2 or 3 \
-percent for someone of usual proportions), of the distance of two cameras (--distance), or of the rig that is there (--scale rig, \
-which keeps its world as well). Otherwise the world has its floor at z = 0, under the middle of where the person was, and z against \
-gravity: by the feet that stand, or else by upright bodies.
+Pictures have no scale. It comes from a person's standing height by the lengths of the bones (--height-m, right to 2 or 3 \
+percent for usual proportions), from the distance of two cameras (--distance), or from the given rig (--scale rig, \
+which also keeps its world). Otherwise the world has its floor at z = 0, its origin under the middle of the walk, and z against \
+gravity: by the standing feet, or else by upright bodies.
 
-An answer is refused, with exit code 7 and every reason, where two halves of the recording give different rigs, a camera has too \
-little in common with the others, its pose is known too badly, or what was found is no person. Nothing is written then. Where a \
-camera is known to more than 0.3 degrees or 1 percent of its distance to the people (one standard deviation), the rig is written, \
-and says so; every such camera is printed, and the exit code is 6.
+An answer is refused, with exit code 7 and every reason, if two halves of the recording give different rigs, a camera has too \
+little in common with the others, its pose is known too badly, or no person was found. Nothing is written then. If a \
+camera is known only to more than 0.3 degrees or 1 percent of its distance to the people (one standard deviation), the rig is written \
+with a note, every such camera is printed, and the exit code is 6.
 
-The clocks of the deployment are believed unless joints fit clearly better with others, or --window is given.
+The clocks of the deployment are used unless joints fit clearly better with others, or --window is given.
 
 With --json one object:
     {\"is_determined\", \"doubts\": [text], \"cautions\": [text], \"clocks_are_found\", \"instants\", \"span_s\", \"vertical\", \"scale_error\", \"stature_metres\", \"exchanged\",
@@ -67,10 +67,10 @@ pub(crate) struct Arguments {
     /// Estimate focal lengths, too: less certain.
     #[arg(long)]
     focal: bool,
-    /// How far the clocks of two cameras may be apart, seconds. A few pictures are found without.
+    /// Largest clock offset of two cameras, seconds. Offsets of a few pictures are found without it.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = window)]
     window: f64,
-    /// Number of the random samples; another one shows how much depends on them.
+    /// Seed of the random samples; another seed shows their influence.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }

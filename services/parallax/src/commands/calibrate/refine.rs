@@ -21,12 +21,11 @@ or the rig is not that of these cameras, begin anew: parallax calibrate people";
 /// Options of `parallax calibrate refine`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The rig of the deployment is believed with the deviations of --sd-degrees and --sd-mm; a camera that was moved breaks away from \
-them. Only a camera whose pose the joints tell better than that moves, the others are held. Time offsets are estimated along, \
-within --sd-ms of those of the deployment.
+The rig of the deployment is trusted to within --sd-degrees and --sd-mm. Only a camera whose pose the joints determine better \
+moves; the others are held. Time offsets are estimated too, within --sd-ms of those of the deployment.
 
-Whether the new rig is better is told by what it was not fitted to: each half of the recording judges the rig of the other one, \
-by how far the joints of each camera are from where the other cameras see them.
+The new rig is judged by data that it was not fitted to: each half of the recording judges the rig of the other one, \
+by the distance of each camera's joints from where the other cameras see them.
 
 Exit codes: 0 better, and --out is written; 6 no better, the rig is to be kept; 7 refused, with every reason.
 
@@ -42,7 +41,7 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     walk: WalkArguments,
-    /// Standard deviation of the rotations of the rig that is there, degrees.
+    /// Standard deviation of the rotations of the given rig, degrees.
     #[arg(long, value_name = "DEGREES", default_value_t = 1.0, value_parser = deviation)]
     sd_degrees: f64,
     /// Standard deviation of the places of its cameras, millimetres.

@@ -20,24 +20,24 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{le
 /// Options of both.
 #[derive(Debug, Args)]
 pub(super) struct WalkArguments {
-    /// The deployment file; of its rig the intrinsics count.
+    /// The deployment file, with a rig that has the intrinsics.
     pub(super) config: PathBuf,
-    /// Write the rig file that was found; nothing is written where the answer is refused.
+    /// Write the rig file; nothing is written if the answer is refused.
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    /// Write a page: residuals, where in the pictures people were, uncertainties, the rig in space, the pictures that fit worst.
+    /// Write a page: residuals, places of people in the pictures, uncertainties, the rig in space, the worst pictures.
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
     /// Look at every n-th picture.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub(super) every: u64,
-    /// Where to begin in the footage of each camera, seconds.
+    /// Start in the footage of each camera, seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     pub(super) from: f64,
-    /// How much of the footage to look at, seconds; all of it if not given.
+    /// Length of the footage to look at, seconds; all of it if not given.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(super) seconds: Option<f64>,
-    /// The most instants that take part, evenly over the footage.
+    /// Most instants to use, evenly over the footage.
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(12..=5000))]
     pub(super) instants: u64,
     /// Replace a value of the deployment, for example `--set rig=lab.toml`; may be given several times.
@@ -82,7 +82,7 @@ pub(super) fn walk(
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
     let deployment = launch::cameras::settled(&deployment)?;
     if deployment.cameras.len() < 2 {
-        let message = "the deployment has one camera: where it stands is told by others only";
+        let message = "the deployment has one camera: its place can only be found from others";
         return Err(Failure::new(ExitKind::Config, message));
     }
     let terminal = Terminal::with_bar(globals.quiet, false, BAR)

@@ -11,17 +11,17 @@ use training::networks::Backend;
 use training::networks::pose::Settings;
 
 const HELP: &str = "\
-PEOPLE is a file of `parallax-lab train network-people`. The network finds 14 joints, nose, heels and big toes as seen, the direction in which the trunk \
-faces, and the expected error of each; the ONNX file carries its card.
+PEOPLE is a file of `parallax-lab train network-people`. The network finds 14 joints, nose, heels and big toes as seen, the direction of the \
+trunk, and the expected error of each. The ONNX file contains its card.
 
-After every hundred steps everything that the training knows is in OUT.checkpoint: what is stopped by Ctrl-C, or killed, goes on with \
---resume and ends with the same network, bit for bit, on the same kind of machine.
+After every hundred steps the state of the training is in OUT.checkpoint. After Ctrl-C or a kill, \
+--resume continues, and ends with the same network, bit for bit, on the same kind of machine.
 
---from trains a network further; a lower `rate` in --settings is for this. --from shipped means the network that ships. With `extras_alone = true` \
+--from continues the training of a network; use a lower `rate` in --settings for this. --from shipped means the network that ships. With `extras_alone = true` \
 in --settings only nose, heels and big toes are learned, and everything else in the file of --from stays as it is.
 
-Nothing has to be installed for it. With LibTorch, which has to be (docs/guide/train.md says how; build with --features libtorch), \
-a training takes less time.
+The built-in training needs no other software. A build with LibTorch (--features libtorch; docs/guide/train.md has the steps) \
+can be faster.
 
 Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a setting is wrong; \
 4 the people or the checkpoint cannot be used; 130 stopped by Ctrl-C.
@@ -51,10 +51,10 @@ pub(crate) struct Arguments {
     /// Random seed, instead of that of the settings.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// What computes: `built-in`, or `libtorch`, if this executable was built with it.
+    /// Backend: `built-in`, or `libtorch`, if this executable was built with it.
     #[arg(long, value_name = "NAME", default_value = "built-in", value_parser = ["built-in", "libtorch"])]
     backend: String,
-    /// A network of this command to go on from, in place of random weights: more steps, or people of your own.
+    /// Network of this command to start from, in place of random weights: for more steps, or your own people.
     #[arg(long, value_name = "NETWORK")]
     from: Option<PathBuf>,
     /// Continue from the checkpoint of an interrupted training; start anew if there is none.

@@ -18,16 +18,16 @@ use crate::commands::train::subjects;
 const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} {msg}";
 
 const HELP: &str = "\
-Two sources: DATASETs of annotated people as for `parallax-lab train fmp`, and scenes that do not exist (--scenes N), whose joints and \
-directions are exact. Of everybody a picture of 256 x 256 pixels is kept, and where the joints are: as seen, so that left and \
-right follow the picture. In which direction somebody faces follows from the marks, if left and right are those of the people \
-themselves (LSP; for PARSE say --sides PARSE=seen).
+Two sources: DATASETs of annotated people as for `parallax-lab train fmp`, and synthetic scenes (--scenes N), whose joints and \
+directions are exact. For each person it keeps a picture of 256 x 256 pixels and the joints as seen, so that left and \
+right follow the picture. The direction of a person follows from the marks, if left and right are the person's \
+own (LSP; for PARSE pass --sides PARSE=seen).
 
-A teacher, another network with a card, helps: its joints stand in for those without a mark, sides that it surely contradicts are \
-exchanged, and where it agrees with a mark the mean of both is learned. Nose, heels and big toes are its own, if its card names them.
+A teacher, another network with a card, helps: its joints replace missing marks, sides that it surely contradicts are \
+exchanged, and where it agrees with a mark the mean of both is learned. Nose, heels and big toes come from the teacher, if its card names them.
 
-One in twelve is kept apart: the training is watched on them, and the expected error is learned on them. Who is judged on must be left \
-out with --without.
+One in twelve is held out: the training is watched on them, and the expected error is learned on them. Leave out the people to judge on \
+with --without.
 
 Exit codes: 0 the file is written; 2 the command line is wrong; 4 a data set or the teacher cannot be used; 130 stopped by Ctrl-C.
 
@@ -56,7 +56,7 @@ pub(crate) struct Arguments {
     /// Frames per camera of a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
-    /// Photographs without people, used as the background of every third scene instead of a room.
+    /// Photographs without people, as the background of every third scene instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
     /// Random seed of the scenes.

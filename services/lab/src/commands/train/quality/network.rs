@@ -11,13 +11,13 @@ use training::networks::quality::settings::Settings;
 use terminal::{Globals, output};
 
 const HELP: &str = "\
-The samples are made by `parallax-lab train quality-samples`; a share of their groups (subjects, images) is validated on, \
-never a part of a group. After every pass the state is in OUT.checkpoint: --resume goes on, and on the CPU the \
-network is the same, bit for bit, whatever the interruptions. OUT.svg shows how the training went. The best pass is \
-written as ONNX, with what `errors` in [paper] needs to know of it inside: preprocessing, unit, thresholds.
+The samples come from `parallax-lab train quality-samples`. Whole groups of them (subjects, images) are held out for \
+validation. After every pass the state is in OUT.checkpoint: --resume continues, and on the CPU the \
+network is the same, bit for bit, whatever the interruptions. OUT.svg shows the progress of the training. The best pass is \
+written as ONNX, with all that `errors` in [paper] needs: preprocessing, unit, thresholds.
 
-VGG-16 (--network vgg16) begins with torchvision's weights, --weights vgg16.safetensors (of a .pth make one \
-with safetensors.torch.save_file), and samples made with --tile vgg16.
+VGG-16 (--network vgg16) begins with torchvision's weights, --weights vgg16.safetensors (convert a .pth \
+by safetensors.torch.save_file), and samples made with --tile vgg16.
 
 Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a \
 setting is wrong; 4 samples, weights or a checkpoint cannot be used; 130 stopped by Ctrl-C.

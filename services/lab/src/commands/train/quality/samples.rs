@@ -12,12 +12,12 @@ use crate::commands::train::subjects;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
-Two sources, together or alone: scenes that do not exist (--scenes N, of the subjects of --subjects, every one of \
+Two sources, together or alone: synthetic scenes (--scenes N, of the subjects of --subjects, each with \
 another action, rig, room, noise, blur and exposure, by the seed), and DATASETs of annotated people as for \
-`parallax-lab train fmp`. Every picture is searched as the pipeline does; what is kept of it is the tile around \
-the best pose with a margin, what the search knows of the pose, and how far off every part is.
+`parallax-lab train fmp`. Every picture is searched as in the pipeline. A sample is the tile around \
+the best pose with a margin, the results of the search, and the error of every part.
 
-Subjects and images that the network is to be judged on belong into a file of their own.
+Put subjects and images for judging the network into a separate file.
 
 Example:
     parallax-lab train quality-samples --scenes 200 --subjects 1-100 --out train.samples
@@ -63,7 +63,7 @@ pub(crate) struct Arguments {
     /// Frames per camera of a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
-    /// Photographs without people, used as the background of every third scene instead of a room.
+    /// Photographs without people, as the background of every third scene instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
     /// Random seed.

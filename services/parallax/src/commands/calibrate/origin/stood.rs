@@ -49,17 +49,16 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
     check(rig, run, &frames, &skeletons)?;
     let found = floor(&times_s, &skeletons).ok_or_else(|| {
         let message = format!(
-            "{}: nobody is seen standing on a foot in its {} frames",
+            "{}: no person stands on a foot in its {} frames",
             run.display(),
             frames.len()
         );
-        Failure::new(ExitKind::Degraded, message)
-            .with_hint("somebody has to walk about, or to stand")
+        Failure::new(ExitKind::Degraded, message).with_hint("let a person walk about, or stand")
     })?;
     if found.vertical == Vertical::Leaning {
         let message =
             "nobody stands upright, and feet stand on one spot: the vertical is not known";
-        let hint = "a run in which somebody walks about tells it";
+        let hint = "use a run in which a person walks about";
         return Err(Failure::new(ExitKind::Degraded, message).with_hint(hint));
     }
     Ok(found)
