@@ -21,7 +21,10 @@ fn picture(nth: usize, rng: &mut fastrand::Rng) -> Picture {
     let mut people = Vec::new();
     if nth % 4 != 3 {
         let [width, height] = [rng.usize(14..20), rng.usize(36..50)];
-        let [left, top] = [rng.usize(0..size[0] - width), rng.usize(0..size[1] - height)];
+        let [left, top] = [
+            rng.usize(0..size[0] - width),
+            rng.usize(0..size[1] - height),
+        ];
         for row in top..top + height {
             let from = 3 * (row * size[0] + left);
             rgb[from..from + 3 * width].fill(if row < top + height / 2 { 250 } else { 10 });
@@ -96,7 +99,10 @@ fn it_learns_to_find_boxes_and_nobody_where_nobody_is() {
     let [first, .., last] = trainer.passes() else {
         panic!("three passes");
     };
-    assert!(last.cost.heat < 0.5 * first.cost.heat, "{first:?}, {last:?}");
+    assert!(
+        last.cost.heat < 0.5 * first.cost.heat,
+        "{first:?}, {last:?}"
+    );
     let score = last.score.unwrap();
     assert!(score.recall > 0.7 && score.quiet > 0.7, "{score:?}");
 }
@@ -138,7 +144,9 @@ fn the_file_that_is_written_finds_what_the_trained_network_found() {
     };
     session.run(&[input], &[BOXES], take).unwrap();
     // Weights are stored in half precision.
-    let scale = expected.iter().fold(0.0_f32, |most, value| most.max(value.abs()));
+    let scale = expected
+        .iter()
+        .fold(0.0_f32, |most, value| most.max(value.abs()));
     let off = found.iter().zip(&expected).map(|(a, b)| (a - b).abs());
     let worst = off.fold(0.0, f32::max);
     assert_eq!(found.len(), expected.len());

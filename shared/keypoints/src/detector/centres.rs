@@ -68,7 +68,11 @@ mod tests {
     #[test]
     fn a_box_lies_around_the_middle_of_its_cell_and_its_neighbours_say_nothing() {
         let around = [1.0, 2.0, 1.5, 4.0];
-        let cells = [([3, 2], 2.0, around), ([4, 2], 1.0, around), ([9, 6], -3.0, around)];
+        let cells = [
+            ([3, 2], 2.0, around),
+            ([4, 2], 1.0, around),
+            ([9, 6], -3.0, around),
+        ];
         let found = boxes(&values(&cells), SIZE, (4, 0.3));
         assert_eq!(found.len(), 1, "{found:?}");
         let expected = [13.5 - 4.0, 9.5 - 8.0, 13.5 + 6.0, 9.5 + 16.0];
