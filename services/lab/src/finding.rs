@@ -37,7 +37,7 @@ pub struct Sources {
     pub scenes: Scenes,
 }
 
-/// Of so many blocks of photographs in a row, and of so many subjects of scenes, one is kept apart.
+/// One of so many blocks of photographs in a row, and of so many subjects of scenes, is kept apart.
 const KEPT: usize = 12;
 /// Photographs in a row that are kept apart together: neighbours often show the same event.
 const BLOCK: usize = 20;

@@ -43,7 +43,7 @@ pub trait Example: Serialize + DeserializeOwned {
     /// The command that writes it.
     const MADE_BY: &str;
 
-    /// Whether it has as many pixels as it should.
+    /// Returns whether it has as many pixels as it should.
     fn is_whole(&self) -> bool;
 }
 
@@ -66,7 +66,7 @@ pub fn write<T: Example>(path: &Path, examples: &Prepared<T>) -> Result<(), Fail
     written.map_err(|error| failure::in_file(path, &error))
 }
 
-/// Whether a file holds prepared examples of a kind.
+/// Returns whether a file holds prepared examples of a kind.
 pub fn is_file<T: Example>(path: &Path) -> bool {
     let mut mark = [0; 8];
     let read = files::open(path).and_then(|mut file| file.read_exact(&mut mark));

@@ -15,16 +15,16 @@ pub struct Earlier {
     pub bytes: Vec<u8>,
 }
 
-/// What is written, and how.
+/// A training: which file it writes, and how.
 #[derive(Debug, Clone)]
 pub struct Job {
     /// The ONNX file.
     pub out: PathBuf,
     /// A network that was trained before, to go on from.
     pub from: Option<Earlier>,
-    /// Whether to go on from the checkpoint of an interrupted training.
+    /// Goes on from the checkpoint of an interrupted training.
     pub resume: bool,
-    /// What calculates.
+    /// The library that computes.
     pub backend: Backend,
 }
 
@@ -32,7 +32,7 @@ pub struct Job {
 pub(crate) struct Shown<'a, T: Task> {
     /// The curves of all passes, SVG.
     pub(crate) curves: &'a dyn Fn(&[Pass<T::Cost, T::Score>]) -> String,
-    /// What a pass came to, in words, after its step.
+    /// A pass in words, after its step.
     pub(crate) words: &'a dyn Fn(&Pass<T::Cost, T::Score>) -> String,
 }
 

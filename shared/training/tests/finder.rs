@@ -166,7 +166,7 @@ fn the_network_that_ships_is_cheap_and_its_card_is_one() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// What the network should find is what the card's codec reads: the same boxes, whatever was varied.
+    /// The card's codec reads boxes that lie in the sample from what the network should give, whatever was varied.
     #[test]
     fn what_should_be_found_is_decoded_as_the_boxes_that_were_shown(seed in any::<u64>()) {
         let settings = small();

@@ -42,7 +42,7 @@ pub fn train(
     trained::run(job, task, &shown, &written, (stop, console))
 }
 
-/// What was learned, and how good the network is on pictures that are kept apart.
+/// Draws the costs, and how good the network is on pictures that are kept apart.
 fn drawn(passes: &[Pass]) -> String {
     let cost = |name, value: &dyn Fn(&Pass) -> f32| Line {
         name,
@@ -74,7 +74,7 @@ fn drawn(passes: &[Pass]) -> String {
     curves::svg(&panels, None)
 }
 
-/// What a pass came to.
+/// Says how a pass ended.
 fn words(pass: &Pass) -> String {
     let learnt = format!("heat {:.3}, sides {:.3}", pass.cost.heat, pass.cost.sides);
     let Some(score) = pass.score else {

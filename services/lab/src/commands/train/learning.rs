@@ -8,7 +8,7 @@ use serde::{Serialize, de::DeserializeOwned};
 use terminal::output;
 use training::networks::Backend;
 
-/// What is written, and how.
+/// Options that say which file is written, and how.
 #[derive(Debug, Args)]
 pub(super) struct Learning {
     /// The ONNX file to write.
@@ -26,7 +26,7 @@ pub(super) struct Learning {
     /// Random seed, instead of that of the settings.
     #[arg(long, value_name = "N")]
     pub(super) seed: Option<u32>,
-    /// What computes: `built-in`, or `libtorch`, if this executable was built with it.
+    /// The library that computes: `built-in`, or `libtorch`, if this executable was built with it.
     #[arg(long, value_name = "NAME", default_value = "built-in", value_parser = ["built-in", "libtorch"])]
     backend: String,
     /// Continue from the checkpoint of an interrupted training; start anew if there is none.
@@ -53,7 +53,7 @@ impl Learning {
         output::line(text.trim_end())
     }
 
-    /// What is written, and how, without a network to go on from.
+    /// The job without a network to go on from.
     pub(super) fn job(&self) -> Result<lab::posetraining::Job, Failure> {
         Ok(lab::posetraining::Job {
             out: self.out.clone().unwrap_or_default(),

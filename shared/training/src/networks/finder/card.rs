@@ -6,11 +6,11 @@ use crate::networks::pose::{DEVIATION, FILL, MEAN};
 
 /// Boxes with a lower score are dropped.
 const LEAST_SCORE: f64 = 0.3;
-/// Of two boxes that share more than this of their union the worse is dropped: people who stand in front of each other share more
+/// The worse of two boxes that share more than this of their union is dropped: people who stand in front of each other share more
 /// than half.
 const MOST_OVERLAP: f64 = 0.7;
 
-/// What a card tells beside how the network is used.
+/// Facts that a card tells beside how the network is used.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct About {
     /// Pictures learned from, and kept apart.

@@ -9,7 +9,7 @@ const LOGARITHMS: core::ops::RangeInclusive<f32> = -3.0..=5.0;
 /// Log-odds beyond which a cell counts as it does there.
 const MOST_LOG_ODDS: f32 = 15.0;
 
-/// What should be found in a batch.
+/// The boxes that should be found in a batch, as heat and sides.
 #[derive(Debug, Clone, Default)]
 pub struct Truth {
     /// Heat of every cell, 0 to 1, exactly 1 where the middle of a box lies: `[n, rows, columns]`. Below 0: the cell does not count.
@@ -22,16 +22,16 @@ pub struct Truth {
 /// The parts of the cost of a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// Of the heat, for each person.
+    /// The cost of the heat, for each person.
     pub heat: f32,
-    /// Of the boxes: the mean negative logarithm of what a box shares with the true one, as a share of their union.
+    /// The cost of the boxes: the mean negative logarithm of what a box shares with the true one, as a share of their union.
     pub sides: f32,
 }
 
 impl Truth {
     /// The cost, and its gradient by the output of the network.
     ///
-    /// Of the heat the focal loss with fewer penalties around a middle (Law and Deng 2018, "`CornerNet`", equation 1); of the boxes
+    /// For the heat the focal loss with fewer penalties around a middle (Law and Deng 2018, "`CornerNet`", equation 1); of the boxes
     /// the logarithm of the intersection over union (Yu et al. 2016, "`UnitBox`"), in cells as much as they have heat.
     ///
     /// * `cells`: columns times rows.
@@ -97,7 +97,7 @@ fn focal(log_odds: f32, heat: f32) -> [f32; 2] {
 
 /// The negative logarithm of the intersection over union of two boxes around a point, and its slopes by the logarithms of the sides.
 fn union(logarithms: [f32; 4], truth: [f32; 4]) -> (f32, [f32; 4]) {
-    let sides = logarithms.map(|it| it.clamp(*LOGARITHMS.start(), *LOGARITHMS.end()).exp());
+    let sides = logarithms.map(|side| side.clamp(*LOGARITHMS.start(), *LOGARITHMS.end()).exp());
     let area = |[left, top, right, bottom]: [f32; 4]| (left + right) * (top + bottom);
     let both: [f32; 4] = core::array::from_fn(|side| sides[side].min(truth[side]));
     let shared = area(both);

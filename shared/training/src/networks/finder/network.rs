@@ -15,7 +15,7 @@ pub const CHANNELS: usize = 5;
 pub const PICTURE: &str = "picture";
 /// Name of the output, `[n, 5, rows, columns]`.
 pub const BOXES: &str = "boxes";
-/// What sides of the input must be multiples of.
+/// Sides of the input are multiples of it.
 pub(crate) const MULTIPLE: usize = 32;
 
 /// The log-odds of an untrained cell.

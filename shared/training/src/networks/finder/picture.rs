@@ -10,7 +10,7 @@ pub const SIDE: usize = 320;
 pub struct Around {
     /// Left, top, right, bottom, pixels.
     pub outline: [f32; 4],
-    /// Whether the network should find it. Otherwise it is not asked: hardly anything is seen of the person, or nobody knows
+    /// Set where the network should find it. Otherwise it is not asked: hardly anything is seen of the person, or nobody knows
     /// whether it is one.
     pub counts: bool,
 }
@@ -22,7 +22,7 @@ impl Around {
         (right - left).max(0.0) * (bottom - top).max(0.0)
     }
 
-    /// What it shares with another box, as a share of their union.
+    /// Returns what it shares with another box, as a share of their union.
     pub fn overlap(&self, other: &Self) -> f32 {
         let shared = self.cut(other.outline).area();
         shared / (self.area() + other.area() - shared).max(f32::MIN_POSITIVE)
@@ -47,7 +47,7 @@ impl Around {
 /// A picture, and the boxes of everybody in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Picture {
-    /// What it is called in messages.
+    /// Its name in messages.
     pub name: String,
     /// Width and height, pixels, [`SIDE`] at most.
     pub size: [usize; 2],
@@ -58,7 +58,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Whether it has as many pixels as it says.
+    /// Returns whether it has as many pixels as it says.
     pub fn is_whole(&self) -> bool {
         let [width, height] = self.size;
         width > 0 && height > 0 && self.rgb.len() == 3 * width * height

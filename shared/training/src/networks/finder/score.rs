@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::picture::Around;
 
-/// What a found box shares with a true one, at least, as a share of their union.
+/// A found box and a true one that is the same share this of their union, at least.
 const SAME: f32 = 0.5;
-/// What it shares with somebody who does not count, at least, so that it is not false.
+/// A box that shares this with somebody who does not count is not false.
 const UNASKED: f32 = 0.3;
 
 /// How good a network is.

@@ -27,7 +27,7 @@ pub struct Settings {
     pub longest: f32,
     /// Share of the mean of the parameters that every step replaces.
     pub averaged: f32,
-    /// What the sides of boxes count beside the heat.
+    /// Weight of the sides of boxes beside the heat.
     pub sides: f32,
     /// How samples are varied.
     pub vary: Vary,

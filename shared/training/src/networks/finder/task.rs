@@ -259,7 +259,7 @@ impl FinderTask<'_> {
 }
 
 impl Trainer<FinderTask<'_>> {
-    /// What the trained network gives for pictures, `[n, 3, side, side]`: `[n, 5, rows, columns]`.
+    /// The output of the trained network for pictures, `[n, 3, side, side]`: `[n, 5, rows, columns]`.
     pub fn find_in(&self, n: usize, pictures: &[f32]) -> Vec<f32> {
         let inputs = vec![pictures.to_vec()];
         let found = self.find(&Shown { n, inputs });

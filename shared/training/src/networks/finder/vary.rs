@@ -1,4 +1,4 @@
-//! What the network is shown of pictures, and what it should find.
+//! Samples: pictures as the network is shown them, and the boxes that it should find.
 
 use fastrand::Rng;
 
@@ -13,7 +13,7 @@ mod layer;
 
 use self::layer::Layer;
 
-/// What the network is shown, and what it should find.
+/// The input of the network, and the output that it should have.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FinderSample {
     /// `[3, side, side]`

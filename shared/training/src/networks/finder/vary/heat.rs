@@ -1,4 +1,4 @@
-//! What should be found of boxes.
+//! Boxes as the heat and the sides that the network should give.
 
 use super::{Around, STRIDE};
 

@@ -134,18 +134,15 @@ fn pasted<'a>(
     let [left, top, right, bottom] = person.outline;
     let near = beside.get(rng.usize(0..beside.len().max(1)));
     let near = near.filter(|near| near.counts && is_person && rng.f32() < CLOSE);
-    let (tall, to) = match near {
-        Some(near) => {
-            let [left, top, right, bottom] = near.outline;
-            let tall = (bottom - top) * (0.2 * normal(rng)).exp();
-            let aside = (right - left) * (0.3 + 0.7 * rng.f32());
-            let x = f32::midpoint(left, right) + if rng.bool() { aside } else { -aside };
-            (tall, [x, bottom - tall * (0.5 + 0.15 * normal(rng))])
-        }
-        None => {
-            let tall = height(frame, 0.9, vary, rng);
-            (tall, frame.map(|side| side * rng.f32()))
-        }
+    let (tall, to) = if let Some(near) = near {
+        let [left, top, right, bottom] = near.outline;
+        let tall = (bottom - top) * (0.2 * normal(rng)).exp();
+        let aside = (right - left) * (0.3 + 0.7 * rng.f32());
+        let x = f32::midpoint(left, right) + if rng.bool() { aside } else { -aside };
+        (tall, [x, bottom - tall * (0.5 + 0.15 * normal(rng))])
+    } else {
+        let tall = height(frame, 0.9, vary, rng);
+        (tall, frame.map(|side| side * rng.f32()))
     };
     let step = ((bottom - top) / tall.max(8.0)).max(1.0 / MOST_ENLARGED);
     let is_tight = rng.bool();

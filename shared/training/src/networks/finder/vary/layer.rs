@@ -22,7 +22,7 @@ pub(super) struct Layer<'a> {
     pub(super) is_mirrored: bool,
     /// The part of the sample that shows it: left, top, right, bottom.
     pub(super) window: [f32; 4],
-    /// Whether the corners of the window show what lies below.
+    /// Set where the corners of the window show what lies below.
     pub(super) is_round: bool,
 }
 
@@ -59,7 +59,7 @@ impl Layer<'_> {
         }
     }
 
-    /// Whether a pixel of the sample shows it.
+    /// Returns whether a pixel of the sample shows it.
     fn shows(&self, [x, y]: [f32; 2]) -> bool {
         let [left, top, right, bottom] = self.window;
         let place = |at: f32, low: f32, high: f32| (2.0 * at - low - high) / (high - low);
