@@ -65,9 +65,11 @@ pub fn prepare(
     sources: &Sources,
     (stop, console): (&Stop, &dyn Console),
 ) -> Result<Prepared, Failure> {
-    let go_on = || match stop.is_requested() {
-        true => Err(Failure::new(ExitKind::Interrupted, "stopped")),
-        false => Ok(()),
+    let go_on = || {
+        if stop.is_requested() {
+            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
+        }
+        Ok(())
     };
     let mut prepared = Prepared::default();
     for pictures in photographs::pictures(sources, &go_on, console)? {
@@ -90,5 +92,5 @@ fn around_joints(joints: impl Iterator<Item = [f64; 2]>) -> Option<[f64; 4]> {
     let known = joints.filter(|at| at.iter().all(|side| side.is_finite()));
     let [left, top, right, bottom] = posenetwork::outline_of(known)?;
     let beyond = BEYOND * (right - left).max(bottom - top);
-    (beyond > 0.0).then(|| [left - beyond, top - beyond, right + beyond, bottom + beyond])
+    (beyond > 0.0).then_some([left - beyond, top - beyond, right + beyond, bottom + beyond])
 }

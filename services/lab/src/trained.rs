@@ -28,12 +28,15 @@ pub struct Job {
     pub backend: Backend,
 }
 
+/// The results of some steps of a task.
+type PassOf<T> = Pass<<T as Task>::Cost, <T as Task>::Score>;
+
 /// How passes are shown.
 pub(crate) struct Shown<'a, T: Task> {
     /// The curves of all passes, SVG.
-    pub(crate) curves: &'a dyn Fn(&[Pass<T::Cost, T::Score>]) -> String,
+    pub(crate) curves: &'a dyn Fn(&[PassOf<T>]) -> String,
     /// A pass in words, after its step.
-    pub(crate) words: &'a dyn Fn(&Pass<T::Cost, T::Score>) -> String,
+    pub(crate) words: &'a dyn Fn(&PassOf<T>) -> String,
 }
 
 /// A file beside the one that is written.
@@ -60,7 +63,7 @@ pub(crate) fn run<T: Task>(
     shown: &Shown<'_, T>,
     written: &dyn Fn(&Trainer<T>) -> Vec<u8>,
     (stop, console): (&Stop, &dyn Console),
-) -> Result<Vec<Pass<T::Cost, T::Score>>, Failure> {
+) -> Result<Vec<PassOf<T>>, Failure> {
     let file = beside(&job.out, ".checkpoint");
     let kept = match files::read(&file, files::RESULTS) {
         Ok(bytes) if job.resume => Some(bytes),

@@ -152,7 +152,12 @@ impl Painter {
     /// The number of samples that see each person, the subject first, after [`draw`](Self::draw).
     pub(crate) fn seen(&self) -> Vec<usize> {
         let mut seen = vec![0; self.bodies.len()];
-        for triangle in self.samples.triangle.iter().filter(|nearest| **nearest != NOTHING) {
+        for triangle in self
+            .samples
+            .triangle
+            .iter()
+            .filter(|nearest| **nearest != NOTHING)
+        {
             let body = |body: &Body| body.first_triangle <= *triangle as usize;
             seen[self.bodies.partition_point(body) - 1] += 1;
         }

@@ -73,7 +73,7 @@ mod tests {
         assert!(small.is_whole() && small.size == [SIDE, SIDE / 2]);
         assert_eq!(small.people.len(), 1, "one lies outside");
         assert_eq!(small.people[0].outline, [24.5, 9.5, 29.5, 19.5]);
-        let bright = small.rgb.iter().filter(|value| **value == 255).count();
-        assert_eq!(bright, 3 * 5 * 10);
+        let light: u32 = small.rgb.iter().map(|value| u32::from(*value)).sum();
+        assert_eq!(light, 255 * 3 * 5 * 10);
     }
 }
