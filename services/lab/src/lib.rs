@@ -6,11 +6,14 @@
 
 pub mod evaluation;
 mod failures;
+mod prepared;
 mod scenes;
 mod searches;
+mod trained;
 
 pub mod consistency;
 pub mod eval;
+pub mod finding;
 pub mod forecast;
 pub mod joints;
 pub mod judged;

@@ -8,17 +8,17 @@ mod photographs;
 mod rendered;
 mod train;
 
-use std::io::{BufReader, Read as _, Write as _};
-use std::path::Path;
-
 use posenetwork::PoseNetwork;
 use training::networks::pose::{Person, SIDE};
 
 use crate::person::Chosen;
+use crate::prepared::Example;
 use crate::scenes::Scenes;
 use failure::{Console, ExitKind, Failure, Stop};
 
-pub use train::{Earlier, Job, Pass, train};
+pub use crate::prepared::{read, write};
+pub use crate::trained::{Earlier, Job};
+pub use train::{Pass, train};
 
 /// Who is learned from.
 #[derive(Debug)]
@@ -38,13 +38,16 @@ const KEPT: usize = 12;
 /// People in a row of a data set that are kept apart together: neighbours often show the same event.
 const BLOCK: usize = 20;
 
-/// The people to learn from, and those who are kept apart.
-#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct Prepared {
-    /// To learn from.
-    pub learnt: Vec<Person>,
-    /// Kept apart: the training is watched on them, and the expected error is learned on them.
-    pub kept: Vec<Person>,
+/// The people to learn from, and those who are kept apart: the expected error is learned on these.
+pub type Prepared = crate::prepared::Prepared<Person>;
+
+impl Example for Person {
+    const KIND: &[u8; 8] = b"PLXPEOPL";
+    const MADE_BY: &str = "network-people";
+
+    fn is_whole(&self) -> bool {
+        self.rgb.len() == 3 * SIDE * SIDE
+    }
 }
 
 /// What the threads share.
@@ -77,78 +80,15 @@ pub fn prepare(
     let marked = photographs::people(people, &work)?;
     for (nth, person) in marked {
         let is_kept = nth / BLOCK % KEPT == KEPT - 1;
-        let to = if is_kept {
-            &mut prepared.kept
-        } else {
-            &mut prepared.learnt
-        };
-        to.push(person);
+        prepared.add(person, is_kept);
     }
     for (subject, person) in rendered::people(&people.scenes, &work)? {
         let is_kept = subject % KEPT as u64 == 0;
-        let to = if is_kept {
-            &mut prepared.kept
-        } else {
-            &mut prepared.learnt
-        };
-        to.push(person);
+        prepared.add(person, is_kept);
     }
     let [learnt, kept] = [prepared.learnt.len(), prepared.kept.len()];
     console.message(&format!("{learnt} people to learn from, {kept} kept apart"));
     Ok(prepared)
-}
-
-/// How the file of prepared people begins.
-const KIND: &[u8; 8] = b"PLXPEOPL";
-/// How it ends: a file that was cut short lacks it.
-const END: &[u8; 8] = b"EVERYONE";
-
-/// Writes prepared people; the file appears when it is whole.
-///
-/// # Errors
-///
-/// The file cannot be written.
-pub fn write(path: &Path, people: &Prepared) -> Result<(), Failure> {
-    let written = files::replace_by(path, |file| {
-        file.write_all(KIND)?;
-        let config = bincode::config::standard();
-        bincode::serde::encode_into_std_write(people, file, config)
-            .map_err(std::io::Error::other)?;
-        file.write_all(END)
-    });
-    written.map_err(|error| failure::in_file(path, &error))
-}
-
-/// Reads what [`write()`] wrote.
-///
-/// # Errors
-///
-/// The file cannot be read, or holds something else.
-pub fn read(path: &Path) -> Result<Prepared, Failure> {
-    let fail = |error: std::io::Error| failure::in_file(path, &error);
-    let is_other = || {
-        let message = format!(
-            "{}: no file of `parallax-lab train network-people`",
-            path.display()
-        );
-        Failure::new(ExitKind::Input, message)
-    };
-    let mut file = BufReader::with_capacity(1 << 20, files::open(path).map_err(fail)?);
-    let mut mark = [0; 8];
-    let n = file.read(&mut mark).map_err(fail)?;
-    if n < mark.len() || &mark != KIND {
-        return Err(is_other());
-    }
-    let config = bincode::config::standard();
-    let people: Prepared = bincode::serde::decode_from_std_read(&mut file, config)
-        .map_err(|error| failure::in_file(path, &error))?;
-    file.read_exact(&mut mark).map_err(fail)?;
-    let all = people.learnt.iter().chain(&people.kept);
-    let is_whole = all.into_iter().all(|it| it.rgb.len() == 3 * SIDE * SIDE);
-    if &mark != END || !is_whole {
-        return Err(is_other());
-    }
-    Ok(people)
 }
 
 #[cfg(test)]

@@ -17,10 +17,19 @@ pub struct Scenes {
     pub subjects: [u64; 2],
     /// Frames of every camera of a scene, some seconds apart.
     pub frames: u16,
+    /// Most people beside the subject who stand around, and as many who pass.
+    pub company: u64,
     /// Photographs without people that stand in the place of every third room.
     pub backdrop: Option<PathBuf>,
     /// Seed of everything random.
     pub seed: u64,
+}
+
+impl Scenes {
+    /// For everything random of a scene.
+    fn rng(&self, nth: u32) -> fastrand::Rng {
+        fastrand::Rng::with_seed(self.seed.wrapping_mul(1_000_003) + u64::from(nth))
+    }
 }
 
 /// One picture of a scene.
@@ -39,6 +48,8 @@ pub(crate) struct Shown<'a> {
     pub(crate) in_world: Vec<[f64; 3]>,
     /// The camera.
     pub(crate) camera: &'a geometry::Camera,
+    /// The joints in the picture of everybody, the subject first, and how many pixels show the person; not finite behind the camera.
+    pub(crate) everybody: Vec<(Vec<[f64; 2]>, f64)>,
 }
 
 /// Makes something of every picture of all scenes, in the order of the scenes, whatever the threads.
@@ -59,7 +70,7 @@ pub(crate) fn of_pictures<T: Send>(
 
 /// What a scene is, by its number: actions and subjects in turn, all else by chance.
 fn settings(scenes: &Scenes, nth: u32) -> Settings {
-    let mut rng = fastrand::Rng::with_seed(scenes.seed.wrapping_mul(1_000_003) + u64::from(nth));
+    let mut rng = scenes.rng(nth);
     let [from, to] = scenes.subjects;
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
     let rig = match nth % 4 {
@@ -80,11 +91,13 @@ fn settings(scenes: &Scenes, nth: u32) -> Settings {
         ..Flaws::default()
     };
     let is_photo = between(0.0, 1.0) < 1.0 / 3.0;
+    let mut company = scenes.rng(nth);
+    let mut others = || company.u64(0..=scenes.company.min(Settings::MOST_OTHERS));
     Settings {
         rig,
         subject: from + rng.u64(0..=to - from),
-        others: 0,
-        passers: 0,
+        others: others(),
+        passers: others(),
         action: Action::ALL[rng.usize(0..Action::ALL.len())],
         seed: rng.u64(1..1 << 32),
         // One frame in three quarters of a second: no two show the same pose.
@@ -128,6 +141,7 @@ fn of_scene<T>(
                 }),
                 in_world: scene.joints(truth.seconds).to_vec(),
                 camera,
+                everybody: everybody(&scene, camera, (truth.seconds, &view)),
             };
             all.extend(make(&shown)?);
         }
@@ -135,4 +149,22 @@ fn of_scene<T>(
         watch(n, n - (all.len() - before));
     }
     Ok(all)
+}
+
+/// Everybody in the last picture of a view, the subject first.
+fn everybody(
+    scene: &Scene,
+    camera: &geometry::Camera,
+    (seconds, view): (f64, &View),
+) -> Vec<(Vec<[f64; 2]>, f64)> {
+    let others = scene.other_joints(seconds);
+    let all = core::iter::once(scene.joints(seconds)).chain(others);
+    let pixels = all.map(|joints| {
+        let pixels = joints.iter().map(|joint| {
+            let pixel = camera.project(&(*joint).into());
+            pixel.map_or([f64::NAN; 2], Into::into)
+        });
+        pixels.collect()
+    });
+    pixels.zip(view.seen_px()).collect()
 }

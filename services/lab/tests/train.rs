@@ -1,6 +1,7 @@
 //! `parallax-lab train fmp` as real processes, on figures that are drawn here.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod finder;
 mod joints;
 mod network;
 

@@ -11,8 +11,19 @@ pub const FOLLOWED_S: f64 = 0.4;
 ///
 /// * `rate_hz`: of the frames that are looked at.
 pub(crate) fn find_every(config: &Config, rate_hz: Option<f64>) -> u64 {
-    let by_rate = || find_every_at(rate_hz, config.detector.is_some());
+    let by_rate = || find_every_at(rate_hz, config.has_detector());
     config.find_every.unwrap_or_else(by_rate)
+}
+
+/// As [`find_every`], while several people are seen: one who is hidden for a moment is found again soon, where a detector looks.
+pub(crate) fn find_every_of_several(config: &Config, rate_hz: Option<f64>) -> u64 {
+    const SECONDS: f64 = 0.125;
+    let every = find_every(config, rate_hz);
+    if config.find_every.is_some() || !config.has_detector() {
+        return every;
+    }
+    let often = rate_hz.map_or(1.0, |rate_hz| (SECONDS * rate_hz).round());
+    (often.clamp(1.0, 1e6) as u64).min(every)
 }
 
 /// In every n-th frame boxes are looked for.
@@ -48,6 +59,23 @@ mod tests {
         assert_eq!(find_every_at(Some(60.0), true), 30);
         assert_eq!(find_every_at(Some(15.0), true), 10);
         assert_eq!(find_every_at(Some(2.5), false), 10);
+    }
+
+    #[test]
+    fn a_detector_looks_more_often_while_it_sees_several_people_unless_it_is_told_how_often() {
+        let by =
+            |config: &Config| [60.0, 15.0, 2.0].map(|hz| find_every_of_several(config, Some(hz)));
+        assert_eq!(by(&Config::default()), [8, 2, 1]);
+        let told = Config {
+            find_every: Some(7),
+            ..Config::default()
+        };
+        assert_eq!(by(&told), [7; 3]);
+        let filters = Config {
+            detector: "none".into(),
+            ..Config::default()
+        };
+        assert_eq!(by(&filters), [60, 15, 1]);
     }
 
     #[test]

@@ -104,8 +104,11 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     let settings = if deployment.has_maps() {
         let networks = deployment.pose_networks().into_iter();
         files.extend(networks.map(|file| ("network.file", file)));
-        let detector = config.detector.as_deref();
-        files.extend(detector.map(|file| ("network.detector", file)));
+        if config.has_detector() {
+            files.push(("network.detector", &config.detector));
+        } else {
+            all.add_text("network.detector", "none");
+        }
         serde_json::to_vec(&without_files(config))
     } else {
         let paper = &deployment.paper;
@@ -153,7 +156,7 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
 fn without_files(config: &network::Config) -> network::Config {
     network::Config {
         file: PathBuf::new(),
-        detector: None,
+        detector: PathBuf::new(),
         onnx_runtime: None,
         ..config.clone()
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::shipped::{SHIPPED, relative_to};
+use crate::shipped::{SHIPPED, is_none, relative_to};
 
 /// The network that finds the joints of people, and where it looks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -14,9 +14,9 @@ use crate::shipped::{SHIPPED, relative_to};
 pub struct Config {
     /// The network that finds joints: an ONNX file with its card beside it (`.toml` for `.onnx`) or in its metadata, or `"shipped"`.
     pub file: PathBuf,
-    /// The detector of people that finds boxes for the network, an ONNX file with its card beside it; by default filters find them.
-    pub detector: Option<PathBuf>,
-    /// Search for people in every n-th frame; by default twice a second with a `detector`, once without.
+    /// The detector of people that finds boxes for the network: an ONNX file with its card beside it, `"shipped"`, or `"none"` for the filters.
+    pub detector: PathBuf,
+    /// Search for people in every n-th frame; by default twice a second with a detector, four times as often while it sees several, once a second without.
     pub find_every: Option<u64>,
     /// Least mean heat of the joints of a visible person, 0 to 1.
     pub least_heat: f64,
@@ -32,7 +32,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             file: PathBuf::from(SHIPPED),
-            detector: None,
+            detector: PathBuf::from(SHIPPED),
             find_every: None,
             least_heat: 0.2,
             people: 4,
@@ -46,11 +46,16 @@ impl Config {
     /// Takes every relative path as relative to `base`.
     pub(crate) fn resolve(&mut self, base: &Path) {
         self.file = relative_to(&self.file, base);
-        for file in [&mut self.detector, &mut self.onnx_runtime]
-            .into_iter()
-            .flatten()
-        {
+        if self.has_detector() {
+            self.detector = relative_to(&self.detector, base);
+        }
+        if let Some(file) = &mut self.onnx_runtime {
             *file = base.join(&file);
         }
+    }
+
+    /// Says if a detector finds the boxes of people; if not, the filters do.
+    pub fn has_detector(&self) -> bool {
+        !is_none(&self.detector)
     }
 }

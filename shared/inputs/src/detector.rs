@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use deployment::is_shipped;
 use failure::{ExitKind, Failure, in_file};
 use footage::{ACCENT, Canvas, line_width};
 use inference::{Description, Session};
@@ -13,6 +14,7 @@ use crate::cards::{CardPlace, OnnxFile, misfit};
 use crate::library::Library;
 use crate::pictures::Picture;
 use crate::refused::refused;
+use crate::shipped::Shipped;
 
 /// A detector that was read.
 #[derive(Debug)]
@@ -84,12 +86,17 @@ pub fn open(path: &Path, card: Option<&Path>) -> Result<Detector, Failure> {
     open_with(path, card, &Library::BuiltIn)
 }
 
-/// As [`open`], run by a library of choice.
+/// As [`open`], run by a library of choice; `shipped` stands for the detector that ships.
 ///
 /// # Errors
 ///
 /// As for [`open`].
 pub fn open_with(path: &Path, card: Option<&Path>, library: &Library) -> Result<Detector, Failure> {
+    if is_shipped(path) {
+        let shipped = Shipped::Detector;
+        let read = OnnxFile::built_in(&shipped.name(), shipped.bytes(), library)?;
+        return DetectorFile::of(read)?.fitted();
+    }
     DetectorFile::of(OnnxFile::open(path, card, library)?)?.fitted()
 }
 

@@ -84,11 +84,11 @@ pub fn network_card(deployment: &Deployment, camera: usize) -> Result<Option<Car
 ///
 /// As for [`pose_network`].
 pub fn detector(config: &Config) -> Result<Option<Detector>, Failure> {
-    let Some(file) = &config.detector else {
+    if !config.has_detector() {
         return Ok(None);
-    };
+    }
     let library = library(config)?;
-    crate::detector::open_with(file, None, &library).map(Some)
+    crate::detector::open_with(&config.detector, None, &library).map(Some)
 }
 
 /// Loads every network of a deployment once, to see that each fits its card.

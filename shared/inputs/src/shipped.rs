@@ -22,17 +22,20 @@ pub enum Shipped {
     Joints,
     /// The network that finds joints.
     PoseNetwork,
+    /// The network that finds people.
+    Detector,
 }
 
 impl Shipped {
     /// All of them.
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 7] = [
         Self::Model,
         Self::Network,
         Self::Consistency,
         Self::Orientation,
         Self::Joints,
         Self::PoseNetwork,
+        Self::Detector,
     ];
 
     /// The content of the file.
@@ -44,6 +47,7 @@ impl Shipped {
             Self::Orientation => include_bytes!("../../../configs/models/person.orientation"),
             Self::Joints => include_bytes!("../../../configs/models/person.joints"),
             Self::PoseNetwork => include_bytes!("../../../configs/models/person.pose.onnx"),
+            Self::Detector => include_bytes!("../../../configs/models/person.boxes.onnx"),
         }
     }
 
@@ -56,6 +60,7 @@ impl Shipped {
             Self::Orientation => "orientation",
             Self::Joints => "joints",
             Self::PoseNetwork => "pose-network",
+            Self::Detector => "detector",
         };
         format!("{SHIPPED}:{kind}").into()
     }
@@ -111,6 +116,7 @@ impl Shipped {
             Self::Orientation => ["paper.orientation", "train orientation"],
             Self::Joints => ["paper.joint_map", "train joints"],
             Self::PoseNetwork => ["network.file", "train network"],
+            Self::Detector => ["network.detector", "train finder"],
         };
         format!(
             "`{key}` is a file that `parallax-lab {made_by}` made, or \"{SHIPPED}\": the one that is built in"
@@ -133,6 +139,7 @@ mod tests {
         let library = crate::library::Library::BuiltIn;
         let network = crate::open_network((Path::new(SHIPPED), None), &library);
         network.unwrap().fitted().unwrap();
+        crate::detector::open(Path::new(SHIPPED), None).unwrap();
     }
 
     #[test]

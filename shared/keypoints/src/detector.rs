@@ -7,6 +7,8 @@ use crate::decode::OutputError;
 use crate::decode::finite;
 use crate::window::sample;
 
+mod centres;
+
 /// The card of a network that finds the boxes of people.
 ///
 /// The whole picture is resized to fit into the input, its top-left corner in that of the input; the rest is filled.
@@ -65,6 +67,15 @@ pub enum Boxes {
         /// The output.
         boxes: String,
     },
+    /// A grid over the picture, `[1, 5, rows, columns]`: log-odds that the middle of somebody's box lies in a cell, and the natural
+    /// logarithms of the distances from the middle of the cell to the left, top, right and bottom of the box, in cells. Every cell
+    /// that is higher than its eight neighbours is somebody (`parallax-lab train finder`).
+    Centres {
+        /// The output; left out: the only one.
+        boxes: Option<String>,
+        /// Pixels of the input for a cell.
+        stride: usize,
+    },
 }
 
 fn grey() -> u8 {
@@ -122,6 +133,11 @@ impl DetectorCard {
                 "less than 10000".to_owned()
             })?;
         }
+        if let Boxes::Centres { stride, .. } = &card.output {
+            demand((1..=256).contains(stride), "output.stride", stride, || {
+                "1 to 256".to_owned()
+            })?;
+        }
         Ok(card)
     }
 
@@ -139,6 +155,7 @@ impl DetectorCard {
                 decoded,
                 ..
             } => self.of_grids((values, shape), strides, *person, *decoded)?,
+            Boxes::Centres { stride, .. } => self.of_centres((values, shape), *stride)?,
             Boxes::List { .. } => {
                 let &[1, n, 5] = shape else {
                     return Err(other(shape, "[1, n, 5]".to_owned()));
@@ -172,6 +189,23 @@ impl DetectorCard {
     pub fn n_cells(&self, strides: &[usize]) -> usize {
         let [width, height] = [self.input.width, self.input.height];
         strides.iter().map(|it| (width / it) * (height / it)).sum()
+    }
+
+    fn of_centres(
+        &self,
+        (values, shape): (&[f32], &[usize]),
+        stride: usize,
+    ) -> Result<Vec<PersonBox>, OutputError> {
+        let [columns, rows] = [self.input.width, self.input.height].map(|side| side / stride);
+        let n_cells = columns * rows;
+        if shape != [1, 5, rows, columns] || values.len() != 5 * n_cells {
+            return Err(other(shape, format!("[1, 5, {rows}, {columns}]")));
+        }
+        Ok(centres::boxes(
+            values,
+            [columns, rows],
+            (stride, self.least_score),
+        ))
     }
 
     fn of_grids(

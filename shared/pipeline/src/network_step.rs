@@ -48,6 +48,8 @@ pub struct NetworkSettings {
     pub n_people: usize,
     /// Boxes are looked for in every n-th frame, and in every one in which nobody is seen well.
     pub find_every: u64,
+    /// The same while several people are seen.
+    pub find_every_of_several: u64,
     /// By how many frames the second of these comes sooner: views that look for boxes in turn do not keep one frame waiting.
     pub find_phase: u64,
     /// Least mean heat of the joints of a person who is seen well, 0 to 1.
@@ -63,6 +65,7 @@ impl Default for NetworkSettings {
         Self {
             n_people: 4,
             find_every: 10,
+            find_every_of_several: 10,
             find_phase: 0,
             least_heat: 0.2,
             maps: MapSettings::default(),
@@ -154,7 +157,6 @@ impl NetworkStep {
             return Ok(());
         };
         let first = self.settings.find_every - self.settings.find_phase % self.settings.find_every;
-        let next = memory.until.map_or(first, |_| self.settings.find_every);
         let (rests, is_due) = (memory.rests(), memory.is_due());
         memory.has_searched = is_due;
         memory.n_seen = 0;
@@ -198,13 +200,19 @@ impl NetworkStep {
             }
         }
         memory.before = before;
+        memory.keep_largest(self.settings.n_people);
+        let every = if memory.n_seen > 1 {
+            self.settings.find_every_of_several
+        } else {
+            self.settings.find_every
+        };
+        let next = memory.until.map_or(first.min(every), |_| every);
         let until = if memory.has_searched {
             Some(next)
         } else {
-            memory.until
+            memory.until.map(|left| left.min(every))
         };
-        memory.until = until.map(|it| it.saturating_sub(1));
-        memory.keep_largest(self.settings.n_people);
+        memory.until = until.map(|left| left.saturating_sub(1));
         // The memory of the list is kept.
         memory.tracks = tracks;
         memory.tracks.clear();

@@ -26,6 +26,7 @@ impl Detector {
         let input = input_of(&card.input, &description.inputs)?;
         let (name, key) = match &card.output {
             Boxes::Yolox { grids, .. } => (grids.clone(), "output.grids"),
+            Boxes::Centres { boxes, .. } => (boxes.clone(), "output.boxes"),
             Boxes::List { boxes } => (Some(boxes.clone()), "output.boxes"),
         };
         let output = only(name.as_ref(), &description.outputs, key)?;

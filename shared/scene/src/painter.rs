@@ -149,6 +149,21 @@ impl Painter {
         triangle != NOTHING && (triangle as usize) < end
     }
 
+    /// The number of samples that see each person, the subject first, after [`draw`](Self::draw).
+    pub(crate) fn seen(&self) -> Vec<usize> {
+        let mut seen = vec![0; self.bodies.len()];
+        for triangle in self
+            .samples
+            .triangle
+            .iter()
+            .filter(|nearest| **nearest != NOTHING)
+        {
+            let body = |body: &Body| body.first_triangle <= *triangle as usize;
+            seen[self.bodies.partition_point(body) - 1] += 1;
+        }
+        seen
+    }
+
     /// Writes how much of every pixel the subject covers, after [`draw`](Self::draw): 0 to 255.
     pub(crate) fn mask(&self, mask: &mut [u8]) {
         mask.fill(0);

@@ -376,6 +376,12 @@ impl View {
         mask
     }
 
+    /// How much of the last picture shows each person, the subject first, then others in the order of [`Scene::other_joints`]: pixels.
+    pub fn seen_px(&self) -> Vec<f64> {
+        let samples = self.painter.seen().into_iter();
+        samples.map(|n| n as f64 / (SUB * SUB) as f64).collect()
+    }
+
     /// Determines what is seen of the people, and writes the picture if it is wanted; returns the bones of the subject.
     fn draw(&mut self, seconds: f64, rgb: Option<&mut [u8]>) -> [Isometry3<f64>; N_BONES] {
         let scene = &self.scene;

@@ -1,8 +1,8 @@
-//! Training of networks: the one that finds joints, and the one that predicts the errors of single views.
+//! Training of networks: one finds joints, one finds people, and one predicts the errors of single views.
 //!
 //! * [`Network`]: a network, defined once by the operations of [`Ops`]. [`initial`] plans its parameters, [`write()`] writes it as
 //!   an ONNX file.
-//! * [`Task`]: what is learned, from whom, and how. [`pose`] and [`quality`] are the two.
+//! * [`Task`]: what is learned, from whom, and how. [`pose`], [`finder`] and [`quality`] are the three.
 //! * [`Trainer`]: runs the steps of a task, keeps the best network, and writes everything that it knows as a checkpoint, from which
 //!   a training goes on and ends with the same bits.
 //! * [`Backend`]: what computes. Rust is built in; `LibTorch` comes with the feature `libtorch`, for a processor with fast cores.
@@ -22,7 +22,9 @@ mod settings;
 #[cfg(feature = "libtorch")]
 mod torch;
 mod training;
+mod trunk;
 
+pub mod finder;
 pub mod pose;
 pub mod quality;
 

@@ -169,6 +169,12 @@ pub fn network_card(input: &[u8]) {
         let step = card.fill(&[200; 3 * 7 * 5], [7, 5], &mut values);
         assert!(step > 0.0 && values.iter().all(|it| !it.is_nan()));
         let _outcome = card.boxes(&values[..15], &[1, 3, 5]);
+        if let keypoints::Boxes::Centres { stride, .. } = card.output {
+            let [rows, columns] = [card.input.height, card.input.width].map(|side| side / stride);
+            let n = 5 * rows * columns;
+            let found = card.boxes(&values[..n.min(values.len())], &[1, 5, rows, columns]);
+            assert!(n > values.len() || found.is_ok_and(|boxes| boxes.len() <= rows * columns));
+        }
         return;
     }
     let Ok(card) = keypoints::Card::parse(input) else {

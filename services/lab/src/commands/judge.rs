@@ -1,5 +1,6 @@
 //! `parallax-lab judge`: evaluates a model on annotated people.
 
+mod detector;
 mod network;
 
 use std::path::PathBuf;
@@ -10,6 +11,7 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use fmp::Search;
 use inputs::Joints;
 use lab::evaluation::Judged;
+use lab::finding;
 use lab::judged::{self, Reader};
 use serde_json::json;
 use skeleton::PARSE14;
@@ -46,17 +48,21 @@ over the people, {\"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\",
 height of the maxima predicts errors of the joints: {\"joints\", \"off_by_half_a_head\", \"auc\" (of predicting these), \
 \"auc_interval\", \"rank_correlation\"}.
 
+A detector of people (.onnx) is judged on the pictures that `parallax-lab train finder-pictures` kept apart, its file in the place of
+DATASET: the share of people who are found, a box being somebody's that shares half of their union, and how many boxes are of nobody.
+
 Examples:
     parallax-lab judge person.fmp PARSE --only 101-200
+    parallax-lab judge person.boxes.onnx pictures.bin
     parallax-lab judge pose.onnx PARSE --card configs/networks/rtmpose-coco17.toml --only 101-200")]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is a switch of the command line"
 )]
 pub(crate) struct Arguments {
-    /// The model file, of 26 parts; or a network that finds keypoints (.onnx).
+    /// The model file, of 26 parts; or a network that finds keypoints or people (.onnx).
     model: PathBuf,
-    /// The data set: people with 14 joints.
+    /// The data set: people with 14 joints; of a detector, pictures of `train finder-pictures`.
     dataset: PathBuf,
     /// The people to evaluate, all if not given.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
@@ -112,6 +118,9 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let terminal = Terminal::with_bar(globals.quiet, false, BAR);
     let is_network = arguments.model.extension();
     if is_network.is_some_and(|it| it.eq_ignore_ascii_case("onnx")) {
+        if finding::is_file::<finding::Picture>(&arguments.dataset) {
+            return detector::run(arguments, &stop, &terminal);
+        }
         return network::run(arguments, &stop, &terminal);
     }
     if arguments.card.is_some() || arguments.find_boxes || arguments.mirror {

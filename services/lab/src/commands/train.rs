@@ -1,7 +1,9 @@
 //! `parallax-lab train`: trains models, networks and multi-view consistency.
 
 mod consistency;
+mod finder;
 mod joints;
+mod learning;
 mod marked;
 mod network;
 mod orientation;
@@ -76,6 +78,10 @@ pub(crate) enum Command {
     NetworkPeople(Box<network::people::Arguments>),
     /// Train the network that finds joints, the direction of the trunk, and expected errors.
     Network(Box<network::learn::Arguments>),
+    /// Prepare pictures for training the network that finds people.
+    FinderPictures(Box<finder::pictures::Arguments>),
+    /// Train the network that finds people in whole pictures.
+    Finder(Box<finder::learn::Arguments>),
     /// Train a network that predicts the error of every part in a single view.
     Quality(Box<quality::network::Arguments>),
     /// Search pictures with known joints, and write the samples for training the quality network.
@@ -124,6 +130,8 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
         Command::Joints(it) => return joints::run(&it, globals),
         Command::NetworkPeople(it) => return network::people::run(&it, globals),
         Command::Network(it) => return network::learn::run(&it, globals),
+        Command::FinderPictures(arguments) => return finder::pictures::run(&arguments, globals),
+        Command::Finder(arguments) => return finder::learn::run(&arguments, globals),
         Command::Quality(arguments) => return quality::network::run(&arguments, globals),
         Command::QualitySamples(arguments) => return quality::samples::run(&arguments, globals),
     };

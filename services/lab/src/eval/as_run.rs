@@ -71,6 +71,7 @@ impl AsRun<'_> {
             let eyes = Eyes::Network(Box::new(network), boxes);
             let settings = NetworkSettings {
                 find_every: 1,
+                find_every_of_several: 1,
                 ..NetworkSettings::default()
             };
             steps.push(NetworkStep::new(eyes, plan.layout().image_size, settings));

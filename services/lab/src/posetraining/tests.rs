@@ -31,7 +31,7 @@ fn people_are_read_as_they_were_written_and_a_file_that_was_cut_is_refused() {
     let bytes = std::fs::read(&file).unwrap();
     for n in [0, 5, 9, 100, bytes.len() - 1] {
         std::fs::write(&file, &bytes[..n]).unwrap();
-        assert!(read(&file).is_err(), "{n} bytes");
+        assert!(read::<Person>(&file).is_err(), "{n} bytes");
     }
 }
 

@@ -11,7 +11,7 @@ use pipeline::{Boxes, NetworkMemory, NetworkSettings, NetworkStep};
 use posenetwork::{Detector, JointMaps, LookError, PoseNetwork};
 use skeleton::PARSE14;
 
-use crate::find_every::find_every;
+use crate::find_every::{find_every, find_every_of_several};
 
 /// Detections of the filters: the lowest score, and how much of a better one's boxes a worse one may cover.
 const THRESHOLD: f32 = -0.5;
@@ -121,6 +121,7 @@ impl Eyes {
         let settings = NetworkSettings {
             n_people,
             find_every: find_every(&deployment.network, Some(rate_hz)),
+            find_every_of_several: find_every_of_several(&deployment.network, Some(rate_hz)),
             least_heat: deployment.network.least_heat,
             ..NetworkSettings::default()
         };

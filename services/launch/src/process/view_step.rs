@@ -5,7 +5,7 @@ use std::sync::Arc;
 use failure::{ExitKind, Failure, OrFail as _};
 use pipeline::{Boxes, Eyes, NetworkSettings, NetworkStep, ViewStep};
 
-use crate::find_every::find_every;
+use crate::find_every::{find_every, find_every_of_several};
 use crate::keypoints;
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;
@@ -43,10 +43,12 @@ pub(crate) fn of_view(
     let config = &deployment.network;
     let size = plan.layout().image_size;
     let step = deployment.capture.frame_step.max(1) as f64;
-    let find_every = find_every(config, resolved.frame_rate_hz().map(|it| it / step));
+    let rate_hz = resolved.frame_rate_hz().map(|rate_hz| rate_hz / step);
+    let find_every = find_every(config, rate_hz);
     let settings = NetworkSettings {
         n_people: config.people,
         find_every,
+        find_every_of_several: find_every_of_several(config, rate_hz),
         find_phase: view as u64 * find_every / deployment.cameras.len().max(1) as u64,
         least_heat: config.least_heat,
         ..NetworkSettings::default()

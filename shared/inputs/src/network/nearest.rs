@@ -48,6 +48,8 @@ fn points_of_detector(card: &DetectorCard, description: &Description) -> Option<
             };
             outputs.filter(|it| many(it)).map(|_| 2).max()
         }
+        // Its files carry their card.
+        Boxes::Centres { .. } => None,
         Boxes::List { boxes } => {
             let five = |it: &Port| match &it.sides[..] {
                 [one, _, five] => one.may_be(1) && five.may_be(5),

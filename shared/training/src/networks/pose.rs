@@ -36,6 +36,7 @@ pub use score::{Judged, Score};
 pub use settings::{Settings, Vary};
 pub use task::{Found, PoseTask, TooFew, file};
 pub use vary::{DEVIATION, FILL, MARGIN, MEAN, NetworkSample, plain, varied};
+pub(in crate::networks) use vary::{coarsen, recolour};
 
 /// The keypoint that is the mirror image of another.
 pub const MIRROR: [usize; N_KEYPOINTS] = [

@@ -133,6 +133,9 @@ fn given(card: &DetectorCard) -> String {
                 "{cells} boxes of grids with strides {strides:?}, in {unit}; people are class {person}"
             )
         }
+        Boxes::Centres { stride, .. } => format!(
+            "a box for each cell of {stride} pixels that is likelier than its neighbours to be the middle of somebody"
+        ),
         Boxes::List { boxes } => format!("`{boxes}`, a list of boxes of people with scores"),
     }
 }

@@ -93,6 +93,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         n,
         subjects,
         frames: arguments.frames,
+        company: 0,
         backdrop: arguments.backdrop.clone(),
         seed,
     };

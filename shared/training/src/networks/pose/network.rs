@@ -5,15 +5,12 @@
 //!
 //! The maps of the [extra keypoints](EXTRAS) have a small head of their own over the features of the joints, so that it can be
 //! trained alone.
-//!
-//! Convolutions are followed by no normalisation over the batch. Their weights are standardised instead (Brock et al. 2021,
-//! "Characterizing signal propagation to close the performance gap in unnormalized `ResNets`"), and every residual block begins
-//! as the identity.
 
 use skeleton::PARSE14;
 
-use crate::networks::ops::{Conv, Dims, Network, Ops, Output, Scaling};
+use crate::networks::ops::{Dims, Network, Ops, Output};
 use crate::networks::parameters::{self, Parameter};
+use crate::networks::trunk::{Trunk, block, plain, with_gain};
 
 /// Joints that have a map: those of [`PARSE14`], in its order.
 pub const N_JOINTS: usize = PARSE14.joints.len();
@@ -144,7 +141,15 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
 
 /// Runs the network: maps, evidence for the direction, logarithms of expected errors.
 fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
-    let [at, deepest] = trunk(ops, shape);
+    let trunk = Trunk {
+        stem: shape.stem,
+        channels: shape.channels,
+        blocks: shape.blocks,
+        refined: 2,
+        hidden: shape.channels[0],
+    };
+    let picture = ops.input(PICTURE);
+    let [at, deepest] = trunk.run(ops, &picture);
     let features = ops.relu(&at);
     let head = with_gain(0.1, plain(N_JOINTS, 1, 1));
     let maps = ops.conv(&features, "maps", head);
@@ -164,82 +169,6 @@ fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
     let maps = ops.join(&[&maps, &extras]);
     let errors = ops.join(&[&errors, &of_extras]);
     vec![maps, front, errors]
-}
-
-/// Features at stride 4, and the deepest ones, which are positive.
-fn trunk<O: Ops>(ops: &mut O, shape: &Shape) -> [O::Value; 2] {
-    let picture = ops.input(PICTURE);
-    let stem = ops.conv(&picture, "stem1", plain(shape.stem, 3, 2));
-    let stem = ops.relu(&stem);
-    let mut at = ops.conv(&stem, "stem2", plain(shape.channels[0], 3, 2));
-    let mut levels = Vec::new();
-    for (level, (&channels, &blocks)) in shape.channels.iter().zip(&shape.blocks).enumerate() {
-        if level > 0 {
-            let active = ops.relu(&at);
-            at = ops.conv(&active, &format!("down{level}"), plain(channels, 3, 2));
-        }
-        for nth in 0..blocks {
-            at = block(
-                ops,
-                &at,
-                &format!("level{level}.{nth}"),
-                [channels, channels / 2],
-            );
-        }
-        levels.push(at.clone());
-    }
-    let deepest = ops.relu(&at);
-    for level in (0..shape.channels.len() - 1).rev() {
-        let channels = shape.channels[level];
-        let active = ops.relu(&at);
-        let narrowed = ops.conv(&active, &format!("up{level}"), plain(channels, 1, 1));
-        let enlarged = ops.doubled(&narrowed);
-        at = ops.add(&levels[level], &enlarged);
-        let hidden = if level == 0 { channels } else { channels / 2 };
-        for nth in 0..if level == 0 { 2 } else { 1 } {
-            at = block(
-                ops,
-                &at,
-                &format!("refine{level}.{nth}"),
-                [channels, hidden],
-            );
-        }
-    }
-    [at, deepest]
-}
-
-fn plain(channels: usize, kernel: usize, stride: usize) -> Conv {
-    Conv {
-        channels,
-        kernel,
-        stride,
-        by_channel: false,
-        scaling: Scaling::Standardised { gain: 1.0 },
-    }
-}
-
-fn with_gain(gain: f32, conv: Conv) -> Conv {
-    Conv {
-        scaling: Scaling::Standardised { gain },
-        ..conv
-    }
-}
-
-/// A residual block: narrowed, convolved, widened, added.
-fn block<O: Ops>(
-    ops: &mut O,
-    at: &O::Value,
-    name: &str,
-    [channels, hidden]: [usize; 2],
-) -> O::Value {
-    let x = ops.relu(at);
-    let x = ops.conv(&x, &format!("{name}.narrow"), plain(hidden, 1, 1));
-    let x = ops.relu(&x);
-    let x = ops.conv(&x, &format!("{name}.inner"), plain(hidden, 3, 1));
-    let x = ops.relu(&x);
-    let widen = with_gain(0.0, plain(channels, 1, 1));
-    let x = ops.conv(&x, &format!("{name}.widen"), widen);
-    ops.add(at, &x)
 }
 
 /// By the features at the joints and the deepest features of the whole picture.

@@ -133,7 +133,7 @@ pub fn varied(
     if rng.f32() < vary.coarse {
         coarsen(&mut rgb, view.size, rng.usize(2..=3));
     }
-    recolour(&mut rgb, vary, rng);
+    recolour(&mut rgb, vary.grey, rng);
     Some(sample(person, shape, &view, &rgb))
 }
 
@@ -243,7 +243,11 @@ fn cover(rgb: &mut [[f32; 3]], other: &Person, [width, height]: [usize; 2], rng:
 }
 
 /// Lowers the resolution: means of squares of pixels, enlarged again between their centres.
-fn coarsen(rgb: &mut [[f32; 3]], [width, height]: [usize; 2], factor: usize) {
+pub(in crate::networks) fn coarsen(
+    rgb: &mut [[f32; 3]],
+    [width, height]: [usize; 2],
+    factor: usize,
+) {
     let [columns, rows] = [width / factor, height / factor];
     let mut small = vec![[0.0f32; 3]; columns * rows];
     let share = 1.0 / (factor * factor) as f32;
@@ -279,11 +283,13 @@ fn coarsen(rgb: &mut [[f32; 3]], [width, height]: [usize; 2], factor: usize) {
 }
 
 /// Changes contrast, brightness and colours, adds noise.
-fn recolour(rgb: &mut [[f32; 3]], vary: &Vary, rng: &mut Rng) {
+///
+/// * `grey`: share of pictures that lose their colours.
+pub(in crate::networks) fn recolour(rgb: &mut [[f32; 3]], grey: f32, rng: &mut Rng) {
     let contrast = (0.2 * normal(rng)).exp();
     let brightness = 15.0 * normal(rng);
     let tint: [f32; 3] = [0; 3].map(|_| 8.0 * normal(rng));
-    let is_grey = rng.f32() < vary.grey;
+    let is_grey = rng.f32() < grey;
     let noise = if rng.f32() < 0.3 {
         10.0 * rng.f32()
     } else {

@@ -107,6 +107,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
             n: arguments.scenes,
             subjects: arguments.subjects,
             frames: arguments.frames,
+            company: 0,
             backdrop: arguments.backdrop.clone(),
             seed: arguments.seed,
         },

@@ -1,0 +1,58 @@
+//! `parallax-lab train finder`: trains the network that finds people in whole pictures.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use failure::{ExitKind, Failure, OrFail as _, Stop};
+use lab::finding;
+use terminal::{Globals, Terminal};
+use training::networks::finder::Settings;
+
+use crate::commands::train::learning::{Learning, named};
+
+const HELP: &str = "\
+PICTURES is a file of `parallax-lab train finder-pictures`. The network finds a box around everybody in a whole picture; the ONNX file \
+carries its card, and is what `network.detector` of a deployment names.
+
+After every hundred steps everything that the training knows is in OUT.checkpoint: what is stopped by Ctrl-C, or killed, goes on with \
+--resume and ends with the same network, bit for bit, on the same kind of machine.
+
+Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a setting is wrong; \
+4 the pictures or the checkpoint cannot be used; 130 stopped by Ctrl-C.
+
+Example:
+    parallax-lab train finder pictures.bin --out person.boxes.onnx";
+
+/// Options of `train finder`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// Pictures, prepared by `train finder-pictures`.
+    #[arg(value_name = "PICTURES", required_unless_present = "print_settings")]
+    pictures: Option<PathBuf>,
+    #[command(flatten)]
+    learning: Learning,
+}
+
+/// Runs the command.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let learning = &arguments.learning;
+    let mut settings: Settings = learning.read()?;
+    settings.steps = learning
+        .steps
+        .map_or(settings.steps, |steps| steps as usize);
+    settings.seed = learning.seed.map_or(settings.seed, u64::from);
+    settings.check().or_fail(ExitKind::Config)?;
+    if learning.print_settings {
+        Learning::print(&settings)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let terminal = Terminal::without_bar(globals.quiet || learning.json, learning.json);
+    let pictures = finding::read(named(arguments.pictures.as_deref()))?;
+    let job = learning.job()?;
+    let passes = finding::train((&job, &settings), &pictures, (&stop, &terminal))?;
+    learning.report(&passes)?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,49 @@
+//! Scenes that do not exist.
+
+use failure::{Console, Failure};
+use training::networks::finder::Picture;
+
+use super::around_joints;
+use super::reduced::reduced;
+use crate::scenes::{Scenes, Shown, of_pictures};
+
+/// Share of a box that shows its person, below which the person is hidden: of whom nothing is hidden it is about a third.
+const HIDDEN: f64 = 0.08;
+
+/// The pictures of all scenes, with the numbers of the subjects.
+pub(super) fn pictures(
+    scenes: &Scenes,
+    go_on: &(dyn Fn() -> Result<(), Failure> + Sync),
+    console: &dyn Console,
+) -> Result<Vec<(u64, Picture)>, Failure> {
+    if scenes.n == 0 {
+        return Ok(Vec::new());
+    }
+    console.begin("scenes", "pictures");
+    let found = of_pictures(
+        scenes,
+        |shown| {
+            go_on()?;
+            Ok(picture(shown))
+        },
+        |n, _| console.advance(n),
+    );
+    console.finish();
+    found
+}
+
+fn picture(shown: &Shown<'_>) -> Option<(u64, Picture)> {
+    let subject = shown.group.rsplit(' ').next()?.parse().ok()?;
+    let people = shown.everybody.iter().filter_map(|(joints, seen_px)| {
+        let outline = around_joints(joints.iter().copied())?;
+        let [left, top, right, bottom] = outline;
+        let size = [shown.picture.width(), shown.picture.height()].map(|side| side as f64);
+        let inside = (right.min(size[0]) - left.max(0.0)) * (bottom.min(size[1]) - top.max(0.0));
+        (*seen_px > 0.0).then_some((outline, *seen_px > HIDDEN * inside))
+    });
+    let people: Vec<_> = people.collect();
+    Some((
+        subject,
+        reduced(shown.source.clone(), shown.picture, &people),
+    ))
+}

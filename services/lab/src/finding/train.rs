@@ -1,0 +1,84 @@
+//! The training itself: from prepared pictures to an ONNX file with its card.
+
+use exports::report::curves::{self, Line, Panel};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
+use inputs::cards::METADATA_KEY;
+use training::networks::Trainer;
+use training::networks::finder::{self, About, Cost, FinderTask, Score, Settings};
+
+use super::Prepared;
+use crate::trained::{self, Job, Shown};
+
+/// The results of a hundred steps.
+pub type Pass = training::networks::Pass<Cost, Score>;
+
+/// Trains a network on prepared pictures, and writes it; a checkpoint, and curves (`.svg`), follow every hundred steps.
+///
+/// # Errors
+///
+/// Nothing to learn from, or nothing kept apart; the checkpoint is of another training; a file cannot be written; it was stopped
+/// ([`ExitKind::Interrupted`]).
+pub fn train(
+    (job, settings): (&Job, &Settings),
+    pictures: &Prepared,
+    (stop, console): (&Stop, &dyn Console),
+) -> Result<Vec<Pass>, Failure> {
+    let shown = [pictures.learnt.as_slice(), pictures.kept.as_slice()];
+    let task = FinderTask::new(settings, shown).or_fail(ExitKind::Input)?;
+    let written = |trainer: &Trainer<FinderTask<'_>>| {
+        let score = trainer.passes().iter().rev().find_map(|pass| pass.score);
+        let about = About {
+            pictures: shown.map(<[_]>::len),
+            samples: settings.steps * settings.batch,
+            score: score.unwrap_or_default(),
+        };
+        let card = finder::card(&settings.shape, &about);
+        trainer.onnx(&[(METADATA_KEY.to_owned(), card)])
+    };
+    let shown = Shown {
+        curves: &drawn,
+        words: &words,
+    };
+    trained::run(job, task, &shown, &written, (stop, console))
+}
+
+/// Draws the costs, and how good the network is on pictures that are kept apart.
+fn drawn(passes: &[Pass]) -> String {
+    let cost = |name, value: &dyn Fn(&Pass) -> f32| Line {
+        name,
+        values: passes.iter().map(|pass| f64::from(value(pass))).collect(),
+    };
+    let judged: Vec<Score> = passes.iter().filter_map(|pass| pass.score).collect();
+    let score = |name, value: &dyn Fn(&Score) -> f32| Line {
+        name,
+        values: judged.iter().map(|score| f64::from(value(score))).collect(),
+    };
+    let panel = |what, lines| Panel { what, lines };
+    let panels = [
+        panel(
+            "cost",
+            vec![
+                cost("heat", &|pass| pass.cost.heat),
+                cost("sides", &|pass| pass.cost.sides),
+            ],
+        ),
+        panel(
+            "pictures kept apart",
+            vec![
+                score("recall", &|score| score.recall),
+                score("false boxes a picture", &|score| score.false_boxes),
+                score("nobody found where nobody is", &|score| score.quiet),
+            ],
+        ),
+    ];
+    curves::svg(&panels, None)
+}
+
+/// Says how a pass ended.
+fn words(pass: &Pass) -> String {
+    let learnt = format!("heat {:.3}, sides {:.3}", pass.cost.heat, pass.cost.sides);
+    let Some(score) = pass.score else {
+        return learnt;
+    };
+    format!("{learnt}; {score}")
+}

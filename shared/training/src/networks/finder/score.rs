@@ -1,0 +1,124 @@
+//! How good a network is on pictures in which everybody has a box.
+
+use serde::{Deserialize, Serialize};
+
+use super::picture::Around;
+
+/// A found box and a true one that is the same share this of their union, at least.
+const SAME: f32 = 0.5;
+/// A box that shares this with somebody who does not count is not false.
+const UNASKED: f32 = 0.3;
+
+/// How good a network is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// Pictures.
+    pub pictures: usize,
+    /// People in them who should be found.
+    pub people: usize,
+    /// Share of these that are.
+    pub recall: f32,
+    /// Boxes of nobody, for each picture.
+    pub false_boxes: f32,
+    /// Pictures of nobody.
+    pub empty: usize,
+    /// Share of these in which nobody is found.
+    pub quiet: f32,
+}
+
+impl core::fmt::Display for Score {
+    fn fmt(&self, to: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(
+            to,
+            "{} pictures kept apart: {:.1} % of {} people found, {:.2} false boxes a picture, {:.1} % of {} pictures of nobody without any",
+            self.pictures,
+            100.0 * self.recall,
+            self.people,
+            self.false_boxes,
+            100.0 * self.quiet,
+            self.empty
+        )
+    }
+}
+
+/// The counts that a score is made of.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Tally {
+    pictures: usize,
+    people: usize,
+    found: usize,
+    wrong: usize,
+    empty: usize,
+    quiet: usize,
+}
+
+impl Tally {
+    /// Adds a picture.
+    ///
+    /// * `found`: the boxes that were found, the surest first; each is one person at most, and so is each person's box.
+    pub fn add(&mut self, people: &[Around], found: &[[f32; 4]]) {
+        let mut left: Vec<&Around> = people.iter().filter(|person| person.counts).collect();
+        self.pictures += 1;
+        self.people += left.len();
+        if people.is_empty() {
+            self.empty += 1;
+            self.quiet += usize::from(found.is_empty());
+        }
+        for outline in found {
+            let own = Around {
+                outline: *outline,
+                counts: true,
+            };
+            let best = (0..left.len()).max_by(|a, b| {
+                let [a, b] = [*a, *b].map(|at| own.overlap(left[at]));
+                a.total_cmp(&b)
+            });
+            if let Some(best) = best.filter(|best| own.overlap(left[*best]) >= SAME) {
+                left.swap_remove(best);
+                self.found += 1;
+                continue;
+            }
+            let mut unasked = people.iter().filter(|person| !person.counts);
+            let is_unasked = unasked.any(|person| {
+                own.overlap(person) >= UNASKED || own.cut(person.outline).area() > 0.5 * own.area()
+            });
+            self.wrong += usize::from(!is_unasked);
+        }
+    }
+
+    /// The score of all pictures.
+    pub fn score(&self) -> Score {
+        let share = |n: usize, of: usize| n as f32 / of.max(1) as f32;
+        Score {
+            pictures: self.pictures,
+            people: self.people,
+            recall: share(self.found, self.people),
+            false_boxes: share(self.wrong, self.pictures),
+            empty: self.empty,
+            quiet: share(self.quiet, self.empty),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_counts_once_and_one_over_somebody_who_does_not_count_is_not_false() {
+        let around = |left: f32, counts| Around {
+            outline: [left, 0.0, left + 10.0, 30.0],
+            counts,
+        };
+        let people = [around(0.0, true), around(50.0, true), around(100.0, false)];
+        let found = [0.0, 1.0, 101.0, 200.0].map(|left| around(left, true).outline);
+        let mut tally = Tally::default();
+        tally.add(&people, &found);
+        tally.add(&[], &[]);
+        let score = tally.score();
+        assert_eq!(
+            [score.recall, score.false_boxes, score.quiet],
+            [0.5, 1.0, 1.0]
+        );
+    }
+}

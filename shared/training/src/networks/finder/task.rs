@@ -1,0 +1,293 @@
+//! The training of the network that finds people: steps of Adam, first over smaller pictures.
+
+use keypoints::DetectorCard;
+use rayon::prelude::*;
+
+use super::card::{About, card};
+use super::cost::{Cost, Truth};
+use super::network::{CHANNELS, Shape, initial};
+use super::picture::Picture;
+use super::score::{Score, Tally};
+use super::settings::Settings;
+use super::vary::{FinderSample, plain, varied};
+use crate::networks::lesson::Shown;
+use crate::networks::onnx::{self, Document};
+use crate::networks::optimiser::{Rule, Step};
+use crate::networks::order;
+use crate::networks::parameters::Parameter;
+use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
+
+/// Pictures that are judged at once.
+const JUDGED_AT_ONCE: usize = 32;
+/// Share of the steps in which their length rises.
+const RISING: f32 = 0.05;
+/// Steps of a pass.
+const STEPS: usize = 100;
+/// Passes between two looks at the pictures that are kept apart.
+const JUDGED: usize = 10;
+
+/// Writes a network as an ONNX file, with weights in half precision.
+///
+/// * `parameters`: in the order of [`initial`].
+/// * `metadata`: keys and values that the file carries.
+///
+/// # Panics
+///
+/// If the parameters are another network's.
+pub fn file(shape: &Shape, parameters: &[Parameter], metadata: &[(String, String)]) -> Vec<u8> {
+    onnx::write(shape, parameters, document(metadata))
+}
+
+fn document(metadata: &[(String, String)]) -> Document {
+    Document {
+        name: "boxes".to_owned(),
+        metadata: metadata.to_vec(),
+        has_half_weights: true,
+        ..Document::default()
+    }
+}
+
+/// There is nothing to learn from, or nothing is kept apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{learnt} pictures to learn from and {kept} kept apart are too few")]
+pub struct NobodyShown {
+    /// To learn from.
+    pub learnt: usize,
+    /// Kept apart.
+    pub kept: usize,
+}
+
+/// The training of the network that finds people.
+#[derive(Debug)]
+pub struct FinderTask<'a> {
+    settings: &'a Settings,
+    learnt: &'a [Picture],
+    kept: &'a [Picture],
+    card: DetectorCard,
+    stamp: u64,
+}
+
+impl<'a> FinderTask<'a> {
+    /// Prepares a training.
+    ///
+    /// * `learnt`, `kept`: pictures to learn from, and others, on which it is judged.
+    ///
+    /// # Errors
+    ///
+    /// [`NobodyShown`]
+    ///
+    /// # Panics
+    ///
+    /// If the card that this crate writes is none.
+    pub fn new(
+        settings: &'a Settings,
+        [learnt, kept]: [&'a [Picture]; 2],
+    ) -> Result<Self, NobodyShown> {
+        if learnt.is_empty() || kept.is_empty() {
+            let [learnt, kept] = [learnt.len(), kept.len()];
+            return Err(NobodyShown { learnt, kept });
+        }
+        let text = card(&settings.shape, &About::default());
+        #[expect(clippy::expect_used, reason = "it was written here")]
+        let card = DetectorCard::parse(&text).expect("a card");
+        Ok(Self {
+            settings,
+            learnt,
+            kept,
+            card,
+            stamp: stamp(settings, [learnt, kept]),
+        })
+    }
+
+    /// The network with the size of the input at a step.
+    fn shape_at(&self, nth: usize) -> Shape {
+        let settings = self.settings;
+        if (nth as f32) < settings.small * settings.steps as f32 {
+            settings.shape.smaller()
+        } else {
+            settings.shape.clone()
+        }
+    }
+
+    fn sample(&self, at: usize, shape: &Shape) -> FinderSample {
+        let seed = self.settings.seed;
+        let picture = &self.learnt[order::shown(at, self.learnt.len(), seed)];
+        let mut dice = order::dice(at, seed);
+        varied(
+            picture,
+            self.learnt,
+            (shape, &self.settings.vary),
+            &mut dice,
+        )
+    }
+
+    /// The length of a step rises, then falls to 0 as a cosine.
+    fn rate(&self, nth: usize) -> f32 {
+        let settings = self.settings;
+        let done = (nth as f32 + 0.5) / settings.steps as f32;
+        if done < RISING {
+            return settings.rate * done / RISING;
+        }
+        let falling = (done - RISING) / (1.0 - RISING);
+        settings.rate * 0.5 * (1.0 + (core::f32::consts::PI * falling).cos())
+    }
+}
+
+impl Task for FinderTask<'_> {
+    type Network = Shape;
+    type Truth = Truth;
+    type Cost = Cost;
+    type Score = Score;
+
+    const LEARNED_FROM: &'static str = "pictures";
+
+    fn stamp(&self) -> u64 {
+        self.stamp
+    }
+
+    fn network(&self) -> Shape {
+        self.settings.shape.clone()
+    }
+
+    fn begin(&self) -> Vec<Parameter> {
+        initial(&self.settings.shape, self.settings.seed)
+    }
+
+    fn seed(&self) -> u64 {
+        self.settings.seed
+    }
+
+    fn n_steps(&self) -> usize {
+        self.settings.steps
+    }
+
+    fn plan(&self, steps: usize, passes: usize) -> Plan {
+        let left = self.settings.steps.saturating_sub(steps);
+        Plan {
+            steps: left.min(STEPS),
+            is_judged: left <= STEPS || (passes + 1).is_multiple_of(JUDGED),
+        }
+    }
+
+    fn learned(&self, _nth: usize, parameters: &[Parameter]) -> Vec<bool> {
+        vec![true; parameters.len()]
+    }
+
+    fn step(&self, nth: usize) -> Step {
+        let settings = self.settings;
+        Step {
+            rule: Rule::Adam,
+            rate: self.rate(nth),
+            decay: settings.decay,
+            longest: settings.longest,
+            // At the beginning a mean over few steps.
+            averaged: settings.averaged.max(1.0 / (nth as f32 + 2.0)),
+        }
+    }
+
+    fn batch(&self, nth: usize) -> Batch<Shape, Truth> {
+        let n = self.settings.batch;
+        let network = self.shape_at(nth);
+        let seen: Vec<FinderSample> = (0..n)
+            .into_par_iter()
+            .map(|at| self.sample(nth * n + at, &network))
+            .collect();
+        let joined = |part: &dyn Fn(&FinderSample) -> &[f32]| -> Vec<f32> {
+            seen.iter().flat_map(part).copied().collect()
+        };
+        Batch {
+            shown: shown(&seen),
+            truth: Truth {
+                heat: joined(&|sample| &sample.heat),
+                sides: joined(&|sample| &sample.sides),
+            },
+            network,
+        }
+    }
+
+    fn cost(&self, nth: usize, truth: &Truth, outputs: &[Vec<f32>]) -> Costed<Cost> {
+        let cells = self.shape_at(nth).cells().pow(2);
+        let found = outputs.first().map_or(&[][..], Vec::as_slice);
+        let (cost, gradient) = truth.cost(found, cells, self.settings.sides);
+        Costed {
+            cost,
+            gradients: vec![gradient],
+        }
+    }
+
+    fn mean(&self, costs: &[(usize, Cost)]) -> Cost {
+        let n = costs.len().max(1) as f32;
+        let mean =
+            |part: &dyn Fn(&Cost) -> f32| costs.iter().map(|(_, cost)| part(cost)).sum::<f32>() / n;
+        Cost {
+            heat: mean(&|cost| cost.heat),
+            sides: mean(&|cost| cost.sides),
+        }
+    }
+
+    fn score(&self, find: &dyn Fn(&Shown) -> Vec<Vec<f32>>) -> Score {
+        let shape = &self.settings.shape;
+        let n = CHANNELS * shape.cells().pow(2);
+        let mut tally = Tally::default();
+        for pictures in self.kept.chunks(JUDGED_AT_ONCE) {
+            let seen: Vec<FinderSample> = pictures
+                .par_iter()
+                .map(|picture| plain(picture, shape))
+                .collect();
+            let outputs = find(&shown(&seen));
+            let found = outputs.first().map_or(&[][..], Vec::as_slice);
+            for (picture, found) in pictures.iter().zip(found.chunks_exact(n)) {
+                tally.add(&picture.people, &self.boxes(picture, found));
+            }
+        }
+        tally.score()
+    }
+}
+
+impl FinderTask<'_> {
+    /// The boxes that the network's output means, pixels of the picture; none where it is not finite.
+    fn boxes(&self, picture: &Picture, found: &[f32]) -> Vec<[f32; 4]> {
+        let Shape { side, .. } = self.settings.shape;
+        let cells = self.settings.shape.cells();
+        let read = self.card.boxes(found, &[1, CHANNELS, cells, cells]);
+        let [width, height] = picture.size;
+        let step = width.max(height) as f64 / side as f64;
+        let found = read.unwrap_or_default().into_iter();
+        let outlines = found.map(|found| found.outline.map(|at| ((at + 0.5) * step - 0.5) as f32));
+        outlines.collect()
+    }
+}
+
+impl Trainer<FinderTask<'_>> {
+    /// The output of the trained network for pictures, `[n, 3, side, side]`: `[n, 5, rows, columns]`.
+    pub fn find_in(&self, n: usize, pictures: &[f32]) -> Vec<f32> {
+        let inputs = vec![pictures.to_vec()];
+        let found = self.find(&Shown { n, inputs });
+        found.into_iter().next().unwrap_or_default()
+    }
+
+    /// The trained network as an ONNX file.
+    ///
+    /// * `metadata`: keys and values that the file carries.
+    pub fn onnx(&self, metadata: &[(String, String)]) -> Vec<u8> {
+        self.file(document(metadata))
+    }
+}
+
+fn shown(seen: &[FinderSample]) -> Shown {
+    let pictures = seen.iter().flat_map(|sample| &sample.picture);
+    Shown {
+        n: seen.len(),
+        inputs: vec![pictures.copied().collect()],
+    }
+}
+
+/// A hash of everything that the result depends on.
+fn stamp(settings: &Settings, pictures: [&[Picture]; 2]) -> u64 {
+    let mut bytes = format!("{settings:?}").into_bytes();
+    for picture in pictures.into_iter().flatten() {
+        bytes.extend(formats::checksum::fnv1a(&picture.rgb).to_le_bytes());
+        bytes.extend(format!("{:?}{:?}", picture.size, picture.people).into_bytes());
+    }
+    formats::checksum::fnv1a(&bytes)
+}
