@@ -152,7 +152,10 @@ impl Looks<'_> {
         if is_known(&memory.seen, memory.n_seen) {
             return self.see_behind(boxed, None, memory);
         }
-        self.keep_look(&look, None, memory);
+        let (workspace, seen) = memory.next();
+        let what = (self.image, look);
+        let best = self.looker.look_closer(what, workspace, &mut seen.maps)?;
+        self.keep_look(&best, None, memory);
         Ok(())
     }
 
