@@ -20,7 +20,7 @@ use crate::prepared::Example;
 use crate::scenes::Scenes;
 
 pub use crate::prepared::{is_file, read, write};
-pub use crate::trained::Job;
+pub use crate::trained::{Earlier, Job};
 pub use judge::judge;
 pub use train::{Pass, train};
 

@@ -9,6 +9,7 @@
 //!
 //! Nothing here reads or writes files.
 
+mod begun;
 mod checkpoint;
 mod compute;
 mod lesson;

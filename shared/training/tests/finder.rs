@@ -6,7 +6,7 @@ use training::networks::finder::{
     About, Around, BOXES, CHANNELS, FinderTask, PICTURE, Picture, STRIDE, Settings, Shape, Vary,
     card, plain, varied,
 };
-use training::networks::{Backend, Plan, Task, Trainer};
+use training::networks::{Backend, Plan, Task as _, Trainer};
 
 /// Pictures of bright upright boxes on noise; every fourth shows nobody.
 fn pictures(n: usize, seed: u64) -> Vec<Picture> {
@@ -78,7 +78,7 @@ fn trainer<'a>(
     pictures: [&'a [Picture]; 2],
     checkpoint: Option<&[u8]>,
 ) -> Trainer<FinderTask<'a>> {
-    let task = FinderTask::new(settings, pictures).unwrap();
+    let task = FinderTask::new(settings, pictures, None).unwrap();
     Trainer::new(task, Backend::BuiltIn, checkpoint).unwrap()
 }
 
@@ -195,7 +195,7 @@ proptest! {
 #[test]
 fn a_task_without_pictures_is_refused() {
     let settings = small();
-    let refused = FinderTask::new(&settings, [&[], &[]]).unwrap_err();
+    let refused = FinderTask::new(&settings, [&[], &[]], None).unwrap_err();
     assert!(refused.to_string().contains("0 pictures"), "{refused}");
     assert_eq!(FinderTask::LEARNED_FROM, "pictures");
 }

@@ -7,7 +7,7 @@ use training::networks::Trainer;
 use training::networks::finder::{self, About, Cost, FinderTask, Score, Settings};
 
 use super::Prepared;
-use crate::trained::{self, Job, Shown};
+use crate::trained::{self, Earlier, Job, Shown};
 
 /// The results of a hundred steps.
 pub type Pass = training::networks::Pass<Cost, Score>;
@@ -24,12 +24,22 @@ pub fn train(
     (stop, console): (&Stop, &dyn Console),
 ) -> Result<Vec<Pass>, Failure> {
     let shown = [pictures.learnt.as_slice(), pictures.kept.as_slice()];
-    let task = FinderTask::new(settings, shown).or_fail(ExitKind::Input)?;
+    let begun = |from: &Earlier| {
+        let begun = finder::begun(&settings.shape, settings.seed, &from.bytes);
+        begun.map_err(|error| {
+            let hint =
+                "--from takes a network of `train finder` that has the `shape` of the settings";
+            failure::in_file(&from.file, &error).with_hint(hint)
+        })
+    };
+    let from = job.from.as_ref().map(begun).transpose()?;
+    let task = FinderTask::new(settings, shown, from).or_fail(ExitKind::Input)?;
     let written = |trainer: &Trainer<FinderTask<'_>>| {
         let score = trainer.passes().iter().rev().find_map(|pass| pass.score);
         let about = About {
             pictures: shown.map(<[_]>::len),
             samples: settings.steps * settings.batch,
+            goes_on: job.from.is_some(),
             score: score.unwrap_or_default(),
         };
         let card = finder::card(&settings.shape, &about);

@@ -17,9 +17,10 @@ mod settings;
 mod task;
 mod vary;
 
+pub use crate::networks::begun::{BeginError, Begun};
 pub use card::{About, card};
 pub use cost::{Cost, Truth};
-pub use network::{BOXES, CHANNELS, PICTURE, STRIDE, Shape, initial};
+pub use network::{BOXES, CHANNELS, PICTURE, STRIDE, Shape, begun, initial};
 pub use picture::{Around, Picture, SIDE};
 pub use score::{Score, Tally};
 pub use settings::{Settings, Vary};

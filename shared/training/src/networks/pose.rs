@@ -13,7 +13,6 @@
 //!
 //! Pixels have their centres at integers.
 
-mod begun;
 mod card;
 mod cost;
 mod marks;
@@ -24,12 +23,12 @@ mod settings;
 mod task;
 mod vary;
 
-pub use begun::{BeginError, Begun, begun};
+pub use crate::networks::begun::{BeginError, Begun};
 pub use card::{About, card};
 pub use cost::{Cost, Truth};
 pub use marks::{Marks, exchange_sides};
 pub use network::{
-    ERROR, EXTRAS, FRONT, MAPS, N_JOINTS, N_KEYPOINTS, PICTURE, STRIDE, Shape, initial,
+    ERROR, EXTRAS, FRONT, MAPS, N_JOINTS, N_KEYPOINTS, PICTURE, STRIDE, Shape, begun, initial,
 };
 pub use person::{Person, SIDE, Source, Target, WINDOW};
 pub use score::{Judged, Score};

@@ -5,10 +5,10 @@ use super::score::Score;
 use crate::networks::pose::{DEVIATION, FILL, MEAN};
 
 /// Boxes with a lower score are dropped.
-const LEAST_SCORE: f64 = 0.3;
+const LEAST_SCORE: f64 = 0.2;
 /// The worse of two boxes that share more than this of their union is dropped: people who stand in front of each other share more
 /// than half.
-const MOST_OVERLAP: f64 = 0.7;
+const MOST_OVERLAP: f64 = 0.65;
 
 /// Facts that a card tells beside how the network is used.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -17,6 +17,8 @@ pub struct About {
     pub pictures: [usize; 2],
     /// Samples that the network was shown.
     pub samples: usize,
+    /// Set where it went on from a network that was trained before.
+    pub goes_on: bool,
     /// How good it is on those that were kept apart.
     pub score: Score,
 }
@@ -30,10 +32,15 @@ pub fn card(shape: &Shape, about: &About) -> String {
         false_boxes,
         ..
     } = about.score;
+    let before = if about.goes_on {
+        " after those of another network that it began with"
+    } else {
+        ""
+    };
     let (recall, fill, side) = (100.0 * recall, FILL as u8, shape.side);
     format!(
         "\
-# A network of `parallax-lab train finder`: {learnt} pictures, {samples} samples. In {kept} pictures that were kept apart it finds
+# A network of `parallax-lab train finder`: {learnt} pictures, {samples} samples{before}. In {kept} pictures that were kept apart it finds
 # {recall:.1} % of {people} people, and {false_boxes:.2} boxes a picture that are of nobody.
 format = \"parallax-detector\"
 version = 1

@@ -3,6 +3,7 @@
 //! A whole picture goes in. Of every cell of four by four pixels it gives the log-odds that the middle of somebody's box lies in
 //! it, and the natural logarithms of the distances from the middle of the cell to the left, top, right and bottom of that box, in cells.
 
+use crate::networks::begun::{self, BeginError, Begun};
 use crate::networks::ops::{Dims, Network, Ops, Output};
 use crate::networks::parameters::{self, Parameter};
 use crate::networks::trunk::{Trunk, plain, with_gain};
@@ -103,4 +104,16 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
         bias.values[1..].copy_from_slice(&SIDE_BIAS);
     }
     all
+}
+
+/// Reads the parameters of a network that [`file()`](super::file()) wrote, to go on from.
+///
+/// * `shape`: its size. The side of the input may be another than that of the file.
+/// * `seed`: of the weights of channels that are 0 in the file.
+///
+/// # Errors
+///
+/// [`BeginError`]
+pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Begun, BeginError> {
+    begun::begun(initial(shape, seed), None, file)
 }

@@ -10,6 +10,7 @@ use super::picture::Picture;
 use super::score::{Score, Tally};
 use super::settings::Settings;
 use super::vary::{FinderSample, plain, varied};
+use crate::networks::begun::Begun;
 use crate::networks::lesson::Shown;
 use crate::networks::onnx::{self, Document};
 use crate::networks::optimiser::{Rule, Step};
@@ -64,6 +65,7 @@ pub struct FinderTask<'a> {
     learnt: &'a [Picture],
     kept: &'a [Picture],
     card: DetectorCard,
+    from: Option<Begun>,
     stamp: u64,
 }
 
@@ -71,6 +73,7 @@ impl<'a> FinderTask<'a> {
     /// Prepares a training.
     ///
     /// * `learnt`, `kept`: pictures to learn from, and others, on which it is judged.
+    /// * `from`: the network of [`begun`](super::begun), to begin with in place of random parameters.
     ///
     /// # Errors
     ///
@@ -82,6 +85,7 @@ impl<'a> FinderTask<'a> {
     pub fn new(
         settings: &'a Settings,
         [learnt, kept]: [&'a [Picture]; 2],
+        from: Option<Begun>,
     ) -> Result<Self, NobodyShown> {
         if learnt.is_empty() || kept.is_empty() {
             let [learnt, kept] = [learnt.len(), kept.len()];
@@ -95,7 +99,8 @@ impl<'a> FinderTask<'a> {
             learnt,
             kept,
             card,
-            stamp: stamp(settings, [learnt, kept]),
+            stamp: stamp(settings, [learnt, kept], from.as_ref()),
+            from,
         })
     }
 
@@ -150,7 +155,8 @@ impl Task for FinderTask<'_> {
     }
 
     fn begin(&self) -> Vec<Parameter> {
-        initial(&self.settings.shape, self.settings.seed)
+        let from = self.from.as_ref().map(|from| from.parameters.clone());
+        from.unwrap_or_else(|| initial(&self.settings.shape, self.settings.seed))
     }
 
     fn seed(&self) -> u64 {
@@ -283,11 +289,15 @@ fn shown(seen: &[FinderSample]) -> Shown {
 }
 
 /// A hash of everything that the result depends on.
-fn stamp(settings: &Settings, pictures: [&[Picture]; 2]) -> u64 {
+fn stamp(settings: &Settings, pictures: [&[Picture]; 2], from: Option<&Begun>) -> u64 {
     let mut bytes = format!("{settings:?}").into_bytes();
     for picture in pictures.into_iter().flatten() {
         bytes.extend(formats::checksum::fnv1a(&picture.rgb).to_le_bytes());
         bytes.extend(format!("{:?}{:?}", picture.size, picture.people).into_bytes());
+    }
+    let from = from.into_iter().flat_map(|from| &from.parameters);
+    for value in from.flat_map(|list| &list.values) {
+        bytes.extend(value.to_bits().to_le_bytes());
     }
     formats::checksum::fnv1a(&bytes)
 }

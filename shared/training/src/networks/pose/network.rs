@@ -8,6 +8,7 @@
 
 use skeleton::PARSE14;
 
+use crate::networks::begun::{BeginError, Begun};
 use crate::networks::ops::{Dims, Network, Ops, Output};
 use crate::networks::parameters::{self, Parameter};
 use crate::networks::trunk::{Trunk, block, plain, with_gain};
@@ -137,6 +138,20 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
         }
     }
     all
+}
+
+/// Reads the parameters of a network that [`file()`](super::file()) wrote, to go on from.
+///
+/// A network without the layers of the [extra keypoints](EXTRAS) gets untrained ones.
+///
+/// * `shape`: its size. Width and height of the input may be others than those of the file.
+/// * `seed`: of the weights of channels that are 0 in the file.
+///
+/// # Errors
+///
+/// [`BeginError`]
+pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Begun, BeginError> {
+    crate::networks::begun::begun(initial(shape, seed), Some(OF_EXTRAS), file)
 }
 
 /// Runs the network: maps, evidence for the direction, logarithms of expected errors.

@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::begun::Begun;
 use super::cost::{Cost, Truth};
 use super::network::{N_KEYPOINTS, OF_EXTRAS, Shape, initial};
 use super::peak;
@@ -10,6 +9,7 @@ use super::person::Person;
 use super::score::{Judged, Score};
 use super::settings::Settings;
 use super::vary::{NetworkSample, plain, varied};
+use crate::networks::begun::Begun;
 use crate::networks::lesson::Shown;
 use crate::networks::onnx::{self, Document};
 use crate::networks::optimiser::{Rule, Step};

@@ -33,6 +33,9 @@ pub(crate) struct Arguments {
     pictures: Option<PathBuf>,
     #[command(flatten)]
     learning: Learning,
+    /// A network of this command to go on from, in place of random weights: more steps, or pictures of your own.
+    #[arg(long, value_name = "NETWORK")]
+    from: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -51,7 +54,17 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let terminal = Terminal::without_bar(globals.quiet || learning.json, learning.json);
     let pictures = finding::read(named(arguments.pictures.as_deref()))?;
-    let job = learning.job()?;
+    let earlier = |file: &PathBuf| -> Result<_, Failure> {
+        let bytes = files::read(file, files::MODEL).map_err(|error| failure::in_file(file, &error));
+        Ok(finding::Earlier {
+            bytes: bytes?,
+            file: file.clone(),
+        })
+    };
+    let job = finding::Job {
+        from: arguments.from.as_ref().map(earlier).transpose()?,
+        ..learning.job()?
+    };
     let passes = finding::train((&job, &settings), &pictures, (&stop, &terminal))?;
     learning.report(&passes)?;
     Ok(ExitCode::SUCCESS)

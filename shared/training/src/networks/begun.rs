@@ -1,11 +1,10 @@
-//! The parameters of a network that was trained before: what a training goes on from.
+//! The parameters of a network that was trained before, from which a training goes on.
 
 use std::collections::BTreeMap;
 
 use inference::onnx::value_of_half;
 use rten_onnx::onnx::{DataType, ModelProto, TensorProto};
 
-use super::network::{OF_EXTRAS, Shape, initial};
 use crate::networks::parameters::{GAIN_OF_RELU, Parameter};
 
 /// Why a training cannot go on from a network.
@@ -45,36 +44,41 @@ pub enum BeginError {
 /// A network that a training goes on from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Begun {
-    /// In the order of [`initial`].
+    /// In the order of the untrained ones.
     pub parameters: Vec<Parameter>,
     /// The numbers of the constants of the file, by the names of the parameters that they stand for.
     pub constants: BTreeMap<String, Vec<f32>>,
 }
 
-/// Reads the parameters of a network that [`file()`](super::file()) wrote.
-///
-/// A network without the layers of the [extra keypoints](super::EXTRAS) gets untrained ones.
+/// Reads the parameters of a network that this crate wrote.
 ///
 /// The weights in the file are standardised ones: every channel gets its length as gain, and weights of the length that they have
 /// at the beginning of a training. The network gives what the file gives, but for roundings.
 ///
-/// * `shape`: its size. Width and height of the input may be others than those of the file.
-/// * `seed`: of the weights of channels that are 0 in the file.
+/// * `all`: the untrained parameters of the network; weights of channels that are 0 in the file stay.
+/// * `may_lack`: how the names of layers begin that the file may lack; they stay untrained.
 ///
 /// # Errors
 ///
 /// [`BeginError`]
-pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Begun, BeginError> {
+pub(crate) fn begun(
+    mut all: Vec<Parameter>,
+    may_lack: Option<&str>,
+    file: &[u8],
+) -> Result<Begun, BeginError> {
     let graph = ModelProto::parse_buf(file)?.graph.unwrap_or_default();
     let constants = graph.initializer;
-    let mut all = initial(shape, seed);
     let mut kept = BTreeMap::new();
     for at in 0..all.len() {
         if is_gain(&all[at]) {
             continue;
         }
         let values = match numbers(&constants, &all[at]) {
-            Err(BeginError::Missing { name, .. }) if name.starts_with(OF_EXTRAS) => continue,
+            Err(BeginError::Missing { name, .. })
+                if may_lack.is_some_and(|layers| name.starts_with(layers)) =>
+            {
+                continue;
+            }
             read => read?,
         };
         kept.insert(all[at].name.clone(), values.clone());
