@@ -11,7 +11,7 @@ pub const FOLLOWED_S: f64 = 0.4;
 ///
 /// * `rate_hz`: of the frames that are looked at.
 pub(crate) fn find_every(config: &Config, rate_hz: Option<f64>) -> u64 {
-    let by_rate = || find_every_at(rate_hz, config.has_detector());
+    let by_rate = || find_every_at(rate_hz, config.has_own_detector());
     config.find_every.unwrap_or_else(by_rate)
 }
 

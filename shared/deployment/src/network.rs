@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::shipped::{SHIPPED, is_none, relative_to};
+use crate::shipped::{SHIPPED, is_none, is_shipped, relative_to};
 
 /// The network that finds the joints of people, and where it looks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -14,9 +14,9 @@ use crate::shipped::{SHIPPED, is_none, relative_to};
 pub struct Config {
     /// The network that finds joints: an ONNX file with its card beside it (`.toml` for `.onnx`) or in its metadata, or `"shipped"`.
     pub file: PathBuf,
-    /// The detector of people that finds boxes for the network: an ONNX file with its card beside it, `"shipped"`, or `"none"` for the filters.
+    /// The detector of people: an ONNX file with its card beside it finds all boxes for the network, `"shipped"` those of several people, `"none"` none; filters find the others.
     pub detector: PathBuf,
-    /// Search for people in every n-th frame; by default twice a second with a detector, four times as often while it sees several, once a second without.
+    /// Search for people in every n-th frame; by default once a second, twice with a `detector` of your own, and eight times while a detector sees several people.
     pub find_every: Option<u64>,
     /// Least mean heat of the joints of a visible person, 0 to 1.
     pub least_heat: f64,
@@ -54,8 +54,13 @@ impl Config {
         }
     }
 
-    /// Says if a detector finds the boxes of people; if not, the filters do.
+    /// Says if a detector finds the boxes of several people; if not, the filters do.
     pub fn has_detector(&self) -> bool {
         !is_none(&self.detector)
+    }
+
+    /// Says if a detector of the user's finds all boxes.
+    pub fn has_own_detector(&self) -> bool {
+        self.has_detector() && !is_shipped(&self.detector)
     }
 }

@@ -125,7 +125,8 @@ impl Looks<'_> {
         Ok(outlines.len())
     }
 
-    /// Looks into the boxes of a detector, each of which is of one person.
+    /// Looks into the boxes of a detector, each of which is of one person. Closer into the only one, which may fit badly: among others a
+    /// closer look would end at the one in front.
     ///
     /// * `outlines`: the nearest person first.
     pub(crate) fn see_boxes(
@@ -138,13 +139,18 @@ impl Looks<'_> {
             if memory.n_seen == self.n_most || memory.people().iter().any(is_same) {
                 continue;
             }
-            self.see_box(*outline, memory)?;
+            self.see_box(*outline, outlines.len() == 1, memory)?;
         }
         Ok(())
     }
 
     /// Looks at the person in a box; where that is somebody who is known, at the one behind.
-    fn see_box(&self, outline: [f64; 4], memory: &mut NetworkMemory) -> Result<(), LookError> {
+    fn see_box(
+        &self,
+        outline: [f64; 4],
+        is_alone: bool,
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
         let boxed = (outline, Turn::Up);
         let Some(look) = self.see_in(boxed, memory)? else {
             return Ok(());
@@ -152,9 +158,13 @@ impl Looks<'_> {
         if is_known(&memory.seen, memory.n_seen) {
             return self.see_behind(boxed, None, memory);
         }
-        let (workspace, seen) = memory.next();
-        let what = (self.image, look);
-        let best = self.looker.look_closer(what, workspace, &mut seen.maps)?;
+        let best = if is_alone {
+            let (workspace, seen) = memory.next();
+            let what = (self.image, look);
+            self.looker.look_closer(what, workspace, &mut seen.maps)?
+        } else {
+            look
+        };
         self.keep_look(&best, None, memory);
         Ok(())
     }

@@ -36,7 +36,12 @@ pub enum Boxes {
     /// A detector of people.
     Detector(Box<Detector>),
     /// The search of the filters over the whole picture.
-    Filters(Box<ViewStep>),
+    Filters {
+        /// The step of the filters.
+        filters: Box<ViewStep>,
+        /// A detector of people, which tells several apart: in place of the filters while several are seen.
+        of_several: Option<Box<Detector>>,
+    },
     /// Whoever looks by [`NetworkStep::look_by`]; they count as those of the filters. [`NetworkStep::look`] finds none.
     Caller,
 }
@@ -136,7 +141,12 @@ impl NetworkStep {
             memory.n_seen = 0;
             return Ok(());
         };
-        self.look_by(image, &mut |values| find(boxes, image, values), memory)
+        let are_several = memory.tracks.len() > 1;
+        self.look_by(
+            image,
+            &mut |values| find((boxes, are_several), image, values),
+            memory,
+        )
     }
 
     /// As [`Self::look`], with boxes that somebody else finds.
@@ -178,7 +188,7 @@ impl NetworkStep {
             memory.found = find(&mut memory.values)?;
             memory.n_looked_into = 0;
         }
-        if is_due && matches!(boxes, Boxes::Detector(_)) {
+        if is_due && by_detector(boxes, tracks.len() > 1).is_some() {
             let found = core::mem::take(&mut memory.found);
             looks.see_boxes(&found, memory)?;
             for track in &tracks {
@@ -317,26 +327,35 @@ fn front_of(sighting: &Sighting, seen: &Seen) -> FrontEvidence {
 }
 
 /// Boxes around people, pixels, the best first.
+///
+/// * `are_several`: whether several people were seen in the frame before.
 fn find(
-    boxes: &Boxes,
+    (boxes, are_several): (&Boxes, bool),
     image: Rgb8View<'_>,
     values: &mut Vec<f32>,
 ) -> Result<Vec<[f64; 4]>, LookError> {
+    if let Some(detector) = by_detector(boxes, are_several) {
+        let mut found = detector.people(image, values)?;
+        // Who is sure and large first: the frame has room for a few.
+        let weight = |it: &keypoints::PersonBox| it.score * (it.outline[3] - it.outline[1]);
+        found.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+        return Ok(found.into_iter().map(|it| it.outline).collect());
+    }
+    let Boxes::Filters { filters, .. } = boxes else {
+        return Ok(Vec::new());
+    };
+    let whole = Scope::whole(filters.layout());
+    values.resize(values.len().max(filters.layout().n_values(&whole)), 0.0);
+    let found = filters.run(image, whole, values);
+    let outline = |it: &Pose| outline_of_parts(filters.bounding_box(it));
+    Ok(found.candidates.iter().map(outline).collect())
+}
+
+/// The detector that finds the next boxes; `None` where the filters or the caller find them.
+fn by_detector(boxes: &Boxes, are_several: bool) -> Option<&Detector> {
     match boxes {
-        Boxes::Detector(detector) => {
-            let mut found = detector.people(image, values)?;
-            // Who is sure and large first: the frame has room for a few.
-            let weight = |it: &keypoints::PersonBox| it.score * (it.outline[3] - it.outline[1]);
-            found.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-            Ok(found.into_iter().map(|it| it.outline).collect())
-        }
-        Boxes::Filters(step) => {
-            let whole = Scope::whole(step.layout());
-            values.resize(values.len().max(step.layout().n_values(&whole)), 0.0);
-            let found = step.run(image, whole, values);
-            let outline = |it: &Pose| outline_of_parts(step.bounding_box(it));
-            Ok(found.candidates.iter().map(outline).collect())
-        }
-        Boxes::Caller => Ok(Vec::new()),
+        Boxes::Detector(detector) => Some(detector),
+        Boxes::Filters { of_several, .. } => of_several.as_deref().filter(|_| are_several),
+        Boxes::Caller => None,
     }
 }

@@ -64,7 +64,13 @@ impl AsRun<'_> {
             let plan = pipeline::plan(&self.filters, camera).or_fail(ExitKind::Input)?;
             let boxes = match self.open.detector()? {
                 Some(detector) => Boxes::Detector(Box::new(detector)),
-                None => Boxes::Filters(Box::new(self.filters(&plan))),
+                None => Boxes::Filters {
+                    filters: Box::new(self.filters(&plan)),
+                    of_several: inputs::detector_of_several(
+                        &deployment::network::Config::default(),
+                    )?
+                    .map(Box::new),
+                },
             };
             let network = self.open.network()?;
             as_seen |= network.card().keypoints.sides == Sides::Seen;

@@ -71,7 +71,10 @@ pub(crate) fn of_view(
         .or_fail(ExitKind::Config)?;
     let boxes = match inputs::detector(config)? {
         Some(detector) => Boxes::Detector(Box::new(detector)),
-        None => Boxes::Filters(Box::new(super::boxes::filters(prepared, view)?)),
+        None => Boxes::Filters {
+            filters: Box::new(super::boxes::filters(prepared, view)?),
+            of_several: inputs::detector_of_several(config)?.map(Box::new),
+        },
     };
     let extras = extras(resolved, network.names());
     let eyes = Eyes::Network(Box::new(network), boxes);
