@@ -322,27 +322,30 @@ impl Tracker {
             if !is_born {
                 continue;
             }
-            let missed = self.missed(track);
-            let known = self.known_again(track, time_s);
-            let id = if let Some(missed) = missed {
-                let (id, bones) = (
-                    self.tracks[missed].id.take(),
-                    self.tracks[missed].bones.clone(),
-                );
-                self.tracks[nth].bones = bones;
-                id.unwrap_or_default()
-            } else if let Some(known) = known {
-                let known = self.gone.remove(known);
-                self.tracks[nth].bones = known.bones;
-                known.id
-            } else {
-                self.last_id + 1
-            };
+            let id = self.identity(nth, time_s);
             self.last_id = self.last_id.max(id);
             self.tracks[nth].id = Some(id);
             births.push(id);
         }
         births
+    }
+
+    /// The id of somebody new: that of who was missed there, of who is known again, or the next one. Bones that are known are taken over.
+    fn identity(&mut self, nth: usize, time_s: f64) -> u64 {
+        let track = &self.tracks[nth];
+        let missed = self.missed(track);
+        let gone = self.known_again(track, time_s);
+        if let Some(missed) = missed {
+            let bones = self.tracks[missed].bones;
+            let id = self.tracks[missed].id.take();
+            self.tracks[nth].bones = bones;
+            return id.unwrap_or(self.last_id + 1);
+        }
+        gone.map_or(self.last_id + 1, |gone| {
+            let known = self.gone.remove(gone);
+            self.tracks[nth].bones = known.bones;
+            known.id
+        })
     }
 
     /// The nearest of those who have been missed for some time, in whose reach somebody new has turned up.

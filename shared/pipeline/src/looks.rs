@@ -189,19 +189,13 @@ impl Looks<'_> {
         let look = self.see_in(boxed, memory);
         memory.look.workspace().cover(&[]);
         let (_, seen) = memory.next();
-        let is_somebody =
-            seen.maps.n_outside(&bars) >= LEAST_BEHIND && seen.maps.heat() >= self.faint(memory);
+        let is_somebody = seen.maps.n_outside(&bars) >= LEAST_BEHIND
+            && seen.maps.heat() >= FAINT * memory.best_heat();
         memory.bars = bars;
         if let Some(look) = look?.filter(|_| is_somebody) {
             self.keep_look(&look, usual_score, memory);
         }
         Ok(())
-    }
-
-    /// The least heat of somebody new.
-    fn faint(&self, memory: &NetworkMemory) -> f64 {
-        let heats = memory.people().iter().map(|known| known.heat);
-        FAINT * heats.fold(0.0, f64::max)
     }
 
     /// Looks into a box, with the picture turned where the person is not upright; the maps are those of the next person.
@@ -380,7 +374,7 @@ impl Looks<'_> {
             return false;
         }
         let last = &memory.seen[memory.n_seen];
-        if last.usual_score.is_none() && last.heat < self.faint(memory) {
+        if last.usual_score.is_none() && last.heat < FAINT * memory.best_heat() {
             return false;
         }
         let is_new = !is_known(&memory.seen, memory.n_seen);

@@ -99,6 +99,12 @@ impl NetworkMemory {
         self.people().iter().map(|it| &it.maps)
     }
 
+    /// The heat of the person of this frame who is seen best, 0 to 1; 0 without anybody.
+    pub(crate) fn best_heat(&self) -> f64 {
+        let heats = self.people().iter().map(|known| known.heat);
+        heats.fold(0.0, f64::max)
+    }
+
     /// Memory for looking, and for one more person of this frame.
     pub(crate) fn next(&mut self) -> (&mut LookMemory, &mut Seen) {
         if self.seen.len() == self.n_seen {

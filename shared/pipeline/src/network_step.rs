@@ -166,7 +166,6 @@ impl NetworkStep {
             memory.n_seen = 0;
             return Ok(());
         };
-        let first = self.settings.find_every - self.settings.find_phase % self.settings.find_every;
         let (rests, is_due) = (memory.rests(), memory.is_due());
         memory.has_searched = is_due;
         memory.n_seen = 0;
@@ -211,10 +210,21 @@ impl NetworkStep {
         }
         memory.before = before;
         memory.keep_largest(self.settings.n_people);
+        self.plan_search(memory);
+        // The memory of the list is kept.
+        memory.tracks = tracks;
+        memory.tracks.clear();
+        Ok(())
+    }
+
+    /// Says in how many frames boxes are looked for next.
+    fn plan_search(&self, memory: &mut NetworkMemory) {
+        let settings = &self.settings;
+        let first = settings.find_every - settings.find_phase % settings.find_every;
         let every = if memory.n_seen > 1 {
-            self.settings.find_every_of_several
+            settings.find_every_of_several
         } else {
-            self.settings.find_every
+            settings.find_every
         };
         let next = memory.until.map_or(first.min(every), |_| every);
         let until = if memory.has_searched {
@@ -223,10 +233,6 @@ impl NetworkStep {
             memory.until.map(|left| left.min(every))
         };
         memory.until = until.map(|left| left.saturating_sub(1));
-        // The memory of the list is kept.
-        memory.tracks = tracks;
-        memory.tracks.clear();
-        Ok(())
     }
 
     /// Takes the people of a frame whose keypoints another program found; they stay in the memory as after [`Self::look`].
@@ -337,9 +343,10 @@ fn find(
     if let Some(detector) = by_detector(boxes, are_several) {
         let mut found = detector.people(image, values)?;
         // Who is sure and large first: the frame has room for a few.
-        let weight = |it: &keypoints::PersonBox| it.score * (it.outline[3] - it.outline[1]);
+        let weight =
+            |found: &keypoints::PersonBox| found.score * (found.outline[3] - found.outline[1]);
         found.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-        return Ok(found.into_iter().map(|it| it.outline).collect());
+        return Ok(found.into_iter().map(|found| found.outline).collect());
     }
     let Boxes::Filters { filters, .. } = boxes else {
         return Ok(Vec::new());
@@ -347,7 +354,7 @@ fn find(
     let whole = Scope::whole(filters.layout());
     values.resize(values.len().max(filters.layout().n_values(&whole)), 0.0);
     let found = filters.run(image, whole, values);
-    let outline = |it: &Pose| outline_of_parts(filters.bounding_box(it));
+    let outline = |pose: &Pose| outline_of_parts(filters.bounding_box(pose));
     Ok(found.candidates.iter().map(outline).collect())
 }
 

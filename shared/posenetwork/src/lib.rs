@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod alone;
+mod behind;
 mod between;
 mod bumps;
 mod closer;

@@ -1,0 +1,47 @@
+//! The parts of a person who is known, to be painted over so that a network sees who is behind.
+
+use skeleton::PARSE14;
+
+use crate::cover::Bar;
+use crate::maps::JointMaps;
+
+/// Least heat of a joint at the end of a part that is painted over, 0 to 1.
+const SURE: f64 = 0.2;
+/// Half the width of a limb, share of the longer side of the box around the person.
+const HALF_WIDTH: f64 = 0.0375;
+/// Of the head, which reaches from the neck to its top, likewise.
+const HALF_HEAD: f64 = 0.06;
+/// The edges and diagonals of the trunk: hips and shoulders by their places in [`PARSE14`].
+const TRUNK: [(usize, usize); 6] = [(2, 8), (3, 9), (8, 9), (2, 3), (2, 9), (3, 8)];
+/// The neck and the top of the head.
+const HEAD: (usize, usize) = (12, 13);
+
+impl JointMaps {
+    /// Adds the parts of the person, between joints that are seen.
+    pub fn add_bars(&self, bars: &mut Vec<Bar>) {
+        let Some([left, top, right, bottom]) = self.around() else {
+            return;
+        };
+        let longer = (right - left).max(bottom - top);
+        let sure = |joint: usize| self.peaks().get(joint)?.filter(|peak| peak.score >= SURE);
+        let limbs = PARSE14.limbs.iter().chain(&TRUNK);
+        bars.extend(limbs.filter_map(|&(from, to)| {
+            let half = if (from, to) == HEAD {
+                HALF_HEAD
+            } else {
+                HALF_WIDTH
+            };
+            Some(Bar {
+                ends: [sure(from)?.at, sure(to)?.at],
+                radius: half * longer,
+            })
+        }));
+    }
+
+    /// The number of joints that are seen outside of bars.
+    pub fn n_outside(&self, bars: &[Bar]) -> usize {
+        let seen = self.peaks().iter().flatten();
+        seen.filter(|peak| peak.score >= SURE && !bars.iter().any(|bar| bar.holds(peak.at)))
+            .count()
+    }
+}
