@@ -276,13 +276,13 @@ const MAY_NOT: &[Mistake] = &[
         "folder of images",
         |it| forbid(it, "b"),
         &["cannot read", "/b", "Permission denied"],
-        &["camera \"b\"", "needs to read it"],
+        &["camera \"b\"", "must be able to read it"],
     ),
     forbidden(
         "rig",
         |it| forbid(it, "rig.toml"),
         &["cannot read", "rig.toml", "Permission denied"],
-        &["needs to read"],
+        &["must be able to read"],
     ),
     forbidden(
         "model",
