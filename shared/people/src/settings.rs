@@ -13,6 +13,13 @@ pub struct Settings {
     pub least_heat: f64,
 }
 
+impl Settings {
+    /// Says if detections may be of nobody: a network sees somebody in every box.
+    pub(crate) fn is_doubtful(&self) -> bool {
+        self.least_heat > 0.0
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {

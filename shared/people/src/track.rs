@@ -136,11 +136,6 @@ impl Track {
         (self.history & RECENT).count_ones() >= FRAMES_OF_BIRTH
     }
 
-    /// Says if detections are given to it as to somebody who is known.
-    pub(crate) fn is_established(&self) -> bool {
-        self.id.is_some() || self.is_somebody()
-    }
-
     /// Says if it was seen for so long that two views are enough.
     pub(crate) fn is_lasting(&self) -> bool {
         (self.history & LONG).count_ones() >= FRAMES_OF_TWO_VIEWS

@@ -137,6 +137,12 @@ impl Tracker {
         self.people(&frame, &births)
     }
 
+    /// Says if detections are given to somebody as to those who are known. What is doubtful goes to who has been seen for some frames, too:
+    /// a known person who is hidden would take the detections of somebody beside.
+    fn is_established(&self, track: &Track) -> bool {
+        track.id.is_some() || self.settings.is_doubtful() && track.is_somebody()
+    }
+
     /// Assigns the detections of every view to the people.
     fn follow(
         &self,
@@ -147,7 +153,7 @@ impl Tracker {
     ) {
         let frame = now.frame;
         let rows: Vec<usize> = (0..self.tracks.len())
-            .filter(|nth| self.tracks[*nth].is_established() == is_known)
+            .filter(|nth| self.is_established(&self.tracks[*nth]) == is_known)
             .collect();
         for free in free.iter_mut() {
             let fit = |row: usize, column: usize| {
@@ -196,7 +202,7 @@ impl Tracker {
             let n = agreed.members.len();
             let is_placed = n >= self.settings.min_views.max(2)
                 && agreed.person.n_core() >= LEAST_SEEN
-                && (n > 2 || agreed.person.is_body());
+                && (n > 2 || !self.settings.is_doubtful() || agreed.person.is_body());
             if is_placed {
                 track.place(time_s, frame, agreed.members, &agreed.person);
             } else if (n == 1 || n > 1 && agreed.person.n_core() < LEAST_SEEN) && track.id.is_some()
@@ -297,7 +303,7 @@ impl Tracker {
         let is_empty = !self.tracks.iter().any(is_known);
         let needed = VIEWS_AT_ONCE.min(frame.n_seeing()).max(2);
         // What sees somebody everywhere has to be sure of somebody new.
-        let is_doubtful = self.settings.least_heat > 0.0;
+        let is_doubtful = self.settings.is_doubtful();
         let is_rich = frame.n_seeing() > VIEWS_AT_ONCE;
         let clear = if is_rich { VIEWS_AT_ONCE } else { 2 };
         let mut births = Vec::new();
@@ -312,7 +318,8 @@ impl Tracker {
             let is_clear = track.members.len() >= needed
                 && track.n_clear(frame, self.settings.least_heat) >= clear
                 && track.n_well_seen(frame, self.settings.least_heat) >= N / 2;
-            let is_there = |track: &&Track| track.id.is_some() && track.is_possible();
+            let is_there =
+                |track: &&Track| track.id.is_some() && (!is_doubtful || track.is_possible());
             let n_known = self.tracks.iter().filter(is_there).count();
             let is_born = track.id.is_none()
                 && track.state == State::Tracked
