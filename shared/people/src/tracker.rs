@@ -200,13 +200,14 @@ impl Tracker {
             let agreed = agree(frame, members, Some(expected));
             give_back(free, &agreed.refused);
             let n = agreed.members.len();
-            let is_placed = n >= self.settings.min_views.max(2)
-                && agreed.person.n_core() >= LEAST_SEEN
-                && (n > 2 || !self.settings.is_doubtful() || agreed.person.is_body());
-            if is_placed {
+            let is_placed =
+                n >= self.settings.min_views.max(2) && agreed.person.n_core() >= LEAST_SEEN;
+            // Rays of two people meet as well.
+            let is_nobody =
+                is_placed && n == 2 && self.settings.is_doubtful() && !agreed.person.is_body();
+            if is_placed && !is_nobody {
                 track.place(time_s, frame, agreed.members, &agreed.person);
-            } else if (n == 1 || n > 1 && agreed.person.n_core() < LEAST_SEEN) && track.id.is_some()
-            {
+            } else if n >= 1 && !is_nobody && track.id.is_some() {
                 track.glimpse(time_s, frame, agreed.members);
             } else {
                 give_back(free, &agreed.members);
@@ -339,15 +340,13 @@ impl Tracker {
 
     /// The id of somebody new: that of who was missed there, of who is known again, or the next one. Bones that are known are taken over.
     fn identity(&mut self, nth: usize, time_s: f64) -> u64 {
-        let track = &self.tracks[nth];
-        let missed = self.missed(track);
-        let gone = self.known_again(track, time_s);
-        if let Some(missed) = missed {
+        if let Some(missed) = self.missed(&self.tracks[nth]) {
             let bones = self.tracks[missed].bones;
             let id = self.tracks[missed].id.take();
             self.tracks[nth].bones = bones;
             return id.unwrap_or(self.last_id + 1);
         }
+        let gone = self.known_again(&self.tracks[nth], time_s);
         gone.map_or(self.last_id + 1, |gone| {
             let known = self.gone.remove(gone);
             self.tracks[nth].bones = known.bones;

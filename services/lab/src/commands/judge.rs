@@ -48,8 +48,8 @@ over the people, {\"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\",
 height of the maxima predicts errors of the joints: {\"joints\", \"off_by_half_a_head\", \"auc\" (of predicting these), \
 \"auc_interval\", \"rank_correlation\"}.
 
-A detector of people (.onnx) is judged on the pictures that `parallax-lab train finder-pictures` kept apart, its file in the place of
-DATASET: the share of people who are found, a box being somebody's that shares half of their union, and how many boxes are of nobody.
+A detector of people (.onnx) is judged on the pictures that `parallax-lab train finder-pictures` kept apart (its file is DATASET): the share of
+people found, and false boxes. A box finds a person if the two boxes share half of their union.
 
 Examples:
     parallax-lab judge person.fmp PARSE --only 101-200

@@ -12,6 +12,29 @@ const EPSILON: f32 = 1e-8;
 /// Share of a running statistic that every batch replaces.
 const MOMENTUM_OF_STATISTICS: f32 = 0.05;
 
+/// Lengths of steps that rise, then fall to 0 as a cosine (Loshchilov and Hutter 2017).
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Schedule {
+    /// Number of steps.
+    pub(crate) steps: usize,
+    /// Share of the steps, the first ones, in which the length rises.
+    pub(crate) rising: f32,
+    /// The longest step.
+    pub(crate) longest: f32,
+}
+
+impl Schedule {
+    /// Length of a step.
+    pub(crate) fn length(&self, nth: usize) -> f32 {
+        let done = (nth as f32 + 0.5) / self.steps as f32;
+        if done < self.rising {
+            return self.longest * done / self.rising;
+        }
+        let falling = (done - self.rising) / (1.0 - self.rising);
+        self.longest * 0.5 * (1.0 + (core::f32::consts::PI * falling).cos())
+    }
+}
+
 /// The direction of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rule {

@@ -134,7 +134,7 @@ fn given(card: &DetectorCard) -> String {
             )
         }
         Boxes::Centres { stride, .. } => format!(
-            "a box for each cell of {stride} pixels that is likelier than its neighbours to be the middle of somebody"
+            "a box for each cell of {stride} pixels with a higher score than its neighbours"
         ),
         Boxes::List { boxes } => format!("`{boxes}`, a list of boxes of people with scores"),
     }

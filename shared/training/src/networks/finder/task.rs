@@ -13,7 +13,7 @@ use super::vary::{FinderSample, plain, varied};
 use crate::networks::begun::Begun;
 use crate::networks::lesson::Shown;
 use crate::networks::onnx::{self, Document};
-use crate::networks::optimiser::{Rule, Step};
+use crate::networks::optimiser::{Rule, Schedule, Step};
 use crate::networks::order;
 use crate::networks::parameters::Parameter;
 use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
@@ -126,15 +126,14 @@ impl<'a> FinderTask<'a> {
         )
     }
 
-    /// The length of a step rises, then falls to 0 as a cosine.
+    /// The length of a step.
     fn rate(&self, nth: usize) -> f32 {
-        let settings = self.settings;
-        let done = (nth as f32 + 0.5) / settings.steps as f32;
-        if done < RISING {
-            return settings.rate * done / RISING;
-        }
-        let falling = (done - RISING) / (1.0 - RISING);
-        settings.rate * 0.5 * (1.0 + (core::f32::consts::PI * falling).cos())
+        let schedule = Schedule {
+            steps: self.settings.steps,
+            rising: RISING,
+            longest: self.settings.rate,
+        };
+        schedule.length(nth)
     }
 }
 

@@ -12,7 +12,7 @@ use super::vary::{NetworkSample, plain, varied};
 use crate::networks::begun::Begun;
 use crate::networks::lesson::Shown;
 use crate::networks::onnx::{self, Document};
-use crate::networks::optimiser::{Rule, Step};
+use crate::networks::optimiser::{Rule, Schedule, Step};
 use crate::networks::order;
 use crate::networks::parameters::Parameter;
 use crate::networks::settings::Precision;
@@ -178,18 +178,17 @@ impl<'a> PoseTask<'a> {
         varied(person, other, (shape, &settings.vary), &mut dice)
     }
 
-    /// The length of a step rises, then falls to 0 as a cosine.
+    /// The length of a step.
     fn rate(&self, nth: usize) -> f32 {
         if self.is_for_error(nth) {
             return ERROR_RATE;
         }
-        let settings = self.settings;
-        let done = (nth as f32 + 0.5) / settings.steps as f32;
-        if done < RISING {
-            return settings.rate * done / RISING;
-        }
-        let falling = (done - RISING) / (1.0 - RISING);
-        settings.rate * 0.5 * (1.0 + (core::f32::consts::PI * falling).cos())
+        let schedule = Schedule {
+            steps: self.settings.steps,
+            rising: RISING,
+            longest: self.settings.rate,
+        };
+        schedule.length(nth)
     }
 }
 

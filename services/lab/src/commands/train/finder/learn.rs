@@ -13,10 +13,10 @@ use crate::commands::train::learning::{Learning, named};
 
 const HELP: &str = "\
 PICTURES is a file of `parallax-lab train finder-pictures`. The network finds a box around everybody in a whole picture; the ONNX file \
-carries its card, and is what `network.detector` of a deployment names.
+carries its card, and serves as `network.detector` of a deployment.
 
-After every hundred steps everything that the training knows is in OUT.checkpoint: what is stopped by Ctrl-C, or killed, goes on with \
---resume and ends with the same network, bit for bit, on the same kind of machine.
+After every hundred steps the state of the training is in OUT.checkpoint. After Ctrl-C or a kill, --resume continues from there and ends with \
+the same network, bit for bit, on the same kind of machine.
 
 Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a setting is wrong; \
 4 the pictures or the checkpoint cannot be used; 130 stopped by Ctrl-C.
@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
     pictures: Option<PathBuf>,
     #[command(flatten)]
     learning: Learning,
-    /// A network of this command to go on from, in place of random weights: more steps, or pictures of your own.
+    /// Network of this command to start from, in place of random weights: for more steps, or your own pictures.
     #[arg(long, value_name = "NETWORK")]
     from: Option<PathBuf>,
 }
