@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::network::{MULTIPLE, Shape};
-use crate::networks::settings::{SettingsError, check, count, from_zero};
+use crate::networks::settings::{Precision, SettingsError, check, count, from_zero};
 
 /// Settings of a training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -13,6 +13,8 @@ pub struct Settings {
     pub seed: u64,
     /// The sizes of the network.
     pub shape: Shape,
+    /// Numbers between layers.
+    pub precision: Precision,
     /// Samples a step.
     pub batch: usize,
     /// Steps of the training.
@@ -69,6 +71,7 @@ impl Default for Settings {
         Self {
             seed: 1,
             shape: Shape::default(),
+            precision: Precision::F32,
             batch: 16,
             steps: 8000,
             small: 0.5,

@@ -16,6 +16,7 @@ use crate::networks::onnx::{self, Document};
 use crate::networks::optimiser::{Rule, Schedule, Step};
 use crate::networks::order;
 use crate::networks::parameters::Parameter;
+use crate::networks::settings::Precision;
 use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
 
 /// Pictures that are judged at once.
@@ -151,6 +152,10 @@ impl Task for FinderTask<'_> {
 
     fn network(&self) -> Shape {
         self.settings.shape.clone()
+    }
+
+    fn precision(&self) -> Precision {
+        self.settings.precision
     }
 
     fn begin(&self) -> Vec<Parameter> {
