@@ -26,9 +26,9 @@ pub struct People {
     /// Photographs of marked people. Left and right are those of the people themselves; where the choice asks for sides as
     /// seen, the marks say nothing of the direction in which somebody faces.
     pub photographs: Chosen,
-    /// Another network, that helps with joints without a mark and with marks that are wrong: once for every thread that asks it,
-    /// or none.
-    pub teachers: Vec<PoseNetwork>,
+    /// For every thread that asks them, other networks that help. The first helps with joints without a mark and with marks that
+    /// are wrong; the others with the keypoints that those before them do not know.
+    pub teachers: Vec<Vec<PoseNetwork>>,
     /// Scenes that do not exist.
     pub scenes: Scenes,
 }

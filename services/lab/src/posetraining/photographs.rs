@@ -75,7 +75,7 @@ pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Per
 /// meanwhile, and so on, until its stack is full.
 fn of_all(
     people: &[Annotated],
-    (sides, teachers): (Sides, &[PoseNetwork]),
+    (sides, teachers): (Sides, &[Vec<PoseNetwork>]),
     work: &Work<'_>,
 ) -> Result<Vec<(usize, Person)>, Failure> {
     let n_threads = match teachers.len() {
@@ -83,7 +83,7 @@ fn of_all(
         n => n,
     };
     let next = AtomicUsize::new(0);
-    let of_thread = |teacher: Option<&PoseNetwork>| {
+    let of_thread = |teachers: &[PoseNetwork]| {
         let mut found = Vec::new();
         loop {
             let nth = next.fetch_add(1, Ordering::Relaxed);
@@ -91,14 +91,15 @@ fn of_all(
                 return Ok::<_, Failure>(found);
             };
             work.go_on()?;
-            found.extend(of_person(person, sides, teacher)?.map(|it| (nth, it)));
+            found.extend(of_person(person, sides, teachers)?.map(|it| (nth, it)));
             work.console.advance(1);
         }
     };
     let of_thread = &of_thread;
     let found: Result<Vec<_>, Failure> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..n_threads)
-            .map(|it| scope.spawn(move || of_thread(teachers.get(it))))
+            .map(|it| teachers.get(it).map_or(&[][..], Vec::as_slice))
+            .map(|teachers| scope.spawn(move || of_thread(teachers)))
             .collect();
         let died = || {
             Err(Failure::new(
@@ -118,7 +119,7 @@ fn of_all(
 fn of_person(
     person: &Annotated,
     sides: Sides,
-    teacher: Option<&PoseNetwork>,
+    teachers: &[PoseNetwork],
 ) -> Result<Option<Person>, Failure> {
     let joints = visible(person);
     let lean = lean(&joints);
@@ -135,18 +136,22 @@ fn of_person(
     if !trunk.is_finite() || trunk < MIN_TRUNK || upright.enlarges() > MOST_ENLARGED {
         return Ok(None);
     }
-    let taught = match teacher {
-        Some(teacher) => taught(teacher, &upright.rgb(picture.view()), &marked)?,
-        None => [UNKNOWN; N_KEYPOINTS],
-    };
+    let rgb = upright.rgb(picture.view());
+    let mut taught = teachers
+        .iter()
+        .map(|teacher| taught(teacher, &rgb, &marked));
+    let first = taught.next().transpose()?;
     let mut of_all = [[f32::NAN; 2]; N_KEYPOINTS];
     of_all[..N_JOINTS].copy_from_slice(&marked);
     let mut marks = Marks {
         marked: of_all,
-        taught,
+        taught: first.unwrap_or([UNKNOWN; N_KEYPOINTS]),
         trunk,
     };
     marks.mend_sides();
+    for other in taught {
+        marks.add_extras(&other?);
+    }
     let Some(across) = across(&marks) else {
         return Ok(None);
     };

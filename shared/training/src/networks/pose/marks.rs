@@ -88,6 +88,24 @@ impl Marks {
         })
     }
 
+    /// Takes the extra keypoints that the teacher does not know from another one, where that finds the joint beside them at its
+    /// mark.
+    ///
+    /// * `other`: as [`taught`](Self::taught), with the same sides.
+    pub fn add_extras(&mut self, other: &[([f32; 2], f32); N_KEYPOINTS]) {
+        for keypoint in N_JOINTS..N_KEYPOINTS {
+            if self.taught[keypoint].1 <= 0.0 && self.is_beside(keypoint, other) {
+                self.taught[keypoint] = other[keypoint];
+            }
+        }
+    }
+
+    /// Whether a teacher finds the joint beside an extra keypoint at its mark.
+    fn is_beside(&self, keypoint: usize, taught: &[([f32; 2], f32); N_KEYPOINTS]) -> bool {
+        let beside = BESIDE[keypoint - N_JOINTS];
+        distance(self.marked[beside], taught[beside].0) < AGREED_BESIDE * self.trunk
+    }
+
     /// Exchanges left and right of marks and teacher.
     pub fn exchange(&mut self) {
         self.marked = exchange_sides(&self.marked);
@@ -139,9 +157,7 @@ impl Marks {
     /// An extra keypoint of the teacher.
     fn extra(&self, keypoint: usize) -> Target {
         let (at, peak) = self.taught[keypoint];
-        let beside = BESIDE[keypoint - N_JOINTS];
-        let off = distance(self.marked[beside], self.taught[beside].0);
-        if peak > SURE_OF_EXTRAS && off < AGREED_BESIDE * self.trunk {
+        if peak > SURE_OF_EXTRAS && self.is_beside(keypoint, &self.taught) {
             Target {
                 at,
                 or: None,
@@ -177,6 +193,18 @@ mod tests {
         marks.taught[heel].1 = 0.9;
         marks.taught[ankle].0 = [30.0, 80.0];
         assert_eq!(marks.targets()[heel].weight, 0.0, "another foot");
+
+        let mut other = marks.taught;
+        other[heel].0 = [7.0, 91.0];
+        marks.taught[ankle].0 = [12.0, 81.0];
+        marks.add_extras(&other);
+        assert_eq!(marks.targets()[heel].at, [8.0, 90.0], "the first knows it");
+        marks.taught[heel].1 = 0.0;
+        marks.add_extras(&other);
+        assert_eq!(marks.targets()[heel].weight, 0.0, "the other's foot");
+        other[ankle].0 = [9.0, 79.0];
+        marks.add_extras(&other);
+        assert_eq!(marks.targets()[heel].at, [7.0, 91.0]);
     }
 
     #[test]

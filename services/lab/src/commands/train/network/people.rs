@@ -1,6 +1,6 @@
 //! `parallax-lab train network-people`: prepares the people that the network learns from.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -24,7 +24,7 @@ right follow the picture. The direction of a person follows from the marks, if l
 own (LSP; for PARSE pass --sides PARSE=seen).
 
 A teacher, another network with a card, helps: its joints replace missing marks, sides that it surely contradicts are \
-exchanged, and where it agrees with a mark the mean of both is learned. Nose, heels and big toes come from the teacher, if its card names them.
+exchanged, and where it agrees with a mark the mean of both is learned. Nose, heels and big toes come from the first teacher whose card names them (`--teacher` again, with its card).
 
 One in twelve is held out: the training is watched on them, and the expected error is learned on them. Leave out the people to judge on \
 with --without.
@@ -41,12 +41,13 @@ Example:
 pub(crate) struct Arguments {
     #[command(flatten)]
     people: Marked,
-    /// A network that finds keypoints, to help with joints and sides.
+    /// A network that finds keypoints, to help with joints and sides. Given again: another one, for the keypoints that those before
+    /// it do not know.
     #[arg(long, value_name = "FILE.onnx")]
-    teacher: Option<PathBuf>,
-    /// Its card, if that is not beside it.
+    teacher: Vec<PathBuf>,
+    /// Its card, if that is not beside it: for the teachers in their order.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
-    teacher_card: Option<PathBuf>,
+    teacher_card: Vec<PathBuf>,
     /// Number of synthetic scenes; each gives some pictures of every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scenes: u32,
@@ -73,16 +74,22 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let card = arguments.teacher_card.as_deref();
-    let open = |file: &Path| -> Result<Vec<_>, Failure> {
-        let each =
-            (0..rayon::current_num_threads()).map(|_| NetworkFile::open(file, card)?.fitted());
+    let of_thread = |_| -> Result<Vec<_>, Failure> {
+        let each = arguments.teacher.iter().enumerate().map(|(nth, file)| {
+            let card = arguments.teacher_card.get(nth).map(PathBuf::as_path);
+            NetworkFile::open(file, card)?.fitted()
+        });
         each.collect()
     };
-    let teachers = arguments.teacher.as_deref().map(open).transpose()?;
+    let n_threads = if arguments.teacher.is_empty() {
+        0
+    } else {
+        rayon::current_num_threads()
+    };
+    let teachers: Result<Vec<_>, Failure> = (0..n_threads).map(of_thread).collect();
     let people = People {
         photographs: arguments.people.chosen(),
-        teachers: teachers.unwrap_or_default(),
+        teachers: teachers?,
         scenes: Scenes {
             n: arguments.scenes,
             subjects: arguments.subjects,
