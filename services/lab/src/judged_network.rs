@@ -2,14 +2,13 @@
 
 use crate::evaluation::{Joints, Pictures};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
-use fmp::Search;
 use keypoints::Keypoint;
-use pipeline::ViewSettings;
-use posenetwork::{JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Turn, outline_of};
+use posenetwork::{
+    Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, Turn, outline_of,
+};
 use training::datasets::{People, Person, Picture, Sides};
 
 use crate::judged::{go_on, pictures, truth};
-use inputs::pictures::{BOXES_PX, Picture as Shown, Searched};
 
 /// Of the neck and the top of the head in `skeleton::PARSE14`.
 const NECK: usize = 12;
@@ -23,7 +22,7 @@ pub struct NetworkReader {
     /// What left and right mean in the marks.
     pub sides: Sides,
     /// Finds the boxes; the box around the marked joints is used without it.
-    pub finder: Option<Search>,
+    pub finder: Option<Detector>,
 }
 
 /// What a network found on people.
@@ -118,7 +117,9 @@ impl NetworkReader {
         let image = picture.view();
         let look = match (&self.finder, outline_of(truth(person))) {
             (Some(finder), _) => {
-                let outlines = found_boxes(finder, person, &picture)?;
+                let found = finder.people(image, &mut Vec::new());
+                let found = found.or_fail(ExitKind::Input)?.into_iter();
+                let outlines: Vec<[f64; 4]> = found.map(|it| it.outline).collect();
                 looker.best_of((image, &outlines), Turn::Up, memory, maps)
             }
             (None, Some(outline)) => looker.look((image, outline), memory, maps),
@@ -132,34 +133,6 @@ impl NetworkReader {
         }
         Ok([Some(at_peaks(maps.peaks())), None])
     }
-}
-
-/// The boxes of the distinct poses that the filters find in a picture, the best first.
-fn found_boxes(
-    finder: &Search,
-    person: &Person,
-    picture: &Picture,
-) -> Result<Vec<[f64; 4]>, Failure> {
-    let picture = Shown {
-        path: person.image.clone(),
-        frame: None,
-        turn: footage::Turn::default(),
-        size: picture.size(),
-        rgb: picture.rgb().to_vec(),
-    };
-    let searched = Searched::new(&picture, Some(BOXES_PX), finder)?;
-    let image = searched.image(&picture)?;
-    // As many, and as far apart, as a view of a deployment offers.
-    let ViewSettings {
-        n_candidates,
-        min_separation,
-        ..
-    } = ViewSettings::default();
-    let found = finder.on(image, searched.layout(), |it| {
-        finder.solver.distinct(it, n_candidates, min_separation)
-    });
-    let outlines = found.iter().map(|it| searched.outline(&finder.model, it));
-    Ok(outlines.collect())
 }
 
 /// The joints at the maxima of their maps; not finite where the keypoints do not tell a joint.

@@ -1,5 +1,5 @@
-//! What the cameras of a deployment see, as films whose clocks can be compared: keypoints of files, or what a network or the
-//! filters find in the footage.
+//! What the cameras of a deployment see, as films whose clocks can be compared: keypoints of files, or what a network
+//! finds in the footage.
 
 mod eyes;
 mod upright;
@@ -155,7 +155,7 @@ impl Finder {
     fn names(&self) -> Vec<String> {
         match self {
             Self::Keypoints(source) => source.names().names().to_vec(),
-            Self::Eyes(eyes) => eyes.names(),
+            Self::Eyes(eyes) => eyes.names().to_vec(),
         }
     }
 
@@ -293,7 +293,7 @@ impl Reader<'_> {
         let mut feed = Feed::open(&spec).or_fail(ExitKind::Input)?;
         let mut upright = Upright::new(info.size, self.roll)?;
         let size = upright.as_ref().map_or(info.size, Upright::size);
-        let mut watch = eyes.watch(deployment, size, rate_hz / part.every as f64)?;
+        let mut watch = eyes.watch(deployment, size, rate_hz / part.every as f64);
         let mut shots = Vec::new();
         loop {
             self.go_on()?;

@@ -104,11 +104,7 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     let settings = if deployment.has_maps() {
         let networks = deployment.pose_networks().into_iter();
         files.extend(networks.map(|file| ("network.file", file)));
-        if config.has_detector() {
-            files.push(("network.detector", &config.detector));
-        } else {
-            all.add_text("network.detector", "none");
-        }
+        files.push(("network.detector", &config.detector));
         serde_json::to_vec(&without_files(config))
     } else {
         let paper = &deployment.paper;

@@ -1,6 +1,5 @@
 //! Runs one process of a deployment: builds the job of its service from the resolved deployment.
 
-mod boxes;
 mod live;
 pub(crate) mod view_step;
 
@@ -17,7 +16,7 @@ use rayon::ThreadPoolBuilder;
 use runtime::Service;
 use viewquality::Forecaster;
 
-use crate::find_every::{self, FOLLOWED_S};
+use crate::find_every::FOLLOWED_S;
 use crate::hosts;
 use crate::prepare::{Prepared, frame_scale, framing, least_heat, space_settings, who_settings};
 use crate::recorded;
@@ -205,7 +204,6 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         frame_step: resolved.deployment.capture.frame_step,
         frame_rate_hz: resolved.frame_rate_hz(),
         most_apart: most_apart(resolved),
-        search_share: find_every::search_share(&resolved.deployment),
         patience: resolved.patience(),
     };
     pose::run(service, &job)

@@ -1,6 +1,6 @@
 //! Looks at a frame with a network that finds keypoints.
 
-use failure::{ExitKind, Failure, OrFail as _, now_nanos};
+use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
 use messages::{Searched, Stamp, Status, ViewPose};
 use pipeline::{NetworkMemory, NetworkStep};
@@ -18,10 +18,7 @@ impl View<'_> {
         state: &mut NetworkState,
     ) -> Result<Result<Found<'_>, Status>, Failure> {
         state.memory.begin(stamp.frame, self.job.most_apart);
-        let begin = now_nanos();
-        let looked = step.look(image, &mut state.memory);
-        self.put_off_search(now_nanos() - begin, &mut state.memory);
-        if let Err(error) = looked {
+        if let Err(error) = step.look(image, &mut state.memory) {
             if !state.has_failed {
                 let error = failure::wording::in_one_line(&error);
                 tracing::warn!(
@@ -78,13 +75,5 @@ impl View<'_> {
             evidence: loan,
             loan_nanos,
         }))
-    }
-
-    /// Puts off the next search for boxes where this one took long: of a slow machine the others need the cores as well.
-    fn put_off_search(&self, took_nanos: u64, memory: &mut NetworkMemory) {
-        let limits = self.job.search_share.zip(self.job.frame_rate_hz);
-        if let Some((share, rate_hz)) = limits.filter(|_| memory.has_searched()) {
-            memory.put_off(took_nanos as f64 * 1e-9 * rate_hz, share);
-        }
     }
 }

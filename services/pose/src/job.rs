@@ -96,9 +96,6 @@ pub struct Job {
     pub frame_rate_hz: Option<f64>,
     /// `Network`: most frames of the footage from one in which people are seen to the next one in which they can be followed.
     pub most_apart: Option<f64>,
-    /// `Network`: most of the time that searches for boxes may take while people are seen well, a share; none where they are made
-    /// whatever they take.
-    pub search_share: Option<f64>,
     /// How long the process waits for receivers.
     pub patience: Duration,
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::shipped::{SHIPPED, is_none, is_shipped, relative_to};
+use crate::shipped::{SHIPPED, relative_to};
 
 /// The network that finds the joints of people, and where it looks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -14,9 +14,9 @@ use crate::shipped::{SHIPPED, is_none, is_shipped, relative_to};
 pub struct Config {
     /// The network that finds joints: an ONNX file with its card beside it (`.toml` for `.onnx`) or in its metadata, or `"shipped"`.
     pub file: PathBuf,
-    /// The detector of people: an ONNX file with its card beside it finds all boxes for the network, `"shipped"` those of several people, `"none"` none; filters find the others.
+    /// The detector of people, which finds boxes for the network: an ONNX file with its card beside it or in its metadata, or `"shipped"`.
     pub detector: PathBuf,
-    /// Search for people in every n-th frame; by default once a second, twice with a `detector` of your own, and eight times while a detector sees several people.
+    /// Search for people in every n-th frame; by default twice a second, and eight times while several people are seen.
     pub find_every: Option<u64>,
     /// Least mean heat of the joints of a visible person, 0 to 1.
     pub least_heat: f64,
@@ -46,21 +46,9 @@ impl Config {
     /// Takes every relative path as relative to `base`.
     pub(crate) fn resolve(&mut self, base: &Path) {
         self.file = relative_to(&self.file, base);
-        if self.has_detector() {
-            self.detector = relative_to(&self.detector, base);
-        }
+        self.detector = relative_to(&self.detector, base);
         if let Some(file) = &mut self.onnx_runtime {
             *file = base.join(&file);
         }
-    }
-
-    /// Says if a detector finds the boxes of several people; if not, the filters do.
-    pub fn has_detector(&self) -> bool {
-        !is_none(&self.detector)
-    }
-
-    /// Says if a detector of the user's finds all boxes.
-    pub fn has_own_detector(&self) -> bool {
-        self.has_detector() && !is_shipped(&self.detector)
     }
 }

@@ -38,9 +38,7 @@ use viewquality::{Network, NetworkError, Table, Tau};
 pub use cards::card_beside;
 pub use failure::{in_file, read_text as text};
 pub use joints::Joints;
-pub use maps::{
-    check_maps, detector, detector_of_several, mirrored, network_card, open_network, pose_network,
-};
+pub use maps::{check_maps, detector, mirrored, network_card, open_network, pose_network};
 pub use shipped::Shipped;
 
 /// Reads the named model, or the shipped model if none is named.

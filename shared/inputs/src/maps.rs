@@ -78,30 +78,14 @@ pub fn network_card(deployment: &Deployment, camera: usize) -> Result<Option<Car
     Ok(network.card().map(|it| it.0.clone()))
 }
 
-/// Loads the detector of a deployment that finds all boxes, if it has one, and tries it once.
+/// Loads the detector of a deployment, and tries it once.
 ///
 /// # Errors
 ///
 /// As for [`pose_network`].
-pub fn detector(config: &Config) -> Result<Option<Detector>, Failure> {
-    if !config.has_own_detector() {
-        return Ok(None);
-    }
+pub fn detector(config: &Config) -> Result<Detector, Failure> {
     let library = library(config)?;
-    crate::detector::open_with(&config.detector, None, &library).map(Some)
-}
-
-/// Loads the detector that ships, if it finds the boxes of several people in a deployment.
-///
-/// # Errors
-///
-/// As for [`pose_network`]: never, but for the library.
-pub fn detector_of_several(config: &Config) -> Result<Option<Detector>, Failure> {
-    if !config.has_detector() || config.has_own_detector() {
-        return Ok(None);
-    }
-    let library = library(config)?;
-    crate::detector::open_with(&config.detector, None, &library).map(Some)
+    crate::detector::open_with(&config.detector, None, &library)
 }
 
 /// Loads every network of a deployment once, to see that each fits its card.

@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use failure::{ExitKind, Failure, OrFail as _, in_file};
-use fmp::{Layout, Model, Pose, Search};
+use fmp::{Layout, Search};
 use footage::{Fill, Rotation, Size, Source, SourceSpec, Turn, Warp, resize_map};
 use kernels::Rgb8View;
-use posenetwork::outline_of_parts;
 
 use crate::images::has_image_name;
 use crate::memory::check_memory;
@@ -205,21 +204,7 @@ impl Searched {
     pub fn in_picture(&self, point: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| (point[axis] + 0.5) * self.per_pixel[axis] - 0.5)
     }
-
-    /// The box of a pose that was found, for a network: all boxes of its parts, widened; left, top, right, bottom, pixels of the
-    /// picture.
-    pub fn outline(&self, model: &Model, pose: &Pose) -> [f64; 4] {
-        let [left, top, right, bottom] = pose.bounding_box(model, &self.layout);
-        let (first, last) = (
-            self.in_picture([left, top]),
-            self.in_picture([right, bottom]),
-        );
-        outline_of_parts([first[0], first[1], last[0], last[1]])
-    }
 }
-
-/// Longest side of a picture in which the filters search for the boxes of a network, pixels.
-pub const BOXES_PX: usize = 640;
 
 /// The size with the longest side that is allowed, and the same shape.
 fn bounded(size: Size, longest: Option<usize>) -> Size {

@@ -46,7 +46,7 @@ pub use fuse_step::{
 pub use fused_view::FusedView;
 pub use motion::Motion;
 pub use network_memory::{LOST, NetworkMemory};
-pub use network_step::{Boxes, Eyes, NetworkSettings, NetworkStep, most_values};
+pub use network_step::{Eyes, NetworkSettings, NetworkStep, most_values};
 pub use sighting::{Sighting, Sightings, parts_of};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};

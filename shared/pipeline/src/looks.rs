@@ -41,30 +41,27 @@ fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
 }
 
 impl Looks<'_> {
-    /// Looks at a person of the frame before: around the box of then if that is long ago, in a wider box where boxes were looked for or the
-    /// last pose was doubtful, else in the same. All but the first are looked at in a wider box when their turn comes, and need no look
-    /// while they stand still.
+    /// Looks at a person of the frame before: around the box of then if that is long ago, in a wider box if the last pose was doubtful, else
+    /// in the same. All but the first need no look while they stand still. Where boxes were looked for, the person is looked at in the
+    /// same box only.
     ///
-    /// * `n_more`: how many people may be looked at in a wider box, or boxes looked into, in this frame.
     /// * `before`: the people of the frame before.
     pub(crate) fn see_once_more(
         &self,
         (nth, track): (usize, &Track),
-        n_more: &mut usize,
         before: &mut [Seen],
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
-        if let Some(apart) = memory.apart.filter(|_| !memory.has_searched) {
-            let around = moved(track.outline, apart);
-            return self.see_later(track, around, memory);
+        if memory.has_searched {
+            return self.see_again(track, before.get(track.index), memory);
         }
-        if track.is_to_widen || track.is_doubtful {
-            if nth == 0 || *n_more > 0 {
-                *n_more -= usize::from(nth > 0);
-                let wider = wider(track.outline, &memory.found);
-                return self.see(track, wider, memory);
-            }
-        } else if nth > 0
+        if let Some(apart) = memory.apart {
+            return self.see_later(track, moved(track.outline, apart), memory);
+        }
+        if track.is_doubtful {
+            return self.see_wider(track, memory);
+        }
+        if nth > 0
             && let Some(hold) = memory.hold
             && let Some(before) = before.get_mut(track.index)
         {
@@ -76,53 +73,6 @@ impl Looks<'_> {
             }
         }
         self.see_again(track, before.get(track.index), memory)
-    }
-
-    /// Looks into boxes of the last search: into all where nobody is known yet, else into few in each frame.
-    pub(crate) fn see_found(
-        &self,
-        n_more: usize,
-        memory: &mut NetworkMemory,
-    ) -> Result<(), LookError> {
-        let n_most = if memory.n_seen == 0 {
-            usize::MAX
-        } else {
-            n_more
-        };
-        let found = core::mem::take(&mut memory.found);
-        let left = &found[memory.n_looked_into.min(found.len())..];
-        memory.n_looked_into += self.see_all(left, n_most, memory)?;
-        memory.found = found;
-        Ok(())
-    }
-
-    /// Looks for people in boxes that were found. One that is much the same as a box that showed somebody known is passed over, and
-    /// one whose first sight is of somebody known gets no closer look: the filters find several boxes around one person.
-    ///
-    /// * `n_most`: most boxes that are looked into.
-    /// * Returns how many of the boxes are done with.
-    pub(crate) fn see_all(
-        &self,
-        outlines: &[[f64; 4]],
-        n_most: usize,
-        memory: &mut NetworkMemory,
-    ) -> Result<usize, LookError> {
-        memory.shown.clear();
-        let mut n_left = n_most;
-        for (nth, outline) in outlines.iter().enumerate() {
-            let is_same = |it: &[f64; 4]| overlap(*it, *outline) > SAME;
-            if !self.is_unknown(*outline, memory) || memory.shown.iter().any(is_same) {
-                continue;
-            }
-            if n_left == 0 {
-                return Ok(nth);
-            }
-            n_left -= 1;
-            if self.see_new(*outline, memory)? {
-                memory.shown.push(*outline);
-            }
-        }
-        Ok(outlines.len())
     }
 
     /// Looks into the boxes of a detector, each of which is of one person. Closer into the only one, which may fit badly: among others a
@@ -232,35 +182,14 @@ impl Looks<'_> {
         memory.n_seen += usize::from(!is_known(&memory.seen, memory.n_seen));
     }
 
-    /// Looks into a box, and closer if somebody new is seen; returns whether it shows somebody known, or now known.
-    fn see_new(&self, outline: [f64; 4], memory: &mut NetworkMemory) -> Result<bool, LookError> {
-        let (look, seen) = memory.next();
-        let what = (self.image, outline);
-        let Some(first) = self.looker.look(what, look, &mut seen.maps)? else {
-            return Ok(false);
-        };
-        if is_known(&memory.seen, memory.n_seen) {
-            return Ok(true);
-        }
-        let (look, seen) = memory.next();
-        let what = (self.image, first);
-        let best = self.looker.look_closer(what, look, &mut seen.maps)?;
-        Ok(self.keep_look(&best, None, memory))
-    }
-
     /// Looks at a person of the frame before, where nobody is known yet, in a wider box as well and around what is seen there, and keeps
     /// the best sight if it is good.
-    fn see(
-        &self,
-        track: &Track,
-        wider: [f64; 4],
-        memory: &mut NetworkMemory,
-    ) -> Result<(), LookError> {
+    fn see_wider(&self, track: &Track, memory: &mut NetworkMemory) -> Result<(), LookError> {
         if !self.is_unknown(track.outline, memory) {
             return Ok(());
         }
         let (look, seen) = memory.next();
-        let what = (self.image, &[track.outline, wider][..]);
+        let what = (self.image, &[track.outline, wider(track.outline)][..]);
         let best = self
             .looker
             .best_of(what, track.turn, look, &mut seen.maps)?;
@@ -284,7 +213,7 @@ impl Looks<'_> {
             return Ok(());
         }
         let (look, seen) = memory.next();
-        let boxes = [track.outline, wider(track.outline, &[]), around];
+        let boxes = [track.outline, wider(track.outline), around];
         let what = (self.image, &boxes[..]);
         let best = self
             .looker
@@ -299,7 +228,7 @@ impl Looks<'_> {
     /// some time, or with the picture turned if the person lies or gets up; keeps what is seen well.
     ///
     /// * `before`: the sight of the person in the frame before.
-    pub(crate) fn see_again(
+    fn see_again(
         &self,
         track: &Track,
         before: Option<&Seen>,
@@ -328,7 +257,6 @@ impl Looks<'_> {
         seen.turn = track.turn;
         seen.front = front;
         seen.usual_score = Some(track.usual_score);
-        seen.is_to_widen = track.is_to_widen;
         let moved = before.and_then(|before| shift(&before.maps, &seen.maps));
         let per_frame = moved.zip(n_frames);
         seen.speed = per_frame.map(|(moved, n_frames)| moved / n_frames.max(1) as f64);
@@ -357,28 +285,27 @@ impl Looks<'_> {
     }
 
     /// Keeps the next person, whose maps are read, as [`Self::keep`] does.
-    fn keep_look(&self, look: &Look, usual_score: Option<f32>, memory: &mut NetworkMemory) -> bool {
+    fn keep_look(&self, look: &Look, usual_score: Option<f32>, memory: &mut NetworkMemory) {
         let (_, seen) = memory.next();
         seen.outline = look.outline;
         seen.turn = look.turn;
         seen.front = look.front;
         seen.usual_score = usual_score;
-        (seen.is_to_widen, seen.speed) = (false, None);
-        self.keep(memory)
+        seen.speed = None;
+        self.keep(memory);
     }
 
-    /// Keeps the next person if it is seen well and not known yet; returns whether somebody known, or now known, is seen.
-    fn keep(&self, memory: &mut NetworkMemory) -> bool {
+    /// Keeps the next person if it is seen well and not known yet.
+    fn keep(&self, memory: &mut NetworkMemory) {
         let (_, seen) = memory.next();
         if !seen.judge(self.size, self.least_heat) {
-            return false;
+            return;
         }
         let last = &memory.seen[memory.n_seen];
         if last.usual_score.is_none() && last.heat < FAINT * memory.best_heat() {
-            return false;
+            return;
         }
         let is_new = !is_known(&memory.seen, memory.n_seen);
         memory.n_seen += usize::from(is_new);
-        true
     }
 }

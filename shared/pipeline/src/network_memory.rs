@@ -33,19 +33,10 @@ pub struct NetworkMemory {
     pub(crate) n_seen: usize,
     /// The people of the frame before.
     pub(crate) before: Vec<Seen>,
-    /// Boxes that showed somebody who is known.
-    pub(crate) shown: Vec<[f64; 4]>,
-    /// Boxes of the last search, and how many of them have been looked into.
-    pub(crate) found: Vec<[f64; 4]>,
-    pub(crate) n_looked_into: usize,
     /// Frames until boxes are looked for; none before the first frame.
     pub(crate) until: Option<u64>,
     /// The number of the last frame, where it is told ([`Self::begin`]).
     last: Option<u64>,
-    /// The frame before which nobody is looked for.
-    rest_until: Option<u64>,
-    /// The frame before which boxes are looked for only where nobody is seen well.
-    due_from: Option<u64>,
     /// Whether the last frame is so short a time ago that nobody has left their box.
     pub(crate) is_soon: bool,
     /// Frames from the last one to this one, and most frames for which a person who stands still is not looked at; `None` where the
@@ -72,8 +63,6 @@ pub(crate) struct Hold {
 pub(crate) struct Seen {
     /// Where the person is looked for next; `None` of one who was just looked at.
     pub(crate) next: Option<Track>,
-    /// As in [`Track`].
-    pub(crate) is_to_widen: bool,
     /// As in [`Track`].
     pub(crate) speed: Option<f64>,
     pub(crate) maps: JointMaps,
@@ -143,27 +132,9 @@ impl NetworkMemory {
         self.last = Some(frame);
     }
 
-    /// Whether nobody is looked for in this frame.
-    pub(crate) fn rests(&self) -> bool {
-        let until = self.rest_until.zip(self.last);
-        until.is_some_and(|(until, frame)| frame < until)
-    }
-
     /// Whether boxes are to be looked for in this frame, whoever is seen.
     pub(crate) fn is_due(&self) -> bool {
-        let from = self.due_from.zip(self.last);
-        let is_put_off = from.is_some_and(|(from, frame)| frame < from);
-        self.until.is_none_or(|it| it == 0) && !is_put_off && !self.rests()
-    }
-
-    /// Puts off the next search for boxes: it may take a share of the time where somebody is seen well, and half of it where nobody is.
-    /// Of a slow machine the other views need the cores as well.
-    ///
-    /// * `took`: how long this frame's took, frames; `share`: above 0.
-    pub fn put_off(&mut self, took: f64, share: f64) {
-        let after = |frames: f64| self.last.map(|it| it.saturating_add(frames.ceil() as u64));
-        self.due_from = after(took / share);
-        self.rest_until = after(2.0 * took).filter(|_| self.n_seen == 0);
+        self.until.is_none_or(|it| it == 0)
     }
 
     /// Whether boxes were looked for in this frame.
@@ -267,37 +238,6 @@ mod tests {
         assert_eq!((memory.until, memory.apart), (Some(7), None));
         memory.begin(60, Some(2.0));
         assert_eq!(memory.until, Some(0));
-    }
-
-    #[test]
-    fn a_search_that_took_long_puts_off_the_next() {
-        let mut memory = NetworkMemory {
-            until: Some(0),
-            ..NetworkMemory::default()
-        };
-        let mut is_due = |frame: u64, took: Option<f64>| {
-            memory.begin(frame, Some(4.0));
-            let is_due = memory.is_due();
-            memory.n_seen = 1;
-            if let Some(took) = took {
-                memory.put_off(took, 0.25);
-            }
-            assert!(!memory.rests());
-            is_due
-        };
-        assert!(is_due(5, Some(2.0)) && !is_due(6, None) && !is_due(12, None) && is_due(13, None));
-    }
-
-    #[test]
-    fn after_a_search_in_vain_nobody_is_looked_for_as_long_as_it_took() {
-        let mut memory = NetworkMemory::default();
-        memory.begin(0, Some(4.0));
-        memory.put_off(3.5, 0.25);
-        let mut rests = |frame: u64| {
-            memory.begin(frame, Some(4.0));
-            memory.rests()
-        };
-        assert!(rests(4) && rests(6) && !rests(7));
     }
 
     #[test]

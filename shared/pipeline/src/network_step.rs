@@ -1,16 +1,14 @@
 //! The single-view step with a network: pixels in, people and the maps of their joints out.
 //!
 //! A network that looks at one person needs a box. While a person is seen well, the box of the next frame is that of the pose,
-//! widened; now and then, and where nobody is seen well, boxes are looked for: by a detector, or by the search of the filters.
-//! Keypoints that another program found take the same way, without a picture.
+//! widened; now and then, and where nobody is seen well, a detector finds boxes. Keypoints that another program found take the same way,
+//! without a picture.
 
-use fmp::{Pose, Scope};
 use kernels::Rgb8View;
 use keypoints::{Keypoint, Way};
 use multiview::FrontEvidence;
 use posenetwork::{
     Detector, JointMaps, LookError, Looker, MOST_CELLS, MapSettings, PersonMaps, PoseNetwork, Turn,
-    outline_of_parts,
 };
 
 use crate::looks::Looks;
@@ -19,31 +17,14 @@ use crate::placed::N;
 use crate::sighting::Sighting;
 use crate::tracks::{MUCH_WORSE, Track};
 use crate::view_result::ExtraKeypoint;
-use crate::view_step::ViewStep;
 
 /// What tells where the joints of people are.
 #[derive(Debug)]
 pub enum Eyes {
-    /// A network that looks into boxes, and what finds these.
-    Network(Box<PoseNetwork>, Boxes),
+    /// A network that looks into boxes, and the detector of people that finds these.
+    Network(Box<PoseNetwork>, Box<Detector>),
     /// Keypoints that another program found: how the joints follow from them (`keypoints::joint_ways` of their names).
     Keypoints(Vec<Vec<Way>>),
-}
-
-/// Where boxes around people come from.
-#[derive(Debug)]
-pub enum Boxes {
-    /// A detector of people.
-    Detector(Box<Detector>),
-    /// The search of the filters over the whole picture.
-    Filters {
-        /// The step of the filters.
-        filters: Box<ViewStep>,
-        /// A detector of people, which tells several apart: in place of the filters while several are seen.
-        of_several: Option<Box<Detector>>,
-    },
-    /// Whoever looks by [`NetworkStep::look_by`]; they count as those of the filters. [`NetworkStep::look`] finds none.
-    Caller,
 }
 
 /// Settings of the step.
@@ -78,9 +59,6 @@ impl Default for NetworkSettings {
         }
     }
 }
-
-/// Boxes around people, pixels, the best first; or why there are none.
-type Outlines<E> = Result<Vec<[f64; 4]>, E>;
 
 /// Least score of an extra keypoint: below it, its place is a guess (0.3 is what mmpose and `Pose2Sim` use).
 const LEAST_SCORE: f64 = 0.3;
@@ -128,48 +106,20 @@ impl NetworkStep {
 
     /// Looks at a frame; what is seen stays in the memory ([`Self::sightings`], [`Self::evidence`]).
     ///
-    /// Where boxes are looked for, those of a detector come before those of the frame before, so that no box shrinks or wanders off
-    /// unnoticed. Those of the filters fit less well and come after: every person of the frame before is then looked at in a wider box as
-    /// well, and the better sight kept. So is one whose pose was much worse than usual. Up to twice as many people as are kept are
-    /// looked at, and the largest kept.
+    /// Where boxes are looked for, they come before those of the frame before, so that no box shrinks or wanders off unnoticed. A person whose
+    /// pose was much worse than usual is looked at in a wider box as well, and the better sight kept. Up to twice as many people as
+    /// are kept are looked at, and the largest kept.
     ///
     /// # Errors
     ///
     /// [`LookError`] if the network or the detector fails, or gives numbers that are not finite.
     pub fn look(&self, image: Rgb8View<'_>, memory: &mut NetworkMemory) -> Result<(), LookError> {
-        let Eyes::Network(_, boxes) = &self.eyes else {
-            memory.n_seen = 0;
-            return Ok(());
-        };
-        let are_several = memory.tracks.len() > 1;
-        self.look_by(
-            image,
-            &mut |values| find((boxes, are_several), image, values),
-            memory,
-        )
-    }
-
-    /// As [`Self::look`], with boxes that somebody else finds.
-    ///
-    /// * `find`: boxes around the people of the frame, the best first; asked when they are looked for. Its argument is memory.
-    ///
-    /// # Errors
-    ///
-    /// As for [`Self::look`], and those of `find`.
-    pub fn look_by<E: From<LookError>>(
-        &self,
-        image: Rgb8View<'_>,
-        find: &mut dyn FnMut(&mut Vec<f32>) -> Outlines<E>,
-        memory: &mut NetworkMemory,
-    ) -> Result<(), E> {
-        let Eyes::Network(network, boxes) = &self.eyes else {
-            memory.n_seen = 0;
-            return Ok(());
-        };
-        let (rests, is_due) = (memory.rests(), memory.is_due());
-        memory.has_searched = is_due;
         memory.n_seen = 0;
-        let mut tracks = core::mem::take(&mut memory.tracks);
+        let Eyes::Network(network, detector) = &self.eyes else {
+            return Ok(());
+        };
+        let is_due = memory.is_due();
+        let tracks = core::mem::take(&mut memory.tracks);
         let mut before = core::mem::take(&mut memory.before);
         core::mem::swap(&mut memory.seen, &mut before);
         let looks = Looks {
@@ -183,30 +133,18 @@ impl NetworkStep {
             least_heat: self.settings.least_heat,
             most_lost: self.most_lost(),
         };
+        memory.has_searched = is_due;
         if is_due {
-            memory.found = find(&mut memory.values)?;
-            memory.n_looked_into = 0;
-        }
-        if is_due && by_detector(boxes, tracks.len() > 1).is_some() {
-            let found = core::mem::take(&mut memory.found);
+            let found = find(detector, image, &mut memory.values)?;
             looks.see_boxes(&found, memory)?;
-            for track in &tracks {
-                looks.see_again(track, before.get(track.index), memory)?;
-            }
-        } else {
-            // Frames that are farther apart show people elsewhere: nothing can wait for the next.
-            let mut n_more = if memory.is_soon { 1 } else { usize::MAX };
-            for (nth, track) in tracks.iter_mut().enumerate() {
-                track.is_to_widen |= is_due;
-                looks.see_once_more((nth, track), &mut n_more, &mut before, memory)?;
-            }
-            looks.see_found(n_more, memory)?;
-            if memory.n_seen == 0 && !is_due && !rests {
-                memory.has_searched = true;
-                memory.found = find(&mut memory.values)?;
-                memory.n_looked_into = 0;
-                looks.see_found(n_more, memory)?;
-            }
+        }
+        for (nth, track) in tracks.iter().enumerate() {
+            looks.see_once_more((nth, track), &mut before, memory)?;
+        }
+        if memory.n_seen == 0 && !is_due {
+            memory.has_searched = true;
+            let found = find(detector, image, &mut memory.values)?;
+            looks.see_boxes(&found, memory)?;
         }
         memory.before = before;
         memory.keep_largest(self.settings.n_people);
@@ -309,7 +247,6 @@ impl NetworkStep {
         let before = ((seen.outline, seen.turn), seen.usual_score);
         let around = seen.maps.around();
         seen.next = around.map(|around| Track {
-            is_to_widen: seen.is_to_widen,
             speed: seen.speed,
             ..Track::next(before, (around, score), self.most_lost())
         });
@@ -332,37 +269,14 @@ fn front_of(sighting: &Sighting, seen: &Seen) -> FrontEvidence {
     seen.front.filter(|_| is_told).unwrap_or_default()
 }
 
-/// Boxes around people, pixels, the best first.
-///
-/// * `are_several`: whether several people were seen in the frame before.
+/// Boxes around people, pixels, who is sure and large first: the frame has room for a few.
 fn find(
-    (boxes, are_several): (&Boxes, bool),
+    detector: &Detector,
     image: Rgb8View<'_>,
     values: &mut Vec<f32>,
 ) -> Result<Vec<[f64; 4]>, LookError> {
-    if let Some(detector) = by_detector(boxes, are_several) {
-        let mut found = detector.people(image, values)?;
-        // Who is sure and large first: the frame has room for a few.
-        let weight =
-            |found: &keypoints::PersonBox| found.score * (found.outline[3] - found.outline[1]);
-        found.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-        return Ok(found.into_iter().map(|found| found.outline).collect());
-    }
-    let Boxes::Filters { filters, .. } = boxes else {
-        return Ok(Vec::new());
-    };
-    let whole = Scope::whole(filters.layout());
-    values.resize(values.len().max(filters.layout().n_values(&whole)), 0.0);
-    let found = filters.run(image, whole, values);
-    let outline = |pose: &Pose| outline_of_parts(filters.bounding_box(pose));
-    Ok(found.candidates.iter().map(outline).collect())
-}
-
-/// The detector that finds the next boxes; `None` where the filters or the caller find them.
-fn by_detector(boxes: &Boxes, are_several: bool) -> Option<&Detector> {
-    match boxes {
-        Boxes::Detector(detector) => Some(detector),
-        Boxes::Filters { of_several, .. } => of_several.as_deref().filter(|_| are_several),
-        Boxes::Caller => None,
-    }
+    let mut found = detector.people(image, values)?;
+    let weight = |found: &keypoints::PersonBox| found.score * (found.outline[3] - found.outline[1]);
+    found.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+    Ok(found.into_iter().map(|found| found.outline).collect())
 }

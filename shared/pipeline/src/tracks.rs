@@ -17,8 +17,6 @@ const MOST_MOVED: f64 = 1.0;
 /// A person who has moved by less is where the last look saw them, share of the height of the network's window: less than the
 /// network is off by.
 const STILL: f64 = 0.01;
-/// Most of a box.
-const MOST: f64 = 0.5;
 
 /// Where a person is looked for in the next frame.
 #[derive(Debug, Clone, Copy)]
@@ -31,8 +29,6 @@ pub(crate) struct Track {
     pub(crate) usual_score: f32,
     /// Whether this frame's is so much lower that the box may not fit.
     pub(crate) is_doubtful: bool,
-    /// Whether the person is still to be looked at in a wider box, since boxes were looked for.
-    pub(crate) is_to_widen: bool,
     /// Index of the person among those of the frame.
     pub(crate) index: usize,
     /// Frames since the person was last looked at.
@@ -73,7 +69,6 @@ impl Track {
             turn,
             usual_score: usual_score + NEW_SCORE * (score - usual_score),
             is_doubtful,
-            is_to_widen: false,
             index: 0,
             n_held: 0,
             speed: None,
@@ -85,32 +80,14 @@ impl Track {
     /// * `n_frames`: from the last look to this frame.
     pub(crate) fn is_still(&self, n_frames: u64) -> bool {
         !self.is_doubtful
-            && !self.is_to_widen
             && self
                 .speed
                 .is_some_and(|speed| speed * n_frames as f64 <= STILL)
     }
 }
 
-/// A box that shows more around a person of the frame before: together with the first box in which most of it lies; without one, enlarged
-/// by a quarter of the longer side all around.
-///
-/// * `found`: boxes around people, the best first.
-pub(crate) fn wider(outline: [f64; 4], found: &[[f64; 4]]) -> [f64; 4] {
-    let [left, top, right, bottom] = outline;
-    let covered = |it: &&[f64; 4]| {
-        let width = right.min(it[2]) - left.max(it[0]);
-        let height = bottom.min(it[3]) - top.max(it[1]);
-        width.max(0.0) * height.max(0.0) > MOST * (right - left) * (bottom - top)
-    };
-    if let Some(it) = found.iter().find(covered) {
-        return [
-            left.min(it[0]),
-            top.min(it[1]),
-            right.max(it[2]),
-            bottom.max(it[3]),
-        ];
-    }
+/// A box that shows more around a person of the frame before.
+pub(crate) fn wider(outline: [f64; 4]) -> [f64; 4] {
     enlarged(outline, WIDER)
 }
 
@@ -164,11 +141,7 @@ mod tests {
             is_doubtful: true,
             ..with(0.0)
         };
-        let to_widen = Track {
-            is_to_widen: true,
-            ..with(0.0)
-        };
-        assert!(!doubtful.is_still(1) && !to_widen.is_still(1));
+        assert!(!doubtful.is_still(1));
     }
 
     #[test]
@@ -191,14 +164,5 @@ mod tests {
     fn who_may_have_moved_on_is_in_a_box_that_grows_with_the_time() {
         assert_eq!(moved(BOX, 1.5), [-50.0, -100.0, 330.0, 400.0]);
         assert_eq!(moved(BOX, 90.0), [-100.0, -150.0, 380.0, 450.0]);
-    }
-
-    #[test]
-    fn a_wider_box_reaches_to_what_was_found_around_the_person() {
-        let legs = [110.0, 150.0, 170.0, 260.0];
-        let elsewhere = [300.0, 50.0, 380.0, 250.0];
-        assert_eq!(wider(legs, &[elsewhere, BOX]), [100.0, 50.0, 180.0, 260.0]);
-        let alone = wider(legs, &[elsewhere]);
-        assert_eq!(alone, [82.5, 122.5, 197.5, 287.5]);
     }
 }

@@ -25,5 +25,5 @@ pub use detector::Detector;
 pub use expected::expected_error;
 pub use maps::{JointMaps, MOST_CELLS, MapSettings};
 pub use network::{FitError, LookError, PoseNetwork, Sight, Turn, Workspace};
-pub use outline::{OF_FILTERS, outline_of, outline_of_parts, overlap};
+pub use outline::{outline_of, overlap};
 pub use person_maps::{MapGrid, PersonMaps};

@@ -24,23 +24,6 @@ pub fn outline_of(joints: impl IntoIterator<Item = [f64; 2]>) -> Option<[f64; 4]
     Some([low[0] - more, low[1] - more, high[0] + more, high[1] + more])
 }
 
-/// By how much the box of the filters' parts is enlarged for a network, share of its sides, on each side.
-pub const OF_FILTERS: f64 = 0.1;
-
-/// The box of a pose that the filters found, enlarged by [`OF_FILTERS`] for a network.
-///
-/// * `parts`: the box around the boxes of all its parts: left, top, right, bottom.
-pub fn outline_of_parts(parts: [f64; 4]) -> [f64; 4] {
-    let [left, top, right, bottom] = parts;
-    let more = [right - left, bottom - top].map(|it| OF_FILTERS * it);
-    [
-        left - more[0],
-        top - more[1],
-        right + more[0],
-        bottom + more[1],
-    ]
-}
-
 /// The share of two boxes that both cover: the intersection over the union, 0 to 1.
 pub fn overlap(a: [f64; 4], b: [f64; 4]) -> f64 {
     let side = |axis: usize| (a[axis + 2].min(b[axis + 2]) - a[axis].max(b[axis])).max(0.0);
@@ -61,12 +44,6 @@ mod tests {
         assert_eq!(outline_of([]), None);
         assert_eq!(outline_of([[1.0, 1.0]]), None, "no extent");
         assert_eq!(outline_of([[f64::NAN, 1.0]]), None);
-    }
-
-    #[test]
-    fn the_box_of_parts_is_enlarged_on_every_side() {
-        let got = outline_of_parts([10.0, 20.0, 30.0, 120.0]);
-        assert_eq!(got, [8.0, 10.0, 32.0, 130.0]);
     }
 
     #[test]

@@ -361,8 +361,8 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
             all.push(sequence);
         }
     }
-    // A network with a detector of its own does without the filters.
-    if arguments.evidence.detector.is_none() {
+    // A network does without the filters.
+    if arguments.evidence.network_evidence.is_none() {
         for warning in height::warnings(&all, arguments.size, arguments.scale) {
             tracing::warn!("{warning}");
         }

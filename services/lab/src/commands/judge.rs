@@ -83,7 +83,7 @@ pub(crate) struct Arguments {
     /// The card of a network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
     #[arg(long, value_name = "CARD")]
     card: Option<PathBuf>,
-    /// Give a network only the picture: it looks into the boxes that the filters find.
+    /// Give a network only the picture: it looks into the boxes that the detector that ships finds.
     #[arg(long)]
     find_boxes: bool,
     /// Also show the mirror image of every person to a network, and use the mean: more exact, twice the time.

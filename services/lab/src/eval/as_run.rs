@@ -7,10 +7,9 @@ use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use geometry::Camera;
 use keypoints::Sides;
-use multiview::ViewPlan;
 use pipeline::{
-    Boxes, Eyes, NetworkEstimator, NetworkEstimatorSettings, NetworkSettings, NetworkStep,
-    SpaceStepSettings, ViewContent, ViewFrame, ViewSettings, ViewStep, WhoSettings,
+    Eyes, NetworkEstimator, NetworkEstimatorSettings, NetworkSettings, NetworkStep,
+    SpaceStepSettings, ViewContent, ViewFrame, WhoSettings,
 };
 use posenetwork::{Detector, PoseNetwork};
 use skeleton::PARSE14;
@@ -26,20 +25,20 @@ pub trait OpenView {
     /// It cannot be read.
     fn network(&self) -> Result<PoseNetwork, Failure>;
 
-    /// The detector; `None` where the filters find people.
+    /// The detector of people.
     ///
     /// # Errors
     ///
     /// It cannot be read.
-    fn detector(&self) -> Result<Option<Detector>, Failure>;
+    fn detector(&self) -> Result<Detector, Failure>;
 }
 
 /// How sequences are solved.
 pub struct AsRun<'a> {
     /// Opens the networks of a view.
     pub open: &'a dyn OpenView,
-    /// The filters, which find people without a detector.
-    pub filters: Arc<Model>,
+    /// The model of parts, by which views are planned.
+    pub model: Arc<Model>,
 }
 
 impl core::fmt::Debug for AsRun<'_> {
@@ -61,20 +60,10 @@ impl AsRun<'_> {
     ) -> Result<NetworkEstimator, Failure> {
         let (mut plans, mut steps, mut as_seen) = (Vec::new(), Vec::new(), false);
         for camera in cameras {
-            let plan = pipeline::plan(&self.filters, camera).or_fail(ExitKind::Input)?;
-            let boxes = match self.open.detector()? {
-                Some(detector) => Boxes::Detector(Box::new(detector)),
-                None => Boxes::Filters {
-                    filters: Box::new(self.filters(&plan)),
-                    of_several: inputs::detector_of_several(
-                        &deployment::network::Config::default(),
-                    )?
-                    .map(Box::new),
-                },
-            };
+            let plan = pipeline::plan(&self.model, camera).or_fail(ExitKind::Input)?;
             let network = self.open.network()?;
             as_seen |= network.card().keypoints.sides == Sides::Seen;
-            let eyes = Eyes::Network(Box::new(network), boxes);
+            let eyes = Eyes::Network(Box::new(network), Box::new(self.open.detector()?));
             let settings = NetworkSettings {
                 find_every: 1,
                 find_every_of_several: 1,
@@ -94,11 +83,6 @@ impl AsRun<'_> {
         };
         let up = sequence.rig.up_in_world();
         Ok(NetworkEstimator::new(&plans, steps, up, settings))
-    }
-
-    fn filters(&self, plan: &ViewPlan) -> ViewStep {
-        let layout = Arc::new(plan.layout().clone());
-        ViewStep::new(Arc::clone(&self.filters), layout, ViewSettings::default())
     }
 }
 

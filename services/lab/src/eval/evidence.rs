@@ -5,15 +5,11 @@ use crate::evaluation::{
     projected,
 };
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
-use fmp::{Layout, Pose, Search};
 use geometry::Camera;
 use kernels::Rgb8View;
 use keypoints::Sides;
 use multiview::{SeenPerson, same_person};
-use pipeline::ViewSettings;
-use posenetwork::{
-    Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork, outline_of_parts,
-};
+use posenetwork::{Detector, JointMaps, LookMemory, Looker, MapSettings, PoseNetwork};
 use skeleton::PARSE14;
 use statistics::score::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
 use training::datasets::sequences::{Frame, Sequence};
@@ -38,7 +34,7 @@ pub struct EvidenceJob<'a> {
     /// The network that finds keypoints.
     pub network: &'a PoseNetwork,
     /// What finds the boxes.
-    pub boxes: Boxes<'a>,
+    pub detector: &'a Detector,
     /// Solves the undisturbed sequences as `run` does, beside the methods that are compared.
     pub as_run: &'a AsRun<'a>,
     /// What goes wrong.
@@ -49,37 +45,6 @@ pub struct EvidenceJob<'a> {
     pub bootstrap: Bootstrap,
     /// Ends the run.
     pub stop: Stop,
-}
-
-/// What finds boxes around people.
-#[derive(Debug, Clone, Copy)]
-pub enum Boxes<'a> {
-    /// A detector.
-    Detector(&'a Detector),
-    /// The filters, over the whole frame.
-    Filters(&'a Search),
-}
-
-impl Boxes<'_> {
-    /// The boxes in a frame, the best first: left, top, right, bottom, pixels.
-    fn find(&self, image: Rgb8View<'_>, values: &mut Vec<f32>) -> Result<Vec<[f64; 4]>, Failure> {
-        match self {
-            Self::Detector(detector) => {
-                let found = detector.people(image, values).or_fail(ExitKind::Input)?;
-                Ok(found.into_iter().map(|it| it.outline).collect())
-            }
-            Self::Filters(search) => {
-                let layout = Layout::new(&search.model, image.width(), image.height());
-                let layout = layout.or_fail(ExitKind::Input)?;
-                let found = search.on(image, &layout, |it| {
-                    let separation = ViewSettings::default().min_separation;
-                    search.solver.distinct(it, MOST_PEOPLE, separation)
-                });
-                let outline = |it: &Pose| outline_of_parts(it.bounding_box(&search.model, &layout));
-                Ok(found.iter().map(outline).collect())
-            }
-        }
-    }
 }
 
 /// The scores of one method under one stress.
@@ -255,9 +220,10 @@ impl EvidenceJob<'_> {
             network: self.network,
             settings: &MapSettings::default(),
         };
-        let boxes = self.boxes.find(image, values)?;
+        let boxes = self.detector.people(image, values);
+        let boxes = boxes.or_fail(ExitKind::Input)?;
         let mut people = Vec::new();
-        for outline in boxes.into_iter().take(MOST_PEOPLE) {
+        for outline in boxes.into_iter().take(MOST_PEOPLE).map(|it| it.outline) {
             let mut maps = JointMaps::default();
             let seen = looker.look((image, outline), memory, &mut maps);
             let Some(seen) = seen.or_fail(ExitKind::Input)? else {

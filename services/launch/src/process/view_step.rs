@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use failure::{ExitKind, Failure, OrFail as _};
-use pipeline::{Boxes, Eyes, NetworkSettings, NetworkStep, ViewStep};
+use pipeline::{Eyes, NetworkSettings, NetworkStep, ViewStep};
 
-use crate::find_every::{find_every, find_every_of_several};
+use crate::find_every::FindEvery;
 use crate::keypoints;
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;
@@ -44,12 +44,12 @@ pub(crate) fn of_view(
     let size = plan.layout().image_size;
     let step = deployment.capture.frame_step.max(1) as f64;
     let rate_hz = resolved.frame_rate_hz().map(|rate_hz| rate_hz / step);
-    let find_every = find_every(config, rate_hz);
+    let find_every = FindEvery::new(config, rate_hz);
     let settings = NetworkSettings {
         n_people: config.people,
-        find_every,
-        find_every_of_several: find_every_of_several(config, rate_hz),
-        find_phase: view as u64 * find_every / deployment.cameras.len().max(1) as u64,
+        find_every: find_every.alone,
+        find_every_of_several: find_every.several,
+        find_phase: view as u64 * find_every.alone / deployment.cameras.len().max(1) as u64,
         least_heat: config.least_heat,
         ..NetworkSettings::default()
     };
@@ -69,15 +69,8 @@ pub(crate) fn of_view(
     let network = inputs::pose_network(deployment, view)?
         .ok_or("the camera has neither a network nor keypoints")
         .or_fail(ExitKind::Config)?;
-    let boxes = match inputs::detector(config)? {
-        Some(detector) => Boxes::Detector(Box::new(detector)),
-        None => Boxes::Filters {
-            filters: Box::new(super::boxes::filters(prepared, view)?),
-            of_several: inputs::detector_of_several(config)?.map(Box::new),
-        },
-    };
     let extras = extras(resolved, network.names());
-    let eyes = Eyes::Network(Box::new(network), boxes);
+    let eyes = Eyes::Network(Box::new(network), Box::new(inputs::detector(config)?));
     let step = NetworkStep::new(eyes, size, settings).with_extras(extras);
     Ok(pose::Step::Network(Box::new(step)))
 }

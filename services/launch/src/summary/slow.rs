@@ -19,7 +19,7 @@ pub(super) fn text(
     is_slow.then(|| {
         format!(
             "  slow          this machine had time for {n} of {n_frames} frames, {:.1} a second: smaller pictures (capture.scale), fewer cameras, less \
-             work beside it, a detector (network.detector) or more cores would help; `latency` below shows which stage takes long\n",
+             work beside it or more cores would help; `latency` below shows which stage takes long\n",
             n as f64 / seconds.max(1e-3)
         )
     })

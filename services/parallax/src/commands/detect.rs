@@ -23,39 +23,39 @@ use by_network::Eyes;
 
 /// Default of `--size`: the longest side of a searched image, pixels.
 const SIZE: usize = 1280;
+/// Default of `--overlap`.
+const OVERLAP: f64 = 0.1;
 
 /// The default detection threshold of the shipped model where its parts are told, chosen by measurement; see [`Arguments`].
 const SHIPPED_THRESHOLD: f64 = -0.5;
 
-/// The default threshold of the filters, and the least heat, where the network decides whether somebody is in a box. By the
-/// search at the full size alone, on pictures that both were trained on (PARSE 1-100, 150 of INRIA without people), 93 % of the people
-/// are kept so, with 0.23 false alarms a picture.
-const BOX_THRESHOLD: f64 = -1.28;
-const LEAST_HEAT: f64 = 0.58;
+/// The least heat where the detector that ships finds boxes.
+const LEAST_HEAT: f64 = 0.5;
 
 /// Options of `parallax detect`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Pictures are turned as their orientation tag (EXIF) says. One with a side longer than \
---size is reduced to that size, and the line says so: \"searched at 1280x960 of 4000x3000\". People smaller than about \
-150 pixels there are not found; --full searches all pixels, with about 460 bytes of memory for each. Of a video every \
+Pictures are turned as their orientation tag (EXIF) says. Of a video every \
 frame is searched, or every n-th with --every. Unreadable pictures are named, the others are searched, and the exit code is 7 \
 (4 if nothing could be read).
 
-The filters propose boxes, and the network that ships finds the joints in them: in every box, widened by 10 %, and then in the \
-box around the person that it sees, as in a deployment. People with less heat than --heat (mean over the joints) are left out. \
-Each person is printed once, in order of heat. --network names your own network (docs/networks.md). \
---box and --detector give other boxes, used as they are, at most --max.
+The detector that ships finds boxes, at most --max, and the network that ships finds the joints in them, as in a deployment. \
+People with less heat than --heat (mean over the joints) are left out. \
+Each person is printed once, in order of heat. --network and --detector name your own (docs/networks.md); --box gives the box.
 
-With --network none, and with --model, --joints or --joint-map, the parts of the filters are printed. \
+People who are lower than an eighth of the longer side of the picture are not found: cut the picture, or give --box.
+
+With --network none, and with --model, --joints or --joint-map, the parts of the filters are printed. A picture with a \
+side longer than --size is then reduced to that size, and the line says so: \"searched at 1280x960 of 4000x3000\". People smaller than \
+about 150 pixels there are not found; --full searches all pixels, with about 460 bytes of memory for each. \
 The card configs/models/person.md has the false alarms for each --threshold.
 
 With --json one line per image, best detection first:
-    {\"image\", \"frame\" (of videos), \"width\", \"height\", \"network\", \"searched\": [width, height], \"detections\": [{\"score\": the
-     mean of its joints', \"box\": [x1, y1, x2, y2], \"box_from\": \"given\", \"detector\" or \"filters\", \"box_score\" (of a detector),
+    {\"image\", \"frame\" (of videos), \"width\", \"height\", \"network\", \"detections\": [{\"score\": the
+     mean of its joints', \"box\": [x1, y1, x2, y2], \"box_from\": \"given\" or \"detector\", \"box_score\" (of a detector),
      \"keypoints\": [{\"name\", \"x\", \"y\", \"score\"}], \"joints\": {name: [x, y]}}]}
 and by the filters alone
-    {\"image\", \"frame\", \"width\", \"height\", \"searched\", \"detections\": [{\"score\", \"level\", \"scale\",
+    {\"image\", \"frame\", \"width\", \"height\", \"searched\": [width, height], \"detections\": [{\"score\", \"level\", \"scale\",
      \"parts\": [{\"x\", \"y\", \"type\", \"box\": [x1, y1, x2, y2]}], \"joints\": {name: [x, y]}}]}
 Pixels of the whole image as it is seen, the centre of its top-left pixel is (0, 0); types and levels count from 1.
 
@@ -74,23 +74,25 @@ pub(crate) struct Arguments {
     /// The model file; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Least heat of a person in a box of the filters: the mean over the joints, from 0 to 1.
-    #[arg(long, value_name = "HEAT", default_value_t = LEAST_HEAT, value_parser = heat)]
-    heat: f64,
-    /// Lowest score of a detection of the filters; if not given: for the model that ships -1.28 with a network and -0.5 without
-    /// one, for another model the trained threshold, but at most -1.
+    /// Least heat of a person in a box of a detector: the mean over the joints, from 0 to 1; if not given, 0.5 with the detector that
+    /// ships, and 0 with --detector.
+    #[arg(long, value_name = "HEAT", value_parser = heat)]
+    heat: Option<f64>,
+    /// Lowest score of a detection of the filters; if not given: -0.5 for the model that ships, for another model the trained
+    /// threshold, but at most -1.
     #[arg(long, value_name = "SCORE", allow_hyphen_values = true)]
     threshold: Option<f64>,
-    /// Non-maximum suppression: the largest share of a better detection's boxes that a worse one may cover.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
-    overlap: f64,
+    /// Non-maximum suppression of the filters: the largest share of a better detection's boxes that a worse one may cover; if not
+    /// given, 0.1.
+    #[arg(long, value_name = "SHARE")]
+    overlap: Option<f64>,
     /// Maximal number of detections per image.
     #[arg(long, value_name = "N", default_value_t = 100)]
     max: usize,
-    /// Longest side of a searched image, pixels; larger images are scaled down.
-    #[arg(long, value_name = "PIXELS", default_value_t = SIZE, value_parser = side)]
-    size: usize,
-    /// Search all pixels, whatever the size of the image.
+    /// Longest side of an image that the filters search, pixels; larger images are scaled down. If not given, 1280.
+    #[arg(long, value_name = "PIXELS", value_parser = side)]
+    size: Option<usize>,
+    /// The filters search all pixels, whatever the size of the image.
     #[arg(long, conflicts_with = "size")]
     full: bool,
     /// Of a video, search every n-th frame.
@@ -123,18 +125,14 @@ pub(crate) struct Arguments {
     /// The card of the network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
     #[arg(long, value_name = "CARD", requires = "network")]
     card: Option<PathBuf>,
-    /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the filters find it.
+    /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the detector finds it.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, allow_hyphen_values = true)]
     outline: Option<Outline>,
     /// Also show the mirror image of every person to the network, and use the mean: more exact, twice the time.
     #[arg(long)]
     mirror: bool,
-    /// Boxes by this detector of people (.onnx) in place of the filters.
-    #[arg(
-        long,
-        value_name = "FILE",
-        conflicts_with_all = ["outline", "model", "threshold", "overlap", "size", "full"]
-    )]
+    /// Boxes by this detector of people (.onnx) in place of the one that ships.
+    #[arg(long, value_name = "FILE", conflicts_with = "outline")]
     detector: Option<PathBuf>,
     /// The card of the detector; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
     #[arg(long, value_name = "CARD", requires = "detector")]
@@ -148,16 +146,23 @@ impl Arguments {
     ///
     /// An option of the one, where the other does it.
     fn network(&self) -> Result<Option<&Path>, Failure> {
+        /// So many of the options also say that the filters find the parts.
+        const N_IMPLY: usize = 3;
         let of_filters = [
             (self.joints.is_some(), "--joints"),
             (self.joint_map.is_some(), "--joint-map"),
             (self.model.is_some(), "--model"),
+            (self.threshold.is_some(), "--threshold"),
+            (self.overlap.is_some(), "--overlap"),
+            (self.size.is_some(), "--size"),
+            (self.full, "--full"),
         ];
         let of_network = [
             (self.outline.is_some(), "--box"),
             (self.mirror, "--mirror"),
             (self.detector.is_some(), "--detector"),
             (self.card.is_some(), "--card"),
+            (self.heat.is_some(), "--heat"),
         ];
         let given = |options: &[(bool, &'static str)]| {
             let mut given = options.iter().filter(|it| it.0);
@@ -165,18 +170,16 @@ impl Arguments {
         };
         let network = match self.network.as_deref() {
             Some(file) => (!deployment::is_none(file)).then_some(file),
-            None => given(&of_filters)
+            None => given(&of_filters[..N_IMPLY])
                 .is_none()
                 .then(|| Path::new(deployment::SHIPPED)),
         };
-        let wrong =
-            match network {
-                // The model is that of the filters that find the boxes.
-                Some(_) => given(&of_filters[..2])
-                    .map(|it| (it, "the filters' parts", "a network", "none")),
-                None => given(&of_network)
-                    .map(|it| (it, "a network", "the filters", deployment::SHIPPED)),
-            };
+        let wrong = match network {
+            Some(_) => given(&of_filters).map(|it| (it, "the filters", "a network", "none")),
+            None => {
+                given(&of_network).map(|it| (it, "a network", "the filters", deployment::SHIPPED))
+            }
+        };
         match wrong {
             None => Ok(network),
             Some((option, of, by, other)) => {
@@ -198,12 +201,14 @@ impl Arguments {
             network = inputs::mirrored(network, "--mirror")?;
         }
         let card = self.detector_card.as_deref();
-        let detector = self.detector.as_ref();
-        let detector = detector.map(|it| inputs::detector::open(it, card));
+        let detector = self.detector.as_deref();
+        let least_heat = detector.map_or(LEAST_HEAT, |_| 0.0);
+        let detector = detector.unwrap_or(Path::new(deployment::SHIPPED));
         Ok(Some(Eyes {
             file: file.to_path_buf(),
             network,
-            detector: detector.transpose()?,
+            detector: inputs::detector::open(detector, card)?,
+            least_heat: self.heat.unwrap_or(least_heat),
         }))
     }
 
@@ -286,7 +291,6 @@ impl<'a> Detector<'a> {
         let model = inputs::model_or_shipped(arguments.model.as_deref())?;
         let network = arguments.network()?;
         let threshold = match arguments.model {
-            None if network.is_some() => BOX_THRESHOLD,
             None => SHIPPED_THRESHOLD,
             Some(_) => model.detection_threshold(),
         };
@@ -302,7 +306,7 @@ impl<'a> Detector<'a> {
             },
             settings: CandidateSettings {
                 threshold: arguments.threshold.unwrap_or(threshold) as f32,
-                overlap: arguments.overlap,
+                overlap: arguments.overlap.unwrap_or(OVERLAP),
                 max: arguments.max,
             },
             search: Search::new(model),
@@ -358,7 +362,7 @@ impl Detector<'_> {
 
     /// The longest side that is searched; none: all pixels.
     fn longest(&self) -> Option<usize> {
-        (!self.arguments.full).then_some(self.arguments.size)
+        (!self.arguments.full).then(|| self.arguments.size.unwrap_or(SIZE))
     }
 
     fn report(

@@ -28,7 +28,7 @@ pub(crate) enum Command {
 /// Options of `parallax sync estimate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-People come from the `keypoints` of a camera, otherwise from its network, otherwise from the filters. The calibration must fit; identities \
+People come from the `keypoints` of a camera, otherwise from its network (by the paper's method from the one that ships). The calibration must fit; identities \
 are not needed. A joint that two cameras see at \
 one instant satisfies their epipolar constraint: the offset of a pair is where this holds best, and all cameras must \
 agree. Offsets are against the first camera (--reference), and do not depend on `offset_ms` and `drift_ppm` in the file.

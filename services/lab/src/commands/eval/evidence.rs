@@ -5,10 +5,9 @@ use std::process::ExitCode;
 
 use clap::Args;
 use failure::{Claim, ExitKind, Failure, OrFail as _, Stop};
-use fmp::Search;
 use inputs::library::Library;
 use lab::eval::as_run::{AsRun, OpenView};
-use lab::eval::evidence::{Boxes, EvidenceJob, EvidenceRow, evidence_text};
+use lab::eval::evidence::{EvidenceJob, EvidenceRow, evidence_text};
 use lab::evaluation::{FilmSettings, Stress};
 use posenetwork::{Detector, PoseNetwork};
 use statistics::score::Bootstrap;
@@ -29,7 +28,7 @@ pub(super) struct Options {
     /// The card of the network; if not given, the one beside it, or in its metadata.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     card: Option<PathBuf>,
-    /// Detector (ONNX) that finds the boxes of people; if not given, the filters find them.
+    /// Detector (ONNX) that finds the boxes of people; if not given, the one that ships.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     pub(super) detector: Option<PathBuf>,
     /// The card of the detector; if not given, the one beside it, or in its metadata.
@@ -70,11 +69,10 @@ impl OpenView for Files<'_> {
         inputs::open_network(network, &Library::BuiltIn)?.fitted()
     }
 
-    fn detector(&self) -> Result<Option<Detector>, Failure> {
+    fn detector(&self) -> Result<Detector, Failure> {
         let detector = self.options.detector.as_deref();
         let card = self.options.detector_card.as_deref();
-        let detector = detector.map(|file| inputs::detector::open(file, card));
-        detector.transpose()
+        inputs::detector::open(detector.unwrap_or(Path::new(deployment::SHIPPED)), card)
     }
 }
 
@@ -90,17 +88,14 @@ pub(super) fn run(
     let sequences = super::sequences(arguments)?;
     let files = Files { file, options };
     let (network, detector) = (files.network()?, files.detector()?);
-    let filters = Search::new(inputs::model_or_shipped(None)?);
     let as_run = AsRun {
         open: &files,
-        filters: inputs::model_or_shipped(None)?,
+        model: inputs::model_or_shipped(None)?,
     };
     let _claim = Claim::take(&arguments.out, "eval")?;
     let job = EvidenceJob {
         network: &network,
-        boxes: detector
-            .as_ref()
-            .map_or(Boxes::Filters(&filters), Boxes::Detector),
+        detector: &detector,
         as_run: &as_run,
         stress: &stress,
         film: FilmSettings {

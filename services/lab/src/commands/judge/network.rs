@@ -5,7 +5,6 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use failure::{Console, ExitKind, Failure, Stop};
-use fmp::Search;
 use inputs::library::Library;
 use lab::evaluation::{Intervals, Judged, Pictures};
 use lab::judged;
@@ -25,10 +24,9 @@ pub(super) fn run(
     refuse(arguments)?;
     let named = (arguments.model.as_path(), arguments.card.as_deref());
     let file = inputs::open_network(named, &Library::BuiltIn)?;
-    let finder = arguments.find_boxes.then(|| {
-        let model = inputs::model_or_shipped(None)?;
-        Ok::<_, Failure>(Search::new(model))
-    });
+    let finder = arguments
+        .find_boxes
+        .then(|| inputs::detector::open(Path::new(deployment::SHIPPED), None));
     let mut network = file.fitted()?;
     if arguments.mirror {
         network = inputs::mirrored(network, "--mirror")?;

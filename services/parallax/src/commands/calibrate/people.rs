@@ -26,7 +26,7 @@ space are off on account of it, a run with this rig tells by its residuals";
 /// Options of `parallax calibrate people`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-People come from the `keypoints` of a camera, otherwise from its network, otherwise from the filters, as in `parallax sync estimate`. \
+People come from the `keypoints` of a camera, otherwise from its network, as in `parallax sync estimate`. \
 The person whom the cameras see longest together is used; one person alone is better. The deployment's rig gives intrinsics and \
 names; its poses are used only with `--scale rig`.
 

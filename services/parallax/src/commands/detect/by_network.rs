@@ -1,15 +1,15 @@
-//! People in boxes, by a network that finds keypoints. The boxes are given, or found by a detector or by the filters.
+//! People in boxes, by a network that finds keypoints. The boxes are given, or found by a detector.
 
 use std::path::PathBuf;
 
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
-use inputs::pictures::{Picture, Searched};
+use inputs::pictures::Picture;
 use inputs::sheet::{Sheet, Skeleton};
 use inputs::{detector, network};
 use posenetwork::{
-    Detector as BoxDetector, JointMaps, LookMemory, MapSettings, OF_FILTERS, PoseNetwork, Turn,
-    Workspace, overlap,
+    Detector as BoxDetector, JointMaps, LookMemory, MapSettings, PoseNetwork, Turn, Workspace,
+    overlap,
 };
 use serde_json::{Map, Value, json};
 use skeleton::PARSE14;
@@ -21,16 +21,14 @@ use inputs::network::keypoints_json;
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
 
-/// How much smaller the picture of the second search is, and its least longest side, pixels.
-const COARSER: usize = 3;
-const SMALLEST: usize = 320;
-
-/// The network that finds keypoints, and the detector of the boxes if there is one.
+/// The network that finds keypoints, and the detector of the boxes.
 pub(super) struct Eyes {
     /// As it is named on the command line.
     pub(super) file: PathBuf,
     pub(super) network: PoseNetwork,
-    pub(super) detector: Option<BoxDetector>,
+    pub(super) detector: BoxDetector,
+    /// Least heat of a person in a box of the detector, 0 to 1.
+    pub(super) least_heat: f64,
 }
 
 /// Where boxes come from.
@@ -38,10 +36,8 @@ pub(super) struct Eyes {
 enum From {
     /// From the user.
     Given,
-    /// From a detector.
+    /// From the detector.
     Detector,
-    /// From the filters, on the picture at this size.
-    Filters([usize; 2]),
 }
 
 /// A box to look into.
@@ -87,68 +83,42 @@ impl Detector<'_> {
         Ok(Ok(()))
     }
 
-    /// The people: in the order of their boxes, or where the filters found these, those who are seen best first, each once.
+    /// The people in the box that is given, or in those of the detector: who is seen best first, each once.
     fn people(&self, eyes: &Eyes, picture: &Picture) -> Result<(Vec<Person>, From), Failure> {
-        let (outlines, from) = self.outlines(eyes, picture)?;
         let mut memory = LookMemory::default();
-        let mut see = |it| match from {
-            From::Filters(_) => Person::seen_closer(eyes, picture, it, &mut memory),
-            From::Given | From::Detector => {
-                Person::seen(&eyes.network, picture, it, memory.workspace())
-            }
-        };
-        let people: Result<Vec<Person>, Failure> = outlines.into_iter().map(&mut see).collect();
-        let mut people = people?;
-        if let From::Filters(_) = from {
-            people.retain(|it| it.score >= self.arguments.heat);
-            people.sort_by(|a, b| b.score.total_cmp(&a.score));
-            let mut apart: Vec<Person> = Vec::with_capacity(people.len());
-            for person in people {
-                let is_same = |it: &Person| overlap(it.outline.sides, person.outline.sides) > SAME;
-                if !apart.iter().any(is_same) {
-                    apart.push(person);
-                }
-            }
-            people = apart;
-        }
-        Ok((people, from))
-    }
-
-    fn outlines(&self, eyes: &Eyes, picture: &Picture) -> Result<(Vec<Outline>, From), Failure> {
-        let plain = |sides| Outline { sides, score: None };
         if let Some(outline) = self.arguments.outline {
-            return Ok((vec![plain(outline.0)], From::Given));
+            let outline = Outline {
+                sides: outline.0,
+                score: None,
+            };
+            let person = Person::seen(&eyes.network, picture, outline, memory.workspace())?;
+            return Ok((vec![person], From::Given));
         }
-        if let Some(boxes) = &eyes.detector {
-            let mut found = detector::people(boxes, picture, &mut Vec::new())?;
-            found.truncate(self.arguments.max);
-            let outlines = found.into_iter().map(|it| Outline {
-                sides: it.outline,
-                score: Some(it.score),
-            });
-            return Ok((outlines.collect(), From::Detector));
+        let mut found = detector::people(&eyes.detector, picture, &mut Vec::new())?;
+        found.truncate(self.arguments.max);
+        let is_alone = found.len() == 1;
+        let people = found.into_iter().map(|found| {
+            let outline = Outline {
+                sides: found.outline,
+                score: Some(found.score),
+            };
+            if is_alone {
+                Person::seen_closer(eyes, picture, outline, &mut memory)
+            } else {
+                Person::seen(&eyes.network, picture, outline, memory.workspace())
+            }
+        });
+        let mut people = people.collect::<Result<Vec<Person>, Failure>>()?;
+        people.retain(|it| it.score >= eyes.least_heat);
+        people.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let mut apart: Vec<Person> = Vec::with_capacity(people.len());
+        for person in people {
+            let is_same = |it: &Person| overlap(it.outline.sides, person.outline.sides) > SAME;
+            if !apart.iter().any(is_same) {
+                apart.push(person);
+            }
         }
-        let searched = Searched::new(picture, self.longest(), &self.search)?;
-        let size = searched.layout().image_size;
-        let mut outlines = self.boxes(picture, &searched)?;
-        // Who fills the picture is found better in a small one.
-        let [width, height] = size;
-        let longest = width.max(height) / COARSER;
-        if longest >= SMALLEST {
-            let coarse = Searched::new(picture, Some(longest), &self.search)?;
-            outlines.extend(self.boxes(picture, &coarse)?);
-        }
-        Ok((
-            outlines.into_iter().map(plain).collect(),
-            From::Filters(size),
-        ))
-    }
-
-    /// Boxes of the filters, pixels of the picture.
-    fn boxes(&self, picture: &Picture, searched: &Searched) -> Result<Vec<[f64; 4]>, Failure> {
-        let found = self.detect(searched.image(picture)?, searched.layout());
-        let model = &self.search.model;
-        Ok(found.iter().map(|it| searched.outline(model, it)).collect())
+        Ok((apart, From::Detector))
     }
 
     fn report_people(
@@ -157,25 +127,15 @@ impl Detector<'_> {
         (eyes, from): (&Eyes, From),
         found: &[Person],
     ) -> Result<(), Failure> {
-        // Who named no network hears of the filters as before: by the number of detections.
-        if found.is_empty() && self.arguments.network.is_some() {
-            output::message(format_args!(
-                "{}: {}, so the network was not asked; --box says where to look",
-                picture.title(),
-                nobody(eyes)
-            ));
+        if found.is_empty() {
+            output::message(format_args!("{}: {}", picture.title(), nobody(eyes)));
         }
         if self.arguments.json {
             return self.report_json(picture, (eyes, from), found);
         }
-        let how = match (from, &eyes.detector) {
-            (From::Filters([width, height]), _) => format!(
-                "boxes by the filters at {width}x{height} of {}, widened by {:.0} % and left for closer ones",
-                picture.size,
-                100.0 * OF_FILTERS
-            ),
-            (From::Detector, Some(boxes)) => format!("boxes by {}", boxes.card().name),
-            _ => "box given".to_owned(),
+        let how = match from {
+            From::Detector => format!("boxes by {}", eyes.detector.card().name),
+            From::Given => "box given".to_owned(),
         };
         let turned = if picture.turn.is_none() {
             String::new()
@@ -210,10 +170,9 @@ impl Detector<'_> {
         (eyes, from): (&Eyes, From),
         found: &[Person],
     ) -> Result<(), Failure> {
-        let (from, searched) = match from {
-            From::Given => ("given", None),
-            From::Detector => ("detector", None),
-            From::Filters(size) => ("filters", Some(size)),
+        let from = match from {
+            From::Given => "given",
+            From::Detector => "detector",
         };
         let detections: Vec<Value> = found.iter().map(|it| it.json(from)).collect();
         let mut line = json!({
@@ -221,7 +180,6 @@ impl Detector<'_> {
             "width": picture.size.width,
             "height": picture.size.height,
             "network": eyes.file,
-            "searched": searched,
             "detections": detections,
         });
         if let Some(detector) = &self.arguments.detector {
@@ -251,7 +209,7 @@ impl Detector<'_> {
 }
 
 impl Person {
-    /// The box of the filters is left for one that fits better, as in a deployment.
+    /// The only box is left for one that fits better, as in a deployment.
     fn seen_closer(
         eyes: &Eyes,
         picture: &Picture,
@@ -338,14 +296,11 @@ impl Person {
     }
 }
 
-/// Who finds nobody.
+/// Why nobody is found.
 fn nobody(eyes: &Eyes) -> String {
-    let Some(boxes) = &eyes.detector else {
-        return "the filters find nobody".to_owned();
-    };
-    let card = boxes.card();
+    let card = eyes.detector.card();
     format!(
-        "{} finds nobody (no box scores `least_score` = {} of its card)",
-        card.name, card.least_score
+        "{} finds nobody (no box scores `least_score` = {} of its card), or the network sees nobody with a heat of {}; --box says where to look",
+        card.name, card.least_score, eyes.least_heat
     )
 }
