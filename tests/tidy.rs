@@ -42,7 +42,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "terminal",
         ],
     ),
-    ("paper", &["fmp", "multiview", "viewquality"]),
+    ("paper", &["fmp", "gpu", "multiview", "viewquality"]),
     (
         "frame",
         &[
@@ -75,7 +75,7 @@ const LAYERS: &[(&str, &[&str])] = &[
 ];
 
 /// The only crates that may contain the word.
-const MAY_BE_UNSAFE: &[&str] = &["failure", "kernels", "runtime"];
+const MAY_BE_UNSAFE: &[&str] = &["failure", "gpu", "kernels", "runtime"];
 
 /// The only crates that may know the transport.
 const MAY_KNOW_TRANSPORT: &[&str] = &["messages", "runtime"];
