@@ -1,4 +1,4 @@
-//! What a build without the feature `gpu` has in its place: no device.
+//! A build without the feature `gpu`: there is no device.
 
 use std::sync::Arc;
 

@@ -127,7 +127,7 @@ impl Device {
         &self.limits
     }
 
-    /// Whether it takes kernels in SPIR-V, whose arithmetic can be decorated.
+    /// Says if it takes kernels in SPIR-V, whose arithmetic can be decorated.
     pub(crate) fn takes_spirv(&self) -> bool {
         self.takes_spirv
     }

@@ -20,7 +20,7 @@ pub enum OpenError {
     Refused {
         /// Its name.
         name: String,
-        /// What it lacks, or what its driver says.
+        /// The reason: something that it lacks, or the words of its driver.
         why: String,
     },
 }
@@ -31,23 +31,23 @@ pub enum Unsuitable {
     /// Something the kernels are not written for.
     #[error("the model has {what}, which the GPU does not do")]
     Model {
-        /// What the model has.
+        /// The property that is in the way.
         what: &'static str,
     },
     /// The device is too small.
     #[error("{what} needs {needed}, the GPU has {has}")]
     TooSmall {
-        /// What needs it.
+        /// The thing that needs it.
         what: &'static str,
-        /// What is needed, in the unit of `what`.
+        /// The number needed, in the unit of `what`.
         needed: u64,
-        /// What the device has.
+        /// The number that the device has.
         has: u64,
     },
     /// The driver does not take the kernels.
     #[error("the driver refuses the kernels: {why}")]
     Refused {
-        /// What it says.
+        /// The words of the driver.
         why: String,
     },
 }

@@ -125,7 +125,7 @@ pub(crate) fn split(device: &Device, layout: &Layout) -> Result<Vec<Range<usize>
     Ok(groups)
 }
 
-/// What a group is made with.
+/// The things that a group is made with.
 pub(crate) struct Parts<'a> {
     pub(crate) device: &'a Device,
     pub(crate) programs: &'a Programs,

@@ -46,7 +46,7 @@ pub use open::adapters;
 #[cfg(feature = "gpu")]
 pub use view::View;
 
-/// Whether this build can use a GPU.
+/// Says if this build can use a GPU.
 pub const IS_BUILT: bool = cfg!(feature = "gpu");
 
 /// The result of a search.

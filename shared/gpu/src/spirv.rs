@@ -68,7 +68,7 @@ mod tests {
         let words = from_wgsl(text).unwrap();
         let marks = words
             .windows(3)
-            .filter(|it| it[0] == NO_CONTRACTION[0] && it[2] == NO_CONTRACTION[1]);
+            .filter(|words| words[0] == NO_CONTRACTION[0] && words[2] == NO_CONTRACTION[1]);
         assert_eq!(marks.count(), 3);
     }
 }

@@ -1,4 +1,4 @@
-//! What the kernels are written for: anything else is the CPU's.
+//! The models and devices that the kernels are written for: all others are the CPU's.
 
 use fmp::{Edge, Layout, Model, Spring, Springs};
 

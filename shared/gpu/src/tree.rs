@@ -34,7 +34,7 @@ pub(crate) struct Tree {
     pub(crate) weights: Vec<f32>,
     /// `[part][type of the parent][type]`.
     pub(crate) bias: Vec<f32>,
-    /// Of every plane stiffness and best offset, first vertical, then horizontal.
+    /// Stiffness and best offset of every plane, first vertical, then horizontal.
     pub(crate) springs: Vec<[f32; 4]>,
     /// `[plane][vertical, horizontal][offset + reach]`.
     pub(crate) costs: Vec<f32>,

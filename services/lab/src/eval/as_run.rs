@@ -68,6 +68,7 @@ impl AsRun<'_> {
                     filters: Box::new(self.filters(&plan)),
                     of_several: inputs::detector_of_several(
                         &deployment::network::Config::default(),
+                        deployment::Device::Cpu,
                     )?
                     .map(Box::new),
                 },

@@ -40,7 +40,7 @@ impl Eyes {
         let network = match inputs::pose_network(deployment, camera)? {
             Some(joints) => Some(Network {
                 joints,
-                detector: inputs::detector(&deployment.network)?,
+                detector: inputs::detector(deployment)?,
             }),
             None => None,
         };

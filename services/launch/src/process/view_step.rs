@@ -5,6 +5,7 @@ use std::sync::Arc;
 use failure::{ExitKind, Failure, OrFail as _};
 use pipeline::{Boxes, Eyes, NetworkSettings, NetworkStep, ViewStep};
 
+use crate::device::on_device;
 use crate::find_every::{find_every, find_every_of_several};
 use crate::keypoints;
 use crate::prepare::Prepared;
@@ -38,6 +39,7 @@ pub(crate) fn of_view(
             Arc::new(plan.layout().clone()),
             prepared.settings.view.clone(),
         );
+        let step = on_device(step, deployment.device)?;
         return Ok(pose::Step::Filters(Box::new(step)));
     }
     let config = &deployment.network;
@@ -69,11 +71,14 @@ pub(crate) fn of_view(
     let network = inputs::pose_network(deployment, view)?
         .ok_or("the camera has neither a network nor keypoints")
         .or_fail(ExitKind::Config)?;
-    let boxes = match inputs::detector(config)? {
+    let boxes = match inputs::detector(deployment)? {
         Some(detector) => Boxes::Detector(Box::new(detector)),
         None => Boxes::Filters {
-            filters: Box::new(super::boxes::filters(prepared, view)?),
-            of_several: inputs::detector_of_several(config)?.map(Box::new),
+            filters: Box::new(on_device(
+                super::boxes::filters(prepared, view)?,
+                deployment.device,
+            )?),
+            of_several: inputs::detector_of_several(config, deployment.device)?.map(Box::new),
         },
     };
     let extras = extras(resolved, network.names());
