@@ -1,5 +1,4 @@
 //! Where frames are searched: `device` of a deployment.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::{Case, PLAIN};
 

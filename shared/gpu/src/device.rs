@@ -104,6 +104,15 @@ impl Device {
         }
     }
 
+    /// The same, giving kernels to the driver as text, checked and with bounds of every access: as one that takes no SPIR-V.
+    #[must_use]
+    pub fn without_spirv(self) -> Self {
+        Self {
+            takes_spirv: false,
+            ..self
+        }
+    }
+
     /// The adapter that was opened.
     pub fn adapter(&self) -> &Adapter {
         &self.adapter

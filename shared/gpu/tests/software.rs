@@ -258,6 +258,20 @@ fn a_device_that_sees_little_at_once_finds_the_same() {
 }
 
 #[test]
+fn a_driver_that_takes_no_spirv_finds_the_same_poses() {
+    let Some(device) = opened() else { return };
+    let device = Arc::new(device.without_spirv());
+    let case = Case::new(&mut Rng::with_seed(9), [6, 3, 5]);
+    let view = case.view(&device).unwrap();
+    let mut evidence = vec![f32::NAN; case.layout.n_responses()];
+    let all = |_: &[Pose]| case.levels();
+    let found = view
+        .search(case.image(), WANTED, &all, &mut evidence)
+        .unwrap();
+    assert_eq!(found, case.solved(&evidence));
+}
+
+#[test]
 fn a_device_that_sees_too_little_is_refused() {
     let Some(small) = opened() else { return };
     let small = Arc::new(small.with_max_binding(10_000));
