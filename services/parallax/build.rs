@@ -3,7 +3,7 @@
 use std::process::Command;
 
 /// Features that a user notices.
-const FEATURES: [&str; 4] = ["hosts", "libtorch", "ort", "parquet"];
+const FEATURES: [&str; 5] = ["gpu", "hosts", "libtorch", "ort", "parquet"];
 
 fn main() {
     for file in ["HEAD", "logs/HEAD"] {

@@ -18,6 +18,7 @@
 //! Data goes to standard output and messages to standard error, both through [`terminal::output`].
 #![forbid(unsafe_code)]
 
+mod device;
 mod earlier;
 mod find_every;
 mod in_process;
@@ -47,6 +48,7 @@ pub mod process;
 pub mod recorded;
 pub mod summary;
 
+pub use device::device;
 pub use earlier::{check_name, make_way};
 pub use find_every::FOLLOWED_S;
 pub use in_process::{InProcess, SentFrame};

@@ -51,6 +51,8 @@ pub struct Report {
     processor_s: BTreeMap<String, f64>,
     /// Messages that each process refused, by cause.
     refused: Vec<(String, [u64; Refusal::N])>,
+    /// Frames that the processor computed because the GPU was lost, by process.
+    without_gpu: BTreeMap<String, u64>,
     is_lossless: bool,
     views: Vec<ViewReport>,
     budget: Option<Budget>,
@@ -107,6 +109,11 @@ impl Report {
                 .iter()
                 .filter(|it| it.counts.refused.iter().any(|n| *n > 0))
                 .map(|it| (it.name.clone(), it.counts.refused))
+                .collect(),
+            without_gpu: processes
+                .iter()
+                .filter(|process| process.counts.n_without_gpu > 0)
+                .map(|process| (process.name.clone(), process.counts.n_without_gpu))
                 .collect(),
             is_lossless: resolved.deployment.capture.mode.is_lossless(),
             views: ViewReport::all(resolved, outcome, recorded.summary()),
@@ -281,6 +288,7 @@ impl Report {
             "processor_s": self.processor_s,
             "dropped": self.n_dropped,
             "refused": self.refused.iter().map(|(name, counts)| (name.as_str(), by_cause(counts))).collect::<BTreeMap<_, _>>(),
+            "without_gpu": self.without_gpu,
             "views": self.views,
             "latency_budget": self.budget.as_ref().map(Budget::json),
             "search_size": { "by_itself": self.search_size, "outside": self.outside },
@@ -414,7 +422,7 @@ impl Report {
         Ok(())
     }
 
-    /// Writes the refused messages by process and cause; nothing if none were refused.
+    /// Writes the refused messages by process and cause, and who lost a GPU; nothing if there are none.
     fn write_refused(&self, text: &mut String) -> core::fmt::Result {
         for (process, counts) in &self.refused {
             let causes = by_cause(counts);
@@ -423,6 +431,12 @@ impl Report {
                 .map(|(cause, n)| format!("{cause} {n}"))
                 .collect();
             writeln!(text, "  refused       {process}: {}", causes.join(", "))?;
+        }
+        for (process, n) in &self.without_gpu {
+            writeln!(
+                text,
+                "  GPU           {process} lost it: the processor computed {n} frames"
+            )?;
         }
         Ok(())
     }

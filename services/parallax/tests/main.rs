@@ -15,6 +15,7 @@ mod everybody;
 mod export;
 mod faults;
 mod full;
+mod gpu;
 mod handstand;
 mod live;
 mod maps;

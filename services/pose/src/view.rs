@@ -6,7 +6,7 @@ use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use fmp::{FrameTime, Layout, Scope, Tracker};
 use kernels::Rgb8View;
 use messages::{EvidenceHeader, FrameHeader, Searched, Status, Timing, ViewPose};
-use pipeline::{ViewEstimate, ViewStep};
+use pipeline::{ComputedOn, ViewEstimate, ViewStep};
 use runtime::metrics::Passage;
 use runtime::{Loan, Sample, Service, SlicePublisher};
 use stage::{Output, StreamFrame, Turn};
@@ -136,6 +136,9 @@ impl View<'_> {
             found = self.find(step, (image, Scope::whole(layout)), responses)?;
         }
         step.update(tracker, at, &found.estimate);
+        if found.estimate.computed_on == ComputedOn::ProcessorForGpu {
+            self.service.health().without_gpu();
+        }
         found.message(layout).or_fail(ExitKind::Run)
     }
 

@@ -65,6 +65,8 @@ pub struct Counts {
     pub n_dropped: u64,
     /// Peak memory over all restarts, including shared memory, bytes.
     pub peak_memory_bytes: u64,
+    /// Frames that the processor computed because the GPU was lost.
+    pub n_without_gpu: u64,
     /// Messages that it refused, by cause ([`Refusal::ALL`]); includes heartbeats on its topic that were not
     /// its own.
     pub refused: [u64; Refusal::N],
@@ -78,6 +80,7 @@ impl Counts {
             n_sent: self.n_sent.saturating_add(health.n_sent),
             n_dropped: self.n_dropped.saturating_add(health.n_dropped),
             peak_memory_bytes: self.peak_memory_bytes.max(health.peak_memory_bytes),
+            n_without_gpu: self.n_without_gpu.saturating_add(health.n_without_gpu),
             refused: std::array::from_fn(|cause| {
                 self.refused[cause].saturating_add(health.refused[cause])
             }),

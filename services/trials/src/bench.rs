@@ -1,5 +1,6 @@
-//! Benchmarks of the transport between processes, and of whole deployments under load.
+//! Benchmarks of the transport between processes, and of whole deployments under load, and of the GPU.
 
+mod gpu;
 mod hop;
 mod load;
 mod options;
@@ -10,6 +11,7 @@ mod report;
 mod transport;
 mod workload;
 
+pub use gpu::{Gpu, gpu};
 pub use load::{Kind, load};
 pub use options::Options;
 pub use receiver::receive;

@@ -18,6 +18,7 @@ mod processes;
 
 mod clocks;
 mod complaint;
+mod device;
 mod entries;
 mod error;
 mod fields;
@@ -45,6 +46,7 @@ use serde::{Deserialize, Serialize};
 
 pub use clocks::{ClockKeys, ClocksError, with_clocks};
 pub use complaint::Complaint;
+pub use device::Device;
 pub use entries::{Entry, Origin};
 pub use error::ConfigError;
 pub use keys::keys;
@@ -78,6 +80,9 @@ pub struct Deployment {
     /// How skeletons are found: by a `network`, or by the filters and the energy of the `paper`.
     #[serde(default)]
     pub method: Method,
+    /// Where frames are searched: on the processor (`cpu`), on a graphics card (`gpu`), or on a graphics card where one can do it (`auto`).
+    #[serde(default)]
+    pub device: Device,
     /// Folder for the results.
     pub output: PathBuf,
     /// Origin of the footage, shown if a file is missing.

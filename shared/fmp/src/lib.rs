@@ -38,7 +38,7 @@ pub use pyramid::FeaturePyramid;
 pub use responses::Responses;
 pub use scope::{Region, Scope, ScopeError, Window};
 pub use search::Search;
-pub use solve::{CandidateSettings, ExtraTerms, IncrementalSolver, SolveStatistics, Solver};
+pub use solve::{CandidateSettings, ExtraTerms, IncrementalSolver, Root, SolveStatistics, Solver};
 pub use track::{FrameTime, TrackSettings, Tracker};
 
 /// Channels of the features: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4

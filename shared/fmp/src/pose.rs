@@ -65,4 +65,30 @@ impl Pose {
             })
             .unwrap_or_default()
     }
+    /// Returns whether the pose is far enough from all others.
+    ///
+    /// * `min_separation`: least mean distance between the part centres of two poses, in units of the mean side of the boxes of
+    ///   both.
+    pub fn is_apart(
+        &self,
+        others: &[Self],
+        (model, layout): (&Model, &Layout),
+        min_separation: f64,
+    ) -> bool {
+        let separation = |other: &Self| {
+            let (mut distances, mut sides) = (0.0, 0.0);
+            for part in 0..self.parts.len() {
+                let [p, q] = [other, self].map(|pose| pose.centre(model, layout, part));
+                distances += (p[0] - q[0]).hypot(p[1] - q[1]);
+                for pose in [other, self] {
+                    let [x1, y1, x2, y2] = pose.part_box(model, layout, part);
+                    sides += f64::midpoint(x2 - x1 + 1.0, y2 - y1 + 1.0);
+                }
+            }
+            distances / (sides / 2.0)
+        };
+        others
+            .iter()
+            .all(|other| separation(other) >= min_separation)
+    }
 }

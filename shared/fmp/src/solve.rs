@@ -88,12 +88,17 @@ pub struct Solver {
 
 /// A placement of the root and the score of the best tree that hangs on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Root {
-    score: f32,
-    level: u16,
-    y: usize,
-    x: usize,
-    mixture: usize,
+pub struct Root {
+    /// The score, with the root bias.
+    pub score: f32,
+    /// Level of the pyramid.
+    pub level: u16,
+    /// Row of the searched cells of the level.
+    pub y: usize,
+    /// Column of the searched cells of the level.
+    pub x: usize,
+    /// Type of the root.
+    pub mixture: usize,
 }
 
 impl Solver {

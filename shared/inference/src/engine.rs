@@ -102,6 +102,9 @@ pub enum LoadError {
     /// The library that should run it cannot be used.
     #[error("ONNX Runtime cannot be used")]
     Library(#[source] Box<dyn std::error::Error + Send + Sync>),
+    /// ONNX Runtime cannot run it on a GPU.
+    #[error("ONNX Runtime cannot use CUDA")]
+    Cuda(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
 /// The library could not run the network.

@@ -12,6 +12,7 @@ pub mod onnx;
 #[cfg(feature = "ort")]
 mod onnx_runtime;
 mod plan;
+mod provider;
 mod rest;
 mod rten_engine;
 mod session;
@@ -23,4 +24,5 @@ mod tests;
 pub use engine::{Description, Input, LoadError, Output, Port, RunError, Side, Values, written};
 #[cfg(feature = "ort")]
 pub use onnx_runtime::OnnxRuntime;
+pub use provider::Provider;
 pub use session::{RunBy, Session};

@@ -10,6 +10,7 @@ use ort::value::{TensorRef, ValueType};
 
 use crate::Values;
 use crate::engine::{Description, Engine, EngineError, Input, LoadError, Output, Port, Side};
+use crate::provider::Provider;
 
 /// The library of this process: only one can be loaded, and it stays loaded.
 static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
@@ -18,7 +19,7 @@ static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
 #[derive(Debug)]
 pub struct OnnxRuntime {
     environment: Environment,
-    on_cuda: bool,
+    provider: Provider,
 }
 
 impl OnnxRuntime {
@@ -46,27 +47,38 @@ impl OnnxRuntime {
         };
         Ok(Self {
             environment,
-            on_cuda: false,
+            provider: Provider::Processor,
         })
     }
 
-    /// Runs networks on the first GPU of NVIDIA's, which the library must have been built for: else no network can be
-    /// loaded.
+    /// Runs networks elsewhere than on the processor.
     #[must_use]
-    pub fn on_cuda(self) -> Self {
-        Self {
-            on_cuda: true,
-            ..self
-        }
+    pub fn on(self, provider: Provider) -> Self {
+        Self { provider, ..self }
     }
 
-    pub(crate) fn load_network(&self, file: &[u8]) -> Result<(Loaded, Description), LoadError> {
-        let session = self.session(file).map_err(LoadError::File)?;
+    /// Loads a network; says also where it runs.
+    pub(crate) fn load_network(
+        &self,
+        file: &[u8],
+    ) -> Result<(Loaded, Description, String), LoadError> {
+        let on_processor = || self.session(file, false).map_err(LoadError::File);
+        let (session, place) = match (self.provider, self.provider.is_cuda()) {
+            (_, false) => (on_processor()?, "the processor".to_owned()),
+            (provider, true) => match self.session(file, true) {
+                Ok(session) => (session, "CUDA".to_owned()),
+                Err(error) if provider == Provider::Cuda => return Err(LoadError::Cuda(error)),
+                Err(error) => (
+                    on_processor()?,
+                    format!("the processor, since CUDA cannot start: {error}"),
+                ),
+            },
+        };
         let description = described(&session).map_err(LoadError::File)?;
-        Ok((Loaded(Mutex::new(session)), description))
+        Ok((Loaded(Mutex::new(session)), description, place))
     }
 
-    fn session(&self, file: &[u8]) -> Result<Session, EngineError> {
+    fn session(&self, file: &[u8], on_cuda: bool) -> Result<Session, EngineError> {
         let builder = Session::builder(&self.environment)?;
         let builder = builder
             .with_intra_threads(1)
@@ -74,7 +86,7 @@ impl OnnxRuntime {
         let builder = builder
             .with_inter_threads(1)
             .map_err(|error| plain(&error))?;
-        let mut builder = if self.on_cuda {
+        let mut builder = if on_cuda {
             let cuda = ort::ep::CUDA::default().build().error_on_failure();
             builder
                 .with_execution_providers([cuda])

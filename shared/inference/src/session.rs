@@ -25,8 +25,8 @@ pub enum RunBy {
     Parallax,
     /// All of it by `rten`; why Parallax itself does not.
     Rten(String),
-    /// ONNX Runtime.
-    OnnxRuntime,
+    /// ONNX Runtime, and where that runs it.
+    OnnxRuntime(String),
 }
 
 impl fmt::Display for RunBy {
@@ -34,7 +34,7 @@ impl fmt::Display for RunBy {
         match self {
             Self::Parallax => to.write_str("Parallax"),
             Self::Rten(why) => write!(to, "rten, since {why}"),
-            Self::OnnxRuntime => to.write_str("ONNX Runtime"),
+            Self::OnnxRuntime(place) => write!(to, "ONNX Runtime on {place}"),
         }
     }
 }
@@ -89,12 +89,12 @@ impl Session {
     #[cfg(feature = "ort")]
     pub fn parse_with(runtime: &OnnxRuntime, file: &[u8]) -> Result<Self, LoadError> {
         let fingerprint = check(file)?;
-        let (engine, description) = runtime.load_network(file)?;
+        let (engine, description, place) = runtime.load_network(file)?;
         Ok(Self {
             engine: Box::new(engine),
             description,
             fingerprint,
-            by: RunBy::OnnxRuntime,
+            by: RunBy::OnnxRuntime(place),
         })
     }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use failure::Failure;
-use inference::Session;
+use inference::{Provider, Session};
 
 use crate::refused::refused;
 
@@ -22,15 +22,16 @@ impl Library {
     /// Loads ONNX Runtime.
     ///
     /// * `file`: the library, for example `/usr/lib/libonnxruntime.so`.
+    /// * `provider`: where it runs networks.
     ///
     /// # Errors
     ///
     /// It cannot be loaded.
     #[cfg(feature = "ort")]
-    pub fn load(file: &Path) -> Result<Self, Failure> {
+    pub fn load(file: &Path, provider: Provider) -> Result<Self, Failure> {
         let loaded = inference::OnnxRuntime::load(file);
         loaded
-            .map(Self::OnnxRuntime)
+            .map(|runtime| Self::OnnxRuntime(runtime.on(provider)))
             .map_err(|error| refused(file, &error))
     }
 
@@ -42,7 +43,7 @@ impl Library {
     ///
     /// Always: this Parallax was built without it.
     #[cfg(not(feature = "ort"))]
-    pub fn load(file: &Path) -> Result<Self, Failure> {
+    pub fn load(file: &Path, _provider: Provider) -> Result<Self, Failure> {
         let message = format!(
             "{}: ONNX Runtime, but this Parallax was built without it: build it with --features ort",
             file.display()

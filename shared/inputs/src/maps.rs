@@ -5,8 +5,9 @@ use std::path::Path;
 use crate::library::Library;
 use crate::network::NetworkFile;
 use deployment::network::Config;
-use deployment::{Deployment, is_shipped};
+use deployment::{Deployment, Device, is_shipped};
 use failure::{ExitKind, Failure};
+use inference::{Provider, RunBy};
 use keypoints::Card;
 use posenetwork::{Detector, PoseNetwork};
 
@@ -24,8 +25,12 @@ pub fn pose_network(
     let Some(file) = deployment.pose_network(camera) else {
         return Ok(None);
     };
-    let library = library(&deployment.network)?;
-    let network = open_network((file, None), &library)?.fitted()?;
+    let library = library(&deployment.network, deployment.device)?;
+    let network = open_network((file, None), &library)?;
+    if let RunBy::OnnxRuntime(place) = network.run_by() {
+        tracing::info!(network = %file.display(), "ONNX Runtime runs it on {place}");
+    }
+    let network = network.fitted()?;
     if deployment.network.mirror {
         return mirrored(network, "network.mirror").map(Some);
     }
@@ -74,7 +79,10 @@ pub fn network_card(deployment: &Deployment, camera: usize) -> Result<Option<Car
     let Some(file) = deployment.pose_network(camera) else {
         return Ok(None);
     };
-    let network = open_network((file, None), &library(&deployment.network)?)?;
+    let network = open_network(
+        (file, None),
+        &library(&deployment.network, deployment.device)?,
+    )?;
     Ok(network.card().map(|it| it.0.clone()))
 }
 
@@ -83,8 +91,9 @@ pub fn network_card(deployment: &Deployment, camera: usize) -> Result<Option<Car
 /// # Errors
 ///
 /// As for [`pose_network`].
-pub fn detector(config: &Config) -> Result<Detector, Failure> {
-    let library = library(config)?;
+pub fn detector(deployment: &Deployment) -> Result<Detector, Failure> {
+    let config = &deployment.network;
+    let library = library(config, deployment.device)?;
     crate::detector::open_with(&config.detector, None, &library)
 }
 
@@ -103,12 +112,17 @@ pub fn check_maps(deployment: &Deployment) -> Result<(), Failure> {
         }
     }
     if !known.is_empty() {
-        detector(&deployment.network)?;
+        detector(deployment)?;
     }
     Ok(())
 }
 
-fn library(config: &Config) -> Result<Library, Failure> {
+fn library(config: &Config, device: Device) -> Result<Library, Failure> {
+    let provider = match device {
+        Device::Auto => Provider::CudaIfItStarts,
+        Device::Gpu => Provider::Cuda,
+        Device::Cpu | Device::Software => Provider::Processor,
+    };
     let file = config.onnx_runtime.as_deref();
-    file.map_or(Ok(Library::BuiltIn), Library::load)
+    file.map_or(Ok(Library::BuiltIn), |file| Library::load(file, provider))
 }

@@ -53,5 +53,5 @@ pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
 pub use space_settings::SpaceStepSettings;
 pub use space_step::{PersonSkeleton, SpaceStep};
 pub use view_result::{ExtraKeypoint, ViewResult};
-pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};
+pub use view_step::{ComputedOn, EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};
 pub use who::{FramePeople, KnownPerson, WhoSettings, WhoStep};

@@ -80,6 +80,20 @@ pub struct ViewEstimate {
     pub bounds: Bounds,
     /// The part of the image that was searched and that the responses cover.
     pub scope: Scope,
+    /// Says where it was computed.
+    pub computed_on: ComputedOn,
+}
+
+/// Where a frame was computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ComputedOn {
+    /// On the processor, as it was meant to be.
+    #[default]
+    Processor,
+    /// On the GPU.
+    Gpu,
+    /// On the processor, because the GPU was lost.
+    ProcessorForGpu,
 }
 
 impl ViewEstimate {
@@ -103,7 +117,12 @@ pub struct ViewStep {
     layout: Arc<Layout>,
     settings: ViewSettings,
     looking: Mutex<viewquality::orientation::Workspace>,
+    /// Searches whole frames, while it can.
+    gpu: Option<gpu::View>,
 }
+
+/// The candidates of a frame, and what its evidence is.
+type Searched = (gpu::Found, Vec<u16>);
 
 impl ViewStep {
     /// Prepares the step.
@@ -114,6 +133,23 @@ impl ViewStep {
             layout,
             settings,
             looking: Mutex::default(),
+            gpu: None,
+        }
+    }
+
+    /// Searches whole frames on a GPU; parts of frames, and all frames once it is lost, on the processor.
+    ///
+    /// # Errors
+    ///
+    /// [`gpu::Unsuitable`], with the step as it was: the GPU cannot do it.
+    pub fn on_gpu(self, device: &Arc<gpu::Device>) -> Result<Self, (Box<Self>, gpu::Unsuitable)> {
+        let model = Arc::clone(self.solver.model());
+        match gpu::View::new(device, model, Arc::clone(&self.layout)) {
+            Ok(gpu) => Ok(Self {
+                gpu: Some(gpu),
+                ..self
+            }),
+            Err(error) => Err((Box::new(self), error)),
         }
     }
 
@@ -135,13 +171,41 @@ impl ViewStep {
     /// Solves one frame within a scope.
     ///
     /// * `scope`: from [`Tracker::scope`], or [`Scope::whole`].
-    /// * `responses`: at least [`Layout::n_values`] values of the scope, overwritten; may lie in
-    ///   shared memory.
+    /// * `responses`: at least [`Layout::n_values`] values of the scope; those of the levels that the estimate offers are
+    ///   overwritten; may lie in shared memory.
     ///
     /// # Panics
     ///
     /// If the image, the scope or `responses` has another size than the layout.
     pub fn run(&self, image: Rgb8View<'_>, scope: Scope, responses: &mut [f32]) -> ViewEstimate {
+        let whole = scope == Scope::whole(&self.layout);
+        let gpu = self.gpu.as_ref().filter(|_| whole);
+        let by_gpu = gpu.map(|gpu| self.search_on_gpu(gpu, image, responses));
+        let ((found, levels), computed_on) = match by_gpu {
+            Some(Ok(searched)) => (searched, ComputedOn::Gpu),
+            Some(Err(gpu::DeviceLost)) => (
+                self.search(image, scope, responses),
+                ComputedOn::ProcessorForGpu,
+            ),
+            None => (self.search(image, scope, responses), ComputedOn::Processor),
+        };
+        let gpu::Found { candidates, bounds } = found;
+        let evidence = Responses::within(&self.layout, responses, &levels, scope);
+        let best = candidates.first();
+        let local = best.map(|pose| local_scores(self.solver.model(), &evidence, pose));
+        ViewEstimate {
+            front: self.front(image, &candidates),
+            candidates,
+            local: local.unwrap_or_default(),
+            levels,
+            bounds,
+            scope,
+            computed_on,
+        }
+    }
+
+    /// Searches a scope on the processor.
+    fn search(&self, image: Rgb8View<'_>, scope: Scope, responses: &mut [f32]) -> Searched {
         let layout = &self.layout;
         self.extractor
             .responses_in(image, layout, &scope, responses);
@@ -152,17 +216,26 @@ impl ViewStep {
             self.settings.n_candidates,
             self.settings.min_separation,
         );
-        let best = candidates.first();
-        let local = best.map(|pose| local_scores(self.solver.model(), &evidence, pose));
         let levels = self.settings.window.levels(scope.levels(), &candidates);
-        ViewEstimate {
-            front: self.front(image, &candidates),
-            candidates,
-            local: local.unwrap_or_default(),
-            levels,
-            bounds,
-            scope,
-        }
+        (gpu::Found { candidates, bounds }, levels)
+    }
+
+    /// Searches a whole frame on the GPU.
+    fn search_on_gpu(
+        &self,
+        gpu: &gpu::View,
+        image: Rgb8View<'_>,
+        responses: &mut [f32],
+    ) -> Result<Searched, gpu::DeviceLost> {
+        let wanted = gpu::Wanted {
+            n: self.settings.n_candidates,
+            min_separation: self.settings.min_separation,
+        };
+        let all = 0..self.layout.levels.len() as u16;
+        let offered = |candidates: &[Pose]| self.settings.window.levels(all.clone(), candidates);
+        let found = gpu.search(image, wanted, &offered, responses)?;
+        let levels = offered(&found.candidates);
+        Ok((found, levels))
     }
 
     /// In which direction the person of every candidate faces; nothing without a detector.

@@ -48,6 +48,7 @@ struct Counts {
     n_received: AtomicU64,
     n_sent: AtomicU64,
     n_total: AtomicU64,
+    n_without_gpu: AtomicU64,
     last_frame: AtomicU64,
     finished: AtomicU32,
     refused: [AtomicU64; Refusal::N],
@@ -72,6 +73,7 @@ impl Health {
             n_received: AtomicU64::new(0),
             n_sent: AtomicU64::new(0),
             n_total: AtomicU64::new(0),
+            n_without_gpu: AtomicU64::new(0),
             last_frame: AtomicU64::new(0),
             finished: AtomicU32::new(0),
             refused: [const { AtomicU64::new(0) }; Refusal::N],
@@ -184,6 +186,13 @@ impl Health {
         self.counts.meter(|meter| meter.camera(counts));
     }
 
+    /// Counts a frame that the processor computed because the GPU was lost; logs the first one.
+    pub fn without_gpu(&self) {
+        if self.counts.n_without_gpu.fetch_add(1, Ordering::Relaxed) == 0 {
+            tracing::warn!("the GPU was lost: the processor computes from here on");
+        }
+    }
+
     /// Counts evidence that was sent.
     pub fn sent_evidence(&self, bytes: u64) {
         self.counts.meter(|meter| meter.sent_evidence(bytes));
@@ -286,6 +295,7 @@ impl Counts {
             finished: self.finished.load(Ordering::Relaxed),
             cpu_millis: cpu_millis(),
             n_total: self.n_total.load(Ordering::Relaxed),
+            n_without_gpu: self.n_without_gpu.load(Ordering::Relaxed),
             refused: self
                 .refused
                 .each_ref()

@@ -34,7 +34,7 @@ impl Eyes {
         };
         Ok(Self {
             joints,
-            detector: inputs::detector(&deployment.network)?,
+            detector: inputs::detector(deployment)?,
             n_people: deployment.network.people.max(4),
         })
     }

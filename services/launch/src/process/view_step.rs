@@ -5,6 +5,7 @@ use std::sync::Arc;
 use failure::{ExitKind, Failure, OrFail as _};
 use pipeline::{Eyes, NetworkSettings, NetworkStep, ViewStep};
 
+use crate::device::on_device;
 use crate::find_every::FindEvery;
 use crate::keypoints;
 use crate::prepare::Prepared;
@@ -38,6 +39,7 @@ pub(crate) fn of_view(
             Arc::new(plan.layout().clone()),
             prepared.settings.view.clone(),
         );
+        let step = on_device(step, deployment.device)?;
         return Ok(pose::Step::Filters(Box::new(step)));
     }
     let config = &deployment.network;
@@ -70,7 +72,7 @@ pub(crate) fn of_view(
         .ok_or("the camera has neither a network nor keypoints")
         .or_fail(ExitKind::Config)?;
     let extras = extras(resolved, network.names());
-    let eyes = Eyes::Network(Box::new(network), Box::new(inputs::detector(config)?));
+    let eyes = Eyes::Network(Box::new(network), Box::new(inputs::detector(deployment)?));
     let step = NetworkStep::new(eyes, size, settings).with_extras(extras);
     Ok(pose::Step::Network(Box::new(step)))
 }

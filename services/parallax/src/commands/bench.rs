@@ -1,5 +1,6 @@
-//! `parallax bench`: benchmarks of the transport between processes, and of whole deployments.
+//! `parallax bench`: benchmarks of the transport between processes, of whole deployments, and of the GPU.
 
+mod gpu;
 mod load;
 mod transport;
 
@@ -23,6 +24,8 @@ pub(crate) enum Command {
     Throughput(load::Arguments),
     /// Measure the latency with one camera, with two, and so on.
     Scale(load::Arguments),
+    /// Measure the search of frames by the filters, on the GPU and on the processor.
+    Gpu(gpu::Arguments),
     /// Run the receiving process of `transport`.
     #[command(hide = true)]
     Receive(Receiver),
@@ -64,6 +67,10 @@ pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failu
         Command::Transport(it) => {
             let report = bench::transport(&it.options(), verbosity)?;
             publish(report, &it.output, globals)
+        }
+        Command::Gpu(it) => {
+            let report = bench::gpu(&it.options(), verbosity)?;
+            publish(Some(report), &it.output, globals)
         }
         Command::Latency(it) => load(Kind::Latency, it),
         Command::Throughput(it) => load(Kind::Throughput, it),

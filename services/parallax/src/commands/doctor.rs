@@ -91,6 +91,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         limit("stack", Resource::Stack, STACK, "ulimit -s 8192"),
     ];
     findings.extend(cameras());
+    findings.extend(adapters());
     findings.push(remains());
     if arguments.json {
         let all = findings.iter().map(|it| {
@@ -195,6 +196,30 @@ fn cameras() -> Vec<Finding> {
         ),
     });
     looked.collect()
+}
+
+/// Graphics cards, best first.
+fn adapters() -> Vec<Finding> {
+    let what = "GPU";
+    if !gpu::IS_BUILT {
+        return vec![Finding::good(
+            what,
+            "none is used: this build has no GPU support",
+        )];
+    }
+    let all = gpu::adapters();
+    if all.is_empty() {
+        let advice = "for a card install its driver and Vulkan: Debian's package is `libvulkan1`";
+        return vec![Finding::good(what, "no Vulkan adapter").but(State::Note, advice)];
+    }
+    let found = |adapter: &gpu::Adapter| {
+        let found = Finding::good(what, adapter.to_string());
+        if adapter.kind == gpu::Kind::Software {
+            return found.but(State::Note, "computes on the processor: for tests only");
+        }
+        found
+    };
+    all.iter().map(found).collect()
 }
 
 fn remains() -> Finding {

@@ -97,6 +97,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         let message = "--view and --publish are for the host that fuses: this one has no skeletons";
         return Err(Failure::new(ExitKind::Usage, message));
     }
+    let device = launch::device(&loaded.deployment)?;
+    if let Some(device) = device.filter(|_| !globals.quiet) {
+        output::message(device);
+    }
     let planned = Planned::of(resolved, globals.level())?.begun(session);
     if arguments.dry_run {
         if let Some(size) = &planned.resolved().search_size {

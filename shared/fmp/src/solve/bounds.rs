@@ -9,9 +9,14 @@ impl Bound {
     ///
     /// * `edges`: see [`Solver::most_of_edges`].
     pub(super) fn of(sweep: &Sweep<'_>, edges: f64) -> Self {
+        Self::of_own(sweep.highest(), sweep.own() + edges)
+    }
+
+    /// For a level of which the sum of the largest own scores and of the edges is known.
+    fn of_own(best: f32, size: f64) -> Self {
         Self {
-            best: sweep.highest(),
-            size: ((sweep.own() + edges) as f32).next_up(),
+            best,
+            size: (size as f32).next_up(),
         }
     }
 }
@@ -28,6 +33,28 @@ impl Solver {
             (sweep.level(), Bound::of(sweep, edges))
         });
         Bounds::of_some(evidence.layout().levels.len(), found)
+    }
+
+    /// The bound of a level whose messages were computed elsewhere, without terms; the bits of [`Self::bounds`].
+    ///
+    /// * `best`: score of the best root, with the root bias.
+    /// * `largest`: largest own score of every part.
+    pub fn bound_of(&self, best: f32, largest: &[f32]) -> Bound {
+        let mut begun = vec![false; largest.len()];
+        let mut own = 0.0;
+        // In the order in which a sweep meets the parts.
+        for part in (0..largest.len()).rev() {
+            let edge = self.model.spec().parts[part].edge.as_ref();
+            for part in [Some(part), edge.map(|edge| edge.parent)]
+                .into_iter()
+                .flatten()
+            {
+                if !std::mem::replace(&mut begun[part], true) {
+                    own += f64::from(largest[part].max(0.0));
+                }
+            }
+        }
+        Bound::of_own(best, own + self.most_of_edges())
     }
 
     /// The maximum that springs and biases can add to a score.

@@ -82,29 +82,12 @@ impl Solver {
             let Some(pose) = poses[at].take() else {
                 continue;
             };
-            if kept
-                .iter()
-                .all(|it| self.separation(evidence, it, &pose) >= min_separation)
-            {
+            let (model, layout) = (&*self.model, evidence.layout());
+            if pose.is_apart(&kept, (model, layout), min_separation) {
                 kept.push(pose);
             }
         }
         kept
-    }
-
-    /// Mean distance between the part centres of two poses, in units of the mean side of their boxes.
-    fn separation(&self, evidence: &Responses<'_>, a: &Pose, b: &Pose) -> f64 {
-        let (model, layout) = (&*self.model, evidence.layout());
-        let (mut distances, mut sides) = (0.0, 0.0);
-        for part in 0..model.n_parts() {
-            let [p, q] = [a, b].map(|it| it.centre(model, layout, part));
-            distances += (p[0] - q[0]).hypot(p[1] - q[1]);
-            for pose in [a, b] {
-                let [x1, y1, x2, y2] = pose.part_box(model, layout, part);
-                sides += f64::midpoint(x2 - x1 + 1.0, y2 - y1 + 1.0);
-            }
-        }
-        distances / (sides / 2.0)
     }
 }
 

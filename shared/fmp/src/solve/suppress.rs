@@ -56,7 +56,7 @@ impl Solver {
 
 impl Root {
     /// Highest score first, then lowest level, then row-major order.
-    pub(super) fn best_first(&self, other: &Self) -> std::cmp::Ordering {
+    pub fn best_first(&self, other: &Self) -> std::cmp::Ordering {
         let place = |it: &Self| (it.level, it.y, it.x);
         other
             .score

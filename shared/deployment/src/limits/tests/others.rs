@@ -7,6 +7,7 @@ pub(super) const OTHERS: &[&str] = &[
     "rig",
     "unit",
     "method",
+    "device",
     "output",
     "camera",
     "capture.mode",

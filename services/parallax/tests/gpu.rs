@@ -1,0 +1,49 @@
+//! Where frames are searched: `device` of a deployment.
+
+use crate::common::{Case, PLAIN};
+
+fn case(name: &str, device: &str) -> Case {
+    let case = Case::new(name, &[2; 2], PLAIN);
+    let both = format!("method = \"paper\"\ndevice = \"{device}\"");
+    case.edit("deployment.toml", "method = \"paper\"", &both);
+    // The planted model shares filters between parts, which the GPU leaves to the processor.
+    case.edit("deployment.toml", "model = \"model.plx\"\n", "");
+    case
+}
+
+#[test]
+fn a_gpu_that_this_build_cannot_use_is_refused_before_anything_starts() {
+    if gpu::IS_BUILT {
+        return;
+    }
+    let ended = case("no-gpu", "gpu").run();
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    let advice = "build it with --features gpu";
+    assert!(ended.stderr.contains(advice), "{}", ended.stderr);
+}
+
+#[cfg(feature = "gpu")]
+#[test]
+fn a_run_on_software_vulkan_finds_the_poses_of_a_run_on_the_processor() {
+    if gpu::adapters().is_empty() {
+        return;
+    }
+    let runs = ["software", "cpu"].map(|device| {
+        let case = case(device, device);
+        let ended = case.run();
+        assert!(ended.stderr.contains("device: "), "{}", ended.stderr);
+        let summary: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
+        assert_eq!(
+            summary["without_gpu"],
+            serde_json::json!({}),
+            "{}",
+            ended.stderr
+        );
+        let lines = case.lines("pose2d.jsonl");
+        assert_eq!(lines.len(), 4, "{}", ended.stderr);
+        let single = |line: &serde_json::Value| line["single"]["parts"].clone();
+        lines.iter().map(single).collect::<Vec<_>>()
+    });
+    assert!(runs[0].iter().all(serde_json::Value::is_array), "{runs:?}");
+    assert_eq!(runs[0], runs[1]);
+}

@@ -1,0 +1,59 @@
+//! A kernel with its buffers.
+
+use wgpu::{BindGroup, Buffer, ComputePass, ComputePipeline};
+
+use crate::device::Device;
+
+/// Workgroups along the first dimension, where there are more than a dimension takes; the kernels know the number.
+pub(crate) const ROW: u32 = 32768;
+
+/// A kernel, its buffers, and how often it runs.
+#[derive(Debug)]
+pub(crate) struct Dispatch {
+    pipeline: ComputePipeline,
+    buffers: BindGroup,
+    groups: [u32; 2],
+}
+
+impl Dispatch {
+    /// Binds buffers to a kernel, in the order of its bindings.
+    ///
+    /// * `groups`: number of workgroups; more in the first dimension than it takes lie in two, if the second one is 1.
+    pub(crate) fn new(
+        device: &Device,
+        pipeline: &ComputePipeline,
+        buffers: &[&Buffer],
+        groups: [usize; 2],
+    ) -> Self {
+        let resources = buffers.iter().map(|buffer| buffer.as_entire_binding());
+        let entry = |(binding, resource)| wgpu::BindGroupEntry { binding, resource };
+        let entries: Vec<_> = (0..).zip(resources).map(entry).collect();
+        let bound = device.raw().create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        let groups = groups.map(|n| n as u32);
+        Self {
+            pipeline: pipeline.clone(),
+            buffers: bound,
+            groups: if groups[0] > ROW {
+                [ROW, groups[0].div_ceil(ROW)]
+            } else {
+                groups
+            },
+        }
+    }
+
+    /// Records it.
+    pub(crate) fn record(&self, pass: &mut ComputePass<'_>) {
+        self.record_some(pass, self.groups[0]);
+    }
+
+    /// Records its first `n` workgroups.
+    pub(crate) fn record_some(&self, pass: &mut ComputePass<'_>, n: u32) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.buffers, &[]);
+        pass.dispatch_workgroups(n, self.groups[1], 1);
+    }
+}
