@@ -20,7 +20,7 @@ pub enum KeyError {
     #[error("there is no {0}")]
     Missing(PathBuf),
     /// There are keys already.
-    #[error("{0} is there already, and is not replaced: hosts that have it would be refused")]
+    #[error("{0} exists and is not replaced, because hosts that have it would be refused")]
     Exists(PathBuf),
     /// A file cannot be written.
     #[error("cannot write {file}")]

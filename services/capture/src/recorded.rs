@@ -40,7 +40,7 @@ pub enum RecordedError {
     #[error("cannot read the recording")]
     Read(#[from] ReadError),
     /// It has no pictures of this camera.
-    #[error("it holds no pictures of {camera:?} as they came; {}", others(.known))]
+    #[error("it holds no original pictures of camera {camera:?}; {}", others(.known))]
     NoCamera {
         /// As asked for.
         camera: String,

@@ -73,7 +73,9 @@ pub fn make_way(folder: &Path, force: bool) -> Result<(), Failure> {
             folder.display()
         );
         let failure = Failure::new(ExitKind::Config, message);
-        return Err(failure.with_hint("--force replaces them, --out names another folder"));
+        return Err(
+            failure.with_hint("replace them with --force, or choose another folder with --out")
+        );
     }
     remove_exports(&folder.join(EXPORT)).map_err(|error| in_file(&folder.join(EXPORT), &error))
 }

@@ -254,7 +254,9 @@ fn refuse_existing(format: Format, path: &Path, force: bool) -> Result<(), Failu
     let name = path.display();
     if !force {
         let failure = Failure::new(ExitKind::Usage, format!("{name} exists"));
-        return Err(failure.with_hint("another folder with --out, or --force to replace it"));
+        return Err(
+            failure.with_hint("choose another folder with --out, or replace it with --force")
+        );
     }
     let is_folder = matches!(format, Format::OpenPose);
     if found.is_dir() != is_folder {

@@ -198,8 +198,8 @@ pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Fr
         let [width, height] = camera.intrinsics.size;
         if size == [height, width] {
             return failure.with_hint(
-                "the size agrees once the pictures are turned: `rotate = 90` or `rotate = 270` (degrees to the right) in its [[camera]], \
-                 `rotate = \"tag\"` as the file asks",
+                "the size agrees once the pictures are turned: set `rotate = 90` or `rotate = 270` (degrees to the right) in its [[camera]], or \
+                 `rotate = \"tag\"` to turn them as the file asks",
             );
         }
         failure.with_hint(

@@ -209,8 +209,7 @@ fn of_live_rates(resolved: &Resolved, rates: &str, ratio: f64) -> Result<Option<
     }
     let failure = Failure::new(ExitKind::Config, rates.to_owned());
     Err(failure.with_hint(
-        "set one rate, `frame_rate_hz` of each [[camera]]; or say how often they are brought together, as \
-         `capture.frame_rate_hz`: a slower camera then has no picture at some of these instants",
+        "set the same `frame_rate_hz` in each [[camera]], or the rate of the common instants as `capture.frame_rate_hz`: a slower camera then has no picture at some of them",
     ))
 }
 

@@ -29,7 +29,7 @@ pub enum ClocksError {
         name: String,
     },
     /// The text is written in a way that is not understood; nothing is lost, for the file was not touched.
-    #[error("the [[camera]] entries are written in a way that cannot be changed without harm")]
+    #[error("the [[camera]] entries are written in a form that cannot be edited safely")]
     Form,
 }
 

@@ -42,7 +42,9 @@ pub struct Window {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ScopeError {
     /// The levels are not there.
-    #[error("levels {first} to {end} are none or beyond the {n_levels} of the layout")]
+    #[error(
+        "the range of levels {first} to {end} is empty, or beyond the {n_levels} levels of the layout"
+    )]
     Levels {
         /// First level asked for.
         first: u16,
@@ -52,7 +54,7 @@ pub enum ScopeError {
         n_levels: usize,
     },
     /// The region is empty or not inside the image.
-    #[error("from {begin} to {end} is nothing or beyond the {side} pixels of the image")]
+    #[error("the range {begin} to {end} is empty, or beyond the {side} pixels of the image")]
     Region {
         /// First pixel.
         begin: u32,

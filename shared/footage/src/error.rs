@@ -15,7 +15,7 @@ pub enum FootageError {
         path: String,
     },
     /// A camera, a stream or a device.
-    #[error("{path} is {what}, no footage: {instead}")]
+    #[error("{path} is {what}, not footage: {instead}")]
     Live {
         /// As the user wrote it.
         path: String,

@@ -29,7 +29,7 @@ pub enum OpenError {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Unsuitable {
     /// Something the kernels are not written for.
-    #[error("the model has {what}, which the GPU does not do")]
+    #[error("the model has {what}, which the GPU does not support")]
     Model {
         /// The property that is in the way.
         what: &'static str,

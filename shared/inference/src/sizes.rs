@@ -39,7 +39,7 @@ const INPUTS: [(&str, &[usize]); 9] = [
 
 /// A size that no network needs.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("node {node:?} ({op}): {what} {value} is larger than any that is run ({most})")]
+#[error("node {node:?} ({op}): {what} {value} exceeds the limit ({most})")]
 pub(crate) struct TooLarge {
     node: String,
     op: String,
@@ -190,7 +190,7 @@ mod tests {
         let error = check(&net.file()).unwrap_err().to_string();
         assert_eq!(
             error,
-            "node \"y\" (Conv): attribute \"pads\" 1000000000 is larger than any that is run (65536)"
+            "node \"y\" (Conv): attribute \"pads\" 1000000000 exceeds the limit (65536)"
         );
     }
 

@@ -1,4 +1,4 @@
-//! Networks that find keypoints as the evidence of a view, in place of the filters.
+//! Networks that find people in pictures, and their keypoints as the evidence of a view.
 //!
 //! [`PoseNetwork`] is a network with its card: a picture and a box around a person in, a [`Sight`] out. [`JointMaps`] are the
 //! logarithms of its maps for the 14 joints of the skeleton, [`PersonMaps`] the same where they lie in the picture.

@@ -17,7 +17,7 @@ const _: () = assert!(
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Malformed {
     /// Its length does not match its type and its count.
-    #[error("a message of {len} bytes, where {expected} are due")]
+    #[error("the message has {len} bytes, expected {expected}")]
     Length {
         /// Its length, bytes.
         len: u64,
@@ -25,7 +25,7 @@ pub enum Malformed {
         expected: u64,
     },
     /// It is not little-endian CDR.
-    #[error("a message that begins with {0:02x?}, which is not little-endian CDR")]
+    #[error("the message begins with {0:02x?}, which is not little-endian CDR")]
     Encoding([u8; 4]),
 }
 

@@ -19,7 +19,7 @@ pub enum ReadError {
     #[error("cannot read the recording")]
     Read(#[from] io::Error),
     /// A chunk does not match its checksum, and with it all its messages.
-    #[error("the chunk at byte {offset} is not what its checksum says")]
+    #[error("the chunk at byte {offset} does not match its checksum")]
     Checksum {
         /// Its offset in the file, bytes.
         offset: u64,

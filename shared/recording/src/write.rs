@@ -28,7 +28,7 @@ pub enum WriteError {
         source: io::Error,
     },
     /// The topic is not one of this program's.
-    #[error("nothing is known of topic {0:?}")]
+    #[error("topic {0:?} is unknown")]
     Topic(String),
 }
 

@@ -44,7 +44,7 @@ pub enum PreflightError {
         limit: u64,
     },
     /// The stack of a process is too small.
-    #[error("a process may have a stack of {} KB, and needs {} KB", .limit / 1024, STACK / 1024)]
+    #[error("the limit for the stack of a process is {} KB, but it needs {} KB", .limit / 1024, STACK / 1024)]
     Stack {
         /// The limit, bytes.
         limit: u64,

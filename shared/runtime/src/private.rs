@@ -80,7 +80,7 @@ pub enum PrivacyError {
         n_files: usize,
     },
     /// It cannot be read, created, or closed to others.
-    #[error("cannot make {path:?} one's own")]
+    #[error("cannot reserve {path:?} for this user alone")]
     File {
         /// The file or directory.
         path: PathBuf,

@@ -32,7 +32,9 @@ pub enum RigChoice {
 #[derive(Debug, thiserror::Error)]
 pub enum RigChoiceError {
     /// The text has none of the known forms.
-    #[error("{text:?} is no rig: expected humaneva, umpm, ring:N[:RADIUS[:HEIGHT]] or a rig file")]
+    #[error(
+        "{text:?} is not a rig: expected humaneva, umpm, ring:N[:RADIUS[:HEIGHT]] or a rig file"
+    )]
     Form {
         /// The text.
         text: String,

@@ -82,7 +82,7 @@ pub enum AddressError {
         key: String,
     },
     /// A key without `=`, or twice.
-    #[error("{text:?} is not one key=value, each key once")]
+    #[error("{text:?} is not key=value, or repeats a key")]
     Pair {
         /// The text.
         text: String,
@@ -311,7 +311,7 @@ mod tests {
             ("http://x", "begins with synth://"),
             ("synth://nowhere?camera=0", "rig of the address"),
             ("synth://umpm", "names no camera"),
-            ("synth://umpm?camera=l&camera=r", "each key once"),
+            ("synth://umpm?camera=l&camera=r", "repeats a key"),
             ("synth://umpm?camera=l&colour", "key=value"),
             ("synth://umpm?camera=l&actoin=walking", "unknown key"),
             ("synth://umpm?camera=l&others=5", "0 to 4"),

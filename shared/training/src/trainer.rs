@@ -61,7 +61,7 @@ pub enum TrainError {
     #[error("a pose does not lie on its image: an image has changed since the training began")]
     Moved,
     /// The trained parameters are not a valid model.
-    #[error("what was trained is no model")]
+    #[error("the result of the training is not a valid model")]
     Model(#[from] ModelError),
 }
 

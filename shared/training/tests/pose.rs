@@ -317,7 +317,7 @@ fn a_file_that_is_not_such_a_network_is_refused_with_what_it_lacks() {
     let middle = broken.len() / 2;
     broken[middle..middle + 64].fill(0xff);
     let said = refused(&settings.shape, &broken);
-    assert!(said.contains("finite ones of half"), "{said}");
+    assert!(said.contains("finite numbers of half"), "{said}");
 }
 
 #[test]

@@ -226,7 +226,7 @@ fn every_fault_is_reported_with_file_and_row_and_counted() {
         "1.5 px outside is accepted by default"
     );
     let expected = [
-        "people.jsonl, line 3: the name \"ann\" is that of line 1",
+        "people.jsonl, line 3: the name \"ann\" is already that of line 1",
         "people.jsonl, line 4: the same image and joints as line 1",
         "people.jsonl, line 5: 3 joints, expected 2",
         "people.jsonl, line 6: joint 2 is not known",

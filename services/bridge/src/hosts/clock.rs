@@ -36,10 +36,10 @@ pub struct Exchange {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ExchangeError {
     /// One of the clocks went back.
-    #[error("an answer before its question")]
+    #[error("the answer is dated before its question")]
     Backwards,
     /// The other host says that it took longer than the whole exchange.
-    #[error("an answer that took {inside} ns of {outside} ns")]
+    #[error("the answer took {inside} ns, the whole exchange only {outside} ns")]
     Inside {
         /// From question to answer there, nanoseconds.
         inside: u64,
@@ -47,7 +47,7 @@ pub enum ExchangeError {
         outside: u64,
     },
     /// The round trip was too long to tell anything.
-    #[error("a round trip of {trip} ns")]
+    #[error("the round trip took {trip} ns, too long to compare the clocks")]
     Slow {
         /// Its length, nanoseconds.
         trip: u64,

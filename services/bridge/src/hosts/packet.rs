@@ -109,7 +109,7 @@ pub enum PacketError {
         expected: usize,
     },
     /// It does not begin as packets do.
-    #[error("no packet of Parallax: it begins with {0:02x?}")]
+    #[error("not a packet of Parallax: it begins with {0:02x?}")]
     Magic([u8; 4]),
     /// The other host has another version.
     #[error(

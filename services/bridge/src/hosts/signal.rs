@@ -44,7 +44,7 @@ pub enum Signal {
 
 /// Bytes that are no signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{len} bytes that are no signal of version {VERSION}")]
+#[error("{len} bytes are not a signal of version {VERSION}")]
 pub struct SignalError {
     /// How many they are.
     pub len: usize,

@@ -260,7 +260,7 @@ fn run_versions(arguments: &Arguments, globals: Globals, stop: Stop) -> Result<E
     report::write(arguments, &config, &job, &done)?;
     if job.stop.is_requested() {
         let failure = Failure::new(ExitKind::Interrupted, "interrupted");
-        return Err(failure.with_hint("--resume goes on where it was"));
+        return Err(failure.with_hint("continue with --resume"));
     }
     outcome(&done)
 }

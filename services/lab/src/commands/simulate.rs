@@ -65,10 +65,10 @@ pub(crate) struct Arguments {
     /// The costs of a run: the output of `parallax run --json`, of the fusing host if there are several.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// `capture` for a frame of a view, milliseconds.
+    /// Processor time of `capture` for a frame of a view, milliseconds.
     #[arg(long, value_name = "MS")]
     capture_ms: Option<f64>,
-    /// `pose` for a frame of a view, milliseconds.
+    /// Processor time of `pose` for a frame of a view, milliseconds.
     #[arg(long, value_name = "MS")]
     pose_ms: Option<f64>,
     /// To JPEG, milliseconds.
@@ -77,7 +77,7 @@ pub(crate) struct Arguments {
     /// From JPEG, milliseconds.
     #[arg(long, value_name = "MS")]
     decode_ms: Option<f64>,
-    /// Fusion for every view of a frame, milliseconds.
+    /// Processor time of fusion for every view of a frame, milliseconds.
     #[arg(long, value_name = "MS")]
     fuse_ms: Option<f64>,
     /// A frame as JPEG, bytes.

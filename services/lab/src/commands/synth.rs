@@ -117,7 +117,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     live: bool,
     /// Time from the instants of the frames to the pictures of each camera, milliseconds, in the order of the rig: 0,5,11,16;
-    /// negative for earlier pictures. The deployment says so too, and a run moves the joints to the instants.
+    /// negative for earlier pictures. The deployment contains these times, and a run moves the joints to the instants.
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = parse::skews)]
     skew_ms: Skews,
     /// Recorded motion.
@@ -263,9 +263,8 @@ fn create_folder(out: &Path) -> Result<(), Failure> {
     let mut inside = std::fs::read_dir(out).map_err(|error| failure::in_file(out, &error))?;
     if inside.next().is_some() {
         let message = format!("{} is not empty", out.display());
-        return Err(
-            Failure::new(ExitKind::Usage, message).with_hint("name a folder that is not there yet")
-        );
+        return Err(Failure::new(ExitKind::Usage, message)
+            .with_hint("name a folder that does not exist yet"));
     }
     Ok(())
 }

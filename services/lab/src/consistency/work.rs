@@ -241,7 +241,7 @@ impl<'a> Learning<'a> {
                 if self.stop.is_requested() {
                     let failure = Failure::new(ExitKind::Interrupted, "interrupted");
                     return Err(failure.with_hint(
-                        "what was learned until then is in OUT, if it came to trying weights",
+                        "if the command had begun to try weights, OUT has what it learned so far",
                     ));
                 }
                 let images = film.at(frame.index).map_err(film_failure)?;

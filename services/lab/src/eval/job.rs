@@ -238,7 +238,7 @@ impl Job<'_> {
             if !self.resume {
                 let message = format!("{} is there already", file.display());
                 let failure = Failure::new(ExitKind::Usage, message);
-                return Err(failure.with_hint("--resume goes on with it; or choose another --out"));
+                return Err(failure.with_hint("continue it with --resume, or choose another --out"));
             }
             (records, n_bytes) = read_records(&read_text(&file)?, &header).map_err(|error| {
                 let failure = in_file(&file, &error);

@@ -76,7 +76,7 @@ impl Store {
                 checkpoint.display()
             );
             return Err(Failure::new(ExitKind::Usage, message).with_hint(
-                "--resume goes on from it; to begin anew, delete it or write to another --out",
+                "continue from it with --resume; to start anew, delete it or choose another --out",
             ));
         }
         Ok(store)

@@ -168,7 +168,7 @@ fn checkpoint(path: &Path, resume: bool) -> Result<Option<Vec<u8>>, Failure> {
         Ok(_) => {
             let message = format!("{} is there: a training was interrupted", path.display());
             Err(Failure::new(ExitKind::Usage, message)
-                .with_hint("--resume goes on from it; to begin anew, delete it"))
+                .with_hint("continue from it with --resume; to start anew, delete it"))
         }
     }
 }

@@ -143,7 +143,7 @@ fn unknown(table: &FrameTable, camera: &str) -> Failure {
             known.join(", ")
         ),
     )
-    .with_hint("name the footage: NAME=PATH, with the name or number of the table")
+    .with_hint("name the footage as NAME=PATH, with the name or number from the table")
 }
 
 struct CameraTask<'a> {

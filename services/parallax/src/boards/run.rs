@@ -271,8 +271,7 @@ fn left_is_right(names: &[String], cameras: &[usize]) -> Failure {
         ""
     };
     Failure::new(ExitKind::Input, message).with_hint(format!(
-        "--back mirrored for a board with two sides; of mirrored pictures (a preview of a webcam) switch the mirroring off in the camera and record \
-         again{more}"
+        "for a board with two sides pass --back mirrored; if the pictures are mirrored (a preview of a webcam), switch mirroring off in the camera and record again{more}"
     ))
 }
 

@@ -105,7 +105,7 @@ struct Limits {
     /// not name, until it reports work.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest pause between results while a process is missing that the others do not need, milliseconds.
+    /// Longest pause between results while a process that the others do not need is missing, milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
 }

@@ -190,7 +190,7 @@ fn remove_existing(file: &Path, force: bool) -> Result<(), Failure> {
         if !force {
             let message = format!("{} is there already", file.display());
             let failure = Failure::new(ExitKind::Usage, message);
-            return Err(failure.with_hint("take another name, or --force to replace it"));
+            return Err(failure.with_hint("choose another name, or replace it with --force"));
         }
         let is_busy = files::open(&file)
             .is_ok_and(|it| matches!(it.try_lock_shared(), Err(TryLockError::WouldBlock)));

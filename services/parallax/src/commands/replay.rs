@@ -297,8 +297,8 @@ fn check_views(
             );
             let failure = Failure::new(ExitKind::Input, message);
             return Err(failure.with_hint(
-                "a host of several records what comes to it: where poses cross, `--from fuse` needs no frames; pictures of live cameras are in \
-                 the recordings of their own hosts",
+                "the recording of one host of several has only what reached this host: if poses were sent, use `--from fuse`, which needs \
+                 no frames; pictures of live cameras are in the recordings of their own hosts",
             ));
         }
     }

@@ -28,9 +28,8 @@ pub(crate) enum Command {
 /// Options of `parallax sync estimate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-People come from the `keypoints` of a camera, otherwise from its network (by the paper's method from the one that ships). The calibration must fit; identities \
-are not needed. A joint that two cameras see at \
-one instant satisfies their epipolar constraint: the offset of a pair is where this holds best, and all cameras must \
+People come from the `keypoints` of a camera, otherwise from its network; with the paper's method, from the network that ships. \
+The calibration must fit; identities are not needed. A joint that two cameras see at one instant satisfies their epipolar constraint: the offset of a pair is where this holds best, and all cameras must \
 agree. Offsets are against the first camera (--reference), and do not depend on `offset_ms` and `drift_ppm` in the file.
 
 An answer is refused, with exit code 7 and the reason, if another offset is nearly as good (people on a treadmill), the minimum \
@@ -39,7 +38,8 @@ nobody. Nothing is written then. Short footage gives no drift; the table says so
 
 --by sound compares the times at which sounds begin instead: steps, voices, doors, claps. Nobody needs to be visible. Sound \
 travels a metre in 2.9 ms, so offsets are uncertain by the distance of two cameras divided by 343 m/s: +- includes this. \
-In JSON `joints` then counts sounds, and pixels are null. Refused are: too few sounds, sounds that only one camera has, a beat, pairs and parts that contradict each other.
+In JSON `joints` then counts sounds, and pixels are null. These are refused: too few sounds, sounds that only one camera has, a \
+regular beat, and pairs or parts that contradict each other.
 
 With --json one object:
     {\"is_determined\", \"doubts\": [text], \"reference\", \"length_s\", \"second_best\",

@@ -26,10 +26,10 @@ results folder. It only listens: no process of the deployment waits for it, and 
 Open and close it at any time, also several at once. It waits for a deployment that does not run yet, and \
 for the next run when one ends. A finished run has a time line.
 
-The page is served on the loopback only, and pages of other sites cannot read it. Users of this \
-machine can, unless you ask for a token; only your own pages, or those with the token, can record, and a recording ends with \
-the page that began it. With --listen 0.0.0.0 other machines can too, with a token, which is made if none \
-is given. Nothing is encrypted: over a shared network, prefer a tunnel (`ssh -L 7878:localhost:7878 HOST`).
+The page is served on the loopback only, and pages of other sites cannot read it. Other users of this machine can, unless you ask \
+for a token. Only your own pages, or those with the token, can record, and a recording ends with the page that began it. With \
+--listen 0.0.0.0 other machines can read the page too; they need a token, which is made if you give none. Nothing is encrypted: \
+over a shared network, prefer a tunnel (`ssh -L 7878:localhost:7878 HOST`).
 
 Keys in the page: ? lists them. Ctrl-C ends the view only.
 

@@ -156,7 +156,7 @@ const NO_FILES: &[Mistake] = &[
         made: |it| source(it, "synth://humanevaa?camera=C1"),
         command: CHECK,
         code: 4,
-        says: &["synth://humanevaa", "is no rig"],
+        says: &["synth://humanevaa", "is not a rig"],
         tries: &["expected humaneva, umpm, ring"],
     },
 ];

@@ -64,7 +64,9 @@ pub enum BoardError {
         rows: usize,
     },
     /// A length that is none.
-    #[error("{text:?} is no length: expected a number above 0 with mm, cm, m or in, such as 40mm")]
+    #[error(
+        "{text:?} is not a length: expected a number above 0 with mm, cm, m or in, such as 40mm"
+    )]
     Length {
         /// The text.
         text: String,
@@ -78,7 +80,7 @@ pub enum BoardError {
         expected: &'static str,
     },
     /// A dictionary that does not exist.
-    #[error("{text:?} is no dictionary; there are {}", dictionary_names().collect::<Vec<_>>().join(", "))]
+    #[error("{text:?} is not a dictionary; expected one of {}", dictionary_names().collect::<Vec<_>>().join(", "))]
     Dictionary {
         /// The text.
         text: String,
@@ -356,11 +358,11 @@ mod tests {
             ("", "is no board"),
             ("charuco:7:40mm", "is no board"),
             ("charuco:7x5", "is no board"),
-            ("charuco:7x5:40", "is no length"),
-            ("charuco:7x5:-1mm", "is no length"),
-            ("charuco:7x5:NaNmm", "is no length"),
+            ("charuco:7x5:40", "is not a length"),
+            ("charuco:7x5:-1mm", "is not a length"),
+            ("charuco:7x5:NaNmm", "is not a length"),
             ("charuco:1x5:40mm", "1x5"),
-            ("charuco:7x5:40mm:9x9_50", "is no dictionary"),
+            ("charuco:7x5:40mm:9x9_50", "is not a dictionary"),
             ("charuco:99x99:40mm", "needs 4900 markers"),
             ("chessboard:9x6:25mm:4x4_50", "no options"),
             ("charuco:7x5:40mm:marker=2", "marker=0.75"),

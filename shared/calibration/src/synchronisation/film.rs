@@ -36,7 +36,7 @@ pub struct Joint {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FilmError {
     /// There are not as many films as cameras.
-    #[error("{films} films of {cameras} cameras")]
+    #[error("{films} films were given for {cameras} cameras")]
     Number {
         /// Films.
         films: usize,
@@ -68,7 +68,9 @@ pub enum FilmError {
         window_s: f64,
     },
     /// A camera is not the reference that was asked for.
-    #[error("reference camera {reference} of {cameras}")]
+    #[error(
+        "reference camera {reference} does not exist: there are {cameras} cameras, counted from 0"
+    )]
     Reference {
         /// Position in the list, from 0.
         reference: usize,

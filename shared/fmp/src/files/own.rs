@@ -31,7 +31,7 @@ pub enum OwnError {
     #[error("the payload is not a model")]
     Payload(#[source] Box<bincode::error::DecodeError>),
     /// Something follows the model in the payload.
-    #[error("the model ends {left} bytes before its payload")]
+    #[error("the payload has {left} bytes after the end of the model")]
     Left {
         /// Bytes that follow.
         left: usize,
@@ -157,7 +157,7 @@ mod tests {
     fn refuses_what_follows_the_model() {
         let mut payload = bytes()[HEADER_BYTES..].to_vec();
         payload.push(0);
-        let expected = "the model ends 1 bytes before its payload";
+        let expected = "the payload has 1 bytes after the end of the model";
         assert_eq!(said_of(&ENVELOPE.seal(&payload)), expected);
     }
 

@@ -40,7 +40,7 @@ pub enum C3dError {
         value: f64,
     },
     /// The last frame is before the first.
-    #[error("frames {first} to {last} are none")]
+    #[error("the range of frames {first} to {last} is empty")]
     Frames {
         /// Number of the first frame.
         first: u32,

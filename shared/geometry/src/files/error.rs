@@ -29,7 +29,7 @@ pub enum RigFileError {
         limit: u64,
     },
     /// Neither content nor extension identify the format.
-    #[error("{path} is no calibration file of a known format (Parallax, Pose2Sim or anipose TOML, Qualisys XML, OpenCV YAML, HumanEva .cal, UMPM .ini, Panoptic JSON)", path = .path.display())]
+    #[error("{path} is not a calibration file of a known format (Parallax, Pose2Sim or anipose TOML, Qualisys XML, OpenCV YAML, HumanEva .cal, UMPM .ini, Panoptic JSON)", path = .path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -139,7 +139,7 @@ pub enum ParseError {
         has_lens: bool,
     },
     /// The cameras cannot be combined into a rig.
-    #[error("the cameras make no rig")]
+    #[error("the cameras do not form a rig")]
     Rig(#[source] RigError),
 }
 
@@ -147,7 +147,7 @@ pub enum ParseError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnwritableRig {
     /// This format is only read.
-    #[error("{format} files are only read")]
+    #[error("{format} files can be read, but not written")]
     ReadOnly {
         /// The format.
         format: &'static str,

@@ -17,7 +17,7 @@ pub struct NameSet {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NamesError {
     /// No set of this name is known.
-    #[error("{name:?} is no known set of keypoints, expected one of {}", NameSet::known_sets().join(", "))]
+    #[error("{name:?} is not a known set of keypoints, expected one of {}", NameSet::known_sets().join(", "))]
     UnknownSet {
         /// The name.
         name: String,
@@ -29,7 +29,7 @@ pub enum NamesError {
         n: usize,
     },
     /// Two keypoints have one name.
-    #[error("the keypoint {name:?} twice, expected every name once")]
+    #[error("the keypoint {name:?} is listed twice; every name must occur once")]
     Twice {
         /// The name.
         name: String,

@@ -35,7 +35,7 @@ pub enum KeypointFileError {
         source: FileError,
     },
     /// A folder has no files of keypoints.
-    #[error("{} has no file that ends in .json: every frame has a file, such as cam01_000000000012_keypoints.json", path.display())]
+    #[error("{} has no file that ends in .json: every frame needs a file, such as cam01_000000000012_keypoints.json", path.display())]
     Empty {
         /// The folder.
         path: PathBuf,
@@ -47,7 +47,7 @@ pub enum KeypointFileError {
         path: PathBuf,
     },
     /// Two files are of one frame.
-    #[error("frame {number} twice: {} and {}; the files of one camera alone belong into a folder", paths[0].display(), paths[1].display())]
+    #[error("frame {number} has two files, {} and {}; a folder must hold the files of one camera only", paths[0].display(), paths[1].display())]
     Twice {
         /// The number in their names.
         number: u64,

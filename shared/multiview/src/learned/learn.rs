@@ -65,7 +65,7 @@ pub struct Pair<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LearnError {
     /// No view was close enough to the truth.
-    #[error("of {views} views none is near the truth: nothing can be learned of them")]
+    #[error("none of {views} views is near the truth, so nothing can be learned from them")]
     Nothing {
         /// Views seen.
         views: u64,

@@ -37,7 +37,7 @@ pub enum FitError {
         expected: String,
     },
     /// It cannot be shown mirror images.
-    #[error("it cannot look at mirror images as well: {0}")]
+    #[error("it cannot process mirror images too: {0}")]
     Mirror(String),
     /// It could not be tried.
     #[error(transparent)]

@@ -112,6 +112,6 @@ fn a_network_that_cannot_is_refused() {
     let refused = fitted(&network("Relu"), &lonely).unwrap().mirrored();
     assert_eq!(
         refused.unwrap_err().to_string(),
-        "it cannot look at mirror images as well: there is a keypoint `left hip`, but no `right hip`"
+        "it cannot process mirror images too: there is a keypoint `left hip`, but no `right hip`"
     );
 }

@@ -29,7 +29,7 @@ pub enum ReadingError {
         view: u32,
     },
     /// Percentiles that are not ascending.
-    #[error("row {row} has percentiles that fall, or none of {count} durations")]
+    #[error("row {row} has percentiles that decrease, or none for {count} durations")]
     Disordered {
         /// Which row.
         row: usize,
@@ -45,7 +45,7 @@ pub enum ReadingError {
         second: usize,
     },
     /// A name that is not UTF-8.
-    #[error("the name of the view is not UTF-8, or goes on after its end")]
+    #[error("the name of the view is not UTF-8, or has text after its end")]
     Name,
     /// A flag that is neither 0 nor 1.
     #[error("finished is {finished}, neither 0 nor 1")]
@@ -54,7 +54,7 @@ pub enum ReadingError {
         finished: u32,
     },
     /// Counts or times that contradict each other.
-    #[error("counts that contradict each other: {what}")]
+    #[error("counts contradict each other: {what}")]
     Contradiction {
         /// The contradiction.
         what: &'static str,

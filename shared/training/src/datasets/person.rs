@@ -128,7 +128,7 @@ pub enum Fault {
         before: String,
     },
     /// Another person has the same name.
-    #[error("the name {name:?} is that of {before}")]
+    #[error("the name {name:?} is already that of {before}")]
     SameName {
         /// The name.
         name: String,

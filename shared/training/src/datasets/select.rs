@@ -29,7 +29,7 @@ pub enum SelectError {
         source: io::Error,
     },
     /// A range that ends before it begins, or begins at 0.
-    #[error("the rows {first}-{last} are none: rows count from 1")]
+    #[error("there are no rows {first}-{last}: rows count from 1")]
     BadRange {
         /// First row.
         first: usize,
@@ -43,7 +43,7 @@ pub enum SelectError {
         path: PathBuf,
     },
     /// A named image has no people.
-    #[error("{name} of the selection is no image of {}", data.display())]
+    #[error("{name} of the selection is not an image of {}", data.display())]
     NoSuchImage {
         /// The image.
         name: String,
@@ -211,8 +211,8 @@ mod tests {
     #[test]
     fn invalid_selections_are_refused() {
         let error = |text| Selection::from_argument(text).unwrap_err().to_string();
-        assert!(error("5-4").starts_with("the rows 5-4 are none"));
-        assert!(error("0-4").starts_with("the rows 0-4 are none"));
+        assert!(error("5-4").starts_with("there are no rows 5-4"));
+        assert!(error("0-4").starts_with("there are no rows 0-4"));
         assert!(error("no/such/list").starts_with("\"no/such/list\" is neither rows"));
         let empty = Selection::from_list(Path::new("l"), "\n \n").unwrap_err();
         assert_eq!(
@@ -237,6 +237,6 @@ mod tests {
             }
         ));
         let error = check("c.jpg").unwrap_err().to_string();
-        assert_eq!(error, "c.jpg of the selection is no image of set");
+        assert_eq!(error, "c.jpg of the selection is not an image of set");
     }
 }

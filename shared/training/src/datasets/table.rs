@@ -125,7 +125,7 @@ pub enum TableError {
         other: String,
     },
     /// A part refers to a joint that does not exist.
-    #[error("part {part} ({name}) names joint {joint} of {n_joints}")]
+    #[error("part {part} ({name}) names joint {joint}, but there are {n_joints}")]
     Joint {
         /// From 1.
         part: usize,

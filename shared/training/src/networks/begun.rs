@@ -11,7 +11,7 @@ use crate::networks::parameters::{GAIN_OF_RELU, Parameter};
 #[derive(Debug, thiserror::Error)]
 pub enum BeginError {
     /// The file is no ONNX file.
-    #[error("it is no ONNX file")]
+    #[error("it is not an ONNX file")]
     Read(#[from] rten_onnx::protobuf::ProtobufError),
     /// A layer is missing: the network is another kind's, or smaller.
     #[error("it has no constant {name}; the network of the settings needs it, {expected:?}")]
@@ -32,7 +32,7 @@ pub enum BeginError {
         expected: Vec<usize>,
     },
     /// A number is not finite, or the bytes of a constant are too few or too many, or of another type.
-    #[error("the numbers of its {name} are not {n} finite ones of half or single precision")]
+    #[error("its {name} does not hold {n} finite numbers of half or single precision")]
     Numbers {
         /// The layer and its role.
         name: String,

@@ -24,13 +24,13 @@ pub enum StoreError {
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
     /// The checksum is right, but what it is of is not what the header says.
-    #[error("the payload is not what it should be")]
+    #[error("the payload does not have the expected form")]
     Payload(#[source] Box<bincode::error::DecodeError>),
     /// Too large for the format.
     #[error("it cannot be written")]
     Encode(#[source] Box<bincode::error::EncodeError>),
     /// Something follows the content in the payload.
-    #[error("its content ends {left} bytes before its payload")]
+    #[error("its payload has {left} bytes after the end of its content")]
     Left {
         /// Bytes that follow.
         left: usize,

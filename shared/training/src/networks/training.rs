@@ -153,7 +153,7 @@ pub enum TrainError {
         learned_from: &'static str,
     },
     /// The settings ask for numbers that only `LibTorch` computes with.
-    #[error("precision is \"bf16\", which only the backend libtorch can compute with")]
+    #[error("precision is \"bf16\", which needs the backend libtorch")]
     Precision,
 }
 

@@ -20,7 +20,7 @@ pub(super) struct Learning {
     /// Print the settings that would be used, as TOML, and exit.
     #[arg(long)]
     pub(super) print_settings: bool,
-    /// Steps, instead of those of the settings.
+    /// Number of steps, instead of that of the settings.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub(super) steps: Option<u32>,
     /// Random seed, instead of that of the settings.

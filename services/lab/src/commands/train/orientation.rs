@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     /// Number of synthetic scenes to judge on.
     #[arg(long, value_name = "N", default_value_t = 0)]
     judge_scenes: u32,
-    /// Numbers of the people in these.
+    /// Numbers of the people in these scenes.
     #[arg(long, value_name = "FROM-TO", default_value = "901-920", value_parser = subjects)]
     judge_subjects: [u64; 2],
     /// Frames per camera of a scene, some seconds apart.

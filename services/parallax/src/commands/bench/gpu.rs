@@ -26,7 +26,7 @@ pub(crate) struct Arguments {
     /// Frames of every row.
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     frames: u64,
-    /// Take software Vulkan where there is no GPU: to see that it works.
+    /// Use software Vulkan if there is no GPU, to check that the search works.
     #[arg(long)]
     software: bool,
     /// Output options.

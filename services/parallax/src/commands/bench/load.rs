@@ -62,7 +62,7 @@ pub(crate) struct Arguments {
     /// Largest median latency end to end of the run with all cameras, milliseconds.
     #[arg(long, value_name = "MS")]
     max_p50_ms: Option<f64>,
-    /// Largest 99th percentile of the same.
+    /// Largest 99th percentile of that latency, milliseconds.
     #[arg(long, value_name = "MS")]
     max_p99_ms: Option<f64>,
     /// Least rate of results of the same run, per second.

@@ -26,7 +26,7 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{le
 #[derive(Debug, Args)]
 #[command(after_help = "\
 A board is KIND:COLUMNSxROWS:SIDE, with options after further colons:
-    charuco:7x5:40mm                  7 x 5 squares; markers of 4x4_1000 (4x4_50 begins with the same), 0.75 of a square
+    charuco:7x5:40mm                  7 x 5 squares; markers of 4x4_1000 (4x4_50 has the same first markers), 0.75 of a square
     charuco:4x5:5.4cm:5x5_250:marker=0.8:legacy      another dictionary, larger markers, drawn as OpenCV before 4.6 did
     chessboard:9x6:25mm               9 x 6 inner corners
     aprilgrid:6x6:88mm:36h11:gap=0.3  6 x 6 tags with gaps of 0.3 of a tag
@@ -35,8 +35,9 @@ Move the board through the whole volume, tilted by 30 to 45 degrees, near and fa
 cameras at a time must see it. Pictures belong together by timestamps.csv beside the first video (Caliscope's: \
 the n-th row of a camera is its n-th picture) or --timestamps, otherwise by their number, or by time if frame rates differ.
 
-The world is the frame of the first camera; `parallax calibrate origin` puts it on the floor. With doubts the files are written,
-the report and the rig say so, and the exit code is 7; without an answer it is 5, or 4 without a board in the pictures.
+The world is the frame of the first camera; `parallax calibrate origin` puts it on the floor. If there are doubts,
+the files are written, the report and the rig state the doubts, and the exit code is 7. If there is no answer, the exit code is 5,
+or 4 if no picture shows the board.
 
 With --json one object:
     {\"is_trusted\", \"doubts\", \"notes\", \"board\", \"sigma_px\",
@@ -50,14 +51,14 @@ Examples:
     parallax calibrate board --board chessboard:9x6:25mm left*.jpg --intrinsics --out left.toml
     parallax calibrate board --board charuco:7x5:40mm wide=a.mp4 b=b.mp4 --known lenses.toml --out rig.toml")]
 pub(crate) struct Arguments {
-    /// One video, folder of pictures or pattern for each camera, in the order of the rig; NAME=PATH names it. With --intrinsics,
-    /// several pictures are those of one camera.
+    /// One video, folder of pictures or pattern for each camera, in the order of the rig; NAME=PATH names it. With --intrinsics, several
+    /// pictures are taken as those of one camera.
     #[arg(value_name = "FOOTAGE", required_unless_present = "print", num_args = 1..)]
     footage: Vec<String>,
     /// The board.
     #[arg(long, value_name = "BOARD", required_unless_present = "print")]
     board: Option<Board>,
-    /// Find only the intrinsics, of every camera alone.
+    /// Find only the intrinsics, for each camera separately.
     #[arg(long)]
     intrinsics: bool,
     /// Intrinsics to keep: a calibration of any format that has cameras of these names.
@@ -72,13 +73,13 @@ pub(crate) struct Arguments {
     /// Look at every n-th frame; chosen by the length of the footage if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     every: Option<u32>,
-    /// Look at no more pictures of a camera.
+    /// Most pictures of a camera to search for the board.
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(1..))]
     most_pictures: u32,
-    /// Use no more frames, those that cover most.
+    /// Most frames to use; those that cover most are chosen.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(3..=2000))]
     most_frames: u32,
-    /// Read the corners from a table, in the columns of Caliscope, instead.
+    /// Read the corners from a table with the columns of Caliscope, instead of searching the pictures.
     #[arg(long, value_name = "FILE")]
     corners: Option<PathBuf>,
     /// Write the corners as such a table.

@@ -91,7 +91,9 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
                 ExitKind::Usage,
                 "neither a board, nor points on the floor, nor people",
             )
-            .with_hint("--board BOARD FOOTAGE..., or --at, --x and --floor, or --people RUN"));
+            .with_hint(
+                "pass --board BOARD FOOTAGE..., or --at, --x and --floor, or --people RUN",
+            ));
         }
         (None, None) => {
             let clicks = [&arguments.at, &arguments.x, &arguments.floor];

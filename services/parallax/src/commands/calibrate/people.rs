@@ -30,15 +30,15 @@ People come from the `keypoints` of a camera, otherwise from its network, as in 
 The person whom the cameras see longest together is used; one person alone is better. The deployment's rig gives intrinsics and \
 names; its poses are used only with `--scale rig`.
 
-Pictures have no scale. It comes from a person's standing height by the lengths of the bones (--height-m, right to 2 or 3 \
-percent for usual proportions), from the distance of two cameras (--distance), or from the given rig (--scale rig, \
-which also keeps its world). Otherwise the world has its floor at z = 0, its origin under the middle of the walk, and z against \
+Pictures have no scale. Give the person's standing height (--height-m), which is compared with the lengths of the bones: right to 2 \
+or 3 percent for usual proportions. Or give the distance of two cameras (--distance), or keep scale and world of the given rig \
+(--scale rig). Otherwise the world has its floor at z = 0, its origin under the middle of the walk, and z against \
 gravity: by the standing feet, or else by upright bodies.
 
 An answer is refused, with exit code 7 and every reason, if two halves of the recording give different rigs, a camera has too \
-little in common with the others, its pose is known too badly, or no person was found. Nothing is written then. If a \
-camera is known only to more than 0.3 degrees or 1 percent of its distance to the people (one standard deviation), the rig is written \
-with a note, every such camera is printed, and the exit code is 6.
+little in common with the others, its pose is too uncertain, or no person was found. Nothing is written then. If the pose of a camera is \
+uncertain by more than 0.3 degrees or 1 percent of its distance to the people (one standard deviation), the rig is written with a \
+note, every such camera is printed, and the exit code is 6.
 
 The clocks of the deployment are used unless joints fit clearly better with others, or --window is given.
 
@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
     /// Take scale and world from the rig of the deployment.
     #[arg(long, value_name = "rig", value_parser = ["rig"])]
     scale: Option<String>,
-    /// Estimate focal lengths, too: less certain.
+    /// Also estimate focal lengths; the result is less certain.
     #[arg(long)]
     focal: bool,
     /// Largest clock offset of two cameras, seconds. Offsets of a few pictures are found without it.

@@ -27,7 +27,7 @@ moves; the others are held. Time offsets are estimated too, within --sd-ms of th
 The new rig is judged by data that it was not fitted to: each half of the recording judges the rig of the other one, \
 by the distance of each camera's joints from where the other cameras see them.
 
-Exit codes: 0 better, and --out is written; 6 no better, the rig is to be kept; 7 refused, with every reason.
+Exit codes: 0 better, and --out is written; 6 not better, keep the rig; 7 refused, with every reason.
 
 With --json one object:
     {\"verdict\": \"better\" | \"no better\" | \"refused\", \"doubts\": [text], \"instants\", \"before_px\", \"after_px\", \"certainty\",
@@ -47,10 +47,10 @@ pub(crate) struct Arguments {
     /// Standard deviation of the places of its cameras, millimetres.
     #[arg(long, value_name = "MM", default_value_t = 30.0, value_parser = deviation)]
     sd_mm: f64,
-    /// Standard deviation of the clocks, milliseconds; 0 holds them.
+    /// Standard deviation of the clocks, milliseconds; 0 keeps them fixed.
     #[arg(long, value_name = "MS", default_value_t = 5.0, value_parser = clock)]
     sd_ms: f64,
-    /// Estimate focal lengths, too: less certain.
+    /// Also estimate focal lengths; the result is less certain.
     #[arg(long)]
     focal: bool,
 }

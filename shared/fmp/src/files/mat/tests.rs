@@ -164,11 +164,11 @@ fn errors_name_the_part() {
             |it| *of_part(it, 3, 2) = row(vec![1.0; 3]),
         ),
         (
-            "the components name what is not there: part 3 names spring 5, but there are 4",
+            "the components name an entry that does not exist: part 3 names spring 5, but there are 4",
             |it| *of_part(it, 3, 2) = row(vec![1.0, 5.0]),
         ),
         (
-            "the components name what is not there: part 1 names bias 0, but there are 9",
+            "the components name an entry that does not exist: part 1 names bias 0, but there are 9",
             |it| *of_part(it, 1, 0) = number(0.0),
         ),
         ("`model.components` is 1x2, expected 1x1", |it| {

@@ -113,13 +113,15 @@ pub enum SyncError {
     #[error("no camera says when it began (.ofs)")]
     Nothing,
     /// A rate that is not positive.
-    #[error("{rate} frames of motion capture for each frame of a camera")]
+    #[error(
+        "there are {rate} frames of motion capture for each frame of a camera, expected more than 0"
+    )]
     Rate {
         /// The rate.
         rate: f64,
     },
     /// A stream that would begin before its first frame.
-    #[error("a camera would begin at its frame {offset}")]
+    #[error("a camera would begin at its frame {offset}, before its first frame, 1")]
     Before {
         /// The frame, from 1.
         offset: f64,

@@ -106,7 +106,7 @@ fn errors_of_invalid_skeletons_have_name_and_number() {
              either side",
             |it| it.weights[3] = vec![(8, 0.4), (7, 0.6)],
         ),
-        ("part 2 (neck) names joint 15 of 14", |it| {
+        ("part 2 (neck) names joint 15, but there are 14", |it| {
             it.weights[1] = vec![(14, 1.0)];
         }),
         (

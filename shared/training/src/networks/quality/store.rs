@@ -17,7 +17,7 @@ pub enum SamplesError {
     #[error(transparent)]
     Store(#[from] StoreError),
     /// A sample has other sizes than its header, or invalid numbers.
-    #[error("sample {sample} ({file_says}) has other sizes, or numbers that are none")]
+    #[error("sample {sample} ({file_says}) has other sizes, or values that are not finite")]
     Sample {
         /// Which, from 1.
         sample: usize,

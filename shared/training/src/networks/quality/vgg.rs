@@ -14,7 +14,7 @@ use crate::networks::parameters::{Parameter, Role};
 #[derive(Debug, thiserror::Error)]
 pub enum VggError {
     /// The bytes end before what the header says.
-    #[error("it is truncated, or no .safetensors file")]
+    #[error("it is truncated, or not a .safetensors file")]
     Truncated,
     /// The header is not what it should be.
     #[error("its header cannot be read")]

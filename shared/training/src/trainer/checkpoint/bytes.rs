@@ -28,10 +28,10 @@ pub enum CheckpointBytesError {
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
     /// The checksum is right, but what it is of is no checkpoint.
-    #[error("the payload is no checkpoint")]
+    #[error("the payload is not a checkpoint")]
     Payload(#[source] Box<bincode::error::DecodeError>),
     /// Something follows the checkpoint in the payload.
-    #[error("the checkpoint ends {left} bytes before its payload")]
+    #[error("the payload has {left} bytes after the end of the checkpoint")]
     Left {
         /// Bytes that follow.
         left: usize,

@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
     /// A detector that finds everybody in the photographs.
     #[arg(long, value_name = "FILE.onnx")]
     teacher: Option<PathBuf>,
-    /// Its card, if that is not beside it.
+    /// The card of the detector; if not given, the file beside it.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
     teacher_card: Option<PathBuf>,
     /// Photographs of nobody; also the background of every third scene.

@@ -41,11 +41,11 @@ Example:
 pub(crate) struct Arguments {
     #[command(flatten)]
     people: Marked,
-    /// A network that finds keypoints, to help with joints and sides. Given again: another one, for the keypoints that those before
-    /// it do not know.
+    /// A network that finds keypoints, to help with joints and sides. Give it again for another network, which adds the keypoints that
+    /// the earlier ones do not know.
     #[arg(long, value_name = "FILE.onnx")]
     teacher: Vec<PathBuf>,
-    /// Its card, if that is not beside it: for the teachers in their order.
+    /// The cards of the teachers, in the same order; if not given, the files beside them.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
     teacher_card: Vec<PathBuf>,
     /// Number of synthetic scenes; each gives some pictures of every camera.

@@ -29,7 +29,7 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
         let time_s = rate_hz.map_or(line.time_s, |it| Some(line.frame as f64 / it));
         let time_s = time_s.ok_or_else(|| {
             let message = format!("{}: the frames of the run have no times", run.display());
-            Failure::new(ExitKind::Input, message).with_hint("--rate gives the frames a second")
+            Failure::new(ExitKind::Input, message).with_hint("pass the frames per second by --rate")
         })?;
         let person = line.followed();
         let joints = PARSE14.joints.iter().map(|joint| {
