@@ -31,5 +31,5 @@ class Full(ClientError):
     def __init__(self, name, most, guests):
         self.most = most
         super().__init__(
-            f"{most} programs read deployment {name!r} already, which is the most: {', '.join(guests)}"
+            f"{most} programs already read deployment {name!r}, which is the limit: {', '.join(guests)}"
         )

@@ -41,7 +41,7 @@ pub(crate) enum Refused {
     People(usize),
     #[error("maps of {n} cells, at most {longest}")]
     Cells { n: usize, longest: usize },
-    #[error("Gaussian {nth} of the maps of person {person} is not a Gaussian")]
+    #[error("Gaussian {nth} of the maps of person {person} has values that no Gaussian has")]
     Gaussian { person: usize, nth: usize },
 }
 

@@ -183,8 +183,8 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     }
     let failure = Failure::new(ExitKind::Input, text);
     Err(failure.with_hint(
-        "cameras with clocks of their own are brought to common instants by `offset_ms` of each [[camera]], whatever their rates: \
-         `parallax sync estimate` finds it, `offset_ms = 0` where they began together; if a file is wrong about its rate, give the \
+        "if the cameras have clocks of their own, set `offset_ms` in each [[camera]], as `parallax sync estimate` finds it (0 if they \
+         began together): a run then brings cameras of any rates to common instants; if a file is wrong about its rate, give the \
          true one as `capture.frame_rate_hz`",
     ))
 }

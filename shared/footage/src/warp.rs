@@ -44,7 +44,7 @@ pub enum WarpError {
         output_size: Size,
     },
     /// The map is singular, not finite, or its translation is too large.
-    #[error("the map from output to source is singular or without bounds: {map:?}")]
+    #[error("the map from output to source is singular or unbounded: {map:?}")]
     BadMap {
         /// The map.
         map: Affine,

@@ -31,7 +31,7 @@ pub(crate) enum NoFront {
         op: String,
         what: &'static str,
     },
-    #[error("what follows the convolutions cannot be run: {0}")]
+    #[error("the layers after the convolutions cannot be run: {0}")]
     Rest(String),
 }
 

@@ -47,7 +47,7 @@ pub enum GuestError {
         running: Vec<String>,
     },
     /// As many programs as may be there at the same time are there.
-    #[error("{most} programs read deployment {name:?} already, which is the most: {}", .guests.join(", "))]
+    #[error("{most} programs already read deployment {name:?}, which is the limit: {}", .guests.join(", "))]
     Full {
         /// Its name.
         name: String,

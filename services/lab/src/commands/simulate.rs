@@ -62,7 +62,7 @@ pub(crate) struct Arguments {
     /// Capacity of the network, megabits per second.
     #[arg(long, value_name = "MBIT", default_value_t = 1000.0)]
     network: f64,
-    /// The costs of a run: the output of `parallax run --json`, of the fusing host if there are several.
+    /// The costs of a run: the output of `parallax run --json`; with several hosts, that of the fusing one.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Processor time of `capture` for a frame of a view, milliseconds.
@@ -71,10 +71,10 @@ pub(crate) struct Arguments {
     /// Processor time of `pose` for a frame of a view, milliseconds.
     #[arg(long, value_name = "MS")]
     pose_ms: Option<f64>,
-    /// To JPEG, milliseconds.
+    /// Processor time to make a JPEG of a frame, milliseconds.
     #[arg(long, value_name = "MS")]
     encode_ms: Option<f64>,
-    /// From JPEG, milliseconds.
+    /// Processor time to decode a frame from JPEG, milliseconds.
     #[arg(long, value_name = "MS")]
     decode_ms: Option<f64>,
     /// Processor time of fusion for every view of a frame, milliseconds.

@@ -19,7 +19,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Show the hosts of a running deployment: which answer, how well clocks are known, what became of every view.
+    /// Show the hosts of a running deployment: which of them answer, how well their clocks are known, and what became of every view.
     Status(StatusArguments),
     /// Make the keys of all hosts: an authority, and a certificate with its key for each.
     Keys(KeysArguments),

@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     /// Name of a deployment or its file (.toml), the folder of a finished run, or a recording (.mcap); may be left out if
     /// only one deployment runs.
     subject: Option<String>,
-    /// The name of a deployment, also if there is a folder of that name.
+    /// Name of a deployment, even if there is a folder of that name.
     #[arg(long, value_name = "NAME", conflicts_with = "subject")]
     deployment: Option<String>,
     /// Port of the page, 0 for any free one; if not given, 7878, or a free one if that is in use.

@@ -35,7 +35,7 @@ pub enum Undetermined {
         directions: Vec<Vec<String>>,
     },
     /// Values that are not finite.
-    #[error("values that are not finite: nothing can be said of the parameters")]
+    #[error("the values are not finite, so the parameters cannot be determined")]
     NotFinite,
 }
 

@@ -82,7 +82,7 @@ pub(crate) struct Arguments {
     /// Read the corners from a table with the columns of Caliscope, instead of searching the pictures.
     #[arg(long, value_name = "FILE")]
     corners: Option<PathBuf>,
-    /// Write the corners as such a table.
+    /// Write the corners into a table with these columns.
     #[arg(long, value_name = "FILE")]
     save_corners: Option<PathBuf>,
     /// Treat all footage as mirrored.

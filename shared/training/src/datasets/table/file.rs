@@ -24,7 +24,7 @@ pub enum SkeletonFileError {
     #[error("not a skeleton")]
     Syntax(#[from] toml::de::Error),
     /// An unknown name of a part or a joint.
-    #[error("{whose} names the {what} {name:?}, which is not there")]
+    #[error("{whose} names the {what} {name:?}, which does not exist")]
     NoSuch {
         /// Where it is used.
         whose: String,

@@ -129,7 +129,7 @@ fn invalid_skeleton_files_are_refused() {
         (
             "a = 0.5",
             "c = 0.5",
-            "the part \"r\" names the joint \"c\", which is not there",
+            "the part \"r\" names the joint \"c\", which does not exist",
         ),
         (
             "[[\"a\", \"b\"]]",
@@ -139,12 +139,12 @@ fn invalid_skeleton_files_are_refused() {
         (
             "[[\"a\", \"b\"]]",
             "[[\"a\", \"x\"]]",
-            "`joint_mirror` names the joint \"x\", which is not there",
+            "`joint_mirror` names the joint \"x\", which does not exist",
         ),
         (
             "name = \"r\"",
             "name = \"r\"\nparent = \"q\"",
-            "the part \"r\" names the part \"q\", which is not there",
+            "the part \"r\" names the part \"q\", which does not exist",
         ),
         ("a = 0.5", "a = 0.25", "the skeleton was refused"),
         ("joints = {", "joint = {", "not a skeleton"),
