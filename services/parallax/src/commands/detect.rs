@@ -118,7 +118,7 @@ pub(crate) struct Arguments {
     /// ships; "none": a joint is the centre of its part, as for other models.
     #[arg(long, value_name = "FILE")]
     joint_map: Option<PathBuf>,
-    /// Keypoints by this network (.onnx); "shipped": the one that ships; "none": parts by the filters. If not given, the one that
+    /// Find keypoints by this network (.onnx); "shipped": the one that ships; "none": parts by the filters. If not given, the one that
     /// ships, unless --model, --joints or --joint-map is.
     #[arg(long, value_name = "FILE")]
     network: Option<PathBuf>,
@@ -131,7 +131,7 @@ pub(crate) struct Arguments {
     /// Also show the mirror image of every person to the network, and use the mean: more exact, twice the time.
     #[arg(long)]
     mirror: bool,
-    /// Boxes by this detector of people (.onnx) in place of the one that ships.
+    /// Find boxes by this detector of people (.onnx), in place of the one that ships.
     #[arg(long, value_name = "FILE", conflicts_with = "outline")]
     detector: Option<PathBuf>,
     /// The card of the detector; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.

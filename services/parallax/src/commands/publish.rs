@@ -11,7 +11,7 @@ use terminal::{Globals, output};
 /// Options of `parallax publish`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Reads the deployment like any other program: no process of it waits, and this command may come and go at any time. Every person of
+Reads the deployment like any other program: no process of the deployment waits for this command, which may come and go at any time. Every person of
 a frame is one datagram of at most 1400 bytes, JSON on one line, or OSC bundles. A joint without a position is sent with the reason,
 never as zeros. Datagrams that nobody receives are lost. docs/guide/programs.md describes both forms.
 

@@ -21,8 +21,8 @@ or the rig is not that of these cameras, begin anew: parallax calibrate people";
 /// Options of `parallax calibrate refine`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The rig of the deployment is trusted to within --sd-degrees and --sd-mm. Only a camera whose pose the joints determine better \
-moves; the others are held. Time offsets are estimated too, within --sd-ms of those of the deployment.
+The rig of the deployment is trusted to within --sd-degrees and --sd-mm. Only cameras whose poses the joints determine better than that are moved; \
+the others stay. Time offsets are estimated too, within --sd-ms of those of the deployment.
 
 The new rig is judged by data that it was not fitted to: each half of the recording judges the rig of the other one, \
 by the distance of each camera's joints from where the other cameras see them.
