@@ -53,7 +53,7 @@ pub(crate) struct Arguments {
     /// Maximal number of instants of the held-out subjects that weights are tried on, evenly spaced.
     #[arg(long, value_name = "N", default_value_t = 48)]
     tries: usize,
-    /// Learn tables by camera names too, for a rig of this name; all sequences must be of one rig.
+    /// Also learn tables by camera names, for a rig of this name; all sequences must be of one rig.
     #[arg(long, value_name = "NAME")]
     rig: Option<String>,
     /// Do not learn the map from parts to joints.

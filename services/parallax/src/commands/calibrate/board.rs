@@ -32,8 +32,9 @@ A board is KIND:COLUMNSxROWS:SIDE, with options after further colons:
     aprilgrid:6x6:88mm:36h11:gap=0.3  6 x 6 tags with gaps of 0.3 of a tag
 
 Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, into the corners of every picture. At least two \
-cameras at a time must see it. Pictures belong together by timestamps.csv beside the first video (Caliscope's: \
-the n-th row of a camera is its n-th picture) or --timestamps, otherwise by their number, or by time if frame rates differ.
+cameras at a time must see it. Pictures that were taken together are named by timestamps.csv beside the first video (Caliscope's: \
+the n-th row of a camera is its n-th picture) or by --timestamps. Without such a table they are those of one number, or of one time \
+if frame rates differ.
 
 The world is the frame of the first camera; `parallax calibrate origin` puts it on the floor. If there are doubts,
 the files are written, the report and the rig state the doubts, and the exit code is 7. If there is no answer, the exit code is 5,
