@@ -24,5 +24,5 @@ mod tests;
 pub use engine::{Description, Input, LoadError, Output, Port, RunError, Side, Values, written};
 #[cfg(feature = "ort")]
 pub use onnx_runtime::OnnxRuntime;
-pub use provider::Provider;
+pub use provider::{Place, Provider};
 pub use session::{RunBy, Session};

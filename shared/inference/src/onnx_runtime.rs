@@ -10,7 +10,7 @@ use ort::value::{TensorRef, ValueType};
 
 use crate::Values;
 use crate::engine::{Description, Engine, EngineError, Input, LoadError, Output, Port, Side};
-use crate::provider::Provider;
+use crate::provider::{Place, Provider};
 
 /// The library of this process: only one can be loaded, and it stays loaded.
 static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
@@ -61,18 +61,19 @@ impl OnnxRuntime {
     pub(crate) fn load_network(
         &self,
         file: &[u8],
-    ) -> Result<(Loaded, Description, String), LoadError> {
-        let on_processor = || self.session(file, false).map_err(LoadError::File);
-        let (session, place) = match (self.provider, self.provider.is_cuda()) {
-            (_, false) => (on_processor()?, "the processor".to_owned()),
-            (provider, true) => match self.session(file, true) {
-                Ok(session) => (session, "CUDA".to_owned()),
-                Err(error) if provider == Provider::Cuda => return Err(LoadError::Cuda(error)),
-                Err(error) => (
-                    on_processor()?,
-                    format!("the processor, since CUDA cannot start: {error}"),
-                ),
-            },
+    ) -> Result<(Loaded, Description, Place), LoadError> {
+        let on_cuda = self.provider.is_cuda().then(|| self.session(file, true));
+        let place = match &on_cuda {
+            None => Place::Processor,
+            Some(Ok(_)) => Place::Cuda,
+            Some(Err(error)) => Place::ProcessorForCuda(error.to_string()),
+        };
+        let session = match on_cuda {
+            Some(Ok(session)) => session,
+            Some(Err(error)) if self.provider == Provider::Cuda => {
+                return Err(LoadError::Cuda(error));
+            }
+            Some(Err(_)) | None => self.session(file, false).map_err(LoadError::File)?,
         };
         let description = described(&session).map_err(LoadError::File)?;
         Ok((Loaded(Mutex::new(session)), description, place))

@@ -6,6 +6,7 @@ use crate::direct::{Direct, Parts};
 use crate::engine::Engine;
 #[cfg(feature = "ort")]
 use crate::onnx_runtime::OnnxRuntime;
+use crate::provider::Place;
 use crate::rten_engine::Rten;
 use crate::{Description, Input, LoadError, Output, RunError, nesting, sizes};
 
@@ -25,8 +26,8 @@ pub enum RunBy {
     Parallax,
     /// All of it by `rten`; why Parallax itself does not.
     Rten(String),
-    /// ONNX Runtime, and where that runs it.
-    OnnxRuntime(String),
+    /// ONNX Runtime.
+    OnnxRuntime(Place),
 }
 
 impl fmt::Display for RunBy {

@@ -7,7 +7,7 @@ use crate::network::NetworkFile;
 use deployment::network::Config;
 use deployment::{Deployment, Device, is_shipped};
 use failure::{ExitKind, Failure};
-use inference::{Provider, RunBy};
+use inference::{Place, Provider, RunBy};
 use keypoints::Card;
 use posenetwork::{Detector, PoseNetwork};
 
@@ -27,8 +27,11 @@ pub fn pose_network(
     };
     let library = library(&deployment.network, deployment.device)?;
     let network = open_network((file, None), &library)?;
-    if let RunBy::OnnxRuntime(place) = network.run_by() {
-        tracing::info!(network = %file.display(), "ONNX Runtime runs it on {place}");
+    match network.run_by() {
+        RunBy::OnnxRuntime(place @ Place::ProcessorForCuda(_)) => {
+            tracing::warn!(network = %file.display(), "ONNX Runtime runs it on {place}");
+        }
+        by => tracing::info!(network = %file.display(), "run by {by}"),
     }
     let network = network.fitted()?;
     if deployment.network.mirror {

@@ -56,7 +56,7 @@ pub fn skeletons() -> String {
 /// * `process`: its unique name in the deployment, for example `pose-2`.
 #[must_use]
 pub fn health(process: &str) -> String {
-    format!("health/v4/{process}")
+    format!("health/v5/{process}")
 }
 
 /// Times and counts of a process: [`Metrics`](crate::Metrics).

@@ -267,7 +267,7 @@ mod tests {
             assert_eq!(Kind::of_topic(&kind.example()), Some(kind));
         }
         assert_eq!(Kind::of_topic("frame/v1/12"), Some(Kind::Frame));
-        assert_eq!(Kind::of_topic("health/v4/pose-3"), Some(Kind::Health));
+        assert_eq!(Kind::of_topic("health/v5/pose-3"), Some(Kind::Health));
         for other in [
             "frame/v2/0",
             "frame/v1",

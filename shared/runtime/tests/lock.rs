@@ -27,7 +27,7 @@ fn no_file_is_left_after_the_end() {
     let deployment = Deployment::new(&process_topics("a"));
     let namespace = deployment.namespace().clone();
     let bus = deployment.bus("a");
-    let publisher = bus.publisher::<Health>("health/v4/a").unwrap();
+    let publisher = bus.publisher::<Health>("health/v5/a").unwrap();
     assert!(!shared_memory(&namespace).is_empty());
     assert!(namespace.config_file().exists());
     drop((publisher, bus));
