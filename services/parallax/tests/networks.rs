@@ -217,27 +217,22 @@ fn keypoints_of_a_box_are_found_where_they_are_and_drawn() {
 }
 
 #[test]
-fn without_a_box_the_filters_find_it_and_that_is_said() {
+fn options_of_the_filters_are_refused_beside_a_network() {
     let case = case("network-search");
-    let model = [
-        "--model",
-        "model.plx",
-        "--network",
-        "net.onnx",
-        "--card",
-        "card.toml",
-    ];
-    let ended = run(&case, &[&["detect", "a/0000.png"], &model[..]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let said = "boxes by the filters at 96x128 of 96x128, widened by 10 %";
-    assert!(ended.stdout.contains(said), "{}", ended.stdout);
-    // Nobody.
-    let nobody = ["detect", "blocks.png", "--threshold", "1000"];
-    let ended = run(&case, &[&nobody[..], &model].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    assert!(ended.stdout.contains("0 detections"), "{}", ended.stdout);
-    let said = "the filters find nobody";
-    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    let detect = ["detect", "a/0000.png", "--network", "net.onnx"];
+    for option in [
+        ["--model", "model.plx"],
+        ["--threshold", "0"],
+        ["--size", "640"],
+    ] {
+        let ended = run(
+            &case,
+            &[&detect[..], &["--card", "card.toml"], &option].concat(),
+        );
+        assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+        let said = format!("{} is about the filters", option[0]);
+        assert!(ended.stderr.contains(&said), "{}", ended.stderr);
+    }
 }
 
 /// What the network that ships is for: nothing is given but the picture.
