@@ -172,7 +172,7 @@ mod tests {
         let refused = |names: &[&str]| NameSet::new(names).unwrap_err().to_string();
         assert!(refused(&[]).contains("0 names"));
         assert!(refused(&["neck"; 300]).contains("257 names"));
-        assert!(refused(&["left_hip", "left hip"]).contains("\"left hip\" twice"));
+        assert!(refused(&["left_hip", "left hip"]).contains("\"left hip\" is listed twice"));
         assert!(refused(&["kp_0", "kp_1"]).contains("no joint of the skeleton"));
         let unknown = NameSet::of_set("coco17").unwrap_err().to_string();
         assert!(

@@ -336,8 +336,8 @@ fn writing_a_rig_that_the_format_cannot_describe_is_an_error() {
     };
     assert!(cause(Format::HumanEva, &fisheye).contains("Kannala-Brandt"));
     assert!(cause(Format::Umpm, &fisheye).contains("Kannala-Brandt"));
-    assert!(cause(Format::Qualisys, &fisheye).contains("only read"));
-    assert!(cause(Format::Panoptic, &fisheye).contains("only read"));
+    assert!(cause(Format::Qualisys, &fisheye).contains("not written"));
+    assert!(cause(Format::Panoptic, &fisheye).contains("not written"));
     let named = |name: &str| {
         let mut cameras = ring_rig(1, BARREL).cameras().to_vec();
         cameras[0].name = name.to_owned();

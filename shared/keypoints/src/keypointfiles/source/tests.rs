@@ -80,7 +80,7 @@ fn folders_that_tell_no_frames_are_refused() {
     let one = frame(&[1.0]);
     let twice = refused(&[("a_1.json", &one), ("b_01.json", &one)]);
     assert!(
-        twice.contains("frame 1 twice") && twice.contains("b_01.json"),
+        twice.contains("frame 1 has two files") && twice.contains("b_01.json"),
         "{twice}"
     );
     let far = refused(&[("1.json", &one), ("99999999999.json", &one)]);
