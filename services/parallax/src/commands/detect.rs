@@ -43,7 +43,7 @@ The detector that ships finds boxes, at most --max, and the network that ships f
 People with less heat than --heat (mean over the joints) are left out. \
 Each person is printed once, in order of heat. --network and --detector name your own (docs/networks.md); --box gives the box.
 
-People who are lower than an eighth of the longer side of the picture are not found: cut the picture, or give --box.
+The detector that ships did not learn people who are lower than an eighth of the picture: cut the picture, or give --box.
 
 With --network none, and with --model, --joints or --joint-map, the parts of the filters are printed. A picture with a \
 side longer than --size is then reduced to that size, and the line says so: \"searched at 1280x960 of 4000x3000\". People smaller than \
