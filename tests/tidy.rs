@@ -205,10 +205,7 @@ const DIALECT: usize = 6451;
 
 #[test]
 fn the_old_dialect_goes() {
-    let files: Vec<PathBuf> = crates()
-        .iter()
-        .flat_map(|(_, dir)| rust_files(dir))
-        .collect();
+    let files: Vec<PathBuf> = crates().iter().flat_map(|(_, dir)| rust_files(dir)).collect();
     let n = dialect::count(&files);
     assert!(
         n <= DIALECT,
@@ -328,17 +325,12 @@ fn only_the_agreed_entries_lie_at_the_top() {
 }
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap()
-        .to_owned()
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
 }
 
 fn dependencies(dir: &Path) -> Vec<String> {
-    let manifest: toml::Table = fs::read_to_string(dir.join("Cargo.toml"))
-        .unwrap()
-        .parse()
-        .unwrap();
+    let manifest: toml::Table =
+        fs::read_to_string(dir.join("Cargo.toml")).unwrap().parse().unwrap();
     manifest
         .get("dependencies")
         .and_then(toml::Value::as_table)

@@ -44,10 +44,7 @@ pub fn check_in_browser(page: &str) {
     let shown = String::from_utf8_lossy(&output.stdout);
     assert!(shown.contains("</html>"), "the page was not opened");
     let log = String::from_utf8_lossy(&output.stderr);
-    let complaints: Vec<&str> = log
-        .lines()
-        .filter(|line| line.contains("CONSOLE"))
-        .collect();
+    let complaints: Vec<&str> = log.lines().filter(|line| line.contains("CONSOLE")).collect();
     assert!(complaints.is_empty(), "{complaints:#?}");
 }
 

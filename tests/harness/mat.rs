@@ -64,10 +64,7 @@ fn matrix(name: &str, value: &Mat) -> Vec<u8> {
         Mat::Structs(fields, values) => (2, vec![1, values.len() / fields.len()]),
         Mat::Numbers(sizes, _) => (6, sizes.clone()),
     };
-    let sizes: Vec<u8> = sizes
-        .iter()
-        .flat_map(|&it| (it as i32).to_le_bytes())
-        .collect();
+    let sizes: Vec<u8> = sizes.iter().flat_map(|&it| (it as i32).to_le_bytes()).collect();
     let mut body = element(6, &[class, 0, 0, 0, 0, 0, 0, 0]);
     body.extend(element(5, &sizes));
     body.extend(element(1, name.as_bytes()));

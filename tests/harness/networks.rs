@@ -13,8 +13,7 @@ pub fn of_colours() -> Network {
         Side::Fixed(3),
     ];
     net.inputs.push(("tile".to_owned(), tile.to_vec()));
-    net.outputs
-        .push(("sigma".to_owned(), vec![Side::Named("n"), Side::Fixed(2)]));
+    net.outputs.push(("sigma".to_owned(), vec![Side::Named("n"), Side::Fixed(2)]));
     net.floats("w", &[3, 2], vec![1.0, 2.0, 10.0, 20.0, 100.0, 200.0]);
     net.floats("b", &[2], vec![0.5, 0.25]);
     net.node("GlobalAveragePool", &["tile"], "mean", vec![]);

@@ -23,11 +23,7 @@ fn a_few_joints_lie_outside_by_no_more_than_two_pixels() {
     };
     let rows = |name: &str| -> Vec<String> {
         let people = read(&shared.join("data").join(name), &strict).unwrap();
-        people
-            .problems
-            .into_iter()
-            .map(|problem| problem.row)
-            .collect()
+        people.problems.into_iter().map(|problem| problem.row).collect()
     };
     assert_eq!(rows("parse"), ["person 15", "person 135"]);
     assert_eq!(rows("lspet"), ["person 3", "person 835"]);

@@ -209,9 +209,7 @@ pub(crate) fn compare(
         .zip(truth)
         // A joint that could not be triangulated counts as an error of one metre.
         .map(|(joint, truth)| {
-            joint
-                .as_ref()
-                .map_or(100.0, |it| 100.0 * (it.in_world - truth).norm())
+            joint.as_ref().map_or(100.0, |it| 100.0 * (it.in_world - truth).norm())
         })
         .collect();
     let mut errors = Errors {

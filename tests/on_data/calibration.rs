@@ -69,21 +69,12 @@ fn median(values: Vec<f64>) -> f64 {
 /// The reference of each frame, in the world of the rig: TRC (X, Y, Z) = world (y, z, x).
 fn reference(folder: &Path) -> Vec<[Point3<f64>; 21]> {
     let text = fs::read_to_string(folder.join("reference_0-69.trc")).unwrap();
-    let names: Vec<&str> = text
-        .lines()
-        .nth(3)
-        .unwrap()
-        .split_whitespace()
-        .skip(2)
-        .collect();
+    let names: Vec<&str> = text.lines().nth(3).unwrap().split_whitespace().skip(2).collect();
     assert_eq!(names, OPENPOSE.map(|(name, _)| name));
     let rows = text.lines().skip(5).filter(|line| !line.trim().is_empty());
     rows.map(|line| {
-        let row: Vec<f64> = line
-            .split_whitespace()
-            .skip(2)
-            .map(|number| number.parse().unwrap())
-            .collect();
+        let row: Vec<f64> =
+            line.split_whitespace().skip(2).map(|number| number.parse().unwrap()).collect();
         std::array::from_fn(|i| Point3::new(row[3 * i + 2], row[3 * i], row[3 * i + 1]))
     })
     .collect()
@@ -126,16 +117,10 @@ fn balancer(folder: &Path, rig: &Rig, truth: &[[Point3<f64>; 21]]) -> Vec<Vec<Pe
             }
         };
         let best = people.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        best.filter(|person| distance(person) < 200.0)
-            .unwrap_or([None; 21])
+        best.filter(|person| distance(person) < 200.0).unwrap_or([None; 21])
     };
     (0..truth.len())
-        .map(|frame| {
-            rig.cameras()
-                .iter()
-                .map(|camera| nearest(frame, camera))
-                .collect()
-        })
+        .map(|frame| rig.cameras().iter().map(|camera| nearest(frame, camera)).collect())
         .collect()
 }
 
@@ -164,9 +149,8 @@ fn fit(folder: &Path, rig: &Rig) -> Fit {
     for (truth, views) in truth.iter().zip(&seen) {
         for (joint, point) in truth.iter().enumerate() {
             let cameras = rig.cameras().iter().enumerate();
-            let used: Vec<_> = cameras
-                .filter_map(|(i, camera)| Some((i, camera, views[i][joint]?)))
-                .collect();
+            let used: Vec<_> =
+                cameras.filter_map(|(i, camera)| Some((i, camera, views[i][joint]?))).collect();
             let observations: Vec<Observation<'_>> = used
                 .iter()
                 .map(|&(_, camera, point_px)| Observation {
@@ -220,12 +204,7 @@ fn the_qualisys_file_and_the_toml_made_from_it_agree_except_for_the_distortion()
         assert_eq!(q.name, t.name);
         assert_eq!(q.intrinsics.size, t.intrinsics.size);
         assert!((q.intrinsics.matrix() - t.intrinsics.matrix()).norm() < 1e-6);
-        assert!(
-            q.camera_from_world
-                .rotation
-                .angle_to(&t.camera_from_world.rotation)
-                < 1e-7
-        );
+        assert!(q.camera_from_world.rotation.angle_to(&t.camera_from_world.rotation) < 1e-7);
         assert!((q.centre_in_world() - t.centre_in_world()).norm() < 1e-7);
         let pairs = q
             .intrinsics
@@ -363,10 +342,7 @@ fn the_rolls_are_those_of_the_reference_runs() {
     // Computed at the mid-hip of a frame, which is not exactly the focus of the rig; with the opposite sign.
     let expect: [f64; 4] = [-11.8, 2.3, 0.8, 27.9];
     assert!(
-        rolls
-            .iter()
-            .zip(expect)
-            .all(|(roll, expect)| (roll - expect).abs() < 3.0),
+        rolls.iter().zip(expect).all(|(roll, expect)| (roll - expect).abs() < 3.0),
         "{rolls:?}"
     );
 }
@@ -386,11 +362,7 @@ fn a_caliscope_rig_reproduces_the_spacing_of_its_board() {
 
     let (points, board) = board_corners(&folder.join("calibration/extrinsic/xy.csv"));
     let report = files::epipolar_check(&rig, &points);
-    let medians: Vec<f64> = report
-        .cameras
-        .iter()
-        .map(|camera| camera.median_px)
-        .collect();
+    let medians: Vec<f64> = report.cameras.iter().map(|camera| camera.median_px).collect();
     println!("epipolar {medians:.2?} px over {} corners", points.len());
     assert!(medians.len() == 4 && medians.iter().all(|median| *median < 2.0));
 
@@ -410,9 +382,7 @@ fn a_caliscope_rig_reproduces_the_spacing_of_its_board() {
                 .collect();
             Some((
                 place,
-                geometry::triangulate(&seen, &Settings::default())
-                    .ok()?
-                    .in_world,
+                geometry::triangulate(&seen, &Settings::default()).ok()?.in_world,
             ))
         })
         .collect();
@@ -433,14 +403,9 @@ type Views = Vec<Option<Point2<f64>>>;
 fn board_corners(path: &Path) -> (Vec<Views>, Vec<Corner>) {
     let mut corners = std::collections::BTreeMap::new();
     for line in fs::read_to_string(path).unwrap().lines().skip(1) {
-        let row: Vec<f64> = line
-            .split(',')
-            .map(|number| number.parse().unwrap())
-            .collect();
+        let row: Vec<f64> = line.split(',').map(|number| number.parse().unwrap()).collect();
         let place = Point2::new(row[8], row[9]);
-        let entry = corners
-            .entry((row[0] as u32, row[5] as u32))
-            .or_insert((vec![None; 4], place));
+        let entry = corners.entry((row[0] as u32, row[5] as u32)).or_insert((vec![None; 4], place));
         entry.0[row[1] as usize] = Some(Point2::new(row[6], row[7]));
     }
     corners

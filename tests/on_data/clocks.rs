@@ -26,11 +26,7 @@ pub(crate) fn recorded(shared: &std::path::Path) -> (Vec<Film>, usize) {
                 score: it.score,
             };
             let people = found.iter().map(|person| Person {
-                joints: person
-                    .keypoints
-                    .iter()
-                    .map(|it| it.as_ref().map(joint))
-                    .collect(),
+                joints: person.keypoints.iter().map(|it| it.as_ref().map(joint)).collect(),
             });
             Shot {
                 time_s: frame as f64 / RATE_HZ,
@@ -55,9 +51,7 @@ fn resampled(film: &Film, first: f64, pace: f64) -> Film {
         let people = film.shots[frame].people.iter();
         Shot {
             time_s: nth as f64 / RATE_HZ,
-            people: people
-                .filter_map(|it| between(it, &next.people, share))
-                .collect(),
+            people: people.filter_map(|it| between(it, &next.people, share)).collect(),
         }
     });
     Film {
@@ -76,9 +70,7 @@ fn between(person: &Person, next: &[Person], share: f64) -> Option<Person> {
     };
     let apart = |other: &&Person| {
         let each = pairs(other);
-        let away = each
-            .iter()
-            .map(|(a, b)| (a.at[0] - b.at[0]).hypot(a.at[1] - b.at[1]));
+        let away = each.iter().map(|(a, b)| (a.at[0] - b.at[0]).hypot(a.at[1] - b.at[1]));
         away.sum::<f64>() / each.len().max(1) as f64
     };
     let other = next.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
@@ -124,9 +116,8 @@ fn shifts_of_the_balancing_cameras_are_found_within_five_milliseconds() {
             })
             .collect();
         let shifted = films.iter().zip(&clocks);
-        let shifted: Vec<Film> = shifted
-            .map(|(it, [first, pace])| resampled(it, *first, *pace))
-            .collect();
+        let shifted: Vec<Film> =
+            shifted.map(|(it, [first, pace])| resampled(it, *first, *pace)).collect();
         let settings = Settings {
             reference: 0,
             window_s: if seed < 15 { 2.0 } else { 10.0 },

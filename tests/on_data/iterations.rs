@@ -162,12 +162,7 @@ fn describe(effort: &SolveStatistics) -> String {
 
 /// Checks and measures all pairs of some shots from their joint start.
 fn measure(name: &str, solver: &Solver, shots: &[Shot], tables: Option<&TypeTables>) {
-    let pool = |n| {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(n)
-            .build()
-            .unwrap()
-    };
+    let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
     let pools = [1, 2].map(pool);
     let answers: Vec<_> = shots.iter().map(Shot::answer).collect();
     let start = choose_start(&Settings::default(), &answers, &|_, _| tables);

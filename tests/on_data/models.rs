@@ -123,9 +123,7 @@ fn a_model_with_an_inconsistent_header_is_refused() {
     let whole = fs::read_to_string(path).unwrap();
     let error = |from: &str, to: &str| {
         assert!(whole.contains(from), "{from}");
-        text::parse(&whole.replacen(from, to, 1))
-            .unwrap_err()
-            .to_string()
+        text::parse(&whole.replacen(from, to, 1)).unwrap_err().to_string()
     };
     assert_eq!(
         error("filtersSz 156", "filtersSz 157"),
@@ -179,9 +177,7 @@ fn rows_of_a_type_table_belong_to_the_first_view_of_its_name() {
         return;
     };
     let (joint, _) = Compatibility::joint_from_conditionals(&there, &back).unwrap();
-    let path = shared_dir()
-        .unwrap()
-        .join("reference/multi_view/mvptc_C1_C2.json");
+    let path = shared_dir().unwrap().join("reference/multi_view/mvptc_C1_C2.json");
     let run: serde_json::Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
     let types = |view: &str, part: usize| {
         let found = run["solo"][view]["parts"][part]["type"].as_u64().unwrap();
@@ -189,12 +185,7 @@ fn rows_of_a_type_table_belong_to_the_first_view_of_its_name() {
     };
     let log_likelihood = |rows: &str, cols: &str| -> f64 {
         (0..26)
-            .map(|part| {
-                joint
-                    .value(part, types(rows, part), types(cols, part))
-                    .max(1e-4)
-                    .ln()
-            })
+            .map(|part| joint.value(part, types(rows, part), types(cols, part)).max(1e-4).ln())
             .sum()
     };
     let evidence = log_likelihood("A", "B") - log_likelihood("B", "A");
@@ -236,11 +227,7 @@ fn the_thresholds_switch_off_the_documented_share_of_parts() {
             let keys: Vec<&str> = line.split(',').take(4).collect();
             let frame = keys[2].parse().unwrap();
             let sigma = table.get(keys[0], keys[1], frame, keys[3]).unwrap();
-            off += sigma
-                .iter()
-                .zip(tau.px())
-                .filter(|(sigma, tau)| sigma > tau)
-                .count();
+            off += sigma.iter().zip(tau.px()).filter(|(sigma, tau)| sigma > tau).count();
         }
         100.0 * off as f64 / (26 * table.n_rows()) as f64
     };

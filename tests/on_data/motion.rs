@@ -105,14 +105,8 @@ fn height_and_leg_noise(motion: &Motion) -> (f64, f64) {
         let square = (0..3).map(|it| (a[it] - b[it]).powi(2));
         square.sum::<f64>().sqrt()
     };
-    let tops = motion
-        .joints
-        .iter()
-        .map(|it| it[13][2] - it[0][2].min(it[5][2]));
-    let shins = motion
-        .joints
-        .iter()
-        .map(|it| norm(it[3], it[4]) + norm(it[4], it[5]));
+    let tops = motion.joints.iter().map(|it| it[13][2] - it[0][2].min(it[5][2]));
+    let shins = motion.joints.iter().map(|it| norm(it[3], it[4]) + norm(it[4], it[5]));
     let mut shins: Vec<f64> = shins.collect();
     shins.sort_by(f64::total_cmp);
     let at = |share: f64| shins[(share * (shins.len() - 1) as f64) as usize];

@@ -136,9 +136,7 @@ fn the_heat_map_of_a_line_agrees_with_the_program() {
         assert_eq!(theirs.shape, [rows, cols]);
         let ours = heat_map(ends, [640, 480], rows, cols);
         let off = ours.iter().zip(&theirs.values);
-        let off = off
-            .map(|(a, b)| (f64::from(*a) - b).abs())
-            .fold(0.0, f64::max);
+        let off = off.map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max);
         println!("{rows}x{cols}: {off:.1e}");
         assert!(off < 2e-6, "{rows}x{cols}: {off:.1e}");
     }
@@ -160,9 +158,7 @@ impl Pair {
             let picture = Picture::read(path);
             Evidence::of(&extractor, solver.model(), &picture)
         });
-        let solo = evidence
-            .each_ref()
-            .map(|it| solver.best(&it.view(), None).unwrap());
+        let solo = evidence.each_ref().map(|it| solver.best(&it.view(), None).unwrap());
         let plans = [0, 1].map(|view| {
             let layout = Arc::new(evidence[view].view().layout().clone());
             ViewPlan::new(cameras[view].clone(), Arc::clone(solver.model()), layout)

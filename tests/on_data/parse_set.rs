@@ -99,10 +99,6 @@ fn outcome(model: &Model, solver: &Solver, evidence: &Evidence, theirs: &Value) 
         theirs_covering: joints_of(&parts_of(&theirs["best_overlapping_gt_box"])),
         score_off: f64::from(pose.score) - number(&best["score"]),
         same_level: best["level"].as_u64() == Some(u64::from(pose.level) + 1),
-        same_parts: our_parts
-            .iter()
-            .zip(&their_parts)
-            .filter(|it| near(*it))
-            .count(),
+        same_parts: our_parts.iter().zip(&their_parts).filter(|it| near(*it)).count(),
     }
 }

@@ -37,10 +37,7 @@ fn in_order(films: &[Film]) -> (Vec<Film>, Vec<usize>) {
     assert!(rows.iter().all(|it| it.len() == 1));
     let joint = |person: &Person, row: &[(usize, f64)]| person.joints[row[0].0];
     let person = |it: &Person| Person {
-        joints: rows
-            .iter()
-            .map(|row| joint(it, row))
-            .collect::<Vec<Option<Joint>>>(),
+        joints: rows.iter().map(|row| joint(it, row)).collect::<Vec<Option<Joint>>>(),
     };
     let shot = |it: &Shot| Shot {
         time_s: it.time_s,

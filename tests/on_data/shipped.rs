@@ -35,9 +35,7 @@ fn the_shipped_model_has_the_accuracy_of_its_card() {
         let mut values = vec![0.0; layout.n_responses()];
         extractor.responses(picture.view(), &layout, &mut values);
         let levels: Vec<u16> = (0..layout.levels.len() as u16).collect();
-        let pose = solver
-            .best(&Responses::new(&layout, &values, &levels), None)
-            .unwrap();
+        let pose = solver.best(&Responses::new(&layout, &values, &levels), None).unwrap();
         let found = PARSE14.from_parts(&pose.centres(&model, &layout));
         let truth = Joints::try_from(person.joints.clone()).unwrap();
         (Joints::try_from(found).unwrap(), truth)

@@ -21,10 +21,7 @@ fn differences(picture: &Picture, model: &Arc<Model>) -> [f64; 3] {
     let (mut largest, mut squares, mut n, mut score) = (0.0_f64, 0.0, 0, 0.0_f64);
     for level in 0..tiled.layout().levels.len() {
         for filter in 0..model.n_filters() {
-            let pairs = tiled
-                .map(level, filter)
-                .iter()
-                .zip(direct.map(level, filter));
+            let pairs = tiled.map(level, filter).iter().zip(direct.map(level, filter));
             for (a, b) in pairs {
                 let off = f64::from(a - b).abs();
                 largest = largest.max(off);

@@ -56,10 +56,7 @@ struct Motion {
 }
 
 fn body(person: &Value) -> Option<(u64, Body)> {
-    let numbers = person["joints19"]
-        .as_array()?
-        .iter()
-        .filter_map(Value::as_f64);
+    let numbers = person["joints19"].as_array()?.iter().filter_map(Value::as_f64);
     let numbers: Vec<f64> = numbers.collect();
     let joint = |nth: usize| {
         let [x, y, z, confidence] = *numbers.get(4 * nth..4 * nth + 4)? else {
@@ -99,10 +96,7 @@ impl Motion {
             let instants: Vec<Vec<(u64, Body)>> = instants.collect();
             for (id, _) in &instants[0] {
                 let of_id = |people: &Vec<(u64, Body)>| {
-                    people
-                        .iter()
-                        .find(|(other, _)| other == id)
-                        .map(|(_, body)| *body)
+                    people.iter().find(|(other, _)| other == id).map(|(_, body)| *body)
                 };
                 let clip: Vec<Body> = instants.iter().filter_map(of_id).collect();
                 if clip.len() == N_INSTANTS {
@@ -131,10 +125,7 @@ impl Motion {
                 &Vector3::y_axis(),
                 random.f64() * std::f64::consts::TAU,
             );
-            let middle = clip[0][NECK]
-                .unwrap()
-                .coords
-                .component_mul(&Vector3::new(1.0, 0.0, 1.0));
+            let middle = clip[0][NECK].unwrap().coords.component_mul(&Vector3::new(1.0, 0.0, 1.0));
             let moved =
                 |body: &Body| body.map(|joint| joint.map(|point| turn * (point - middle) + place));
             people.push(clip.iter().map(moved).collect());
@@ -148,25 +139,20 @@ impl Motion {
 fn is_hidden(camera: &Camera, joint: &Point3<f64>, nth: usize, people: &[Body]) -> bool {
     let from = camera.centre_in_world();
     let ray = (joint - from).try_normalize(1e-9).unwrap();
-    people
-        .iter()
-        .enumerate()
-        .filter(|(other, _)| *other != nth)
-        .any(|(_, other)| {
-            let [Some(neck), Some(right), Some(left)] =
-                [other[NECK], other[HIPS[0]], other[HIPS[1]]]
-            else {
-                return false;
-            };
-            let hips = nalgebra::center(&right, &left);
-            (0..=8).any(|step| {
-                let point = neck + (hips - neck) * (f64::from(step) / 8.0);
-                let along = (point - from).dot(&ray);
-                along > 0.0
-                    && along < (joint - from).norm() - TRUNK_M
-                    && (point - from - ray * along).norm() < TRUNK_M
-            })
+    people.iter().enumerate().filter(|(other, _)| *other != nth).any(|(_, other)| {
+        let [Some(neck), Some(right), Some(left)] = [other[NECK], other[HIPS[0]], other[HIPS[1]]]
+        else {
+            return false;
+        };
+        let hips = nalgebra::center(&right, &left);
+        (0..=8).any(|step| {
+            let point = neck + (hips - neck) * (f64::from(step) / 8.0);
+            let along = (point - from).dot(&ray);
+            along > 0.0
+                && along < (joint - from).norm() - TRUNK_M
+                && (point - from - ray * along).norm() < TRUNK_M
         })
+    })
 }
 
 /// Shows each person to a view; nothing of one who is hidden.
@@ -334,10 +320,8 @@ fn two_to_eight_people_are_told_apart_in_the_views_of_real_cameras() {
             n_views,
             noise_m: noise_mm / 1e3,
         };
-        let draws: Vec<Vec<Pairs>> = pairs(&motion, setting, 60)
-            .into_iter()
-            .map(|pairs| vec![pairs])
-            .collect();
+        let draws: Vec<Vec<Pairs>> =
+            pairs(&motion, setting, 60).into_iter().map(|pairs| vec![pairs]).collect();
         let of = |nth: usize| {
             move |pairs: &[Pairs]| {
                 let sum = |of: fn(&Pairs) -> usize| pairs.iter().map(of).sum();

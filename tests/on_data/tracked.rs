@@ -169,9 +169,8 @@ fn fused(
     let mut estimator = Estimator::new(model, &clip.cameras, rig.up_in_world(), &settings).unwrap();
     let mut all = crate::balancing::Errors::default();
     for (frame, truth) in truth.iter().enumerate().take(N_FUSED) {
-        let images: Vec<_> = (0..clip.cameras.len())
-            .map(|view| Some(image(clip, view, frame)))
-            .collect();
+        let images: Vec<_> =
+            (0..clip.cameras.len()).map(|view| Some(image(clip, view, frame))).collect();
         let got = estimator.estimate(&images, &vec![None; images.len()]);
         let errors = compare(&got, &estimator, &clip.cameras, truth);
         all.joints_cm.extend(errors.joints_cm);

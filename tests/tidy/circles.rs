@@ -33,10 +33,8 @@ struct Import {
 /// * `files`: all in it.
 pub(crate) fn of_crate(src: &Path, files: &[PathBuf]) -> Vec<Vec<String>> {
     let sources = sources(src, files);
-    let exports: BTreeMap<&Module, Exports> = sources
-        .iter()
-        .map(|(module, text)| (module, exports(module, text)))
-        .collect();
+    let exports: BTreeMap<&Module, Exports> =
+        sources.iter().map(|(module, text)| (module, exports(module, text))).collect();
     let needs: BTreeMap<&Module, BTreeSet<&Module>> = sources
         .iter()
         .map(|(module, text)| {
@@ -68,10 +66,7 @@ fn sources(src: &Path, files: &[PathBuf]) -> BTreeMap<Module, String> {
 
 fn module_of(file: &Path) -> Module {
     let name = file.with_extension("");
-    let mut parts: Module = name
-        .iter()
-        .map(|part| part.to_string_lossy().into_owned())
-        .collect();
+    let mut parts: Module = name.iter().map(|part| part.to_string_lossy().into_owned()).collect();
     let is_root = parts.len() == 1 && ["lib", "main"].contains(&parts[0].as_str());
     if is_root || parts.last().is_some_and(|it| it == "mod") {
         parts.pop();
@@ -83,9 +78,7 @@ fn module_of(file: &Path) -> Module {
 fn code(text: &str) -> (String, Vec<String>) {
     let mut tests = Vec::new();
     let mut kept = String::new();
-    let mut lines = text
-        .lines()
-        .map(|line| line.split("//").next().unwrap_or_default().trim_end());
+    let mut lines = text.lines().map(|line| line.split("//").next().unwrap_or_default().trim_end());
     while let Some(line) = lines.next() {
         let indent = line.len() - line.trim_start().len();
         if line.trim() != "#[cfg(test)]" {
@@ -276,10 +269,8 @@ fn circles(needs: &BTreeMap<&Module, BTreeSet<&Module>>) -> Vec<Vec<String>> {
         }
         reached
     };
-    let reached: BTreeMap<&Module, BTreeSet<&Module>> = needs
-        .keys()
-        .map(|module| (*module, reach(module)))
-        .collect();
+    let reached: BTreeMap<&Module, BTreeSet<&Module>> =
+        needs.keys().map(|module| (*module, reach(module))).collect();
     let mut seen: BTreeSet<&Module> = BTreeSet::new();
     let mut circles = Vec::new();
     for (module, reachable) in &reached {

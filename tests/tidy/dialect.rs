@@ -17,18 +17,13 @@ pub(crate) fn count(files: &[PathBuf]) -> usize {
 
 fn in_line(line: &str) -> usize {
     let line = line.trim_start();
-    let doc = ["/// ", "//! "]
-        .iter()
-        .find_map(|mark| line.strip_prefix(mark));
+    let doc = ["/// ", "//! "].iter().find_map(|mark| line.strip_prefix(mark));
     if let Some(doc) = doc {
         let begins = ["What ", "Whether ", "Of ", "Whoever ", "Wherever "];
         return usize::from(begins.iter().any(|word| doc.starts_with(word)));
     }
     let closures = ["|it|", "|&it|", "|it:", "|mut it|", "|(it,"];
-    let n_closures: usize = closures
-        .iter()
-        .map(|closure| line.matches(closure).count())
-        .sum();
+    let n_closures: usize = closures.iter().map(|closure| line.matches(closure).count()).sum();
     n_closures + usize::from(line.contains("fn of("))
 }
 

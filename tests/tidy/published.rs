@@ -45,9 +45,7 @@ pub(crate) fn versions(root: &Path) -> [String; 3] {
     let workspace = table(&root.join("Cargo.toml"));
     let python = table(&root.join("python/pyproject.toml"));
     let module = fs::read_to_string(root.join("python/parallax_client/__init__.py")).unwrap();
-    let line = module
-        .lines()
-        .find_map(|line| line.strip_prefix("__version__ = "));
+    let line = module.lines().find_map(|line| line.strip_prefix("__version__ = "));
     [
         text(&workspace["workspace"]["package"]["version"]),
         text(&python["project"]["version"]),

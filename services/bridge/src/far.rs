@@ -384,8 +384,7 @@ impl Sending<'_> {
         };
         let address = &self.job.address;
         let topic = Topics::of(&address.deployment).data(&address.host);
-        self.link
-            .send(&topic, Packet { head, body }.to_bytes(), false);
+        self.link.send(&topic, Packet { head, body }.to_bytes(), false);
         self.service.health().sent(stamp.frame);
     }
 }

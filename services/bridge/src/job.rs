@@ -96,7 +96,6 @@ impl Job {
 
     /// The frame of the footage at an instant.
     pub(crate) fn frame(&self, nth: u64) -> u64 {
-        self.start_frame
-            .saturating_add(nth.saturating_mul(self.frame_step))
+        self.start_frame.saturating_add(nth.saturating_mul(self.frame_step))
     }
 }

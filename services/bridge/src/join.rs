@@ -101,11 +101,7 @@ pub fn join(
         link.send(&topics.up(&address.host), ping.to_bytes().to_vec(), true);
         std::thread::sleep(ASK_EVERY);
     };
-    let clock = heard
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .clock
-        .clone();
+    let clock = heard.lock().unwrap_or_else(PoisonError::into_inner).clock.clone();
     link.close();
     Ok(Some(begin(&clock, welcome)))
 }
@@ -113,9 +109,7 @@ pub fn join(
 /// When a run began, by our clock.
 fn begin(clock: &Clock, welcome: Welcome) -> u64 {
     let now = now_nanos();
-    clock
-        .estimate(now)
-        .map_or(now, |it| it.ours(welcome.session))
+    clock.estimate(now).map_or(now, |it| it.ours(welcome.session))
 }
 
 fn listen(

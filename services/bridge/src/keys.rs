@@ -146,8 +146,7 @@ fn write_private(file: &Path, text: &str) -> Result<(), KeyError> {
     }
     let mut options = std::fs::File::options();
     let open = options.write(true).create_new(true).mode(0o600).open(file);
-    open.and_then(|mut it| it.write_all(text.as_bytes()))
-        .map_err(failed)
+    open.and_then(|mut it| it.write_all(text.as_bytes())).map_err(failed)
 }
 
 #[cfg(test)]

@@ -49,10 +49,7 @@ impl Link {
             Priority::Data
         };
         let put = self.0.put(key, bytes);
-        let put = put
-            .congestion_control(CongestionControl::Drop)
-            .priority(priority)
-            .express(true);
+        let put = put.congestion_control(CongestionControl::Drop).priority(priority).express(true);
         if let Err(error) = put.wait() {
             tracing::debug!(%error, key, "not sent");
         }
@@ -262,10 +259,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let names = ["desk", "rack", "shelf"];
         let of_desk = vec!["127.0.0.1".to_owned()];
-        let made: Vec<(String, Vec<String>)> = names
-            .iter()
-            .map(|it| ((*it).to_owned(), of_desk.clone()))
-            .collect();
+        let made: Vec<(String, Vec<String>)> =
+            names.iter().map(|it| ((*it).to_owned(), of_desk.clone())).collect();
         crate::keys::make_keys(folder.path(), &made).unwrap();
         let at = format!("127.0.0.1:{}", port());
         // `who` has the certificate of `keys`.

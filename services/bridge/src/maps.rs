@@ -63,10 +63,7 @@ impl ViewMaps {
             first_px: maps.grid().first_px,
             cell_px: maps.grid().cell_px,
             size: maps.grid().size.map(|side| side as u32),
-            gaussians: bumps(maps, &MapSettings::default())
-                .into_iter()
-                .map(gaussian)
-                .collect(),
+            gaussians: bumps(maps, &MapSettings::default()).into_iter().map(gaussian).collect(),
         });
         let maps = Maps {
             people: people.collect(),
@@ -202,9 +199,7 @@ mod tests {
         let checked = view.unpack(&maps().to_bytes()).unwrap();
         let mut values = vec![0.0; checked.n_values()];
         let header = checked.fill(&mut values);
-        let again = view
-            .unpack(&ViewMaps::pack(&header, &values).unwrap())
-            .unwrap();
+        let again = view.unpack(&ViewMaps::pack(&header, &values).unwrap()).unwrap();
         let mut others = vec![0.0; again.n_values()];
         assert_eq!(again.fill(&mut others), header);
         let settings = MapSettings::default();

@@ -107,12 +107,7 @@ pub(crate) fn run(service: &Service, job: &Job, role: &Near) -> Result<(), Failu
         it.write_report(false);
     }
     it.write_report(true);
-    let n_connected = || {
-        it.views
-            .iter()
-            .map(|view| view.publisher.n_connected())
-            .sum()
-    };
+    let n_connected = || it.views.iter().map(|view| view.publisher.n_connected()).sum();
     let send_ends = || it.views.iter().try_for_each(|view| it.end(view));
     stage.end_with(n_connected, send_ends)
 }
@@ -216,15 +211,10 @@ impl Receiving<'_> {
         let times = |nth: u64| Times::of(&arrived.head, &clock, instant, grid.at(nth));
         if arrived.is_beside() {
             let nth = it.arrivals.nearest(instant);
-            return it
-                .publisher
-                .send(service, job.frame(nth), arrived, &times(nth));
+            return it.publisher.send(service, job.frame(nth), arrived, &times(nth));
         }
         if arrived.head.status == Status::END {
-            let end = it
-                .arrivals
-                .nearest(instant)
-                .clamp(it.arrivals.next(), self.role.n_frames);
+            let end = it.arrivals.nearest(instant).clamp(it.arrivals.next(), self.role.n_frames);
             it.end = Some(end);
             return self.end_if_over(index);
         }
@@ -232,12 +222,10 @@ impl Receiving<'_> {
             Place::Frame(nth) => {
                 while it.arrivals.next() < nth {
                     let frame = job.frame(it.arrivals.next());
-                    it.publisher
-                        .send_nothing(service, frame, Gap::LeftOut.status())?;
+                    it.publisher.send_nothing(service, frame, Gap::LeftOut.status())?;
                     it.arrivals.gave_up(Gap::LeftOut);
                 }
-                it.publisher
-                    .send(service, job.frame(nth), arrived, &times(nth))?;
+                it.publisher.send(service, job.frame(nth), arrived, &times(nth))?;
                 it.arrivals.used();
                 health.sent(job.frame(nth));
                 self.report.took(it.index, arrived, &clock);
@@ -258,8 +246,7 @@ impl Receiving<'_> {
                 && let Some(gap) = it.arrivals.overdue(now, is_there)
             {
                 let frame = self.job.frame(it.arrivals.next());
-                it.publisher
-                    .send_nothing(self.service, frame, gap.status())?;
+                it.publisher.send_nothing(self.service, frame, gap.status())?;
                 it.arrivals.gave_up(gap);
                 self.service.health().sent(frame);
             }
@@ -282,8 +269,7 @@ impl Receiving<'_> {
 
     fn end(&self, view: &View) -> Result<(), Failure> {
         let frame = self.job.frame(view.end.unwrap_or(view.arrivals.next()));
-        view.publisher
-            .send_nothing(self.service, frame, Status::END)
+        view.publisher.send_nothing(self.service, frame, Status::END)
     }
 
     /// Logs hosts that come and go, and clocks that are not known well enough.
@@ -301,11 +287,7 @@ impl Receiving<'_> {
         if !is_last && !self.report.is_due(REPORT_EVERY) {
             return;
         }
-        let views = self
-            .views
-            .iter()
-            .map(|it| (it.index, it.remote, it.arrivals.tally()));
-        self.report
-            .write(&self.remotes, &views.collect::<Vec<_>>(), is_last);
+        let views = self.views.iter().map(|it| (it.index, it.remote, it.arrivals.tally()));
+        self.report.write(&self.remotes, &views.collect::<Vec<_>>(), is_last);
     }
 }

@@ -105,16 +105,13 @@ impl<'a> Camera<'a> {
 
     /// Waits for the receivers, then skips the frames that earlier epochs of this process have sent. Returns how many.
     pub(crate) fn resume(&mut self, supply: &mut Supply) -> u64 {
-        self.wait_for_receivers()
-            .map_or(0, |sent| supply.skip(sent))
+        self.wait_for_receivers().map_or(0, |sent| supply.skip(sent))
     }
 
     /// Waits for the receivers. Returns how many frames earlier epochs of this process have sent, if there were some.
     pub(crate) fn wait_for_receivers(&mut self) -> Option<u64> {
         let patience = self.service.patience_at_start(self.job.patience);
-        let n = self
-            .publisher
-            .wait_for_subscribers(self.n_expected, patience);
+        let n = self.publisher.wait_for_subscribers(self.n_expected, patience);
         if n < self.n_expected {
             tracing::warn!(
                 n,
@@ -203,9 +200,7 @@ impl<'a> Camera<'a> {
             if self.job.mode == Mode::Realtime || n >= self.n_expected {
                 break;
             }
-            let n = self
-                .publisher
-                .wait_for_subscribers(self.n_expected, self.job.patience);
+            let n = self.publisher.wait_for_subscribers(self.n_expected, self.job.patience);
             if self.service.stop().is_requested() {
                 break;
             }
@@ -219,9 +214,8 @@ impl<'a> Camera<'a> {
                 break;
             }
         }
-        self.n_expected = self
-            .n_expected
-            .max(self.publisher.n_connected().min(self.job.n_consumers));
+        self.n_expected =
+            self.n_expected.max(self.publisher.n_connected().min(self.job.n_consumers));
         let health = self.service.health();
         health.sent(index);
         health.passed(&Passage {

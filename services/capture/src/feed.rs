@@ -95,16 +95,9 @@ impl Feed {
         }
         let address = address(spec)?;
         let in_scene = |source: SceneError| failed(spec, source);
-        let rig = address
-            .settings
-            .rig
-            .rig()
-            .map_err(|error| in_scene(error.into()))?;
+        let rig = address.settings.rig.rig().map_err(|error| in_scene(error.into()))?;
         let camera = scene::camera_of(&rig, &address.camera).map_err(in_scene)?;
-        let [width, height] = rig.cameras()[camera]
-            .intrinsics
-            .size
-            .map(|side| side as usize);
+        let [width, height] = rig.cameras()[camera].intrinsics.size.map(|side| side as usize);
         info(spec, &address, Size::new(width, height))
     }
 

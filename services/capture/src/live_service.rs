@@ -107,10 +107,7 @@ impl Live<'_, '_> {
 
     /// Sends a picture at its instant, and says of those before it that they were left out.
     fn take(&mut self, picture: &Picture, n_frames: u64) -> Result<(), Failure> {
-        if let Some(why) = self
-            .grid
-            .wrong_clock(picture.at_nanos, picture.arrived_at_nanos)
-        {
+        if let Some(why) = self.grid.wrong_clock(picture.at_nanos, picture.arrived_at_nanos) {
             (self.refused, self.counts.n_refused) = (Some(why), self.counts.n_refused + 1);
             return Ok(());
         }

@@ -52,11 +52,8 @@ impl Worker<'_> {
     ) -> Result<(), Failure> {
         let (answers, sigma_ages) = self.answers(frame);
         let others = following.others(&self.job.plans, &answers);
-        let samples: Vec<Option<Ref<'_, Sample<f32, EvidenceHeader>>>> = self
-            .evidence
-            .iter()
-            .map(|held| held.as_ref()?.of(frame.number()))
-            .collect();
+        let samples: Vec<Option<Ref<'_, Sample<f32, EvidenceHeader>>>> =
+            self.evidence.iter().map(|held| held.as_ref()?.of(frame.number())).collect();
         let evidence = samples.iter().enumerate();
         let evidence =
             evidence.map(|(view, sample)| self.evidence_of(view, sample.as_deref()?, &answers));

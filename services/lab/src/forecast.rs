@@ -134,9 +134,7 @@ fn with_views(costs: &Costs, load: &Load, near: usize, n_far: usize) -> Forecast
         latency_ms: capture + pose + fusing + link_ms,
         link_ms,
         fits: cores.into_iter().all(is_free)
-            && bytes_s
-                .into_iter()
-                .all(|it| it <= 0.8 * load.network_bytes_s),
+            && bytes_s.into_iter().all(|it| it <= 0.8 * load.network_bytes_s),
     }
 }
 

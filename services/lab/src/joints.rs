@@ -96,9 +96,7 @@ fn found(
             console.message(&format!("left out: {problem}: {}", problem.fault));
         }
         let people = read.people.into_iter();
-        let people: Vec<Person> = people
-            .map(|it| sides.of(it, table.joint_mirror()))
-            .collect();
+        let people: Vec<Person> = people.map(|it| sides.of(it, table.joint_mirror())).collect();
         let marked: Result<Vec<Option<Marked>>, Failure> = people
             .par_iter()
             .map(|person| {

@@ -164,9 +164,8 @@ fn around(model: &fmp::Model, pose: &Pose, layout: &Layout) -> (f64, [f64; 4]) {
 pub fn numbers(report: &Report) -> Value {
     let sticks = |rule: PcpRule| {
         let each = PARSE_STICKS.iter().zip(report.sticks(rule));
-        let mut value: serde_json::Map<String, Value> = each
-            .map(|(stick, it)| (stick.0.to_owned(), it.percent().into()))
-            .collect();
+        let mut value: serde_json::Map<String, Value> =
+            each.map(|(stick, it)| (stick.0.to_owned(), it.percent().into())).collect();
         value.insert("total".to_owned(), report.pcp(rule).percent().into());
         value
     };

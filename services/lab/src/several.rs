@@ -45,9 +45,7 @@ pub fn run(set: &Shelf) -> Run {
         let n_views = |person: &Person| person.detections.iter().flatten().count();
         people.retain(|person| n_views(person) >= LEAST_VIEWS);
         let solved = solver.step(time_s, &people, frame);
-        let put = solved
-            .iter()
-            .map(|person| Put::new(person.id, &person.joints));
+        let put = solved.iter().map(|person| Put::new(person.id, &person.joints));
         run.score.add(truth, &put.collect::<Vec<Put>>());
     }
     run

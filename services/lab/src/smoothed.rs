@@ -145,9 +145,7 @@ pub fn compare(
         block: rate_hz.round().max(1.0) as usize,
         ..Bootstrap::default()
     };
-    let n = tried
-        .first()
-        .map_or(0.0, |it| it.iter().map(|it| it.0.position_m.n).sum());
+    let n = tried.first().map_or(0.0, |it| it.iter().map(|it| it.0.position_m.n).sum());
     Comparison {
         n_compared: n as usize,
         rows: rows(&tried, &bootstrap),
@@ -180,18 +178,11 @@ fn tried(
     for (joint, truth) in truth.iter().enumerate() {
         let path = |track: &Option<Motion>| -> Option<Vec<Option<Vector3<f64>>>> {
             let track = &track.as_ref()?.joints[joint];
-            Some(
-                track
-                    .iter()
-                    .map(|it| it.ok().map(|it| it.position))
-                    .collect(),
-            )
+            Some(track.iter().map(|it| it.ok().map(|it| it.position)).collect())
         };
         let paths: Vec<_> = tracks.iter().map(path).collect();
         let has_all = |at: usize| paths.iter().flatten().all(|it| it[at].is_some());
-        let counted: Vec<bool> = (0..n)
-            .map(|at| truth[at].is_some() && has_all(at))
-            .collect();
+        let counted: Vec<bool> = (0..n).map(|at| truth[at].is_some() && has_all(at)).collect();
         for (path, tried) in paths.iter().zip(&mut all) {
             let Some(path) = path else { continue };
             let mut errors = vec![Errors::default(); n];

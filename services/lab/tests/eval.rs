@@ -271,9 +271,7 @@ fn an_unusable_consistency_file_is_refused() {
     let ended = case.start(&out).wait();
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(ended.stderr.contains("nobody is left"), "{}", ended.stderr);
-    let ended = case
-        .start(&[&out[..], &["--hold-out", "eve"]].concat())
-        .wait();
+    let ended = case.start(&[&out[..], &["--hold-out", "eve"]].concat()).wait();
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(
         ended.stderr.contains("no subject \"eve\""),

@@ -24,13 +24,9 @@ set = "lsp-14"
 /// Fourteen mixtures of the means of red, green and blue in blocks of four by four pixels.
 fn network() -> Network {
     let mut net = Network::default();
-    net.inputs
-        .push(("picture".to_owned(), sides([1, 3, 64, 48])));
-    net.outputs
-        .push(("maps".to_owned(), sides([1, 14, 16, 12])));
-    let weights = (0..14 * 3)
-        .map(|it| (it * 5 % 7) as f32 / 7.0 - 0.3)
-        .collect();
+    net.inputs.push(("picture".to_owned(), sides([1, 3, 64, 48])));
+    net.outputs.push(("maps".to_owned(), sides([1, 14, 16, 12])));
+    let weights = (0..14 * 3).map(|it| (it * 5 % 7) as f32 / 7.0 - 0.3).collect();
     net.floats("weights", &[14, 3, 1, 1], weights);
     let four = || Attribute::Ints(vec![4, 4]);
     let attributes = vec![("kernel_shape", four()), ("strides", four())];
@@ -48,9 +44,7 @@ fn detector(score: f32) -> Network {
 /// Three views of a synthetic person, the networks and their cards.
 fn case(name: &str, score: f32) -> Case {
     let case = Case::new(name, &[1, 1], PLAIN);
-    let made = case
-        .start(&["synth", "people", "--rig", "ring:3", "--frames", "2"])
-        .wait();
+    let made = case.start(&["synth", "people", "--rig", "ring:3", "--frames", "2"]).wait();
     assert_eq!(made.status.code(), Some(0), "{}", made.stderr);
     case.write("net.onnx", network().file());
     case.write("net.toml", CARD);
@@ -108,8 +102,7 @@ fn a_detector_that_finds_nobody_leaves_every_joint_unfound() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let rows: Vec<Value> = serde_json::from_str(ended.stdout.trim()).unwrap();
     assert!(
-        rows.iter()
-            .all(|it| it["pcp3d"] == 0.0 && it["limbs_mm"] == 2000.0),
+        rows.iter().all(|it| it["pcp3d"] == 0.0 && it["limbs_mm"] == 2000.0),
         "{rows:?}"
     );
 }
@@ -145,8 +138,6 @@ fn what_cannot_be_judged_is_refused() {
         4,
         "[1, 3, 64, 64], but the card says [1, 3, 64, 96]",
     );
-    let without = case
-        .start(&["eval", "people", "--out", "out", "--stress", "all"])
-        .wait();
+    let without = case.start(&["eval", "people", "--out", "out", "--stress", "all"]).wait();
     assert_eq!(without.status.code(), Some(2), "{}", without.stderr);
 }

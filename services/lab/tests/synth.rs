@@ -180,12 +180,7 @@ fn a_live_scene_keeps_up_with_the_clock() {
     let shots = || -> Vec<(f64, f64)> {
         let views = lines().into_iter().flat_map(|line| {
             let frame = line["frame"].as_f64().unwrap();
-            let views: Vec<_> = line["views"]
-                .as_object()
-                .unwrap()
-                .values()
-                .cloned()
-                .collect();
+            let views: Vec<_> = line["views"].as_object().unwrap().values().cloned().collect();
             views
                 .into_iter()
                 .filter_map(move |it| Some((frame, it["camera"]["captured_ms"].as_f64()?)))

@@ -75,10 +75,7 @@ struct Drawn {
 impl Drawn {
     /// Draws `n` people to train on, and 8 others; annotates them in `people.jsonl` and `others.jsonl`.
     fn new(n: usize) -> Self {
-        let folder = tempfile::Builder::new()
-            .prefix("parallax-")
-            .tempdir()
-            .unwrap();
+        let folder = tempfile::Builder::new().prefix("parallax-").tempdir().unwrap();
         let drawn = Self { folder };
         drawn.write("settings.toml", SETTINGS);
         drawn.people("people", n, 1);
@@ -187,9 +184,7 @@ fn a_trained_model_finds_other_figures_with_any_threads_and_after_kills() {
     assert!(one.stdout.contains("false alarms"), "{}", one.stdout);
     assert!(is_gone(&drawn.path("one/m.fmp.checkpoint")));
 
-    let two = drawn
-        .train("two/m.fmp", &["--threads", "2", "--json"])
-        .wait();
+    let two = drawn.train("two/m.fmp", &["--threads", "2", "--json"]).wait();
     assert_ended(&two, 0, &[]);
     assert!(drawn.model("one/m.fmp") == drawn.model("two/m.fmp"));
     let events = events(&two);
@@ -212,9 +207,7 @@ fn a_trained_model_finds_other_figures_with_any_threads_and_after_kills() {
     let judged = judged.wait();
     assert_ended(&judged, 0, &[]);
     let judged: Value = serde_json::from_str(&judged.stdout).unwrap();
-    let pcp = judged["best"]["pcp"]["both_ends"]["total"]
-        .as_f64()
-        .unwrap();
+    let pcp = judged["best"]["pcp"]["both_ends"]["total"].as_f64().unwrap();
     assert!(pcp >= 80.0, "PCP {pcp}: {judged}");
 
     let shown = ["model", "show", "one/m.fmp", "--html", "m.html"];
@@ -257,9 +250,7 @@ fn add_bad_labels(drawn: &Drawn) {
     let bad = [
         line("people/0.png", &outside).to_string(),
         line("people/99.png", &FIGURE).to_string(),
-        line("people/1.png", &FIGURE)
-            .to_string()
-            .replace("[41.0,118.0]", "null"),
+        line("people/1.png", &FIGURE).to_string().replace("[41.0,118.0]", "null"),
         line("people/2.png", &one_place).to_string(),
         line("people/3.png", &FIGURE[1..]).to_string(),
         sound.lines().next().unwrap().to_owned(),
@@ -349,8 +340,6 @@ fn a_wrong_command_line_is_refused_before_the_training() {
     }
     let folder = drawn.train("no/m.fmp", &[]).wait();
     assert_ended(&folder, 2, &["no such folder"]);
-    let printed = drawn
-        .start(&["train", "fmp", "--print-settings", "--seed", "7"])
-        .wait();
+    let printed = drawn.start(&["train", "fmp", "--print-settings", "--seed", "7"]).wait();
     assert!(printed.stdout.contains("seed = 7\n"), "{}", printed.stdout);
 }

@@ -40,9 +40,7 @@ pub fn source(camera: &Camera, config: &Config) -> SourceSpec {
                 Rotation::By(Turn::clockwise(degrees.into()).unwrap_or_default())
             }
         },
-        numbers: camera
-            .numbers
-            .map(|[first, step]| PictureNumbers { first, step }),
+        numbers: camera.numbers.map(|[first, step]| PictureNumbers { first, step }),
         ..SourceSpec::new(camera.source.clone())
     }
 }

@@ -240,9 +240,7 @@ fn paths(format: Format, job: &Job, trials: &[Trial], pictures: &[Pictures]) -> 
         Format::OpenPose => vec![name("-openpose")],
         Format::Mp4 => {
             let views = pictures.iter();
-            views
-                .map(|it| name(&format!("-{}.mp4", it.view.name)))
-                .collect()
+            views.map(|it| name(&format!("-{}.mp4", it.view.name))).collect()
         }
     }
 }

@@ -261,9 +261,7 @@ impl Reader<'_> {
         let mut shots = Vec::new();
         for frame in frames.step_by(part.every as usize) {
             self.go_on()?;
-            let known = source
-                .of_frame(frame, &mut found)
-                .or_fail(ExitKind::Input)?;
+            let known = source.of_frame(frame, &mut found).or_fail(ExitKind::Input)?;
             self.console.advance(1);
             if known.is_some() {
                 shots.push(Shot {

@@ -129,20 +129,15 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
         all.add(deployment.method.name(), &settings.or_fail(ExitKind::Run)?);
     }
     let hosts = deployment.hosts.iter();
-    let views: Vec<String> = hosts
-        .map(|it| format!("{}: {}", it.name, it.views.join(" ")))
-        .collect();
+    let views: Vec<String> =
+        hosts.map(|it| format!("{}: {}", it.name, it.views.join(" "))).collect();
     all.add("views of hosts", views.join("\n").as_bytes());
     let settings = serde_json::to_vec(&(
         &deployment.capture,
         &deployment.link.carry,
         &deployment.unit,
         deployment.up,
-        deployment
-            .cameras
-            .iter()
-            .map(|it| &it.name)
-            .collect::<Vec<_>>(),
+        deployment.cameras.iter().map(|it| &it.name).collect::<Vec<_>>(),
     ));
     all.add("capture", &settings.or_fail(ExitKind::Run)?);
     Ok(all)
@@ -209,9 +204,7 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
                 })
                 .collect(),
             n_frames: resolved.n_frames(),
-            n_receivers: views
-                .map(|view| topology.receivers_of(&topic(view)))
-                .collect(),
+            n_receivers: views.map(|view| topology.receivers_of(&topic(view))).collect(),
             patience: resolved.patience(),
             max_clock_share: MAX_CLOCK_SHARE,
             file: deployment.output.join("hosts.json"),

@@ -64,9 +64,7 @@ pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
             }
             known.push(network);
             let card = inputs::network_card(deployment, index)?;
-            as_seen |= card
-                .as_ref()
-                .is_some_and(|it| it.keypoints.sides == Sides::Seen);
+            as_seen |= card.as_ref().is_some_and(|it| it.keypoints.sides == Sides::Seen);
             card.map(|it| it.names()).unwrap_or_default()
         };
         let names = names.into_iter().filter(|it| !::keypoints::is_joint(it));
@@ -91,9 +89,7 @@ pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
 /// Number of frames of the keypoints of every camera, from the first frame of the footage on; none for a camera without them.
 pub(crate) fn lengths(deployment: &Deployment) -> Result<Vec<Option<u64>>, Failure> {
     let cameras = deployment.cameras.iter();
-    cameras
-        .map(|it| Ok(of_camera(it)?.map(|it| it.n_frames())))
-        .collect()
+    cameras.map(|it| Ok(of_camera(it)?.map(|it| it.n_frames()))).collect()
 }
 
 /// The deployment with grey footage for every camera without a source: of the size that the rig says, as long as its keypoints.

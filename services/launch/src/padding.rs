@@ -11,11 +11,7 @@ pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option
     let padded = cameras.iter().filter(|it| share(it.1, frame) > MIN_SHARE);
     let padded: Vec<(&str, [u32; 2])> = padded.copied().collect();
     let (_, image) = *padded.first()?;
-    let names: Vec<&str> = padded
-        .iter()
-        .filter(|it| it.1 == image)
-        .map(|it| it.0)
-        .collect();
+    let names: Vec<&str> = padded.iter().filter(|it| it.1 == image).map(|it| it.0).collect();
     let [width, height] = fitting(image, frame);
     Some(format!(
         "{:.0} % of every {}x{} frame of {} is padding, for the camera's image is {}x{}: searched in vain, and the person \

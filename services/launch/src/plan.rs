@@ -136,25 +136,15 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
 ///
 /// * `names`: the names of its processes.
 pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String]) -> Vec<TopicPlan> {
-    let sizes = prepared
-        .views
-        .iter()
-        .enumerate()
-        .map(|(view, it)| ViewSize {
-            picture_bytes: picture_bytes(resolved, view),
-            frame_bytes: it
-                .framing
-                .out_size()
-                .map(|side| side as usize)
-                .iter()
-                .product::<usize>()
-                * 3,
-            evidence_values: if resolved.deployment.has_maps() {
-                pipeline::most_values(resolved.deployment.network.people)
-            } else {
-                it.plan.layout().n_responses()
-            },
-        });
+    let sizes = prepared.views.iter().enumerate().map(|(view, it)| ViewSize {
+        picture_bytes: picture_bytes(resolved, view),
+        frame_bytes: it.framing.out_size().map(|side| side as usize).iter().product::<usize>() * 3,
+        evidence_values: if resolved.deployment.has_maps() {
+            pipeline::most_values(resolved.deployment.network.people)
+        } else {
+            it.plan.layout().n_responses()
+        },
+    });
     let delivery = resolved.delivery();
     let held_frames = if resolved.deployment.predicts_errors() && delivery == Delivery::Realtime {
         quality::HELD_REALTIME
@@ -222,9 +212,7 @@ fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
 fn processes(resolved: &Resolved, file: &Path) -> Vec<ProcessSpec> {
     let topology = resolved.topology();
     let processes = topology.processes().iter();
-    processes
-        .map(|it| process(it, &topology, resolved, file))
-        .collect()
+    processes.map(|it| process(it, &topology, resolved, file)).collect()
 }
 
 fn process(
@@ -256,10 +244,7 @@ fn process(
             deployment::Role::Redundant => Role::Redundant,
             deployment::Role::Optional => Role::Optional,
         },
-        senders: topology
-            .senders_to(process)
-            .map(|it| it.name.clone())
-            .collect(),
+        senders: topology.senders_to(process).map(|it| it.name.clone()).collect(),
         scheduling: scheduling::requested(
             &resolved.deployment.runtime,
             process.service,

@@ -66,9 +66,8 @@ impl Prepared {
         let rig = inputs::rig_of(deployment)?;
         let (mut views, mut sizes) = (Vec::new(), Vec::new());
         let names = deployment.cameras.iter().map(|it| it.name.as_str());
-        let framings = names
-            .enumerate()
-            .map(|(index, name)| (name, framing(resolved, &rig, index)));
+        let framings =
+            names.enumerate().map(|(index, name)| (name, framing(resolved, &rig, index)));
         let framings = inputs::advice::of_all(framings.collect())?;
         for (camera, framing) in deployment.cameras.iter().zip(framings) {
             sizes.extend(rig.camera(&camera.name).map(|it| it.intrinsics.size));

@@ -362,9 +362,7 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let topology = resolved.topology();
     let plan = resolved.recording.as_ref();
-    let plan = plan
-        .ok_or("there is no recording")
-        .or_fail(ExitKind::Config)?;
+    let plan = plan.ok_or("there is no recording").or_fail(ExitKind::Config)?;
     let job = record::Job {
         file: plan.file.clone(),
         about: recorded::about(resolved, plan)?,
@@ -373,11 +371,7 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
             fused: topology.fused(),
             has_quality: resolved.deployment.has_quality(),
             pictures: plan.pictures.clone(),
-            processes: topology
-                .processes()
-                .iter()
-                .map(|it| it.name.clone())
-                .collect(),
+            processes: topology.processes().iter().map(|it| it.name.clone()).collect(),
             elsewhere: topology.topics_elsewhere(),
         },
         queue_bytes: plan.queue_mb.saturating_mul(1_000_000),
@@ -411,9 +405,7 @@ fn replay(
     let job = record::replay::Job {
         file: plan.file.clone(),
         outputs: replayed.outputs.iter().map(output).collect(),
-        pace: plan
-            .speed
-            .map_or(record::replay::Pace::Max, record::replay::Pace::Times),
+        pace: plan.speed.map_or(record::replay::Pace::Max, record::replay::Pace::Times),
         frame_step: resolved.deployment.capture.frame_step.max(1),
         patience: resolved.patience(),
     };

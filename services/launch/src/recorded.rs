@@ -72,10 +72,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
     let paper = &deployment.paper;
     let errors = paper.errors.as_ref();
     let table = errors.and_then(Errors::table);
-    for file in [Some(&deployment.rig), table.map(|table| &table.table)]
-        .into_iter()
-        .flatten()
-    {
+    for file in [Some(&deployment.rig), table.map(|table| &table.table)].into_iter().flatten() {
         let bytes =
             files::read(file, files::MODEL).map_err(|error| failure::in_file(file, &error))?;
         files.insert(file.clone(), formats::checksum::fnv1a(&bytes));
@@ -187,9 +184,7 @@ pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
         chunks.len()
     );
     let named = damaged.iter().take(MAX_LISTED).map(|message| {
-        let frame = message
-            .frame
-            .map_or(String::new(), |it| format!(", frame {it}"));
+        let frame = message.frame.map_or(String::new(), |it| format!(", frame {it}"));
         let Damaged {
             topic,
             offset,

@@ -79,11 +79,7 @@ fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
         }
         path.canonicalize().unwrap_or(path)
     };
-    let all: Vec<PathBuf> = deployment
-        .cameras
-        .iter()
-        .map(|it| canonical(&it.source))
-        .collect();
+    let all: Vec<PathBuf> = deployment.cameras.iter().map(|it| canonical(&it.source)).collect();
     for (nth, source) in all.iter().enumerate() {
         let is_blank = Blank::is_blank(&deployment.cameras[nth].source);
         let Some(first) = all[..nth].iter().position(|it| it == source && !is_blank) else {
@@ -103,10 +99,7 @@ fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
 /// Applies the checks of `parallax calib check` to the cameras of the deployment.
 fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
     let rig = inputs::rig_of(deployment)?;
-    let named = deployment
-        .cameras
-        .iter()
-        .filter_map(|it| rig.camera(&it.name));
+    let named = deployment.cameras.iter().filter_map(|it| rig.camera(&it.name));
     let used = Rig::new(named.cloned().collect(), rig.up_in_world(), rig.source());
     // A camera that the rig does not contain is reported elsewhere, by name.
     let Ok(used) = used else {
@@ -129,12 +122,8 @@ fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
         let failure = Failure::new(ExitKind::Calibration, message);
         return Err(failure.with_hint(hint(first)));
     }
-    let warnings = rest
-        .into_iter()
-        .filter(|it| it.severity() >= Severity::Warning);
-    Ok(warnings
-        .map(|it| format!("{}: {it}", deployment.rig.display()))
-        .collect())
+    let warnings = rest.into_iter().filter(|it| it.severity() >= Severity::Warning);
+    Ok(warnings.map(|it| format!("{}: {it}", deployment.rig.display())).collect())
 }
 
 /// The hint for a finding.
@@ -177,9 +166,7 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
         "{rates}: frames are paired by their numbers, so that in the end they are {drift:.1} frames apart"
     );
     if high / low <= MAX_RATE_RATIO || deployment.capture.frame_rate_hz.is_some() {
-        return Ok((drift >= 0.5)
-            .then_some(text)
-            .or_else(|| without_rate(resolved)));
+        return Ok((drift >= 0.5).then_some(text).or_else(|| without_rate(resolved)));
     }
     let failure = Failure::new(ExitKind::Input, text);
     Err(failure.with_hint(
@@ -218,11 +205,7 @@ fn check_lengths(resolved: &Resolved) -> Option<String> {
     if resolved.has_live() {
         return None;
     }
-    let names = resolved
-        .deployment
-        .cameras
-        .iter()
-        .map(|it| it.name.as_str());
+    let names = resolved.deployment.cameras.iter().map(|it| it.name.as_str());
     let lengths = resolved.footage.iter().map(|it| it.n_frames);
     shorter(&names.zip(lengths).collect::<Vec<_>>())
 }

@@ -84,10 +84,7 @@ impl SearchSize {
                 None => groups.push(vec![it]),
             }
         }
-        let chosen: Vec<String> = groups
-            .iter()
-            .map(|it| describe(it, groups.len() > 1))
-            .collect();
+        let chosen: Vec<String> = groups.iter().map(|it| describe(it, groups.len() > 1)).collect();
         let why = match self.n_sharing {
             0 => "no two cameras share a space in which a person can stand, so the frames are as large as time permits"
                 .to_owned(),

@@ -81,9 +81,7 @@ impl Report {
         let cameras: Vec<&str> = cameras.map(|it| it.name.as_str()).collect();
         let recorded = Recorded::read(folder, session, &cameras);
         let processes = &outcome.processes;
-        let given_up = processes
-            .iter()
-            .filter(|it| it.state == supervise::State::GivenUp);
+        let given_up = processes.iter().filter(|it| it.state == supervise::State::GivenUp);
         let restarted = processes.iter().filter(|it| it.restarts > 0);
         Self {
             name: resolved.deployment.name.clone(),
@@ -144,9 +142,7 @@ impl Report {
     /// * `n_faults`: the number of faults injected into a process.
     pub fn unexpected_failures(&self, n_faults: impl Fn(&str) -> u32) -> Vec<String> {
         let restarted = self.restarts.iter();
-        let unexpected = restarted
-            .filter(|(name, n)| *n > n_faults(name))
-            .map(|it| &it.0);
+        let unexpected = restarted.filter(|(name, n)| *n > n_faults(name)).map(|it| &it.0);
         let mut failed: Vec<String> = unexpected.chain(&self.given_up).cloned().collect();
         failed.sort();
         failed.dedup();
@@ -426,10 +422,8 @@ impl Report {
     fn write_refused(&self, text: &mut String) -> core::fmt::Result {
         for (process, counts) in &self.refused {
             let causes = by_cause(counts);
-            let causes: Vec<String> = causes
-                .iter()
-                .map(|(cause, n)| format!("{cause} {n}"))
-                .collect();
+            let causes: Vec<String> =
+                causes.iter().map(|(cause, n)| format!("{cause} {n}")).collect();
             writeln!(text, "  refused       {process}: {}", causes.join(", "))?;
         }
         for (process, n) in &self.without_gpu {

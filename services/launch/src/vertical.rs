@@ -59,10 +59,7 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
     if rig.up_in_world().is_some() || !deployment.capture.upright {
         return Ok(None);
     }
-    let named = deployment
-        .cameras
-        .iter()
-        .filter_map(|it| rig.camera(&it.name));
+    let named = deployment.cameras.iter().filter_map(|it| rig.camera(&it.name));
     let cameras: Vec<Camera> = named.cloned().collect();
     if let Some(found) = keypoints::find(deployment, &cameras)? {
         return Ok(Some(found));
@@ -119,10 +116,7 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
 fn choose(tried: &[Hypothesis]) -> Option<Hypothesis> {
     let score = |it: &Hypothesis| it.score.unwrap_or(f64::NEG_INFINITY);
     let best = tried.iter().map(score).fold(f64::NEG_INFINITY, f64::max);
-    tried
-        .iter()
-        .find(|it| score(it) >= best - SAME_SCORE)
-        .copied()
+    tried.iter().find(|it| score(it) >= best - SAME_SCORE).copied()
 }
 
 fn text(up: &UnitVector3<f64>) -> String {
@@ -166,10 +160,7 @@ fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
     let world = world_axes();
     let found = [level, upright].map(|it| it.map(snapped));
     let [level, upright] = found;
-    let likely = level
-        .into_iter()
-        .chain(upright)
-        .chain(upright.map(|it| -it));
+    let likely = level.into_iter().chain(upright).chain(upright.map(|it| -it));
     let opposite = level.map(|it| -it);
     let mut directions: Vec<UnitVector3<f64>> = Vec::new();
     for direction in likely.chain(world).chain(opposite) {
@@ -203,9 +194,7 @@ fn common_normal(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3
     let mut found = None;
     for _ in 0..5 {
         let weighted = all.iter().zip(&weights);
-        let sum: Matrix3<f64> = weighted
-            .map(|(it, weight)| it * it.transpose() * *weight)
-            .sum();
+        let sum: Matrix3<f64> = weighted.map(|(it, weight)| it * it.transpose() * *weight).sum();
         let eigen = SymmetricEigen::new(sum);
         let order = eigen.eigenvalues.iter().enumerate();
         let mut order: Vec<(usize, f64)> = order.map(|(nth, it)| (nth, *it)).collect();
@@ -256,9 +245,7 @@ impl<'a> Images<'a> {
         let model = inputs::model_or_shipped(deployment.paper.model.as_deref())?;
         // Nobody can be found in the grey pictures of cameras that have keypoints alone.
         let views = deployment.cameras.iter();
-        let views = views
-            .filter(|it| !Blank::is_blank(&it.source))
-            .take(MAX_VIEWS);
+        let views = views.filter(|it| !Blank::is_blank(&it.source)).take(MAX_VIEWS);
         let views = views.filter_map(|entry| {
             let camera = cameras.iter().find(|it| it.name == entry.name)?;
             View::new(entry, camera, &deployment.capture)
@@ -311,11 +298,8 @@ impl<'a> View<'a> {
         if let Some((_, score)) = self.tried.iter().find(|it| difference(it.0) < SAME_ROLL) {
             return *score;
         }
-        let scores: Vec<f64> = self
-            .rgb
-            .iter()
-            .filter_map(|it| self.search_at(search, it, degrees))
-            .collect();
+        let scores: Vec<f64> =
+            self.rgb.iter().filter_map(|it| self.search_at(search, it, degrees)).collect();
         let n = scores.len();
         let score = (n > 0).then(|| scores.iter().sum::<f64>() / n as f64);
         self.tried.push((degrees, score));

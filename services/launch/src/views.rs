@@ -79,9 +79,7 @@ impl ViewReport {
         let not_processed =
             (camera.n_dropped + pose.n_dropped).min(frames.saturating_sub(answered));
         let of = |reason: &str| missing.iter().find(|it| it.0.text() == reason);
-        let lost = of(Missing::PROCESS_LOST)
-            .map_or(0, |it| it.1)
-            .min(not_processed);
+        let lost = of(Missing::PROCESS_LOST).map_or(0, |it| it.1).min(not_processed);
         let faults = Status::CAMERA_FAULTS.iter();
         let faults = faults.filter_map(|it| Some((it.reason().to_owned(), of(it.reason())?.1)));
         Self {
@@ -104,9 +102,7 @@ impl ViewReport {
             Missing::Late | Missing::Dropped => !is_lossless,
             other => other.text() == Status::NO_DETECTION.reason(),
         };
-        self.missing
-            .iter()
-            .any(|(reason, n)| *n > 0 && !is_expected(reason))
+        self.missing.iter().any(|(reason, n)| *n > 0 && !is_expected(reason))
     }
 }
 
@@ -121,9 +117,7 @@ pub(crate) fn n_reached(resolved: &Resolved, outcome: &Outcome) -> u64 {
         .iter()
         .filter(|it| ["capture", "bridge"].contains(&it.service.as_str()));
     let last = cameras.filter_map(|it| it.last.as_ref().filter(|it| it.n_sent > 0));
-    let last = last
-        .map(|it| it.last_frame.saturating_sub(capture.start_frame))
-        .max();
+    let last = last.map(|it| it.last_frame.saturating_sub(capture.start_frame)).max();
     last.map_or(0, |it| it / capture.frame_step.max(1) + 1)
 }
 

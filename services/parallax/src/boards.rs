@@ -51,11 +51,7 @@ impl CameraFootage {
     ///
     /// Footage that cannot be opened, or has no frames.
     pub fn size(&self) -> Result<[u32; 2], Failure> {
-        let first = self
-            .paths
-            .first()
-            .ok_or("no pictures")
-            .or_fail(ExitKind::Input)?;
+        let first = self.paths.first().ok_or("no pictures").or_fail(ExitKind::Input)?;
         let source = Source::open(&SourceSpec::upright(first)).map_err(footage_failure)?;
         let size = source.info().size;
         Ok([size.width as u32, size.height as u32])
@@ -120,18 +116,13 @@ pub struct Looked {
 impl Looked {
     /// All sights.
     pub fn sights(&self) -> Vec<Sight> {
-        self.cameras
-            .iter()
-            .flat_map(|it| it.sights.clone())
-            .collect()
+        self.cameras.iter().flat_map(|it| it.sights.clone()).collect()
     }
 
     /// The cameras whose pictures are mirrored.
     pub fn mirrored(&self) -> Vec<usize> {
         let is_mirrored = |it: &&Seen| 2 * it.n_mirrored > it.sights.len();
         let each = self.cameras.iter().enumerate();
-        each.filter(|it| is_mirrored(&it.1))
-            .map(|it| it.0)
-            .collect()
+        each.filter(|it| is_mirrored(&it.1)).map(|it| it.0).collect()
     }
 }

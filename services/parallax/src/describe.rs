@@ -54,11 +54,8 @@ impl<'a> Placed<'a> {
             .into_iter()
             .map(|it| self.at(it))
             .collect();
-        let parts: Vec<Value> = centres
-            .iter()
-            .enumerate()
-            .map(|(part, it)| self.part(part, *it))
-            .collect();
+        let parts: Vec<Value> =
+            centres.iter().enumerate().map(|(part, it)| self.part(part, *it)).collect();
         let scale = self.layout.levels[usize::from(self.pose.level)].scale;
         let mut value = json!({
             "score": self.pose.score,
@@ -93,12 +90,7 @@ impl<'a> Placed<'a> {
 /// The joints of a pose by name; null if the model lacks parts that the set needs.
 fn joints_of(centres: &[[f64; 2]], joints: &NamedJoints) -> Value {
     let set = joints.set;
-    let needed = set
-        .joints
-        .iter()
-        .flat_map(|it| it.parts)
-        .max()
-        .map_or(0, |it| it + 1);
+    let needed = set.joints.iter().flat_map(|it| it.parts).max().map_or(0, |it| it + 1);
     if centres.len() < needed {
         return Value::Null;
     }

@@ -240,9 +240,7 @@ fn part_type_tables() {
             let tables = "workers = 2\n[[paper.compatibility]]\nviews = [\"a\", \"b\"]\n\
                               files = [\"ab.csv\", \"ba.csv\"]";
             it.edit("deployment.toml", "workers = 2", tables);
-            let rows: Vec<String> = (2..54)
-                .map(|row| format!("{},0.5,0.5\n", row / 2))
-                .collect();
+            let rows: Vec<String> = (2..54).map(|row| format!("{},0.5,0.5\n", row / 2)).collect();
             let rows = rows.concat();
             it.write("ab.csv", &rows);
             it.write("ba.csv", rows.replacen("2,0.5,0.5", "2,NaN,0.5", 1));
@@ -300,9 +298,7 @@ fn every_pixel_format_works() {
     ];
     let found = kinds.map(|(name, image)| {
         image.save(case.path(name)).unwrap();
-        let ended = case
-            .start(&["detect", name, "--model", "model.plx", "--json"])
-            .wait();
+        let ended = case.start(&["detect", name, "--model", "model.plx", "--json"]).wait();
         assert_eq!(ended.status.code(), Some(0), "{name}: {}", ended.stderr);
         let mut line: Value = serde_json::from_str(&ended.stdout).unwrap();
         line["detections"].take()

@@ -35,10 +35,8 @@ fn two_processes_read_every_message_at_the_same_place_without_copying() {
     let (ended, report) = bench(&case, &[&SERIES[..], &more].concat());
     assert_eq!(ended.status.code(), Some(0), "{}\n{report:#}", ended.stderr);
     let rows = report["numbers"].as_array().unwrap();
-    let kinds: Vec<(&Value, &Value)> = rows
-        .iter()
-        .map(|it| (&it["receiver"], &it["bytes"]))
-        .collect();
+    let kinds: Vec<(&Value, &Value)> =
+        rows.iter().map(|it| (&it["receiver"], &it["bytes"])).collect();
     let expected = [
         (&json!("event"), &json!(64)),
         (&json!("event"), &json!(115_584)),
@@ -108,9 +106,7 @@ fn copied_bytes(stderr: &str, process: &str) -> usize {
 fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
     const N_FRAMES: usize = 12;
     let case = Case::new("copies", &[N_FRAMES; 2], PLAIN);
-    let ended = case
-        .start(&["run", "deployment.toml", "--json", "-v"])
-        .wait();
+    let ended = case.start(&["run", "deployment.toml", "--json", "-v"]).wait();
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     for view in 0..2 {
@@ -127,11 +123,7 @@ fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
     }
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let evidence = report["recorded"]["summary"]["evidence_bytes_per_frame"].as_object();
-    let evidence: u64 = evidence
-        .unwrap()
-        .values()
-        .map(|it| it.as_u64().unwrap())
-        .sum();
+    let evidence: u64 = evidence.unwrap().values().map(|it| it.as_u64().unwrap()).sum();
     let fuse = copied_bytes(&ended.stderr, "fuse-0");
     let read = 2 * (N_FRAMES + 1) * size_of::<ViewPose>();
     let sent = (N_FRAMES + 1) * size_of::<PairPose>();

@@ -62,9 +62,7 @@ fn a_command_line_that_is_wrong_is_found() {
     for (text, what) in wrong {
         let line = lines(text).pop().unwrap();
         let refused = line.cargo_problem().is_some()
-            || line
-                .ours()
-                .is_some_and(|command| command::check(command).is_err());
+            || line.ours().is_some_and(|command| command::check(command).is_err());
         assert!(refused, "`{text}` is taken: {what}");
     }
     for text in [
@@ -123,10 +121,7 @@ fn blocks_marked_to_run_succeed_in_an_empty_folder() {
 fn results_are_described(folder: &Path) -> usize {
     let reference = fs::read_to_string(root().join("docs/reference/files.md")).unwrap();
     let is_result = |file: &PathBuf| file.parent().is_some_and(|it| it.ends_with("out"));
-    let files: Vec<PathBuf> = files_below(folder, "")
-        .into_iter()
-        .filter(is_result)
-        .collect();
+    let files: Vec<PathBuf> = files_below(folder, "").into_iter().filter(is_result).collect();
     for file in &files {
         let name = file.file_name().unwrap().to_str().unwrap();
         assert!(
@@ -340,10 +335,7 @@ fn all_blocks() -> Vec<(String, Block)> {
         let text = fs::read_to_string(file).unwrap();
         let name = shown(file);
         let with_place = |block: Block| (format!("{name}:{}", block.line), block);
-        blocks(&text)
-            .into_iter()
-            .map(with_place)
-            .collect::<Vec<_>>()
+        blocks(&text).into_iter().map(with_place).collect::<Vec<_>>()
     };
     markdown_files().iter().flat_map(of_file).collect()
 }

@@ -34,10 +34,7 @@ fn detect(case: &Case, more: &[&str]) -> (Ended, Vec<Value>) {
 fn a_damaged_file_is_named_and_the_others_are_searched() {
     let (case, picture) = case("detect-broken", 3);
     let mut jpeg = Cursor::new(Vec::new());
-    picture
-        .to_rgb8()
-        .write_to(&mut jpeg, image::ImageFormat::Jpeg)
-        .unwrap();
+    picture.to_rgb8().write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
     case.write("a/0001.jpg", &jpeg.get_ref()[..700]);
     case.write("a/0002.bmp", "");
     let (ended, lines) = detect(&case, &["a", "absent.png"]);
@@ -65,9 +62,7 @@ fn a_picture_is_searched_with_its_orientation_tag_applied() {
     let (case, picture) = case("detect-turned", 1);
     let stored = imageops::rotate270(&picture.to_rgb8());
     let mut png = Vec::new();
-    stored
-        .write_with_encoder(PngEncoder::new(&mut png))
-        .unwrap();
+    stored.write_with_encoder(PngEncoder::new(&mut png)).unwrap();
     let mut jpeg = Vec::new();
     stored
         .write_with_encoder(JpegEncoder::new_with_quality(&mut jpeg, 100))
@@ -91,9 +86,7 @@ fn a_picture_is_searched_with_its_orientation_tag_applied() {
     let drawn = |name: &str| image::open(case.path("drawn").join(name)).unwrap();
     assert_eq!(drawn("turned.png").width(), 96);
     for by in [["--model", "model.plx"], ["--box", "0,0,90,120"]] {
-        let ended = case
-            .start(&[&["detect", "turned.png"], &by[..]].concat())
-            .wait();
+        let ended = case.start(&[&["detect", "turned.png"], &by[..]].concat()).wait();
         let said = "90 degrees to the right";
         assert!(ended.stdout.contains(said), "{by:?}: {}", ended.stdout);
     }
@@ -133,9 +126,7 @@ fn a_large_picture_is_searched_at_a_reported_smaller_size() {
     }
     assert_eq!(number(&large["scale"]), 4.0 * number(&small["scale"]));
     let plain = ["detect", "large.png", "--model", "model.plx"];
-    let ended = case
-        .start(&[&plain[..], &["--size", "128"]].concat())
-        .wait();
+    let ended = case.start(&[&plain[..], &["--size", "128"]].concat()).wait();
     let said = "searched at 96x128 of 384x512";
     assert!(ended.stdout.contains(said), "{}", ended.stdout);
     let ended = case.start(&[&plain[..], &["--full"]].concat()).wait();

@@ -63,12 +63,7 @@ fn parsed(ended: &Ended) -> Value {
 /// A box of the detector in the picture, which is twice as large as its input.
 fn in_picture(nth: usize) -> Value {
     let side = |it: f32| (f64::from(it) + 0.5) * 2.0 - 0.5;
-    json!(
-        BOXES[nth][..4]
-            .iter()
-            .map(|it| side(*it))
-            .collect::<Vec<_>>()
-    )
+    json!(BOXES[nth][..4].iter().map(|it| side(*it)).collect::<Vec<_>>())
 }
 
 const DETECT: [&str; 6] = [
@@ -131,8 +126,7 @@ fn a_card_lies_beside_the_detector_or_in_it() {
     let shown = parsed(&run(&case, &["model", "show", "det.onnx", "--json"], &[]));
     assert_eq!(shown["detector_card"]["name"], "Few boxes always");
     std::fs::remove_file(case.path("det.onnx.toml")).unwrap();
-    net.metadata
-        .push(entry(&CARD.replace("[64", "").replace("width", "wide")));
+    net.metadata.push(entry(&CARD.replace("[64", "").replace("width", "wide")));
     case.write("det.onnx", net.file());
     let ended = run(&case, &DETECT, &[]);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);

@@ -43,9 +43,7 @@ mod long {
         let case = Case::new("entering", &[1, 1], "");
         let who = ["--rig", "ring:4", "--subjects", "907", "--seed", "12"];
         let frames = ["--frames", &N_FRAMES.to_string(), "--rate", "10"];
-        let ended = case
-            .start(&[&["synth", "room"], &who[..], &frames].concat())
-            .wait();
+        let ended = case.start(&[&["synth", "room"], &who[..], &frames].concat()).wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         for camera in ["c1", "c2", "c3", "c4"] {
             let empty = empty_room(&case, camera);
@@ -56,9 +54,7 @@ mod long {
                 for value in noisy.iter_mut() {
                     *value = value.saturating_add(random.u8(..8));
                 }
-                noisy
-                    .save(picture(&case, "cameras", camera, frame))
-                    .unwrap();
+                noisy.save(picture(&case, "cameras", camera, frame)).unwrap();
             }
         }
         let lossless = ["--set", "capture.mode=lossless"];

@@ -91,9 +91,7 @@ fn three_people_keep_their_identities_when_any_process_is_killed() {
         let begin = 30 + 60 * nth as u64;
         started.until("the next kill", |_| {
             let lines = case.lines("pose3d.jsonl");
-            lines
-                .last()
-                .is_some_and(|line| line["frame"].as_u64().unwrap() >= begin)
+            lines.last().is_some_and(|line| line["frame"].as_u64().unwrap() >= begin)
         });
         assert!(processes(case.folder()).len() > 4);
         signal("KILL", started.pid_of(victim).into());

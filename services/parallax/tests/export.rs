@@ -50,9 +50,7 @@ fn found(case: &Case) -> Vec<Vec<Option<[f64; 3]>>> {
 #[test]
 fn a_run_is_exported_from_its_folder_and_from_its_recording() {
     let case = Case::new("export", &[N_FRAMES; 2], PLAIN);
-    let ended = case
-        .start(&["record", "deployment.toml", "--out", "run.mcap"])
-        .wait();
+    let ended = case.start(&["record", "deployment.toml", "--out", "run.mcap"]).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
 
     // Nothing tells the rate of pictures.
@@ -67,12 +65,7 @@ fn a_run_is_exported_from_its_folder_and_from_its_recording() {
     let told = ["--to", &all, "--rate", "20", "--up", "0,0,1"];
     let of_folder = done(&case, "out", &told);
     assert_eq!(of_folder["frames"], N_FRAMES);
-    assert!(
-        of_folder["people"][0]["frames_with_points"]
-            .as_u64()
-            .unwrap()
-            > 0
-    );
+    assert!(of_folder["people"][0]["frames_with_points"].as_u64().unwrap() > 0);
     done(&case, "run.mcap", &told);
     for name in FILES {
         let [a, b] = ["out/export", "run-export"].map(|it| fs::read(case.path(it).join(name)));
@@ -103,9 +96,7 @@ fn check_positions(case: &Case) {
     let trc = Trc::parse(&fs::read_to_string(folder.join("pose3d.trc")).unwrap()).unwrap();
     assert_eq!((c3d.n_frames(), trc.frames.len()), (N_FRAMES, N_FRAMES));
     assert_eq!((c3d.rate_hz(), trc.rate_hz), (20.0, 20.0));
-    let views: Vec<_> = fs::read_dir(folder.join("pose3d-openpose"))
-        .unwrap()
-        .collect();
+    let views: Vec<_> = fs::read_dir(folder.join("pose3d-openpose")).unwrap().collect();
     assert_eq!(views.len(), 3, "two views, and the mark of the folder");
     for (frame, due) in found.iter().enumerate() {
         for (joint, due) in due.iter().enumerate() {
@@ -118,9 +109,7 @@ fn check_positions(case: &Case) {
                     "frame {frame}, joint {joint}"
                 );
                 let off = read.map_or(0.0, |it| {
-                    (0..3)
-                        .map(|axis| (it[axis] - due[axis]).abs())
-                        .fold(0.0, f64::max)
+                    (0..3).map(|axis| (it[axis] - due[axis]).abs()).fold(0.0, f64::max)
                 });
                 assert!(off < 1e-5, "frame {frame}, joint {joint}: {off} m");
             }

@@ -233,9 +233,7 @@ fn a_live_run_continues_without_a_suspended_view_until_it_is_back() {
     signal("STOP", started.pid_of("pose --index 1").into());
     started.until("lost frames", |_| {
         let lines = case.lines("pose3d.jsonl");
-        lines
-            .iter()
-            .any(|it| it["views_missing"]["b"] == "process lost")
+        lines.iter().any(|it| it["views_missing"]["b"] == "process lost")
     });
     fs::rename(case.path("away.plx"), case.path("model.plx")).unwrap();
     let ended = started.wait();
@@ -251,14 +249,10 @@ fn a_live_run_continues_without_a_suspended_view_until_it_is_back() {
 
 /// Checks that view `b` was late, then lost with its process, and is back.
 fn assert_back_after_a_gap(lines: &[Value]) {
-    let n_without_b = lines
-        .iter()
-        .filter(|it| it["views_present"] == json!(["a", "c"]));
+    let n_without_b = lines.iter().filter(|it| it["views_present"] == json!(["a", "c"]));
     assert!(n_without_b.count() > 3, "{lines:?}");
-    let reasons: BTreeSet<&str> = lines
-        .iter()
-        .filter_map(|it| it["views_missing"]["b"].as_str())
-        .collect();
+    let reasons: BTreeSet<&str> =
+        lines.iter().filter_map(|it| it["views_missing"]["b"].as_str()).collect();
     for reason in ["late", "process lost"] {
         assert!(reasons.contains(reason), "{reasons:?}");
     }

@@ -55,18 +55,12 @@ mod long {
     /// Median distance of the joints that were found from the truth, metres, and the share that was found.
     fn judged(case: &Case, turned: &Isometry3<f64>) -> (f64, f64) {
         let truth = std::fs::read_to_string(case.path("room/truth.jsonl")).unwrap();
-        let mut lines = truth
-            .lines()
-            .map(|it| serde_json::from_str::<Value>(it).unwrap());
+        let mut lines = truth.lines().map(|it| serde_json::from_str::<Value>(it).unwrap());
         let names = lines.next().unwrap()["joints"].clone();
         let mut places = BTreeMap::new();
         for line in lines {
             let frame = line["frame"].as_u64().unwrap();
-            let both = names
-                .as_array()
-                .unwrap()
-                .iter()
-                .zip(line["joints"].as_array().unwrap());
+            let both = names.as_array().unwrap().iter().zip(line["joints"].as_array().unwrap());
             for (name, at) in both {
                 let at = turned * point(at).unwrap();
                 places.insert((frame, name.as_str().unwrap().to_owned()), at);
@@ -108,9 +102,7 @@ mod long {
             "--rate",
             &rate_hz.to_string(),
         ];
-        let ended = case
-            .start(&[&["synth", "room"], &who[..], &frames].concat())
-            .wait();
+        let ended = case.start(&[&["synth", "room"], &who[..], &frames].concat()).wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         case
     }

@@ -60,10 +60,7 @@ fn every_process_and_view_of_a_run_is_shown_with_rates_and_times() {
     started.until("three frames", |_| case.lines("pose3d.jsonl").len() >= 3);
 
     let shown = processes(&case);
-    let names: Vec<&str> = shown
-        .iter()
-        .map(|it| it["process"].as_str().unwrap())
-        .collect();
+    let names: Vec<&str> = shown.iter().map(|it| it["process"].as_str().unwrap()).collect();
     assert_eq!(names, PROCESSES);
     shown.iter().for_each(assert_plausible);
     for (view, name) in [(0, "a"), (1, "b")] {

@@ -71,10 +71,8 @@ fn directions() -> [[f64; 3]; N] {
 fn network(bias: f32) -> Network {
     let mut net = Network::default();
     let sides = |n: [usize; 4]| n.map(Side::Fixed).to_vec();
-    net.inputs
-        .push(("picture".to_owned(), sides([1, 3, 128, 96])));
-    net.outputs
-        .push(("maps".to_owned(), sides([1, N, 128, 96])));
+    net.inputs.push(("picture".to_owned(), sides([1, 3, 128, 96])));
+    net.outputs.push(("maps".to_owned(), sides([1, N, 128, 96])));
     let weights = directions().into_iter().flatten();
     let weights = weights.map(|it| 4.0 * it as f32);
     net.floats("weights", &[N, 3, 1, 1], weights.collect());
@@ -185,8 +183,7 @@ pub(crate) fn case(name: &str, views: [Option<Named>; 4]) -> Case {
 }
 
 pub(crate) fn run(case: &Case, more: &[&str]) -> Ended {
-    case.start(&[&["run", "deployment.toml"], more].concat())
-        .wait()
+    case.start(&[&["run", "deployment.toml"], more].concat()).wait()
 }
 
 /// The status of every frame, and the mean distance of its joints from the truth, metres.
@@ -339,10 +336,7 @@ fn what_belongs_to_the_papers_method_is_refused_beside_a_network() {
 fn place(name: &str, frame: f64) -> Point3<f64> {
     let joints = joints_at(frame);
     let named = |name: &str| {
-        let number = skeleton::PARSE14
-            .joints
-            .iter()
-            .position(|it| it.name == name);
+        let number = skeleton::PARSE14.joints.iter().position(|it| it.name == name);
         joints[number.unwrap()]
     };
     let by = |x: f64, z: f64| Vector3::new(x, 0.0, z);

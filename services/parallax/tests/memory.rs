@@ -38,9 +38,7 @@ fn model() -> Model {
     let mut spec: ModelSpec = small.spec().clone();
     let n_parts = spec.parts.len();
     for (part, it) in spec.parts.iter_mut().enumerate() {
-        it.filter_of_type = (0..N_TYPES)
-            .map(|mixture| part * N_TYPES + mixture)
-            .collect();
+        it.filter_of_type = (0..N_TYPES).map(|mixture| part * N_TYPES + mixture).collect();
         if let Some(edge) = &mut it.edge {
             edge.bias = vec![vec![0.0; N_TYPES]; N_TYPES];
             if let fmp::Springs::PerChildType(springs) = &mut edge.springs {
@@ -52,13 +50,9 @@ fn model() -> Model {
     let filter = || Filter {
         rows: 6,
         cols: 6,
-        weights: (0..36 * N_CHANNELS)
-            .map(|_| 0.1 * random.f64() - 0.05)
-            .collect(),
+        weights: (0..36 * N_CHANNELS).map(|_| 0.1 * random.f64() - 0.05).collect(),
     };
-    spec.filters = std::iter::repeat_with(filter)
-        .take(n_parts * N_TYPES)
-        .collect();
+    spec.filters = std::iter::repeat_with(filter).take(n_parts * N_TYPES).collect();
     spec.interval = 10;
     Model::new(spec).unwrap()
 }
@@ -67,9 +61,7 @@ fn model() -> Model {
 fn noise(seed: u64) -> Canvas {
     let [width, height] = SIZE.map(|it| it as usize);
     let mut random = fastrand::Rng::with_seed(seed);
-    let rgb: Vec<u8> = std::iter::repeat_with(|| random.u8(..))
-        .take(width * height * 3)
-        .collect();
+    let rgb: Vec<u8> = std::iter::repeat_with(|| random.u8(..)).take(width * height * 3).collect();
     Canvas::from_rgb(Size::new(width, height), &rgb)
 }
 

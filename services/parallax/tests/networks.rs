@@ -87,8 +87,7 @@ fn a_network_is_explained_by_its_card() {
         assert!(ended.stdout.contains(words), "{words}: {}", ended.stdout);
     }
     let mut net = network("Relu");
-    net.metadata
-        .push(("parallax.card".to_owned(), CARD.to_owned()));
+    net.metadata.push(("parallax.card".to_owned(), CARD.to_owned()));
     case.write("inside.onnx", net.file());
     let shown = json(&run(&case, &["model", "show", "inside.onnx", "--json"]));
     assert_eq!(shown["card"]["name"], "Three colours", "{shown}");
@@ -241,16 +240,12 @@ fn with_the_network_that_ships_everybody_is_found_once_and_where_they_are() {
     let case = Case::new("net-ships", &[1, 1], PLAIN);
     let who = ["--rig", "ring:3", "--subjects", "901", "--seed", "77"];
     let one = ["--actions", "walking", "--frames", "1"];
-    let ended = case
-        .start(&[&["synth", "room"], &who[..], &one].concat())
-        .wait();
+    let ended = case.start(&[&["synth", "room"], &who[..], &one].concat()).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let rig = case.path("room/rig.toml");
     let rig = geometry::files::read(&rig, &geometry::files::ReadOptions::default()).unwrap();
     let truth = std::fs::read_to_string(case.path("room/truth.jsonl")).unwrap();
-    let mut truth = truth
-        .lines()
-        .map(|it| serde_json::from_str::<Value>(it).unwrap());
+    let mut truth = truth.lines().map(|it| serde_json::from_str::<Value>(it).unwrap());
     let names = truth.next().unwrap()["joints"].clone();
     let places = truth.next().unwrap()["joints"].clone();
     let named = |name: &str| {

@@ -50,9 +50,8 @@ fn move_cameras(case: &Case, to: impl Fn(f64) -> f64) {
             return line.to_owned();
         };
         let numbers = numbers.trim_end_matches(']').split(',');
-        let moved: Vec<String> = numbers
-            .map(|it| format!("{:?}", to(it.trim().parse().unwrap())))
-            .collect();
+        let moved: Vec<String> =
+            numbers.map(|it| format!("{:?}", to(it.trim().parse().unwrap()))).collect();
         format!("translation_metres = [{}]", moved.join(", "))
     };
     let lines: Vec<String> = text.lines().map(line).collect();

@@ -65,9 +65,7 @@ fn pictures(named: [Named; 4]) -> [Vec<Canvas>; 4] {
     core::array::from_fn(|view| {
         let camera = &rig.cameras()[view];
         let frames = 0..N_FRAMES;
-        frames
-            .map(|frame| picture(camera, frame, named[view]))
-            .collect()
+        frames.map(|frame| picture(camera, frame, named[view])).collect()
     })
 }
 

@@ -171,10 +171,7 @@ fn tracked_poses() {
     one.assert_same(&case, 3, 20);
     let lines = case.lines("pose2d.jsonl");
     let n_full = lines.iter().filter(|line| line["search"] == "full").count();
-    let n_tracked = lines
-        .iter()
-        .filter(|line| line["search"] == "tracked")
-        .count();
+    let n_tracked = lines.iter().filter(|line| line["search"] == "tracked").count();
     // Frames 0 and 10 at least.
     assert!(n_full >= 6 && n_tracked > 0, "{n_full} {n_tracked}");
     assert_eq!(n_full + n_tracked, 60);
@@ -186,9 +183,7 @@ fn concurrent_deployments_do_not_interfere() {
         Case::new("left", &[12; 2], PLAIN),
         Case::new("right", &[9; 3], PLAIN),
     ];
-    let started = cases
-        .each_ref()
-        .map(|it| it.start(&["run", "deployment.toml"]));
+    let started = cases.each_ref().map(|it| it.start(&["run", "deployment.toml"]));
     for started in started {
         let ended = started.wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);

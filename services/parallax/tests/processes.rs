@@ -12,10 +12,7 @@ use serde_json::{Value, json};
 
 /// The frame numbers of a run's results.
 fn frames(lines: &[Value]) -> Vec<u64> {
-    lines
-        .iter()
-        .map(|it| it["frame"].as_u64().unwrap())
-        .collect()
+    lines.iter().map(|it| it["frame"].as_u64().unwrap()).collect()
 }
 
 #[test]
@@ -91,9 +88,7 @@ fn a_killed_pose_process_is_restarted_and_its_gap_is_reported() {
     let without = lines.iter().filter(|it| it["views_present"] != all);
     let without: Vec<_> = without.map(|it| it["views_missing"].clone()).collect();
     assert!(
-        without
-            .iter()
-            .all(|it| *it == json!({ "b": "process lost" })),
+        without.iter().all(|it| *it == json!({ "b": "process lost" })),
         "{without:?}"
     );
     assert_eq!(lines[99]["views_present"], all, "the view is not back");

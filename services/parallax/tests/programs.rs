@@ -41,25 +41,17 @@ fn mapped_file(bytes: &[u8]) -> String {
         let (range, _) = line.split_once(' ')?;
         let (begin, end) = range.split_once('-')?;
         let [begin, end] = [begin, end].map(|it| usize::from_str_radix(it, 16));
-        (begin.ok()?..end.ok()?)
-            .contains(&at)
-            .then(|| line.to_owned())
+        (begin.ok()?..end.ok()?).contains(&at).then(|| line.to_owned())
     };
     let line = maps.lines().find_map(of_line).unwrap_or_default();
-    line.split_ascii_whitespace()
-        .nth(5)
-        .unwrap_or_default()
-        .to_owned()
+    line.split_ascii_whitespace().nth(5).unwrap_or_default().to_owned()
 }
 
 #[test]
 fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending() {
     let live = PACED.replace("\"paced\"", "\"realtime\"");
     let case = Case::new("client", &[160; 2], &live);
-    let wish = Wish::skeletons()
-        .with_poses()
-        .with_pictures()
-        .every_frame(64);
+    let wish = Wish::skeletons().with_poses().with_pictures().every_frame(64);
     // Before there is a deployment.
     let refused = Client::open(&case.name, &wish).unwrap_err();
     assert!(refused.is_not_running(), "{refused}");
@@ -90,9 +82,7 @@ fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending()
     signal("KILL", started.pid_of("triangulate").into());
     until(|| {
         let moment = next(&mut client);
-        moment
-            .skeletons
-            .is_some_and(|skeletons| skeletons.message().stamp.epoch == 1)
+        moment.skeletons.is_some_and(|skeletons| skeletons.message().stamp.epoch == 1)
     });
     // The run ends, and its files are removed, while the client is there.
     let ended = started.wait();
@@ -127,11 +117,7 @@ fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
             "{file}"
         );
     }
-    let pixels = || {
-        pictures()
-            .map(|it| it.pixels().to_vec())
-            .collect::<Vec<_>>()
-    };
+    let pixels = || pictures().map(|it| it.pixels().to_vec()).collect::<Vec<_>>();
     let before = pixels();
     let so_far = case.lines("pose3d.jsonl").len();
     until(|| case.lines("pose3d.jsonl").len() > so_far + 25);
@@ -142,11 +128,7 @@ fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let lines = case.lines("pose3d.jsonl");
     assert_eq!(lines.len(), 160);
-    assert!(
-        lines
-            .iter()
-            .all(|it| it["views_missing"] == serde_json::json!({}))
-    );
+    assert!(lines.iter().all(|it| it["views_missing"] == serde_json::json!({})));
     case.assert_nothing_left();
 }
 
@@ -207,9 +189,7 @@ fn datagrams_say_where_joints_are_and_the_run_is_as_without() {
     socket.set_read_timeout(Some(WATCHDOG)).unwrap();
     let port = socket.local_addr().unwrap().port();
     let target = format!("udp://127.0.0.1:{port}");
-    let beyond = case
-        .start(&["run", "deployment.toml", "--publish", "udp://192.0.2.1:9"])
-        .wait();
+    let beyond = case.start(&["run", "deployment.toml", "--publish", "udp://192.0.2.1:9"]).wait();
     assert_eq!(beyond.status.code(), Some(2), "{}", beyond.stderr);
     assert!(
         beyond.stderr.contains("--beyond-this-machine"),
@@ -262,9 +242,7 @@ mod long {
 
     /// Whether a Python has all that its tests need.
     fn is_able(python: &str) -> bool {
-        let imports = Command::new(python)
-            .args(["-c", "import iceoryx2, numpy, pytest"])
-            .output();
+        let imports = Command::new(python).args(["-c", "import iceoryx2, numpy, pytest"]).output();
         imports.is_ok_and(|it| it.status.success())
     }
 

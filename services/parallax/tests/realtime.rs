@@ -34,9 +34,7 @@ impl Finished {
                 let present = it["views_present"].as_array().unwrap();
                 assert_ne!(
                     present.contains(&view["name"]),
-                    it["views_missing"]
-                        .get(view["name"].as_str().unwrap())
-                        .is_some(),
+                    it["views_missing"].get(view["name"].as_str().unwrap()).is_some(),
                     "present, or missing for a reason: {it}"
                 );
                 present.contains(&view["name"])

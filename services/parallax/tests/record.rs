@@ -91,17 +91,12 @@ fn a_truncated_recording_is_replayed_up_to_its_end() {
     let ended = replayed(&case, &["--from", "fuse", "--out", "part"]);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert!(
-        ended
-            .stderr
-            .contains("not complete: cut off; read up to byte"),
+        ended.stderr.contains("not complete: cut off; read up to byte"),
         "{}",
         ended.stderr
     );
     let [before, after] = ["out", "part"].map(|it| text(&case.path(it), "pose3d.jsonl"));
-    let same = before
-        .lines()
-        .zip(after.lines())
-        .take_while(|it| it.0 == it.1);
+    let same = before.lines().zip(after.lines()).take_while(|it| it.0 == it.1);
     assert!(same.count() >= 2, "{before}\n{after}");
     assert!(after.lines().count() < 8, "{after}");
 }

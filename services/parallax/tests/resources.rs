@@ -74,9 +74,7 @@ fn a_file_that_cannot_grow_is_counted_and_ends_no_process() {
     let record = started.pid_of("results").to_string();
     // The file is larger than that already.
     let limit = "--fsize=1000:1000";
-    let set = std::process::Command::new("prlimit")
-        .args(["--pid", &record, limit])
-        .status();
+    let set = std::process::Command::new("prlimit").args(["--pid", &record, limit]).status();
     assert!(
         set.is_ok_and(|it| it.success()),
         "prlimit belongs to util-linux"
@@ -114,9 +112,7 @@ fn files_of_a_run_are_accessible_to_their_owner_only_with_any_umask() {
         stat -c %a /dev/shm/px-$(id -u) >base";
     let started = Started::in_mount_namespace(case.folder(), script);
     let in_own = started.is_some();
-    let ended = started
-        .unwrap_or_else(|| case.start_in_shell(script))
-        .wait();
+    let ended = started.unwrap_or_else(|| case.start_in_shell(script)).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     if in_own {
         let mode = fs::read_to_string(case.path("base")).unwrap();
@@ -255,10 +251,7 @@ fn no_process_of_a_run_has_a_network_socket() {
             let table = fs::read_to_string(format!("/proc/{pid}/net/{protocol}"));
             let table = table.unwrap_or_default();
             let words: BTreeSet<&str> = table.split_ascii_whitespace().collect();
-            let open: Vec<_> = own
-                .iter()
-                .filter(|it| words.contains(it.as_str()))
-                .collect();
+            let open: Vec<_> = own.iter().filter(|it| words.contains(it.as_str())).collect();
             assert!(open.is_empty(), "process {pid} has a {protocol} socket");
         }
     }

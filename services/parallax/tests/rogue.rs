@@ -194,10 +194,8 @@ fn refused(case: &Case, ended: &Ended) -> BTreeSet<String> {
     assert!(!ended.stderr.contains("panic"), "{}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let restarts = report["restarts"].as_array().unwrap();
-    let restarted: BTreeSet<&str> = restarts
-        .iter()
-        .map(|restart| restart["process"].as_str().unwrap())
-        .collect();
+    let restarted: BTreeSet<&str> =
+        restarts.iter().map(|restart| restart["process"].as_str().unwrap()).collect();
     assert_eq!(restarted.len(), 1, "only the replaced one: {restarted:?}");
     let lines = case.lines("pose3d.jsonl");
     let last = lines.last().unwrap();
@@ -229,9 +227,7 @@ fn a_foreign_process_cannot_publish_another_type_or_beside_the_right_sender() {
     let (case, started, rogue) = start("types", PACED);
     let wrong_type = rogue.bus.publisher::<PairPose>(&topic::view_pose(0));
     assert!(matches!(wrong_type, Err(PortError::WrongType { .. })));
-    let wrong_header = rogue
-        .bus
-        .slice_publisher::<u8, EvidenceHeader>(&topic::frame(0));
+    let wrong_header = rogue.bus.slice_publisher::<u8, EvidenceHeader>(&topic::frame(0));
     assert!(matches!(wrong_header, Err(PortError::WrongType { .. })));
     let second = rogue.bus.publisher::<ViewPose>(&topic::view_pose(0));
     assert!(matches!(second, Err(PortError::Publisher { .. })));

@@ -57,11 +57,8 @@ fn a_dry_run_shows_cores_and_priority_of_every_process() {
     case.edit("deployment.toml", "9999", "1000");
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let lines: Vec<Vec<&str>> = ended
-        .stdout
-        .lines()
-        .map(|it| it.split_whitespace().collect())
-        .collect();
+    let lines: Vec<Vec<&str>> =
+        ended.stdout.lines().map(|it| it.split_whitespace().collect()).collect();
     for expected in [
         &["pose-0", "spin"][..],
         &["fuse-0", "cores=0", "spin"],
@@ -104,15 +101,9 @@ fn without_rights(case: &Case) -> Option<Output> {
     let drop = if is_owner { drop } else { Vec::new() };
     let words = [&limits[..], &drop, &parallax].concat();
     let mut command = Command::new("prlimit");
-    let output = command
-        .current_dir(case.folder())
-        .args(words)
-        .output()
-        .ok()?;
+    let output = command.current_dir(case.folder()).args(words).output().ok()?;
     let stderr = String::from_utf8_lossy(&output.stderr);
-    let is_tool = ["prlimit:", "setpriv:"]
-        .iter()
-        .any(|it| stderr.starts_with(it));
+    let is_tool = ["prlimit:", "setpriv:"].iter().any(|it| stderr.starts_with(it));
     (!is_tool).then_some(output)
 }
 

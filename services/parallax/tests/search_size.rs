@@ -51,9 +51,7 @@ fn deployment(case: &Case, sizes: &[[u32; 2]], focal: f64, units_per_metre: f64)
         // The picture is not looked at: only its size is.
         let size = footage::Size::new(*width as usize, *height as usize);
         let shade = 40 + 20 * u8::try_from(text.len() % 7).unwrap();
-        footage::Canvas::new(size, [shade; 3])
-            .save_png(&case.path(&file))
-            .unwrap();
+        footage::Canvas::new(size, [shade; 3]).save_png(&case.path(&file)).unwrap();
         write!(text, "\n[[camera]]\nname = {name:?}\nsource = {file:?}\n").unwrap();
     }
     case.write("deployment.toml", text);
@@ -62,10 +60,7 @@ fn deployment(case: &Case, sizes: &[[u32; 2]], focal: f64, units_per_metre: f64)
 fn said(case: &Case) -> String {
     let ended = case.start(DRY).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let size = ended
-        .stdout
-        .lines()
-        .find(|it| it.starts_with("capture.scale"));
+    let size = ended.stdout.lines().find(|it| it.starts_with("capture.scale"));
     size.unwrap().to_owned()
 }
 
@@ -120,9 +115,7 @@ fn cameras_of_different_sizes_are_told_apart_and_small_people_are_warned_of() {
 /// The summary as JSON, and as text.
 fn run(case: &Case, more: &[&str]) -> (Value, String) {
     let summary = |arguments: &[&str]| {
-        let ended = case
-            .start(&[&["run", "deployment.toml"], more, arguments].concat())
-            .wait();
+        let ended = case.start(&[&["run", "deployment.toml"], more, arguments].concat()).wait();
         case.assert_nothing_left();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         ended.stdout

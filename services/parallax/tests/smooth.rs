@@ -133,14 +133,7 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
     );
     let smoothed = lines(&case, "out/pose3d-smooth.jsonl");
     assert_eq!(smoothed.len(), N_FRAMES);
-    assert!(
-        smoothed[40].people[0]
-            .states
-            .values()
-            .filter(|it| *it == "measured")
-            .count()
-            > 10
-    );
+    assert!(smoothed[40].people[0].states.values().filter(|it| *it == "measured").count() > 10);
     assert_angles(&case);
     // Without `smooth` the next run has nothing smoothed, not what an earlier one has left.
     let off = [
@@ -195,9 +188,7 @@ fn each_of_several_people_is_smoothed_alone() {
                 line.people.clear();
                 line.status = FrameLine::NO_RESULT.to_owned();
             }
-            _ => line
-                .people
-                .insert((frame % 2) as usize, person(7, at(frame, 7))),
+            _ => line.people.insert((frame % 2) as usize, person(7, at(frame, 7))),
         }
         line
     });
@@ -232,12 +223,7 @@ fn each_of_several_people_is_smoothed_alone() {
         (person.ids[0], joint.measured, joint.filled)
     };
     assert_eq!([counts(0), counts(1)], [(1, 49, 1), (7, 46, 4)]);
-    assert!(
-        report
-            .people
-            .iter()
-            .all(|person| person.frames_of_breaks.is_empty())
-    );
+    assert!(report.people.iter().all(|person| person.frames_of_breaks.is_empty()));
 }
 
 #[test]
@@ -282,10 +268,7 @@ fn missing() -> JointLine {
 }
 
 fn text(lines: impl IntoIterator<Item = FrameLine>) -> String {
-    lines
-        .into_iter()
-        .map(|it| runfiles::to_line(&it).unwrap())
-        .collect()
+    lines.into_iter().map(|it| runfiles::to_line(&it).unwrap()).collect()
 }
 
 #[test]

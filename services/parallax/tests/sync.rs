@@ -106,9 +106,7 @@ fn clocks_are_found_written_and_used() {
         "--set",
         "capture.n_frames=6",
     ];
-    let ended = case
-        .start(&[&["run", "deployment.toml"], &set[..]].concat())
-        .wait();
+    let ended = case.start(&[&["run", "deployment.toml"], &set[..]].concat()).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let lines = case.lines("pose3d.jsonl");
     assert_eq!(lines.len(), 6);

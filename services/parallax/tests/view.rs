@@ -156,10 +156,7 @@ fn a_page_follows_a_run_from_before_its_begin_until_after_its_end() {
 fn finished(case: &Case) {
     let out = fs::read_dir(case.path("out")).unwrap();
     let names = out.map(|it| it.unwrap().file_name().into_string().unwrap());
-    let recording = names
-        .into_iter()
-        .find(|it| it.starts_with("recording-"))
-        .unwrap();
+    let recording = names.into_iter().find(|it| it.starts_with("recording-")).unwrap();
     let recording = format!("out/{recording}");
     for (subject, has_pictures) in [("out", false), (recording.as_str(), true)] {
         let view = View::start(case, &[subject]);
@@ -189,9 +186,7 @@ fn finished(case: &Case) {
     }
     fs::create_dir(case.path("empty")).unwrap();
     for wrong in ["empty", "no/such/folder", "rig.toml", "model.plx"] {
-        let ended = case
-            .start(&["view", "--port", "0", wrong])
-            .wait_among_others();
+        let ended = case.start(&["view", "--port", "0", wrong]).wait_among_others();
         let code = ended.status.code();
         assert!(
             code.is_some_and(|it| (1..=4).contains(&it)),

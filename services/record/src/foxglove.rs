@@ -189,11 +189,7 @@ impl Foxglove {
 
     fn entity(&self, person: &SkeletonMessage, frame: u64, time: &Value) -> Value {
         let found = |it: &Joint3d| {
-            let is_finite = it
-                .in_world
-                .iter()
-                .chain(&it.covariance)
-                .all(|it| it.is_finite());
+            let is_finite = it.in_world.iter().chain(&it.covariance).all(|it| it.is_finite());
             it.status == Status::OK && is_finite
         };
         let joints = person.listed_joints().iter();
@@ -264,16 +260,12 @@ fn ellipsoid(joint: &Joint3d) -> Option<Value> {
     let [xx, xy, xz, yy, yz, zz] = joint.covariance;
     let covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     let eigen = covariance.symmetric_eigen();
-    let diameters = eigen
-        .eigenvalues
-        .map(|it| 2.0 * SPREAD * it.max(0.0).sqrt());
+    let diameters = eigen.eigenvalues.map(|it| 2.0 * SPREAD * it.max(0.0).sqrt());
     let mut axes = eigen.eigenvectors;
     if axes.determinant() < 0.0 {
         axes.column_mut(0).neg_mut();
     }
-    let is_sane = diameters
-        .iter()
-        .all(|it| it.is_finite() && *it <= LARGEST_M);
+    let is_sane = diameters.iter().all(|it| it.is_finite() && *it <= LARGEST_M);
     if !is_sane || diameters.max() <= 0.0 {
         return None;
     }

@@ -73,10 +73,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
             session: service.session(),
             ..job.about
         },
-        topics: channels
-            .iter()
-            .map(|channel| channel.name.clone())
-            .collect(),
+        topics: channels.iter().map(|channel| channel.name.clone()).collect(),
         foxglove: job.foxglove.map(Foxglove::new),
     };
     let thread = WriterThread::start(move || write_all(task, &outlet))?;
@@ -157,10 +154,7 @@ impl<'a> Recorder<'a> {
             inlet,
             receivers,
             sent: vec![Sent::default(); channels.len()],
-            counts: channels
-                .iter()
-                .map(|channel| counted_by(channel, channels))
-                .collect(),
+            counts: channels.iter().map(|channel| counted_by(channel, channels)).collect(),
             n_evidence: vec![0; channels.len()],
             is_over: false,
         })

@@ -128,13 +128,7 @@ mod tests {
         let [near, far] = [0, 1].map(topic::view_pose);
         assert!(names.contains(&near.as_str()) && names.contains(&far.as_str()));
         assert!(!names.contains(&topic::frame(1).as_str()), "{names:?}");
-        let sender = |name: &str| {
-            all.iter()
-                .find(|it| it.name == name)
-                .unwrap()
-                .sender
-                .clone()
-        };
+        let sender = |name: &str| all.iter().find(|it| it.name == name).unwrap().sender.clone();
         assert_eq!(sender(&near).as_deref(), Some("pose-0"));
         assert_eq!(sender(&far), None);
     }
@@ -160,9 +154,7 @@ mod tests {
         let counted = |name: &str| {
             let counter = all.iter().find(|channel| channel.name == name).unwrap();
             let counted = counted_by(counter, &all).into_iter();
-            counted
-                .map(|index| all[index].name.clone())
-                .collect::<Vec<_>>()
+            counted.map(|index| all[index].name.clone()).collect::<Vec<_>>()
         };
         assert_eq!(counted(&topic::health("pose-1")), [topic::view_pose(1)]);
         assert_eq!(counted(&topic::health("fuse-0")), [topic::pair_pose(0)]);

@@ -27,11 +27,7 @@ pub fn file_of_life(file: &Path, epoch: u32) -> PathBuf {
 /// Creates a new file, readable by its owner only because it shows people. It is locked while it is being written.
 pub(crate) fn create(file: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
-    let made = options
-        .write(true)
-        .create_new(true)
-        .mode(0o600)
-        .open(file)?;
+    let made = options.write(true).create_new(true).mode(0o600).open(file)?;
     if let Err(error) = made.try_lock() {
         tracing::debug!(%error, "cannot lock the recording");
     }

@@ -42,9 +42,8 @@ impl Calibration {
         if record.skeletons.n_seen > 1 {
             return;
         }
-        let points: Vec<_> = (0..scene.views.len())
-            .map(|view| parts(scene, record, view))
-            .collect();
+        let points: Vec<_> =
+            (0..scene.views.len()).map(|view| parts(scene, record, view)).collect();
         // What networks see in an empty room is somewhere else in each view, and no camera's fault.
         let is_there = |person: &SkeletonMessage| person.status == Status::OK;
         if !scene.has_maps || record.followed().is_some_and(is_there) {
@@ -88,11 +87,8 @@ impl Calibration {
             let read = wire::skew_from_message(view.pose.as_ref()?);
             read.ok()
         };
-        let skews_s: Vec<f64> = record
-            .views
-            .iter()
-            .map(|view| skew_s(view).unwrap_or(0.0))
-            .collect();
+        let skews_s: Vec<f64> =
+            record.views.iter().map(|view| skew_s(view).unwrap_or(0.0)).collect();
         self.steps.note(instant_s, points, &skews_s);
         for (view, fit) in self.fits.iter_mut().enumerate() {
             let step = self.steps.step(view);
@@ -142,10 +138,7 @@ impl Calibration {
     /// Logs it once, as soon as it is known.
     fn tell_contradiction(&mut self, scene: &Scene) {
         let names = || scene.views.iter().map(|it| it.name.clone());
-        let Some(it) = self
-            .contradicted(names())
-            .filter(|_| !self.is_contradiction_told)
-        else {
+        let Some(it) = self.contradicted(names()).filter(|_| !self.is_contradiction_told) else {
             return;
         };
         self.is_contradiction_told = true;

@@ -262,9 +262,7 @@ fn other_than_pictures(folder: &Path, deep: usize) -> io::Result<Option<PathBuf>
             continue;
         }
         let name = entry.file_name().into_string().unwrap_or_default();
-        let number = name
-            .split_once('.')
-            .filter(|it| matches!(it.1, "png" | "png.part"));
+        let number = name.split_once('.').filter(|it| matches!(it.1, "png" | "png.part"));
         if !number.is_some_and(|it| it.0.bytes().all(|digit| digit.is_ascii_digit())) {
             return Ok(Some(path));
         }

@@ -119,9 +119,7 @@ impl FrameRecord {
         let read = if scene.has_maps {
             wire::sightings_from_message(message, message.n_keypoints as usize).map(|seen| {
                 let people = seen.into_iter().flat_map(|seen| seen.people);
-                people
-                    .map(|person| Own::seen(&person, scene.least_heat))
-                    .collect()
+                people.map(|person| Own::seen(&person, scene.least_heat)).collect()
             })
         } else {
             let layout = &scene.views[view].layout;
@@ -171,9 +169,7 @@ impl FrameRecord {
     /// The expected errors of a view's parts, pixels of the frame.
     pub(crate) fn sigma_px(&self, scene: &Scene, view: usize) -> Option<Vec<f32>> {
         let message = self.views.get(view)?.quality.as_ref()?;
-        wire::sigma_from_message(message, scene.model.n_parts())
-            .ok()
-            .flatten()
+        wire::sigma_from_message(message, scene.model.n_parts()).ok().flatten()
     }
 }
 

@@ -163,11 +163,8 @@ impl Gather {
         let mut absent = Vec::new();
         for frame in (self.next..end).step_by(self.frame_step as usize) {
             let parts = self.frames.remove(&frame);
-            let pose = |view: usize| {
-                parts
-                    .as_ref()
-                    .and_then(|parts| parts.views[view].pose.as_ref())
-            };
+            let pose =
+                |view: usize| parts.as_ref().and_then(|parts| parts.views[view].pose.as_ref());
             let histories = self.histories.iter_mut().enumerate();
             let views: Vec<Missing> = histories
                 .map(|(view, history)| history.note_result(frame, pose(view), is_lost))
@@ -315,10 +312,7 @@ mod tests {
     }
 
     fn reasons(absent: &[Absent]) -> Vec<(u64, &str)> {
-        absent
-            .iter()
-            .map(|absent| (absent.frame, absent.reason.as_str()))
-            .collect()
+        absent.iter().map(|absent| (absent.frame, absent.reason.as_str())).collect()
     }
 
     #[test]

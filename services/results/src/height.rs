@@ -121,9 +121,7 @@ mod tests {
         let both = heights.medians(names());
         assert_eq!(
             both,
-            ["left", "right"]
-                .map(|it| (it.to_owned(), Some(120.0)))
-                .into()
+            ["left", "right"].map(|it| (it.to_owned(), Some(120.0))).into()
         );
         assert_eq!(Heights::new(2).medians(names())["left"], None);
         let lying = FusedView {

@@ -57,11 +57,7 @@ impl Latency {
         let transport = HOPS.map(|it| (Kind::Transport, it));
         let waiting = HOPS.map(|it| (Kind::Waiting, it));
         let mut histograms = BTreeMap::new();
-        for key in stages
-            .into_iter()
-            .chain(transport)
-            .chain(waiting)
-            .chain([(Kind::EndToEnd, "")])
+        for key in stages.into_iter().chain(transport).chain(waiting).chain([(Kind::EndToEnd, "")])
         {
             histograms.insert(key, Histogram::new_with_bounds(1, LONGEST_MICROS, 3)?);
         }
@@ -79,15 +75,11 @@ impl Latency {
             let timings = [
                 (
                     "capture",
-                    view.frame
-                        .filter(|it| it.status == Status::OK)
-                        .map(|it| it.timing),
+                    view.frame.filter(|it| it.status == Status::OK).map(|it| it.timing),
                 ),
                 (
                     "pose",
-                    view.pose
-                        .filter(|it| it.status == Status::OK)
-                        .map(|it| it.timing),
+                    view.pose.filter(|it| it.status == Status::OK).map(|it| it.timing),
                 ),
                 ("quality", view.quality.map(|it| it.timing)),
             ];
@@ -111,10 +103,7 @@ impl Latency {
     /// The path of a frame, from the result back to its capture.
     fn walk(&mut self, record: &FrameRecord) -> Option<()> {
         let result = record.skeletons.timing;
-        let pair = record
-            .fused
-            .iter()
-            .max_by_key(|it| it.timing.sent_at_nanos)?;
+        let pair = record.fused.iter().max_by_key(|it| it.timing.sent_at_nanos)?;
         let view = (0..record.views.len())
             .filter(|it| record.views[*it].pose.is_some())
             .max_by_key(|it| record.views[*it].pose.map(|it| it.timing.sent_at_nanos))?;
@@ -141,18 +130,12 @@ impl Latency {
             pose,
             self.sent.get(&("pose", view)).copied(),
         );
-        let captured = record
-            .skeletons
-            .stamp
-            .captured_at_nanos
-            .min(frame.received_at_nanos);
+        let captured = record.skeletons.stamp.captured_at_nanos.min(frame.received_at_nanos);
         let end_to_end = result.sent_at_nanos.saturating_sub(captured);
         self.note(Kind::EndToEnd, "", end_to_end);
         self.total.end_to_end += end_to_end;
-        self.total.computation += [frame, pose, pair.timing, result]
-            .map(computation)
-            .iter()
-            .sum::<u64>();
+        self.total.computation +=
+            [frame, pose, pair.timing, result].map(computation).iter().sum::<u64>();
         Some(())
     }
 
@@ -211,9 +194,7 @@ impl Latency {
 }
 
 fn computation(timing: Timing) -> u64 {
-    timing
-        .sent_at_nanos
-        .saturating_sub(timing.received_at_nanos)
+    timing.sent_at_nanos.saturating_sub(timing.received_at_nanos)
 }
 
 fn percentiles(histogram: &Histogram<u32>) -> Percentiles {

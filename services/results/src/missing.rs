@@ -125,9 +125,7 @@ impl ViewHistory {
     /// Whether its capture process was not running when the frame was due.
     fn was_not_captured(&self, frame: u64) -> bool {
         let is_later = self.captured.is_some_and(|(_, last)| last < frame);
-        let is_between = self
-            .gap
-            .is_some_and(|[last, first]| last < frame && frame < first);
+        let is_between = self.gap.is_some_and(|[last, first]| last < frame && frame < first);
         self.lost_capture && is_later || is_between
     }
 }

@@ -169,9 +169,7 @@ impl Output {
     /// Writes the rows of a frame in the tables.
     fn rows(&mut self, frame: &Skeletons) {
         let row = trc::row(&self.scene, self.tally.n_lines(), frame);
-        let rows = self
-            .pose3d_csv
-            .append(&pose3d::csv_rows(&self.scene, frame));
+        let rows = self.pose3d_csv.append(&pose3d::csv_rows(&self.scene, frame));
         let row = self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row));
         self.note(rows);
         self.note(row);

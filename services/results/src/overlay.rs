@@ -192,9 +192,7 @@ mod tests {
         let with = draw(&scene, &record, 0, 0).unwrap();
         let pixels = |it: &Canvas| -> Vec<[u8; 3]> { it.rgb().as_chunks().0.to_vec() };
         let (with, without) = (pixels(&with), pixels(&without));
-        let changed: Vec<usize> = (0..with.len())
-            .filter(|&it| with[it] != without[it])
-            .collect();
+        let changed: Vec<usize> = (0..with.len()).filter(|&it| with[it] != without[it]).collect();
         assert!(!changed.is_empty());
         // A pixel of the frame is two of the footage, whose middle is (79.5, 59.5): the point lies at 4 m.
         for it in changed {

@@ -66,13 +66,10 @@ fn distances(
     parts: &[[f64; 2]],
 ) -> Vec<[f64; 2]> {
     let camera = scene.views[view].framing.camera();
-    let joints = record
-        .followed()
-        .map_or(&[][..], SkeletonMessage::listed_joints);
+    let joints = record.followed().map_or(&[][..], SkeletonMessage::listed_joints);
     let seen = joints_of(scene, parts).unwrap_or_default();
     let both = joints.iter().zip(&seen);
-    both.filter_map(|(joint, seen)| distance(camera, joint, *seen))
-        .collect()
+    both.filter_map(|(joint, seen)| distance(camera, joint, *seen)).collect()
 }
 
 fn distance(camera: &Camera, joint: &Joint3d, seen: [f64; 2]) -> Option<[f64; 2]> {

@@ -49,9 +49,7 @@ pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> FrameLine {
         seen: Some(frame.n_seen),
         status: frame.status.reason().to_owned(),
         time_s: scene.time_s(frame.stamp.frame),
-        views_missing: missing
-            .map(|(name, reason)| (name.to_owned(), reason.into()))
-            .collect(),
+        views_missing: missing.map(|(name, reason)| (name.to_owned(), reason.into())).collect(),
         views_present: owned(scene.names(frame.views_present)),
     }
 }
@@ -86,11 +84,7 @@ fn person_line(scene: &Scene, person: &SkeletonMessage) -> PersonLine {
 /// The line of a frame that has no result: the reason, and why every view has no part in it.
 pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
     let views = scene.views.iter().enumerate();
-    let why = |view: usize| {
-        it.views
-            .get(view)
-            .map_or(it.reason.as_str(), |it| it.reason())
-    };
+    let why = |view: usize| it.views.get(view).map_or(it.reason.as_str(), |it| it.reason());
     FrameLine {
         frame: it.frame,
         people: Vec::new(),
@@ -98,9 +92,7 @@ pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
         seen: None,
         status: FrameLine::NO_RESULT.to_owned(),
         time_s: scene.time_s(it.frame),
-        views_missing: views
-            .map(|(view, it)| (it.name.clone(), why(view).into()))
-            .collect(),
+        views_missing: views.map(|(view, it)| (it.name.clone(), why(view).into())).collect(),
         views_present: Vec::new(),
     }
 }
@@ -166,15 +158,11 @@ pub(crate) fn csv_rows(scene: &Scene, frame: &Skeletons) -> String {
         return rows_of(scene, frame.stamp.frame, &nobody(scene, frame.status));
     }
     let people = frame.listed().iter();
-    people
-        .map(|person| rows_of(scene, frame.stamp.frame, person))
-        .collect()
+    people.map(|person| rows_of(scene, frame.stamp.frame, person)).collect()
 }
 
 fn rows_of(scene: &Scene, frame: u64, person: &SkeletonMessage) -> String {
-    let time = scene
-        .time_s(frame)
-        .map_or(String::new(), |it| format!("{it:.6}"));
+    let time = scene.time_s(frame).map_or(String::new(), |it| format!("{it:.6}"));
     let id = match person.id {
         0 => String::new(),
         id => id.to_string(),
@@ -255,11 +243,7 @@ mod tests {
             line["people"][0]["joints"]["right knee"].get("position_m"),
             None
         );
-        assert!(
-            !csv_rows(&scene(), &record.skeletons)
-                .to_lowercase()
-                .contains("nan")
-        );
+        assert!(!csv_rows(&scene(), &record.skeletons).to_lowercase().contains("nan"));
     }
 
     #[test]
@@ -271,18 +255,8 @@ mod tests {
         let columns = CSV_HEADER.split(',').count();
         let rows = csv_rows(&scene(), &pose);
         assert_eq!(rows.lines().count(), 28);
-        assert!(
-            rows.lines()
-                .nth(13)
-                .unwrap()
-                .starts_with("3,0.050000,1,head,")
-        );
-        assert!(
-            rows.lines()
-                .nth(27)
-                .unwrap()
-                .starts_with("3,0.050000,9,head,")
-        );
+        assert!(rows.lines().nth(13).unwrap().starts_with("3,0.050000,1,head,"));
+        assert!(rows.lines().nth(27).unwrap().starts_with("3,0.050000,9,head,"));
         for row in rows.lines() {
             assert_eq!(row.split(',').count(), columns, "{row}");
         }

@@ -74,9 +74,7 @@ impl Scene {
 impl View {
     /// A point of the frame in pixels of the footage.
     pub fn in_source(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        self.framing
-            .source_from_output()
-            .map(|row| row[0] * x + row[1] * y + row[2])
+        self.framing.source_from_output().map(|row| row[0] * x + row[1] * y + row[2])
     }
 
     /// Pixels of the footage per pixel of the frame.

@@ -133,14 +133,10 @@ impl Ports {
             skeletons: Port::open(service, waiter, &topic::skeletons(), Sender::All)?,
         };
         for view in 0..job.scene.views.len() {
-            let frames = service
-                .bus()
-                .slice_subscriber(&topic::frame(view), waiter)?;
+            let frames = service.bus().slice_subscriber(&topic::frame(view), waiter)?;
             ports.frames.push(frames);
             let (poses, sender) = (topic::view_pose(view), Sender::View(view));
-            ports
-                .poses
-                .push(Port::open(service, waiter, &poses, sender)?);
+            ports.poses.push(Port::open(service, waiter, &poses, sender)?);
             if job.has_quality {
                 let errors = Port::open(service, waiter, &topic::view_quality(view), sender)?;
                 ports.qualities.push(errors);
@@ -156,9 +152,7 @@ impl Ports {
                 topic::pair_pose(worker),
                 Sender::Worker { worker, n_workers },
             );
-            ports
-                .pairs
-                .push(Port::open(service, waiter, &pairs, sender)?);
+            ports.pairs.push(Port::open(service, waiter, &pairs, sender)?);
         }
         Ok(ports)
     }
@@ -224,9 +218,7 @@ impl Ports {
                 while frames.receive()?.is_some() {}
             }
             self.poses.iter().try_for_each(Port::drain::<ViewPose>)?;
-            self.qualities
-                .iter()
-                .try_for_each(Port::drain::<ViewQuality>)?;
+            self.qualities.iter().try_for_each(Port::drain::<ViewQuality>)?;
             self.pairs.iter().try_for_each(Port::drain::<PairPose>)?;
             self.people.iter().try_for_each(Port::drain::<People>)?;
             self.skeletons.drain::<Skeletons>()?;

@@ -44,20 +44,14 @@ impl Person {
 
 impl Smoothing {
     pub(crate) fn begin(scene: &Scene, file: File) -> io::Result<Self> {
-        let joints = scene
-            .joints
-            .joints
-            .iter()
-            .map(|joint| joint.name.to_owned());
+        let joints = scene.joints.joints.iter().map(|joint| joint.name.to_owned());
         let extras = scene.extra_keypoints.iter().cloned();
         Ok(Self {
             people: BTreeMap::new(),
             names: joints.chain(extras).collect(),
             n_joints: scene.joints.joints.len(),
             n_frames: 0,
-            rate_hz: scene
-                .frame_rate_hz
-                .map(|rate_hz| rate_hz / scene.frame_step.max(1) as f64),
+            rate_hz: scene.frame_rate_hz.map(|rate_hz| rate_hz / scene.frame_step.max(1) as f64),
             file: Lines::new(file)?,
         })
     }
@@ -124,9 +118,7 @@ impl Smoothing {
             fill_s: FILL_S,
             method: "kalman".to_owned(),
             n_frames: self.n_frames,
-            people: people
-                .map(|(id, person)| self.person_report(*id, person))
-                .collect(),
+            people: people.map(|(id, person)| self.person_report(*id, person)).collect(),
             rate_hz: self.rate_hz,
             schema_version: runfiles::VERSION,
             ..SmoothReport::default()

@@ -104,8 +104,7 @@ impl Tally {
             scene.time_s(record.frame()),
             &own::distances_m(scene, record)[..],
         );
-        self.trusted
-            .add(record.followed(), scene.joints.limbs, seen);
+        self.trusted.add(record.followed(), scene.joints.limbs, seen);
         self.people.add(frame);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
             *count = it.frame.as_ref().map_or(*count, |it| it.n_dropped);
@@ -113,11 +112,7 @@ impl Tally {
     }
 
     fn searches(&mut self, scene: &Scene, record: &FrameRecord) {
-        let views = scene
-            .views
-            .iter()
-            .zip(&record.views)
-            .zip(&mut self.evidence);
+        let views = scene.views.iter().zip(&record.views).zip(&mut self.evidence);
         for ((view, it), [bytes, n]) in views {
             let searched = it
                 .pose
@@ -129,9 +124,7 @@ impl Tally {
             let of_view = summary.searches.entry(view.name.clone()).or_default();
             *of_view.entry(pose.searched.name().to_owned()).or_default() += 1;
             let mean = *bytes / *n;
-            summary
-                .evidence_bytes_per_frame
-                .insert(view.name.clone(), mean);
+            summary.evidence_bytes_per_frame.insert(view.name.clone(), mean);
         }
     }
 
@@ -177,9 +170,7 @@ impl Tally {
     pub(crate) fn failed(&mut self, what: &dyn core::fmt::Display) -> bool {
         self.summary.writes_failed += 1;
         let is_first = self.summary.first_failure.is_none();
-        self.summary
-            .first_failure
-            .get_or_insert_with(|| what.to_string());
+        self.summary.first_failure.get_or_insert_with(|| what.to_string());
         is_first
     }
 

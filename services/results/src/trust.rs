@@ -108,10 +108,7 @@ impl Trusted {
             if let (Some(one), Some(other)) = (place(pose, bone.0), place(pose, bone.1)) {
                 let step = (one - other).norm().min(LONGEST_M) / LENGTH_STEP_M;
                 let n_steps = (LONGEST_M / LENGTH_STEP_M) as usize + 1;
-                let counts = self
-                    .lengths
-                    .entry(*bone)
-                    .or_insert_with(|| vec![0; n_steps]);
+                let counts = self.lengths.entry(*bone).or_insert_with(|| vec![0; n_steps]);
                 counts[(step as usize).min(n_steps - 1)] += 1;
             }
         }
@@ -133,11 +130,7 @@ impl Trusted {
 
     /// The scatter of the lengths of the bones, metres.
     fn bone_scatter_m(&self) -> Option<f64> {
-        let scatters: Vec<f64> = self
-            .lengths
-            .values()
-            .filter_map(|it| scatter_m(it))
-            .collect();
+        let scatters: Vec<f64> = self.lengths.values().filter_map(|it| scatter_m(it)).collect();
         (!scatters.is_empty()).then(|| scatters.iter().sum::<f64>() / scatters.len() as f64)
     }
 

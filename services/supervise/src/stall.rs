@@ -35,23 +35,21 @@ impl Stall {
         let seen = Arc::clone(&watched);
         // A stopped process sleeps through many ticks and counts one.
         let tick = limit / 60;
-        thread::Builder::new()
-            .name("stall".to_owned())
-            .spawn(move || {
-                let (mut turns, mut waited) = (0, Duration::ZERO);
-                while ended.recv_timeout(tick) == Err(RecvTimeoutError::Timeout) {
-                    let now = seen.turns.load(Ordering::Relaxed);
-                    if now != turns || seen.is_outside.load(Ordering::Relaxed) {
-                        (turns, waited) = (now, Duration::ZERO);
-                        continue;
-                    }
-                    waited += tick;
-                    if waited >= limit {
-                        on_stall();
-                        return;
-                    }
+        thread::Builder::new().name("stall".to_owned()).spawn(move || {
+            let (mut turns, mut waited) = (0, Duration::ZERO);
+            while ended.recv_timeout(tick) == Err(RecvTimeoutError::Timeout) {
+                let now = seen.turns.load(Ordering::Relaxed);
+                if now != turns || seen.is_outside.load(Ordering::Relaxed) {
+                    (turns, waited) = (now, Duration::ZERO);
+                    continue;
                 }
-            })?;
+                waited += tick;
+                if waited >= limit {
+                    on_stall();
+                    return;
+                }
+            }
+        })?;
         Ok(Self { watched, _end: end })
     }
 

@@ -171,9 +171,7 @@ impl Supervisor<'_> {
         while !self.stop.is_requested() {
             let now = Instant::now();
             if now.saturating_duration_since(last_turn) > ASLEEP {
-                self.watches
-                    .iter_mut()
-                    .for_each(|watch| watch.restart_timers(now));
+                self.watches.iter_mut().for_each(|watch| watch.restart_timers(now));
             }
             last_turn = now;
             for index in 0..self.watches.len() {
@@ -311,9 +309,7 @@ impl Supervisor<'_> {
             }
         }
         match watch.metrics.latest() {
-            Ok(metrics) => metrics
-                .iter()
-                .for_each(|message| watch.note_metrics(message)),
+            Ok(metrics) => metrics.iter().for_each(|message| watch.note_metrics(message)),
             Err(error) => {
                 tracing::warn!(process = watch.spec.name, %error, "cannot receive its metrics");
             }
@@ -430,10 +426,7 @@ impl Supervisor<'_> {
     /// Stops all processes, and kills those that do not end.
     fn shut_down(&mut self) {
         (self.on_event)(Event::Stopping);
-        self.watches
-            .iter()
-            .filter_map(Watch::child)
-            .for_each(Child::terminate);
+        self.watches.iter().filter_map(Watch::child).for_each(Child::terminate);
         let begin = Instant::now();
         let mut is_repeated = false;
         while self.watches.iter().any(|watch| watch.child().is_some()) {
@@ -444,10 +437,7 @@ impl Supervisor<'_> {
             // repeat ours.
             if !is_repeated && REPEAT_STOP.contains(&waited) {
                 is_repeated = true;
-                self.watches
-                    .iter()
-                    .filter_map(Watch::child)
-                    .for_each(Child::terminate);
+                self.watches.iter().filter_map(Watch::child).for_each(Child::terminate);
             }
             for index in 0..self.watches.len() {
                 self.receive(index, now);

@@ -269,9 +269,7 @@ impl Watch {
             self.work.since_iteration >= most
         };
         self.spec.most_work.is_some_and(is_too_much)
-            && self
-                .current
-                .is_some_and(|health| health.n_sent >= WARM_UP_MESSAGES)
+            && self.current.is_some_and(|health| health.n_sent >= WARM_UP_MESSAGES)
             && self.at_work_since.is_some_and(worked)
     }
 

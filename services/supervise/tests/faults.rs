@@ -50,12 +50,7 @@ fn is_from_epoch(event: &Recorded, epoch: u32) -> bool {
 
 fn state_of(run: &Run, process: &str) -> State {
     let outcome = run.outcome();
-    outcome
-        .processes
-        .iter()
-        .find(|it| it.name == process)
-        .unwrap()
-        .state
+    outcome.processes.iter().find(|it| it.name == process).unwrap().state
 }
 
 #[test]
@@ -445,9 +440,7 @@ fn children_end_with_a_killed_supervisor_and_the_next_one_cleans_up() {
         .spawn()
         .unwrap();
     let mut lines = BufReader::new(supervisor.stdout.take().unwrap()).lines();
-    let pids: Vec<u32> = (0..2)
-        .map(|_| lines.next().unwrap().unwrap().parse().unwrap())
-        .collect();
+    let pids: Vec<u32> = (0..2).map(|_| lines.next().unwrap().unwrap().parse().unwrap()).collect();
     // Both have started: their files exist.
     assert!(pids.iter().all(|&pid| is_alive(pid)), "{pids:?}");
     supervisor.kill().unwrap();
@@ -465,9 +458,7 @@ fn full_shared_memory_is_an_error_with_the_numbers_instead_of_sigbus() {
         env!("CARGO_BIN_EXE_supervise-dummy"),
         base.path().display()
     );
-    let unshared = Command::new("unshare")
-        .args(["-m", "sh", "-c", &script])
-        .output();
+    let unshared = Command::new("unshare").args(["-m", "sh", "-c", &script]).output();
     let Ok(output) = unshared else {
         eprintln!("skipped: unshare is absent");
         return;

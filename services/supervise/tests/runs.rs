@@ -47,11 +47,7 @@ fn a_realtime_run_does_not_wait_for_a_slow_receiver() {
         ],
     );
     let run = case.run(|_, _| {});
-    let got: Vec<_> = run
-        .got("sink")
-        .into_iter()
-        .map(|(_, frame)| frame)
-        .collect();
+    let got: Vec<_> = run.got("sink").into_iter().map(|(_, frame)| frame).collect();
     assert!(got.len() < 200, "{got:?}");
     assert!(got.is_sorted_by(|a, b| a < b), "{got:?}");
     assert_eq!(run.outcome().processes[1].counts.n_sent, 200);
@@ -73,12 +69,7 @@ fn a_stop_request_ends_all_processes_cleanly() {
     });
     let outcome = run.outcome();
     assert!(outcome.interrupted);
-    assert!(
-        outcome
-            .processes
-            .iter()
-            .all(|process| process.state == State::Stopped)
-    );
+    assert!(outcome.processes.iter().all(|process| process.state == State::Stopped));
     assert!(run.deaths("sink").is_empty() && run.deaths("source").is_empty());
 }
 

@@ -127,9 +127,7 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
         n_frames: setup.n_frames,
         rate_hz: setup.rate_hz,
         deadline_ms: setup.deadline_ms as f64,
-        machine: before
-            .zip(after)
-            .map(|(before, after)| before.slower(after)),
+        machine: before.zip(after).map(|(before, after)| before.slower(after)),
         processes: &processes,
         report: &report,
         truth: &synthetic.truth(results.iter().map(|it| it.frame))?,

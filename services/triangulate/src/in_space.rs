@@ -58,9 +58,8 @@ pub fn run_in_space(service: &Service, job: &SpaceJob, mut step: SpaceStep) -> R
     let people = stage.people_input(move |message| {
         wire::people_from_message(message, n_views).map(Input::People)
     })?;
-    let held: Result<Vec<_>, Failure> = (0..n_views)
-        .map(|view| stage.hold_evidence(view, job.frame_step))
-        .collect();
+    let held: Result<Vec<_>, Failure> =
+        (0..n_views).map(|view| stage.hold_evidence(view, job.frame_step)).collect();
     let solver = Solver {
         service,
         job,
@@ -96,20 +95,14 @@ impl Solver<'_> {
             Some(Input::People(people)) => people,
             _ => FramePeople::default(),
         };
-        let samples: Vec<Option<Ref<'_, Sample<f32, EvidenceHeader>>>> = self
-            .held
-            .iter()
-            .map(|held| held.of(frame.number()))
-            .collect();
+        let samples: Vec<Option<Ref<'_, Sample<f32, EvidenceHeader>>>> =
+            self.held.iter().map(|held| held.of(frame.number())).collect();
         let maps = samples.iter().map(|sample| match sample {
             Some(sample) => self.maps(sample),
             None => Vec::new(),
         });
         let maps: Vec<Vec<PersonMaps<'_>>> = maps.collect();
-        let instant_s = self
-            .job
-            .frame_rate_hz
-            .map(|rate| frame.number() as f64 / rate);
+        let instant_s = self.job.frame_rate_hz.map(|rate| frame.number() as f64 / rate);
         step.begin(instant_s);
         let solved = step.run(&answers, &maps, &people);
         let present = answers.iter().enumerate();

@@ -87,9 +87,7 @@ impl Board {
     pub(crate) fn begin(&self, hello: &Value, scene: Option<Arc<Scene>>) {
         self.change(|inner, version| {
             inner.hello = Slot::new(version, text(hello));
-            for slot in [&mut inner.state, &mut inner.moment]
-                .into_iter()
-                .chain(&mut inner.pictures)
+            for slot in [&mut inner.state, &mut inner.moment].into_iter().chain(&mut inner.pictures)
             {
                 *slot = Slot::default();
             }
@@ -218,8 +216,7 @@ impl Board {
 
     /// Whether a page shows the pictures of a view.
     pub(crate) fn wants(&self, view: usize) -> bool {
-        self.wanted(view)
-            .is_some_and(|it| it.load(Ordering::Relaxed) > 0)
+        self.wanted(view).is_some_and(|it| it.load(Ordering::Relaxed) > 0)
     }
 
     fn change(&self, change: impl FnOnce(&mut Inner, u64)) {
@@ -227,9 +224,7 @@ impl Board {
         inner.version += 1;
         let version = inner.version;
         change(&mut inner, version);
-        inner
-            .bells
-            .retain(|bell| bell.upgrade().is_some_and(|bell| ring(&bell)));
+        inner.bells.retain(|bell| bell.upgrade().is_some_and(|bell| ring(&bell)));
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {

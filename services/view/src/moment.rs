@@ -86,9 +86,7 @@ impl Moment {
                 .map(|rate| rounded(message.stamp.frame as f64 / rate, 1e3)),
             why: (message.status != Status::OK).then(|| message.status.reason().to_owned()),
             id: person.map(|person| person.id),
-            others: others
-                .map(|other| Other::of_message(scene, other))
-                .collect(),
+            others: others.map(|other| Other::of_message(scene, other)).collect(),
             joints: places(joints, person.is_some()),
             spread: joints
                 .iter()

@@ -140,9 +140,7 @@ fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {
         return Ok(());
     };
     let origin = origin.to_str().unwrap_or_default();
-    let site = ["http://", "https://"]
-        .iter()
-        .find_map(|it| origin.strip_prefix(it));
+    let site = ["http://", "https://"].iter().find_map(|it| origin.strip_prefix(it));
     if site == Some(host) {
         Ok(())
     } else {

@@ -330,9 +330,7 @@ mod tests {
             u32::from(!is_question),
             "{question:?}"
         );
-        let answers = answers
-            .iter()
-            .map(|it| serde_json::from_str(it.to_text().unwrap()));
+        let answers = answers.iter().map(|it| serde_json::from_str(it.to_text().unwrap()));
         let answers: Vec<Value> = answers.collect::<Result<_, _>>().unwrap();
         assert!(answers.len() <= 1, "{question:?}: {answers:?}");
         answers

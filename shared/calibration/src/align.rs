@@ -87,10 +87,7 @@ pub fn differences(from: &[Camera], to: &[Camera], with_scale: bool) -> Vec<Diff
     let each = from.iter().zip(to).map(|(a, b)| {
         let a = similarity.camera(a);
         Difference {
-            turn: a
-                .camera_from_world
-                .rotation
-                .angle_to(&b.camera_from_world.rotation),
+            turn: a.camera_from_world.rotation.angle_to(&b.camera_from_world.rotation),
             way: (a.centre_in_world() - b.centre_in_world()).norm(),
         }
     });

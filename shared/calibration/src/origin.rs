@@ -247,10 +247,7 @@ mod tests {
             let points = [[0.0, 0.0], [1.0, 0.0], other];
             let clicks = points.map(|[x, y]| -> Vec<Click> {
                 let at = |nth: usize| truth.cameras()[nth].project(&Point3::new(x, y, 0.0));
-                [0, 2]
-                    .into_iter()
-                    .filter_map(|nth| Some((nth, at(nth)?)))
-                    .collect()
+                [0, 2].into_iter().filter_map(|nth| Some((nth, at(nth)?))).collect()
             });
             let found = from_points(&moved, &clicks).unwrap();
             is_same(&rebased(&moved, &found, "three points").unwrap(), &truth);

@@ -297,11 +297,9 @@ fn deviations(all: &Solved) -> Vec<[f64; 2]> {
             return [0.0; 2];
         };
         let sd = |own: &[usize]| {
-            let squares = own.iter().map(|it| {
-                known
-                    .as_ref()
-                    .map_or(f64::INFINITY, |known| known.sd(*it).powi(2))
-            });
+            let squares = own
+                .iter()
+                .map(|it| known.as_ref().map_or(f64::INFINITY, |known| known.sd(*it).powi(2)));
             inflation * (squares.sum::<f64>() / 3.0).sqrt()
         };
         [sd(&pose[..3]).to_degrees(), sd(&pose[3..])]
@@ -339,10 +337,7 @@ fn disagreement(rigs: &[Vec<Camera>], all: &Solved, settings: &Settings, outcome
 
 fn difference(a: &Camera, b: &Camera) -> Difference {
     Difference {
-        turn: a
-            .camera_from_world
-            .rotation
-            .angle_to(&b.camera_from_world.rotation),
+        turn: a.camera_from_world.rotation.angle_to(&b.camera_from_world.rotation),
         way: (a.centre_in_world() - b.centre_in_world()).norm(),
     }
 }

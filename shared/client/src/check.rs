@@ -61,9 +61,7 @@ pub(crate) fn pose(message: &ViewPose) -> bool {
 /// Whether a picture is as large as its header says; one without pixels may be empty.
 pub(crate) fn picture(header: &FrameHeader, len: usize) -> bool {
     let [width, height] = [header.width, header.height].map(|side| side as usize);
-    let expected = width
-        .checked_mul(height)
-        .and_then(|area| area.checked_mul(3));
+    let expected = width.checked_mul(height).and_then(|area| area.checked_mul(3));
     if header.status == Status::OK {
         len > 0 && expected == Some(len)
     } else {

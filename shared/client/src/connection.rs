@@ -59,9 +59,7 @@ impl Connection {
         // Where it does not, the guest says why.
         wait_for_description(&namespace, STARTING);
         let guest = Guest::open(&namespace)?;
-        let text = namespace
-            .description()
-            .map_err(|error| unreadable(deployment, error))?;
+        let text = namespace.description().map_err(|error| unreadable(deployment, error))?;
         let running = Running::read(&text)?;
         let skeletons = if wish.skeletons {
             Some(guest.port(&topic::skeletons())?)

@@ -116,12 +116,7 @@ impl<P> Joiner<P> {
     ///
     /// A skeleton is the last that is sent about a frame: it says that the rest is there, or will not be.
     pub(crate) fn take(&mut self, now: Instant) -> Vec<Gathered<P>> {
-        let last = self
-            .pending
-            .values()
-            .rev()
-            .find(|it| self.is_over(it, now))
-            .map(|it| it.frame);
+        let last = self.pending.values().rev().find(|it| self.is_over(it, now)).map(|it| it.frame);
         let Some(last) = last else {
             return Vec::new();
         };
@@ -215,19 +210,12 @@ mod tests {
         assert_eq!(joiner.take(now).len(), 0);
         joiner.add_pose(0, pose(2), now);
         joiner.add_pose(1, pose(2), now);
-        let frames: Vec<_> = joiner
-            .take(now)
-            .iter()
-            .map(|it| (it.frame, it.is_complete))
-            .collect();
+        let frames: Vec<_> = joiner.take(now).iter().map(|it| (it.frame, it.is_complete)).collect();
         assert_eq!(frames, [(1, false), (2, true)]);
         joiner.add_pose(0, pose(3), now);
         let later = now + Duration::from_secs(1);
-        let frames: Vec<_> = joiner
-            .take(later)
-            .iter()
-            .map(|it| (it.frame, it.is_complete))
-            .collect();
+        let frames: Vec<_> =
+            joiner.take(later).iter().map(|it| (it.frame, it.is_complete)).collect();
         assert_eq!(frames, [(3, false)]);
     }
 

@@ -136,10 +136,7 @@ impl Client {
     pub fn next(&mut self, patience: Duration) -> Result<Option<Moment>, ClientError> {
         let inner = lock(&self.shared.inner);
         let is_idle = |inner: &mut Inner| inner.ready.is_empty() && inner.problem.is_none();
-        let waited = self
-            .shared
-            .changed
-            .wait_timeout_while(inner, patience, is_idle);
+        let waited = self.shared.changed.wait_timeout_while(inner, patience, is_idle);
         let (mut inner, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let Some(mut moment) = inner.ready.pop_front() else {
             return inner.problem.take().map_or(Ok(None), Err);

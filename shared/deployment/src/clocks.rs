@@ -43,10 +43,7 @@ type Edit = (Range<usize>, String);
 /// [`ClocksError`].
 pub fn with_clocks(text: &str, clocks: &[ClockKeys]) -> Result<String, ClocksError> {
     let document = DeTable::parse(text).map_err(|_odd| ClocksError::Syntax)?;
-    let cameras = document
-        .get_ref()
-        .iter()
-        .find(|it| it.0.get_ref() == "camera");
+    let cameras = document.get_ref().iter().find(|it| it.0.get_ref() == "camera");
     let cameras = cameras.and_then(|it| it.1.get_ref().as_array());
     let mut edits: Vec<Edit> = Vec::new();
     for clock in clocks {

@@ -131,10 +131,7 @@ impl FromStr for Faults {
         if text.trim().is_empty() {
             return Ok(Self::default());
         }
-        text.split(',')
-            .map(str::parse)
-            .collect::<Result<_, _>>()
-            .map(Self)
+        text.split(',').map(str::parse).collect::<Result<_, _>>().map(Self)
     }
 }
 

@@ -26,9 +26,7 @@ pub fn keys() -> Vec<Key> {
     for name in top {
         match SECTIONS.iter().find(|it| it.0 == *name) {
             Some((section, fields)) => keys.extend(
-                fields()
-                    .iter()
-                    .map(|name| schema.key(&format!("{section}."), section, name)),
+                fields().iter().map(|name| schema.key(&format!("{section}."), section, name)),
             ),
             None => keys.push(schema.key("", "", name)),
         }
@@ -106,10 +104,8 @@ mod tests {
         let names: Vec<String> = keys().into_iter().map(|it| it.name).collect();
         assert_eq!(names[..3], ["name", "rig", "unit"]);
         assert_eq!(names.last().unwrap(), "runtime.lock_memory");
-        let sections: Vec<&str> = names
-            .iter()
-            .filter_map(|it| Some(it.split_once('.')?.0))
-            .collect();
+        let sections: Vec<&str> =
+            names.iter().filter_map(|it| Some(it.split_once('.')?.0)).collect();
         let mut unique = sections.clone();
         unique.dedup();
         assert_eq!(unique, SECTIONS.map(|it| it.0));

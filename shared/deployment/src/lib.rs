@@ -185,22 +185,18 @@ impl Deployment {
 
     /// How long a stage waits for a view that is late, milliseconds.
     pub fn deadline_ms(&self) -> u64 {
-        self.supervise
-            .deadline_ms
-            .unwrap_or(match self.capture.mode {
-                capture::Mode::Lossless | capture::Mode::Paced => 10_000,
-                capture::Mode::Realtime => 200,
-            })
+        self.supervise.deadline_ms.unwrap_or(match self.capture.mode {
+            capture::Mode::Lossless | capture::Mode::Paced => 10_000,
+            capture::Mode::Realtime => 200,
+        })
     }
 
     /// How long the main loop of a process may stand still before it is killed, seconds.
     pub fn hang_limit_s(&self) -> u64 {
-        self.supervise
-            .hang_limit_s
-            .unwrap_or(match self.capture.mode {
-                capture::Mode::Lossless | capture::Mode::Paced => 120,
-                capture::Mode::Realtime => 10,
-            })
+        self.supervise.hang_limit_s.unwrap_or(match self.capture.mode {
+            capture::Mode::Lossless | capture::Mode::Paced => 120,
+            capture::Mode::Realtime => 10,
+        })
     }
 
     /// Takes every relative path as relative to `base`.

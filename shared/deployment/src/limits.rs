@@ -80,11 +80,7 @@ impl Deployment {
                  120 is usual"
             ));
         }
-        if let Some(rate) = self
-            .capture
-            .frame_rate_hz
-            .filter(|it| !(1.0..=1000.0).contains(it))
-        {
+        if let Some(rate) = self.capture.frame_rate_hz.filter(|it| !(1.0..=1000.0).contains(it)) {
             doubts.push(format!(
                 "`capture.frame_rate_hz` is {rate} frames per second: cameras have 1 to 1000"
             ));

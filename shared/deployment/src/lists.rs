@@ -30,10 +30,9 @@ fn too_long(said: &Value, taken: &Value, key: &str) -> Option<Complaint> {
             got: format!("a list of {} values", said.len()),
             expected: format!("{}", taken.len()),
         }),
-        (Value::Array(said), Value::Array(taken)) => said
-            .iter()
-            .zip(taken)
-            .find_map(|(said, taken)| too_long(said, taken, key)),
+        (Value::Array(said), Value::Array(taken)) => {
+            said.iter().zip(taken).find_map(|(said, taken)| too_long(said, taken, key))
+        }
         _ => None,
     }
 }

@@ -119,9 +119,7 @@ fn keys_of_kind(camera: &Camera) -> Result<(), Complaint> {
         "none: it is for RTSP cameras",
     )?;
     let scheme = camera.source.split(':').next().unwrap_or_default();
-    let is_rtsp = ["rtsp", "rtsps"]
-        .iter()
-        .any(|it| scheme.eq_ignore_ascii_case(it));
+    let is_rtsp = ["rtsp", "rtsps"].iter().any(|it| scheme.eq_ignore_ascii_case(it));
     demand(
         is_rtsp || camera.clock.is_none(),
         "camera.clock",

@@ -110,11 +110,7 @@ impl Config {
         if let Tau::File(tau) = &mut self.tau {
             tau.file = base.join(&tau.file);
         }
-        for file in self
-            .compatibility
-            .iter_mut()
-            .flat_map(|tables| &mut tables.files)
-        {
+        for file in self.compatibility.iter_mut().flat_map(|tables| &mut tables.files) {
             *file = base.join(&file);
         }
     }

@@ -58,10 +58,7 @@ pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> Con
 /// What is wrong with an option `--set`, with its key.
 pub(super) fn of_set(error: &toml::de::Error) -> ConfigError {
     let said = error.to_string();
-    let key = said
-        .split("in `")
-        .nth(1)
-        .and_then(|it| it.split('`').next());
+    let key = said.split("in `").nth(1).and_then(|it| it.split('`').next());
     ConfigError::explain("--set".to_owned(), error.message(), key)
 }
 
@@ -75,9 +72,9 @@ fn within(table: &DeTable<'_>, span: &Range<usize>) -> Option<String> {
     table.iter().find_map(|(name, value)| {
         let inner = match value.get_ref() {
             DeValue::Table(it) => within(it, span),
-            DeValue::Array(entries) => entries
-                .iter()
-                .find_map(|it| within(it.get_ref().as_table()?, span)),
+            DeValue::Array(entries) => {
+                entries.iter().find_map(|it| within(it.get_ref().as_table()?, span))
+            }
             _ => None,
         };
         let name = name.get_ref();

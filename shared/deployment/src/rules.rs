@@ -55,9 +55,7 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
     let n = it.cameras.len();
     whole("camera", n)?;
     for (index, camera) in it.cameras.iter().enumerate() {
-        let twin = it.cameras[..index]
-            .iter()
-            .any(|other| other.name == camera.name);
+        let twin = it.cameras[..index].iter().any(|other| other.name == camera.name);
         demand(
             !twin,
             "camera",

@@ -49,9 +49,7 @@ fn numbers_of(schema: &Value, key: &str) -> Option<Vec<String>> {
             waiting.extend(is_one.then(|| format!("{at}/{inner}")));
         }
         let kinds = [&node["type"]];
-        let mut kinds = kinds
-            .into_iter()
-            .chain(node["type"].as_array().into_iter().flatten());
+        let mut kinds = kinds.into_iter().chain(node["type"].as_array().into_iter().flatten());
         if kinds.any(|it| it == "integer" || it == "number") {
             found.push(at);
         }
@@ -129,10 +127,7 @@ impl Shapes {
         for choice in ["anyOf", "oneOf"] {
             if let Some(choices) = schema[choice].as_array() {
                 let all = choices.iter().filter(|it| it["type"] != "null");
-                return all
-                    .map(|it| self.takes(it))
-                    .collect::<Vec<_>>()
-                    .join(" or ");
+                return all.map(|it| self.takes(it)).collect::<Vec<_>>().join(" or ");
             }
         }
         if let Some(values) = schema["enum"].as_array() {
@@ -199,10 +194,7 @@ mod tests {
                 assert_eq!(bounds, [Some(least), Some(most)], "{place}");
             }
         }
-        for key in crate::keys()
-            .iter()
-            .filter(|it| it.takes.contains("number"))
-        {
+        for key in crate::keys().iter().filter(|it| it.takes.contains("number")) {
             let has_range = RANGES.iter().any(|it| it.0 == key.name);
             let needs_none = WITHOUT_RANGE.contains(&key.name.as_str());
             assert!(has_range != needs_none, "{}: what may it be?", key.name);
@@ -257,13 +249,7 @@ mod tests {
     #[test]
     fn what_a_key_takes_is_told_in_words() {
         let keys = crate::keys();
-        let takes = |name: &str| {
-            keys.iter()
-                .find(|it| it.name == name)
-                .unwrap()
-                .takes
-                .clone()
-        };
+        let takes = |name: &str| keys.iter().find(|it| it.name == name).unwrap().takes.clone();
         assert_eq!(takes("paper.workers"), "whole number");
         assert_eq!(takes("paper.energy"), "\"paper\" or \"released\"");
         assert_eq!(takes("paper.errors"), "text or table");

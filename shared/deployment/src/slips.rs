@@ -2,10 +2,7 @@
 
 /// What is to be said of a whole text that is none of a deployment; none where it may be one.
 pub(super) fn other_file(text: &str) -> Option<&'static str> {
-    let begins = |head: &str| {
-        text.lines()
-            .any(|it| it.trim_end() == head || it.starts_with(head))
-    };
+    let begins = |head: &str| text.lines().any(|it| it.trim_end() == head || it.starts_with(head));
     if begins("format = \"parallax-rig\"") {
         return Some("this is a rig file: name the deployment file, whose `rig` it is");
     }

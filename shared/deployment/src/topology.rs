@@ -252,9 +252,7 @@ impl Topology {
 
     /// Workers that read the evidence of a view.
     pub fn workers_on(&self, view: usize) -> usize {
-        (0..self.n_workers)
-            .filter(|&worker| self.reads(worker, view))
-            .count()
+        (0..self.n_workers).filter(|&worker| self.reads(worker, view)).count()
     }
 
     fn reads(&self, worker: usize, view: usize) -> bool {
@@ -420,9 +418,7 @@ fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
         (0..n_views).flat_map(with_first).collect()
     } else {
         let named = deployment.paper.pairs.iter();
-        named
-            .filter_map(|names| indices(deployment, names))
-            .collect()
+        named.filter_map(|names| indices(deployment, names)).collect()
     };
     pairs.sort_unstable();
     pairs.dedup();

@@ -23,9 +23,7 @@ pub fn draw(canvas: &mut Canvas, trials: &[Trial], slot: usize, view: &ViewCamer
         return;
     };
     let status = &trial.slots[slot].status;
-    let time = trial
-        .time_s(slot)
-        .map_or(String::new(), |it| format!(" {it:.3} s"));
+    let time = trial.time_s(slot).map_or(String::new(), |it| format!(" {it:.3} s"));
     let what = match &**status {
         "ok" => "",
         "" => " no result",
@@ -43,10 +41,8 @@ fn best(trials: &[Trial], slot: usize) -> Option<&Trial> {
 
 /// Draws a person; returns the upper left corner of what the view sees of it.
 fn person(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) -> Option<[f64; 2]> {
-    let seen: Vec<Option<Seen>> = trial
-        .points(slot)
-        .map(|it| it.and_then(|it| view.see(it)))
-        .collect();
+    let seen: Vec<Option<Seen>> =
+        trial.points(slot).map(|it| it.and_then(|it| view.see(it))).collect();
     let names: Vec<&str> = trial.names().collect();
     let n_joints = trial.joints.joints.len();
     let width = line_width(canvas.size());
@@ -55,10 +51,8 @@ fn person(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) ->
             ellipse(canvas, seen, width / 2.0, side_of(name));
         }
     }
-    let places: Vec<[f64; 2]> = seen
-        .iter()
-        .map(|it| it.map_or([f64::NAN; 2], |it| it.at))
-        .collect();
+    let places: Vec<[f64; 2]> =
+        seen.iter().map(|it| it.map_or([f64::NAN; 2], |it| it.at)).collect();
     draw_limbs(canvas, &places, &limbs(trial));
     for (name, at) in names.iter().zip(&places).skip(n_joints) {
         canvas.disc(*at, width, side_of(name).colour());
@@ -101,9 +95,7 @@ pub(crate) fn side_of(name: &str) -> Side {
             rest.next() == Some(of) && rest.next().is_some_and(char::is_uppercase)
         };
         name.starts_with(side)
-            || ["upper", "lower"]
-                .iter()
-                .any(|it| name.strip_prefix(it).is_some_and(own))
+            || ["upper", "lower"].iter().any(|it| name.strip_prefix(it).is_some_and(own))
     };
     if is("right", 'R') {
         Side::Right

@@ -145,10 +145,7 @@ struct Held {
 impl Held {
     fn take(&mut self, slot: usize, posed: &Posed, is_there: &[bool; N_NODES]) {
         let turning = (0..N_NODES).filter(|&it| has_channels(it, is_there));
-        let n_held = turning
-            .clone()
-            .filter(|&it| !posed.is_turn_seen[it])
-            .count();
+        let n_held = turning.clone().filter(|&it| !posed.is_turn_seen[it]).count();
         if n_held == 0 && posed.seen[0].is_some() {
             return;
         }
@@ -209,10 +206,7 @@ fn notes(
     if !trial.extras.is_empty() {
         notes.push("keypoints beside the joints are left out: they hang on nothing".to_owned());
     }
-    let known = lengths
-        .iter()
-        .zip(NODES)
-        .filter_map(|it| Some((it.1.name, (*it.0)?)));
+    let known = lengths.iter().zip(NODES).filter_map(|it| Some((it.1.name, (*it.0)?)));
     let known = known.map(|(name, length)| format!("{name} {:.1}", CM * length));
     notes.push(format!(
         "fixed lengths of the bones that end in each joint (medians), cm: {}",

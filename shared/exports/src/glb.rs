@@ -187,12 +187,7 @@ fn skin(store: &mut Store, rest: &[Vector3<f64>; N_NODES], pieces: &[Piece]) -> 
     });
     let matrices: Vec<f32> = of_tree
         .chain(of_pieces)
-        .flat_map(|it| {
-            it.as_slice()
-                .iter()
-                .map(|it| *it as f32)
-                .collect::<Vec<_>>()
-        })
+        .flat_map(|it| it.as_slice().iter().map(|it| *it as f32).collect::<Vec<_>>())
         .collect();
     let joints: Vec<usize> = (0..N_NODES + pieces.len()).map(in_file).collect();
     json!({
@@ -214,10 +209,7 @@ fn nodes(trial: &Trial, rest: &[Vector3<f64>; N_NODES], pieces: &[Piece]) -> Vec
             .iter()
             .enumerate()
             .filter(|it| it.1.parent.map_or(0, in_file) == file_node);
-        let of_pieces = pieces
-            .iter()
-            .enumerate()
-            .filter(|it| it.1.parent == file_node);
+        let of_pieces = pieces.iter().enumerate().filter(|it| it.1.parent == file_node);
         let of_pieces = of_pieces.map(|it| in_file(N_NODES + it.0));
         of_tree.map(|it| in_file(it.0)).chain(of_pieces).collect()
     };
@@ -287,22 +279,16 @@ impl Tracks {
             for (nth, piece) in pieces.iter().enumerate() {
                 match piece.of {
                     Of::Bone(node) => {
-                        let ends = anchor(node)
-                            .and_then(|it| posed.seen[it])
-                            .zip(posed.seen[node]);
+                        let ends = anchor(node).and_then(|it| posed.seen[it]).zip(posed.seen[node]);
                         let width = piece.scale.x;
                         let scale =
                             ends.map(|(from, to)| Vector3::new(width, (to - from).norm(), width));
                         tracks.scales[nth].extend(real3(scale.unwrap_or_default()));
                     }
                     Of::Keypoint(point) => {
-                        let place = trial
-                            .point(slot, point)
-                            .map(|it| (world * it.in_world).coords);
+                        let place = trial.point(slot, point).map(|it| (world * it.in_world).coords);
                         let n = tracks.marks[nth].len();
-                        let held = tracks.marks[nth]
-                            .get(n.wrapping_sub(3)..)
-                            .map(<[f32]>::to_vec);
+                        let held = tracks.marks[nth].get(n.wrapping_sub(3)..).map(<[f32]>::to_vec);
                         let rest = || real3(piece.rest.translation.vector).to_vec();
                         let place = place
                             .map_or_else(|| held.unwrap_or_else(rest), |it| real3(it).to_vec());
@@ -372,12 +358,8 @@ fn extras(trial: &Trial) -> Value {
         let value = json!({ "standard_deviation_m": deviations, "gaps": trial.gaps(nth), "filled": trial.filled(nth) });
         (label, value)
     };
-    let points: serde_json::Map<String, Value> = trial
-        .labels()
-        .into_iter()
-        .enumerate()
-        .map(of_point)
-        .collect();
+    let points: serde_json::Map<String, Value> =
+        trial.labels().into_iter().enumerate().map(of_point).collect();
     json!({ "points": points })
 }
 

@@ -22,10 +22,7 @@ pub(crate) const LANDMARKS: [(&str, &[&str]); 15] = [
 /// The landmark of a joint of HumanEva-I's set; any other name as it is.
 fn plain_name(joint: &str) -> &str {
     let is_humaneva = joint.contains(|it: char| it.is_ascii_uppercase());
-    let found = LANDMARKS
-        .iter()
-        .filter(|_| is_humaneva)
-        .find(|it| it.1.contains(&joint));
+    let found = LANDMARKS.iter().filter(|_| is_humaneva).find(|it| it.1.contains(&joint));
     found.map_or(joint, |it| it.0)
 }
 

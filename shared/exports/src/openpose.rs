@@ -16,9 +16,7 @@ pub const SUFFIX: &str = "_keypoints.json";
 /// The file of a view and a frame; whoever was not found is not in it. `person_id` is -1 in a run of one person.
 pub fn frame(trials: &[Trial], slot: usize, view: &ViewCamera) -> String {
     let id = |trial: &Trial| (trials.len() > 1).then_some(trial.id());
-    let people = trials
-        .iter()
-        .filter_map(|trial| person(trial, id(trial), slot, view));
+    let people = trials.iter().filter_map(|trial| person(trial, id(trial), slot, view));
     json!({ "version": 1.3, "people": people.collect::<Vec<Value>>() }).to_string()
 }
 

@@ -65,10 +65,8 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
         column::<Int64Type, _>(&mut group, &frames, None)?;
         numbers(&mut group, places.iter().map(|it| trial.time_s(it.0)))?;
         let ids = || places.iter().map(|place| trial.id_at(place.0));
-        let known: Vec<i64> = ids()
-            .flatten()
-            .map(|id| i64::try_from(id).unwrap_or(i64::MAX))
-            .collect();
+        let known: Vec<i64> =
+            ids().flatten().map(|id| i64::try_from(id).unwrap_or(i64::MAX)).collect();
         let levels: Vec<i16> = ids().map(|id| i16::from(id.is_some())).collect();
         column::<Int64Type, _>(&mut group, &known, Some(&levels))?;
         texts(&mut group, places.iter().map(|it| names[it.1].clone()))?;
@@ -93,9 +91,7 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
         let named = |it: &Point| views(trial, it);
         texts(
             &mut group,
-            places
-                .iter()
-                .map(|it| point(it).map_or(String::new(), named)),
+            places.iter().map(|it| point(it).map_or(String::new(), named)),
         )?;
         let states = places.iter().map(|it| state(trial, it.0, it.1).to_owned());
         texts(&mut group, states)?;
@@ -153,11 +149,7 @@ mod tests {
         let mut on_disk = tempfile::tempfile().unwrap();
         on_disk.write_all(&file).unwrap();
         let reader = SerializedFileReader::new(on_disk).unwrap();
-        let rows: Vec<_> = reader
-            .get_row_iter(None)
-            .unwrap()
-            .map(Result::unwrap)
-            .collect();
+        let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
         assert_eq!(rows.len(), 3 * 14);
         let due = trial.point(2, 13).unwrap().in_world;
         let last = rows.last().unwrap();

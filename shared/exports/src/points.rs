@@ -69,11 +69,8 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
 
 /// TRC: metres, y up, as `pose3d.trc` of a run.
 pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
-    let labels: Vec<String> = trial
-        .labels()
-        .iter()
-        .map(|it| it.replace(['\t', '\n', '\r'], "_"))
-        .collect();
+    let labels: Vec<String> =
+        trial.labels().iter().map(|it| it.replace(['\t', '\n', '\r'], "_")).collect();
     let heading = formats::trc::Heading {
         file_name: &format!("{}.trc", trial.name),
         rate_hz: rate(trial)?,
@@ -84,9 +81,7 @@ pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     write!(out, "{heading}")?;
     let turn = trial.y_up_from_world();
     for slot in 0..trial.slots.len() {
-        let points = trial
-            .points(slot)
-            .map(|it| it.map(|it| (turn * it.in_world).into()));
+        let points = trial.points(slot).map(|it| it.map(|it| (turn * it.in_world).into()));
         let time_s = trial.time_s(slot).unwrap_or(0.0);
         out.write_all(formats::trc::row(slot as u64 + 1, time_s, points).as_bytes())?;
     }

@@ -41,9 +41,7 @@ fn place(point: Option<&Point>) -> [String; 4] {
 /// A row for each frame: four columns for each point.
 pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut table = csv::Writer::from_writer(out);
-    let mut head = ["frame", "time_s", "person", "status"]
-        .map(str::to_owned)
-        .to_vec();
+    let mut head = ["frame", "time_s", "person", "status"].map(str::to_owned).to_vec();
     for name in trial.labels() {
         head.extend(["x_m", "y_m", "z_m", "sd_m"].map(|it| format!("{name}_{it}")));
     }

@@ -305,9 +305,8 @@ impl Gathering {
             return Vec::new();
         };
         let joints = set.joints.iter().map(|joint| joint.name);
-        let mut points: Vec<_> = joints
-            .map(|name| self.point(name, person.joints.get(name), person))
-            .collect();
+        let mut points: Vec<_> =
+            joints.map(|name| self.point(name, person.joints.get(name), person)).collect();
         for name in self.extras.clone() {
             points.push(self.point(&name, person.keypoints.get(&name), person));
         }
@@ -371,9 +370,8 @@ impl Gathering {
         self.frames.sort_by_key(|line| line.frame);
         self.frames.dedup_by_key(|line| line.frame);
         let ends = self.frames.first().zip(self.frames.last());
-        let (first, last) = ends
-            .map(|(first, last)| (first.frame, last.frame))
-            .ok_or(TrialError::Empty)?;
+        let (first, last) =
+            ends.map(|(first, last)| (first.frame, last.frame)).ok_or(TrialError::Empty)?;
         let joints = self.joints.ok_or(TrialError::NoPoint { frames: n_lines })?;
         let steps = self.frames.iter().map(|line| line.frame - first);
         let step = steps.fold(0, common).max(1);
@@ -457,9 +455,7 @@ fn common(a: u64, b: u64) -> u64 {
 
 /// Frames of the footage per second, by the first and the last line with a time; to nine digits, since times are rounded.
 fn rate(frames: &[Gathered]) -> Option<f64> {
-    let mut timed = frames
-        .iter()
-        .filter_map(|line| Some((line.frame, line.time_s?)));
+    let mut timed = frames.iter().filter_map(|line| Some((line.frame, line.time_s?)));
     let first = timed.next()?;
     let last = timed.next_back();
     let (frames, seconds) = match last {

@@ -34,9 +34,7 @@ impl Claim {
             );
         }
         let path = folder.join(FILE);
-        let mut file = opened
-            .reopen(FILE)
-            .map_err(|error| in_file(&path, &error))?;
+        let mut file = opened.reopen(FILE).map_err(|error| in_file(&path, &error))?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::Error(_)) => return Ok(Self { _file: None }),
@@ -90,9 +88,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("out");
         let first = Claim::take(&folder, "deployment room").unwrap();
-        let refused = Claim::take(&folder, "deployment hall")
-            .unwrap_err()
-            .to_string();
+        let refused = Claim::take(&folder, "deployment hall").unwrap_err().to_string();
         let owner = format!("process {}, deployment room", std::process::id());
         assert!(refused.contains(&owner), "{refused}");
         drop(first);

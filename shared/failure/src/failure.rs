@@ -69,9 +69,7 @@ impl ExitKind {
 
     /// The kind with an exit status, if there is one.
     pub fn of_status(status: i32) -> Option<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|kind| i32::from(kind.status()) == status)
+        Self::ALL.into_iter().find(|kind| i32::from(kind.status()) == status)
     }
 
     /// Whether the process would fail again in the same way, because its input is wrong.

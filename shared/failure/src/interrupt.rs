@@ -74,11 +74,7 @@ mod tests {
         let stop = Stop::new().unwrap();
         stop.request();
         let (_held, never) = sync_channel::<()>(1);
-        assert!(
-            unless_stopped(&stop, move || never.recv())
-                .unwrap()
-                .is_none()
-        );
+        assert!(unless_stopped(&stop, move || never.recv()).unwrap().is_none());
     }
 
     #[test]

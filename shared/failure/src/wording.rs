@@ -45,10 +45,7 @@ fn line(text: &str) -> String {
         if let Some((before, complaint)) = text.split_once(kind)
             && let Some((got, rest)) = complaint.rsplit_once(", expected ")
         {
-            let end = [" at line ", " in `"]
-                .iter()
-                .filter_map(|mark| rest.find(mark))
-                .min();
+            let end = [" at line ", " in `"].iter().filter_map(|mark| rest.find(mark)).min();
             let (asked, after) = rest.split_at(end.unwrap_or(rest.len()));
             let got = if kind.contains("length") {
                 format!("{got} values")

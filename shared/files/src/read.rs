@@ -128,10 +128,6 @@ mod tests {
         assert_eq!(error.kind(), ErrorKind::FileTooLarge);
         assert!(error.to_string().contains("11 bytes"), "{error}");
         // It says that it is empty, and is not.
-        assert!(
-            !read_text(Path::new("/proc/self/stat"), 1 << 20)
-                .unwrap()
-                .is_empty()
-        );
+        assert!(!read_text(Path::new("/proc/self/stat"), 1 << 20).unwrap().is_empty());
     }
 }

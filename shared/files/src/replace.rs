@@ -56,9 +56,7 @@ fn split(path: &Path) -> io::Result<(Folder, &OsStr)> {
         let text = "does not end with the name of a file";
         io::Error::new(io::ErrorKind::InvalidInput, text)
     })?;
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     Ok((Folder::open(folder.unwrap_or(Path::new(".")))?, name))
 }
 

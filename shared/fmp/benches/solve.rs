@@ -19,10 +19,7 @@ const N_TYPES: usize = 6;
 
 fn main() {
     let model = Arc::new(Model::new(spec()).unwrap());
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(2)
-        .build()
-        .unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     for [width, height] in [[172, 224], [640, 480]] {
         let layout = Layout::new(&model, width, height).unwrap();
         let values = planted(&layout);

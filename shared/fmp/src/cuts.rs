@@ -82,9 +82,8 @@ fn needed(source: &Source<'_>, level: usize, axis: usize) -> Option<Range<usize>
         // the first and the last cell of an image have no features.
         let last = padded - 2 * (pad + 1);
         let begin_cell = begin.saturating_sub(pad).clamp(1, last.max(1));
-        let end_cell = (begin + n + filter)
-            .saturating_sub(pad)
-            .clamp(begin_cell + 1, last.max(1) + 1);
+        let end_cell =
+            (begin + n + filter).saturating_sub(pad).clamp(begin_cell + 1, last.max(1) + 1);
         let first_px = begin_cell.saturating_sub(2) * source.cell_px;
         let side = it.image_size[axis];
         let end = if end_cell + 2 > last + 1 {

@@ -181,9 +181,7 @@ mod tests {
         fs::write(&path, bytes).unwrap();
         match read(&path) {
             Ok(model) => format!("fine: {}", model.spec().name),
-            Err(error) => error
-                .to_string()
-                .replace(&dir.path().display().to_string(), "dir"),
+            Err(error) => error.to_string().replace(&dir.path().display().to_string(), "dir"),
         }
     }
 
@@ -210,17 +208,9 @@ mod tests {
     fn the_error_for_a_missing_model_tells_where_models_come_from() {
         let error = read(Path::new("no/such.plx")).unwrap_err();
         assert!(matches!(error, ModelFileError::Absent { .. }));
-        assert!(
-            error
-                .to_string()
-                .starts_with("there is no model file no/such.plx: ")
-        );
+        assert!(error.to_string().starts_with("there is no model file no/such.plx: "));
         assert!(error.to_string().contains("parallax-lab model import"));
-        assert!(
-            error
-                .to_string()
-                .contains("the one that ships with Parallax")
-        );
+        assert!(error.to_string().contains("the one that ships with Parallax"));
     }
 
     #[test]

@@ -35,9 +35,7 @@ impl Pose {
 
     /// Centres of all parts; see [`Self::centre`].
     pub fn centres(&self, model: &Model, layout: &Layout) -> Vec<[f64; 2]> {
-        (0..self.parts.len())
-            .map(|part| self.centre(model, layout, part))
-            .collect()
+        (0..self.parts.len()).map(|part| self.centre(model, layout, part)).collect()
     }
 
     /// Box `[x1, y1, x2, y2]` of a part, pixels of the image, both corners inside the box.
@@ -87,8 +85,6 @@ impl Pose {
             }
             distances / (sides / 2.0)
         };
-        others
-            .iter()
-            .all(|other| separation(other) >= min_separation)
+        others.iter().all(|other| separation(other) >= min_separation)
     }
 }

@@ -351,8 +351,7 @@ impl Search<'_> {
         let mut best = lock(&self.best);
         let beaten = |(it, _): &(Root, Workspace)| root.best_first(it).is_lt();
         let loser = if best.as_ref().is_none_or(beaten) {
-            best.replace((root, workspace))
-                .map(|(it, of)| (it.level, of))
+            best.replace((root, workspace)).map(|(it, of)| (it.level, of))
         } else {
             Some((level, workspace))
         };

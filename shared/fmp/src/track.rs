@@ -108,8 +108,7 @@ impl Tracker {
         let at = at.into();
         let near = || {
             let (settings, last) = (self.settings.as_ref()?, self.last.as_ref()?);
-            last.allows_tracking_to(settings, at)
-                .then(|| last.near(settings, layout, at))?
+            last.allows_tracking_to(settings, at).then(|| last.near(settings, layout, at))?
         };
         near().unwrap_or_else(|| Scope::whole(layout))
     }
@@ -149,9 +148,7 @@ impl Tracker {
                 at,
                 level: pose.level,
                 around: pose.bounding_box(model, layout),
-                full: before
-                    .filter(|_| *scope != Scope::whole(layout))
-                    .unwrap_or(here),
+                full: before.filter(|_| *scope != Scope::whole(layout)).unwrap_or(here),
             }
         });
     }

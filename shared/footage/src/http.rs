@@ -44,9 +44,7 @@ pub(crate) fn ask(address: &str) -> Option<Answer> {
     if !scheme.eq_ignore_ascii_case("http") || host.contains('@') {
         return None;
     }
-    let has_port = host
-        .rsplit_once(':')
-        .is_some_and(|it| it.1.parse::<u16>().is_ok());
+    let has_port = host.rsplit_once(':').is_some_and(|it| it.1.parse::<u16>().is_ok());
     let with_port = if has_port {
         host.to_owned()
     } else {

@@ -39,9 +39,9 @@ impl Pacer {
     pub fn due_nanos(&self, k: u64) -> u64 {
         match self.rate_hz {
             None => 0,
-            Some(rate_hz) => self
-                .start_nanos
-                .saturating_add((k as f64 * 1e9 / rate_hz).round() as u64),
+            Some(rate_hz) => {
+                self.start_nanos.saturating_add((k as f64 * 1e9 / rate_hz).round() as u64)
+            }
         }
     }
 

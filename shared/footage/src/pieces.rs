@@ -155,9 +155,7 @@ impl<R: Read> Cutter<R> {
             return Ok(None);
         }
         let id = self.vint(first[0], 4, bytes)?;
-        let id = bytes[id..]
-            .iter()
-            .fold(0, |sum, it| sum << 8 | u32::from(*it));
+        let id = bytes[id..].iter().fold(0, |sum, it| sum << 8 | u32::from(*it));
         self.input.read_exact(&mut first)?;
         let length = self.vint(first[0], 8, bytes)?;
         Ok(Some((id, number(&bytes[length..]))))
@@ -179,9 +177,7 @@ impl<R: Read> Cutter<R> {
 
 /// A number of variable length with its marker; none for "not known", all ones.
 fn number(bytes: &[u8]) -> Option<u64> {
-    let all = bytes
-        .iter()
-        .fold(0_u64, |sum, it| sum << 8 | u64::from(*it));
+    let all = bytes.iter().fold(0_u64, |sum, it| sum << 8 | u64::from(*it));
     let mask = (1_u64 << (7 * bytes.len())) - 1;
     Some(all & mask).filter(|it| *it != mask)
 }
@@ -195,9 +191,7 @@ fn split(bytes: &[u8]) -> Option<(u32, &[u8], &[u8])> {
     let n_length = rest.first()?.leading_zeros() as usize + 1;
     let length = number(rest.get(..n_length).filter(|_| n_length <= 8)?)?;
     let rest = &rest[n_length..];
-    let length = usize::try_from(length)
-        .ok()
-        .filter(|it| *it <= rest.len())?;
+    let length = usize::try_from(length).ok().filter(|it| *it <= rest.len())?;
     let (inside, after) = rest.split_at(length);
     Some((id, inside, after))
 }
@@ -209,9 +203,7 @@ fn looked_into(mut cluster: &[u8]) -> (u64, bool) {
         cluster = after;
         let (block, is_key) = match id {
             id::TIMESTAMP if inside.len() <= 8 => {
-                let all = inside
-                    .iter()
-                    .fold(0_u64, |sum, it| sum << 8 | u64::from(*it));
+                let all = inside.iter().fold(0_u64, |sum, it| sum << 8 | u64::from(*it));
                 base = all.cast_signed();
                 continue;
             }
@@ -280,10 +272,8 @@ mod tests {
             cluster(120, true, b"c"),
         ];
         let pieces = cut(&[head(), pictures.concat()].concat());
-        let kinds: Vec<(PieceKind, u64)> = pieces
-            .iter()
-            .map(|it| (it.kind, it.nanos / 1_000_000))
-            .collect();
+        let kinds: Vec<(PieceKind, u64)> =
+            pieces.iter().map(|it| (it.kind, it.nanos / 1_000_000)).collect();
         let expected = [
             (PieceKind::Head, 0),
             (PieceKind::Key, 43),

@@ -48,14 +48,8 @@ pub(crate) fn output_within(mut command: Command, limit: Duration) -> io::Result
 
 /// The version of `ffmpeg`; empty if it does not tell.
 pub(crate) fn version_of(ffmpeg: &PathBuf) -> String {
-    let said = Command::new(ffmpeg)
-        .arg("-version")
-        .stdin(Stdio::null())
-        .output();
+    let said = Command::new(ffmpeg).arg("-version").stdin(Stdio::null()).output();
     let said = said.map(|it| it.stdout).unwrap_or_default();
     let text = String::from_utf8_lossy(&said);
-    text.split_whitespace()
-        .nth(2)
-        .unwrap_or_default()
-        .to_owned()
+    text.split_whitespace().nth(2).unwrap_or_default().to_owned()
 }

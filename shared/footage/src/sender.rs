@@ -285,9 +285,8 @@ mod tests {
             );
         }
         let rounded = |nth: i64| nth % 3 * MS / 3;
-        let found: Vec<Option<i64>> = (200..230)
-            .map(|nth| offsets.add(told(nth, rounded(nth))))
-            .collect();
+        let found: Vec<Option<i64>> =
+            (200..230).map(|nth| offsets.add(told(nth, rounded(nth)))).collect();
         assert_eq!(found[..N_EQUAL - 1], [None; N_EQUAL - 1]);
         let last = found[29].unwrap() - 7_000_000 * MS;
         assert!((last - MS / 3).abs() < MS / 10, "{last}");

@@ -319,10 +319,7 @@ impl Clock {
 
     fn stamp(&self) -> (u64, Option<f64>) {
         let by_rate = || self.rate_hz.map(|rate_hz| self.index as f64 / rate_hz);
-        let listed = self
-            .times_s
-            .as_ref()
-            .and_then(|times_s| times_s.get(self.index as usize));
+        let listed = self.times_s.as_ref().and_then(|times_s| times_s.get(self.index as usize));
         (self.index, listed.copied().or_else(by_rate))
     }
 

@@ -215,9 +215,7 @@ impl StreamSpec {
         } else {
             None
         };
-        let to_tell = times
-            .as_ref()
-            .map(|it| format!("pipe\\:{}", it.1.as_raw_fd()));
+        let to_tell = times.as_ref().map(|it| format!("pipe\\:{}", it.1.as_raw_fd()));
         let mut child = Command::new(&self.ffmpeg)
             .args(["-nostdin", "-v", "error"])
             .args(self.input_options())
@@ -442,9 +440,7 @@ mod tests {
     #[test]
     fn a_password_is_in_no_error() {
         let spec = StreamSpec::new("rtsp://me:secret@127.0.0.1:9/a");
-        let said = spec
-            .failed("rtsp://me:secret@127.0.0.1:9/a: Connection refused")
-            .to_string();
+        let said = spec.failed("rtsp://me:secret@127.0.0.1:9/a: Connection refused").to_string();
         assert!(!said.contains("secret"), "{said}");
         assert!(said.contains("Connection refused"), "{said}");
     }
@@ -453,11 +449,7 @@ mod tests {
     fn a_program_that_does_not_end_is_killed() {
         let mut command = Command::new("sleep");
         command.arg("1000");
-        assert!(
-            output_within(command, Duration::from_millis(50))
-                .unwrap()
-                .is_none()
-        );
+        assert!(output_within(command, Duration::from_millis(50)).unwrap().is_none());
         let mut command = Command::new("echo");
         command.arg("here");
         let ended = output_within(command, PATIENCE).unwrap().unwrap();

@@ -228,9 +228,8 @@ fn files_that_are_not_videos_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["text.mp4", "text.txt", "-text.mkv", "noise.avi"] {
         let path = folder.path().join(name);
-        let noise: Vec<u8> = (0_u32..5000)
-            .map(|it| (it.wrapping_mul(2_654_435_761) >> 24) as u8)
-            .collect();
+        let noise: Vec<u8> =
+            (0_u32..5000).map(|it| (it.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
         let text = b"this is a text, whatever its name says\n";
         fs::write(
             &path,

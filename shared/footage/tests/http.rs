@@ -20,9 +20,7 @@ fn camera(answer: fn(&mut TcpStream, &[u8]) -> std::io::Result<()>) -> String {
             let answer_one = move || {
                 let mut jpeg = Vec::new();
                 let picture = frame(3);
-                picture
-                    .write_with_encoder(JpegEncoder::new(&mut jpeg))
-                    .unwrap();
+                picture.write_with_encoder(JpegEncoder::new(&mut jpeg)).unwrap();
                 let mut request = [0; 4096];
                 let read = stream.read(&mut request);
                 // Whoever hangs up has heard enough.

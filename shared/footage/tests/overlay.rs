@@ -159,15 +159,8 @@ fn a_composed_sheet_contains_every_picture() {
     });
     for n_columns in 1..6 {
         let sheet = compose(&tiles, n_columns);
-        let count = |colour| {
-            sheet
-                .rgb()
-                .as_chunks::<3>()
-                .0
-                .iter()
-                .filter(|it| **it == colour)
-                .count()
-        };
+        let count =
+            |colour| sheet.rgb().as_chunks::<3>().0.iter().filter(|it| **it == colour).count();
         for colour in colours {
             assert_eq!(
                 count(colour),
@@ -198,15 +191,11 @@ fn a_saved_picture_is_read_back_and_no_other_file_remains() {
 #[test]
 fn errors_of_saving_name_the_file() {
     let folder = tempfile::tempdir().unwrap();
-    let error = black()
-        .save_png(&folder.path().join("absent/view.png"))
-        .unwrap_err();
+    let error = black().save_png(&folder.path().join("absent/view.png")).unwrap_err();
     assert!(matches!(error, OverlayError::Io { .. }));
     assert!(error.to_string().contains("absent/view.png"), "{error}");
     let empty = Canvas::new(Size::new(0, 0), [0; 3]);
-    let error = empty
-        .save_png(&folder.path().join("empty.png"))
-        .unwrap_err();
+    let error = empty.save_png(&folder.path().join("empty.png")).unwrap_err();
     assert!(matches!(error, OverlayError::Encode { .. }), "{error}");
 }
 

@@ -255,9 +255,7 @@ fn cut(folder: &Path, name: &str, is_cut: impl Fn(usize) -> bool) -> PathBuf {
     let mut stream = Vec::new();
     for nth in 0..8 {
         let mut file = Vec::new();
-        frame(nth)
-            .write_with_encoder(JpegEncoder::new(&mut file))
-            .unwrap();
+        frame(nth).write_with_encoder(JpegEncoder::new(&mut file)).unwrap();
         let n = if is_cut(nth) {
             file.len() * 7 / 10
         } else {

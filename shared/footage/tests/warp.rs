@@ -20,9 +20,7 @@ fn noise(size: Size) -> Vec<u8> {
 
 fn warp(source: Size, rgb: &[u8], output: Size, map: &Affine, fill: Fill) -> Vec<u8> {
     let mut out = vec![99; output.rgb_bytes()];
-    Warp::new(source, output, map, fill)
-        .unwrap()
-        .apply(rgb, &mut out);
+    Warp::new(source, output, map, fill).unwrap().apply(rgb, &mut out);
     out
 }
 
@@ -249,13 +247,8 @@ impl Reference<'_> {
 
     /// `None` where rounding the position of the centre is ambiguous.
     fn pixel(&self, x: usize, y: usize) -> Option<[f64; 3]> {
-        let centre = self
-            .map
-            .map(|[a, b, t]| (a * x as f64 + b * y as f64 + t) * 32.0);
-        if centre
-            .iter()
-            .any(|it| ((it + 0.5) - (it + 0.5).round()).abs() < 1e-5)
-        {
+        let centre = self.map.map(|[a, b, t]| (a * x as f64 + b * y as f64 + t) * 32.0);
+        if centre.iter().any(|it| ((it + 0.5) - (it + 0.5).round()).abs() < 1e-5) {
             return None;
         }
         let offset = |it: usize| (it as f64 + 0.5) / self.n as f64 - 0.5;

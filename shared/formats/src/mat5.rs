@@ -101,12 +101,7 @@ impl Numbers<'_> {
     }
 
     fn each<const N: usize>(&self, value: impl Fn([u8; N]) -> f64) -> Vec<f64> {
-        self.bytes
-            .as_chunks()
-            .0
-            .iter()
-            .map(|&it| value(it))
-            .collect()
+        self.bytes.as_chunks().0.iter().map(|&it| value(it)).collect()
     }
 }
 
@@ -232,12 +227,7 @@ fn matrix<'a>(
         return Ok((String::new(), Value::Other));
     }
     let sizes = rest.typed("an array's sizes", &[MI_INT32], "5 (int32)")?;
-    let sizes: Vec<i32> = sizes
-        .as_chunks()
-        .0
-        .iter()
-        .map(|&it| i32::from_le_bytes(it))
-        .collect();
+    let sizes: Vec<i32> = sizes.as_chunks().0.iter().map(|&it| i32::from_le_bytes(it)).collect();
     let name = rest.typed("an array's name", &[MI_INT8], "1 (int8)")?;
     let name = String::from_utf8_lossy(name).into_owned();
     let value = match class {
@@ -375,14 +365,11 @@ struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {
     fn take(&mut self, n_bytes: usize, what: &'static str) -> Result<&'a [u8], ContainerError> {
-        let (taken, rest) = self
-            .0
-            .split_at_checked(n_bytes)
-            .ok_or(ContainerError::Ended {
-                what,
-                got: self.0.len(),
-                expected: n_bytes,
-            })?;
+        let (taken, rest) = self.0.split_at_checked(n_bytes).ok_or(ContainerError::Ended {
+            what,
+            got: self.0.len(),
+            expected: n_bytes,
+        })?;
         self.0 = rest;
         Ok(taken)
     }

@@ -105,17 +105,14 @@ impl Camera {
     ///
     /// `None` where the lens model cannot be inverted.
     pub fn undistort(&self, pixel: &Point2<f64>) -> Option<Point2<f64>> {
-        self.intrinsics
-            .lens
-            .undistort(&self.intrinsics.normalised(pixel))
+        self.intrinsics.lens.undistort(&self.intrinsics.normalised(pixel))
     }
 
     /// The ideal pixel of a pixel: where the same ray falls without distortion.
     ///
     /// `None` where the lens model cannot be inverted.
     pub fn undistorted_px(&self, pixel: &Point2<f64>) -> Option<Point2<f64>> {
-        self.undistort(pixel)
-            .map(|normalised| self.intrinsics.pixel(&normalised))
+        self.undistort(pixel).map(|normalised| self.intrinsics.pixel(&normalised))
     }
 
     /// The pixel of an ideal pixel: inverse of [`undistorted_px`](Self::undistorted_px).

@@ -24,9 +24,7 @@ pub fn fundamental(a: &Camera, b: &Camera) -> Matrix3<f64> {
     let rotation = b_from_a.rotation.to_rotation_matrix();
     let essential = b_from_a.translation.vector.cross_matrix() * rotation.matrix();
     let fundamental = inverse_calibration(b).transpose() * essential * inverse_calibration(a);
-    fundamental
-        .try_normalize(0.0)
-        .unwrap_or_else(Matrix3::zeros)
+    fundamental.try_normalize(0.0).unwrap_or_else(Matrix3::zeros)
 }
 
 fn inverse_calibration(camera: &Camera) -> Matrix3<f64> {

@@ -2,14 +2,12 @@
 
 /// The longer side of the upright rectangle around points, in their unit; `None` without points.
 pub fn longer_side(points: impl Iterator<Item = [f64; 2]>) -> Option<f64> {
-    let corners = points
-        .map(|point| [point; 2])
-        .reduce(|[low, high], [point, _]| {
-            let of = |pick: fn(f64, f64) -> f64, corner: [f64; 2]| {
-                [0, 1].map(|axis| pick(corner[axis], point[axis]))
-            };
-            [of(f64::min, low), of(f64::max, high)]
-        });
+    let corners = points.map(|point| [point; 2]).reduce(|[low, high], [point, _]| {
+        let of = |pick: fn(f64, f64) -> f64, corner: [f64; 2]| {
+            [0, 1].map(|axis| pick(corner[axis], point[axis]))
+        };
+        [of(f64::min, low), of(f64::max, high)]
+    });
     corners.map(|[low, high]| (high[0] - low[0]).max(high[1] - low[1]))
 }
 

@@ -119,9 +119,7 @@ impl core::str::FromStr for Unit {
             ("", unit) => unit,
             (number, Some(unit)) => {
                 let metres = number.parse().ok().map(|it: f64| it / unit.per_metre());
-                metres
-                    .filter(|metres| (1e-6..=1e3).contains(metres))
-                    .map(Self::Length)
+                metres.filter(|metres| (1e-6..=1e3).contains(metres)).map(Self::Length)
             }
             (_, None) => None,
         };
@@ -253,11 +251,7 @@ struct Document {
 
 impl Document {
     fn stem(&self) -> String {
-        self.path
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
+        self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 
     fn parse(&self, options: &ReadOptions) -> Result<Rig, RigFileError> {
@@ -304,22 +298,13 @@ fn combine(
 ) -> Result<Rig, RigFileError> {
     let source = documents
         .iter()
-        .map(|document| {
-            document
-                .path
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-        })
+        .map(|document| document.path.file_name().unwrap_or_default().to_string_lossy())
         .collect::<Vec<_>>()
         .join(", ");
     if first.format == Format::OpenCv {
         // One camera may be spread over several of these files.
         let stems: Vec<String> = documents.iter().map(Document::stem).collect();
-        let texts = documents
-            .iter()
-            .zip(&stems)
-            .map(|(d, stem)| (stem.as_str(), d.text.as_str()));
+        let texts = documents.iter().zip(&stems).map(|(d, stem)| (stem.as_str(), d.text.as_str()));
         let rig = opencv::parse(&texts.collect::<Vec<_>>(), options);
         let rig = rig.map_err(|source| first.error(source))?;
         let left_out = rig.left_out().to_vec();

@@ -197,10 +197,7 @@ fn output(calibrated: [u32; 2], wanted: OutSize) -> Result<([u32; 2], f64), Fram
         OutSize::Scale(scale) => full.map(|extent| extent * scale),
     };
     let rounded = [width, height].map(f64::round);
-    if !rounded
-        .iter()
-        .all(|extent| (1.0..=LARGEST).contains(extent))
-    {
+    if !rounded.iter().all(|extent| (1.0..=LARGEST).contains(extent)) {
         return Err(FramingError::OutSize { width, height });
     }
     let scale = match wanted {

@@ -32,13 +32,9 @@ impl std::fmt::Display for LensModel {
     /// The name of the model, and the coefficients that are not 0.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let listed = |name: &str, values: &[f64]| {
-            let nonzero = values
-                .iter()
-                .enumerate()
-                .filter(|(_, value)| **value != 0.0);
-            let parts: Vec<String> = nonzero
-                .map(|(index, value)| format!(", {name}{} {value}", index + 1))
-                .collect();
+            let nonzero = values.iter().enumerate().filter(|(_, value)| **value != 0.0);
+            let parts: Vec<String> =
+                nonzero.map(|(index, value)| format!(", {name}{} {value}", index + 1)).collect();
             parts.concat()
         };
         match self {
@@ -96,8 +92,7 @@ impl Lens {
     ///
     /// `None` outside the valid range of the model.
     pub fn distort(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
-        self.distort_with_jacobian(point)
-            .map(|(distorted, _)| distorted)
+        self.distort_with_jacobian(point).map(|(distorted, _)| distorted)
     }
 
     /// [`distort`](Self::distort) with its derivative, row = output, column = input.

@@ -146,9 +146,7 @@ pub struct NotARotation {
 /// [`NotARotation`] if an entry of R Rᵀ - I exceeds 1e-3, or the matrix mirrors.
 pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, NotARotation> {
     const LIMIT: f64 = 1e-3;
-    let deviation = (matrix * matrix.transpose() - Matrix3::identity())
-        .abs()
-        .max();
+    let deviation = (matrix * matrix.transpose() - Matrix3::identity()).abs().max();
     let determinant = matrix.determinant();
     // `Matrix::max` ignores NaN, so the entries are checked too.
     let finite = matrix.iter().all(|entry| entry.is_finite());
@@ -215,10 +213,7 @@ impl Rig {
                 let name = camera.name.clone();
                 return Err(RigError::Name { index, name });
             }
-            if cameras[..index]
-                .iter()
-                .any(|other| other.name == camera.name)
-            {
+            if cameras[..index].iter().any(|other| other.name == camera.name) {
                 return Err(RigError::DuplicateName {
                     name: camera.name.clone(),
                 });
@@ -300,9 +295,7 @@ impl Rig {
         if eigen.min() < 1e-4 {
             return None;
         }
-        normal
-            .cholesky()
-            .map(|factor| origin + factor.solve(&right))
+        normal.cholesky().map(|factor| origin + factor.solve(&right))
     }
 }
 
@@ -335,25 +328,9 @@ fn check_finite(camera: &Camera) -> Result<(), RigError> {
     let numbers = [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)];
     let mut numbers = numbers
         .into_iter()
-        .chain(
-            lens.model()
-                .coefficients()
-                .map(labelled("a lens coefficient")),
-        )
-        .chain(
-            rotation
-                .coords
-                .iter()
-                .copied()
-                .map(labelled("a number of the rotation")),
-        )
-        .chain(
-            translation
-                .vector
-                .iter()
-                .copied()
-                .map(labelled("a number of the translation")),
-        );
+        .chain(lens.model().coefficients().map(labelled("a lens coefficient")))
+        .chain(rotation.coords.iter().copied().map(labelled("a number of the rotation")))
+        .chain(translation.vector.iter().copied().map(labelled("a number of the translation")));
     match numbers.find(|(_, value)| !value.is_finite()) {
         Some((quantity, value)) => {
             let camera = camera.name.clone();

@@ -121,8 +121,7 @@ fn common(person_px: &[Option<f64>], limits: &[f64]) -> Option<f64> {
         logs.sum::<f64>().abs()
     };
     let good = SCALES.into_iter().filter(|it| *it <= limit && is_good(*it));
-    good.filter(|_| !known.is_empty())
-        .min_by(|a, b| off(*a).total_cmp(&off(*b)))
+    good.filter(|_| !known.is_empty()).min_by(|a, b| off(*a).total_cmp(&off(*b)))
 }
 
 /// The scale up to a limit that brings a height nearest to what is aimed at.
@@ -135,12 +134,7 @@ fn nearest(person_px: f64, limit: f64) -> f64 {
 
 /// The largest scale at which a frame is not too large to search.
 fn largest(image: [u32; 2]) -> f64 {
-    let pixels = |scale: f64| {
-        at_scale(image, scale)
-            .into_iter()
-            .map(u64::from)
-            .product::<u64>()
-    };
+    let pixels = |scale: f64| at_scale(image, scale).into_iter().map(u64::from).product::<u64>();
     let largest = SCALES.into_iter().find(|it| pixels(*it) <= MOST_PIXELS);
     largest.unwrap_or_else(|| (MOST_PIXELS as f64 / pixels(1.0) as f64).sqrt())
 }
@@ -156,10 +150,7 @@ fn at_scale(image: [u32; 2], scale: f64) -> [u32; 2] {
 ///
 /// `None` without any; more than 1 enlarges.
 pub fn better_scale(seen: &[[f64; 2]]) -> Option<f64> {
-    let logs: Vec<f64> = seen
-        .iter()
-        .map(|[scale, px]| (scale * AIM_PX / px).ln())
-        .collect();
+    let logs: Vec<f64> = seen.iter().map(|[scale, px]| (scale * AIM_PX / px).ln()).collect();
     let mean = logs.iter().sum::<f64>() / logs.len() as f64;
     let [least, most] = [SCALES[SCALES.len() - 1], 2.0];
     let exact = mean.exp().clamp(least, most);

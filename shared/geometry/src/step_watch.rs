@@ -195,10 +195,8 @@ impl StepWatch {
 
 impl View {
     fn new(camera: &Camera, points_px: &[[f64; 2]], instant_s: f64, skew_s: f64) -> Option<Self> {
-        let points: Vec<Option<Point2<f64>>> = points_px
-            .iter()
-            .map(|px| camera.undistort(&Point2::from(*px)))
-            .collect();
+        let points: Vec<Option<Point2<f64>>> =
+            points_px.iter().map(|px| camera.undistort(&Point2::from(*px))).collect();
         let side = longer_side(points.iter().flatten().map(|it| [it.x, it.y]))?;
         let seconds = instant_s + skew_s;
         seconds.is_finite().then_some(Self {

@@ -85,9 +85,7 @@ impl Device {
                 PATIENCE
             },
             adapter,
-            max_binding: limits
-                .max_storage_buffer_binding_size
-                .min(limits.max_buffer_size),
+            max_binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
             limits,
             takes_spirv,
             is_lost,
@@ -162,12 +160,11 @@ impl Device {
 
     /// A buffer with contents that stay.
     pub(crate) fn table<T: bytemuck::Pod>(&self, contents: &[T]) -> Buffer {
-        self.raw
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: None,
-                contents: bytemuck::cast_slice(contents),
-                usage: BufferUsages::STORAGE,
-            })
+        self.raw.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: None,
+            contents: bytemuck::cast_slice(contents),
+            usage: BufferUsages::STORAGE,
+        })
     }
 
     /// A buffer that is written from here or by kernels, and can be read.

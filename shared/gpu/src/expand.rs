@@ -9,9 +9,7 @@ pub(crate) fn expand(text: &str) -> String {
     while let Some(loop_) = Loop::first(rest) {
         out.push_str(&rest[..loop_.begin]);
         for value in (loop_.first..loop_.end).step_by(loop_.step) {
-            let body = loop_
-                .body
-                .replace(&format!("${}", loop_.name), &value.to_string());
+            let body = loop_.body.replace(&format!("${}", loop_.name), &value.to_string());
             out.push('{');
             out.push_str(&expand(&body));
             out.push_str("}\n");

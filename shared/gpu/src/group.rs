@@ -102,9 +102,7 @@ impl Shared {
 /// Splits the levels so that the maps of no group are larger than the device can see.
 pub(crate) fn split(device: &Device, layout: &Layout) -> Result<Vec<Range<usize>>, Unsuitable> {
     let bytes_of_cell = (layout.n_filters * size_of::<f32>()) as u64;
-    let most = device
-        .max_binding()
-        .min(u64::from(ROW) * RESPONSES as u64 * bytes_of_cell);
+    let most = device.max_binding().min(u64::from(ROW) * RESPONSES as u64 * bytes_of_cell);
     let (mut groups, mut first, mut held) = (Vec::new(), 0, 0);
     for (level, size) in layout.levels.iter().enumerate() {
         let needed = (size.rows * size.cols) as u64 * bytes_of_cell;
@@ -167,18 +165,12 @@ impl Tables {
                 unused: 0,
             });
             tables.cells.push(cell0);
-            tables
-                .level_of_cell
-                .extend(std::iter::repeat_n(within, area));
+            tables.level_of_cell.extend(std::iter::repeat_n(within, area));
             let blocks = (0..area).step_by(COMBINE);
-            tables
-                .blocks
-                .extend(blocks.map(|first| [within, first as u32]));
+            tables.blocks.extend(blocks.map(|first| [within, first as u32]));
             for y in (0..size.rows).step_by(TILE) {
                 let tiles = (0..size.cols).step_by(TILE);
-                tables
-                    .tiles
-                    .extend(tiles.map(|x| [within, y as u32, x as u32, 0]));
+                tables.tiles.extend(tiles.map(|x| [within, y as u32, x as u32, 0]));
             }
             feature0 += padded(level);
         }

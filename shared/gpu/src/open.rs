@@ -72,9 +72,7 @@ fn described(adapter: &wgpu::Adapter) -> Adapter {
     let info = adapter.get_info();
     Adapter {
         kind: kind(info.device_type),
-        driver: format!("{} {}", info.driver, info.driver_info)
-            .trim()
-            .to_owned(),
+        driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
         name: info.name,
     }
 }

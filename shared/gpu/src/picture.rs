@@ -84,9 +84,7 @@ impl Features {
         let values = device.space(feature_bytes);
         let mut dispatches = tables.shrinking(device, programs, (&image, width), image_bytes);
         let shrunken = dispatches.1;
-        dispatches
-            .0
-            .extend(tables.describing(device, programs, &shrunken, &values));
+        dispatches.0.extend(tables.describing(device, programs, &shrunken, &values));
         Ok(Self {
             image,
             values,
@@ -126,15 +124,11 @@ impl Tables {
                 tables.octaves.push(Vec::new());
             }
             let blocks = |n: usize, block: usize| {
-                (0..n)
-                    .step_by(block)
-                    .map(move |first| [level as u32, first as u32])
+                (0..n).step_by(block).map(move |first| [level as u32, first as u32])
             };
             tables.octaves[level / interval].extend(blocks(w * h, BLOCK));
             tables.pixels.extend(blocks(w * h, BLOCK));
-            tables
-                .histograms
-                .extend(blocks(cells[0] * cells[1], HISTOGRAM_BLOCK));
+            tables.histograms.extend(blocks(cells[0] * cells[1], HISTOGRAM_BLOCK));
             let n_padded = of_level.padded[0] * of_level.padded[1];
             tables.padded.extend(blocks(n_padded, BLOCK));
             tables.n_pixels += w * h;

@@ -120,31 +120,27 @@ fn filled(text: &str, sizes: Sizes) -> String {
         ("@REACH@", sizes.reach),
         ("@SLOTS@", sizes.slots),
     ];
-    numbers
-        .iter()
-        .fold(text.to_owned(), |text, (name, number)| {
-            text.replace(name, &number.to_string())
-        })
+    numbers.iter().fold(text.to_owned(), |text, (name, number)| {
+        text.replace(name, &number.to_string())
+    })
 }
 
 /// Compiles a text: with its arithmetic decorated where the device takes that.
 #[expect(unsafe_code, reason = "wgpu hands SPIR-V to the driver as it is")]
 fn module(device: &Device, text: &str, kernels: &[Entry]) -> Result<ShaderModule, Unsuitable> {
     if !device.takes_spirv() {
-        return Ok(device
-            .raw()
-            .create_shader_module(wgpu::ShaderModuleDescriptor {
+        return Ok(
+            device.raw().create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: None,
                 source: wgpu::ShaderSource::Wgsl(text.into()),
-            }));
+            }),
+        );
     }
     let words = spirv::from_wgsl(text).map_err(|why| Unsuitable::Refused { why })?;
-    let entry_points = kernels
-        .iter()
-        .map(|entry| wgpu::PassthroughShaderEntryPoint {
-            name: entry.name.into(),
-            workgroup_size: (1, 1, 1),
-        });
+    let entry_points = kernels.iter().map(|entry| wgpu::PassthroughShaderEntryPoint {
+        name: entry.name.into(),
+        workgroup_size: (1, 1, 1),
+    });
     let module = wgpu::ShaderModuleDescriptorPassthrough {
         spirv: Some(words.into()),
         entry_points: entry_points.collect::<Vec<_>>().into(),

@@ -40,12 +40,7 @@ pub(crate) fn shape(model: &Model) -> Result<Shape, Unsuitable> {
     if !numbered.copied().eq(0..model.n_filters()) {
         return Err(without("filters that are not numbered part by part"));
     }
-    if spec
-        .filters
-        .iter()
-        .any(|filter| [filter.rows, filter.cols] != [side; 2])
-        || side != cols
-    {
+    if spec.filters.iter().any(|filter| [filter.rows, filter.cols] != [side; 2]) || side != cols {
         return Err(without("filters of unequal size"));
     }
     if spec.cell_px != CELL_PX {
@@ -125,11 +120,7 @@ pub(crate) fn fits(device: &Device, what: &'static str, n_bytes: u64) -> Result<
 
 /// Checks that every level has cells.
 pub(crate) fn layout(layout: &Layout) -> Result<(), Unsuitable> {
-    if layout
-        .levels
-        .iter()
-        .any(|level| level.rows * level.cols == 0)
-    {
+    if layout.levels.iter().any(|level| level.rows * level.cols == 0) {
         return Err(without("levels without cells"));
     }
     Ok(())

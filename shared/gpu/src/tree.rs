@@ -54,11 +54,7 @@ impl Tree {
     pub(crate) fn new(model: &Model, layout: &Layout, slots: usize) -> Result<Self, Unsuitable> {
         let shape = suits::shape(model)?;
         let children = suits::children(model)?;
-        let longest = layout
-            .levels
-            .iter()
-            .map(|level| level.rows.max(level.cols))
-            .max();
+        let longest = layout.levels.iter().map(|level| level.rows.max(level.cols)).max();
         let mut tree = Self {
             n_parts: model.n_parts(),
             n_types: shape.n_types,
@@ -124,9 +120,7 @@ impl Tree {
             height[parent] = height[parent].max(height[part] + 1);
         }
         for wanted in 0..=height[0] {
-            let parts: Vec<usize> = (0..n_parts)
-                .filter(|part| height[*part] == wanted)
-                .collect();
+            let parts: Vec<usize> = (0..n_parts).filter(|part| height[*part] == wanted).collect();
             let planes = parts.iter().filter(|part| **part > 0);
             let planes = planes.flat_map(|part| part * n_types..(part + 1) * n_types);
             let planes = planes.map(|plane| plane as u32).collect();

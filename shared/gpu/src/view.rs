@@ -146,9 +146,7 @@ impl View {
             let first = self.layout.levels[group.levels.start].offset;
             let n = group.memory.maps.size() as usize / size_of::<f32>();
             let bytes = bytemuck::cast_slice(&responses[first..first + n]);
-            self.device
-                .queue()
-                .write_buffer(&group.memory.maps, 0, bytes);
+            self.device.queue().write_buffer(&group.memory.maps, 0, bytes);
         }
         self.solved(std::iter::empty(), wanted, &mut staging)
     }
@@ -169,10 +167,9 @@ impl View {
         record(&mut encoder, &mut self.features.dispatches.iter());
         let mut values = Vec::new();
         let all = Piece::whole(&self.features.values);
-        self.device
-            .read(encoder, &[all], &mut staging, &mut |bytes| {
-                values.extend_from_slice(bytemuck::cast_slice(bytes));
-            })?;
+        self.device.read(encoder, &[all], &mut staging, &mut |bytes| {
+            values.extend_from_slice(bytemuck::cast_slice(bytes));
+        })?;
         Ok(values)
     }
 
@@ -297,13 +294,9 @@ impl View {
         let mut places = Vec::new();
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         for (group_idx, group) in self.groups.iter().enumerate() {
-            let own = peaks
-                .iter()
-                .enumerate()
-                .filter(|(_, peak)| peak.group == group_idx);
-            let (own, roots): (Vec<usize>, Vec<u32>) = own
-                .map(|(at, peak)| (at, (peak.cell * 8 + peak.root.mixture) as u32))
-                .unzip();
+            let own = peaks.iter().enumerate().filter(|(_, peak)| peak.group == group_idx);
+            let (own, roots): (Vec<usize>, Vec<u32>) =
+                own.map(|(at, peak)| (at, (peak.cell * 8 + peak.root.mixture) as u32)).unzip();
             if own.is_empty() {
                 continue;
             }
@@ -349,28 +342,21 @@ impl View {
             evidence.len() >= self.layout.n_responses(),
             "one value per response"
         );
-        let group = |level: usize| {
-            self.groups
-                .iter()
-                .find(|group| group.levels.contains(&level))
-        };
+        let group = |level: usize| self.groups.iter().find(|group| group.levels.contains(&level));
         let levels = levels.iter().map(|level| usize::from(*level));
-        let (levels, pieces): (Vec<usize>, Vec<Piece<'_>>) = levels
-            .filter_map(|level| Some((level, group(level)?.maps_of(level))))
-            .unzip();
+        let (levels, pieces): (Vec<usize>, Vec<Piece<'_>>) =
+            levels.filter_map(|level| Some((level, group(level)?.maps_of(level)))).unzip();
         if levels.is_empty() {
             return Ok(());
         }
-        self.device
-            .read(self.encoder()?, &pieces, staging, &mut |bytes| {
-                let mut values: &[f32] = bytemuck::cast_slice(bytes);
-                for (level, piece) in levels.iter().zip(&pieces) {
-                    let (maps, rest) = values.split_at(piece.n as usize / size_of::<f32>());
-                    values = rest;
-                    evidence[self.layout.levels[*level].offset..][..maps.len()]
-                        .copy_from_slice(maps);
-                }
-            })
+        self.device.read(self.encoder()?, &pieces, staging, &mut |bytes| {
+            let mut values: &[f32] = bytemuck::cast_slice(bytes);
+            for (level, piece) in levels.iter().zip(&pieces) {
+                let (maps, rest) = values.split_at(piece.n as usize / size_of::<f32>());
+                values = rest;
+                evidence[self.layout.levels[*level].offset..][..maps.len()].copy_from_slice(maps);
+            }
+        })
     }
 }
 

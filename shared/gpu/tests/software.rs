@@ -40,9 +40,7 @@ fn spec(rng: &mut Rng, [n_parts, n_types, side]: [usize; 3]) -> ModelSpec {
     let filter = |rng: &mut Rng| Filter {
         rows: side,
         cols: side,
-        weights: (0..side * side * N_CHANNELS)
-            .map(|_| rng.f64() * 0.2 - 0.1)
-            .collect(),
+        weights: (0..side * side * N_CHANNELS).map(|_| rng.f64() * 0.2 - 0.1).collect(),
     };
     let part = |rng: &mut Rng, part: usize| PartSpec {
         name: format!("part {part}"),
@@ -84,9 +82,7 @@ fn edge(rng: &mut Rng, parent: usize, n_types: usize) -> Edge {
     Edge {
         parent,
         springs: Springs::PerChildType((0..n_types).map(|_| spring(rng)).collect()),
-        bias: (0..n_types)
-            .map(|_| (0..n_types).map(|own| bias(rng, own)).collect())
-            .collect(),
+        bias: (0..n_types).map(|_| (0..n_types).map(|own| bias(rng, own)).collect()).collect(),
     }
 }
 
@@ -146,13 +142,7 @@ fn features_have_the_bits_of_the_cpu() {
     let pyramid = FeaturePyramid::new(&case.model, case.image(), &case.layout);
     let levels = 0..case.layout.levels.len();
     let expected: Vec<u32> = levels
-        .flat_map(|level| {
-            pyramid
-                .level(level)
-                .cells
-                .iter()
-                .map(|value| value.to_bits())
-        })
+        .flat_map(|level| pyramid.level(level).cells.iter().map(|value| value.to_bits()))
         .collect();
     let found: Vec<u32> = found.iter().map(|value| value.to_bits()).collect();
     let differ = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
@@ -188,9 +178,7 @@ fn a_search_gives_evidence_and_the_poses_that_are_in_it() {
     let view = case.view(&device).unwrap();
     let mut evidence = vec![f32::NAN; case.layout.n_responses()];
     let all = |_: &[Pose]| case.levels();
-    let found = view
-        .search(case.image(), WANTED, &all, &mut evidence)
-        .unwrap();
+    let found = view.search(case.image(), WANTED, &all, &mut evidence).unwrap();
     assert_eq!(found, case.solved(&evidence));
 
     let mut expected = vec![0.0; evidence.len()];
@@ -231,9 +219,7 @@ fn the_model_that_ships_is_one_for_the_gpu() {
     let mut evidence = vec![f32::NAN; case.layout.n_responses()];
     let all = |_: &[Pose]| case.levels();
     let view = case.view(&device).unwrap();
-    let found = view
-        .search(case.image(), WANTED, &all, &mut evidence)
-        .unwrap();
+    let found = view.search(case.image(), WANTED, &all, &mut evidence).unwrap();
     assert_eq!(found, case.solved(&evidence));
 }
 
@@ -249,9 +235,7 @@ fn a_device_that_sees_little_at_once_finds_the_same() {
     let [whole, split] = [&device, &small].map(|device| {
         let mut evidence = vec![f32::NAN; case.layout.n_responses()];
         let view = case.view(device).unwrap();
-        let found = view
-            .search(case.image(), WANTED, &levels, &mut evidence)
-            .unwrap();
+        let found = view.search(case.image(), WANTED, &levels, &mut evidence).unwrap();
         (found, evidence)
     });
     assert_eq!(whole, split);
@@ -265,9 +249,7 @@ fn a_driver_that_takes_no_spirv_finds_the_same_poses() {
     let view = case.view(&device).unwrap();
     let mut evidence = vec![f32::NAN; case.layout.n_responses()];
     let all = |_: &[Pose]| case.levels();
-    let found = view
-        .search(case.image(), WANTED, &all, &mut evidence)
-        .unwrap();
+    let found = view.search(case.image(), WANTED, &all, &mut evidence).unwrap();
     assert_eq!(found, case.solved(&evidence));
 }
 

@@ -92,19 +92,13 @@ fn time(session: &Session) -> f64 {
     });
     let shape: Vec<usize> = sides.collect();
     let n = shape.iter().product();
-    let picture: Vec<f32> = (0..n)
-        .map(|at: usize| (at * 7 % 255) as f32 / 128.0 - 1.0)
-        .collect();
+    let picture: Vec<f32> = (0..n).map(|at: usize| (at * 7 % 255) as f32 / 128.0 - 1.0).collect();
     let input = Input {
         name: &input.name,
         shape: &shape,
         values: Values::F32(&picture),
     };
-    let outputs: Vec<&str> = description
-        .outputs
-        .iter()
-        .map(|port| port.name.as_str())
-        .collect();
+    let outputs: Vec<&str> = description.outputs.iter().map(|port| port.name.as_str()).collect();
     let begin = processor_time();
     session.run(&[input], &outputs, &mut |_output| {}).unwrap();
     processor_time() - begin

@@ -91,14 +91,11 @@ impl Engine for Direct {
             let Some(rest) = rest.as_ref().filter(|_| !behind.is_empty()) else {
                 return Ok(());
             };
-            let given = names
-                .iter()
-                .zip(exits)
-                .map(|(name, (shape, values))| Input {
-                    name,
-                    shape,
-                    values: Values::F32(values),
-                });
+            let given = names.iter().zip(exits).map(|(name, (shape, values))| Input {
+                name,
+                shape,
+                values: Values::F32(values),
+            });
             let given: Vec<Input<'_>> = given.chain([input]).collect();
             let wanted: Vec<&str> = behind.iter().map(|index| outputs[*index]).collect();
             rest.run(&given, &wanted, &mut |output| {

@@ -107,10 +107,7 @@ struct Finding<'a> {
 impl Front {
     /// Finds the front of a network.
     pub(crate) fn find(source: &Source) -> Result<Self, NoFront> {
-        let (name, sides) = source
-            .input()
-            .filter(|input| fits(input.1))
-            .ok_or(NoFront::Input)?;
+        let (name, sides) = source.input().filter(|input| fits(input.1)).ok_or(NoFront::Input)?;
         let input = Value {
             stack: 0,
             is_relu: false,
@@ -230,10 +227,7 @@ impl<'a> Finding<'a> {
             None => Some(vec![0.0; outputs]),
         };
         let kernel = ints(node, "kernel_shape").is_none_or(|sides| {
-            sides
-                .iter()
-                .map(|side| usize::try_from(*side))
-                .eq([Ok(down), Ok(across)])
+            sides.iter().map(|side| usize::try_from(*side)).eq([Ok(down), Ok(across)])
         });
         let is_dilated = ints(node, "dilations").is_some_and(|all| all.iter().any(|n| *n != 1));
         if int(node, "group").unwrap_or(1) != 1 {
@@ -327,9 +321,7 @@ impl<'a> Finding<'a> {
             makers.extend(node.output.iter().map(|name| (name.as_str(), at)));
         }
         let outputs = self.source.graph.output.iter();
-        let mut open: Vec<&str> = outputs
-            .filter_map(|output| output.name.as_deref())
-            .collect();
+        let mut open: Vec<&str> = outputs.filter_map(|output| output.name.as_deref()).collect();
         let mut seen = HashSet::new();
         while let Some(name) = open.pop() {
             if !seen.insert(name) {

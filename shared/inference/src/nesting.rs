@@ -72,9 +72,7 @@ fn walk(kind: Kind, bytes: &[u8], base: usize, depth: usize) -> Result<(), Malfo
             _ => None,
         };
         let end = length.and_then(|length| at.checked_add(length));
-        let end = end
-            .filter(|end| *end <= bytes.len())
-            .ok_or(malformed(begin))?;
+        let end = end.filter(|end| *end <= bytes.len()).ok_or(malformed(begin))?;
         if let (2, Some(child)) = (wire, kind.child(field)) {
             if depth == MAX_DEPTH {
                 return Err(malformed(begin));

@@ -174,9 +174,7 @@ impl Network {
             .each(&self.constants, |graph, it| graph.message(5, &constant(it)))
             .each(&self.inputs, |graph, it| graph.message(11, &value(it)))
             .each(&self.outputs, |graph, it| graph.message(12, &value(it)));
-        let operators = Message::default()
-            .text(1, "")
-            .number(2, self.operator_set.into());
+        let operators = Message::default().text(1, "").number(2, self.operator_set.into());
         Message::default()
             .number(1, IR_VERSION)
             .each(&self.producer, |model, (name, version)| {
@@ -206,9 +204,9 @@ fn attribute(name: &str, value: &Attribute) -> Message {
     let named = Message::default().text(1, name);
     match value {
         Attribute::Int(value) => named.number(3, *value).number(20, 2),
-        Attribute::Ints(all) => named
-            .each(all, |message, value| message.number(8, *value))
-            .number(20, 7),
+        Attribute::Ints(all) => {
+            named.each(all, |message, value| message.number(8, *value)).number(20, 7)
+        }
     }
 }
 

@@ -81,17 +81,11 @@ impl OnnxRuntime {
 
     fn session(&self, file: &[u8], on_cuda: bool) -> Result<Session, EngineError> {
         let builder = Session::builder(&self.environment)?;
-        let builder = builder
-            .with_intra_threads(1)
-            .map_err(|error| plain(&error))?;
-        let builder = builder
-            .with_inter_threads(1)
-            .map_err(|error| plain(&error))?;
+        let builder = builder.with_intra_threads(1).map_err(|error| plain(&error))?;
+        let builder = builder.with_inter_threads(1).map_err(|error| plain(&error))?;
         let mut builder = if on_cuda {
             let cuda = ort::ep::CUDA::default().build().error_on_failure();
-            builder
-                .with_execution_providers([cuda])
-                .map_err(|error| plain(&error))?
+            builder.with_execution_providers([cuda]).map_err(|error| plain(&error))?
         } else {
             builder
         };
@@ -139,11 +133,7 @@ fn sides(of: &ValueType) -> Vec<Side> {
     let side = |(&size, name): (&i64, &String)| {
         usize::try_from(size).map_or_else(|_| Side::Named(name.clone()), Side::Fixed)
     };
-    shape
-        .iter()
-        .zip(dimension_symbols.iter())
-        .map(side)
-        .collect()
+    shape.iter().zip(dimension_symbols.iter()).map(side).collect()
 }
 
 /// A network loaded by the library; it runs for one caller at a time.

@@ -65,10 +65,7 @@ struct Places {
 
 impl Places {
     fn find(&mut self, shape: BlockedShape) -> usize {
-        let free = self
-            .free
-            .iter()
-            .position(|place| self.shapes[*place] == shape);
+        let free = self.free.iter().position(|place| self.shapes[*place] == shape);
         free.map_or_else(
             || {
                 self.shapes.push(shape);
@@ -166,11 +163,7 @@ impl Plan {
         let spare = || self.spare.lock().unwrap_or_else(PoisonError::into_inner);
         let memory = spare().pop();
         let mut memory = memory.unwrap_or_else(|| Memory {
-            places: self
-                .places
-                .iter()
-                .map(|shape| Some(Blocked::new(*shape)))
-                .collect(),
+            places: self.places.iter().map(|shape| Some(Blocked::new(*shape))).collect(),
             exits: vec![Vec::new(); self.exits.len()],
         });
         if let Some(input) = &mut memory.places[0] {
@@ -185,9 +178,7 @@ impl Plan {
             }
         }
         let exits = self.exits.iter().zip(&memory.exits);
-        let exits: Vec<_> = exits
-            .map(|(exit, values)| (exit.shape, &values[..]))
-            .collect();
+        let exits: Vec<_> = exits.map(|(exit, values)| (exit.shape, &values[..])).collect();
         let result = then(&exits);
         spare().push(memory);
         result

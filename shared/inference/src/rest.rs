@@ -47,9 +47,8 @@ pub(crate) fn rest(file: &[u8], source: &Source, front: &Front) -> Option<Vec<u8
 fn graph(bytes: &[u8], source: &Source, front: &Front) -> Option<Vec<u8>> {
     let nodes = source.graph.node.iter().enumerate();
     let kept = nodes.filter(|(at, _)| front.behind.contains(at));
-    let taken: HashSet<&str> = kept
-        .flat_map(|(_, node)| node.input.iter().map(String::as_str))
-        .collect();
+    let taken: HashSet<&str> =
+        kept.flat_map(|(_, node)| node.input.iter().map(String::as_str)).collect();
     let (mut n_nodes, mut n_constants) = (0, 0);
     let mut graph = Vec::new();
     for field in fields(bytes)? {

@@ -35,8 +35,7 @@ impl Rten {
     fn id(&self, ids: &[NodeId], wanted: &str) -> Result<NodeId, EngineError> {
         let mut ids = ids.iter().rev();
         let id = ids.find(|id| name(&self.model, **id) == wanted);
-        id.copied()
-            .ok_or_else(|| format!("the network has no `{wanted}`").into())
+        id.copied().ok_or_else(|| format!("the network has no `{wanted}`").into())
     }
 }
 
@@ -59,10 +58,8 @@ impl Engine for Rten {
                 },
             ));
         }
-        let ids: Result<Vec<NodeId>, EngineError> = outputs
-            .iter()
-            .map(|it| self.id(self.model.output_ids(), it))
-            .collect();
+        let ids: Result<Vec<NodeId>, EngineError> =
+            outputs.iter().map(|it| self.id(self.model.output_ids(), it)).collect();
         let options = RunOptions::default().with_thread_pool(Some(Arc::clone(&self.threads)));
         let found = self.model.run(given, &ids?, Some(options))?;
         for (index, value) in found.iter().enumerate() {

@@ -133,9 +133,7 @@ fn whole(tensor: &TensorProto) -> Vec<i64> {
     let is_float = tensor.data_type.is_some_and(|it| it.0 == FLOAT);
     let raw: Vec<i64> = if is_float {
         let values = raw.as_chunks::<4>().0.iter();
-        values
-            .map(|it| f32::from_le_bytes(*it).ceil() as i64)
-            .collect()
+        values.map(|it| f32::from_le_bytes(*it).ceil() as i64).collect()
     } else {
         let values = raw.as_chunks::<8>().0.iter();
         values.map(|it| i64::from_le_bytes(*it)).collect()

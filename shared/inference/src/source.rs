@@ -92,17 +92,14 @@ pub(crate) fn ints<'a>(node: &'a NodeProto, name: &str) -> Option<&'a [i64]> {
 /// A whole number of an attribute.
 pub(crate) fn int(node: &NodeProto, name: &str) -> Option<i64> {
     let mut all = node.attribute.iter();
-    all.find(|attribute| attribute.name.as_deref() == Some(name))?
-        .i
+    all.find(|attribute| attribute.name.as_deref() == Some(name))?.i
 }
 
 /// A text of an attribute, or what holds without it.
 pub(crate) fn text<'a>(node: &'a NodeProto, name: &str, without: &'a str) -> &'a str {
     let mut all = node.attribute.iter();
     let found = all.find(|attribute| attribute.name.as_deref() == Some(name));
-    found
-        .and_then(|found| found.s.as_deref())
-        .unwrap_or(without)
+    found.and_then(|found| found.s.as_deref()).unwrap_or(without)
 }
 
 fn constant(tensor: &TensorProto) -> Option<Constant> {
@@ -113,12 +110,7 @@ fn constant(tensor: &TensorProto) -> Option<Constant> {
     let kind = tensor.data_type?.0;
     let values: Vec<f32> = match kind {
         FLOAT if raw.is_empty() => tensor.float_data.clone(),
-        FLOAT => raw
-            .as_chunks::<4>()
-            .0
-            .iter()
-            .map(|bytes| f32::from_le_bytes(*bytes))
-            .collect(),
+        FLOAT => raw.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect(),
         FLOAT16 => raw
             .as_chunks::<2>()
             .0
@@ -127,8 +119,6 @@ fn constant(tensor: &TensorProto) -> Option<Constant> {
             .collect(),
         _ => return None,
     };
-    let n = shape
-        .iter()
-        .try_fold(1_usize, |n, side| n.checked_mul(*side))?;
+    let n = shape.iter().try_fold(1_usize, |n, side| n.checked_mul(*side))?;
     (n == values.len()).then_some(Constant { shape, values })
 }

@@ -92,21 +92,15 @@ impl Net {
         let n = outputs * inputs * side * side;
         let scale = 1.5 / ((inputs * side * side) as f32).sqrt();
         self.seed += 1;
-        let weights = noise(n, self.seed)
-            .iter()
-            .map(|weight| weight * scale)
-            .collect();
-        self.net
-            .floats(&names[0], &[outputs, inputs, side, side], weights);
-        self.net
-            .floats(&names[1], &[outputs], noise(outputs, self.seed + 7));
+        let weights = noise(n, self.seed).iter().map(|weight| weight * scale).collect();
+        self.net.floats(&names[0], &[outputs, inputs, side, side], weights);
+        self.net.floats(&names[1], &[outputs], noise(outputs, self.seed + 7));
         let attributes = vec![
             ("kernel_shape", Attribute::Ints(vec![side as i64; 2])),
             ("strides", Attribute::Ints(vec![stride; 2])),
             ("pads", Attribute::Ints(vec![side as i64 / 2; 4])),
         ];
-        self.net
-            .node("Conv", &[from, &names[0], &names[1]], to, attributes);
+        self.net.node("Conv", &[from, &names[0], &names[1]], to, attributes);
     }
 
     fn node(&mut self, op: &str, from: &[&str], to: &str) {

@@ -73,10 +73,7 @@ pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
 
 /// The failure to create a folder for results.
 pub(crate) fn on_folder(folder: &Path, error: &io::Error) -> Failure {
-    let in_the_way = folder
-        .ancestors()
-        .find(|it| it.exists())
-        .filter(|it| !it.is_dir());
+    let in_the_way = folder.ancestors().find(|it| it.exists()).filter(|it| !it.is_dir());
     let message = match in_the_way {
         Some(file) => format!(
             "cannot make the folder {}: {} is a file",

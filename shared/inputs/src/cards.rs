@@ -81,10 +81,7 @@ impl OnnxFile {
 impl CardText {
     /// The card of a network in a file: the given one, or one beside it.
     fn beside(network: &Path, given: Option<&Path>) -> Result<Option<Self>, Failure> {
-        let Some(file) = given
-            .map(Path::to_path_buf)
-            .or_else(|| card_beside(network))
-        else {
+        let Some(file) = given.map(Path::to_path_buf).or_else(|| card_beside(network)) else {
             return Ok(None);
         };
         Ok(Some(Self {

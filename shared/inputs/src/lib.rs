@@ -76,9 +76,7 @@ pub fn model(path: &Path) -> Result<Arc<Model>, Failure> {
     if deployment::is_shipped(path) {
         return shipped_model();
     }
-    fmp::files::read(path)
-        .map(Arc::new)
-        .or_fail(ExitKind::Input)
+    fmp::files::read(path).map(Arc::new).or_fail(ExitKind::Input)
 }
 
 /// Reads a calibration of any supported format.
@@ -133,9 +131,7 @@ fn rig_with(deployment: &Deployment, options: ReadOptions) -> Result<Rig, Failur
         ..options
     };
     let read = rig(&[&deployment.rig], &options)?;
-    let up = deployment
-        .up
-        .and_then(|up| UnitVector3::try_new(up.into(), 1e-9));
+    let up = deployment.up.and_then(|up| UnitVector3::try_new(up.into(), 1e-9));
     Ok(match up {
         Some(up) => read.with_up(Some(up)),
         None => read,
@@ -167,9 +163,7 @@ pub fn camera_of<'a>(
 ///
 /// A file cannot be read, its part types are not those of the model, or the two contradict each other.
 fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> {
-    let n_types: Vec<usize> = (0..model.n_parts())
-        .map(|part| model.n_types(part))
-        .collect();
+    let n_types: Vec<usize> = (0..model.n_parts()).map(|part| model.n_types(part)).collect();
     let read = |file: &Path| -> Result<Compatibility, Failure> {
         let text = text(file)?;
         let table = Compatibility::parse(&text, &n_types);
@@ -264,10 +258,7 @@ pub fn pair_tables(
         deployment::paper::Energy::Paper => learned.weights.appearance,
         deployment::paper::Energy::Released => Appearance::Joint,
     };
-    let rig = config
-        .consistency
-        .as_ref()
-        .and_then(deployment::paper::Consistency::rig);
+    let rig = config.consistency.as_ref().and_then(deployment::paper::Consistency::rig);
     if let Some(rig) = rig {
         let Some(own) = learned.of_rig(rig, cameras, appearance) else {
             let message = format!("`paper.consistency`: no rig {rig:?} was learned");

@@ -163,8 +163,7 @@ impl Searched {
             let map = resize_map(picture.size, size);
             let mut pixels = vec![0; size.rgb_bytes()];
             let warp = Warp::new(picture.size, size, &map, Fill::Replicate);
-            warp.or_fail(ExitKind::Input)?
-                .apply(&picture.rgb, &mut pixels);
+            warp.or_fail(ExitKind::Input)?.apply(&picture.rgb, &mut pixels);
             Some(pixels)
         };
         let share = |of: usize, to: usize| of as f64 / to as f64;

@@ -116,13 +116,10 @@ impl Sheet {
 
     fn write(&mut self) -> Result<(), Failure> {
         let waiting = std::mem::take(&mut self.waiting);
-        let tiles: Vec<Tile<'_>> = waiting
-            .iter()
-            .map(|(picture, caption)| Tile { picture, caption })
-            .collect();
+        let tiles: Vec<Tile<'_>> =
+            waiting.iter().map(|(picture, caption)| Tile { picture, caption }).collect();
         let page = compose(&tiles, N_COLUMNS);
-        page.save_png(&self.path_of_page())
-            .or_fail(ExitKind::Input)?;
+        page.save_png(&self.path_of_page()).or_fail(ExitKind::Input)?;
         self.page += 1;
         Ok(())
     }
@@ -171,9 +168,8 @@ mod tests {
             }
             sheet.finish().unwrap();
             let entries = std::fs::read_dir(&folder).unwrap();
-            let mut names: Vec<_> = entries
-                .map(|it| it.unwrap().file_name().into_string().unwrap())
-                .collect();
+            let mut names: Vec<_> =
+                entries.map(|it| it.unwrap().file_name().into_string().unwrap()).collect();
             names.sort();
             assert_eq!(names, expected);
         }
@@ -194,9 +190,7 @@ mod tests {
             score: 0.5,
         };
         let size = Size::new(440, 100);
-        sheet
-            .add("a.png", size, &vec![90; size.rgb_bytes()], Some(&skeleton))
-            .unwrap();
+        sheet.add("a.png", size, &vec![90; size.rgb_bytes()], Some(&skeleton)).unwrap();
         sheet.finish().unwrap();
         let page = image::open(path).unwrap().into_rgb8();
         let blue: Vec<[u32; 2]> = page

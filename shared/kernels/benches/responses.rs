@@ -14,9 +14,7 @@ use rustix::time::{ClockId, clock_gettime};
 const N_FILTERS: usize = 156;
 
 fn main() {
-    let repetitions = std::env::args()
-        .find_map(|it| it.parse().ok())
-        .unwrap_or(20);
+    let repetitions = std::env::args().find_map(|it| it.parse().ok()).unwrap_or(20);
     for isa in Isa::available() {
         // Without multiply-adds in hardware it takes minutes.
         if isa == Isa::available()[0] && Isa::available().len() > 1 {

@@ -105,9 +105,7 @@ impl Conv {
     ) -> Result<Self, ConvSizeError> {
         let [kernel_rows, kernel_cols] = size.kernel;
         let sides = [size.outputs, size.inputs, kernel_rows, kernel_cols];
-        let n = sides
-            .iter()
-            .try_fold(1_usize, |n, side| n.checked_mul(*side));
+        let n = sides.iter().try_fold(1_usize, |n, side| n.checked_mul(*side));
         let is_empty = n == Some(0) || size.stride.contains(&0);
         if n != Some(weights.len()) || bias.len() != size.outputs || is_empty {
             return Err(ConvSizeError {

@@ -174,9 +174,7 @@ mod tests {
         (3..sized(75, 30), 3..sized(45, 18), any::<u64>()).prop_map(move |(width, height, seed)| {
             let mut state = seed | 1;
             let data = std::iter::repeat_with(|| {
-                state = state
-                    .wrapping_mul(6364136223846793005)
-                    .wrapping_add(1442695040888963407);
+                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
                 (state >> 60) as f64 * step
             });
             Planes::from_samples(width, height, data.take(3 * width * height).collect())

@@ -249,9 +249,7 @@ mod tests {
     fn noise(seed: u64, n: usize) -> Vec<u8> {
         let mut state = seed | 1;
         let bytes = std::iter::repeat_with(|| {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (state >> 56) as u8
         });
         bytes.take(n).collect()

@@ -421,10 +421,7 @@ impl Card {
             &n,
             || format!("1 to {MAX_KEYPOINTS} names"),
         )?;
-        let twice = names
-            .iter()
-            .enumerate()
-            .find(|(nth, it)| names[..*nth].contains(it));
+        let twice = names.iter().enumerate().find(|(nth, it)| names[..*nth].contains(it));
         demand(
             twice.is_none(),
             "keypoints.names",

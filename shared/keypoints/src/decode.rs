@@ -465,28 +465,16 @@ mod tests {
         for shape in wrong {
             let refused = HeatMaps::new(&values, shape, Layout::Planes, [2, 0]).unwrap_err();
             assert!(
-                refused
-                    .to_string()
-                    .contains("expected [1, 2, rows, columns]"),
+                refused.to_string().contains("expected [1, 2, rows, columns]"),
                 "{refused}"
             );
         }
         let right = HeatMaps::new(&values, &[1, 3, 4, 2], Layout::Pixels, [2, 0]);
         assert_eq!(right.unwrap().size(), [3, 4]);
         let refused = SimCc::new([&values; 2], [&[1, 2, 12], &[1, 2, 11]], [12, 12], 2);
-        assert!(
-            refused
-                .unwrap_err()
-                .to_string()
-                .contains("expected [1, 2, 12]")
-        );
+        assert!(refused.unwrap_err().to_string().contains("expected [1, 2, 12]"));
         let refused = List::new(&values, &[1, 24], &[ListField::X; 5], 5);
-        assert!(
-            refused
-                .unwrap_err()
-                .to_string()
-                .contains("5 keypoints of 5 numbers")
-        );
+        assert!(refused.unwrap_err().to_string().contains("5 keypoints of 5 numbers"));
         let mut odd = values;
         odd[7] = f32::NAN;
         let refused = HeatMaps::new(&odd, &[1, 2, 3, 4], Layout::Planes, [2, 0]).unwrap_err();

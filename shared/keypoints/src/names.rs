@@ -279,27 +279,18 @@ pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
     let ways = |name: &str| -> Vec<Way> {
         match name {
             "neck" => necks().into_iter().flatten().map(way).collect(),
-            "head" => mean(&["head top"])
-                .map(way)
-                .into_iter()
-                .chain(heads())
-                .collect(),
+            "head" => mean(&["head top"]).map(way).into_iter().chain(heads()).collect(),
             name => mean(&[name]).map(way).into_iter().collect(),
         }
     };
-    PARSE14
-        .joints
-        .iter()
-        .map(|joint| ways(joint.name))
-        .collect()
+    PARSE14.joints.iter().map(|joint| ways(joint.name)).collect()
 }
 
 /// The best way of every joint where all keypoints are there, as a weighted sum of them: the first of [`joint_ways`]; `None` for a joint
 /// that does not follow from them.
 pub fn joint_rows(names: &[String]) -> Vec<Option<Vec<(usize, f64)>>> {
     let ways = joint_ways(names).into_iter();
-    ways.map(|ways| Some(ways.into_iter().next()?.row))
-        .collect()
+    ways.map(|ways| Some(ways.into_iter().next()?.row)).collect()
 }
 
 /// Whether a keypoint is a joint of `skeleton::PARSE14` by its name; all others are extra keypoints.

@@ -67,10 +67,7 @@ mod tests {
                 !card.weights.is_empty() && !card.licence.is_empty(),
                 "{name}"
             );
-            let missing = joint_rows(&card.names())
-                .iter()
-                .filter(|it| it.is_none())
-                .count();
+            let missing = joint_rows(&card.names()).iter().filter(|it| it.is_none()).count();
             assert_eq!(missing, 0, "{name}");
         }
     }
@@ -92,9 +89,8 @@ mod tests {
             let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
             let files = std::fs::read_dir(folder).unwrap();
             let names = files.map(|it| it.unwrap().path());
-            let mut names: Vec<_> = names
-                .map(|it| it.file_stem().unwrap().to_str().unwrap().to_owned())
-                .collect();
+            let mut names: Vec<_> =
+                names.map(|it| it.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
             names.sort();
             names
         };

@@ -83,10 +83,8 @@ fn value(
         return Err(Unknown::Missing);
     }
     let up = up.unwrap_or_else(Vector3::z_axis);
-    let places: Vec<Place> = found
-        .iter()
-        .map(|it| (it.position, it.covariance.filter(is_finite)))
-        .collect();
+    let places: Vec<Place> =
+        found.iter().map(|it| (it.position, it.covariance.filter(is_finite))).collect();
     let points: Vec<Vector3<f64>> = found.iter().map(|it| it.position).collect();
     let degrees = angle.degrees(&points, &up).ok_or(Unknown::Undefined)?;
     let sd_degrees = spread::sd(degrees, &places, |points| angle.degrees(points, &up))?;

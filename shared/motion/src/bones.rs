@@ -64,10 +64,7 @@ fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)])
     let mut joints: Vec<usize> = here.iter().flat_map(|it| it.0).collect();
     joints.sort_unstable();
     joints.dedup();
-    let found: Vec<Estimate> = joints
-        .iter()
-        .filter_map(|&it| tracks[it][at].ok())
-        .collect();
+    let found: Vec<Estimate> = joints.iter().filter_map(|&it| tracks[it][at].ok()).collect();
     if found.is_empty() {
         return;
     }
@@ -81,10 +78,8 @@ fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)])
     let Some((positions, covariances)) = projected(&found, &places) else {
         return;
     };
-    for ((joint, old), (position, covariance)) in joints
-        .iter()
-        .zip(found)
-        .zip(positions.into_iter().zip(covariances))
+    for ((joint, old), (position, covariance)) in
+        joints.iter().zip(found).zip(positions.into_iter().zip(covariances))
     {
         tracks[*joint][at] = Ok(Estimate {
             position,
@@ -101,10 +96,8 @@ type Projected = (Vec<Vector3<f64>>, Vec<Matrix3<f64>>);
 fn projected(found: &[Estimate], bones: &[([usize; 2], f64)]) -> Option<Projected> {
     let n = found.len();
     let unknown = Matrix3::identity() * UNKNOWN_SD_M.powi(2);
-    let covariances: Vec<Matrix3<f64>> = found
-        .iter()
-        .map(|it| it.covariance.unwrap_or(unknown))
-        .collect();
+    let covariances: Vec<Matrix3<f64>> =
+        found.iter().map(|it| it.covariance.unwrap_or(unknown)).collect();
     let mut positions: Vec<Vector3<f64>> = found.iter().map(|it| it.position).collect();
     let mut last = None;
     for _ in 0..N_STEPS {
@@ -124,9 +117,7 @@ fn projected(found: &[Estimate], bones: &[([usize; 2], f64)]) -> Option<Projecte
             off[nth] = now - length - along.dot(&moved);
             for (joint, sign) in [(*a, -1.0), (*b, 1.0)] {
                 let column: Vector3<f64> = covariances[joint] * along * sign;
-                spread
-                    .fixed_view_mut::<3, 1>(3 * joint, nth)
-                    .copy_from(&column);
+                spread.fixed_view_mut::<3, 1>(3 * joint, nth).copy_from(&column);
                 derivative
                     .fixed_view_mut::<1, 3>(nth, 3 * joint)
                     .copy_from(&(along * sign).transpose());

@@ -222,9 +222,8 @@ mod tests {
     /// The share of a sine's amplitude that is left, and its delay in seconds.
     fn passed(hz: f64) -> f64 {
         let rate = 120.0;
-        let wave: Vec<f64> = (0..1200)
-            .map(|it| (2.0 * PI * hz * f64::from(it) / rate).sin())
-            .collect();
+        let wave: Vec<f64> =
+            (0..1200).map(|it| (2.0 * PI * hz * f64::from(it) / rate).sin()).collect();
         let got = twice(&wave, rate, 6.0);
         let (mut same, mut all) = (0.0, 0.0);
         for at in 300..900 {

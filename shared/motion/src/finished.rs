@@ -57,9 +57,8 @@ pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure>
     let run = read(&request.folder, request.rate_hz)?;
     console.begin("", "smoothing");
     let people = run.people.iter();
-    let motions: Result<Vec<Motion>, Failure> = people
-        .map(|person| smoothed(&person.recorded, &request.settings))
-        .collect();
+    let motions: Result<Vec<Motion>, Failure> =
+        people.map(|person| smoothed(&person.recorded, &request.settings)).collect();
     let motions = motions?;
     let up = request.up.or_else(|| folder::up(&request.folder));
     let mut report = report(&run, &motions, &request.settings);
@@ -202,12 +201,7 @@ fn doubts_of(person: &SmoothedPerson, n_frames: usize) -> Vec<String> {
 
 /// Counts of all joints together, for people.
 pub fn totals(report: &SmoothReport) -> BTreeMap<&'static str, usize> {
-    let joints = || {
-        report
-            .people
-            .iter()
-            .flat_map(|person| person.joints.values())
-    };
+    let joints = || report.people.iter().flat_map(|person| person.joints.values());
     let sum = |of: fn(&SmoothedJoint) -> usize| joints().map(of).sum::<usize>();
     [
         ("measured", sum(|it| it.measured)),

@@ -93,8 +93,7 @@ pub fn add(errors: &mut [Errors], times: &[f64], track: &Path, truth: &Path, cou
             differences(times, [true_before, true_here, true_after]);
         let it = &mut errors[at];
         it.velocity_m_s.add((velocity - true_velocity).norm());
-        it.acceleration_m_s2
-            .add((acceleration - true_acceleration).norm());
+        it.acceleration_m_s2.add((acceleration - true_acceleration).norm());
         it.late[0] -= (here - true_here).dot(&true_velocity);
         it.late[1] += true_velocity.norm_squared();
     }

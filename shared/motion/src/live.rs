@@ -36,10 +36,7 @@ impl Smoother {
         let models = |name: &&str| Models::new(prior(Role::of(name)));
         Self {
             joints: names.iter().map(models).collect(),
-            is_sided: names
-                .iter()
-                .map(|it| crate::mirrored_name(it).is_some())
-                .collect(),
+            is_sided: names.iter().map(|it| crate::mirrored_name(it).is_some()).collect(),
             fill_s,
             delay: Delay::default(),
         }
@@ -102,11 +99,7 @@ pub fn over(recorded: &Recorded, fill_s: f64) -> Motion {
         unsure: [
             0,
             0,
-            recorded
-                .sides
-                .iter()
-                .filter(|it| **it == Sides::Unsure)
-                .count(),
+            recorded.sides.iter().filter(|it| **it == Sides::Unsure).count(),
         ],
         delay_s: smoother.delay_s().unwrap_or(0.0),
         ..Report::default()

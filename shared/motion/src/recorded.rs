@@ -101,9 +101,7 @@ impl Recorded {
             if !time_s.is_finite() {
                 return Err(TimesError::NotFinite { at });
             }
-            let before_s = at
-                .checked_sub(1)
-                .map_or(f64::NEG_INFINITY, |it| self.times[it]);
+            let before_s = at.checked_sub(1).map_or(f64::NEG_INFINITY, |it| self.times[it]);
             if time_s <= before_s {
                 return Err(TimesError::Order {
                     at,
@@ -145,9 +143,8 @@ impl Recorded {
     ///
     /// The limit is half a metre and 12 m/s, which nobody runs; the body is the median of its joints in each axis.
     pub(crate) fn breaks(&self) -> Vec<usize> {
-        let centres: Vec<(usize, Vector3<f64>)> = (0..self.times.len())
-            .filter_map(|at| Some((at, self.centre(at)?)))
-            .collect();
+        let centres: Vec<(usize, Vector3<f64>)> =
+            (0..self.times.len()).filter_map(|at| Some((at, self.centre(at)?))).collect();
         let median_of = |range: &[(usize, Vector3<f64>)]| {
             Vector3::from_fn(|axis, _| median(range.iter().map(|it| it.1[axis]).collect()))
         };
@@ -182,9 +179,7 @@ impl Recorded {
 
 /// The middle value; 0 of none.
 pub(crate) fn median(values: Vec<f64>) -> f64 {
-    statistics::Sorted::new(values)
-        .interpolated(0.5)
-        .unwrap_or(0.0)
+    statistics::Sorted::new(values).interpolated(0.5).unwrap_or(0.0)
 }
 
 /// A person over time, smoothed.

@@ -123,9 +123,7 @@ pub fn mirrored_name(name: &str) -> Option<String> {
     if let Some(rest) = name.strip_prefix("right ") {
         return Some(format!("left {rest}"));
     }
-    let limb = ["upper", "lower"]
-        .iter()
-        .find_map(|it| Some((*it, name.strip_prefix(*it)?)));
+    let limb = ["upper", "lower"].iter().find_map(|it| Some((*it, name.strip_prefix(*it)?)));
     let (part, rest) = limb?;
     if let Some(rest) = rest.strip_prefix('L') {
         return Some(format!("{part}R{rest}"));

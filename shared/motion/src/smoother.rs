@@ -50,11 +50,7 @@ pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
         .iter()
         .enumerate()
         .map(|(nth, joint)| {
-            let all: Vec<Usable> = joint
-                .measured
-                .iter()
-                .map(|it| usable(it.as_ref()?))
-                .collect();
+            let all: Vec<Usable> = joint.measured.iter().map(|it| usable(it.as_ref()?)).collect();
             let mut track = Track::new(all);
             for at in (0..track.used.len()).filter(|&at| withheld(nth, at)) {
                 track.used[at] = None;
@@ -107,10 +103,7 @@ fn stretches(times: &[f64], used: &[Usable], breaks: &[usize], fill_s: f64) -> V
 /// What was measured, as it is: joints with a side too where sides are not certain.
 pub fn as_measured(recorded: &Recorded) -> Motion {
     let estimate = |it: &Option<Measured>| -> Smoothed {
-        let it = it
-            .as_ref()
-            .filter(|it| usable(it).is_some())
-            .ok_or(Absent::Gap)?;
+        let it = it.as_ref().filter(|it| usable(it).is_some()).ok_or(Absent::Gap)?;
         Ok(Estimate {
             position: it.position,
             covariance: it.covariance,

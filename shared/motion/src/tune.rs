@@ -117,10 +117,7 @@ fn score(windows: &[(&[f64], &[Usable])], jerk: f64, scale: f64) -> (f64, f64) {
         let found = scale_of(&distances).clamp(SCALES[0], SCALES[1]);
         let student = found * GAUSSIAN_SHARE;
         let n = distances.len() as f64;
-        let tails: f64 = distances
-            .iter()
-            .map(|it| (it / (FREEDOM * student)).ln_1p())
-            .sum();
+        let tails: f64 = distances.iter().map(|it| (it / (FREEDOM * student)).ln_1p()).sum();
         score = -0.5 * (log_determinants + 3.0 * n * student.ln() + (FREEDOM + 3.0) * tails);
         let is_settled = (found / scale).ln().abs() < 0.02;
         scale = found;
@@ -149,10 +146,8 @@ fn student_scale(distances: &[f64]) -> f64 {
     let mut scale = (median / 2.366).max(1e-12);
     let n = distances.len() as f64;
     for _ in 0..30 {
-        let sum: f64 = distances
-            .iter()
-            .map(|it| it * (FREEDOM + 3.0) / (FREEDOM + it / scale))
-            .sum();
+        let sum: f64 =
+            distances.iter().map(|it| it * (FREEDOM + 3.0) / (FREEDOM + it / scale)).sum();
         let next = (sum / (3.0 * n)).max(1e-12);
         let is_settled = (next / scale).ln().abs() < 1e-4;
         scale = next;

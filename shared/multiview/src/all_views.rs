@@ -95,17 +95,9 @@ pub fn estimate_all_views(
     let inputs = inputs(input);
     let pairs = Pairs::new(&of_pair, &inputs, start.exchanged);
     let candidate = |(view, idx): (&ViewInput<'_>, &usize)| view.candidates[*idx].clone();
-    let poses: Vec<Pose> = input
-        .views
-        .iter()
-        .zip(start.candidates)
-        .map(candidate)
-        .collect();
+    let poses: Vec<Pose> = input.views.iter().zip(start.candidates).map(candidate).collect();
     let own_score = |view: usize, pose: &Pose| f64::from(solver.score(evidence[view], pose, None));
-    let own = poses
-        .iter()
-        .enumerate()
-        .map(|(view, pose)| own_score(view, pose));
+    let own = poses.iter().enumerate().map(|(view, pose)| own_score(view, pose));
     let mut state = State::new(own.collect(), poses, &pairs);
     let order = order(input, &state.poses);
     let mut solvers: Vec<_> = evidence.iter().map(|it| solver.incremental(it)).collect();
@@ -257,9 +249,7 @@ impl<'a> Pairs<'a> {
         };
         let each: Vec<Consistency<'b>> = others.map(one).collect();
         let n_parts = poses[target].parts.len();
-        let keys = (0..n_parts)
-            .map(|part| term_keys.key(&each, part))
-            .collect();
+        let keys = (0..n_parts).map(|part| term_keys.key(&each, part)).collect();
         Supports { each, keys }
     }
 
@@ -299,10 +289,7 @@ impl ExtraTerms for Supports<'_> {
     }
 
     fn of_type(&self, part: usize, mixture: usize) -> f32 {
-        self.each
-            .iter()
-            .map(|terms| terms.of_type(part, mixture))
-            .sum()
+        self.each.iter().map(|terms| terms.of_type(part, mixture)).sum()
     }
 
     fn max_gain(&self, part: usize) -> f32 {

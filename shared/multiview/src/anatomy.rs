@@ -42,9 +42,7 @@ pub fn anatomical_evidence(
     let length = trunk.norm();
     let neck = at(NECK);
     let ahead = |joint: usize, from: Option<Point3<f64>>| {
-        at(joint)
-            .zip(from)
-            .map_or(0.0, |(joint, from)| (joint - from).dot(&front))
+        at(joint).zip(from).map_or(0.0, |(joint, from)| (joint - from).dot(&front))
     };
     let across = |right: usize, left: usize| Some(at(left)? - at(right)?);
     let sides = [across(R_SHOULDER, L_SHOULDER), across(R_HIP, L_HIP)];

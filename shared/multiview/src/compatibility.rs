@@ -181,12 +181,7 @@ impl Compatibility {
 
     /// The table whose part `i` is part `parts[i]` of this one.
     pub(crate) fn permuted(&self, parts: &[usize]) -> Self {
-        Self::of(
-            parts
-                .iter()
-                .map(|&part| self.values[part].clone())
-                .collect(),
-        )
+        Self::of(parts.iter().map(|&part| self.values[part].clone()).collect())
     }
 
     /// `p(type in second view | type in first view)` of a joint table.
@@ -233,10 +228,7 @@ fn parse_row(
         });
     }
     let probabilities = &fields[1..];
-    if probabilities
-        .iter()
-        .all(|field| field.eq_ignore_ascii_case("nan"))
-    {
+    if probabilities.iter().all(|field| field.eq_ignore_ascii_case("nan")) {
         return Ok(None);
     }
     let mut values = Vec::with_capacity(n_types);

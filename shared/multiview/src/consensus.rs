@@ -204,9 +204,7 @@ fn of_mean(view: &Sightings<'_>) -> Option<Choice> {
 }
 
 fn mean(points: &[[f64; 2]]) -> Point2<f64> {
-    let sum = points
-        .iter()
-        .fold([0.0; 2], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
+    let sum = points.iter().fold([0.0; 2], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
     Point2::from(sum.map(|it| it / points.len() as f64))
 }
 
@@ -219,10 +217,7 @@ fn best(
     let mut best: Option<(f64, Point3<f64>)> = None;
     for (first, of_first) in choices.iter().enumerate() {
         for of_second in &choices[first + 1..] {
-            for (a, b) in of_first
-                .iter()
-                .flat_map(|a| of_second.iter().map(move |b| (a, b)))
-            {
+            for (a, b) in of_first.iter().flat_map(|a| of_second.iter().map(move |b| (a, b))) {
                 let (Some(a), Some(b)) = (&a.ray, &b.ray) else {
                     continue;
                 };

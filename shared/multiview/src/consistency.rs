@@ -176,8 +176,7 @@ impl ExtraTerms for Consistency<'_> {
     }
 
     fn of_type(&self, part: usize, mixture: usize) -> f32 {
-        self.pair_terms
-            .of_type([self.target; 2], [part, mixture], self.support)
+        self.pair_terms.of_type([self.target; 2], [part, mixture], self.support)
     }
 
     fn max_gain(&self, part: usize) -> f32 {
@@ -237,9 +236,7 @@ fn active_parts(
     };
     let by_part = |on: &dyn Fn([f32; 2], [f32; 2]) -> bool| -> Vec<bool> {
         let parts = counterpart.iter().enumerate();
-        parts
-            .map(|(part, &other)| on(expected(0, part), expected(1, other)))
-            .collect()
+        parts.map(|(part, &other)| on(expected(0, part), expected(1, other))).collect()
     };
     let usable = |[sigma, tau]: [f32; 2]| sigma <= tau;
     // Compared in thresholds, since a person can be larger in one view than in the other.

@@ -158,11 +158,7 @@ impl FacingFilter {
             let changed = changed.min(n - changed);
             settings.memory * score - settings.change_cost * f64::from(changed)
         };
-        let best = self
-            .scores
-            .iter()
-            .map(from)
-            .fold(f64::NEG_INFINITY, f64::max);
+        let best = self.scores.iter().map(from).fold(f64::NEG_INFINITY, f64::max);
         if best.is_finite() { best } else { 0.0 }
     }
 }

@@ -162,9 +162,7 @@ impl Line {
         let at_x = |x: f64| [x, -(line.x * x + line.z) / line.y];
         let at_y = |y: f64| [-(line.y * y + line.z) / line.x, y];
         let sides = [at_x(left), at_x(right)];
-        let sides = sides
-            .into_iter()
-            .filter(|[_, y]| (top..=bottom).contains(y));
+        let sides = sides.into_iter().filter(|[_, y]| (top..=bottom).contains(y));
         let ends = [at_y(top), at_y(bottom)];
         let ends = ends.into_iter().filter(|[x, _]| left < *x && *x < right);
         let mut points = sides.chain(ends).map(|point| point.map(|it| it + 1.0));
@@ -183,19 +181,13 @@ impl Line {
 fn weights(settings: &Settings, pair: &PairInput<'_>, counterpart: &[usize]) -> [Vec<bool>; 2] {
     let n_parts = counterpart.len();
     let sigma = |view: usize, part: usize| {
-        pair.views[view]
-            .sigma_px
-            .and_then(|sigma_px| sigma_px.get(part))
+        pair.views[view].sigma_px.and_then(|sigma_px| sigma_px.get(part))
     };
     let is_on = |view: usize, part: usize| {
         let expectation = pair.views[view].expectation(settings, part);
         expectation.is_none_or(|[sigma, tau]| sigma <= tau)
     };
-    let mut on = [0, 1].map(|view| {
-        (0..n_parts)
-            .map(|part| is_on(view, part))
-            .collect::<Vec<_>>()
-    });
+    let mut on = [0, 1].map(|view| (0..n_parts).map(|part| is_on(view, part)).collect::<Vec<_>>());
     for (part, &other) in counterpart.iter().enumerate() {
         if let (Some(first), Some(second), Some(rescue), false, false) = (
             sigma(0, part),

@@ -265,12 +265,7 @@ fn shortfall(view: &SpaceView<'_>, found: &SpacePose, share: f64) -> f64 {
         let best = f64::from(best.fold(view.evidence.floor(), f32::max));
         Some(best - view.at(named, &(*at)?))
     };
-    let mut short: Vec<f64> = found
-        .joints
-        .iter()
-        .enumerate()
-        .filter_map(of_joint)
-        .collect();
+    let mut short: Vec<f64> = found.joints.iter().enumerate().filter_map(of_joint).collect();
     short.sort_by(f64::total_cmp);
     let nth = (short.len() as f64 * share) as usize;
     short.get(nth).copied().unwrap_or(0.0)

@@ -43,9 +43,7 @@ pub(crate) struct Crossings<'a> {
 impl<'a> Crossings<'a> {
     /// Prepares for views whose [`SpaceView::exchanged`] is not looked at.
     pub(crate) fn new(views: &'a [SpaceView<'a>]) -> Self {
-        let rays = views
-            .iter()
-            .map(|view| core::array::from_fn(|name| view.rays(name)));
+        let rays = views.iter().map(|view| core::array::from_fn(|name| view.rays(name)));
         let n_pairs = views.len() * views.len();
         Self {
             views,

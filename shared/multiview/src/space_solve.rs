@@ -74,20 +74,17 @@ impl Held<'_> {
         at: &Point3<f64>,
     ) -> f64 {
         let crowded = self.occupied[joint].map_or(0.0, |other| cost(at, &other, self.settings));
-        let bones = TREE
-            .iter()
-            .zip(self.lengths)
-            .map(|([parent, child], bone)| {
-                let other = match joint {
-                    it if it == *parent => joints[*child],
-                    it if it == *child => joints[*parent],
-                    _ => None,
-                };
-                other.map_or(0.0, |other| {
-                    let off = ((at - other).norm() - bone.mean) / bone.sd;
-                    (off * off / 2.0).min(self.settings.cap)
-                })
-            });
+        let bones = TREE.iter().zip(self.lengths).map(|([parent, child], bone)| {
+            let other = match joint {
+                it if it == *parent => joints[*child],
+                it if it == *child => joints[*parent],
+                _ => None,
+            };
+            other.map_or(0.0, |other| {
+                let off = ((at - other).norm() - bone.mean) / bone.sd;
+                (off * off / 2.0).min(self.settings.cap)
+            })
+        });
         unary(views, joint, at) - crowded - self.settings.springs * bones.sum::<f64>()
     }
 }

@@ -54,10 +54,7 @@ pub struct SpaceView<'a> {
 
 /// The evidence of all views for a joint at a place.
 pub(crate) fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
-    views
-        .iter()
-        .map(|view| view.at(view.named(joint), at))
-        .sum()
+    views.iter().map(|view| view.at(view.named(joint), at)).sum()
 }
 
 impl SpaceView<'_> {
@@ -71,9 +68,7 @@ impl SpaceView<'_> {
     /// * `named`: what the view calls the joint.
     pub(crate) fn rays(&self, named: usize) -> Vec<Ray> {
         let maxima = self.evidence.maxima(named).iter();
-        maxima
-            .filter_map(|(at, _)| self.camera.ray(&(*at).into()))
-            .collect()
+        maxima.filter_map(|(at, _)| self.camera.ray(&(*at).into())).collect()
     }
 
     /// What the view calls a joint.

@@ -174,11 +174,7 @@ fn between<'a>(
             .collect()
     };
     (0..views.len())
-        .map(|first| {
-            (first + 1..views.len())
-                .map(|second| pair(first, second))
-                .collect()
-        })
+        .map(|first| (first + 1..views.len()).map(|second| pair(first, second)).collect())
         .collect()
 }
 
@@ -231,9 +227,7 @@ impl Problem {
     }
 
     fn value(&self, chosen: &[usize]) -> f64 {
-        (0..chosen.len())
-            .map(|view| self.gain(&chosen[..view], chosen[view]))
-            .sum()
+        (0..chosen.len()).map(|view| self.gain(&chosen[..view], chosen[view])).sum()
     }
 
     /// Greedy from every state of the first view, then coordinate ascent until nothing changes.
@@ -292,9 +286,8 @@ mod tests {
         vec(vec(-2.0..2.0_f64, 3), 4).prop_flat_map(|unary| {
             let pairs = vec(vec(vec(-2.0..2.0_f64, 3), 3), 6);
             pairs.prop_map(move |mut pairs| {
-                let between = (0..4)
-                    .map(|first| (first + 1..4).map(|_| pairs.remove(0)).collect())
-                    .collect();
+                let between =
+                    (0..4).map(|first| (first + 1..4).map(|_| pairs.remove(0)).collect()).collect();
                 Problem {
                     unary: unary.clone(),
                     between,

@@ -186,9 +186,7 @@ mod tests {
             let seen = first.project(&(ray.origin + along)).unwrap();
             let on_curve = of_pixels(first.undistorted_px(&seen).unwrap(), ideal);
             assert!(on_curve < 1e-12, "{on_curve}");
-            let beside = first
-                .undistorted_px(&(seen + Vector2::new(0.0, 4.0)))
-                .unwrap();
+            let beside = first.undistorted_px(&(seen + Vector2::new(0.0, 4.0))).unwrap();
             assert!(of_pixels(beside, ideal) > 0.5, "a cell away");
             without_lenses = without_lenses.max(of_pixels(seen, pixel));
         }

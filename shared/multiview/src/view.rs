@@ -40,13 +40,10 @@ impl ViewPlan {
             .map(|part| {
                 let filter = model.filter(part, 0);
                 let size = [filter.rows, filter.cols];
-                sizes
-                    .iter()
-                    .position(|other| *other == size)
-                    .unwrap_or_else(|| {
-                        sizes.push(size);
-                        sizes.len() - 1
-                    })
+                sizes.iter().position(|other| *other == size).unwrap_or_else(|| {
+                    sizes.push(size);
+                    sizes.len() - 1
+                })
             })
             .collect();
         Self {

@@ -101,8 +101,7 @@ mod tests {
 
     fn total(costs: &[Vec<f64>], assigned: &[Option<usize>]) -> f64 {
         let each = costs.iter().zip(assigned);
-        each.map(|(row, column)| column.map_or(NEVER, |column| row[column]))
-            .sum()
+        each.map(|(row, column)| column.map_or(NEVER, |column| row[column])).sum()
     }
 
     /// The least total of all assignments of the rows from `row` on.

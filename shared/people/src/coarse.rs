@@ -31,9 +31,7 @@ impl Coarse {
 
     /// Says if the bones are those of a person.
     pub(crate) fn is_body(&self) -> bool {
-        skeleton::body::check(&self.joints, &self.covariances, None)
-            .nobody
-            .is_none()
+        skeleton::body::check(&self.joints, &self.covariances, None).nobody.is_none()
     }
 }
 
@@ -82,10 +80,7 @@ pub(crate) fn agree(frame: &Frame, mut members: Vec<Member>, expected: Option<&J
             let fit = to_person(frame.sights(member.at), seen?, frame.as_seen);
             fit.map(|fit| fit.distance)
         };
-        let each = members
-            .iter()
-            .map(|member| distance(member).unwrap_or(0.0))
-            .enumerate();
+        let each = members.iter().map(|member| distance(member).unwrap_or(0.0)).enumerate();
         let worst = each.max_by(|a, b| a.1.total_cmp(&b.1));
         let is_one_too_many = |worst: &(usize, f64)| {
             members.len() >= 2 && (is_disputed || is_placed && worst.1 > CONTRADICTS_M)

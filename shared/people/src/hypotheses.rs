@@ -93,10 +93,7 @@ pub(crate) fn hypotheses(
         if kept.len() == MOST {
             break;
         }
-        if kept
-            .iter()
-            .all(|other| (other.place - one.place).norm() > SAME_M)
-        {
+        if kept.iter().all(|other| (other.place - one.place).norm() > SAME_M) {
             kept.push(one);
         }
     }

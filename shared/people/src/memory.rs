@@ -98,9 +98,7 @@ impl Remembered {
                 mean_m: take(KINDS)?.try_into().ok()?,
                 n: take(KINDS)?.try_into().ok()?,
             },
-            colour: <[f64; 3]>::try_from(take(3)?)
-                .ok()
-                .filter(|colour| known(colour)),
+            colour: <[f64; 3]>::try_from(take(3)?).ok().filter(|colour| known(colour)),
         };
         let is_sound = known(person.velocity.as_slice()) && person.seen_s.is_finite();
         is_sound.then_some(person)

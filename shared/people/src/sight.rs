@@ -26,9 +26,7 @@ impl Sight {
     /// Takes a keypoint; `None` where the lens has no ray.
     pub(crate) fn new(camera: &Camera, keypoint: &Keypoint) -> Option<Self> {
         let usable = keypoint.sd_px.is_finite() && keypoint.sd_px > 0.0 && keypoint.heat > 0.0;
-        let ray = camera
-            .ray(&Point2::from(keypoint.at_px))
-            .filter(|_| usable)?;
+        let ray = camera.ray(&Point2::from(keypoint.at_px)).filter(|_| usable)?;
         let focal = (camera.intrinsics.fx * camera.intrinsics.fy).sqrt();
         Some(Self {
             origin: ray.origin,
@@ -193,10 +191,7 @@ pub(crate) fn settle(sights: &[Sight], start: &Point3<f64>, prior: Option<Prior>
     let factor = normal.cholesky()?;
     let point = start + factor.solve(&target);
     let covariance = factor.inverse();
-    let is_finite = point
-        .iter()
-        .chain(covariance.iter())
-        .all(|entry| entry.is_finite());
+    let is_finite = point.iter().chain(covariance.iter()).all(|entry| entry.is_finite());
     is_finite.then_some(Met {
         point,
         covariance,

@@ -67,10 +67,7 @@ impl Knowledge {
         let step_s = (time_s - self.time_s).max(0.0);
         Some(Prior {
             point: past.point + past.velocity * (DAMPING * step_s),
-            sd: past
-                .sd
-                .hypot(EXPECTED_SD_M)
-                .hypot(EXPECTED_SD_M_PER_S * step_s),
+            sd: past.sd.hypot(EXPECTED_SD_M).hypot(EXPECTED_SD_M_PER_S * step_s),
         })
     }
 }
@@ -119,11 +116,8 @@ impl Solver {
             .zip(views)
             .map(|(camera, view)| rays(camera, view))
             .collect();
-        self.known
-            .retain(|_, known| time_s - known.time_s <= CARRIED_S);
-        let solved = people
-            .iter()
-            .map(|person| self.solve(time_s, person, people, &rays));
+        self.known.retain(|_, known| time_s - known.time_s <= CARRIED_S);
+        let solved = people.iter().map(|person| self.solve(time_s, person, people, &rays));
         solved.collect::<Vec<Solved>>()
     }
 
@@ -134,16 +128,11 @@ impl Solver {
         let priors: [Option<Prior>; N] =
             core::array::from_fn(|joint| known.expected(joint, time_s));
         let places: [Vec<Hypothesis>; N] = core::array::from_fn(|joint| {
-            let near = priors[joint]
-                .map(|prior| prior.point)
-                .or(person.joints[joint]);
+            let near = priors[joint].map(|prior| prior.point).or(person.joints[joint]);
             hypotheses(&candidates[joint], near, priors[joint])
         });
         let choices: [Vec<Choice>; N] = core::array::from_fn(|joint| {
-            places[joint]
-                .iter()
-                .map(|place| choice(place, priors[joint]))
-                .collect()
+            places[joint].iter().map(|place| choice(place, priors[joint])).collect()
         });
         let stature =
             skeleton::body::stature(&person.joints).map_or(ANY_STATURE_M, |stature| stature.metres);
@@ -195,9 +184,7 @@ fn remember(known: &mut Knowledge, time_s: f64, solved: &Solved) {
             continue;
         };
         let past = known.joints[joint];
-        let measured = past
-            .filter(|_| step_s > 0.0)
-            .map(|past| (point - past.point) / step_s);
+        let measured = past.filter(|_| step_s > 0.0).map(|past| (point - past.point) / step_s);
         let before = past.map_or_else(Vector3::zeros, |past| past.velocity);
         let velocity = before + NEW_VELOCITY * (measured.unwrap_or(before) - before);
         let is_seen = solved.n_views[joint] > 0;
@@ -228,9 +215,7 @@ fn refined(
     for _ in 0..2 {
         let views = candidates.chunk_by(|a, b| a.view == b.view);
         let best = views.filter_map(|view| {
-            let near = view
-                .iter()
-                .filter(|candidate| candidate.sight.deviations(&at) < OUTLYING);
+            let near = view.iter().filter(|candidate| candidate.sight.deviations(&at) < OUTLYING);
             near.max_by(|a, b| a.support(&at).total_cmp(&b.support(&at)))
         });
         let weighted = best.map(|candidate| Sight {
@@ -253,11 +238,7 @@ fn candidates(
     (order, rays): (&[usize], &[Rays]),
 ) -> Vec<Candidate> {
     let mut all = Vec::new();
-    for (nth, view) in order
-        .iter()
-        .enumerate()
-        .filter(|(_, view)| **view < rays.len())
-    {
+    for (nth, view) in order.iter().enumerate().filter(|(_, view)| **view < rays.len()) {
         let first = all.len();
         let name = named(joint, person.is_exchanged[*view]);
         let mut add = |sight: Option<Sight>, trust: f64| {
@@ -271,9 +252,7 @@ fn candidates(
             if person.detections[*view] == Some(index) {
                 add(sights[name], 1.0);
             } else {
-                let is_anybodys = people
-                    .iter()
-                    .any(|other| other.detections[*view] == Some(index));
+                let is_anybodys = people.iter().any(|other| other.detections[*view] == Some(index));
                 add(
                     sights[name],
                     if is_anybodys {
@@ -301,18 +280,12 @@ fn candidates(
 }
 
 fn rays(camera: &Camera, view: &View) -> Rays {
-    let loose = view.loose.iter().map(|joint| {
-        joint
-            .iter()
-            .filter_map(|keypoint| Sight::new(camera, keypoint))
-            .collect()
-    });
+    let loose = view
+        .loose
+        .iter()
+        .map(|joint| joint.iter().filter_map(|keypoint| Sight::new(camera, keypoint)).collect());
     Rays {
-        detections: view
-            .detections
-            .iter()
-            .map(|detection| sights(camera, detection))
-            .collect(),
+        detections: view.detections.iter().map(|detection| sights(camera, detection)).collect(),
         loose: loose.collect(),
     }
 }

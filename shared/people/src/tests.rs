@@ -39,17 +39,13 @@ fn walk(seed: u64, n_people: usize, n_frames: usize, n_views: usize) -> Vec<Vec<
         });
         people.collect::<Vec<Actor>>()
     };
-    (0..n_frames)
-        .map(|nth| seen(&cameras, &frame(nth), 3.0, &mut random))
-        .collect()
+    (0..n_frames).map(|nth| seen(&cameras, &frame(nth), 3.0, &mut random)).collect()
 }
 
 fn follow(n_views: usize, frames: &[Vec<View>]) -> Vec<Vec<Person>> {
     let mut tracker = Tracker::new(ring(n_views), settings());
     let frames = frames.iter().enumerate();
-    frames
-        .map(|(nth, views)| tracker.step(nth as f64 / RATE_HZ, views))
-        .collect()
+    frames.map(|(nth, views)| tracker.step(nth as f64 / RATE_HZ, views)).collect()
 }
 
 proptest! {
@@ -164,11 +160,7 @@ fn two_who_pass_each_other_keep_their_ids() {
     let side = |people: &[Person], id: usize| people[id].joints[12].unwrap().y > 0.0;
     let first = [0, 1].map(|id| side(&people[0], id));
     assert_ne!(first[0], first[1]);
-    assert!(
-        people
-            .iter()
-            .all(|people| [0, 1].map(|id| side(people, id)) == first)
-    );
+    assert!(people.iter().all(|people| [0, 1].map(|id| side(people, id)) == first));
 }
 
 #[test]
@@ -180,9 +172,7 @@ fn who_comes_back_is_known_by_the_bones_and_a_stranger_is_not() {
         stature,
     };
     let stay = |random: &mut Rng, people: &[Actor], n: usize| {
-        (0..n)
-            .map(|_| seen(&ring(4), people, 2.0, random))
-            .collect::<Vec<_>>()
+        (0..n).map(|_| seen(&ring(4), people, 2.0, random)).collect::<Vec<_>>()
     };
     let mut frames = stay(&mut random, &[at(1.9)], 40);
     frames.extend(stay(&mut random, &[], 40));

@@ -75,9 +75,7 @@ impl Track {
     pub(crate) fn expected(&self, time_s: f64) -> Joints {
         let unseen_s = (time_s - self.placed_s).max(0.0);
         let moved = self.velocity * DAMPED_S * (1.0 - (-unseen_s / DAMPED_S).exp());
-        self.coarse
-            .joints
-            .map(|joint| joint.map(|point| point + moved))
+        self.coarse.joints.map(|joint| joint.map(|point| point + moved))
     }
 
     /// How far away a detection may be, metres.
@@ -216,9 +214,7 @@ impl Track {
 /// By how much the trunk moved; by how much everything did, where nothing of the trunk is known.
 fn moved(from: &Joints, to: &Joints) -> Option<Vector3<f64>> {
     let of = |joints: &[usize]| {
-        let both = joints
-            .iter()
-            .filter_map(|joint| Some(to[*joint]? - from[*joint]?));
+        let both = joints.iter().filter_map(|joint| Some(to[*joint]? - from[*joint]?));
         let (n, sum) = both.fold((0.0, Vector3::zeros()), |(n, sum), step| {
             (n + 1.0, sum + step)
         });

@@ -106,14 +106,10 @@ impl Tracker {
     /// * `views`: in the order of the cameras; a view that is missing sees nobody.
     pub fn step(&mut self, time_s: f64, views: &[View]) -> Vec<Person> {
         let frame = Frame::new(&self.cameras, &self.order, views, self.settings.as_seen);
-        let expected: Vec<Joints> = self
-            .tracks
-            .iter()
-            .map(|track| track.expected(time_s))
-            .collect();
-        let mut free: Vec<Vec<Place>> = (0..frame.n_views())
-            .map(|view| frame.places(view).collect())
-            .collect();
+        let expected: Vec<Joints> =
+            self.tracks.iter().map(|track| track.expected(time_s)).collect();
+        let mut free: Vec<Vec<Place>> =
+            (0..frame.n_views()).map(|view| frame.places(view).collect()).collect();
         let now = Now {
             frame: &frame,
             time_s,
@@ -166,11 +162,7 @@ impl Tracker {
                 fit.filter(|fit| fit.distance < self.tracks[track].reach(now.time_s, now.gap_s))
             };
             let fits: Vec<_> = (0..rows.len())
-                .map(|row| {
-                    (0..free.len())
-                        .map(|column| fit(row, column))
-                        .collect::<Vec<_>>()
-                })
+                .map(|row| (0..free.len()).map(|column| fit(row, column)).collect::<Vec<_>>())
                 .collect();
             let cost =
                 |row: usize, column: usize| fits[row][column].map_or(NEVER, |fit| fit.distance);
@@ -285,17 +277,13 @@ impl Tracker {
 
     /// Takes away who has not been seen for too long.
     fn bury(&mut self, time_s: f64) {
-        let (alive, dead) = self
-            .tracks
-            .drain(..)
-            .partition(|track: &Track| match track.id {
-                Some(_) => time_s - track.seen_s <= DEATH_S,
-                None => track.is_possible(),
-            });
+        let (alive, dead) = self.tracks.drain(..).partition(|track: &Track| match track.id {
+            Some(_) => time_s - track.seen_s <= DEATH_S,
+            None => track.is_possible(),
+        });
         self.tracks = alive;
         self.gone.extend(dead.iter().filter_map(remembered));
-        self.gone
-            .retain(|person| time_s - person.seen_s <= REMEMBERED_S);
+        self.gone.retain(|person| time_s - person.seen_s <= REMEMBERED_S);
     }
 
     /// Gives ids to those who are somebody by now.
@@ -360,14 +348,10 @@ impl Tracker {
         let each = self.tracks.iter().enumerate().filter_map(|(nth, track)| {
             let is_missed = track.id.is_some() && !track.is_possible();
             let distance = (track.trunk()? - trunk).norm();
-            let is_another = track
-                .bones
-                .difference(&new.bones)
-                .is_some_and(|by| by > OTHER_BONES);
+            let is_another = track.bones.difference(&new.bones).is_some_and(|by| by > OTHER_BONES);
             (is_missed && distance < MISSED_M && !is_another).then_some((nth, distance))
         });
-        each.min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|nearest| nearest.0)
+        each.min_by(|a, b| a.1.total_cmp(&b.1)).map(|nearest| nearest.0)
     }
 
     /// The one of those who are gone who has the same bones, and the same colour.
@@ -383,8 +367,7 @@ impl Tracker {
             let is_past = time_s > person.seen_s;
             (is_same && is_past).then_some((nth, bones / SAME_BONES + colour / SAME_COLOUR))
         });
-        each.min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|nearest| nearest.0)
+        each.min_by(|a, b| a.1.total_cmp(&b.1)).map(|nearest| nearest.0)
     }
 
     /// Marks those who are too near to each other to be told apart.
@@ -396,10 +379,7 @@ impl Tracker {
             .collect();
         for (nth, track) in self.tracks.iter_mut().enumerate() {
             let is_near = trunks.iter().enumerate().any(|(other, trunk)| {
-                other != nth
-                    && trunks[nth]
-                        .zip(*trunk)
-                        .is_some_and(|(a, b)| (a - b).norm() < ONE_M)
+                other != nth && trunks[nth].zip(*trunk).is_some_and(|(a, b)| (a - b).norm() < ONE_M)
             });
             if is_near {
                 track.state = State::Unsure;

@@ -104,15 +104,9 @@ pub(crate) fn choose(
     });
     let mut best_of: [Vec<usize>; N - 1] = core::array::from_fn(|_| Vec::new());
     for (branch, (joint, parent, _)) in BRANCHES.iter().enumerate().rev() {
-        let above = choices[*parent]
-            .iter()
-            .map(|choice| Some(choice.place))
-            .chain([None]);
+        let above = choices[*parent].iter().map(|choice| Some(choice.place)).chain([None]);
         for (nth, above) in above.enumerate() {
-            let below = choices[*joint]
-                .iter()
-                .map(|choice| Some(choice.place))
-                .chain([None]);
+            let below = choices[*joint].iter().map(|choice| Some(choice.place)).chain([None]);
             let with = below.zip(&worths[*joint]).map(|(place, worth)| {
                 let both = above.zip(place);
                 worth - both.map_or(0.0, |(a, b)| expectations.cost(branch, (a - b).norm()))
@@ -131,9 +125,7 @@ pub(crate) fn choose(
 }
 
 fn most(worths: impl Iterator<Item = f64>) -> (usize, f64) {
-    worths
-        .enumerate()
-        .fold((0, f64::NEG_INFINITY), |best, (nth, worth)| {
-            if worth > best.1 { (nth, worth) } else { best }
-        })
+    worths.enumerate().fold((0, f64::NEG_INFINITY), |best, (nth, worth)| {
+        if worth > best.1 { (nth, worth) } else { best }
+    })
 }

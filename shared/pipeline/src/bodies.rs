@@ -80,9 +80,7 @@ impl Bodies {
         self.lengths.add(&places, &verdict);
         let kept = verdict.keep(&places);
         let lengths = Some(&self.lengths).filter(|_| settings.learn);
-        let refined = settings
-            .prior
-            .then(|| skeleton::body::refine(&kept, &covariances, lengths));
+        let refined = settings.prior.then(|| skeleton::body::refine(&kept, &covariances, lengths));
         let change = |joint: usize| Change {
             is_dropped: verdict.nobody.is_some() || verdict.dropped[joint],
             moved: refined.as_ref().and_then(|refined| {

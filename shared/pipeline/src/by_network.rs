@@ -126,13 +126,10 @@ impl NetworkEstimator {
             })
             .collect();
         let sightings = sightings?;
-        let people = self
-            .who
-            .run(time_s(frame, self.settings.frame_rate_hz), &sightings);
+        let people = self.who.run(time_s(frame, self.settings.frame_rate_hz), &sightings);
         let evidence = self.views.iter().zip(&sightings).map(|(view, seen)| {
             let maps = view.step.evidence(&view.memory);
-            maps.take(seen.as_ref().map_or(0, |seen| seen.people.len()))
-                .collect()
+            maps.take(seen.as_ref().map_or(0, |seen| seen.people.len())).collect()
         });
         let evidence: Vec<Vec<PersonMaps<'_>>> = evidence.collect();
         let rate = self.settings.frame_rate_hz;

@@ -155,10 +155,7 @@ impl Estimator {
         };
         let evidence: Vec<Option<Responses<'_>>> = (0..estimates.len()).map(evidence).collect();
         let all_views = (self.solved_in != Views::Pairs)
-            .then(|| {
-                self.fuse
-                    .all_views(&answers, &evidence, &others, Support::Mean)
-            })
+            .then(|| self.fuse.all_views(&answers, &evidence, &others, Support::Mean))
             .flatten();
         let pairs = match self.solved_in {
             Views::Pairs => self.pairs(&answers, &evidence, &start),
@@ -171,10 +168,7 @@ impl Estimator {
         Estimate {
             answers,
             start,
-            scopes: estimates
-                .iter()
-                .map(|it| Some(it.as_ref()?.scope))
-                .collect(),
+            scopes: estimates.iter().map(|it| Some(it.as_ref()?.scope)).collect(),
             pairs,
             all_views,
             skeleton,

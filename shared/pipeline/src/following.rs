@@ -100,16 +100,14 @@ impl Following {
         let first = people().next().map(|it| it.0);
         let chosen = match self.follow {
             Follow::Clearest => first,
-            Follow::Largest => people()
-                .max_by(|a, b| a.1.size_px.total_cmp(&b.1.size_px))
-                .map(|it| it.0),
+            Follow::Largest => {
+                people().max_by(|a, b| a.1.size_px.total_cmp(&b.1.size_px)).map(|it| it.0)
+            }
             Follow::Last => return self.nearest(&found.people),
         };
         if let Some(chosen) = chosen {
             let place = found.people[chosen].place;
-            let is_same = self
-                .last
-                .is_some_and(|last| (place - last).norm() <= REACH_M);
+            let is_same = self.last.is_some_and(|last| (place - last).norm() <= REACH_M);
             self.id += u64::from(!is_same);
             self.last = Some(place);
         }
@@ -121,8 +119,7 @@ impl Following {
         let near = self.last.and_then(|last| {
             let reach = REACH_M + REACH_PER_FRAME_M * f64::from(self.n_without);
             let each = people.iter().map(|it| (it.place - last).norm()).enumerate();
-            each.filter(|it| it.1 <= reach)
-                .min_by(|a, b| a.1.total_cmp(&b.1))
+            each.filter(|it| it.1 <= reach).min_by(|a, b| a.1.total_cmp(&b.1))
         });
         if let Some((chosen, _)) = near {
             self.patience = (self.patience + 1).min(MOST_PATIENCE);

@@ -94,9 +94,7 @@ pub struct AllViewsHypothesis {
 impl AllViewsResult {
     /// Drops the views that `keep` rejects; `None` if fewer than two are left.
     pub fn only(mut self, keep: impl Fn(usize) -> bool) -> Option<Self> {
-        let kept: Vec<usize> = (0..self.views.len())
-            .filter(|idx| keep(self.views[*idx]))
-            .collect();
+        let kept: Vec<usize> = (0..self.views.len()).filter(|idx| keep(self.views[*idx])).collect();
         if kept.len() < 2 {
             return None;
         }

@@ -169,10 +169,7 @@ mod tests {
         let fused = Fused::AllViews(&result);
         let columns = |view, exchanged| {
             let poses = fused.poses(view, exchanged);
-            poses
-                .iter()
-                .map(|pose| pose.1.parts[0].x)
-                .collect::<Vec<_>>()
+            poses.iter().map(|pose| pose.1.parts[0].x).collect::<Vec<_>>()
         };
         assert_eq!(columns(2, 0b00100), [11]);
         assert_eq!(columns(2, 0b10000), [21]);

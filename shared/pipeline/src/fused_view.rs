@@ -85,12 +85,7 @@ pub(crate) fn fuse(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Op
                 ..average(&poses)?
             },
             exchanged: is_exchanged(exchanged, view),
-            cell_px: candidates
-                .poses
-                .iter()
-                .map(|pose| pose.cell_px)
-                .sum::<f64>()
-                / n,
+            cell_px: candidates.poses.iter().map(|pose| pose.cell_px).sum::<f64>() / n,
             single_score: candidates.single_score,
         })
     };

@@ -190,9 +190,7 @@ impl Looks<'_> {
         }
         let (look, seen) = memory.next();
         let what = (self.image, &[track.outline, wider(track.outline)][..]);
-        let best = self
-            .looker
-            .best_of(what, track.turn, look, &mut seen.maps)?;
+        let best = self.looker.best_of(what, track.turn, look, &mut seen.maps)?;
         if let Some(best) = best {
             self.keep_look(&best, Some(track.usual_score), memory);
         }
@@ -215,9 +213,7 @@ impl Looks<'_> {
         let (look, seen) = memory.next();
         let boxes = [track.outline, wider(track.outline), around];
         let what = (self.image, &boxes[..]);
-        let best = self
-            .looker
-            .best_of(what, track.turn, look, &mut seen.maps)?;
+        let best = self.looker.best_of(what, track.turn, look, &mut seen.maps)?;
         if let Some(best) = best.filter(|it| it.score >= track.usual_score - self.most_lost) {
             self.keep_look(&best, Some(track.usual_score), memory);
         }

@@ -92,8 +92,7 @@ impl Motion {
         let height_px = height(&points);
         let velocities = self.velocities(view, instant_s + taken_s, points, height_px);
         let by = |it: Option<Velocity>| {
-            it.and_then(|it| it.shift(skew_s))
-                .unwrap_or_else(Vector2::zeros)
+            it.and_then(|it| it.shift(skew_s)).unwrap_or_else(Vector2::zeros)
         };
         Some(velocities.into_iter().map(by).collect())
     }

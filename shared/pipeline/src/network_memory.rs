@@ -157,9 +157,7 @@ impl Seen {
 /// Whether the person after the first `n` is one of these: two boxes can be of one person.
 pub(crate) fn is_known(seen: &[Seen], n: usize) -> bool {
     let (before, last) = seen[..=n].split_at(n);
-    before
-        .iter()
-        .any(|known| in_common(&known.maps, &last[0].maps) >= TWIN)
+    before.iter().any(|known| in_common(&known.maps, &last[0].maps) >= TWIN)
 }
 
 /// The share of the joints that two sights have in common, with sides as they are or exchanged.

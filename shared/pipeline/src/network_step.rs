@@ -197,9 +197,7 @@ impl NetworkStep {
                 ..
             } = &self.settings;
             seen.turn = Turn::Up;
-            let is_there = seen
-                .maps
-                .of_keypoints(keypoints.as_ref(), rows, maps, *keypoint_sigma);
+            let is_there = seen.maps.of_keypoints(keypoints.as_ref(), rows, maps, *keypoint_sigma);
             if is_there && seen.judge(self.size, self.settings.least_heat) {
                 memory.n_seen += 1;
             }

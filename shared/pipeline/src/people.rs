@@ -122,9 +122,7 @@ impl Found {
         let people = || self.people.iter().enumerate();
         let of_view = |(view, sightings): (usize, &Vec<FoundBody>)| {
             let is_of = |person: &Person, it: &FoundBody| {
-                person.lines_px[view]
-                    .as_ref()
-                    .is_some_and(|line| it.is_on(line))
+                person.lines_px[view].as_ref().is_some_and(|line| it.is_on(line))
             };
             let is_other = |it: &FoundBody| {
                 let mut others = people().filter(|(index, _)| Some(*index) != followed);
@@ -332,9 +330,7 @@ fn meeting(rays: &[&Ray]) -> Option<Point3<f64>> {
         return None;
     }
     let point = Point3::from(normal.cholesky()?.solve(&target));
-    let is_before = rays
-        .iter()
-        .all(|it| (point - it.origin).dot(&it.direction) > 0.0);
+    let is_before = rays.iter().all(|it| (point - it.origin).dot(&it.direction) > 0.0);
     is_before.then_some(point)
 }
 

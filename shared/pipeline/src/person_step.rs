@@ -111,9 +111,7 @@ impl PersonStep {
             None => joints_at(&[None; N], &[], &settings.maps),
         };
         let of_set = of_set(settings.joints, &joints);
-        let settled = self
-            .bodies
-            .settle(&settings.body, &joints, (settings.joints, of_set));
+        let settled = self.bodies.settle(&settings.body, &joints, (settings.joints, of_set));
         let (mut settled, body): (Vec<Result<Triangulated, NoJoint>>, Option<Body>) = settled;
         let takes_part =
             |view: usize| solution.is_some_and(|it| it.views.iter().any(|part| part.view == view));
@@ -166,10 +164,7 @@ impl PersonStep {
             };
             let found = sighting.places(false).map(Point2::from);
             let found = found.map(|at| Some(at).filter(|at| at.x.is_finite()));
-            if let Some(by) = self
-                .seen
-                .since_instant(view, [answer.skew_s; 2], found.to_vec())
-            {
+            if let Some(by) = self.seen.since_instant(view, [answer.skew_s; 2], found.to_vec()) {
                 evidence.move_to_instant(by);
             }
             shown.push(Shown {
@@ -265,10 +260,7 @@ impl PersonStep {
     fn heat_of(&self, joint: usize, found: &SolvedPerson, view: &PartView<'_>) -> f64 {
         let at = found.pose.joints[joint];
         at.map_or(0.0, |at| {
-            self.rig
-                .settings
-                .maps
-                .heat(view.shown.evidence_at(joint, &at))
+            self.rig.settings.maps.heat(view.shown.evidence_at(joint, &at))
         })
     }
 

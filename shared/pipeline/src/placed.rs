@@ -154,10 +154,7 @@ pub(crate) struct Between {
 
 /// The joint of a part, by number in `skeleton::PARSE14`; `None` for a part between joints.
 fn joint_of(part: usize) -> Option<usize> {
-    PARSE14
-        .joints
-        .iter()
-        .position(|joint| joint.parts == [part])
+    PARSE14.joints.iter().position(|joint| joint.parts == [part])
 }
 
 pub(crate) fn between(part: usize) -> Between {

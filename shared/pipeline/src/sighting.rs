@@ -57,10 +57,7 @@ impl Sighting {
     ///
     /// * `least_heat`: of a joint that is seen well, 0 to 1.
     pub fn is_clear(&self, least_heat: f64) -> bool {
-        let well = self
-            .heats
-            .iter()
-            .filter(|heat| f64::from(**heat) >= least_heat);
+        let well = self.heats.iter().filter(|heat| f64::from(**heat) >= least_heat);
         well.count() >= N / 2
     }
 

@@ -159,9 +159,7 @@ impl SkeletonStep {
             Some(map) => Cow::from(map.from_parts(centres)),
             None => self.space.settings.joints.from_parts(centres).into(),
         };
-        let joints = self
-            .space
-            .triangulate(&at_instant, n_joints, points, &expected_px);
+        let joints = self.space.triangulate(&at_instant, n_joints, points, &expected_px);
         let (joints, body) = self.as_body(joints, &at_instant, &of_body_px);
         Skeleton {
             joints,
@@ -207,8 +205,7 @@ impl SkeletonStep {
             joints.clone()
         } else {
             let points = |centres: &[[f64; 2]]| Cow::from(PARSE14.from_parts(centres));
-            self.space
-                .triangulate(views, PARSE14.joints.len(), points, expected_px)
+            self.space.triangulate(views, PARSE14.joints.len(), points, expected_px)
         };
         self.bodies.settle(&settings.body, &of_body, (set, joints))
     }
@@ -224,11 +221,7 @@ impl SkeletonStep {
     ) -> Vec<Vec<f64>> {
         let of_view = |(view, answer): (usize, &Option<ViewResult>)| {
             let of_parts = answer.as_ref()?.sigma_px.as_ref()?.iter();
-            let [width, height] = self.space.plans[view]
-                .camera()
-                .intrinsics
-                .size
-                .map(f64::from);
+            let [width, height] = self.space.plans[view].camera().intrinsics.size.map(f64::from);
             let weighed = |sigma: &f32| {
                 let sigma = f64::from(*sigma).min(width.hypot(height));
                 sigma * self.space.settings.error_weight
@@ -240,9 +233,7 @@ impl SkeletonStep {
             Some(of_joints.map(|[sigma, _]| sigma).collect())
         };
         let views = answers.iter().enumerate();
-        views
-            .map(|view| of_view(view).unwrap_or_default())
-            .collect()
+        views.map(|view| of_view(view).unwrap_or_default()).collect()
     }
 
     /// The views that see the person from behind, the margin of the decision about which views see the
@@ -270,13 +261,9 @@ impl SkeletonStep {
                 (hypothesis, judged.seen)
             })
             .unzip();
-        let facing = self
-            .filter
-            .decide(&self.space.settings.facing_filter, &hypotheses, present);
+        let facing = self.filter.decide(&self.space.settings.facing_filter, &hypotheses, present);
         let Seen { front, log_ratio } = seen[facing.hypothesis];
-        let sides = self
-            .sides
-            .decide(&self.space.settings.sides, front, log_ratio);
+        let sides = self.sides.decide(&self.space.settings.sides, front, log_ratio);
         let exchanges = if sides.exchange {
             !facing.exchanges & present
         } else {
@@ -298,11 +285,7 @@ impl SkeletonStep {
             return (solved, Kept::Solved);
         }
         let agreement = |views: &[Option<FusedView>]| {
-            let n_parts = self
-                .space
-                .plans
-                .first()
-                .map_or(0, |it| it.model().n_parts());
+            let n_parts = self.space.plans.first().map_or(0, |it| it.model().n_parts());
             let parts = self.space.triangulate(views, n_parts, Cow::from, &[]);
             self.space.agreement(views, &parts)
         };
@@ -355,9 +338,8 @@ impl SkeletonStep {
             let candidate =
                 |energy: f64, pose: &Pose| Candidate::of_pose(pose, energy, plan, mirror);
             let poses = fused.poses(view, exchanged).into_iter();
-            let mut poses: Vec<Candidate> = poses
-                .map(|(energy, pose)| candidate(energy, pose))
-                .collect();
+            let mut poses: Vec<Candidate> =
+                poses.map(|(energy, pose)| candidate(energy, pose)).collect();
             let (n_pairs, single_score) = (poses.len(), f64::from(best.score));
             if poses.is_empty() {
                 if !frame.is_alone {
@@ -382,11 +364,7 @@ impl SkeletonStep {
         workspace: &mut ConsensusWorkspace,
     ) -> Vec<Option<FusedView>> {
         let mut views = fuse(candidates, exchanged);
-        let n_parts = self
-            .space
-            .plans
-            .first()
-            .map_or(0, |it| it.model().n_parts());
+        let n_parts = self.space.plans.first().map_or(0, |it| it.model().n_parts());
         let mut sightings: Vec<Sightings<'_>> = views
             .iter()
             .zip(&self.space.plans)
@@ -396,9 +374,7 @@ impl SkeletonStep {
             for (sightings, candidates) in sightings.iter_mut().zip(candidates) {
                 let all = candidates.iter().flat_map(|it| &it.poses);
                 sightings.points_px.clear();
-                sightings
-                    .points_px
-                    .extend(all.map(|it| it.centres_px[part]));
+                sightings.points_px.extend(all.map(|it| it.centres_px[part]));
             }
             let agreed = workspace.agree(&self.space.settings.consensus, &sightings);
             for (view, agreed) in views.iter_mut().zip(agreed) {

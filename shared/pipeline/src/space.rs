@@ -102,9 +102,7 @@ impl Space {
         // The middle of a pose does not depend on what its parts are called.
         let middle = |centres: &[[f64; 2]]| {
             let n = centres.len() as f64;
-            let sum = centres
-                .iter()
-                .fold([0.0, 0.0], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
+            let sum = centres.iter().fold([0.0, 0.0], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
             sum.map(|it| it / n)
         };
         let of_fused = middle(&fused.pose.centres_px);
@@ -137,9 +135,9 @@ impl Space {
             let present = views.iter().enumerate();
             let present = present.filter_map(|(view, fused)| Some((view, fused.as_ref()?)));
             match part {
-                Ok(point) => present
-                    .map(|(view, fused)| of_view(point.residuals_px[view], fused))
-                    .sum(),
+                Ok(point) => {
+                    present.map(|(view, fused)| of_view(point.residuals_px[view], fused)).sum()
+                }
                 Err(_) => present.count() as f64 * cap,
             }
         };

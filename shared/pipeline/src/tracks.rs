@@ -79,10 +79,7 @@ impl Track {
     ///
     /// * `n_frames`: from the last look to this frame.
     pub(crate) fn is_still(&self, n_frames: u64) -> bool {
-        !self.is_doubtful
-            && self
-                .speed
-                .is_some_and(|speed| speed * n_frames as f64 <= STILL)
+        !self.is_doubtful && self.speed.is_some_and(|speed| speed * n_frames as f64 <= STILL)
     }
 }
 

@@ -29,9 +29,9 @@ impl EvidenceWindow {
     pub fn levels(self, searched: Range<u16>, candidates: &[Pose]) -> Vec<u16> {
         let offered = |level: u16| match self {
             Self::All => true,
-            Self::Around(reach) => candidates
-                .iter()
-                .any(|pose| pose.level.abs_diff(level) <= reach),
+            Self::Around(reach) => {
+                candidates.iter().any(|pose| pose.level.abs_diff(level) <= reach)
+            }
         };
         searched.filter(|level| offered(*level)).collect()
     }
@@ -207,8 +207,7 @@ impl ViewStep {
     /// Searches a scope on the processor.
     fn search(&self, image: Rgb8View<'_>, scope: Scope, responses: &mut [f32]) -> Searched {
         let layout = &self.layout;
-        self.extractor
-            .responses_in(image, layout, &scope, responses);
+        self.extractor.responses_in(image, layout, &scope, responses);
         let searched: Vec<u16> = scope.levels().collect();
         let evidence = Responses::within(layout, responses, &searched, scope);
         let (candidates, bounds) = self.solver.distinct_and_bounds(

@@ -31,10 +31,7 @@ impl JointMaps {
     pub fn turn(&self, now: Turn) -> Turn {
         let mean = |joints: core::ops::Range<usize>, least: usize| {
             let peaks = self.peaks().get(joints)?.iter().flatten();
-            let sure: Vec<[f64; 2]> = peaks
-                .filter(|it| it.score >= SURE)
-                .map(|it| it.at)
-                .collect();
+            let sure: Vec<[f64; 2]> = peaks.filter(|it| it.score >= SURE).map(|it| it.at).collect();
             let n = sure.len();
             (n >= least)
                 .then(|| [0, 1].map(|axis| sure.iter().map(|it| it[axis]).sum::<f64>() / n as f64))

@@ -80,9 +80,7 @@ impl Looker<'_> {
         workspace: &mut Workspace,
         maps: &mut JointMaps,
     ) -> Result<Option<Look>, LookError> {
-        let sight = self
-            .network
-            .look_turned(image, (outline, turn), workspace)?;
+        let sight = self.network.look_turned(image, (outline, turn), workspace)?;
         let Some(sight) = sight else {
             return Ok(None);
         };
@@ -190,8 +188,7 @@ impl Looker<'_> {
                 best = Some(look);
             }
         }
-        best.map(|seen| self.look_closer((image, seen), memory, maps))
-            .transpose()
+        best.map(|seen| self.look_closer((image, seen), memory, maps)).transpose()
     }
 
     /// Looks into a box; the maps are `other` of the memory.

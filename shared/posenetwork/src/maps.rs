@@ -93,9 +93,7 @@ pub const MOST_CELLS: usize = 1 << 15;
 fn coarseness([rows, columns]: [usize; 2]) -> usize {
     let area = |every: &usize| rows.div_ceil(*every) * columns.div_ceil(*every);
     let most = rows.max(columns).max(1);
-    (1..=most)
-        .find(|every| area(every) <= MOST_CELLS)
-        .unwrap_or(most)
+    (1..=most).find(|every| area(every) <= MOST_CELLS).unwrap_or(most)
 }
 
 /// Cells between two columns or rows of a grid that is made for a codec without maps.
@@ -145,8 +143,7 @@ impl JointMaps {
             (rows, columns, step)
         };
         self.values.clear();
-        self.values
-            .resize(N_JOINTS * self.rows * self.columns, self.floor);
+        self.values.resize(N_JOINTS * self.rows * self.columns, self.floor);
         self.peaks.clear();
         self.keypoints.clear();
         self.sigma_px = None;
@@ -155,12 +152,9 @@ impl JointMaps {
         if let Some(errors) = sight.errors() {
             self.errors.extend(errors);
             let of_row = |row: &Vec<(usize, f64)>| {
-                row.iter()
-                    .map(|(it, share)| share.abs() * self.errors[*it])
-                    .sum()
+                row.iter().map(|(it, share)| share.abs() * self.errors[*it]).sum()
             };
-            self.told
-                .extend(rows.iter().map(|row| row.as_ref().map(of_row)));
+            self.told.extend(rows.iter().map(|row| row.as_ref().map(of_row)));
         }
         let each = keypoints.iter().enumerate();
         self.keypoints
@@ -205,8 +199,7 @@ impl JointMaps {
         let n_values = N_JOINTS * self.rows * self.columns;
         self.values.clear();
         // Once for the widest grid, so that no later frame allocates.
-        self.values
-            .reserve(N_JOINTS * MOST_ROWS * (4 * MOST_ROWS + 1));
+        self.values.reserve(N_JOINTS * MOST_ROWS * (4 * MOST_ROWS + 1));
         self.values.resize(n_values, self.floor);
         self.peaks.clear();
         self.peaks.resize(N_JOINTS, None);
@@ -340,16 +333,14 @@ impl JointMaps {
 
     /// The evidence for a joint at a point of the picture ([`PersonMaps::at`]); the floor before the first picture.
     pub fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
-        self.evidence()
-            .map_or(self.floor, |maps| maps.at(joint, point))
+        self.evidence().map_or(self.floor, |maps| maps.at(joint, point))
     }
 
     /// The highest maxima of a joint's map ([`PersonMaps::maxima`]).
     ///
     /// * `n`: at most so many.
     pub fn maxima(&self, joint: usize, n: usize) -> Vec<([f64; 2], f32)> {
-        self.evidence()
-            .map_or_else(Vec::new, |maps| maps.maxima(joint, n, |_| true))
+        self.evidence().map_or_else(Vec::new, |maps| maps.maxima(joint, n, |_| true))
     }
 
     /// The evidence where a view shows nothing of a joint.

@@ -284,8 +284,7 @@ impl PoseNetwork {
             held.shape.extend_from_slice(output.shape);
             held.values.clear();
             held.is_f32 = output.values.is_some();
-            held.values
-                .extend_from_slice(output.values.unwrap_or_default());
+            held.values.extend_from_slice(output.values.unwrap_or_default());
         })?;
         Ok(())
     }

@@ -134,9 +134,7 @@ impl<'a> PersonMaps<'a> {
                 let left = column.checked_sub(1).map(|column| line[column]);
                 let right = line.get(column + 1).copied();
                 let away = [vertex(left, *here, right), vertex(above, *here, below)];
-                let at = self
-                    .grid
-                    .place([column as f64 + away[0], row as f64 + away[1]]);
+                let at = self.grid.place([column as f64 + away[0], row as f64 + away[1]]);
                 if is_wanted(at) {
                     found.push((at, *here));
                 }

@@ -76,8 +76,7 @@ impl Loaded {
             _ => {}
         }
         if let Some(chunk) = Chunk::read(&head) {
-            self.records
-                .reserve(chunk.n_bytes.min(MOST_RESERVED) as usize);
+            self.records.reserve(chunk.n_bytes.min(MOST_RESERVED) as usize);
             let mut part = input.take(chunk.n_bytes);
             let n = part.read_to_end(&mut self.records)? as u64;
             self.is_sound = n == chunk.n_bytes && crc32fast::hash(&self.records) == chunk.checksum;

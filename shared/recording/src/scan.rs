@@ -93,8 +93,7 @@ impl<R: Read + Seek> Scan<'_, R> {
             op::CHUNK => self.chunk(begin)?,
             op::METADATA if len <= MAX_RECORD_BYTES => {
                 let body = self.cursor.bytes(len)?;
-                self.metadata(&body)
-                    .ok_or(Stop::Damaged("what is said about the run"))?;
+                self.metadata(&body).ok_or(Stop::Damaged("what is said about the run"))?;
             }
             op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE_INDEX | op::ATTACHMENT => {
                 self.cursor.skip(len)?;

@@ -158,9 +158,7 @@ impl<W: Write> Writer<W> {
     /// Says of which run it is, and which topics there are.
     fn say_about(&mut self) -> Result<(), WriteError> {
         let about = self.about.clone();
-        about
-            .into_iter()
-            .try_for_each(|(name, map)| self.describe(name, map))
+        about.into_iter().try_for_each(|(name, map)| self.describe(name, map))
     }
 
     /// Adds the next topic.
@@ -176,8 +174,7 @@ impl<W: Write> Writer<W> {
             .add_schema(schema.name, schema.encoding, schema.text.as_bytes())
             .and_then(|schema| {
                 let nothing = BTreeMap::new();
-                self.out
-                    .add_channel_with_id(channel, schema, name, encoding, &nothing)
+                self.out.add_channel_with_id(channel, schema, name, encoding, &nothing)
             });
         added.map_err(|error| failed(&self.keeper, error))?;
         self.topics.push(Topic {
@@ -310,7 +307,5 @@ fn failed(keeper: &Keeper, error: McapError) -> WriteError {
 /// Names of topics by the numbers of their channels.
 fn numbered(topics: &[String]) -> BTreeMap<String, String> {
     let numbered = (1_u16..).zip(topics);
-    numbered
-        .map(|(channel, name)| (channel.to_string(), name.clone()))
-        .collect()
+    numbered.map(|(channel, name)| (channel.to_string(), name.clone())).collect()
 }

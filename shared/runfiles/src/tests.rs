@@ -65,9 +65,7 @@ fn assert_strict<T: Serialize>(
         match parse(&missing.to_string()) {
             Ok(_) => assert!(may_be_missing.contains(&field.as_str()), "{field}"),
             Err(error) => assert!(
-                error
-                    .to_string()
-                    .contains(&format!("missing field `{field}`")),
+                error.to_string().contains(&format!("missing field `{field}`")),
                 "{error}"
             ),
         }

@@ -247,11 +247,7 @@ mod tests {
             reprojection: Some(0.458),
             ..few
         };
-        let doubts: Vec<String> = impossible
-            .doubts()
-            .iter()
-            .map(ToString::to_string)
-            .collect();
+        let doubts: Vec<String> = impossible.doubts().iter().map(ToString::to_string).collect();
         assert!(
             doubts.len() == 1 && doubts[0].contains("46 %"),
             "{doubts:?}"

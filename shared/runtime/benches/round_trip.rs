@@ -98,19 +98,11 @@ fn answer(
 }
 
 fn measure(name: &str, len: usize, rounds: usize, copies: bool) {
-    let base = tempfile::Builder::new()
-        .prefix("px")
-        .tempdir_in("/dev/shm")
-        .unwrap();
-    let lock = Namespace::below("b", base.path())
-        .unwrap()
-        .acquire()
-        .unwrap();
+    let base = tempfile::Builder::new().prefix("px").tempdir_in("/dev/shm").unwrap();
+    let lock = Namespace::below("b", base.path()).unwrap().acquire().unwrap();
     let stop = Stop::new().unwrap();
     let bus = Bus::open(lock.namespace(), "bench", &stop).unwrap();
-    let topics = bus
-        .create_topics(&[plan("there", len), plan("back", len)])
-        .unwrap();
+    let topics = bus.create_topics(&[plan("there", len), plan("back", len)]).unwrap();
     let (publisher, subscriber, waiter) = ends(&bus, "there", "back");
     let args = [
         "echo".into(),

@@ -116,10 +116,7 @@ impl Child {
             Vec::new()
         };
         let text = [whole, rest].concat();
-        Ok(String::from_utf8_lossy(&text)
-            .lines()
-            .map(str::to_owned)
-            .collect())
+        Ok(String::from_utf8_lossy(&text).lines().map(str::to_owned).collect())
     }
 
     /// How it ended, if it has. Its remaining children are killed then.

@@ -73,10 +73,7 @@ impl Types {
         node: &Node<S>,
         name: &ServiceName,
     ) -> Builder<Bytes, Head, S> {
-        let builder = node
-            .service_builder(name)
-            .publish_subscribe::<Bytes>()
-            .user_header::<Head>();
+        let builder = node.service_builder(name).publish_subscribe::<Bytes>().user_header::<Head>();
         // SAFETY: chunks of the topic are read and written as these types only: every port below keeps them, and checks.
         let builder = unsafe { builder.__internal_set_payload_type_details(&self.element) };
         // SAFETY: as above.

@@ -296,10 +296,7 @@ impl Counts {
             cpu_millis: cpu_millis(),
             n_total: self.n_total.load(Ordering::Relaxed),
             n_without_gpu: self.n_without_gpu.load(Ordering::Relaxed),
-            refused: self
-                .refused
-                .each_ref()
-                .map(|count| count.load(Ordering::Relaxed)),
+            refused: self.refused.each_ref().map(|count| count.load(Ordering::Relaxed)),
         }
     }
 

@@ -153,11 +153,7 @@ struct Given<'a>(&'a [(&'static str, OsString)]);
 
 impl Given<'_> {
     fn find(&self, flag: &str) -> Option<&OsString> {
-        self.0
-            .iter()
-            .rev()
-            .find(|(name, _)| *name == flag)
-            .map(|(_, value)| value)
+        self.0.iter().rev().find(|(name, _)| *name == flag).map(|(_, value)| value)
     }
 
     fn path(&self, flag: &'static str) -> Result<PathBuf, LaunchError> {

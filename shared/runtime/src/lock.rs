@@ -176,10 +176,8 @@ impl Drop for DeploymentLock {
             return;
         }
         let root = &self.root;
-        let removed = wipe(&self.namespace, root).and_then(|()| {
-            root.remove(&self.namespace)
-                .map_err(unusable(&self.namespace))
-        });
+        let removed = wipe(&self.namespace, root)
+            .and_then(|()| root.remove(&self.namespace).map_err(unusable(&self.namespace)));
         if let Err(error) = removed {
             tracing::warn!(%error, "cannot remove the files of the deployment");
         }

@@ -110,9 +110,7 @@ pub(crate) fn populate(
         let own = mapping.writable
             && mapping.shared
             && mapping.path.starts_with(&begin)
-            && Path::new(mapping.path)
-                .extension()
-                .is_some_and(|extension| extension == "data")
+            && Path::new(mapping.path).extension().is_some_and(|extension| extension == "data")
             && mapping.path.contains(&name);
         if own {
             reserve(&mapping)?;

@@ -116,9 +116,8 @@ impl Namespace {
         let Some(text) = root.to_str().filter(|_| root.is_absolute()) else {
             return Err(NamespaceError::Root { root });
         };
-        let plain = text
-            .bytes()
-            .all(|byte| byte.is_ascii_alphanumeric() || b"-_./".contains(&byte));
+        let plain =
+            text.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_./".contains(&byte));
         if !plain {
             return Err(NamespaceError::Root { root });
         }
@@ -185,9 +184,7 @@ impl Namespace {
             root: self.root.clone(),
         };
         let mut config = Config::default();
-        config.global.prefix = FileName::new(self.prefix.as_bytes())
-            .ok()
-            .ok_or_else(refused)?;
+        config.global.prefix = FileName::new(self.prefix.as_bytes()).ok().ok_or_else(refused)?;
         let root = IoxPath::new(self.root.as_os_str().as_encoded_bytes())
             .ok()
             .ok_or_else(refused)?;

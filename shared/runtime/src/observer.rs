@@ -154,10 +154,7 @@ impl Observer {
         let config = self.bus.namespace().config().map_err(BusError::from)?;
         let living = living(&config);
         for watched in &mut self.processes {
-            let node = living
-                .iter()
-                .flatten()
-                .find(|(name, _)| *name == watched.process);
+            let node = living.iter().flatten().find(|(name, _)| *name == watched.process);
             watched.pid = node.map(|(_, pid)| *pid);
             if let Some(metrics) = watched.subscriber.latest()? {
                 watched.metrics = Some(metrics);

@@ -53,10 +53,7 @@ impl Place {
         let (numbers, []) = bytes.as_chunks() else {
             return None;
         };
-        let numbers: Vec<u64> = numbers
-            .iter()
-            .map(|number| u64::from_le_bytes(*number))
-            .collect();
+        let numbers: Vec<u64> = numbers.iter().map(|number| u64::from_le_bytes(*number)).collect();
         numbers.try_into().ok()
     }
 
@@ -106,8 +103,7 @@ fn read(file: &File, slot: u64) -> Option<(u64, Vec<u8>)> {
         return None;
     }
     let mut bytes = vec![0; len as usize];
-    file.read_exact_at(&mut bytes, begin + HEADER_BYTES as u64)
-        .ok()?;
+    file.read_exact_at(&mut bytes, begin + HEADER_BYTES as u64).ok()?;
     (fnv1a(&bytes) == checksum).then_some((number, bytes))
 }
 

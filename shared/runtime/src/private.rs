@@ -167,11 +167,8 @@ impl Root {
             return Ok(());
         }
         let names = beneath::names(&self.root).map_err(failed(namespace.root()))?;
-        let is_known = |name: &&CString| {
-            [LOCK_FILE, MARK_FILE]
-                .map(str::as_bytes)
-                .contains(&name.as_bytes())
-        };
+        let is_known =
+            |name: &&CString| [LOCK_FILE, MARK_FILE].map(str::as_bytes).contains(&name.as_bytes());
         let n_files = names.len() - names.iter().filter(is_known).count();
         // Another run may have written the marker file in the meantime: it does so first.
         if n_files > 0 && !is_marked(&self.root, namespace) {
@@ -196,10 +193,7 @@ impl Root {
     /// Removes everything in the directory but the lock file and the marker file.
     pub(crate) fn empty(&self) -> io::Result<()> {
         for name in beneath::names(&self.root)? {
-            if ![LOCK_FILE, MARK_FILE]
-                .map(str::as_bytes)
-                .contains(&name.as_bytes())
-            {
+            if ![LOCK_FILE, MARK_FILE].map(str::as_bytes).contains(&name.as_bytes()) {
                 beneath::remove(&self.root, &name)?;
             }
         }

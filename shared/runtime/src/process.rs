@@ -104,9 +104,9 @@ pub fn run_service(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Fai
             ExitCode::SUCCESS
         }
         Ok(Err(failure)) => failure.exit(),
-        Err(panic) => Failure::new(ExitKind::Run, panic_text(panic.as_ref()))
-            .with_hint(DEFECT)
-            .exit(),
+        Err(panic) => {
+            Failure::new(ExitKind::Run, panic_text(panic.as_ref())).with_hint(DEFECT).exit()
+        }
     }
 }
 

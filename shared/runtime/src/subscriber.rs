@@ -269,9 +269,7 @@ impl Port {
         } else if extras.wakes {
             waiter.watch(bus.listener(topic)?);
         }
-        let mut builder = messages
-            .subscriber_builder()
-            .set_degradation_handler(connections());
+        let mut builder = messages.subscriber_builder().set_degradation_handler(connections());
         if bus.looks_on() {
             builder = builder.name(&onlooker());
         }
@@ -301,12 +299,10 @@ impl Port {
         // appear in between.
         let publishers = self.publishers();
         let connected = self.reader.port().update_connections();
-        connected
-            .inspect_err(note_room)
-            .map_err(|source| PortError::Connection {
-                topic: self.topic.to_string(),
-                source,
-            })?;
+        connected.inspect_err(note_room).map_err(|source| PortError::Connection {
+            topic: self.topic.to_string(),
+            source,
+        })?;
         self.acknowledge(publishers);
         Ok(())
     }
@@ -316,18 +312,13 @@ impl Port {
         let publishers = self.ready.as_ref().map(|_| self.publishers());
         let topic = || Arc::clone(&self.topic);
         let sample =
-            self.reader
-                .receive()
-                .inspect_err(note_room)
-                .map_err(|source| match source {
-                    IoxReceiveError::ExceedsMaxBorrows => {
-                        ReceiveError::TooManyHeld { topic: topic() }
-                    }
-                    source @ IoxReceiveError::ConnectionFailure(_) => ReceiveError::Transport {
-                        topic: topic(),
-                        source,
-                    },
-                })?;
+            self.reader.receive().inspect_err(note_room).map_err(|source| match source {
+                IoxReceiveError::ExceedsMaxBorrows => ReceiveError::TooManyHeld { topic: topic() },
+                source @ IoxReceiveError::ConnectionFailure(_) => ReceiveError::Transport {
+                    topic: topic(),
+                    source,
+                },
+            })?;
         if let Some(publishers) = publishers {
             self.acknowledge(publishers);
         }

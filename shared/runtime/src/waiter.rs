@@ -130,10 +130,7 @@ impl Waiter {
             return Ok(Woken::Stop);
         }
         for &index in &awake {
-            let drained = self
-                .listeners
-                .get(index)
-                .map(|listener| listener.try_wait(|_| {}));
+            let drained = self.listeners.get(index).map(|listener| listener.try_wait(|_| {}));
             if let Some(Err(error)) = drained {
                 tracing::debug!(?error, "cannot drain a wake-up");
             }

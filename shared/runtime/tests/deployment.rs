@@ -81,22 +81,16 @@ impl Ports {
     fn open(&mut self, deployment: &Deployment, process: &str) {
         let bus = deployment.bus(process);
         let mut waiter = bus.waiter();
-        self.health_out
-            .push(bus.publisher(&topic::health(process)).unwrap());
+        self.health_out.push(bus.publisher(&topic::health(process)).unwrap());
         let (stage, index) = process.split_once('-').unwrap_or((process, "0"));
         let index = index.parse().unwrap();
         match stage {
-            "capture" => self
-                .frames_out
-                .push(bus.slice_publisher(&topic::frame(index)).unwrap()),
+            "capture" => self.frames_out.push(bus.slice_publisher(&topic::frame(index)).unwrap()),
             "pose" => self.open_pose(&bus, &mut waiter, index),
             "quality" => {
-                self.poses_in.push(
-                    bus.subscriber(&topic::view_pose(index), &mut waiter)
-                        .unwrap(),
-                );
-                self.quality_out
-                    .push(bus.publisher(&topic::view_quality(index)).unwrap());
+                self.poses_in
+                    .push(bus.subscriber(&topic::view_pose(index), &mut waiter).unwrap());
+                self.quality_out.push(bus.publisher(&topic::view_quality(index)).unwrap());
             }
             "fuse" => self.open_fuse(&bus, &mut waiter, index),
             _ => self.open_last(&bus, &mut waiter, stage == "results"),
@@ -105,51 +99,39 @@ impl Ports {
     }
 
     fn open_pose(&mut self, bus: &Bus, waiter: &mut Waiter, view: usize) {
-        self.frames_in
-            .push(bus.slice_subscriber(&topic::frame(view), waiter).unwrap());
-        self.poses_out
-            .push(bus.publisher(&topic::view_pose(view)).unwrap());
-        self.evidence_out
-            .push(bus.slice_publisher(&topic::evidence(view)).unwrap());
+        self.frames_in.push(bus.slice_subscriber(&topic::frame(view), waiter).unwrap());
+        self.poses_out.push(bus.publisher(&topic::view_pose(view)).unwrap());
+        self.evidence_out.push(bus.slice_publisher(&topic::evidence(view)).unwrap());
     }
 
     fn open_fuse(&mut self, bus: &Bus, waiter: &mut Waiter, worker: usize) {
         for view in 0..N_VIEWS {
-            self.evidence_in.push(
-                bus.slice_subscriber(&topic::evidence(view), waiter)
-                    .unwrap(),
-            );
-            self.poses_in
-                .push(bus.subscriber(&topic::view_pose(view), waiter).unwrap());
+            self.evidence_in
+                .push(bus.slice_subscriber(&topic::evidence(view), waiter).unwrap());
+            self.poses_in.push(bus.subscriber(&topic::view_pose(view), waiter).unwrap());
             self.quality_in
                 .push(bus.subscriber(&topic::view_quality(view), waiter).unwrap());
         }
-        self.pairs_out
-            .push(bus.publisher(&topic::pair_pose(worker)).unwrap());
+        self.pairs_out.push(bus.publisher(&topic::pair_pose(worker)).unwrap());
     }
 
     /// Triangulate, which publishes the result, and record, which receives everything.
     fn open_last(&mut self, bus: &Bus, waiter: &mut Waiter, records: bool) {
         for view in 0..N_VIEWS {
-            self.poses_in
-                .push(bus.subscriber(&topic::view_pose(view), waiter).unwrap());
+            self.poses_in.push(bus.subscriber(&topic::view_pose(view), waiter).unwrap());
             if records {
-                self.frames_in
-                    .push(bus.slice_subscriber(&topic::frame(view), waiter).unwrap());
+                self.frames_in.push(bus.slice_subscriber(&topic::frame(view), waiter).unwrap());
                 self.quality_in
                     .push(bus.subscriber(&topic::view_quality(view), waiter).unwrap());
             }
         }
         for worker in 0..N_WORKERS {
-            self.pairs_in
-                .push(bus.subscriber(&topic::pair_pose(worker), waiter).unwrap());
+            self.pairs_in.push(bus.subscriber(&topic::pair_pose(worker), waiter).unwrap());
         }
         if records {
-            self.result_in
-                .push(bus.subscriber(&topic::skeletons(), waiter).unwrap());
+            self.result_in.push(bus.subscriber(&topic::skeletons(), waiter).unwrap());
         } else {
-            self.result_out
-                .push(bus.publisher(&topic::skeletons()).unwrap());
+            self.result_out.push(bus.publisher(&topic::skeletons()).unwrap());
         }
     }
 }
@@ -177,12 +159,7 @@ fn a_deployment_of_eight_views_opens_all_ports_within_its_memory_plan() {
         }
         let used: u64 = shared_memory(deployment.namespace())
             .iter()
-            .map(|name| {
-                std::fs::metadata(format!("/dev/shm/{name}"))
-                    .unwrap()
-                    .blocks()
-                    * 512
-            })
+            .map(|name| std::fs::metadata(format!("/dev/shm/{name}")).unwrap().blocks() * 512)
             .sum();
         let pools: u64 = topics.iter().map(TopicPlan::pool_bytes).sum();
         let overhead = used.saturating_sub(pools) / processes.len() as u64;

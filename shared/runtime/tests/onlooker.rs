@@ -42,12 +42,9 @@ fn a_sender_without_loss_does_not_wait_for_onlookers_and_its_receiver_gets_every
     assert_eq!(publisher.wait_for_subscribers(1, Duration::ZERO), 0);
     let receiving = deployment.bus("receiver");
     let mut waiter = receiving.waiter();
-    let receiver = receiving
-        .subscriber::<ViewQuality>("small", &mut waiter)
-        .unwrap();
-    let receiver_of_frames = receiving
-        .slice_subscriber::<u8, FrameHeader>("frames", &mut waiter)
-        .unwrap();
+    let receiver = receiving.subscriber::<ViewQuality>("small", &mut waiter).unwrap();
+    let receiver_of_frames =
+        receiving.slice_subscriber::<u8, FrameHeader>("frames", &mut waiter).unwrap();
     assert_eq!(publisher.wait_for_subscribers(1, NOT_STUCK), 1);
     let begin = Instant::now();
     // Every onlooker holds an array, and lets the others lie.
@@ -78,9 +75,7 @@ fn an_onlooker_is_not_woken_and_sees_the_newest() {
     let publisher = bus.publisher::<ViewQuality>("small").unwrap();
     let looking = deployment.bus("x").as_onlooker();
     let mut waiter = looking.waiter();
-    let onlooker = looking
-        .subscriber::<ViewQuality>("small", &mut waiter)
-        .unwrap();
+    let onlooker = looking.subscriber::<ViewQuality>("small", &mut waiter).unwrap();
     for frame in 0..9 {
         publisher.send(&quality(frame)).unwrap();
     }

@@ -36,9 +36,7 @@ fn a_message_arrives_and_wakes_the_receiver() {
     let (sender, receiver) = (deployment.bus("sender"), deployment.bus("receiver"));
     let publisher = sender.publisher::<ViewQuality>("small").unwrap();
     let mut waiter = receiver.waiter();
-    let subscriber = receiver
-        .subscriber::<ViewQuality>("small", &mut waiter)
-        .unwrap();
+    let subscriber = receiver.subscriber::<ViewQuality>("small", &mut waiter).unwrap();
     assert_eq!(subscriber.receive().unwrap(), None);
     assert_eq!(publisher.send(&quality(7)).unwrap(), 1);
     assert_eq!(waiter.wait(SOON).unwrap(), Woken::Message);
@@ -53,9 +51,7 @@ fn an_array_is_read_in_place() {
     let bus = deployment.bus("both");
     let mut waiter = bus.waiter();
     let publisher = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
-    let subscriber = bus
-        .slice_subscriber::<u8, FrameHeader>("frames", &mut waiter)
-        .unwrap();
+    let subscriber = bus.slice_subscriber::<u8, FrameHeader>("frames", &mut waiter).unwrap();
     for (len, value) in [(1000, 3), (1, 4), (999, 5), (0, 6)] {
         let mut loan = publisher.loan(len).unwrap();
         assert_eq!(loan.payload_mut().as_ptr().align_offset(64), 0);
@@ -88,9 +84,7 @@ fn a_dropped_loan_is_not_sent() {
     let bus = deployment.bus("both");
     let mut waiter = bus.waiter();
     let publisher = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
-    let subscriber = bus
-        .slice_subscriber::<u8, FrameHeader>("frames", &mut waiter)
-        .unwrap();
+    let subscriber = bus.slice_subscriber::<u8, FrameHeader>("frames", &mut waiter).unwrap();
     for _ in 0..100 {
         drop(publisher.loan(10).unwrap());
     }
@@ -103,9 +97,7 @@ fn a_slow_receiver_gets_the_newest_and_the_sender_never_waits() {
     let bus = deployment.bus("both");
     let mut waiter = bus.waiter();
     let publisher = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
-    let subscriber = bus
-        .slice_subscriber::<u8, FrameHeader>("frames", &mut waiter)
-        .unwrap();
+    let subscriber = bus.slice_subscriber::<u8, FrameHeader>("frames", &mut waiter).unwrap();
     let held = {
         let mut loan = publisher.loan(8).unwrap();
         loan.payload_mut().fill(200);
@@ -134,9 +126,7 @@ fn a_receiver_that_may_borrow_one_array_gets_the_newest() {
     let bus = deployment.bus("both");
     let mut waiter = bus.waiter();
     let publisher = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
-    let subscriber = bus
-        .slice_subscriber::<u8, FrameHeader>("frames", &mut waiter)
-        .unwrap();
+    let subscriber = bus.slice_subscriber::<u8, FrameHeader>("frames", &mut waiter).unwrap();
     for value in 0..3 {
         let mut loan = publisher.loan(8).unwrap();
         loan.payload_mut().fill(value);
@@ -185,9 +175,7 @@ fn an_earlier_subscriber_counts_once_it_is_connected() {
     let deployment = Deployment::new(&[small(Delivery::Lossless, 1)]);
     let (sender, receiver) = (deployment.bus("sender"), deployment.bus("receiver"));
     let mut waiter = receiver.waiter();
-    let subscriber = receiver
-        .subscriber::<ViewQuality>("small", &mut waiter)
-        .unwrap();
+    let subscriber = receiver.subscriber::<ViewQuality>("small", &mut waiter).unwrap();
     let publisher = sender.publisher::<ViewQuality>("small").unwrap();
     assert_eq!(publisher.n_connected(), 1);
     assert_eq!(
@@ -274,10 +262,8 @@ fn another_type_is_refused_by_name() {
     let deployment = Deployment::new(&[frames(Delivery::Realtime, 8)]);
     let bus = deployment.bus("wrong");
     for error in [
-        bus.slice_publisher::<f32, FrameHeader>("frames")
-            .unwrap_err(),
-        bus.slice_publisher::<u8, EvidenceHeader>("frames")
-            .unwrap_err(),
+        bus.slice_publisher::<f32, FrameHeader>("frames").unwrap_err(),
+        bus.slice_publisher::<u8, EvidenceHeader>("frames").unwrap_err(),
         bus.publisher::<ViewQuality>("frames").unwrap_err(),
     ] {
         assert!(matches!(error, PortError::WrongType { .. }), "{error}");
@@ -288,10 +274,7 @@ fn another_type_is_refused_by_name() {
 #[test]
 fn a_missing_topic_is_refused() {
     let deployment = Deployment::new(&[]);
-    let error = deployment
-        .bus("lost")
-        .publisher::<ViewQuality>("small")
-        .unwrap_err();
+    let error = deployment.bus("lost").publisher::<ViewQuality>("small").unwrap_err();
     assert!(matches!(error, PortError::NoSuchTopic { .. }), "{error}");
 }
 
@@ -350,9 +333,7 @@ fn two_deployments_do_not_exchange_messages() {
     let (bus_one, bus_two) = (one.bus("same"), two.bus("same"));
     let mut waiter = bus_two.waiter();
     let publisher = bus_one.publisher::<ViewQuality>("small").unwrap();
-    let subscriber = bus_two
-        .subscriber::<ViewQuality>("small", &mut waiter)
-        .unwrap();
+    let subscriber = bus_two.subscriber::<ViewQuality>("small", &mut waiter).unwrap();
     assert_eq!(publisher.send(&quality(1)).unwrap(), 0);
     assert_eq!(subscriber.receive().unwrap(), None);
     assert_ne!(one.namespace().prefix(), two.namespace().prefix());

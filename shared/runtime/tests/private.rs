@@ -210,10 +210,7 @@ fn census(path: &Path) -> Vec<(PathBuf, u32)> {
     below(path, &mut found);
     found.sort();
     let mode = |path: &PathBuf| fs::symlink_metadata(path).unwrap().mode();
-    found
-        .into_iter()
-        .map(|path| (path.clone(), mode(&path)))
-        .collect()
+    found.into_iter().map(|path| (path.clone(), mode(&path))).collect()
 }
 
 #[test]
@@ -233,9 +230,7 @@ fn a_link_instead_of_the_base_is_never_followed() {
     let own = Namespace::below("t", &link).unwrap();
     let refused = [
         own.acquire().unwrap_err().to_string(),
-        Bus::open(&own, "one", &Stop::new().unwrap())
-            .unwrap_err()
-            .to_string(),
+        Bus::open(&own, "one", &Stop::new().unwrap()).unwrap_err().to_string(),
         runtime::deployments(&link).unwrap_err().to_string(),
     ];
     for text in refused {

@@ -31,9 +31,7 @@ fn main() {
             a_slot_is_released_if_its_owner_left_incomplete_files();
         }
         // One process cleans up in one deployment only, as a supervisor does.
-        _ => ["role:in-vain", "role:unfinished"]
-            .into_iter()
-            .for_each(passes),
+        _ => ["role:in-vain", "role:unfinished"].into_iter().for_each(passes),
     }
 }
 

@@ -47,9 +47,7 @@ fn a_spinning_receiver_gets_all_messages() {
             });
             let bus = deployment.bus("pose").with_spin(true);
             let mut waiter = bus.waiter();
-            let port = bus
-                .slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)
-                .unwrap();
+            let port = bus.slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter).unwrap();
             let (mut received, begin) = (Vec::new(), Instant::now());
             while received.len() < 100 && begin.elapsed() < WATCHDOG {
                 // It does not sleep, so the reason for returning is always time.
@@ -79,9 +77,7 @@ fn a_spinning_waiter_stops_on_request_and_makes_progress() {
     let deployment = deployment(Delivery::Realtime);
     let bus = deployment.bus("pose").with_spin(true);
     let mut waiter = bus.waiter();
-    let _port = bus
-        .slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)
-        .unwrap();
+    let _port = bus.slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter).unwrap();
     let before = bus.progress().count();
     for _ in 0..1000 {
         assert_eq!(waiter.wait(WATCHDOG).unwrap(), Woken::Time);

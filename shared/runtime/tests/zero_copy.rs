@@ -31,8 +31,7 @@ fn every_receiver_reads_pixels_in_place() {
     let readers = ["one", "two"].map(|it| deployment.bus(it));
     let ports = readers.each_ref().map(|bus| {
         let mut waiter = bus.waiter();
-        bus.slice_subscriber::<u8, FrameHeader>(PIXELS, &mut waiter)
-            .unwrap()
+        bus.slice_subscriber::<u8, FrameHeader>(PIXELS, &mut waiter).unwrap()
     });
     let publisher = camera.slice_publisher::<u8, FrameHeader>(PIXELS).unwrap();
     for round in 0..9 {
@@ -62,9 +61,7 @@ fn kept_arrays_are_counted_as_copies() {
     let deployment = deployment();
     let (camera, recorder) = (deployment.bus("camera"), deployment.bus("recorder"));
     let mut waiter = recorder.waiter();
-    let port = recorder
-        .slice_subscriber::<u8, FrameHeader>(PIXELS, &mut waiter)
-        .unwrap();
+    let port = recorder.slice_subscriber::<u8, FrameHeader>(PIXELS, &mut waiter).unwrap();
     let publisher = camera.slice_publisher::<u8, FrameHeader>(PIXELS).unwrap();
     let mut loan = publisher.loan(1000).unwrap();
     loan.payload_mut().fill(7);

@@ -103,12 +103,7 @@ impl View<'_> {
         [here, right, below]: [Point2<f32>; 3],
         mut set_near: impl FnMut(usize, f32),
     ) -> Pixel {
-        let back = self
-            .camera
-            .camera_from_world
-            .rotation
-            .inverse()
-            .cast::<f32>();
+        let back = self.camera.camera_from_world.rotation.inverse().cast::<f32>();
         let light = &self.room.light;
         let (mut base, mut key, mut place) = (Linear::zeros(), Linear::zeros(), Vector3::zeros());
         for sub in 0..SUB * SUB {

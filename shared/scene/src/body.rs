@@ -173,12 +173,8 @@ impl Bones {
             (HAND, 0.03),
             (SHIN, 0.055),
         ];
-        let limbs = limbs
-            .into_iter()
-            .flat_map(|(pair, r)| pair.map(|it| (it, r)));
-        let joints = round
-            .chain(limbs)
-            .map(|(bone, r)| frames[bone].translation.z - r * scale);
+        let limbs = limbs.into_iter().flat_map(|(pair, r)| pair.map(|it| (it, r)));
+        let joints = round.chain(limbs).map(|(bone, r)| frames[bone].translation.z - r * scale);
         soles.chain(joints).fold(f64::INFINITY, f64::min)
     }
 

@@ -62,10 +62,8 @@ impl Bystander {
     ///
     /// * `number`: among those of the scene, from 0.
     pub(crate) fn standing(settings: &Settings, number: u64) -> Self {
-        let mut random = Random::new(settings.subject)
-            .fork("others")
-            .nth(settings.seed)
-            .nth(number);
+        let mut random =
+            Random::new(settings.subject).fork("others").nth(settings.seed).nth(number);
         let subject = Subject::new(random.bits());
         let share = (number as f64 + random.range(0.0, 0.6)) / settings.others.max(1) as f64;
         let bearing = share * core::f64::consts::TAU;
@@ -88,10 +86,7 @@ impl Bystander {
         number: u64,
         trunks: &dyn Fn(f64) -> Vec<Vector3<f64>>,
     ) -> Self {
-        let random = Random::new(settings.subject)
-            .fork("passers")
-            .nth(settings.seed)
-            .nth(number);
+        let random = Random::new(settings.subject).fork("passers").nth(settings.seed).nth(number);
         let subject = Subject::new(random.fork("subject").bits());
         let n_instants = (WATCHED_S / WATCHED_EVERY_S) as usize;
         let instants = (0..n_instants).map(|nth| nth as f64 * WATCHED_EVERY_S);

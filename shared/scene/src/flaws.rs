@@ -63,11 +63,7 @@ impl Flaws {
             &mut self.calibration_degrees,
             &mut self.calibration_mm,
         ];
-        Self::NAMES
-            .iter()
-            .zip(all)
-            .find(|it| *it.0 == name)
-            .map(|it| it.1)
+        Self::NAMES.iter().zip(all).find(|it| *it.0 == name).map(|it| it.1)
     }
 
     /// Checks the ranges.
@@ -101,12 +97,7 @@ impl Flaws {
 
     /// Whether a camera's frame is dropped. The first never is.
     pub(crate) fn drops(&self, random: Random, camera: usize, frame: u64) -> bool {
-        frame > 0
-            && random
-                .fork("drop")
-                .nth(camera as u64)
-                .nth(frame)
-                .chance(self.drop)
+        frame > 0 && random.fork("drop").nth(camera as u64).nth(frame).chance(self.drop)
     }
 
     /// The clock offset of a camera, seconds.
@@ -156,9 +147,7 @@ impl Flaws {
                 let bits = random.bits().to_le_bytes();
                 let sum: i32 = bits[..4].iter().map(|it| i32::from(*it)).sum();
                 let deviate = (f64::from(sum) - 510.0) / 147.8;
-                *value = (f64::from(*value) + self.noise * deviate)
-                    .round()
-                    .clamp(0.0, 255.0) as u8;
+                *value = (f64::from(*value) + self.noise * deviate).round().clamp(0.0, 255.0) as u8;
             }
         }
     }
@@ -208,9 +197,7 @@ mod tests {
     const SIZE: Size = Size::new(40, 30);
 
     fn degraded(flaws: Flaws) -> Vec<u8> {
-        let mut rgb: Vec<u8> = (0..SIZE.rgb_bytes())
-            .map(|it| (it / 3 % 40 * 6) as u8)
-            .collect();
+        let mut rgb: Vec<u8> = (0..SIZE.rgb_bytes()).map(|it| (it / 3 % 40 * 6) as u8).collect();
         flaws.degrade(Random::new(1), SIZE, &mut rgb);
         rgb
     }
@@ -223,10 +210,7 @@ mod tests {
             noise: 5.0,
             ..Flaws::default()
         });
-        let off = plain
-            .iter()
-            .zip(&noisy)
-            .map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
+        let off = plain.iter().zip(&noisy).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
         let deviation = (off.sum::<f64>() / plain.len() as f64).sqrt();
         assert!((deviation - 5.0).abs() < 0.5, "{deviation}");
         assert!((mean(&noisy) - mean(&plain)).abs() < 0.7);
@@ -275,9 +259,7 @@ mod tests {
             drop: 0.2,
             ..Flaws::default()
         };
-        let n = (0..2000)
-            .filter(|it| flaws.drops(Random::new(3), 1, *it))
-            .count();
+        let n = (0..2000).filter(|it| flaws.drops(Random::new(3), 1, *it)).count();
         assert!((330..470).contains(&n), "{n}");
         assert!(!(0..50).any(|it| flaws.drops(Random::new(it), 1, 0)));
     }

@@ -75,13 +75,9 @@ impl Mesh {
                     blend += moves[usize::from(*bone)] * *share;
                 }
             }
-            posed
-                .points
-                .push(Point3::from(blend * point.coords.push(1.0)));
+            posed.points.push(Point3::from(blend * point.coords.push(1.0)));
             let turned = blend.fixed_columns::<3>(0) * normal;
-            posed
-                .normals
-                .push(turned.try_normalize(1e-6).unwrap_or(*normal));
+            posed.normals.push(turned.try_normalize(1e-6).unwrap_or(*normal));
         }
     }
 }
@@ -173,11 +169,7 @@ mod tests {
     #[test]
     fn points_lie_on_the_surface_and_the_bones_inside() {
         let (bones, shape, mesh) = mesh_of(4);
-        let on = mesh
-            .points
-            .iter()
-            .filter(|it| shape.distance(it).abs() < 1.5e-3)
-            .count();
+        let on = mesh.points.iter().filter(|it| shape.distance(it).abs() < 1.5e-3).count();
         assert!(on as f64 > 0.98 * mesh.points.len() as f64);
         let joints = bones.joints(&shape.frames);
         for (joint, at) in skeleton::PARSE14.joints.iter().zip(joints) {
@@ -203,11 +195,7 @@ mod tests {
         pose.angles[crate::body::FOREARM[0]] = [90.0, 0.0, 0.0];
         let mut posed = Posed::default();
         mesh.pose(&bones.frames(&pose), &mut posed);
-        let moved = posed
-            .points
-            .iter()
-            .zip(&mesh.points)
-            .filter(|(a, b)| (*a - *b).norm() > 0.05);
+        let moved = posed.points.iter().zip(&mesh.points).filter(|(a, b)| (*a - *b).norm() > 0.05);
         let (mut n, mut left) = (0, 0);
         for (_, at) in moved {
             n += 1;

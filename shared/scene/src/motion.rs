@@ -96,10 +96,7 @@ struct Actor {
 impl Motion {
     /// An action. The same subject, action and seed move the same way.
     pub(crate) fn new(subject: &Subject, action: Action, seed: u64) -> Self {
-        let random = Random::new(seed)
-            .fork("motion")
-            .nth(subject.number)
-            .fork(action.name());
+        let random = Random::new(seed).fork("motion").nth(subject.number).fork(action.name());
         let mut stage = random.fork("stage");
         let bones = Bones::new(&subject.proportions);
         let place = [stage.range(-0.25, 0.25), stage.range(-0.25, 0.25)];

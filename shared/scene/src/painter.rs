@@ -87,8 +87,7 @@ impl Painter {
         let camera = of.camera;
         self.eye = camera.centre_in_world().coords.cast();
         let size = of.backdrop.size;
-        self.samples
-            .begin(size.width * SUB, size.height * SUB, &of.backdrop.near);
+        self.samples.begin(size.width * SUB, size.height * SUB, &of.backdrop.near);
         self.corners.clear();
         self.bodies.resize_with(of.people.len(), Body::default);
         let mut n_triangles = 0;
@@ -141,10 +140,7 @@ impl Painter {
 
     /// Whether a sample sees the subject.
     pub(crate) fn sees_subject(&self, sample: usize) -> bool {
-        let end = self
-            .bodies
-            .get(1)
-            .map_or(usize::MAX, |it| it.first_triangle);
+        let end = self.bodies.get(1).map_or(usize::MAX, |it| it.first_triangle);
         let triangle = self.samples.triangle[sample];
         triangle != NOTHING && (triangle as usize) < end
     }
@@ -152,12 +148,7 @@ impl Painter {
     /// The number of samples that see each person, the subject first, after [`draw`](Self::draw).
     pub(crate) fn seen(&self) -> Vec<usize> {
         let mut seen = vec![0; self.bodies.len()];
-        for triangle in self
-            .samples
-            .triangle
-            .iter()
-            .filter(|nearest| **nearest != NOTHING)
-        {
+        for triangle in self.samples.triangle.iter().filter(|nearest| **nearest != NOTHING) {
             let body = |body: &Body| body.first_triangle <= *triangle as usize;
             seen[self.bodies.partition_point(body) - 1] += 1;
         }
@@ -171,10 +162,7 @@ impl Painter {
         let width = self.samples.width / SUB;
         for y in y1 / SUB..y2.div_ceil(SUB) {
             for x in x1 / SUB..x2.div_ceil(SUB) {
-                let n = self
-                    .of_pixel(x, y)
-                    .filter(|it| self.sees_subject(*it))
-                    .count();
+                let n = self.of_pixel(x, y).filter(|it| self.sees_subject(*it)).count();
                 mask[y * width + x] = (n * 255 / (SUB * SUB)) as u8;
             }
         }
@@ -187,10 +175,7 @@ impl Painter {
 
     /// The mean of the samples of a pixel, where any of them sees a person.
     fn pixel(&self, of: &Input<'_>, x: usize, y: usize) -> Option<Linear> {
-        let n = self
-            .of_pixel(x, y)
-            .filter(|it| self.samples.triangle[*it] != NOTHING)
-            .count();
+        let n = self.of_pixel(x, y).filter(|it| self.samples.triangle[*it] != NOTHING).count();
         if n == 0 {
             return None;
         }
@@ -211,9 +196,7 @@ impl Painter {
 
     /// The light reflected to the camera by a place of the body.
     fn shade(&self, of: &Input<'_>, triangle: usize, place: Point2<f32>) -> Linear {
-        let after = self
-            .bodies
-            .partition_point(|it| it.first_triangle <= triangle);
+        let after = self.bodies.partition_point(|it| it.first_triangle <= triangle);
         let body = &self.bodies[after - 1];
         let Figure { mesh, wear } = of.people[after - 1].figure;
         let corners = mesh.triangles[triangle - body.first_triangle].map(|it| it as usize);
@@ -236,15 +219,10 @@ impl Painter {
         let key = direct * (1.0 - dark);
         let to_eye = self.eye - at.coords;
         let half = to_eye.try_normalize(1e-6).unwrap_or(Vector3::z()) + of.light.to_key;
-        let mirrored = half
-            .try_normalize(1e-6)
-            .map_or(0.0, |it| it.dot(&normal).max(0.0));
+        let mirrored = half.try_normalize(1e-6).map_or(0.0, |it| it.dot(&normal).max(0.0));
         let shine = finish.gloss * mirrored.powi(24) * 4.0 * (1.0 - dark);
         // Places near the floor are darker.
         let low = 1.0 - 0.35 * (-(at.z.max(0.0)) / 0.25).exp();
-        finish
-            .colour
-            .component_mul(&(of.light.around(&normal) * low + key))
-            + of.light.key * shine
+        finish.colour.component_mul(&(of.light.around(&normal) * low + key)) + of.light.key * shine
     }
 }

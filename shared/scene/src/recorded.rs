@@ -140,12 +140,8 @@ fn recorded_leg(recording: &Recording) -> f64 {
         (knee - hip).norm() + (ankle - knee).norm()
     };
     let all = recording.postures.iter();
-    let all: Vec<f64> = all
-        .flat_map(|it| [0, 1].map(|side| length(it, side)))
-        .collect();
-    Sorted::new(all)
-        .upper_median()
-        .map_or(1e-3, |it| it.max(1e-3))
+    let all: Vec<f64> = all.flat_map(|it| [0, 1].map(|side| length(it, side))).collect();
+    Sorted::new(all).upper_median().map_or(1e-3, |it| it.max(1e-3))
 }
 
 /// The rotations of all bones, in the frame of the recording.

@@ -80,16 +80,12 @@ impl RigChoice {
         };
         let mut fields = rest.split(':');
         let n = fields.next().and_then(|it| it.parse().ok());
-        let n = n
-            .filter(|it| (1..=MAX_RING_CAMERAS).contains(it))
-            .ok_or_else(wrong)?;
+        let n = n.filter(|it| (1..=MAX_RING_CAMERAS).contains(it)).ok_or_else(wrong)?;
         let mut metres = |default: f64, least: f64| match fields.next() {
             None => Ok(default),
             Some(text) => {
                 let value: Option<f64> = text.parse().ok();
-                value
-                    .filter(|it| (least..=50.0).contains(it))
-                    .ok_or_else(wrong)
+                value.filter(|it| (least..=50.0).contains(it)).ok_or_else(wrong)
             }
         };
         let ring = Self::Ring {
@@ -151,10 +147,7 @@ fn umpm() -> Result<Rig, RigChoiceError> {
         rows += row * row.transpose();
     }
     let eigen = rows.symmetric_eigen();
-    let up: Vector3<f64> = eigen
-        .eigenvectors
-        .column(eigen.eigenvalues.imin())
-        .into_owned();
+    let up: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
     let first = rig.cameras()[0].camera_from_world.rotation.inverse();
     // y points down in pictures.
     let up = if (first * Vector3::y()).dot(&up) > 0.0 {
@@ -273,11 +266,7 @@ mod tests {
     fn presets_have_the_cameras_of_their_names() {
         let rig = RigChoice::HumanEva.rig().unwrap();
         assert_eq!(rig.cameras().len(), 3);
-        assert!(
-            rig.cameras()
-                .iter()
-                .all(|it| it.intrinsics.size == [640, 480])
-        );
+        assert!(rig.cameras().iter().all(|it| it.intrinsics.size == [640, 480]));
         for (a, b) in [(0, 1), (0, 2)] {
             assert!((angle_between(&rig, a, b) - 90.0).abs() < 25.0);
         }
@@ -303,9 +292,7 @@ mod tests {
             let rig = RigChoice::parse(choice).unwrap().rig().unwrap();
             let stage = world_from_stage(&rig).unwrap();
             for camera in rig.cameras() {
-                let pixel = camera
-                    .project(&(stage * Point3::new(0.0, 0.0, 0.9)))
-                    .unwrap();
+                let pixel = camera.project(&(stage * Point3::new(0.0, 0.0, 0.9))).unwrap();
                 let [width, height] = camera.intrinsics.size.map(f64::from);
                 let share = [pixel.x / width, pixel.y / height];
                 assert!(

@@ -116,9 +116,7 @@ impl Room {
     /// Whether furniture stands between a point and the key lamp.
     pub(crate) fn is_shaded(&self, at: &Vector3<f32>, towards: &Vector3<f32>) -> bool {
         let from = Point3::from(at + towards * 2e-3);
-        self.blocks
-            .iter()
-            .any(|it| it.enter(&from, towards).is_some())
+        self.blocks.iter().any(|it| it.enter(&from, towards).is_some())
     }
 
     fn walls(&self, from: &Point3<f32>, direction: &Vector3<f32>) -> Hit {
@@ -175,8 +173,7 @@ impl Room {
             return (Linear::new(0.5, 0.48, 0.45), false);
         }
         (
-            self.wall
-                .colour(&Vector3::new(place.x, place.y, wall as f32)),
+            self.wall.colour(&Vector3::new(place.x, place.y, wall as f32)),
             false,
         )
     }

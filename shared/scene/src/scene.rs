@@ -170,12 +170,7 @@ impl Scene {
         Header {
             frame_rate_hz: self.settings.rate_hz,
             up: up.into(),
-            cameras: self
-                .rig
-                .cameras()
-                .iter()
-                .map(|it| it.name.clone())
-                .collect(),
+            cameras: self.rig.cameras().iter().map(|it| it.name.clone()).collect(),
             ..Header::new(self.settings.subject, self.action(), self.settings.seed)
         }
     }
@@ -198,9 +193,7 @@ impl Scene {
             joints.map(|joint| (self.world_from_stage * joint).coords.into())
         };
         let others = self.others.iter();
-        others
-            .map(|other| in_world(other.joints(seconds)))
-            .collect()
+        others.map(|other| in_world(other.joints(seconds))).collect()
     }
 
     /// Nose, left and right heel, left and right big toe at a time, metres in the world.
@@ -227,11 +220,7 @@ impl Scene {
             shown -= 1;
         }
         let late = flaws.late_s(self.random, camera);
-        let skew = self
-            .settings
-            .skews_ms
-            .get(camera)
-            .map_or(0.0, |it| it * 1e-3);
+        let skew = self.settings.skews_ms.get(camera).map_or(0.0, |it| it * 1e-3);
         (self.seconds(shown) + skew + late, shown != frame)
     }
 }
@@ -239,9 +228,8 @@ impl Scene {
 /// Those who stand around, then those who pass.
 fn others(settings: &Settings, performance: &Performance) -> Vec<Bystander> {
     let standing = 0..settings.others;
-    let mut others: Vec<Bystander> = standing
-        .map(|nth| Bystander::standing(settings, nth))
-        .collect();
+    let mut others: Vec<Bystander> =
+        standing.map(|nth| Bystander::standing(settings, nth)).collect();
     for nth in 0..settings.passers {
         let trunk = |frames: [Isometry3<f64>; N_BONES]| frames[PELVIS].translation.vector;
         let trunks = |seconds: f64| {
@@ -264,12 +252,10 @@ pub fn camera_of(rig: &Rig, name: &str) -> Result<usize, SceneError> {
     let cameras = rig.cameras();
     let by_name = cameras.iter().position(|it| it.name == name);
     let by_number = || name.parse().ok().filter(|it| *it < cameras.len());
-    by_name
-        .or_else(by_number)
-        .ok_or_else(|| SceneError::NoCamera {
-            name: name.to_owned(),
-            known: cameras.iter().map(|it| it.name.clone()).collect(),
-        })
+    by_name.or_else(by_number).ok_or_else(|| SceneError::NoCamera {
+        name: name.to_owned(),
+        known: cameras.iter().map(|it| it.name.clone()).collect(),
+    })
 }
 
 /// How long after the instants of the frames the camera of an address takes its pictures, milliseconds; 0 for a camera that the rig
@@ -278,9 +264,7 @@ pub fn skew_ms_of(address: &Address) -> f64 {
     let Settings { rig, skews_ms, .. } = &address.settings;
     let rig = (!skews_ms.is_empty()).then(|| rig.rig().ok()).flatten();
     let nth = rig.and_then(|rig| camera_of(&rig, &address.camera).ok());
-    nth.and_then(|nth| skews_ms.get(nth))
-        .copied()
-        .unwrap_or(0.0)
+    nth.and_then(|nth| skews_ms.get(nth)).copied().unwrap_or(0.0)
 }
 
 /// One camera of a scene: makes its pictures, in buffers of its own.
@@ -348,16 +332,8 @@ impl View {
         );
         let (seconds, repeated) = self.scene.taken(self.camera, frame);
         let frames = self.draw(seconds, Some(rgb));
-        let random = self
-            .scene
-            .random
-            .fork("spoil")
-            .nth(self.camera as u64)
-            .nth(seconds.to_bits());
-        self.scene
-            .settings
-            .flaws
-            .degrade(random, self.backdrop.size, rgb);
+        let random = self.scene.random.fork("spoil").nth(self.camera as u64).nth(seconds.to_bits());
+        self.scene.settings.flaws.degrade(random, self.backdrop.size, rgb);
         self.ground_truth(&frames, seconds, repeated)
     }
 

@@ -208,11 +208,7 @@ impl Address {
             value: value.to_owned(),
             expected: expected.to_owned(),
         };
-        let count = || {
-            value
-                .parse::<u64>()
-                .map_err(|_not| wrong("a whole number, 0 or more"))
-        };
+        let count = || value.parse::<u64>().map_err(|_not| wrong("a whole number, 0 or more"));
         let settings = &mut self.settings;
         match key {
             "camera" => value.clone_into(&mut self.camera),

@@ -38,8 +38,7 @@ impl Shadow {
         self.low = low;
         (self.width, self.height) = (extent.x as usize + 2, extent.y as usize + 2);
         self.near.clear();
-        self.near
-            .resize(self.width * self.height, f32::NEG_INFINITY);
+        self.near.resize(self.width * self.height, f32::NEG_INFINITY);
         let mut first = 0;
         for Surface { points, triangles } in bodies {
             for triangle in *triangles {

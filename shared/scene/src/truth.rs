@@ -250,12 +250,7 @@ mod tests {
 
     #[test]
     fn every_joint_of_every_set_is_made_of_the_fourteen() {
-        let known: Vec<usize> = PARSE14
-            .joints
-            .iter()
-            .flat_map(|it| it.parts)
-            .copied()
-            .collect();
+        let known: Vec<usize> = PARSE14.joints.iter().flat_map(|it| it.parts).copied().collect();
         for set in JointSet::ALL {
             for joint in set.joints {
                 assert!(

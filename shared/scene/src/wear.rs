@@ -112,10 +112,7 @@ impl Wear {
         let from = at - limb[0];
         let share = from.dot(&axis) / axis.norm_squared();
         let off = from - axis * share;
-        let across = axis
-            .cross(&Vector3::x())
-            .try_normalize(1e-6)
-            .unwrap_or(Vector3::y());
+        let across = axis.cross(&Vector3::x()).try_normalize(1e-6).unwrap_or(Vector3::y());
         let around = off.x.atan2(off.dot(&across)) * 0.06;
         (share, Vector2::new(around, share * axis.norm()))
     }
@@ -200,10 +197,7 @@ impl Wear {
         }
         if pair(0.0, -0.027, 0.024, 0.006) {
             return Finish {
-                colour: self
-                    .subject
-                    .skin
-                    .component_mul(&Linear::new(0.75, 0.42, 0.42)),
+                colour: self.subject.skin.component_mul(&Linear::new(0.75, 0.42, 0.42)),
                 ..self.skin(at)
             };
         }

@@ -27,10 +27,8 @@ fn synthetic_people_are_people_whatever_they_do() {
                 let tall = found.stature.unwrap().metres;
                 assert!((1.4..2.05).contains(&tall), "{at}: {tall} m");
                 let moved = refine(&joints, &[None; 14], None).joints;
-                let moved = moved
-                    .iter()
-                    .zip(&joints)
-                    .map(|(a, b)| (a.unwrap() - b.unwrap()).norm());
+                let moved =
+                    moved.iter().zip(&joints).map(|(a, b)| (a.unwrap() - b.unwrap()).norm());
                 let values = [
                     found.deviation,
                     deviation(&joints),

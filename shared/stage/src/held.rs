@@ -21,9 +21,7 @@ pub struct Held<E: Element, H: BulkHeader> {
 
 impl<E: Element, H: BulkHeader> fmt::Debug for Held<E, H> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Held")
-            .field("view", &self.inner.view)
-            .finish_non_exhaustive()
+        f.debug_struct("Held").field("view", &self.inner.view).finish_non_exhaustive()
     }
 }
 

@@ -98,17 +98,13 @@ impl<'a, T> Inbox<'a, T> {
     pub(crate) fn processed(&mut self, stamp: &Stamp, busy_nanos: u64) {
         if let Some(step) = self.skip_step() {
             let nth = stamp.frame / step;
-            self.cadence
-                .processed(nth, stamp.captured_at_nanos, busy_nanos);
+            self.cadence.processed(nth, stamp.captured_at_nanos, busy_nanos);
         }
     }
 
     fn skip_step(&self) -> Option<u64> {
         let is_realtime = self.rules.delivery == Delivery::Realtime;
-        self.rules
-            .skips
-            .filter(|_| is_realtime)
-            .map(|step| step.max(1))
+        self.rules.skips.filter(|_| is_realtime).map(|step| step.max(1))
     }
 
     /// The last messages of every slot.

@@ -75,9 +75,7 @@ impl Input {
         let elapsed = |at: u64| now.saturating_sub(at);
         let silence = elapsed(began_at.max(self.received_at.unwrap_or(0)));
         let absence = silence.min(self.alive_at.map_or(u64::MAX, elapsed));
-        let is_overdue = self
-            .deadline
-            .is_some_and(|deadline| elapsed(began_at) >= deadline);
+        let is_overdue = self.deadline.is_some_and(|deadline| elapsed(began_at) >= deadline);
         is_overdue || absence >= patience[0] || silence >= patience[1]
     }
 }
@@ -233,16 +231,11 @@ impl<T> Joiner<T> {
     pub fn is_over(&self, now: u64) -> bool {
         let patience = [self.patience_nanos, self.alive_patience_nanos];
         let is_silent = |input: &Input| {
-            input
-                .received_at
-                .is_some_and(|at| input.silent_since(at, now, patience))
+            input.received_at.is_some_and(|at| input.silent_since(at, now, patience))
         };
         self.pending.is_empty()
             && self.inputs.iter().any(|input| input.ended)
-            && self
-                .inputs
-                .iter()
-                .all(|input| input.ended || input.down || is_silent(input))
+            && self.inputs.iter().all(|input| input.ended || input.down || is_silent(input))
     }
 }
 

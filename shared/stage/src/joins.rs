@@ -47,8 +47,7 @@ impl<T> Joins<T> {
         {
             // It may be too late for its own frame and in time for the next one.
             let value = copy(&item.value);
-            self.last
-                .keep(slot, stamp.frame, stamp.captured_at_nanos, value);
+            self.last.keep(slot, stamp.frame, stamp.captured_at_nanos, value);
         }
         match self.joiner.push(slot, stamp.frame, item, context.now()) {
             Push::Taken => {}

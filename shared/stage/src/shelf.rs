@@ -39,11 +39,8 @@ impl<S> Shelf<S> {
             };
             self.held.push(sample);
             if self.capacity > 1 && self.held.len() == self.capacity {
-                let steps: Vec<u64> = self
-                    .held
-                    .iter()
-                    .map(|(frame, _)| frame / self.frame_step)
-                    .collect();
+                let steps: Vec<u64> =
+                    self.held.iter().map(|(frame, _)| frame / self.frame_step).collect();
                 self.held.remove(least_needed(&steps));
             }
         }

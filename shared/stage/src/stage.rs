@@ -197,10 +197,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         frame_step: u64,
     ) -> Result<Held<f32, EvidenceHeader>, Failure> {
         let topic = topic::evidence(view);
-        let subscriber = self
-            .service
-            .bus()
-            .slice_subscriber(&topic, &mut self.waiter)?;
+        let subscriber = self.service.bus().slice_subscriber(&topic, &mut self.waiter)?;
         let shelf = Shelf::new(1, frame_step);
         let held = Held::<f32, EvidenceHeader>::new(subscriber, view, shelf, |sample, expected| {
             expected.check(&sample.header().stamp, &sample.header().timing)
@@ -220,10 +217,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         frame_step: u64,
     ) -> Result<Held<u8, FrameHeader>, Failure> {
         let topic = topic::frame(view);
-        let subscriber = self
-            .service
-            .bus()
-            .slice_subscriber(&topic, &mut self.waiter)?;
+        let subscriber = self.service.bus().slice_subscriber(&topic, &mut self.waiter)?;
         let capacity = match self.service.delivery() {
             Delivery::Lossless => 1,
             Delivery::Realtime => HELD_REALTIME,
@@ -271,8 +265,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         end_stamp: EndStamp,
     ) -> Result<Output<'a, M>, Failure> {
         let publisher = Rc::new(self.service.bus().publisher::<M>(topic)?);
-        self.outgoing
-            .push(Outgoing::messages(&publisher, n_receivers, end_stamp));
+        self.outgoing.push(Outgoing::messages(&publisher, n_receivers, end_stamp));
         Ok(Output::new(self.service, publisher))
     }
 
@@ -287,8 +280,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         n_receivers: usize,
     ) -> Result<Rc<SlicePublisher<E, H>>, Failure> {
         let publisher = Rc::new(self.service.bus().slice_publisher(topic)?);
-        self.outgoing
-            .push(Outgoing::arrays(&publisher, n_receivers));
+        self.outgoing.push(Outgoing::arrays(&publisher, n_receivers));
         Ok(publisher)
     }
 

@@ -69,14 +69,10 @@ pub fn man(arguments: &ManArguments, mut command: Command) -> Result<ExitCode, F
 /// A page cannot be written.
 pub fn write_pages(command: Command, folder: &Path) -> Result<usize, Failure> {
     let below: Vec<Command> = command.get_subcommands().cloned().collect();
-    let name = command
-        .get_display_name()
-        .unwrap_or_else(|| command.get_name());
+    let name = command.get_display_name().unwrap_or_else(|| command.get_name());
     let file = folder.join(format!("{name}.1"));
     let mut page = Vec::new();
-    clap_mangen::Man::new(command)
-        .render(&mut page)
-        .or_fail(ExitKind::Run)?;
+    clap_mangen::Man::new(command).render(&mut page).or_fail(ExitKind::Run)?;
     files::replace(&file, &page).map_err(|error| in_file(&file, &error))?;
     let mut n_pages = 1;
     for command in below {

@@ -13,17 +13,11 @@ pub struct Outline(
 ///
 /// It is not four numbers, or has no extent.
 pub fn outline(text: &str) -> Result<Outline, String> {
-    let numbers: Result<Vec<f64>, _> = text
-        .split(',')
-        .map(|number| number.trim().parse())
-        .collect();
-    let corners = numbers
-        .ok()
-        .and_then(|four| <[f64; 4]>::try_from(four).ok());
+    let numbers: Result<Vec<f64>, _> =
+        text.split(',').map(|number| number.trim().parse()).collect();
+    let corners = numbers.ok().and_then(|four| <[f64; 4]>::try_from(four).ok());
     let is_box = |[left, top, right, bottom]: &[f64; 4]| {
-        [left, top, right, bottom]
-            .iter()
-            .all(|edge| edge.is_finite())
+        [left, top, right, bottom].iter().all(|edge| edge.is_finite())
             && left < right
             && top < bottom
     };

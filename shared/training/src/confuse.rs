@@ -55,8 +55,7 @@ impl Loss<'_> {
     pub(crate) fn of_pose(&self, model: &Model, pose: &Pose) -> f64 {
         let centres = pose.centres(model, self.layout);
         let off = centres.iter().zip(&self.marked.parts);
-        off.map(|(a, b)| self.of((a[0] - b[0]).hypot(a[1] - b[1])))
-            .sum()
+        off.map(|(a, b)| self.of((a[0] - b[0]).hypot(a[1] - b[1]))).sum()
     }
 }
 

@@ -22,17 +22,10 @@ impl Marked {
     /// every side by half of its width and height together (Yang & Ramanan 2013).
     pub fn surroundings(&self) -> [f64; 4] {
         let half = self.side / 2.0;
-        let low = |axis: usize| {
-            self.parts
-                .iter()
-                .map(|it| it[axis] - half)
-                .fold(f64::INFINITY, f64::min)
-        };
+        let low =
+            |axis: usize| self.parts.iter().map(|it| it[axis] - half).fold(f64::INFINITY, f64::min);
         let high = |axis: usize| {
-            self.parts
-                .iter()
-                .map(|it| it[axis] + half)
-                .fold(f64::NEG_INFINITY, f64::max)
+            self.parts.iter().map(|it| it[axis] + half).fold(f64::NEG_INFINITY, f64::max)
         };
         let around = [low(0), low(1), high(0), high(1)];
         let grow = (around[2] - around[0] + around[3] - around[1]) / 2.0;
@@ -225,10 +218,7 @@ impl Search<'_> {
             rows.map(|(row, weights)| {
                 let first = ((cell.y + row) * map.cols + cell.x) * N_CHANNELS;
                 let cells = map.cells[first..first + len].iter();
-                cells
-                    .zip(weights)
-                    .map(|(a, b)| f64::from(*a) * b)
-                    .sum::<f64>()
+                cells.zip(weights).map(|(a, b)| f64::from(*a) * b).sum::<f64>()
             })
             .sum()
         };
@@ -291,9 +281,7 @@ impl Search<'_> {
         Pose {
             score: (score + self.model.spec().root_bias) as f32,
             level: self.level as u16,
-            parts: placed
-                .map(|((cell, k), of)| placement(&of[*cell], *k))
-                .collect(),
+            parts: placed.map(|((cell, k), of)| placement(&of[*cell], *k)).collect(),
         }
     }
 }

@@ -113,9 +113,8 @@ impl Plan {
         }
         let side = fits.min(settings.max_filter_cells);
         let filter_px = side * settings.cell_px;
-        let large: Vec<usize> = (0..people.len())
-            .filter(|&it| sides[it] >= filter_px as f64)
-            .collect();
+        let large: Vec<usize> =
+            (0..people.len()).filter(|&it| sides[it] >= filter_px as f64).collect();
         if large.is_empty() {
             let n_people = people.len();
             return Err(PlanError::NoPeople {
@@ -125,10 +124,7 @@ impl Plan {
         }
         let in_cells = |&it: &usize| {
             let scale = side as f64 / sides[it];
-            people[it]
-                .iter()
-                .map(|at| at.map(|px| px * scale))
-                .collect()
+            people[it].iter().map(|at| at.map(|px| px * scale)).collect()
         };
         let in_cells: Vec<Vec<[f64; 2]>> = large.iter().map(in_cells).collect();
         let Types { of_person, anchors } = cluster(&in_cells, tree.sides(settings), settings);

@@ -103,9 +103,7 @@ impl Shape {
         Model::new(ModelSpec {
             name: self.name.clone(),
             filters: filters.collect(),
-            parts: (0..self.n_parts())
-                .map(|it| self.part(&at, v, it))
-                .collect(),
+            parts: (0..self.n_parts()).map(|it| self.part(&at, v, it)).collect(),
             root_bias: v[at.root] / ROOT_BIAS_SCALE,
             interval: self.interval,
             cell_px: self.cell_px,

@@ -56,14 +56,8 @@ impl Symmetry {
 
     /// The mean of a vector and its mirror image.
     pub(crate) fn balance(&self, v: &[f64]) -> Vec<f64> {
-        let theirs = self
-            .mirrored
-            .iter()
-            .map(|&(at, sign)| sign * v[at as usize]);
-        v.iter()
-            .zip(theirs)
-            .map(|(own, theirs)| 0.5 * (own + theirs))
-            .collect()
+        let theirs = self.mirrored.iter().map(|&(at, sign)| sign * v[at as usize]);
+        v.iter().zip(theirs).map(|(own, theirs)| 0.5 * (own + theirs)).collect()
     }
 }
 
@@ -118,9 +112,7 @@ mod tests {
     fn shape() -> Shape {
         Shape {
             name: "small".to_owned(),
-            part_names: ["head", "trunk", "right", "left"]
-                .map(str::to_owned)
-                .to_vec(),
+            part_names: ["head", "trunk", "right", "left"].map(str::to_owned).to_vec(),
             parents: vec![None, Some(0), Some(1), Some(1)],
             mirror: Some(SIDES.to_vec()),
             anchors: vec![

@@ -34,9 +34,8 @@ pub(crate) fn vector(seed: u64) -> Vec<f64> {
 /// Coarse noise, so that features differ from cell to cell.
 pub(crate) fn noise(width: usize, height: usize, seed: u64) -> Picture {
     let mut random = fastrand::Rng::with_seed(seed);
-    let blocks: Vec<u8> = (0..(width / 3 + 1) * (height / 3 + 1) * 3)
-        .map(|_| random.u8(..))
-        .collect();
+    let blocks: Vec<u8> =
+        (0..(width / 3 + 1) * (height / 3 + 1) * 3).map(|_| random.u8(..)).collect();
     let mut picture = Picture::filled(Size::new(width, height), [0; 3]);
     for (at, value) in picture.rgb_mut().iter_mut().enumerate() {
         let (x, y) = (at / 3 % width, at / 3 / width);

@@ -88,9 +88,7 @@ pub struct Trainer<'a> {
 
 impl std::fmt::Debug for Trainer<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Trainer")
-            .field("next", &self.next)
-            .finish_non_exhaustive()
+        f.debug_struct("Trainer").field("next", &self.next).finish_non_exhaustive()
     }
 }
 
@@ -116,10 +114,7 @@ impl<'a> Trainer<'a> {
             next: 0,
             cells: Mutex::default(),
             right: vec![None; plan.n_people()],
-            symmetry: settings
-                .symmetric
-                .then(|| Symmetry::of(plan.shape()))
-                .flatten(),
+            symmetry: settings.symmetric.then(|| Symmetry::of(plan.shape())).flatten(),
             v: vec![0.0; at.len()],
             threshold: 0.0,
             plan,
@@ -222,8 +217,7 @@ impl<'a> Trainer<'a> {
                 shares[*person as usize] = share;
             }
         }
-        self.machine
-            .retain(|it| matches!(it, Origin::Background { .. }));
+        self.machine.retain(|it| matches!(it, Origin::Background { .. }));
         self.right = placed.into_iter().map(|it| it.map(|it| it.0)).collect();
         let people = self.right.iter().zip(shares).enumerate();
         let (origins, shares): (Vec<_>, Vec<_>) = people
@@ -266,11 +260,7 @@ impl<'a> Trainer<'a> {
             Origin::Background { image, .. } => Some(*image as usize),
             Origin::Right { .. } | Origin::Mistake { .. } => None,
         };
-        let shown: BTreeSet<usize> = self
-            .machine
-            .entries()
-            .filter_map(|it| image(it.0))
-            .collect();
+        let shown: BTreeSet<usize> = self.machine.entries().filter_map(|it| image(it.0)).collect();
         let cells = self.cells.get_mut().unwrap_or_else(PoisonError::into_inner);
         cells.retain(|it, _| shown.contains(it));
     }

@@ -162,10 +162,7 @@ fn in_the_middle(
     random: &mut fastrand::Rng,
 ) -> OfPart {
     let is_left: Vec<bool> = plain.iter().zip(&mirrored).map(|(a, b)| a < b).collect();
-    let right = plain
-        .into_iter()
-        .zip(mirrored)
-        .map(|(a, b)| if a < b { b } else { a });
+    let right = plain.into_iter().zip(mirrored).map(|(a, b)| if a < b { b } else { a });
     let half = Settings {
         n_types: settings.n_types / 2,
         ..settings.clone()
@@ -174,17 +171,14 @@ fn in_the_middle(
     let label = |(label, is_left): (&usize, bool)| 2 * label + usize::from(is_left);
     let labels = found.labels.iter().zip(is_left).map(label).collect();
     let centres = found.centres.into_iter();
-    let centres = centres
-        .flat_map(|it| [it.clone(), in_mirror(&it)])
-        .collect();
+    let centres = centres.flat_map(|it| [it.clone(), in_mirror(&it)]).collect();
     OfPart { labels, centres }
 }
 
 /// A mirrored point.
 fn in_mirror(point: &[f64]) -> Vec<f64> {
     let axes = point.iter().enumerate();
-    axes.map(|(axis, it)| if axis % 2 == 0 { -it } else { *it })
-        .collect()
+    axes.map(|(axis, it)| if axis % 2 == 0 { -it } else { *it }).collect()
 }
 
 fn middle(points: &mut dyn Iterator<Item = &Vec<f64>>) -> Vec<f64> {

@@ -144,9 +144,7 @@ fn the_file_that_is_written_finds_what_the_trained_network_found() {
     };
     session.run(&[input], &[BOXES], take).unwrap();
     // Weights are stored in half precision.
-    let scale = expected
-        .iter()
-        .fold(0.0_f32, |most, value| most.max(value.abs()));
+    let scale = expected.iter().fold(0.0_f32, |most, value| most.max(value.abs()));
     let off = found.iter().zip(&expected).map(|(a, b)| (a - b).abs());
     let worst = off.fold(0.0, f32::max);
     assert_eq!(found.len(), expected.len());

@@ -207,19 +207,13 @@ fn the_file_that_is_written_finds_what_the_trained_network_found() {
     let expected = [
         found.maps,
         found.fronts,
-        found
-            .errors
-            .iter()
-            .map(|logarithm| logarithm.exp())
-            .collect(),
+        found.errors.iter().map(|logarithm| logarithm.exp()).collect(),
     ];
     // Weights are stored in half precision.
     let names = ["maps", "direction", "errors"];
     for ((name, got), expected) in names.iter().zip(&outputs).zip(&expected) {
         assert_eq!(got.len(), expected.len(), "{name}");
-        let scale = expected
-            .iter()
-            .fold(0.0f32, |most, value| most.max(value.abs()));
+        let scale = expected.iter().fold(0.0f32, |most, value| most.max(value.abs()));
         let off = got.iter().zip(expected).map(|(a, b)| (a - b).abs());
         let worst = off.fold(0.0f32, f32::max);
         assert!(worst < 0.01 * scale, "{name}: {worst} of {scale}");
@@ -269,9 +263,7 @@ fn a_training_goes_on_from_a_network_that_was_written() {
     let mut begun = Trainer::new(task, Backend::BuiltIn, None).unwrap();
     let sample = plain(&people[0], &settings.shape).unwrap();
     let [before, after] = [&whole, &begun].map(|trainer| trainer.find_in(1, &sample.picture).maps);
-    let scale = before
-        .iter()
-        .fold(0.0f32, |most, value| most.max(value.abs()));
+    let scale = before.iter().fold(0.0f32, |most, value| most.max(value.abs()));
     for (a, b) in before.iter().zip(&after) {
         assert!((a - b).abs() < 0.01 * scale, "{a} and {b} of {scale}");
     }

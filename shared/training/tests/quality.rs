@@ -26,9 +26,7 @@ fn samples(kind: Kind, n: usize) -> Samples {
         Sample {
             group: format!("subject {}", nth % 20),
             source: format!("picture {nth}"),
-            picture: (0..3 * rows * cols)
-                .map(|_| bright + dice.u8(0..40))
-                .collect(),
+            picture: (0..3 * rows * cols).map(|_| bright + dice.u8(0..40)).collect(),
             evidence,
             height_px: 200.0,
             errors_px: vec![1.0 + 20.0 * in_evidence + 20.0 * in_picture; N_PARTS],
@@ -188,21 +186,12 @@ fn a_checkpoint_of_other_settings_or_samples_is_refused() {
 fn groups_are_not_split_and_a_single_group_is_refused() {
     let (settings, mut samples) = (settings(Kind::Evidence), samples(Kind::Evidence, 200));
     let task = QualityTask::new(&settings, &samples, &[]).unwrap();
-    let validated: Vec<&str> = task
-        .validated()
-        .iter()
-        .map(|sample| sample.group.as_str())
-        .collect();
-    let of_these = samples
-        .all
-        .iter()
-        .filter(|sample| validated.contains(&sample.group.as_str()));
+    let validated: Vec<&str> =
+        task.validated().iter().map(|sample| sample.group.as_str()).collect();
+    let of_these = samples.all.iter().filter(|sample| validated.contains(&sample.group.as_str()));
     assert_eq!(of_these.count(), validated.len());
     assert!(!validated.is_empty() && validated.len() < 120);
-    samples
-        .all
-        .iter_mut()
-        .for_each(|sample| sample.group.clear());
+    samples.all.iter_mut().for_each(|sample| sample.group.clear());
     let result = QualityTask::new(&settings, &samples, &[]);
     assert!(matches!(result, Err(TaskError::TooFew { .. })));
 }

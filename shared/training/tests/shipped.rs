@@ -19,19 +19,11 @@ fn the_shipped_network_has_its_card_and_matches_onnx_runtime() {
     assert_eq!(network.tile_shape(), TileShape::SMALL);
     assert_eq!(network.card().unit, Unit::LogRelative);
     assert_eq!(network.card().identity, "person.quality");
-    assert!(
-        network
-            .card()
-            .tau
-            .iter()
-            .all(|tau| (0.01..0.2).contains(tau))
-    );
+    assert!(network.card().tau.iter().all(|tau| (0.01..0.2).contains(tau)));
     let tile: Vec<f32> = (0..TileShape::SMALL.n_values())
         .map(|at| ((at % 11) as f32 - 5.0) * 0.1)
         .collect();
-    let evidence: Vec<f32> = (0..n_evidence(N_PARTS))
-        .map(|at| (at % 7) as f32 * 0.1)
-        .collect();
+    let evidence: Vec<f32> = (0..n_evidence(N_PARTS)).map(|at| (at % 7) as f32 * 0.1).collect();
     let output = network.run(&tile, &evidence).unwrap();
     for (part, (output, expected)) in output.iter().zip(EXPECTED).enumerate() {
         assert!(

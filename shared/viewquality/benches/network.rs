@@ -119,18 +119,14 @@ impl Layers {
             ("pads", Attribute::Ints(vec![pad; 4])),
             ("group", Attribute::Int(groups as i64)),
         ];
-        self.net
-            .node("Conv", &[&self.last, &weights, &bias], &raw, attributes);
+        self.net.node("Conv", &[&self.last, &weights, &bias], &raw, attributes);
         self.net.node("Relu", &[&raw], &out, vec![]);
         (self.last, self.channels) = (out, channels);
     }
 
     /// A random number around 0, scaled so that sums of `fan_in` terms keep their size.
     fn random(&mut self, fan_in: usize) -> f32 {
-        self.seed = self
-            .seed
-            .wrapping_mul(1_664_525)
-            .wrapping_add(1_013_904_223);
+        self.seed = self.seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let unit = (self.seed >> 8) as f32 / (1 << 24) as f32;
         (unit - 0.5) * (24.0 / fan_in as f32).sqrt()
     }

@@ -213,9 +213,7 @@ impl Card {
             Unit::Pixels => 1.0,
             Unit::Relative | Unit::LogRelative => tile_height,
         };
-        self.tau
-            .iter()
-            .map(move |it| (f64::from(*it) * scale) as f32)
+        self.tau.iter().map(move |it| (f64::from(*it) * scale) as f32)
     }
 }
 

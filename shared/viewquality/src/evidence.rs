@@ -158,9 +158,8 @@ pub fn evidence(
         let [spring, pair_bias] = edge(model, pose, part);
         let from_mirror =
             mirror.map_or(0.0, |mirror| sides(distance(centre, centres[mirror[part]])));
-        let from_second = second
-            .as_ref()
-            .map_or(FAR, |second| sides(distance(centre, second[part])));
+        let from_second =
+            second.as_ref().map_or(FAR, |second| sides(distance(centre, second[part])));
         let to_border = [centre[0], centre[1], width - centre[0], height - centre[1]];
         let inside = sides(to_border.into_iter().fold(f64::INFINITY, f64::min));
         out.extend([score.response, score.contrast, score.margin]);
@@ -173,9 +172,7 @@ pub fn evidence(
     let [x1, y1, x2, y2] = pose.bounding_box(model, layout);
     out.extend([
         pose.score,
-        candidates
-            .get(1)
-            .map_or(FAR, |it| (pose.score - it.score).min(FAR)),
+        candidates.get(1).map_or(FAR, |it| (pose.score - it.score).min(FAR)),
         candidates.len().min(MOST_CANDIDATES) as f32 / MOST_CANDIDATES as f32,
         box_side(model, layout, pose, 0).ln() as f32,
         (tile.height_px() / layout.image_size[1] as f64) as f32,

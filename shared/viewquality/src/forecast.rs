@@ -96,8 +96,7 @@ impl Forecaster {
         let tile = Tile::around(bounds, self.network.tile_shape()).ok_or(ForecastError::NoTile)?;
         let card = self.network.card();
         if self.network.takes_tile() {
-            self.sampler
-                .sample(input.image, &tile, &card.colours, &mut self.tile);
+            self.sampler.sample(input.image, &tile, &card.colours, &mut self.tile);
         }
         if self.network.takes_evidence() {
             evidence(

@@ -33,9 +33,7 @@ impl Default for Selection {
 impl Selection {
     /// The table's frame for a frame of the deployment; `None` if it exceeds the range of numbers.
     pub fn table_frame(&self, frame: u64) -> Option<i64> {
-        let steps = i64::try_from(frame)
-            .ok()?
-            .checked_mul(i64::from(self.frame_step))?;
+        let steps = i64::try_from(frame).ok()?.checked_mul(i64::from(self.frame_step))?;
         self.frame_offset.checked_add(steps)
     }
 }
@@ -108,11 +106,8 @@ impl Predictor {
 /// The first few sequences of a table.
 fn known(table: &Table) -> String {
     const SHOWN: usize = 12;
-    let mut names: Vec<String> = table
-        .names()
-        .take(SHOWN + 1)
-        .map(|name| format!("`{name}`"))
-        .collect();
+    let mut names: Vec<String> =
+        table.names().take(SHOWN + 1).map(|name| format!("`{name}`")).collect();
     if names.len() > SHOWN {
         names.truncate(SHOWN);
         names.push("...".to_owned());

@@ -226,11 +226,8 @@ impl Table {
 impl std::fmt::Display for Name {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let names = [&self.subject, &self.action, &self.view];
-        let given: Vec<&str> = names
-            .into_iter()
-            .map(String::as_str)
-            .filter(|name| !name.is_empty())
-            .collect();
+        let given: Vec<&str> =
+            names.into_iter().map(String::as_str).filter(|name| !name.is_empty()).collect();
         f.write_str(&given.join(" "))
     }
 }

@@ -92,9 +92,7 @@ impl Tau {
     pub fn median_and_inaccuracy(errors: &TrainingErrors) -> Self {
         let both = errors.median_px.iter().zip(&errors.inaccuracy_px);
         Self {
-            px: both
-                .map(|(median, inaccuracy)| median + inaccuracy)
-                .collect(),
+            px: both.map(|(median, inaccuracy)| median + inaccuracy).collect(),
         }
     }
 
@@ -169,9 +167,7 @@ mod tests {
             let expected = format!(
                 "line 2: `{bad}` is not a threshold in pixels, expected a finite number from 0"
             );
-            let error = Tau::parse(&format!("1\n2 {bad}"), 3)
-                .unwrap_err()
-                .to_string();
+            let error = Tau::parse(&format!("1\n2 {bad}"), 3).unwrap_err().to_string();
             assert_eq!(error, expected);
         }
         let error = Tau::parse("1 2", 3).unwrap_err().to_string();

@@ -185,8 +185,7 @@ impl Sampler {
             let begin = self.weights.len();
             let weight = |it: i64| (1.0 - (it as f64 - at).abs() / reach).max(0.0);
             let total: f64 = (first..=last).map(weight).sum();
-            self.weights
-                .extend((first..=last).map(|it| (weight(it) / total) as f32));
+            self.weights.extend((first..=last).map(|it| (weight(it) / total) as f32));
             let count = self.weights.len() - begin;
             self.taps.push(Taps {
                 first,
@@ -201,10 +200,7 @@ impl Sampler {
         let inside = |it: i64| it.clamp(0, image_width as i64 - 1) as usize;
         let columns = &self.taps[height..];
         let first = columns.iter().map(|it| inside(it.first)).min();
-        let last = columns
-            .iter()
-            .map(|it| inside(it.first + it.count as i64 - 1))
-            .max();
+        let last = columns.iter().map(|it| inside(it.first + it.count as i64 - 1)).max();
         [first.unwrap_or(0), last.map_or(1, |it| it + 1)]
     }
 

@@ -67,9 +67,7 @@ pub fn people_from_message(message: &People, n_views: usize) -> Result<FramePeop
             index("view of a candidate", entry, view, n_views)?;
             let limit = messages::MAX_CANDIDATES;
             let candidate = index("candidates", view, usize::from(candidate), limit)?;
-            let is_taken = people
-                .iter()
-                .any(|other| other.candidates[view] == Some(candidate));
+            let is_taken = people.iter().any(|other| other.candidates[view] == Some(candidate));
             equal("people of a candidate", 1 + usize::from(is_taken), 1)?;
             candidates[view] = Some(candidate);
         }

@@ -165,9 +165,7 @@ pub fn front_from_message(
 ) -> Result<Vec<FrontEvidence>, WireError> {
     let n = count("front", n_candidates, MAX_CANDIDATES)?;
     let of_candidates = message.front[..n].iter().enumerate();
-    of_candidates
-        .map(|(candidate, it)| checked_front(candidate, *it))
-        .collect()
+    of_candidates.map(|(candidate, it)| checked_front(candidate, *it)).collect()
 }
 
 fn checked_front(candidate: usize, evidence: FrontEvidence) -> Result<FrontEvidence, WireError> {
@@ -191,12 +189,7 @@ pub fn extras_to_message(
 ) -> Result<(), WireError> {
     message.n_keypoints = count("n_keypoints", n, MAX_KEYPOINTS)? as u32;
     let n_sent = room_of(n).min(extras.len());
-    for (entry, (slot, it)) in message
-        .keypoints
-        .iter_mut()
-        .zip(&extras[..n_sent])
-        .enumerate()
-    {
+    for (entry, (slot, it)) in message.keypoints.iter_mut().zip(&extras[..n_sent]).enumerate() {
         if let Some(([x, y], sigma)) = it {
             *slot = [*x as f32, *y as f32, *sigma as f32];
             checked_extra(entry, slot)?;

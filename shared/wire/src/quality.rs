@@ -81,9 +81,7 @@ pub fn tau_from_message(
     equal("n_thresholds", message.n_thresholds as usize, n_parts)?;
     count("n_thresholds", n_parts, MAX_PARTS)?;
     let tau = message.tau_px[..n_parts].iter().enumerate();
-    tau.map(|(part, &tau)| checked(part, tau))
-        .collect::<Result<_, _>>()
-        .map(Some)
+    tau.map(|(part, &tau)| checked(part, tau)).collect::<Result<_, _>>().map(Some)
 }
 
 /// Adds the prediction for one of the two views of a pair.

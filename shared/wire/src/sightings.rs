@@ -163,20 +163,13 @@ pub fn grids_from_message(message: &EvidenceHeader) -> Result<Vec<MapGrid>, Wire
     let n = count("n_people", message.n_people as usize, MAX_CANDIDATES)?;
     let people = message.people[..n].iter().enumerate();
     let grid = |(nth, grid): (usize, &GridMessage)| {
-        if let Some(side) = grid
-            .size
-            .into_iter()
-            .find(|side| !(1..=MOST_CELLS).contains(side))
-        {
+        if let Some(side) = grid.size.into_iter().find(|side| !(1..=MOST_CELLS).contains(side)) {
             return Err(refused("grid.size", nth, f64::from(side), "1 to 65536"));
         }
         if let Some(far) = grid.first_px.into_iter().find(|side| !is_place(*side)) {
             return Err(refused("grid.first_px", nth, far, "a place in pixels"));
         }
-        if let Some(step) = grid
-            .cell_px
-            .into_iter()
-            .find(|step| !(*step > 0.0 && is_place(*step)))
+        if let Some(step) = grid.cell_px.into_iter().find(|step| !(*step > 0.0 && is_place(*step)))
         {
             return Err(refused("grid.cell_px", nth, step, "pixels above 0"));
         }

@@ -32,10 +32,7 @@ pub fn deployment_text(input: &[u8]) {
         return;
     };
     let file = std::path::Path::new("deployment.toml");
-    let option = input
-        .lines()
-        .next()
-        .and_then(|it| it.strip_prefix("#--set "));
+    let option = input.lines().next().and_then(|it| it.strip_prefix("#--set "));
     let set: Vec<String> = option.map(str::to_owned).into_iter().collect();
     let loaded = match Loaded::parse(input, file, &set, &AnyMachine) {
         Ok(it) => it,
@@ -305,10 +302,7 @@ pub fn people_lines(input: &[u8]) {
 
 /// The MATLAB annotations of PARSE and LSP.
 pub fn people_mat(input: &[u8]) {
-    for people in [parse_labels(input), parse_joints(input)]
-        .into_iter()
-        .flatten()
-    {
+    for people in [parse_labels(input), parse_joints(input)].into_iter().flatten() {
         for (joints, visible) in people {
             assert_eq!(joints.len(), visible.len());
         }

@@ -109,9 +109,7 @@ fn model() -> Model {
     let filter = |seed: usize| Filter {
         rows: 3,
         cols: 3,
-        weights: (0..9 * N_CHANNELS)
-            .map(|it| ((seed + it) % 7) as f64 * 0.1)
-            .collect(),
+        weights: (0..9 * N_CHANNELS).map(|it| ((seed + it) % 7) as f64 * 0.1).collect(),
     };
     let spring = Spring {
         w: [0.01, 0.0, 0.02, 0.0],
@@ -253,30 +251,20 @@ fn candidates(input: &[u8]) {
     let World { model, plans, .. } = world();
     let message = view_pose(input);
     if let Ok(poses) = wire::candidates_from_message(&message, model, plans[0].layout()) {
-        let centres = poses
-            .iter()
-            .flat_map(|it| it.centres(model, plans[0].layout()));
+        let centres = poses.iter().flat_map(|it| it.centres(model, plans[0].layout()));
         assert!(centres.flatten().all(f64::is_finite));
     }
     if let Ok(front) = wire::front_from_message(&message, message.n_candidates as usize) {
         assert!(front.as_flattened().iter().all(|it| it.is_finite()));
     }
     if let Ok(Some(seen)) = wire::sightings_from_message(&message, 2) {
-        let joints = seen
-            .people
-            .iter()
-            .flat_map(|person| person.joints)
-            .flatten();
+        let joints = seen.people.iter().flat_map(|person| person.joints).flatten();
         assert!(joints.flatten().all(f32::is_finite));
     }
     let extras = wire::extras_from_message(&message, 2, message.n_candidates as usize);
     if let Ok(extras) = extras {
         let found = extras.iter().flatten();
-        assert!(
-            found
-                .flat_map(|it| [it.0[0], it.0[1], it.1])
-                .all(f64::is_finite)
-        );
+        assert!(found.flat_map(|it| [it.0[0], it.0[1], it.1]).all(f64::is_finite));
     }
     if let Ok(scores) = wire::local_from_message(&message, model.n_parts()) {
         assert!(scores.iter().all(|it| it.margin.is_finite()));
@@ -452,11 +440,7 @@ pub fn wire_fusion(input: &[u8]) {
             found.extend(read.expect("it was written"));
         }
     }
-    found.extend(
-        wire::pair_from_message(&pair_pose(pairs), plans)
-            .ok()
-            .flatten(),
-    );
+    found.extend(wire::pair_from_message(&pair_pose(pairs), plans).ok().flatten());
     let mut step = SkeletonStep::new(plans.clone(), None, settings());
     let skeleton = step.run(&answers, &found);
     let person = wire::SolvedPerson {

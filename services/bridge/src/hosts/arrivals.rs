@@ -18,8 +18,7 @@ pub struct Grid {
 impl Grid {
     /// When an instant is, nanoseconds.
     pub fn at(&self, nth: u64) -> u64 {
-        self.start_nanos
-            .saturating_add((nth as f64 * self.period_nanos).round() as u64)
+        self.start_nanos.saturating_add((nth as f64 * self.period_nanos).round() as u64)
     }
 
     /// The latest instant that is not after a time; 0 before all.

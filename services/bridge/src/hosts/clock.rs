@@ -147,10 +147,7 @@ impl Clock {
             None => self.parts.push_back((part, sample)),
         }
         while self.parts.len() > N_PARTS
-            || self
-                .parts
-                .front()
-                .is_some_and(|it| it.0 + (N_PARTS as u64) <= part)
+            || self.parts.front().is_some_and(|it| it.0 + (N_PARTS as u64) <= part)
         {
             self.parts.pop_front();
         }
@@ -207,9 +204,7 @@ fn sample(it: &Exchange) -> Result<Sample, ExchangeError> {
     let (Some(outside), Some(inside)) = (outside, inside) else {
         return Err(ExchangeError::Backwards);
     };
-    let trip = outside
-        .checked_sub(inside)
-        .ok_or(ExchangeError::Inside { inside, outside })?;
+    let trip = outside.checked_sub(inside).ok_or(ExchangeError::Inside { inside, outside })?;
     if trip > MOST_TRIP {
         return Err(ExchangeError::Slow { trip });
     }

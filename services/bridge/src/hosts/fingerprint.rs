@@ -37,10 +37,7 @@ impl Fingerprint {
             let found = all.0.iter().find(|it| it.0 == what);
             found.map_or_else(|| "nothing".to_owned(), |it| it.1.clone())
         };
-        let only_there = other
-            .0
-            .iter()
-            .filter(|it| !self.0.iter().any(|own| own.0 == it.0));
+        let only_there = other.0.iter().filter(|it| !self.0.iter().any(|own| own.0 == it.0));
         let all = self.0.iter().chain(only_there);
         let compared = all.map(|(what, _)| Difference {
             what: what.clone(),
@@ -75,11 +72,7 @@ mod tests {
         here.add("rig", b"a");
         there.add("rig", b"b");
         there.add_text("network", "shipped");
-        let got: Vec<String> = here
-            .differences(&there)
-            .iter()
-            .map(ToString::to_string)
-            .collect();
+        let got: Vec<String> = here.differences(&there).iter().map(ToString::to_string).collect();
         assert_eq!(
             got,
             [

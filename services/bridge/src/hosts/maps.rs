@@ -150,10 +150,7 @@ impl Reader<'_> {
     }
 
     fn next<const N: usize>(&mut self) -> Result<[u8; N], MapsError> {
-        let left = self
-            .bytes
-            .get(self.at..)
-            .and_then(|left| left.first_chunk());
+        let left = self.bytes.get(self.at..).and_then(|left| left.first_chunk());
         let chunk = left.ok_or(self.length(self.at + N))?;
         self.at += N;
         Ok(*chunk)

@@ -107,9 +107,7 @@ impl<T> Outbox<T> {
 
     /// What became of the parcels of a lane.
     pub fn sent(&self, lane: usize) -> Sent {
-        self.lanes
-            .get(lane)
-            .map_or_else(Sent::default, |it| it.sent)
+        self.lanes.get(lane).map_or_else(Sent::default, |it| it.sent)
     }
 
     /// Lanes with something that waits.
@@ -119,9 +117,7 @@ impl<T> Outbox<T> {
 
     /// Whether nothing waits, and nothing is on its way.
     pub fn is_empty(&self) -> bool {
-        self.lanes
-            .iter()
-            .all(|it| it.waiting.is_none() && it.on_way.is_empty())
+        self.lanes.iter().all(|it| it.waiting.is_none() && it.on_way.is_empty())
     }
 }
 

@@ -336,9 +336,7 @@ fn hear_hellos(
             return;
         };
         let name = host_of(key);
-        let remote = remotes
-            .iter()
-            .find(|it| it.name == name && it.name == hello.host);
+        let remote = remotes.iter().find(|it| it.name == name && it.name == hello.host);
         let answer = hello.answer(remote.is_some(), &fingerprint, welcome);
         match (remote, &answer) {
             (Some(remote), Answer::Welcome(_)) => remote.welcomed(hello.origin, now_nanos()),

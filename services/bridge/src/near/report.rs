@@ -60,16 +60,10 @@ impl Report {
         let times = self.views.entry(view).or_default();
         let head = &it.head;
         let since = |later: u64, earlier: u64| later.saturating_sub(earlier);
-        times
-            .encode
-            .add(since(head.packed_at_nanos, head.sent_at_nanos));
-        times
-            .network
-            .add(since(it.came_at, clock.ours(head.packed_at_nanos)));
+        times.encode.add(since(head.packed_at_nanos, head.sent_at_nanos));
+        times.network.add(since(it.came_at, clock.ours(head.packed_at_nanos)));
         times.decode.add(since(it.decoded_at, it.came_at));
-        times
-            .all
-            .add(since(now_nanos(), clock.ours(head.sent_at_nanos)));
+        times.all.add(since(now_nanos(), clock.ours(head.sent_at_nanos)));
         times.n_bytes += it.n_bytes as u64;
         times.n_overtaken = head.n_overtaken;
     }

@@ -172,9 +172,7 @@ impl LiveCamera {
             return false;
         };
         let scheme = address.split(':').next().unwrap_or_default();
-        ["http", "https"]
-            .iter()
-            .any(|it| scheme.eq_ignore_ascii_case(it))
+        ["http", "https"].iter().any(|it| scheme.eq_ignore_ascii_case(it))
     }
 
     pub(super) fn stream(&self, address: &str) -> StreamSpec {

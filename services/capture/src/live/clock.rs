@@ -52,9 +52,7 @@ impl ClockMap {
     /// * `presented_nanos`: by the camera's clock.
     /// * `arrived_at_nanos`: by that of this machine.
     pub(super) fn taken_at(&mut self, presented_nanos: i64, arrived_at_nanos: u64) -> u64 {
-        let offset = arrived_at_nanos
-            .cast_signed()
-            .saturating_sub(presented_nanos);
+        let offset = arrived_at_nanos.cast_signed().saturating_sub(presented_nanos);
         let least = self.0.add(arrived_at_nanos, offset);
         presented_nanos.saturating_add(least).max(0).cast_unsigned()
     }
@@ -133,12 +131,8 @@ mod tests {
             let presented = (nth * 40 * MS).cast_signed();
             map.taken_at(presented, 1_000 * MS + nth * 40 * MS + delay * MS)
         };
-        let got: Vec<u64> = [5, 5, 30, 9, 6]
-            .into_iter()
-            .zip(0..)
-            .map(|(d, n)| (n, d))
-            .map(of)
-            .collect();
+        let got: Vec<u64> =
+            [5, 5, 30, 9, 6].into_iter().zip(0..).map(|(d, n)| (n, d)).map(of).collect();
         let expected: Vec<u64> = (0..5).map(|nth| 1_005 * MS + nth * 40 * MS).collect();
         assert_eq!(got, expected);
     }

@@ -41,8 +41,7 @@ impl Grid {
 
     /// When an instant is, nanoseconds.
     pub(crate) fn due_nanos(&self, nth: u64) -> u64 {
-        self.start_nanos
-            .saturating_add((nth as f64 * self.period).round() as u64)
+        self.start_nanos.saturating_add((nth as f64 * self.period).round() as u64)
     }
 
     /// The latest instant that is not after `now_nanos`; 0 before all.
@@ -62,10 +61,7 @@ impl Grid {
 
     /// The place of a time among the instants.
     fn exact(&self, at_nanos: u64) -> f64 {
-        at_nanos
-            .cast_signed()
-            .wrapping_sub(self.start_nanos.cast_signed()) as f64
-            / self.period
+        at_nanos.cast_signed().wrapping_sub(self.start_nanos.cast_signed()) as f64 / self.period
     }
 
     /// What is wrong with the time of a picture: equal to or before that of the one before, or not of this moment.

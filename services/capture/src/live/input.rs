@@ -163,9 +163,8 @@ impl Device {
         self.last_nanos = arrived_at_nanos;
         let is_whole =
             !picture.is_damaged && self.format.to_rgb(picture.bytes, stride, self.size, rgb);
-        let (at_nanos, timed_by) = picture
-            .at_nanos
-            .map_or((arrived_at_nanos, TimedBy::ARRIVAL), |it| {
+        let (at_nanos, timed_by) =
+            picture.at_nanos.map_or((arrived_at_nanos, TimedBy::ARRIVAL), |it| {
                 (it, TimedBy::DRIVER)
             });
         if let Some(originals) = &self.originals {

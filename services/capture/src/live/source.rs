@@ -105,9 +105,7 @@ impl Source {
             originals,
         };
         let thread = thread::Builder::new().name("live camera".to_owned());
-        let thread = thread
-            .spawn(move || keeper.keep_open())
-            .or_fail(ExitKind::Run)?;
+        let thread = thread.spawn(move || keeper.keep_open()).or_fail(ExitKind::Run)?;
         Ok(Self {
             shared,
             thread: Some(thread),
@@ -118,10 +116,7 @@ impl Source {
     pub(crate) fn next(&self, patience: Duration) -> Option<Picture> {
         let state = self.shared.state();
         let is_empty = |it: &mut State| it.waiting.is_empty();
-        let waited = self
-            .shared
-            .news
-            .wait_timeout_while(state, patience, is_empty);
+        let waited = self.shared.news.wait_timeout_while(state, patience, is_empty);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let is_silent = |it: Instant| it.elapsed() > LONGEST_SILENCE;
         if state.waits_since.is_some_and(is_silent)

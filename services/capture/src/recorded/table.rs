@@ -184,9 +184,7 @@ impl Table {
     /// The first picture after those of the connection of another.
     pub(super) fn after_connection(&self, at: usize) -> usize {
         let rest = self.pictures.get(at..).unwrap_or_default();
-        let n = rest
-            .iter()
-            .take_while(|it| it.connection == rest[0].connection);
+        let n = rest.iter().take_while(|it| it.connection == rest[0].connection);
         at + n.count()
     }
 
@@ -237,10 +235,7 @@ fn heads(
         // The number and the time of sending are told by the checked index of the file, too.
         let is_same = entry.frame.is_none_or(|it| it == header.stamp.frame)
             && entry.publish_time == header.timing.sent_at_nanos;
-        let age = header
-            .timing
-            .sent_at_nanos
-            .abs_diff(header.stamp.captured_at_nanos);
+        let age = header.timing.sent_at_nanos.abs_diff(header.stamp.captured_at_nanos);
         if is_same && age <= MAX_AGE_NANOS && header.status != Status::END {
             all.push((*entry, header));
         }

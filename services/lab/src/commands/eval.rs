@@ -168,10 +168,7 @@ pub(crate) struct Arguments {
 
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT")?;
-    let side = |it: &str| {
-        it.parse::<u32>()
-            .map_err(|error| format!("{it:?}: {error}"))
-    };
+    let side = |it: &str| it.parse::<u32>().map_err(|error| format!("{it:?}: {error}"));
     Ok([side(width)?, side(height)?])
 }
 
@@ -318,10 +315,7 @@ fn outcome(done: &Done) -> Result<ExitCode, Failure> {
 
 /// Whether single pictures are evaluated; refuses pictures together with sequences.
 fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
-    let n = arguments
-        .sequences
-        .iter()
-        .filter(|it| lab::eval::pictures::is_one(it));
+    let n = arguments.sequences.iter().filter(|it| lab::eval::pictures::is_one(it));
     let n = n.count();
     let selects = arguments.only.is_some() || arguments.without.is_some();
     let refuse = |message: &str| Err(Failure::new(ExitKind::Usage, message));
@@ -450,11 +444,7 @@ fn settings_text(
     };
     let model = formats::checksum::fnv1a(&inputs::model_bytes(arguments.model.as_deref())?);
     let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
-    let network = arguments
-        .network
-        .as_ref()
-        .map(|it| of(Shipped::Network, it))
-        .transpose()?;
+    let network = arguments.network.as_ref().map(|it| of(Shipped::Network, it)).transpose()?;
     let network = network.map_or_else(String::new, |it| format!("network {it:016x}, "));
     let orientation = if deployment::is_none(&arguments.orientation) {
         String::new()

@@ -155,10 +155,7 @@ fn ports(ports: &[Port]) -> Vec<Value> {
 fn card_json(card: &Card, place: &CardPlace) -> Value {
     let rows = joint_rows(&card.names());
     let joints = PARSE14.joints.iter().zip(rows);
-    let missing: Vec<&str> = joints
-        .filter(|it| it.1.is_none())
-        .map(|it| it.0.name)
-        .collect();
+    let missing: Vec<&str> = joints.filter(|it| it.1.is_none()).map(|it| it.0.name).collect();
     json!({
         "from": place.to_string(),
         "name": card.name,
@@ -234,10 +231,8 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
         ("networks", "networks that find keypoints", networks),
         ("detectors", "detectors of people", detectors),
     ] {
-        let files: Vec<String> = nearest
-            .iter()
-            .map(|it| format!("configs/{folder}/{it}.toml"))
-            .collect();
+        let files: Vec<String> =
+            nearest.iter().map(|it| format!("configs/{folder}/{it}.toml")).collect();
         let come = match &files[..] {
             [] => continue,
             [_] => "comes nearest",

@@ -127,9 +127,7 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
         }
     }
     if it.json {
-        let all = rows
-            .iter()
-            .map(|(load, got)| json!({ "load": load, "forecast": got }));
+        let all = rows.iter().map(|(load, got)| json!({ "load": load, "forecast": got }));
         let all: Vec<_> = all.collect();
         output::json(&json!({ "schema_version": 1, "costs": costs, "rows": all }))?;
         return Ok(ExitCode::SUCCESS);

@@ -194,12 +194,7 @@ const N_FRAMES: u64 = 60;
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let n_cameras = arguments
-        .rig
-        .rig()
-        .map_err(synth::rig_failure)?
-        .cameras()
-        .len();
+    let n_cameras = arguments.rig.rig().map_err(synth::rig_failure)?.cameras().len();
     let skews_ms = skews_of(&arguments.skew_ms, n_cameras)?;
     let recording = arguments.motion.recording()?;
     let job = Job {

@@ -137,11 +137,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
     };
     let settings = settings(&arguments)?;
     if arguments.print_settings {
-        output::line(
-            toml::to_string(&settings)
-                .or_fail(ExitKind::Run)?
-                .trim_end(),
-        )?;
+        output::line(toml::to_string(&settings).or_fail(ExitKind::Run)?.trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let out = arguments.out.clone().unwrap_or_default();

@@ -79,9 +79,7 @@ fn text(out: &Path, done: &Done) -> String {
 
 fn row(point: &Point, mark: &str) -> String {
     let it = &point.weights;
-    let cap = it
-        .max_distance_cells
-        .map_or_else(|| "-".to_owned(), |it| it.to_string());
+    let cap = it.max_distance_cells.map_or_else(|| "-".to_owned(), |it| it.to_string());
     let form = match (it.beta > 0.0, it.appearance) {
         (false, _) => "-",
         (true, Appearance::Joint) => "joint",

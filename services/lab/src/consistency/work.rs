@@ -219,9 +219,7 @@ impl<'a> Learning<'a> {
             }
         })?;
         let points = tallies.iter().zip(tried);
-        Ok(points
-            .map(|(tally, weights)| tally.point(*weights))
-            .collect())
+        Ok(points.map(|(tally, weights)| tally.point(*weights)).collect())
     }
 
     /// Every frame of all sequences.
@@ -302,9 +300,7 @@ fn joint_errors(learner: &Learner, other: &Learner) -> Vec<(Option<f64>, f64)> {
     let with = |ridge: f64| (Some(ridge), theirs.error_of(learner.joints(), ridge));
     errors.extend(RIDGES.map(with));
     let known = errors.into_iter();
-    known
-        .filter_map(|(ridge, it)| Some((ridge, it?.sqrt())))
-        .collect()
+    known.filter_map(|(ridge, it)| Some((ridge, it?.sqrt()))).collect()
 }
 
 fn smallest(errors: &[(Option<f64>, f64)]) -> Option<f64> {

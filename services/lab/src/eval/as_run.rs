@@ -107,7 +107,5 @@ pub fn joints(
         return Ok(vec![None; PARSE14.joints.len()]);
     };
     let joints = followed.skeleton.joints.iter();
-    Ok(joints
-        .map(|joint| Some(joint.as_ref().ok()?.in_world.coords.into()))
-        .collect())
+    Ok(joints.map(|joint| Some(joint.as_ref().ok()?.in_world.coords.into())).collect())
 }

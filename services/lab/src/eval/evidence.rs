@@ -294,10 +294,8 @@ fn chosen(
     (stress, as_seen): (Stress, bool),
 ) -> Vec<(Camera, NetworkView)> {
     let n_views = instant.cameras.len();
-    let people: Vec<Vec<SeenPerson>> = seen
-        .iter()
-        .map(|it| it.1.iter().map(|it| it.0.clone()).collect())
-        .collect();
+    let people: Vec<Vec<SeenPerson>> =
+        seen.iter().map(|it| it.1.iter().map(|it| it.0.clone()).collect()).collect();
     let each: Vec<(&Camera, &[SeenPerson])> = seen
         .iter()
         .zip(&people)
@@ -351,8 +349,7 @@ impl Tally {
         ));
         let errors = joint_errors(found, truth);
         let limbs = errors.iter().take(N_LIMB_JOINTS).flatten();
-        self.errors
-            .push(Share::of(limbs.map(|it| it.min(MOST_M) * 1000.0)));
+        self.errors.push(Share::of(limbs.map(|it| it.min(MOST_M) * 1000.0)));
     }
 }
 

@@ -136,9 +136,7 @@ impl Job<'_> {
                 }
                 self.looked_up(sequence, frame, view, scales[view])
             });
-            let predicted = predicted
-                .into_inner()
-                .unwrap_or_else(PoisonError::into_inner);
+            let predicted = predicted.into_inner().unwrap_or_else(PoisonError::into_inner);
             let record = Record {
                 frame: frame.number,
                 found,
@@ -199,10 +197,7 @@ impl Job<'_> {
         let forecast = forecast.ok()?;
         let tenth = joints.map(|it| tenth_of(it));
         let tau_px: Vec<f32> = if !self.tau_px.is_empty() {
-            self.tau_px
-                .iter()
-                .map(|it| it * frame_scale as f32)
-                .collect()
+            self.tau_px.iter().map(|it| it * frame_scale as f32).collect()
         } else if forecast.tau_px.is_empty() {
             tenth.map_or_else(Vec::new, |it| vec![it as f32; forecast.sigma_px.len()])
         } else {
@@ -227,9 +222,7 @@ impl Job<'_> {
     fn keep(&self, sequence: &Sequence) -> Result<(File, Vec<Record>), Failure> {
         let name = format!("{} {}", sequence.dataset, sequence.name);
         let safe = |it: char| if it.is_alphanumeric() { it } else { '-' };
-        let file = self
-            .poses
-            .join(name.chars().map(safe).collect::<String>() + ".jsonl");
+        let file = self.poses.join(name.chars().map(safe).collect::<String>() + ".jsonl");
         let versions = self.versions.iter().map(ToString::to_string).collect();
         let header = Header::new(&sequence.name, &self.settings, versions);
         let wrong = |error: std::io::Error| in_file(&file, &error);

@@ -24,9 +24,7 @@ pub fn is_one(path: &Path) -> bool {
 
 /// The last word of a path, with that before where it is a file of a known name.
 pub fn name(path: &Path) -> String {
-    let is_known = path
-        .file_name()
-        .is_some_and(|it| it == "labels.mat" || it == "joints.mat");
+    let is_known = path.file_name().is_some_and(|it| it == "labels.mat" || it == "joints.mat");
     let place = if is_known { path.parent() } else { Some(path) };
     let stem = place.and_then(Path::file_stem).unwrap_or_default();
     let stem = stem.to_string_lossy().into_owned();

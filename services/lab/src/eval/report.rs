@@ -18,9 +18,7 @@ impl Done {
     pub fn summary(&self, versions: &[Version], bootstrap: &Bootstrap) -> Summary {
         let versions: Vec<String> = versions.iter().map(ToString::to_string).collect();
         let records = self.sequences.iter().flat_map(|it| &it.1);
-        let predicted: Vec<_> = records
-            .flat_map(|it| it.predicted.iter().flatten())
-            .collect();
+        let predicted: Vec<_> = records.flat_map(|it| it.predicted.iter().flatten()).collect();
         Summary {
             predictions: judge(&predicted),
             ..summarise(&measured(self), &versions, bootstrap)
@@ -100,9 +98,7 @@ fn row(group: &Group) -> String {
     let name: Vec<&str> = name.into_iter().filter(|it| !it.is_empty()).collect();
     let mut row = vec![format!("{:<28} {:>6}", name.join(" "), group.frames)];
     for it in &group.versions {
-        let gain = it
-            .gain
-            .map_or_else(String::new, |it| format!(" ({it:+.2})"));
+        let gain = it.gain.map_or_else(String::new, |it| format!(" ({it:+.2})"));
         let value = it.pcp3d.map(|it| format!("{it:.2}{gain}"));
         row.push(format!("{:>22}", value.unwrap_or_else(|| "-".to_owned())));
     }

@@ -167,9 +167,7 @@ impl Bench {
         let found = {
             let evidence = self.evidence(images, &single_views, &responses, expected);
             let trials = self.setup.trials.par_iter().enumerate();
-            trials
-                .map(|(nth, it)| self.version(nth, it.version, &evidence))
-                .collect()
+            trials.map(|(nth, it)| self.version(nth, it.version, &evidence)).collect()
         };
         self.responses = responses;
         found

@@ -84,9 +84,7 @@ impl Film {
             };
             let source = Source::open(&spec).map_err(unread)?;
             let size = source.info().size;
-            let out_size = settings
-                .size
-                .map_or(OutSize::Scale(settings.scale), OutSize::Exact);
+            let out_size = settings.size.map_or(OutSize::Scale(settings.scale), OutSize::Exact);
             let roll = if settings.upright {
                 upright_roll(camera, &sequence.rig).unwrap_or(0.0)
             } else {
@@ -124,18 +122,12 @@ impl Film {
 
     /// The cameras of the frames.
     pub fn cameras(&self) -> Vec<Camera> {
-        self.reels
-            .iter()
-            .map(|it| it.framing.camera().clone())
-            .collect()
+        self.reels.iter().map(|it| it.framing.camera().clone()).collect()
     }
 
     /// From pixels of the frames to those of the footage, for every view.
     pub fn footage_from_frame(&self) -> Vec<[[f64; 3]; 2]> {
-        self.reels
-            .iter()
-            .map(|it| it.framing.source_from_output())
-            .collect()
+        self.reels.iter().map(|it| it.framing.source_from_output()).collect()
     }
 
     /// The images of all views at a frame of the sequence; `None` for a view whose footage has ended.

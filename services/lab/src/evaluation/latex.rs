@@ -66,16 +66,9 @@ pub fn number(value: Option<f64>, digits: usize) -> String {
 /// The largest group of every data set.
 pub fn overall(summary: &Summary) -> impl Iterator<Item = &Group> {
     let last = |(nth, it): &(usize, &Group)| {
-        summary.groups[nth + 1..]
-            .iter()
-            .all(|other| other.dataset != it.dataset)
+        summary.groups[nth + 1..].iter().all(|other| other.dataset != it.dataset)
     };
-    summary
-        .groups
-        .iter()
-        .enumerate()
-        .filter(last)
-        .map(|it| it.1)
+    summary.groups.iter().enumerate().filter(last).map(|it| it.1)
 }
 
 /// Ours, and the paper's in parentheses.

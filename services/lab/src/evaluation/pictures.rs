@@ -123,18 +123,11 @@ fn tables(set: &Pictures, bootstrap: &Bootstrap) -> Vec<Table> {
             )
         };
         let limbs = report.limbs(PcpRule::MeanOfEnds).map(|it| it.0);
-        let by_rule = RULES
-            .iter()
-            .zip(intervals.pcp)
-            .map(|((rule, name), interval)| {
-                let mut row: Vec<f64> = report
-                    .limbs(*rule)
-                    .iter()
-                    .map(|it| it.1.percent())
-                    .collect();
-                row.push(report.pcp(*rule).percent());
-                ((*name).to_owned(), row, interval)
-            });
+        let by_rule = RULES.iter().zip(intervals.pcp).map(|((rule, name), interval)| {
+            let mut row: Vec<f64> = report.limbs(*rule).iter().map(|it| it.1.percent()).collect();
+            row.push(report.pcp(*rule).percent());
+            ((*name).to_owned(), row, interval)
+        });
         tables.push(Table {
             title: title("PCP, %"),
             columns: columns(limbs.into_iter(), "total"),

@@ -26,10 +26,7 @@ pub fn linear(views: &[Sighting<'_>]) -> Option<Point3<f64>> {
         }
     }
     let solved = normal.symmetric_eigen();
-    let point = solved
-        .eigenvectors
-        .column(solved.eigenvalues.imin())
-        .into_owned();
+    let point = solved.eigenvectors.column(solved.eigenvalues.imin()).into_owned();
     let point = Point3::new(point[0], point[1], point[2]) / point[3];
     point.iter().all(|it| it.is_finite()).then_some(point)
 }
@@ -41,10 +38,8 @@ pub fn dropping(views: &[Sighting<'_>], limit_px: f64) -> Option<Point3<f64>> {
     let mut best: Option<(f64, Point3<f64>)> = None;
     for kept in (2..=n).rev() {
         for mask in (0_u32..1 << n).filter(|it| it.count_ones() as usize == kept) {
-            let chosen: Vec<Sighting<'_>> = (0..n)
-                .filter(|it| mask >> it & 1 == 1)
-                .map(|it| views[it])
-                .collect();
+            let chosen: Vec<Sighting<'_>> =
+                (0..n).filter(|it| mask >> it & 1 == 1).map(|it| views[it]).collect();
             let Some(point) = linear(&chosen) else {
                 continue;
             };

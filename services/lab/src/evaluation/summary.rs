@@ -145,28 +145,18 @@ pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootst
         add(&mut groups, names, vec![it]);
     }
     for dataset in distinct(sequences.iter().map(|it| &it.dataset)) {
-        let own: Vec<&Measured> = sequences
-            .iter()
-            .filter(|it| it.dataset == dataset)
-            .collect();
+        let own: Vec<&Measured> = sequences.iter().filter(|it| it.dataset == dataset).collect();
         let several = |of: &[&Measured]| of.len() > 1;
         for action in distinct(own.iter().map(|it| &it.action)) {
-            let of: Vec<&Measured> = own
-                .iter()
-                .copied()
-                .filter(|it| it.action == action)
-                .collect();
+            let of: Vec<&Measured> = own.iter().copied().filter(|it| it.action == action).collect();
             if several(&of) {
                 add(&mut groups, [dataset, "All", action], of);
             }
         }
         let subjects = distinct(own.iter().map(|it| &it.subject));
         for subject in subjects.iter().filter(|_| subjects.len() > 1) {
-            let of: Vec<&Measured> = own
-                .iter()
-                .copied()
-                .filter(|it| it.subject == *subject)
-                .collect();
+            let of: Vec<&Measured> =
+                own.iter().copied().filter(|it| it.subject == *subject).collect();
             if several(&of) {
                 add(&mut groups, [dataset, subject, "Overall"], of);
             }
@@ -247,9 +237,7 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
         pcp3d_interval: bootstrap.interval(&pcp),
         gain: Share::mean(&gains).filter(|_| is_compared),
         gain_interval: bootstrap.interval(&gains).filter(|_| is_compared),
-        parts: (0..statistics::score::SEGMENT_NAMES.len())
-            .map(segment)
-            .collect(),
+        parts: (0..statistics::score::SEGMENT_NAMES.len()).map(segment).collect(),
         curve: curve(&own),
         mpjpe_mm: Share::mean(&errors),
         mpjpe_interval: bootstrap.interval(&errors),
@@ -258,9 +246,7 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
         exchanged_interval: bootstrap.interval(&exchanged),
         pck3d: of_joints(|it| it <= PCK_M),
         lost: of_joints(|it| !it.is_finite()),
-        pcp2d: images
-            .as_ref()
-            .map(|it| it.pcp(PcpRule::MeanOfEnds).percent()),
+        pcp2d: images.as_ref().map(|it| it.pcp(PcpRule::MeanOfEnds).percent()),
         pck2d: images.map(|it| [0, 1].map(|share| it.pck(share).percent())),
         iterations: Share::mean(&[effort]),
         unsettled: (effort.n > 0.0).then(|| 100.0 * f64::from(n_unsettled) / effort.n),
@@ -275,10 +261,8 @@ fn percent(is_right: bool) -> f64 {
 }
 
 fn curve(frames: &[&FrameScore]) -> Vec<[f64; 2]> {
-    let errors: Vec<f64> = frames
-        .iter()
-        .flat_map(|it| it.segments.iter().flatten().copied())
-        .collect();
+    let errors: Vec<f64> =
+        frames.iter().flat_map(|it| it.segments.iter().flatten().copied()).collect();
     let point = |nth: usize| {
         let gamma = 0.05 * nth as f64;
         // The steps are not exact in binary, and 0.5 has to agree with the tables.
@@ -368,11 +352,8 @@ mod tests {
             measured("S1", "Jog", &[[6, 12]; 4]),
         ];
         let got = summary(&sequences);
-        let names: Vec<_> = got
-            .groups
-            .iter()
-            .map(|it| (it.subject.as_str(), it.action.as_str()))
-            .collect();
+        let names: Vec<_> =
+            got.groups.iter().map(|it| (it.subject.as_str(), it.action.as_str())).collect();
         let expected = [
             ("S1", "Box"),
             ("S2", "Box"),

@@ -131,9 +131,8 @@ mod tests {
     #[test]
     fn every_set_has_the_fourteen_joints() {
         for set in JointSet::ALL {
-            let joints: Vec<Option<Point>> = (0..set.joints.len())
-                .map(|it| Some([it as f64, 0.0, 0.0]))
-                .collect();
+            let joints: Vec<Option<Point>> =
+                (0..set.joints.len()).map(|it| Some([it as f64, 0.0, 0.0])).collect();
             assert!(
                 parse14(set, &joints).iter().all(Option::is_some),
                 "{}",

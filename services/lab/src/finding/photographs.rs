@@ -155,9 +155,7 @@ fn added(marked: &[[f64; 4]], found: &[PersonBox]) -> Vec<Box4> {
         let mut marked = marked.iter();
         !marked.any(|marked| is_same(marked, &found.outline))
     });
-    others
-        .map(|found| (found.outline, found.score >= SURE))
-        .collect()
+    others.map(|found| (found.outline, found.score >= SURE)).collect()
 }
 
 fn is_same(a: &[f64; 4], b: &[f64; 4]) -> bool {

@@ -45,11 +45,9 @@ pub(super) fn ellipses(edge: &Edge) -> Vec<(usize, Ellipse)> {
 pub(super) fn of_pair(edge: &Edge, parent_type: usize, own_type: usize) -> Option<Ellipse> {
     match &edge.springs {
         Springs::PerChildType(all) => all.get(own_type).map(Ellipse::of),
-        Springs::PerTypePair(rows) => rows
-            .get(parent_type)?
-            .get(own_type)?
-            .as_ref()
-            .map(Ellipse::of),
+        Springs::PerTypePair(rows) => {
+            rows.get(parent_type)?.get(own_type)?.as_ref().map(Ellipse::of)
+        }
     }
 }
 

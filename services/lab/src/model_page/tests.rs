@@ -26,9 +26,7 @@ pub(crate) fn planted(name: &str) -> ModelSpec {
     let filter = |seed: usize| Filter {
         rows: 2,
         cols: 3,
-        weights: (0..6 * N_CHANNELS)
-            .map(|it| ((it + 1000 * seed) as f64).sin())
-            .collect(),
+        weights: (0..6 * N_CHANNELS).map(|it| ((it + 1000 * seed) as f64).sin()).collect(),
     };
     ModelSpec {
         name: name.to_owned(),
@@ -53,10 +51,7 @@ fn count(page: &str, name: &str) -> usize {
         ..ParsingOptions::default()
     };
     let document = Document::parse_with_options(page, options).unwrap();
-    document
-        .descendants()
-        .filter(|it| it.has_tag_name(name))
-        .count()
+    document.descendants().filter(|it| it.has_tag_name(name)).count()
 }
 
 #[test]

@@ -79,11 +79,7 @@ pub(crate) fn front_in_view(shown: &Shown<'_>) -> Option<[f32; 2]> {
     let joints: Vec<Option<Point3<f64>>> = shown
         .in_world
         .iter()
-        .map(|it| {
-            it.iter()
-                .all(|it| it.is_finite())
-                .then(|| Point3::from(*it))
-        })
+        .map(|it| it.iter().all(|it| it.is_finite()).then(|| Point3::from(*it)))
         .collect();
     let known: Vec<&Point3<f64>> = joints.iter().flatten().collect();
     let sum: Vector3<f64> = known.iter().map(|it| it.coords).sum();

@@ -64,15 +64,9 @@ impl Gallery {
         };
         let people: Vec<_> = data.people.iter().enumerate().collect();
         let copies: Result<Vec<_>, AlbumError> = people.into_par_iter().map(of_person).collect();
-        let (copies, parts) = copies
-            .or_fail(ExitKind::Input)?
-            .into_iter()
-            .flatten()
-            .unzip();
+        let (copies, parts) = copies.or_fail(ExitKind::Input)?.into_iter().flatten().unzip();
         let images = data.people.iter().map(|it| it.0.image.as_path());
-        let files: Vec<&Path> = images
-            .chain(data.negatives.iter().map(PathBuf::as_path))
-            .collect();
+        let files: Vec<&Path> = images.chain(data.negatives.iter().map(PathBuf::as_path)).collect();
         Ok(Self {
             stamp: stamp(&files),
             people: data.people.iter().map(|it| it.0.clone()).collect(),

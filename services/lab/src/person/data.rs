@@ -103,10 +103,7 @@ impl Data {
             let people = people.into_iter();
             let people = people.map(|it| sides.of(it, table.joint_mirror()));
             for problem in problems {
-                *data
-                    .left_out
-                    .entry(problem.fault.kind().name())
-                    .or_default() += 1;
+                *data.left_out.entry(problem.fault.kind().name()).or_default() += 1;
                 progress.left_out(&problem)?;
             }
             data.people.extend(people.map(|it| (it, angles.clone())));
@@ -123,10 +120,7 @@ impl Data {
     /// Decodes every image once, to know that it can be.
     fn negatives(&mut self, folders: &[PathBuf], progress: &Progress) -> Result<(), Failure> {
         let images = in_folders(folders)?;
-        let read: Vec<_> = images
-            .par_iter()
-            .map(|it| Picture::read(it).err())
-            .collect();
+        let read: Vec<_> = images.par_iter().map(|it| Picture::read(it).err()).collect();
         for (image, error) in images.into_iter().zip(read) {
             match error {
                 None => self.negatives.push(image),
@@ -160,10 +154,7 @@ pub(crate) fn read_options(
     table: &SkeletonTable,
 ) -> Result<Vec<ReadOptions>, Failure> {
     let all = &arguments.datasets;
-    if let Some((_, twice)) = (1..)
-        .zip(all)
-        .find(|&(after, path)| all[after..].contains(path))
-    {
+    if let Some((_, twice)) = (1..).zip(all).find(|&(after, path)| all[after..].contains(path)) {
         let message = format!("{}: the data set is named twice", twice.display());
         return Err(Failure::new(ExitKind::Usage, message));
     }

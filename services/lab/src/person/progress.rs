@@ -92,14 +92,12 @@ impl Progress {
 
     /// Begins to read the features of a checkpoint's examples again.
     pub(super) fn resuming(&self, n_done: usize) {
-        self.console
-            .begin(&format!("going on after step {n_done}"), "");
+        self.console.begin(&format!("going on after step {n_done}"), "");
     }
 
     /// Tells that a training goes on.
     pub(super) fn resumed(&self, n_done: usize, n_steps: usize) -> Result<(), Failure> {
-        self.console
-            .message(&format!("going on after step {n_done} of {n_steps}"));
+        self.console.message(&format!("going on after step {n_done} of {n_steps}"));
         self.console
             .event(&json!({ "event": "resumed", "done": n_done, "steps": n_steps }))
     }
@@ -181,8 +179,7 @@ impl Watch for Progress {
             Event::Collected { held, bytes, .. } => state.held = Some((held, bytes)),
             Event::Gap(gap) => state.gap = Some(gap),
         }
-        self.console
-            .details(&(state.details() + &state.left_text()));
+        self.console.details(&(state.details() + &state.left_text()));
     }
 
     fn go_on(&self) -> bool {

@@ -129,11 +129,8 @@ impl Report {
             "people        {} used, in {} images with turned and mirrored ones",
             self.n_people, self.n_images
         )?;
-        let reasons: Vec<String> = self
-            .left_out
-            .iter()
-            .map(|(kind, n)| format!("{kind} {n}"))
-            .collect();
+        let reasons: Vec<String> =
+            self.left_out.iter().map(|(kind, n)| format!("{kind} {n}")).collect();
         let n_left_out = self.n_left_out();
         if reasons.is_empty() {
             writeln!(text, "  left out    0")?;

@@ -20,9 +20,7 @@ impl Crop {
     /// * `angle`: the picture is turned by it first, radians, clockwise.
     pub(super) fn around(joints: &[[f64; 2]], angle: f64) -> Option<Self> {
         let turn = [angle.cos(), angle.sin()];
-        let known = joints
-            .iter()
-            .filter(|it| it.iter().all(|it| it.is_finite()));
+        let known = joints.iter().filter(|it| it.iter().all(|it| it.is_finite()));
         let turned = known.map(|[x, y]| [turn[0] * x - turn[1] * y, turn[1] * x + turn[0] * y]);
         let [left, top, right, bottom] = posenetwork::outline_of(turned)?;
         let shape = Shape::default();

@@ -49,12 +49,10 @@ pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Per
         let read = training::datasets::read(path, &options).map_err(dataset_failure)?;
         for problem in &read.problems {
             let cause = &problem.fault;
-            work.console
-                .message(&format!("left out: {problem}: {cause}"));
+            work.console.message(&format!("left out: {problem}: {cause}"));
         }
         let n = read.people.len();
-        work.console
-            .begin(&crate::eval::pictures::name(path), "people");
+        work.console.begin(&crate::eval::pictures::name(path), "people");
         work.console.set(0, n);
         let found = of_all(&read.people, (sides, &people.teachers), work);
         work.console.finish();
@@ -137,9 +135,7 @@ fn of_person(
         return Ok(None);
     }
     let rgb = upright.rgb(picture.view());
-    let mut taught = teachers
-        .iter()
-        .map(|teacher| taught(teacher, &rgb, &marked));
+    let mut taught = teachers.iter().map(|teacher| taught(teacher, &rgb, &marked));
     let first = taught.next().transpose()?;
     let mut of_all = [[f32::NAN; 2]; N_KEYPOINTS];
     of_all[..N_JOINTS].copy_from_slice(&marked);
@@ -241,9 +237,7 @@ fn length([x, y]: Point) -> f32 {
 /// seen from behind. The teacher's where there is no mark; nothing where neither is known.
 fn across(marks: &Marks) -> Option<f32> {
     let widths = PAIRS.iter().filter_map(|[right, left]| {
-        let is_marked = [right, left]
-            .iter()
-            .all(|it| marks.marked[**it][0].is_finite());
+        let is_marked = [right, left].iter().all(|it| marks.marked[**it][0].is_finite());
         let x = |joint: usize| {
             if is_marked {
                 marks.marked[joint][0]
@@ -265,18 +259,14 @@ fn taught(
     marked: &[Point; N_JOINTS],
 ) -> Result<[(Point, f32); N_KEYPOINTS], Failure> {
     let last = (SIDE - 1) as f64;
-    let known = marked
-        .iter()
-        .filter(|it| it[0].is_finite())
-        .map(|at| at.map(f64::from));
+    let known = marked.iter().filter(|it| it[0].is_finite()).map(|at| at.map(f64::from));
     let Some([left, top, right, bottom]) = posenetwork::outline_of(known) else {
         return Ok([UNKNOWN; N_KEYPOINTS]);
     };
     let plain = find(teacher, rgb, [left, top, right, bottom])?;
     let rows = rgb.chunks_exact(3 * SIDE);
-    let mirrored: Vec<u8> = rows
-        .flat_map(|row| row.chunks_exact(3).rev().flatten().copied())
-        .collect();
+    let mirrored: Vec<u8> =
+        rows.flat_map(|row| row.chunks_exact(3).rev().flatten().copied()).collect();
     let other = find(teacher, &mirrored, [last - right, top, last - left, bottom])?;
     let other = exchange_sides(&other).map(|([x, y], score)| ([last as f32 - x, y], score));
     let near = SAME * SIDE as f32;
@@ -306,8 +296,7 @@ fn find(
         return Ok([UNKNOWN; N_KEYPOINTS]);
     };
     let mut maps = JointMaps::default();
-    maps.read(&sight, &MapSettings::default())
-        .or_fail(ExitKind::Input)?;
+    maps.read(&sight, &MapSettings::default()).or_fail(ExitKind::Input)?;
     Ok(core::array::from_fn(|keypoint| {
         let peak = match keypoint.checked_sub(N_JOINTS) {
             None => maps.peaks().get(keypoint).copied().flatten(),

@@ -76,8 +76,7 @@ fn a_network_that_was_not_trained_fits_its_card_and_tells_front_and_errors() {
         "{errors:?}"
     );
     let mut maps = posenetwork::JointMaps::default();
-    maps.read(&sight, &posenetwork::MapSettings::default())
-        .unwrap();
+    maps.read(&sight, &posenetwork::MapSettings::default()).unwrap();
     let expected = maps.expected_px(0).unwrap();
     assert!((expected - 8.0).abs() < 0.1, "along one axis: {expected}");
     let (_, of_nose) = maps.keypoint(N_JOINTS).unwrap();

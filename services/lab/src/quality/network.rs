@@ -114,12 +114,10 @@ pub fn train(
         replace(&beside(".svg"), drawn.as_bytes())?;
         say.pass(&trainer)?;
     }
-    let identity = job.identity.clone().unwrap_or_else(|| {
-        out.file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
-    });
+    let identity = job
+        .identity
+        .clone()
+        .unwrap_or_else(|| out.file_stem().unwrap_or_default().to_string_lossy().into_owned());
     replace(out, &trainer.onnx(&identity))?;
     say.judged("validation", &trainer.judge(trainer.task().validated()))?;
     for file in &job.judge {

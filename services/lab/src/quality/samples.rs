@@ -102,22 +102,14 @@ fn people(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
             ..ReadOptions::default()
         };
         let read = training::datasets::read(path, &options).map_err(dataset_failure)?;
-        let name = path
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let found: Result<Vec<_>, Failure> = read
             .people
             .par_iter()
             .map(|person| {
                 work.go_on()?;
                 let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
-                let file = person
-                    .image
-                    .file_name()
-                    .unwrap_or_default()
-                    .to_string_lossy();
+                let file = person.image.file_name().unwrap_or_default().to_string_lossy();
                 let source = format!("{name} {file}");
                 let named = (source.clone(), source);
                 let found = work.observer.observe(picture.view(), &person.joints, named);

@@ -104,8 +104,7 @@ impl Tally {
             let each = put.iter().map(|put| distance(put, there));
             each.fold(f64::INFINITY, f64::min)
         });
-        self.errors_m
-            .push(Share::of(nearest.filter(|nearest| *nearest < FOUND_M)));
+        self.errors_m.push(Share::of(nearest.filter(|nearest| *nearest < FOUND_M)));
         self.n_true += there.len();
     }
 
@@ -176,9 +175,7 @@ fn deviation(person: &PersonLine) -> f64 {
 /// Mean distance of the joints, metres; infinite if half of them are unknown.
 fn distance(put: &Joints, there: &Joints) -> f64 {
     let both = put.iter().zip(there);
-    let each: Vec<f64> = both
-        .filter_map(|(a, b)| Some(((*a)? - (*b)?).norm()))
-        .collect();
+    let each: Vec<f64> = both.filter_map(|(a, b)| Some(((*a)? - (*b)?).norm())).collect();
     if 2 * each.len() <= N_JOINTS {
         return f64::INFINITY;
     }
@@ -253,9 +250,7 @@ mod tests {
     #[test]
     fn everybody_where_they_are_is_everything() {
         let truth = frames(60);
-        let lines: Vec<FrameLine> = (0..60)
-            .map(|nth| line(nth, &[(1, 0.01), (2, 2.01)]))
-            .collect();
+        let lines: Vec<FrameLine> = (0..60).map(|nth| line(nth, &[(1, 0.01), (2, 2.01)])).collect();
         let score = everybody(&truth, &lines, RATE_HZ);
         assert_eq!(score.ap.len(), RIGHT_MM.len());
         assert!(score.ap.values().all(|ap| (ap - 100.0).abs() < 1e-9));

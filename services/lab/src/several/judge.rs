@@ -42,9 +42,7 @@ impl Put {
     pub fn plain(id: u64, joints: &Joints) -> Self {
         let mut all = [None; N_TRUE];
         all[..14].copy_from_slice(joints);
-        all[14] = joints[2]
-            .zip(joints[3])
-            .map(|(a, b)| nalgebra::center(&a, &b));
+        all[14] = joints[2].zip(joints[3]).map(|(a, b)| nalgebra::center(&a, &b));
         Self { id, joints: all }
     }
 
@@ -53,15 +51,11 @@ impl Put {
     pub fn new(id: u64, joints: &Joints) -> Self {
         let middle = |a: usize, b: usize| Some(nalgebra::center(&joints[a]?, &joints[b]?));
         let [shoulders, hips] = [middle(8, 9), middle(2, 3)];
-        let ears = joints[12]
-            .zip(joints[13])
-            .map(|(neck, head)| neck + (head - neck) * EARS);
+        let ears = joints[12].zip(joints[13]).map(|(neck, head)| neck + (head - neck) * EARS);
         let mut all = [None; N_TRUE];
         all[..12].copy_from_slice(&joints[..12]);
         all[14] = hips;
-        all[12] = shoulders
-            .zip(ears)
-            .map(|(shoulders, ears)| nalgebra::center(&shoulders, &ears));
+        all[12] = shoulders.zip(ears).map(|(shoulders, ears)| nalgebra::center(&shoulders, &ears));
         let face = || {
             let across = joints[8]? - joints[9]?;
             (shoulders? - hips?).cross(&across).try_normalize(1e-9)
@@ -193,9 +187,7 @@ mod tests {
     }
 
     fn put(id: u64, person: &TruePerson, off_m: f64) -> Put {
-        let joints = person
-            .joints
-            .map(|joint| Some(joint + Vector3::y() * off_m));
+        let joints = person.joints.map(|joint| Some(joint + Vector3::y() * off_m));
         Put { id, joints }
     }
 

@@ -67,18 +67,11 @@ impl Report {
     /// * `views`: those of the set that were used.
     pub fn new(run: &Run, views: &[usize]) -> Self {
         let score = &run.score;
-        let times: Vec<f64> = run
-            .association
-            .iter()
-            .map(|time| 1e3 * time.as_secs_f64())
-            .collect();
+        let times: Vec<f64> = run.association.iter().map(|time| 1e3 * time.as_secs_f64()).collect();
         let times = Sorted::new(times);
         let time = |share: f64| times.nearest_rank(share).unwrap_or(0.0);
-        let actors: Vec<ActorReport> = score
-            .actors
-            .iter()
-            .map(|(id, actor)| of_actor(*id, actor))
-            .collect();
+        let actors: Vec<ActorReport> =
+            score.actors.iter().map(|(id, actor)| of_actor(*id, actor)).collect();
         Self {
             views: views.to_vec(),
             frames: score.frames.len(),
@@ -123,10 +116,7 @@ pub(super) fn measured(frames: &[Share], scale: f64) -> Option<Measured> {
 fn mean(frames: &[Vec<PartsOfFrame>]) -> Option<Measured> {
     let of_parts = |parts: &[PartsOfFrame]| {
         let of_actor = |id: usize| {
-            let own = parts
-                .iter()
-                .filter(|part| part.actor == id)
-                .map(|part| part.right);
+            let own = parts.iter().filter(|part| part.actor == id).map(|part| part.right);
             Share::mean(&own.collect::<Vec<Share>>())
         };
         let each: Option<Vec<f64>> = (0..ACTORS).map(of_actor).collect();

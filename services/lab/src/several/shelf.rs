@@ -107,12 +107,8 @@ impl Shelf {
             );
         }
         let truth = truth(&folder.join("gt.txt"))?;
-        let frames = (0..truth.len()).map(|_| {
-            views
-                .iter_mut()
-                .map(|view| view.next().unwrap_or_default())
-                .collect()
-        });
+        let frames = (0..truth.len())
+            .map(|_| views.iter_mut().map(|view| view.next().unwrap_or_default()).collect());
         Ok(Self {
             cameras,
             frames: frames.collect(),
@@ -124,10 +120,7 @@ impl Shelf {
     #[must_use]
     pub fn with_views(&self, views: &[usize]) -> Self {
         Self {
-            cameras: views
-                .iter()
-                .map(|view| self.cameras[*view].clone())
-                .collect(),
+            cameras: views.iter().map(|view| self.cameras[*view].clone()).collect(),
             frames: self
                 .frames
                 .iter()
@@ -277,10 +270,7 @@ fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> View {
     for (field, strengths) in fields.iter().enumerate() {
         let [from, to] = [FIELDS[0][field], FIELDS[1][field]];
         let n_to = candidates[to].len().max(1);
-        let each = strengths
-            .iter()
-            .enumerate()
-            .filter(|(_, strength)| **strength > 0.0);
+        let each = strengths.iter().enumerate().filter(|(_, strength)| **strength > 0.0);
         edges.extend(each.map(|(nth, strength)| Edge {
             strength: *strength,
             ends: [(from, nth / n_to), (to, nth % n_to)],
@@ -290,9 +280,7 @@ fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> View {
     let mut groups: Vec<Group> = Vec::new();
     for Edge { ends: [a, b], .. } in edges {
         let owner = |(keypoint, candidate): (usize, usize)| {
-            groups
-                .iter()
-                .position(|group| group[keypoint] == Some(candidate))
+            groups.iter().position(|group| group[keypoint] == Some(candidate))
         };
         match (owner(a), owner(b)) {
             (None, None) => {
@@ -326,11 +314,8 @@ fn seen(candidates: &[Candidates], groups: &[Group]) -> View {
     let people = groups.iter().zip(&sizes);
     let detections = people.map(|(group, size)| Detection {
         joints: core::array::from_fn(|nth| {
-            let complete = |way: &&Way| {
-                way.row
-                    .iter()
-                    .all(|(keypoint, _)| group[*keypoint].is_some())
-            };
+            let complete =
+                |way: &&Way| way.row.iter().all(|(keypoint, _)| group[*keypoint].is_some());
             joint(candidates, group, ways[nth].iter().find(complete)?, *size)
         }),
         colour: None,
@@ -343,11 +328,8 @@ fn seen(candidates: &[Candidates], groups: &[Group]) -> View {
         let [(keypoint, _)] = row[..] else {
             return Vec::new();
         };
-        let is_free = |candidate: &usize| {
-            groups
-                .iter()
-                .all(|group| group[keypoint] != Some(*candidate))
-        };
+        let is_free =
+            |candidate: &usize| groups.iter().all(|group| group[keypoint] != Some(*candidate));
         let free = (0..candidates[keypoint].len()).filter(is_free);
         free.filter_map(|candidate| placed(candidates[keypoint][candidate], largest))
             .collect()
@@ -459,12 +441,7 @@ mod tests {
         assert_eq!(view.detections.len(), 2);
         for detection in &view.detections {
             let x = detection.joints[0].unwrap().at_px[0];
-            assert!(
-                detection
-                    .joints
-                    .iter()
-                    .all(|joint| joint.unwrap().at_px[0] == x)
-            );
+            assert!(detection.joints.iter().all(|joint| joint.unwrap().at_px[0] == x));
         }
         assert_eq!(view.loose[6].len(), 1);
         assert_eq!(view.loose.iter().flatten().count(), 1);

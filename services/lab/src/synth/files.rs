@@ -131,10 +131,7 @@ pub(super) fn deployment(
         let (name, source) = (quoted(&camera.name), quoted(&source));
         write!(text, "\n[[camera]]\nname = {name}\nsource = {source}\n").or_fail(ExitKind::Run)?;
         // The address of a scene has it.
-        let skew_ms = settings
-            .skews_ms
-            .get(nth)
-            .filter(|it| **it != 0.0 && !job.live);
+        let skew_ms = settings.skews_ms.get(nth).filter(|it| **it != 0.0 && !job.live);
         if let Some(skew_ms) = skew_ms {
             writeln!(text, "skew_ms = {skew_ms:?}").or_fail(ExitKind::Run)?;
         }

@@ -70,12 +70,7 @@ fn performed(file: &Path, motion: &Motion) -> Recording {
 fn name(file: &Path) -> String {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let plain = |it: char| if it.is_ascii_alphanumeric() { it } else { '-' };
-    let name: String = stem
-        .to_ascii_lowercase()
-        .chars()
-        .map(plain)
-        .take(16)
-        .collect();
+    let name: String = stem.to_ascii_lowercase().chars().map(plain).take(16).collect();
     match name.trim_matches('-') {
         "" => "motion".to_owned(),
         name => name.to_owned(),

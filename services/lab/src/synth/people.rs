@@ -26,11 +26,10 @@ impl People {
 
     /// Adds those of a sequence in a folder of that name.
     pub(super) fn append(&mut self, folder: &str, others: Self) {
-        self.0
-            .extend(others.0.into_iter().map(|(mut person, name, behind)| {
-                person.image = Path::new(folder).join(&person.image);
-                (person, name, behind)
-            }));
+        self.0.extend(others.0.into_iter().map(|(mut person, name, behind)| {
+            person.image = Path::new(folder).join(&person.image);
+            (person, name, behind)
+        }));
     }
 
     /// Writes both files of annotations; none if there is nobody.

@@ -152,11 +152,7 @@ impl<'a> Sequence<'a> {
             return people;
         }
         for frame in frames {
-            for seen in frame
-                .views
-                .iter()
-                .filter(|it| !it.repeated && it.outline.is_some())
-            {
+            for seen in frame.views.iter().filter(|it| !it.repeated && it.outline.is_some()) {
                 let file = files::name(&format!("{:06}", frame.frame), self.job.format);
                 let image = Path::new("cameras").join(&seen.camera).join(file);
                 let unknown = [f64::NAN; 2];

@@ -8,9 +8,7 @@ use super::{Drawn, assert_ended};
 fn pictures_are_prepared_a_network_learns_from_them_and_is_judged_on_those_kept_apart() {
     let drawn = Drawn::new(240);
     let words = ["train", "finder-pictures", "people.jsonl", "--json"];
-    let ended = drawn
-        .start(&[&words[..], &["--out", "pictures.bin"]].concat())
-        .wait();
+    let ended = drawn.start(&[&words[..], &["--out", "pictures.bin"]].concat()).wait();
     assert_ended(&ended, 0, &[]);
     let report: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
     assert_eq!([&report["learnt"], &report["kept_apart"]], [220, 20]);
@@ -32,9 +30,7 @@ fn pictures_are_prepared_a_network_learns_from_them_and_is_judged_on_those_kept_
     let pass: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
     assert_eq!([&pass["step"], &pass["score"]["pictures"]], [3, 20]);
 
-    let ended = drawn
-        .start(&["judge", "n.onnx", "pictures.bin", "--json"])
-        .wait();
+    let ended = drawn.start(&["judge", "n.onnx", "pictures.bin", "--json"]).wait();
     assert_ended(&ended, 0, &[]);
     let judged: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(judged["people"], 20, "everybody has a box");

@@ -8,9 +8,7 @@ use super::{Drawn, assert_ended};
 fn people_are_prepared_and_one_block_in_twelve_is_kept_apart() {
     let drawn = Drawn::new(240);
     let words = ["train", "network-people", "people.jsonl", "--sides", "seen"];
-    let ended = drawn
-        .start(&[&words[..], &["--json", "--out", "people.bin"]].concat())
-        .wait();
+    let ended = drawn.start(&[&words[..], &["--json", "--out", "people.bin"]].concat()).wait();
     assert_ended(&ended, 0, &[]);
     let report: Value = serde_json::from_str(ended.stdout.lines().last().unwrap()).unwrap();
     assert_eq!([&report["learnt"], &report["kept_apart"]], [220, 20]);
@@ -24,9 +22,7 @@ fn people_that_are_not_there_are_named_and_settings_can_be_printed() {
     let words = ["train", "network", "people.bin", "--out", "n.onnx"];
     let ended = drawn.start(&words).wait();
     assert_ended(&ended, 4, &["people.bin"]);
-    let ended = drawn
-        .start(&["train", "network", "--print-settings"])
-        .wait();
+    let ended = drawn.start(&["train", "network", "--print-settings"]).wait();
     assert_ended(&ended, 0, &[]);
     assert!(ended.stdout.contains("[shape]"), "{}", ended.stdout);
 }

@@ -63,9 +63,9 @@ pub(crate) fn footage(
                     of_files(camera, capture)
                 }
                 None => elsewhere(deployment, camera),
-                Some(Ok(found)) => found
-                    .map(|it| of_live(it, capture))
-                    .map_err(|it| refused(it, camera)),
+                Some(Ok(found)) => {
+                    found.map(|it| of_live(it, capture)).map_err(|it| refused(it, camera))
+                }
                 Some(Err(_panic)) => {
                     Err(Failure::new(ExitKind::Run, "a camera could not be asked"))
                 }
@@ -174,9 +174,7 @@ fn elsewhere(deployment: &Deployment, camera: &Camera) -> Result<Footage, Failur
     let capture = &deployment.capture;
     let rig = inputs::rig_of(deployment)?;
     // One that is not in the rig is reported later, by name.
-    let size = rig
-        .camera(&camera.name)
-        .map_or([1; 2], |it| it.intrinsics.size);
+    let size = rig.camera(&camera.name).map_or([1; 2], |it| it.intrinsics.size);
     let rate_hz = capture.frame_rate_hz;
     Ok(Footage {
         size,

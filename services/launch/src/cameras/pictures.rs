@@ -111,9 +111,8 @@ fn with_up(rig: Rig) -> Rig {
         return rig;
     }
     let down = rig.cameras().iter();
-    let down: Vector3<f64> = down
-        .map(|it| it.camera_from_world.rotation.inverse() * Vector3::y())
-        .sum();
+    let down: Vector3<f64> =
+        down.map(|it| it.camera_from_world.rotation.inverse() * Vector3::y()).sum();
     let up = UnitVector3::try_new(-down, 0.3 * rig.cameras().len() as f64);
     let level = Rig::new(rig.cameras().to_vec(), up, rig.source());
     level.unwrap_or(rig)

@@ -98,18 +98,16 @@ impl Origin {
             resolved = Ok(settings);
         }
         let n_lines = gathering.n_lines();
-        let mut trials = gathering
-            .finish(&given.name, given.rate_hz)
-            .map_err(|error| {
-                let kind = match error {
-                    TrialError::Empty | TrialError::NoPoint { .. } => ExitKind::Degraded,
-                    TrialError::Joints(_) | TrialError::Range { .. } => ExitKind::Input,
-                };
-                Failure::new(
-                    kind,
-                    format!("{}: {error}; nothing is written", source.display()),
-                )
-            })?;
+        let mut trials = gathering.finish(&given.name, given.rate_hz).map_err(|error| {
+            let kind = match error {
+                TrialError::Empty | TrialError::NoPoint { .. } => ExitKind::Degraded,
+                TrialError::Joints(_) | TrialError::Range { .. } => ExitKind::Input,
+            };
+            Failure::new(
+                kind,
+                format!("{}: {error}; nothing is written", source.display()),
+            )
+        })?;
         // All have the same places.
         check_rate(&trials[0], given)?;
         flaws.extend(of_times(&trials[0], n_lines));
@@ -245,9 +243,7 @@ fn lines(
     let mut text = String::new();
     for number in 1_usize.. {
         text.clear();
-        let n = input
-            .read_line(&mut text)
-            .map_err(|error| in_file(&path, &error))?;
+        let n = input.read_line(&mut text).map_err(|error| in_file(&path, &error))?;
         if n == 0 {
             break;
         }
@@ -266,9 +262,7 @@ fn lines(
                 return Err(in_file(&path, &error));
             }
         };
-        gathering
-            .push(&line)
-            .map_err(|error| in_file(&path, &error))?;
+        gathering.push(&line).map_err(|error| in_file(&path, &error))?;
     }
     Ok(gathering)
 }
@@ -326,15 +320,11 @@ fn line(skeletons: &Skeletons, joints: &JointSet, resolved: &Resolved) -> FrameL
     let people = skeletons.listed().iter();
     FrameLine {
         frame,
-        people: people
-            .map(|message| person(message, joints, resolved))
-            .collect(),
+        people: people.map(|message| person(message, joints, resolved)).collect(),
         reason: None,
         seen: None,
         status: skeletons.status.reason().to_owned(),
-        time_s: resolved
-            .frame_rate_hz()
-            .map(|rate_hz| frame as f64 / rate_hz),
+        time_s: resolved.frame_rate_hz().map(|rate_hz| frame as f64 / rate_hz),
         views_missing: BTreeMap::new(),
         views_present: Vec::new(),
     }
@@ -349,12 +339,7 @@ fn person(message: &SkeletonMessage, joints: &JointSet, resolved: &Resolved) -> 
     PersonLine {
         id: message.id,
         joints: names.zip(listed.map(point)).collect(),
-        keypoints: resolved
-            .extra_keypoints
-            .iter()
-            .cloned()
-            .zip(extras.map(point))
-            .collect(),
+        keypoints: resolved.extra_keypoints.iter().cloned().zip(extras.map(point)).collect(),
         pairs: message.n_pairs,
         status: message.status.reason().to_owned(),
         ..PersonLine::default()

@@ -70,9 +70,7 @@ fn write_all(
     }
     let room = files::Folder::create(folder).map_err(|error| cannot_write(folder, &error))?;
     let put = |room: &files::Folder, name: &str, text: &str| {
-        let written = room
-            .begin(name)
-            .and_then(|mut file| file.write_all(text.as_bytes()));
+        let written = room.begin(name).and_then(|mut file| file.write_all(text.as_bytes()));
         at(&room.path().join(name), written)
     };
     put(&room, MARK, "keypoints exported by parallax\n")?;

@@ -77,12 +77,7 @@ impl Pictures {
     ///
     /// The footage or the recording cannot be read.
     pub(super) fn at(&mut self, frame: u64) -> Result<Option<&[u8]>, Failure> {
-        let n_bytes = 3 * self
-            .view
-            .size
-            .iter()
-            .map(|it| *it as usize)
-            .product::<usize>();
+        let n_bytes = 3 * self.view.size.iter().map(|it| *it as usize).product::<usize>();
         match &mut self.from {
             From::Footage { feed, at, is_over } => {
                 while !*is_over && at.is_none_or(|it| it < frame) {

@@ -147,10 +147,7 @@ fn each_of_several_people_has_a_file_and_one_alone_the_simple_name() {
         let table = read(&format!("x-person{id}-long.csv"));
         for (frame, is_there) in frames.into_iter().enumerate() {
             let row = format!("{frame},{},{id},head,", frame as f64 / 50.0);
-            let rest = table
-                .lines()
-                .find_map(|line| line.strip_prefix(&row))
-                .unwrap();
+            let rest = table.lines().find_map(|line| line.strip_prefix(&row)).unwrap();
             let place = if is_there {
                 format!("{id},2,3,")
             } else {
@@ -220,11 +217,8 @@ fn what_a_run_does_not_tell_is_asked_for_before_anything_is_written() {
     let timeless = timeless.replace("\"time_s\":0,", "\"time_s\":null,");
     let folder = run(&[("pose3d.jsonl", &timeless)]);
     let origin = Origin::read(folder.path(), &Given::default()).unwrap();
-    let refused = |formats: &[&str]| {
-        exported(&origin, &job(folder.path(), formats))
-            .unwrap_err()
-            .to_string()
-    };
+    let refused =
+        |formats: &[&str]| exported(&origin, &job(folder.path(), formats)).unwrap_err().to_string();
     assert!(refused(&["c3d", "csv"]).contains("how many frames a second"));
     assert!(refused(&["openpose"]).contains("deployment.json"));
     assert!(!folder.path().join("export").exists());
@@ -272,9 +266,7 @@ fn runs_that_are_not_whole_say_so_and_those_without_a_joint_are_refused() {
         "pose3d.jsonl",
         &text.replace("\"frame\":1,", "\"frame\":-1,"),
     )]);
-    let error = Origin::read(wrong.path(), &given())
-        .unwrap_err()
-        .to_string();
+    let error = Origin::read(wrong.path(), &given()).unwrap_err().to_string();
     assert!(
         error.contains("line 2") && error.contains("frame"),
         "{error}"

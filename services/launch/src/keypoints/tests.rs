@@ -35,9 +35,7 @@ fn deployment(folder: &Path, more: &str, set: &[&str]) -> Deployment {
     );
     let set: Vec<String> = set.iter().map(|it| (*it).to_owned()).collect();
     let file = folder.join("deployment.toml");
-    Loaded::parse(&text, &file, &set, &AnyMachine)
-        .unwrap()
-        .deployment
+    Loaded::parse(&text, &file, &set, &AnyMachine).unwrap().deployment
 }
 
 #[test]

@@ -114,10 +114,7 @@ mod tests {
         let value = describe(&snapshot());
         assert_eq!(value["name"], "walk");
         let processes = value["processes"].as_array().unwrap();
-        let states: Vec<&str> = processes
-            .iter()
-            .map(|it| it["state"].as_str().unwrap())
-            .collect();
+        let states: Vec<&str> = processes.iter().map(|it| it["state"].as_str().unwrap()).collect();
         assert_eq!(states, ["begins", "dead", "runs", "runs"]);
         assert_eq!(processes[0]["measured"], Value::Null);
         let pose = &processes[2]["measured"];

@@ -73,10 +73,8 @@ impl Snapshot {
         observed: &[ObservedProcess<'_>],
         now: u64,
     ) -> Self {
-        let mut processes: Vec<ProcessSnapshot> = observed
-            .iter()
-            .map(|it| ProcessSnapshot::new(it, now))
-            .collect();
+        let mut processes: Vec<ProcessSnapshot> =
+            observed.iter().map(|it| ProcessSnapshot::new(it, now)).collect();
         processes.sort_by_key(|it| sort_key(&it.name));
         Self {
             name: name.to_owned(),
@@ -105,9 +103,7 @@ impl Snapshot {
 impl ProcessSnapshot {
     fn new(observed: &ObservedProcess<'_>, now: u64) -> Self {
         let read = observed.metrics.map(Reading::from_message);
-        let age_nanos = observed
-            .metrics
-            .map_or(0, |it| now.saturating_sub(it.at_nanos));
+        let age_nanos = observed.metrics.map_or(0, |it| now.saturating_sub(it.at_nanos));
         let (reading, problem) = match read {
             None => (None, None),
             Some(Ok(reading)) => (Some(reading), None),

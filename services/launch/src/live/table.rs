@@ -11,21 +11,14 @@ const NONE: &str = "-";
 
 /// A deployment as two tables. The titles contain the units.
 pub fn table(snapshot: &Snapshot) -> String {
-    let alive = snapshot
-        .processes
-        .iter()
-        .filter(|it| it.pid.is_some())
-        .count();
+    let alive = snapshot.processes.iter().filter(|it| it.pid.is_some()).count();
     let mut text = format!(
         "{}: run by process {}, {alive} of {} processes live\n\n",
         snapshot.name,
         snapshot.supervisor,
         snapshot.processes.len()
     );
-    let rows = snapshot
-        .processes
-        .iter()
-        .map(|process| process_row(snapshot, process));
+    let rows = snapshot.processes.iter().map(|process| process_row(snapshot, process));
     push_table(&mut text, &PROCESSES, rows);
     let problems = snapshot.processes.iter().filter_map(|process| {
         let problem = process.problem?;
@@ -39,10 +32,7 @@ pub fn table(snapshot: &Snapshot) -> String {
         Some(format!("people in view, of whom one is followed: {n}\n\n"))
     });
     text.extend(counted);
-    let rows = snapshot
-        .processes
-        .iter()
-        .flat_map(|process| time_rows(snapshot, process));
+    let rows = snapshot.processes.iter().flat_map(|process| time_rows(snapshot, process));
     push_table(&mut text, &TIMES, rows);
     text
 }
@@ -136,30 +126,14 @@ fn process_row(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<String> {
     let uptime = |it: &Reading| format!("{:.0}", (it.at_nanos - it.began_at_nanos) as f64 / 1e9);
     vec![
         process.name.clone(),
-        or_none(
-            reading
-                .and_then(|it| it.view.as_ref())
-                .map(|it| view(snapshot, it.index)),
-        ),
+        or_none(reading.and_then(|it| it.view.as_ref()).map(|it| view(snapshot, it.index))),
         process.state.name().to_owned(),
         or_none(reading.filter(|_| is_active).map(uptime)),
         or_none(reading.map(|it| it.n_sent.to_string())),
-        or_none(
-            reading
-                .filter(|_| is_active)
-                .map(|it| rate(it.sent_millihertz)),
-        ),
+        or_none(reading.filter(|_| is_active).map(|it| rate(it.sent_millihertz))),
         or_none(reading.map(|it| it.restarts.to_string())),
-        or_none(
-            reading
-                .and_then(|it| it.queue)
-                .map(|it| format!("{} of {}", it[0], it[1])),
-        ),
-        or_none(
-            reading
-                .filter(|it| it.memory_bytes > 0)
-                .map(|it| megabytes(it.memory_bytes)),
-        ),
+        or_none(reading.and_then(|it| it.queue).map(|it| format!("{} of {}", it[0], it[1]))),
+        or_none(reading.filter(|it| it.memory_bytes > 0).map(|it| megabytes(it.memory_bytes))),
         or_none(
             reading
                 .filter(|it| it.evidence_bytes > 0)

@@ -19,10 +19,7 @@ pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> 
         camera,
         size: Size::new(footage.size[0] as usize, footage.size[1] as usize),
         rate_hz: resolved.instants_hz(),
-        is_kept: resolved
-            .recording
-            .as_ref()
-            .is_some_and(|it| it.pictures.contains(&view)),
+        is_kept: resolved.recording.as_ref().is_some_and(|it| it.pictures.contains(&view)),
         name: entry.name.clone(),
         max_skew_nanos: max_skew_nanos(resolved),
         lead_nanos: crate::cameras::lead_nanos(&resolved.deployment),

@@ -23,12 +23,9 @@ pub(super) fn exchanged(exchanged: &Exchanged) -> String {
 
 /// Text on cameras whose views contradict each other.
 pub(super) fn contradicted(contradicted: &Contradicted) -> String {
-    let likely = contradicted
-        .likely
-        .as_ref()
-        .map_or_else(String::new, |[first, second]| {
-            format!(" ({first} and {second} exchanged would fit best)")
-        });
+    let likely = contradicted.likely.as_ref().map_or_else(String::new, |[first, second]| {
+        format!(" ({first} and {second} exchanged would fit best)")
+    });
     format!(
         "  calibration   the cameras contradict each other: rays to the same part miss each other by {:.1} degrees, where up \
          to {:.1} are usual; see whether every `source` is the footage of its camera{likely}, the rig is the one of this \

@@ -85,9 +85,7 @@ fn latency(report: &LatencyReport) -> Table {
         heading: "Latency".to_owned(),
         note: "Milliseconds: from capture to result, then the computing time of every stage."
             .to_owned(),
-        columns: ["", "measured", "median", "99 of 100", "longest"]
-            .map(str::to_owned)
-            .into(),
+        columns: ["", "measured", "median", "99 of 100", "longest"].map(str::to_owned).into(),
         rows: rows.collect(),
     }
 }
@@ -101,11 +99,7 @@ fn space(folder: &Path, content: &Content<'_>) -> Result<Space, Failure> {
     });
     let up = content.rig.up_in_world();
     Ok(Space {
-        joints: joints
-            .joints
-            .iter()
-            .map(|joint| joint.name.to_owned())
-            .collect(),
+        joints: joints.joints.iter().map(|joint| joint.name.to_owned()).collect(),
         limbs: joints.limbs.to_vec(),
         eyes: eyes.collect(),
         up: up.map_or([0.0, 0.0, 1.0], |up| up.into_inner().into()),
@@ -178,9 +172,7 @@ fn strips(folder: &Path, cameras: &[String]) -> Vec<Strip> {
 /// What the pictures of a file name such as `000010.png` show.
 fn caption(name: &str) -> String {
     let number = name.trim_end_matches(".png");
-    let number = number
-        .parse()
-        .map_or(number.to_owned(), |it: u64| it.to_string());
+    let number = number.parse().map_or(number.to_owned(), |it: u64| it.to_string());
     format!("frame {number}")
 }
 

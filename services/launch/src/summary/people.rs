@@ -41,9 +41,8 @@ impl Outside {
     /// For people.
     pub(super) fn text(&self) -> String {
         let views = self.views.iter();
-        let views: Vec<String> = views
-            .map(|(name, px)| format!("{px:.0} px high in {name}"))
-            .collect();
+        let views: Vec<String> =
+            views.map(|(name, px)| format!("{px:.0} px high in {name}")).collect();
         format!(
             "people are {} ({} to {} is what the search does well): set capture.scale = {}{}",
             views.join(", "),

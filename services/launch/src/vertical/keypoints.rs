@@ -49,9 +49,7 @@ pub(super) fn find(
         let step = source.n_frames().div_ceil(MOST_FRAMES).max(1);
         let mut people = Vec::new();
         for frame in (0..source.n_frames()).step_by(step as usize) {
-            source
-                .of_frame(frame, &mut people)
-                .or_fail(ExitKind::Input)?;
+            source.of_frame(frame, &mut people).or_fail(ExitKind::Input)?;
             let standing = people.iter().filter_map(|person| {
                 let joint = |nth: usize| {
                     let found = |at: usize| person.keypoints.get(at).copied().flatten();
@@ -89,10 +87,7 @@ fn vertical(all: &[Standing]) -> Option<Vertical> {
     let up = common_normal(&normals, all.iter().map(|it| it.upward).sum())?;
     let n_agreeing = all.iter().filter(|it| it.upward.dot(&up) > 0.0).count();
     let share = n_agreeing as f64 / all.len() as f64;
-    let mut leans: Vec<f64> = normals
-        .iter()
-        .map(|it| it.dot(&up).abs().min(1.0).asin())
-        .collect();
+    let mut leans: Vec<f64> = normals.iter().map(|it| it.dot(&up).abs().min(1.0).asin()).collect();
     leans.sort_by(f64::total_cmp);
     let lean = leans[leans.len() / 2].to_degrees();
     if share < LEAST_AGREEING || lean > MOST_LEAN {

@@ -158,9 +158,7 @@ mod tests {
     #[test]
     fn a_table_is_read_as_it_was_written_and_refused_where_it_is_cut() {
         let names = ["left".to_owned(), "cam_7".to_owned()];
-        let board: Vec<_> = (0..4)
-            .map(|it| Point2::new(f64::from(it) * 0.05, 0.05))
-            .collect();
+        let board: Vec<_> = (0..4).map(|it| Point2::new(f64::from(it) * 0.05, 0.05)).collect();
         let corners = (0..4).map(|id| (id, Point2::new(10.5 + id as f64, 20.25)));
         let sights = vec![Sight::new(1, 35, corners, &board)];
         let folder = tempfile::tempdir().unwrap();

@@ -18,10 +18,7 @@ pub struct FrameTable {
 impl FrameTable {
     /// The frames of a camera: of its name, or of a number that its name ends with.
     pub fn of(&self, camera: &str) -> Option<&[usize]> {
-        let digits = camera.len()
-            - camera
-                .trim_end_matches(|it: char| it.is_ascii_digit())
-                .len();
+        let digits = camera.len() - camera.trim_end_matches(|it: char| it.is_ascii_digit()).len();
         let number = &camera[camera.len() - digits..];
         let found = self.frames.get(camera).or_else(|| self.frames.get(number));
         found.map(Vec::as_slice)
@@ -60,10 +57,7 @@ fn table(text: &str) -> Result<FrameTable, String> {
         let frame = without_fraction(cell(sync)).parse::<usize>();
         let frame = frame
             .map_err(|error| format!("row {}: sync_index {:?}: {error}", nth + 2, cell(sync)))?;
-        frames
-            .entry(without_fraction(cell(camera)).to_owned())
-            .or_default()
-            .push(frame);
+        frames.entry(without_fraction(cell(camera)).to_owned()).or_default().push(frame);
     }
     // The pictures of a video are in the order of time, whatever the order of the rows.
     for list in frames.values_mut() {

@@ -72,9 +72,7 @@ pub fn look(
     let slowest_hz = slowest(&rates);
     let n_pictures = |infos: &Vec<SourceInfo>| infos.iter().map(|it| it.n_frames as usize).sum();
     let longest: usize = infos.iter().map(n_pictures).max().unwrap_or(0);
-    let every = settings
-        .every
-        .unwrap_or_else(|| longest.div_ceil(settings.most.max(1)).max(1));
+    let every = settings.every.unwrap_or_else(|| longest.div_ceil(settings.most.max(1)).max(1));
     console.begin("", "looking for the board");
     let total: usize = infos.iter().map(n_pictures).sum::<usize>();
     console.set(0, total);
@@ -84,11 +82,9 @@ pub fn look(
         .map(|camera| {
             let table = match &frames {
                 None => None,
-                Some(table) => Some(
-                    table
-                        .of(&camera.name)
-                        .ok_or_else(|| unknown(table, &camera.name))?,
-                ),
+                Some(table) => {
+                    Some(table.of(&camera.name).ok_or_else(|| unknown(table, &camera.name))?)
+                }
             };
             let task = CameraTask {
                 finder: &finder,
@@ -244,17 +240,10 @@ fn agreed(finder: &Finder, raw: Vec<Raw>) -> Looked {
         votes[it.found.variant] += it.found.corners.len();
     }
     // The first of the best: the board as it was said to be.
-    let best = (0..votes.len())
-        .rev()
-        .max_by_key(|it| votes[*it])
-        .unwrap_or(0);
+    let best = (0..votes.len()).rev().max_by_key(|it| votes[*it]).unwrap_or(0);
     let variant = &finder.variants()[best];
     let cameras = raw.into_iter().enumerate().map(|(camera, raw)| {
-        let own: Vec<&Sighting> = raw
-            .found
-            .iter()
-            .filter(|it| it.found.variant == best)
-            .collect();
+        let own: Vec<&Sighting> = raw.found.iter().filter(|it| it.found.variant == best).collect();
         let count = |is: &dyn Fn(&Found) -> bool| own.iter().filter(|it| is(&it.found)).count();
         let mut nothing: Vec<(Nothing, usize)> = raw.nothing.into_iter().collect();
         nothing.sort_by_key(|it| core::cmp::Reverse(it.1));

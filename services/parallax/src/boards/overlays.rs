@@ -51,11 +51,7 @@ pub fn worst(
         }
         own.sort_by(|a, b| b.1.total_cmp(&a.1));
         let share = most.div_ceil(3.min(outcome.cameras.len().max(1)));
-        list.extend(
-            own.into_iter()
-                .take(share)
-                .map(|(frame, rms)| (nth, frame, rms)),
-        );
+        list.extend(own.into_iter().take(share).map(|(frame, rms)| (nth, frame, rms)));
     }
     list.sort_by(|a, b| b.2.total_cmp(&a.2));
     list.truncate(most);
@@ -64,10 +60,7 @@ pub fn worst(
         let Some(picture) = seen[nth].pictures.get(&frame) else {
             continue;
         };
-        let own = outcome.cameras[nth]
-            .residuals
-            .iter()
-            .filter(|it| it.frame == frame);
+        let own = outcome.cameras[nth].residuals.iter().filter(|it| it.frame == frame);
         let residuals: Vec<Residual> = own.copied().collect();
         if let Some(jpeg) = drawn(&cameras[nth], *picture, &residuals)? {
             overlays.push(Overlay {

@@ -137,9 +137,7 @@ pub fn calibrate(
         ));
     }
     Ok(Calibrated {
-        board: looked
-            .as_ref()
-            .map_or_else(|| settings.board.clone(), |it| it.board.clone()),
+        board: looked.as_ref().map_or_else(|| settings.board.clone(), |it| it.board.clone()),
         task,
         looked,
         outcome,
@@ -223,9 +221,7 @@ fn mirrored(
     }
     let turned = |points: &mut Vec<Point2<f64>>| points.iter_mut().for_each(|it| it.x = -it.x);
     turned(&mut task.board);
-    task.sights
-        .iter_mut()
-        .for_each(|it| turned(&mut it.on_board));
+    task.sights.iter_mut().for_each(|it| turned(&mut it.on_board));
     notes.push(
         "all footage is mirrored: left and right of what is found with this rig are exchanged"
             .to_owned(),
@@ -338,11 +334,8 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
         ..settings.look.clone()
     };
     // The largest of each family has the codes of the smaller ones.
-    let largest = dictionary_names().filter(|it| {
-        !["_50", "_100", "_250"]
-            .iter()
-            .any(|small| it.ends_with(small))
-    });
+    let largest = dictionary_names()
+        .filter(|it| !["_50", "_100", "_250"].iter().any(|small| it.ends_with(small)));
     for name in largest {
         let text = settings.board.to_string();
         let mut parts: Vec<&str> = text.split(':').collect();
@@ -365,15 +358,11 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
 fn reasons(looked: &Looked) -> String {
     use calibration::boards::Nothing;
 
-    let most = looked
-        .cameras
-        .iter()
-        .flat_map(|it| &it.nothing)
-        .max_by_key(|it| {
-            // What says more goes first.
-            let says = !matches!(it.0, Nothing::NoGrid | Nothing::NoMarkers);
-            (says, it.1)
-        });
+    let most = looked.cameras.iter().flat_map(|it| &it.nothing).max_by_key(|it| {
+        // What says more goes first.
+        let says = !matches!(it.0, Nothing::NoGrid | Nothing::NoMarkers);
+        (says, it.1)
+    });
     match most.map(|it| it.0) {
         Some(Nothing::OtherGrid { columns, rows }) => format!(
             "a chessboard of {columns}x{rows} inner corners is there: inner corners are counted, not squares"
@@ -425,12 +414,8 @@ impl Calibrated {
     ///
     /// Numbers that no camera has.
     pub fn rig(&self) -> Result<Rig, Failure> {
-        let cameras: Vec<Camera> = self
-            .outcome
-            .cameras
-            .iter()
-            .map(|it| it.camera.clone())
-            .collect();
+        let cameras: Vec<Camera> =
+            self.outcome.cameras.iter().map(|it| it.camera.clone()).collect();
         let mut source = format!("calibrate board {}", self.board);
         if !self.task.wants_rig {
             source += "; intrinsics alone: the poses are not known";

@@ -146,9 +146,7 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
 fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
     if as_json {
         let cameras: Vec<Value> = rig.cameras().iter().map(|it| describe(it, rig)).collect();
-        let up = rig
-            .up_in_world()
-            .map(|it| <[f64; 3]>::from(it.into_inner()));
+        let up = rig.up_in_world().map(|it| <[f64; 3]>::from(it.into_inner()));
         output::json(&json!({
             "schema_version": 1, "source": rig.source(), "up": up, "cameras": cameras,
         }))?;
@@ -223,9 +221,7 @@ fn describe(camera: &Camera, rig: &Rig) -> Value {
 
 fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode, Failure> {
     let findings = geometry::files::check(rig);
-    let has_problems = findings
-        .iter()
-        .any(|it| it.severity() != geometry::files::Severity::Note);
+    let has_problems = findings.iter().any(|it| it.severity() != geometry::files::Severity::Note);
     let report = detections.map(|file| own_views::agreement(rig, file));
     let report = report.transpose()?;
     let disagreements = report.as_ref().map_or(&[][..], |it| &it.disagreements);
@@ -275,12 +271,8 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
 fn survey_text(survey: &Survey) -> String {
     let mut lines = vec![format!("{} cameras", survey.cameras.len())];
     for place in &survey.cameras {
-        let height = place
-            .height_m
-            .map(|it| format!("{it:.2} m above the origin"));
-        let distance = place
-            .distance_m
-            .map(|it| format!("{it:.2} m from the middle"));
+        let height = place.height_m.map(|it| format!("{it:.2} m above the origin"));
+        let distance = place.distance_m.map(|it| format!("{it:.2} m from the middle"));
         let known: Vec<String> = height.into_iter().chain(distance).collect();
         lines.push(format!("  {:<12} {}", place.name, known.join(", ")));
     }

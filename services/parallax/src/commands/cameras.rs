@@ -85,10 +85,7 @@ fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
     let entry = deployment.cameras.iter().find(|it| it.name == *name);
     let live = entry.and_then(launch::cameras::live_camera);
     live.ok_or_else(|| {
-        let live = deployment
-            .cameras
-            .iter()
-            .filter(|it| launch::cameras::is_live(&it.source));
+        let live = deployment.cameras.iter().filter(|it| launch::cameras::is_live(&it.source));
         let names: Vec<&str> = live.map(|it| it.name.as_str()).collect();
         let message = format!("{} has no live camera {name:?}", file.display());
         let hint = if names.is_empty() {
@@ -121,10 +118,8 @@ fn list(as_json: bool) -> Result<ExitCode, Failure> {
     }
     if as_json {
         let cameras: Vec<Value> = found.iter().map(described).collect();
-        let others: Vec<Value> = others
-            .iter()
-            .map(|(path, why)| json!({ "path": path, "why": why }))
-            .collect();
+        let others: Vec<Value> =
+            others.iter().map(|(path, why)| json!({ "path": path, "why": why })).collect();
         output::json(&json!({ "schema_version": 1, "cameras": cameras, "not_usable": others }))?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -158,14 +153,10 @@ fn look(path: &Path) -> Result<Found, VideoError> {
 /// The names of a device that stay when it is plugged in again.
 fn stable_names(path: &Path) -> Vec<PathBuf> {
     let folders = ["/dev/v4l/by-id", "/dev/v4l/by-path"];
-    let entries = folders
-        .iter()
-        .filter_map(|it| std::fs::read_dir(it).ok())
-        .flatten();
+    let entries = folders.iter().filter_map(|it| std::fs::read_dir(it).ok()).flatten();
     let links = entries.filter_map(|it| Some(it.ok()?.path()));
-    let mut names: Vec<PathBuf> = links
-        .filter(|it| it.canonicalize().is_ok_and(|it| it == path))
-        .collect();
+    let mut names: Vec<PathBuf> =
+        links.filter(|it| it.canonicalize().is_ok_and(|it| it == path)).collect();
     names.sort();
     names
 }
@@ -203,10 +194,7 @@ fn described(it: &Found) -> Value {
 
 fn text(it: &Found) -> String {
     let [width, height] = it.mode.size;
-    let rate = it
-        .mode
-        .rate_hz
-        .map_or_else(String::new, |it| format!(", {it:.2} a second"));
+    let rate = it.mode.rate_hz.map_or_else(String::new, |it| format!(", {it:.2} a second"));
     let about = &it.about;
     let mut lines = vec![
         format!(
@@ -218,11 +206,7 @@ fn text(it: &Found) -> String {
         ),
         format!("  now           {} {width}x{height}{rate}", it.mode.format),
     ];
-    lines.extend(
-        it.stable
-            .iter()
-            .map(|it| format!("  stable name   {}", it.display())),
-    );
+    lines.extend(it.stable.iter().map(|it| format!("  stable name   {}", it.display())));
     for format in &it.formats {
         let is_read = footage::PixelFormat::of_letters(format.format.0).is_some();
         let note = if is_read { "" } else { " (not read)" };
@@ -240,9 +224,7 @@ fn text(it: &Found) -> String {
         }
     }
     lines.extend(it.controls.iter().map(|control| {
-        let value = control
-            .value
-            .map_or_else(|| "-".to_owned(), |it| it.to_string());
+        let value = control.value.map_or_else(|| "-".to_owned(), |it| it.to_string());
         let fixed = if control.is_fixed {
             ", cannot be set now"
         } else {

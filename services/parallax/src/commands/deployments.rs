@@ -108,9 +108,7 @@ pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
     }
     if arguments.json {
         let removed: Vec<Value> = removed.into_iter().map(describe).collect();
-        let failed = failed
-            .iter()
-            .map(|(name, why)| json!({ "name": name, "why": why }));
+        let failed = failed.iter().map(|(name, why)| json!({ "name": name, "why": why }));
         let failed: Vec<Value> = failed.collect();
         output::json(&json!({ "schema_version": 1, "removed": removed, "failed": failed }))?;
     } else {

@@ -170,9 +170,7 @@ impl Arguments {
         };
         let network = match self.network.as_deref() {
             Some(file) => (!deployment::is_none(file)).then_some(file),
-            None => given(&of_filters[..N_IMPLY])
-                .is_none()
-                .then(|| Path::new(deployment::SHIPPED)),
+            None => given(&of_filters[..N_IMPLY]).is_none().then(|| Path::new(deployment::SHIPPED)),
         };
         let wrong = match network {
             Some(_) => given(&of_filters).map(|it| (it, "the filters", "a network", "none")),
@@ -240,9 +238,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let files = inputs::images::listed(&arguments.images)?;
     let mut sheet = arguments.sheet.as_ref().map(|it| {
-        let n_pictures = files
-            .iter()
-            .map(|it| pictures::count(it, arguments.wanted()));
+        let n_pictures = files.iter().map(|it| pictures::count(it, arguments.wanted()));
         Sheet::new(it.clone(), n_pictures.sum())
     });
     let (mut n_searched, mut n_failed) = (0_u64, 0_usize);
@@ -401,9 +397,7 @@ impl Detector<'_> {
         let notes = notes.collect::<Vec<_>>().join("; ");
         let n = found.len();
         let detections = if n == 1 { "detection" } else { "detections" };
-        let frame = picture
-            .frame
-            .map_or(String::new(), |it| format!(" frame {it}"));
+        let frame = picture.frame.map_or(String::new(), |it| format!(" frame {it}"));
         output::line(format_args!(
             "{}{frame}: {n} {detections}{notes}",
             picture.path.display()
@@ -429,10 +423,7 @@ impl Detector<'_> {
     fn skeleton(&self, searched: &Searched, pose: &Pose) -> Skeleton {
         let centres = pose.centres(&self.search.model, searched.layout());
         Skeleton {
-            points: centres
-                .into_iter()
-                .map(|it| searched.in_picture(it))
-                .collect(),
+            points: centres.into_iter().map(|it| searched.in_picture(it)).collect(),
             limbs: limbs(&self.search.model),
             score: pose.score,
         }

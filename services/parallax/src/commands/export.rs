@@ -133,9 +133,7 @@ fn name(text: &str) -> Result<String, String> {
         && !text.starts_with('.')
         && !text.contains(|it: char| it == '/' || it.is_control());
     let expected = "expected the name of a file, without a folder";
-    is_plain
-        .then(|| text.to_owned())
-        .ok_or_else(|| expected.to_owned())
+    is_plain.then(|| text.to_owned()).ok_or_else(|| expected.to_owned())
 }
 
 fn rate(text: &str) -> Result<f64, String> {
@@ -145,9 +143,7 @@ fn rate(text: &str) -> Result<f64, String> {
 
 pub(crate) fn up(text: &str) -> Result<UnitVector3<f64>, String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|it| it.trim().parse().ok()).collect();
-    let [x, y, z] = numbers
-        .and_then(|it| it.try_into().ok())
-        .unwrap_or_default();
+    let [x, y, z] = numbers.and_then(|it| it.try_into().ok()).unwrap_or_default();
     let up = UnitVector3::try_new(Vector3::new(x, y, z), 1e-9);
     up.filter(|it| it.iter().all(|it| it.is_finite()))
         .ok_or_else(|| format!("expected a direction such as 0,0,1, got {text:?}"))
@@ -174,10 +170,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     )?;
     let job = Job {
         formats: arguments.to.clone(),
-        out: arguments
-            .out
-            .clone()
-            .unwrap_or_else(|| beside(&arguments.source)),
+        out: arguments.out.clone().unwrap_or_else(|| beside(&arguments.source)),
         name: arguments.name.clone(),
         force: arguments.force,
     };

@@ -109,10 +109,7 @@ fn in_one_thread() -> Result<(), Failure> {
     let program = std::env::current_exe().or_fail(ExitKind::Run)?;
     let arguments = std::env::args_os().skip(1);
     // Returns only if it fails.
-    let error = Program::new(program)
-        .args(arguments)
-        .env(name, value)
-        .exec();
+    let error = Program::new(program).args(arguments).env(name, value).exec();
     Err(Failure::new(
         ExitKind::Run,
         format!("this program cannot be started anew: {error}"),
@@ -130,9 +127,7 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     let deployment = &loaded.deployment;
     let named = arguments.host.as_deref();
     let host = hosts::choose(deployment, named, &machine())?;
-    let host = host
-        .ok_or("the deployment has no [[host]]")
-        .or_fail(ExitKind::Usage)?;
+    let host = host.ok_or("the deployment has no [[host]]").or_fail(ExitKind::Usage)?;
     in_one_thread()?;
     let mut address = hosts::address(deployment, host)?;
     // The host that fuses asks itself: its bridge listens already.
@@ -189,10 +184,7 @@ fn line(host: &Value, deployment: &Deployment) -> String {
     let mut text = format!("{name}: {there}; {clock}\n");
     for view in host["views"].as_array().into_iter().flatten() {
         let index = view["view"].as_u64().unwrap_or(0) as usize;
-        let camera = deployment
-            .cameras
-            .get(index)
-            .map_or("?", |it| it.name.as_str());
+        let camera = deployment.cameras.get(index).map_or("?", |it| it.name.as_str());
         // Writing to a string cannot fail.
         let _infallible = writeln!(
             text,

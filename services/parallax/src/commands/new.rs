@@ -183,11 +183,7 @@ fn rig_steps(arguments: &Arguments) -> Vec<Step> {
         steps.push(Step::new(&words, Some(raw)));
         return steps;
     }
-    let board = arguments
-        .board
-        .as_ref()
-        .map(ToString::to_string)
-        .unwrap_or_default();
+    let board = arguments.board.as_ref().map(ToString::to_string).unwrap_or_default();
     let report = if arguments.people.is_some() {
         room.join("lenses.html")
     } else {
@@ -241,11 +237,7 @@ fn later_steps(arguments: &Arguments, deployment: &Path) -> Vec<Step> {
 
 /// The deployment file: the cameras, the rig, and where results go.
 fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
-    let stem = arguments
-        .room
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy();
+    let stem = arguments.room.file_name().unwrap_or_default().to_string_lossy();
     let plain = |it: char| {
         if it.is_ascii_alphanumeric() || it == '-' {
             it

@@ -330,9 +330,7 @@ fn needed(resolved: &Resolved, from: Stage) -> impl Iterator<Item = (Kind, &'sta
         _ => true,
     };
     let given = all.into_iter();
-    given
-        .filter(move |it| it.0 < from && is_sent(it.0))
-        .map(|it| (it.1, it.2))
+    given.filter(move |it| it.0 < from && is_sent(it.0)).map(|it| (it.1, it.2))
 }
 
 #[cfg(test)]

@@ -108,12 +108,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         }
         return show(planned.plan());
     }
-    if let Some(size) = planned
-        .resolved()
-        .search_size
-        .as_ref()
-        .filter(|_| !globals.quiet)
-    {
+    if let Some(size) = planned.resolved().search_size.as_ref().filter(|_| !globals.quiet) {
         output::message(size.text());
     }
     let name = &loaded.deployment.name;
@@ -138,8 +133,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 fn above_zero(text: &str) -> Result<f64, String> {
     let number: f64 = text.parse().ok().ok_or("not a number")?;
     let fits = number.is_finite() && number > 0.0;
-    fits.then_some(number)
-        .ok_or_else(|| "not above 0".to_owned())
+    fits.then_some(number).ok_or_else(|| "not above 0".to_owned())
 }
 
 /// Prints processes, shared memory and the largest topics.

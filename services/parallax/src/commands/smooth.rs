@@ -156,15 +156,10 @@ fn tell(request: &Request, outcome: &Outcome) -> Result<(), Failure> {
         "{} over {} frames{of} of {n_joints} joints, {:.0} ms late",
         report.method, report.n_frames, report.delay_ms
     ))?;
-    let counts: Vec<String> = finished::totals(report)
-        .iter()
-        .map(|(name, n)| format!("{n} {name}"))
-        .collect();
+    let counts: Vec<String> =
+        finished::totals(report).iter().map(|(name, n)| format!("{n} {name}")).collect();
     output::line(format_args!("positions: {}", counts.join(", ")))?;
-    let joints = report
-        .people
-        .iter()
-        .flat_map(|person| person.joints.values());
+    let joints = report.people.iter().flat_map(|person| person.joints.values());
     let scales: Vec<f64> = joints.filter_map(|joint| joint.covariance_scale).collect();
     let scale = statistics::Sorted::new(scales).interpolated(0.5);
     if let Some(scale) = scale {

@@ -140,11 +140,7 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
         }
     };
     terminal.finish();
-    let names: Vec<&str> = deployment
-        .cameras
-        .iter()
-        .map(|it| it.name.as_str())
-        .collect();
+    let names: Vec<&str> = deployment.cameras.iter().map(|it| it.name.as_str()).collect();
     if arguments.json {
         output::json(&as_json(&outcome, &names, &finders, reference))?;
     } else {
@@ -176,11 +172,7 @@ fn reference(arguments: &Arguments, deployment: &Deployment) -> Result<usize, Fa
     };
     let found = deployment.cameras.iter().position(|it| it.name == *name);
     found.ok_or_else(|| {
-        let known: Vec<&str> = deployment
-            .cameras
-            .iter()
-            .map(|it| it.name.as_str())
-            .collect();
+        let known: Vec<&str> = deployment.cameras.iter().map(|it| it.name.as_str()).collect();
         let message = format!(
             "--reference: no camera {name:?}; there are {}",
             known.join(", ")
@@ -383,18 +375,13 @@ fn write(file: &Path, outcome: &Outcome, names: &[&str]) -> Result<(), Failure> 
     let keys = |(name, it): (&&str, &calibration::synchronisation::CameraClock)| ClockKeys {
         name: (*name).to_owned(),
         offset_ms: 1e3 * it.offset_s,
-        drift_ppm: it
-            .drift_error
-            .map(|_| 1e6 * it.drift)
-            .filter(|it| *it != 0.0),
+        drift_ppm: it.drift_error.map(|_| 1e6 * it.drift).filter(|it| *it != 0.0),
     };
     let keys: Vec<ClockKeys> = names.iter().zip(&outcome.cameras).map(keys).collect();
     let text = failure::read_text(file)?;
     let changed = with_clocks(&text, &keys).map_err(|error| {
         let lines = keys.iter().map(|it| {
-            let drift = it
-                .drift_ppm
-                .map_or(String::new(), |it| format!(", drift_ppm = {it:.3}"));
+            let drift = it.drift_ppm.map_or(String::new(), |it| format!(", drift_ppm = {it:.3}"));
             format!("{}: offset_ms = {:.3}{drift}", it.name, it.offset_ms)
         });
         let hint = format!(

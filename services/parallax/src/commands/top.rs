@@ -58,8 +58,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn pause(text: &str) -> Result<f64, String> {
     let seconds: f64 = text.parse().ok().ok_or("not a number")?;
     let fits = (0.1..=3600.0).contains(&seconds);
-    fits.then_some(seconds)
-        .ok_or_else(|| "not from 0.1 to 3600".to_owned())
+    fits.then_some(seconds).ok_or_else(|| "not from 0.1 to 3600".to_owned())
 }
 
 #[cfg(test)]

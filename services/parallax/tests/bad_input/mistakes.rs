@@ -84,10 +84,7 @@ pub(crate) fn check(table: &[Mistake]) {
         permit(&case);
         let words = it.says.iter().chain(it.tries);
         let lacks: Vec<&&str> = words.filter(|word| !stderr.contains(**word)).collect();
-        let has: Vec<&&str> = NEVER
-            .iter()
-            .filter(|word| stderr.contains(**word))
-            .collect();
+        let has: Vec<&&str> = NEVER.iter().filter(|word| stderr.contains(**word)).collect();
         if status.code() != Some(it.code) || !lacks.is_empty() || !has.is_empty() {
             wrong.push(format!(
                 "{}: {status}, expected {}; lacks {lacks:?}, has {has:?}\n{stderr}",

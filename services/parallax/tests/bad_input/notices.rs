@@ -18,9 +18,7 @@ fn a_file_reports_the_origin_of_its_data() {
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
     assert!(
-        ended
-            .stderr
-            .contains("where its data come from: the room's archive, folder 7"),
+        ended.stderr.contains("where its data come from: the room's archive, folder 7"),
         "{}",
         ended.stderr
     );
@@ -47,9 +45,7 @@ fn shipped_files_report_the_origin_of_their_data() {
         ),
     ] {
         fs::copy(configs.join(name), case.path("configs").join(name)).unwrap();
-        let ended = case
-            .start(&["run", &format!("configs/{name}"), "--dry-run"])
-            .wait();
+        let ended = case.start(&["run", &format!("configs/{name}"), "--dry-run"]).wait();
         assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
         for word in [&words[..], &["where its data come from"]].concat() {
             assert!(
@@ -98,9 +94,7 @@ fn padding_is_reported_with_a_size_that_needs_none() {
     let case = Case::new("oops-pad", &[2; 2], PLAIN);
     let said = |size: &str| {
         let set = format!("capture.size={size}");
-        let ended = case
-            .start(&["config", "check", "deployment.toml", "--set", &set])
-            .wait();
+        let ended = case.start(&["config", "check", "deployment.toml", "--set", &set]).wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         ended.stderr
     };
@@ -119,16 +113,10 @@ fn padding_is_reported_with_a_size_that_needs_none() {
 #[test]
 fn the_announced_size_of_a_recording_is_right() {
     let case = Case::new("oops-room", &[4; 2], PLAIN);
-    let ended = case
-        .start(&["record", "deployment.toml", "--out", "run.mcap"])
-        .wait();
+    let ended = case.start(&["record", "deployment.toml", "--out", "run.mcap"]).wait();
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let line = ended
-        .stderr
-        .lines()
-        .find(|it| it.starts_with("recording "))
-        .unwrap();
+    let line = ended.stderr.lines().find(|it| it.starts_with("recording ")).unwrap();
     assert!(
         ended.stderr.contains("--without evidence: "),
         "{}",

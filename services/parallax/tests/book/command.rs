@@ -85,19 +85,13 @@ impl Line {
             Some("parallax-lab") => vec!["services/lab".to_owned()],
             Some(name) => vec![format!("shared/{name}"), format!("services/{name}")],
         };
-        let manifests = folders
-            .iter()
-            .map(|it| super::root().join(it).join("Cargo.toml"));
-        let Some(manifest) = manifests
-            .into_iter()
-            .find_map(|it| fs::read_to_string(it).ok())
+        let manifests = folders.iter().map(|it| super::root().join(it).join("Cargo.toml"));
+        let Some(manifest) = manifests.into_iter().find_map(|it| fs::read_to_string(it).ok())
         else {
             return Some("there is no such package".to_owned());
         };
         let feature = value(["--features", "-F"])?;
-        let declared = manifest
-            .lines()
-            .any(|line| line.starts_with(&format!("{feature} = ")));
+        let declared = manifest.lines().any(|line| line.starts_with(&format!("{feature} = ")));
         (!declared).then(|| format!("there is no feature {feature}"))
     }
 
@@ -117,9 +111,7 @@ pub(crate) fn lines(text: &str) -> Vec<Line> {
     let commands = joined.lines().flat_map(|line| {
         let words = words(line);
         let parts = words.split(|word| word == "&&").map(|part| {
-            let end = part
-                .iter()
-                .position(|word| ["|", ">", "<", ";"].contains(&word.as_str()));
+            let end = part.iter().position(|word| ["|", ">", "<", ";"].contains(&word.as_str()));
             Line(part[..end.unwrap_or(part.len())].to_vec())
         });
         parts.collect::<Vec<_>>()
@@ -195,11 +187,7 @@ struct Usage<'a> {
 impl<'a> Usage<'a> {
     fn parse(help: &'a str, depth: usize) -> Result<Self, String> {
         let line = help.lines().find_map(|line| line.strip_prefix("Usage: "));
-        let mut words = line
-            .ok_or("there is no usage line")?
-            .split(' ')
-            .skip(1 + depth)
-            .peekable();
+        let mut words = line.ok_or("there is no usage line")?.split(' ').skip(1 + depth).peekable();
         let (mut least, mut most, mut required) = (0, 0_usize, Vec::new());
         while let Some(word) = words.next() {
             let n = if word.ends_with("...") { usize::MAX } else { 1 };
@@ -256,9 +244,7 @@ impl<'a> Usage<'a> {
         let shown = self.help.lines().find_map(|line| {
             let line = line.trim_start();
             let long = line.split_once(", ").map_or(line, |(_, long)| long);
-            let rest = [line, long]
-                .into_iter()
-                .find_map(|it| it.strip_prefix(option))?;
+            let rest = [line, long].into_iter().find_map(|it| it.strip_prefix(option))?;
             rest.starts_with([' ', '\n']).then_some(rest)
         });
         let shown = shown.unwrap_or_default().trim_start_matches(' ');
@@ -284,10 +270,7 @@ fn help_of(program: Program, path: &[String]) -> Result<String, String> {
 
 /// Whether it succeeded, and what it printed: on success to standard output, else to standard error.
 fn run(program: Program, arguments: &[String]) -> (bool, String) {
-    let ended = Command::new(program.file())
-        .args(arguments)
-        .output()
-        .unwrap();
+    let ended = Command::new(program.file()).args(arguments).output().unwrap();
     let said = if ended.status.success() {
         ended.stdout
     } else {

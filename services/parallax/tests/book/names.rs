@@ -31,10 +31,7 @@ pub(crate) fn exists(root: &Path, path: &str) -> bool {
         return false;
     };
     let files = files_below(source, ".rs");
-    let texts: Vec<String> = files
-        .iter()
-        .map(|file| fs::read_to_string(file).unwrap())
-        .collect();
+    let texts: Vec<String> = files.iter().map(|file| fs::read_to_string(file).unwrap()).collect();
     segments.all(|segment| texts.iter().any(|text| declares(text, segment)))
 }
 

@@ -59,10 +59,7 @@ impl Case {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let nth = COUNT.fetch_add(1, Ordering::Relaxed);
         let case = Self {
-            folder: tempfile::Builder::new()
-                .prefix("parallax-")
-                .tempdir()
-                .unwrap(),
+            folder: tempfile::Builder::new().prefix("parallax-").tempdir().unwrap(),
             name: format!("{name}-{}-{nth}", std::process::id()),
         };
         geometry::files::write(&case.path("rig.toml"), Format::Own, rig).unwrap();
@@ -172,9 +169,6 @@ impl Case {
         let text = fs::read_to_string(part).or_else(|_| fs::read_to_string(whole));
         let text = text.unwrap_or_default();
         let end = text.rfind('\n').map_or(0, |at| at + 1);
-        text[..end]
-            .lines()
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect()
+        text[..end].lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     }
 }

@@ -20,10 +20,8 @@ pub(crate) fn sides(n: [usize; 4]) -> Vec<Side> {
 /// `score` and a ten-thousandth of the mean colour.
 pub(crate) fn detector_of([left, top, right, bottom]: [f32; 4], score: f32) -> Network {
     let mut net = Network::default();
-    net.inputs
-        .push(("picture".to_owned(), sides([1, 3, 64, 64])));
-    net.outputs
-        .push(("dets".to_owned(), [1, 1, 5].map(Side::Fixed).to_vec()));
+    net.inputs.push(("picture".to_owned(), sides([1, 3, 64, 64])));
+    net.outputs.push(("dets".to_owned(), [1, 1, 5].map(Side::Fixed).to_vec()));
     net.floats("box", &[1, 1, 5], vec![left, top, right, bottom, score]);
     net.floats("little", &[1], vec![1e-4]);
     net.ints("flat", vec![1, 1, 1]);

@@ -30,11 +30,8 @@ impl OneProcess {
     /// Compares the results of a run with those of this computation.
     pub(crate) fn assert_same(&self, case: &Case, n_views: usize, n_frames: usize) {
         let rig = geometry::files::read(&case.path("rig.toml"), &ReadOptions::default()).unwrap();
-        let mut views: Vec<View> = rig
-            .cameras()
-            .iter()
-            .map(|it| View::new(it, &rig, self.upright_size))
-            .collect();
+        let mut views: Vec<View> =
+            rig.cameras().iter().map(|it| View::new(it, &rig, self.upright_size)).collect();
         let cameras: Vec<Camera> = views.iter().map(|it| it.framing.camera().clone()).collect();
         let (model, up) = (planted::model(), rig.up_in_world());
         let mut settings = self.settings.clone();
@@ -47,10 +44,8 @@ impl OneProcess {
         let mut n_placed = 0;
         for frame in 0..n_frames {
             let pictures = rig.cameras().iter().map(|it| planted::picture(it, frame));
-            let frames: Vec<Vec<u8>> = pictures
-                .zip(&mut views)
-                .map(|(it, view)| view.frame(&it))
-                .collect();
+            let frames: Vec<Vec<u8>> =
+                pictures.zip(&mut views).map(|(it, view)| view.frame(&it)).collect();
             let is_missing = |view: usize| self.is_missing.is_some_and(|it| it(frame, view));
             let images = frames.iter().zip(&views).enumerate();
             let images = images.map(|(nth, (it, view))| {

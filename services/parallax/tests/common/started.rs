@@ -26,9 +26,7 @@ pub(crate) fn parallax() -> PathBuf {
 /// The executable whose command the arguments begin with.
 fn program(arguments: &[&str]) -> PathBuf {
     const LAB: [&str; 6] = ["eval", "judge", "model", "simulate", "synth", "train"];
-    let is_lab = arguments
-        .first()
-        .is_some_and(|command| LAB.contains(command))
+    let is_lab = arguments.first().is_some_and(|command| LAB.contains(command))
         || arguments.contains(&"--truth");
     built(if is_lab { "parallax-lab" } else { "parallax" })
 }
@@ -71,9 +69,7 @@ impl Started {
             return None;
         }
         let mut command = Command::new("unshare");
-        command
-            .args(["-m", "sh", "-ec", script])
-            .env("PARALLAX", parallax());
+        command.args(["-m", "sh", "-ec", script]).env("PARALLAX", parallax());
         Some(Self::from_command(folder, command))
     }
 
@@ -197,9 +193,7 @@ impl Drop for Started {
 
 /// Sends a signal to a process, or to a process group if the number is negative.
 pub(crate) fn signal(name: &str, id: i64) {
-    let status = Command::new("kill")
-        .args(["-s", name, "--", &id.to_string()])
-        .status();
+    let status = Command::new("kill").args(["-s", name, "--", &id.to_string()]).status();
     assert!(status.unwrap().success(), "kill -s {name} {id}");
 }
 

@@ -59,9 +59,7 @@ impl Clock {
     /// * `now`: this machine's clock, nanoseconds.
     pub(crate) fn rebase(&self, recorded: &Envelope, [session, epoch, now]: [u64; 3]) -> Envelope {
         let timing = recorded.timing;
-        let computing = timing
-            .sent_at_nanos
-            .saturating_sub(timing.received_at_nanos);
+        let computing = timing.sent_at_nanos.saturating_sub(timing.received_at_nanos);
         Envelope {
             stamp: Stamp {
                 session,

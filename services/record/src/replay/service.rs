@@ -192,8 +192,7 @@ impl<'a> Playback<'a> {
 
     fn rebased(&self, recorded: &Envelope) -> Envelope {
         let (session, epoch) = (self.service.session(), self.service.epoch());
-        self.clock
-            .rebase(recorded, [session, u64::from(epoch), now_nanos()])
+        self.clock.rebase(recorded, [session, u64::from(epoch), now_nanos()])
     }
 
     fn send(

@@ -100,9 +100,7 @@ fn searches_and_the_bytes_of_their_evidence_are_counted_by_view() {
     assert_eq!(summary.searches["left"], [("full".to_owned(), 4)].into());
     assert_eq!(summary.evidence_bytes_per_frame["right"], 500);
     let text = text(&dir, "pose2d.jsonl");
-    let lines = text
-        .lines()
-        .map(|it| serde_json::from_str::<Value>(it).unwrap());
+    let lines = text.lines().map(|it| serde_json::from_str::<Value>(it).unwrap());
     let said: Vec<Value> = lines.map(|it| it["search"].clone()).collect();
     assert_eq!(said[3], "tracked");
     assert_eq!(said[7], Value::Null, "there was no frame");
@@ -229,10 +227,7 @@ fn files_of_everybody_have_everybody_and_those_of_one_who_is_followed() {
     assert!(rows.contains("\n6,0.100000,,right ankle,,"), "{rows}");
     let trc = formats::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
     // z is up in the scene: (y, z, x).
-    let x = trc
-        .frames
-        .iter()
-        .map(|frame| frame[0].map(|place| place[2]));
+    let x = trc.frames.iter().map(|frame| frame[0].map(|place| place[2]));
     assert_eq!(
         x.collect::<Vec<_>>(),
         [Some(3.0), Some(3.0), Some(8.0), None]

@@ -44,30 +44,23 @@ pub(crate) struct Run {
 impl Case {
     /// * `processes`: name, behaviour, role.
     pub(crate) fn new(delivery: Delivery, processes: &[(&str, &str, Role)]) -> Self {
-        let base = tempfile::Builder::new()
-            .prefix("px")
-            .tempdir_in("/dev/shm")
-            .unwrap();
+        let base = tempfile::Builder::new().prefix("px").tempdir_in("/dev/shm").unwrap();
         let frames = TopicPlan::slices::<u8, FrameHeader>(
             "data".to_owned(),
             delivery,
             Limits::new(2, 1, 1),
             100_000,
         );
-        let specs = processes
-            .iter()
-            .map(|&(name, behaviour, role)| ProcessSpec {
-                name: name.to_owned(),
-                service: "dummy".to_owned(),
-                args: behaviour.split(' ').map(Into::into).collect(),
-                role,
-                senders: Vec::new(),
-                scheduling: Scheduling::default(),
-                most_work: None,
-            });
-        let health = processes
-            .iter()
-            .flat_map(|&(name, _, _)| process_topics(name));
+        let specs = processes.iter().map(|&(name, behaviour, role)| ProcessSpec {
+            name: name.to_owned(),
+            service: "dummy".to_owned(),
+            args: behaviour.split(' ').map(Into::into).collect(),
+            role,
+            senders: Vec::new(),
+            scheduling: Scheduling::default(),
+            most_work: None,
+        });
+        let health = processes.iter().flat_map(|&(name, _, _)| process_topics(name));
         let plan = Plan {
             executable: env!("CARGO_BIN_EXE_supervise-dummy").into(),
             given: Vec::new(),
@@ -173,9 +166,7 @@ impl Run {
 
 /// Sends a signal.
 pub(crate) fn kill(signal: &str, pid: u32) {
-    let status = Command::new("sh")
-        .args(["-c", &format!("kill {signal} {pid}")])
-        .status();
+    let status = Command::new("sh").args(["-c", &format!("kill {signal} {pid}")]).status();
     assert!(status.unwrap().success(), "kill {signal} {pid}");
 }
 

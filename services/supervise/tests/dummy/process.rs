@@ -116,9 +116,7 @@ fn send(
 /// * `dies`: whether it is killed at the end of stream.
 fn receive(service: &Service, pause: u64, dies: bool) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
-    let subscriber = service
-        .bus()
-        .slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)?;
+    let subscriber = service.bus().slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)?;
     while waiter.wait(SOON)? != Woken::Stop {
         while let Some(sample) = subscriber.receive()? {
             let header = sample.header();
@@ -147,9 +145,7 @@ fn receive(service: &Service, pause: u64, dies: bool) -> Result<(), Failure> {
 /// Subscribes and never reads.
 fn hold(service: &Service) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
-    let subscriber = service
-        .bus()
-        .slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)?;
+    let subscriber = service.bus().slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)?;
     // Connected, like a process that dies during its work.
     while subscriber.receive()?.is_none() {
         waiter.wait(SOON)?;
@@ -183,10 +179,7 @@ fn die_in_loan(service: &Service) -> Result<(), Failure> {
 
 fn die() -> Result<(), Failure> {
     let script = format!("kill -9 {}", std::process::id());
-    Command::new("sh")
-        .args(["-c", &script])
-        .status()
-        .or_fail(ExitKind::Run)?;
+    Command::new("sh").args(["-c", &script]).status().or_fail(ExitKind::Run)?;
     Err(Failure::new(ExitKind::Run, "survived kill -9"))
 }
 
@@ -243,9 +236,7 @@ fn idle(service: &Service) -> Result<(), Failure> {
 
 fn wrong_type(service: &Service) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
-    service
-        .bus()
-        .subscriber::<ViewQuality>(TOPIC, &mut waiter)?;
+    service.bus().subscriber::<ViewQuality>(TOPIC, &mut waiter)?;
     Ok(())
 }
 
@@ -269,10 +260,7 @@ fn stubborn(service: &Service) -> Result<(), Failure> {
 
 /// Starts a child process and does not end it.
 fn orphan(service: &Service) -> Result<(), Failure> {
-    let child = Command::new("sleep")
-        .arg("600")
-        .spawn()
-        .or_fail(ExitKind::Run)?;
+    let child = Command::new("sleep").arg("600").spawn().or_fail(ExitKind::Run)?;
     print_line(&format!("child {}", child.id()))?;
     idle(service)
 }

@@ -103,10 +103,9 @@ fn steps(
         };
         let step = ViewStep::new(Arc::clone(model), Arc::clone(&layout), settings);
         match device {
-            Some(device) => step
-                .on_gpu(device)
-                .map_err(|(_, error)| error)
-                .or_fail(ExitKind::Config),
+            Some(device) => {
+                step.on_gpu(device).map_err(|(_, error)| error).or_fail(ExitKind::Config)
+            }
             None => Ok(step),
         }
     };
@@ -139,10 +138,7 @@ fn measure(
         let searched = steps.par_iter().zip(&mut responses);
         let computed_on =
             searched.map(|(step, responses)| step.run(image, scope, responses).computed_on);
-        let is_lost = computed_on
-            .filter(|by| *by == ComputedOn::ProcessorForGpu)
-            .count()
-            > 0;
+        let is_lost = computed_on.filter(|by| *by == ComputedOn::ProcessorForGpu).count() > 0;
         if is_lost && on_gpu {
             return Err(gpu::DeviceLost).or_fail(ExitKind::Run);
         }

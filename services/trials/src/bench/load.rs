@@ -131,8 +131,7 @@ impl Options {
                 .map(|it| limit::at_most("p50, ms", it, end_to_end.map(|it| it.p50))),
             self.max_p99_ms
                 .map(|it| limit::at_most("p99, ms", it, end_to_end.map(|it| it.p99))),
-            self.min_rate_hz
-                .map(|it| limit::at_least("results a second", it, rate)),
+            self.min_rate_hz.map(|it| limit::at_least("results a second", it, rate)),
         ];
         limits.into_iter().flatten().collect()
     }

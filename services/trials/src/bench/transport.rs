@@ -178,9 +178,7 @@ impl Transport {
 
 impl Row {
     fn lost(&self) -> u64 {
-        self.measured
-            .sent
-            .saturating_sub(self.measured.receiver.received)
+        self.measured.sent.saturating_sub(self.measured.receiver.received)
     }
 
     fn cells(&self) -> Vec<String> {

@@ -245,9 +245,7 @@ impl Workload {
         let deployment = self.deployment(case)?;
         let planned = Planned::new(&deployment, self.verbosity.level)?;
         let victim = format!("capture-{}", case.n_views - 1);
-        let mut injector = case
-            .has_dead
-            .then(|| Injector::new(ProcessFault::Kill, &victim, 0.0));
+        let mut injector = case.has_dead.then(|| Injector::new(ProcessFault::Kill, &victim, 0.0));
         let before = cpu_seconds_of_children()?;
         let report = planned.run(self.verbosity.quiet, stop, &mut |event| {
             injector
@@ -258,11 +256,7 @@ impl Workload {
         if stop.is_requested() {
             return Ok(None);
         }
-        let names: Vec<String> = deployment
-            .cameras
-            .iter()
-            .map(|it| it.name.clone())
-            .collect();
+        let names: Vec<String> = deployment.cameras.iter().map(|it| it.name.clone()).collect();
         let mut results = results::read(&deployment.output, &names)?;
         if let Some(injector) = &injector {
             let killed = injector.times().injected;
@@ -315,20 +309,10 @@ fn spread(percentiles: &Percentiles) -> Spread {
 /// Keeps the first cameras, and removes settings that name others.
 fn keep_views(deployment: &mut Deployment, n_views: usize) {
     deployment.cameras.truncate(n_views);
-    let names: Vec<String> = deployment
-        .cameras
-        .iter()
-        .map(|it| it.name.clone())
-        .collect();
+    let names: Vec<String> = deployment.cameras.iter().map(|it| it.name.clone()).collect();
     let is_kept = |name: &String| names.contains(name);
-    deployment
-        .paper
-        .pairs
-        .retain(|pair| pair.iter().all(is_kept));
-    deployment
-        .paper
-        .compatibility
-        .retain(|it| it.views.iter().all(is_kept));
+    deployment.paper.pairs.retain(|pair| pair.iter().all(is_kept));
+    deployment.paper.compatibility.retain(|it| it.views.iter().all(is_kept));
     if let Some(Errors::Table(table)) = &mut deployment.paper.errors {
         table.views.retain(|name, _| is_kept(name));
     }

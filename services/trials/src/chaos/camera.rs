@@ -50,16 +50,11 @@ impl CameraFailure {
         results: &[FrameResult],
     ) -> Self {
         let reason = |it: &FrameResult| it.views.get(view).and_then(|it| it.missing.clone());
-        let during: Vec<&FrameResult> = results
-            .iter()
-            .filter(|it| (span[0]..span[1]).contains(&it.frame))
-            .collect();
+        let during: Vec<&FrameResult> =
+            results.iter().filter(|it| (span[0]..span[1]).contains(&it.frame)).collect();
         let flagged = fault.parts().iter().map(|(_, status)| {
             let cause = status.reason();
-            let n = during
-                .iter()
-                .filter(|it| reason(it).as_deref() == Some(cause))
-                .count();
+            let n = during.iter().filter(|it| reason(it).as_deref() == Some(cause)).count();
             (cause.to_owned(), n)
         });
         let has_others = |it: &&&FrameResult| it.views.iter().any(|it| it.missing.is_none());
@@ -210,9 +205,8 @@ mod tests {
 
     #[test]
     fn an_undetected_fault_and_a_camera_that_never_returns_miss_limits() {
-        let unnoticed: Vec<FrameResult> = (0..8)
-            .map(|it| moment(it, 100.0 * it as f64, None))
-            .collect();
+        let unnoticed: Vec<FrameResult> =
+            (0..8).map(|it| moment(it, 100.0 * it as f64, None)).collect();
         assert_eq!(missed(&failed(&unnoticed)), ["frames called camera gone"]);
         let gone = Some("camera gone");
         let never_back: Vec<FrameResult> = (0..8)

@@ -171,10 +171,7 @@ fn n_used(state: &Value) -> u64 {
 fn unaccounted(state: &Value, n_frames: u64) -> Vec<String> {
     let sum = |view: &Value| {
         let counts = ["used", "late", "gone", "left_out"];
-        counts
-            .iter()
-            .filter_map(|it| view[it].as_u64())
-            .sum::<u64>()
+        counts.iter().filter_map(|it| view[it].as_u64()).sum::<u64>()
     };
     let mut odd: Vec<String> = views(state)
         .filter(|view| sum(view) != n_frames)
@@ -197,9 +194,7 @@ fn write(testbed: &Testbed, host: &str, port: u16) -> Result<PathBuf, Failure> {
     let plan = testbed.plan(host, &[])?;
     let cameras = &plan.resolved().deployment.cameras;
     let names = |all: &[deployment::capture::Camera]| {
-        let quoted = all
-            .iter()
-            .map(|it| toml::Value::from(it.name.as_str()).to_string());
+        let quoted = all.iter().map(|it| toml::Value::from(it.name.as_str()).to_string());
         quoted.collect::<Vec<_>>().join(", ")
     };
     let (near, far) = cameras.split_at(cameras.len() / 2);
@@ -217,10 +212,7 @@ fn write(testbed: &Testbed, host: &str, port: u16) -> Result<PathBuf, Failure> {
 
 fn start(testbed: &Testbed, file: &Path, host: &str, output: &Path) -> Result<Child, Failure> {
     let mut command = Command::new(std::env::current_exe().or_fail(ExitKind::Run)?);
-    command
-        .arg("run")
-        .arg(file)
-        .args(["--quiet", "--host", host]);
+    command.arg("run").arg(file).args(["--quiet", "--host", host]);
     command.arg("--out").arg(output);
     for pair in testbed.set(&[]) {
         command.arg("--set").arg(pair);

@@ -53,11 +53,7 @@ pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, F
     let mut outcome = run.outcome(|_| 0);
     let is_named = outcome.suspected.contains(&camera);
     outcome.suspected.retain(|it| *it != camera);
-    let summary = run
-        .report
-        .as_ref()
-        .ok()
-        .and_then(|it| it.recorded().summary());
+    let summary = run.report.as_ref().ok().and_then(|it| it.recorded().summary());
     let fits = summary.map(|it| &it.calibration);
     let fit = fits.and_then(|it| it.get(&camera)).copied();
     let fit = fit.unwrap_or_default();

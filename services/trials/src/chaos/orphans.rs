@@ -40,12 +40,7 @@ pub(super) fn kill(
         fs::remove_file(&results).map_err(|error| failure::in_file(&results, &error))?;
     }
     let mut command = Command::new(std::env::current_exe().or_fail(ExitKind::Run)?);
-    command
-        .arg("run")
-        .arg(&testbed.file)
-        .arg("--out")
-        .arg(&output)
-        .arg("--quiet");
+    command.arg("run").arg(&testbed.file).arg("--out").arg(&output).arg("--quiet");
     for pair in testbed.set(&[]) {
         command.arg("--set").arg(pair);
     }
@@ -92,8 +87,7 @@ fn wait_for_results(testbed: &Testbed, supervisor: &mut Child, file: &Path) -> R
 fn children(parent: u32) -> BTreeSet<u32> {
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
     let pids = entries.filter_map(|it| it.file_name().to_str()?.parse().ok());
-    pids.filter(|it| state(*it).is_some_and(|it| it.1 == parent))
-        .collect()
+    pids.filter(|it| state(*it).is_some_and(|it| it.1 == parent)).collect()
 }
 
 /// Whether a process runs; a zombie does not.

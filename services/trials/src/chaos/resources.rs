@@ -157,9 +157,7 @@ impl ResourceMonitor {
 
 /// Ages of one class differ by less than a factor of two: the logarithm of the age in seconds.
 fn age_class(nanos: u64) -> u32 {
-    (nanos / 1_000_000_000)
-        .checked_ilog2()
-        .map_or(0, |it| it + 1)
+    (nanos / 1_000_000_000).checked_ilog2().map_or(0, |it| it + 1)
 }
 
 /// The memory of all processes in two parts of a run, bytes: of every process the mean over the classes of age that it had in
@@ -176,11 +174,8 @@ fn at_equal_ages(parts: [&[Sample]; 2]) -> [u64; 2] {
             }
             classes
         });
-        let both: Vec<u32> = by_class[0]
-            .keys()
-            .filter(|it| by_class[1].contains_key(it))
-            .copied()
-            .collect();
+        let both: Vec<u32> =
+            by_class[0].keys().filter(|it| by_class[1].contains_key(it)).copied().collect();
         for (sum, classes) in sums.iter_mut().zip(by_class) {
             let medians = both.iter().filter_map(|it| {
                 let mut all = classes.get(it)?.clone();
@@ -244,9 +239,7 @@ pub(super) fn n_files(namespace: &Namespace) -> u64 {
 pub(super) fn shared_files(namespace: &Namespace) -> Vec<String> {
     let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
     let names = entries.filter_map(|it| it.file_name().into_string().ok());
-    names
-        .filter(|it| it.starts_with(namespace.prefix()))
-        .collect()
+    names.filter(|it| it.starts_with(namespace.prefix())).collect()
 }
 
 /// Anonymous resident memory of a process, bytes; 0 if it has ended.
@@ -324,11 +317,8 @@ mod tests {
         start(&mut monitor, "a", 1);
         health_at(&mut monitor, "a", 0, 4);
         health_at(&mut monitor, "a", 1, 5);
-        let taken: Vec<_> = monitor
-            .samples
-            .iter()
-            .map(|it| (it.used.files, it.used.descriptors))
-            .collect();
+        let taken: Vec<_> =
+            monitor.samples.iter().map(|it| (it.used.files, it.used.descriptors)).collect();
         assert_eq!(taken, [(2, 2), (5, 2)]);
         let within = |span: Range<u64>| monitor.within(&(span.start * PERIOD..span.end * PERIOD));
         assert_eq!(within(3..6).map(|it| it.files), Some(5));

@@ -109,20 +109,10 @@ impl Scenario {
             // Two of its cameras at either host; what carries messages is in some builds only.
             Self::Host(_) => {
                 bridge::HAS_LINK
-                    && processes
-                        .iter()
-                        .filter(|it| service_of(it) == "capture")
-                        .count()
-                        > 3
+                    && processes.iter().filter(|it| service_of(it) == "capture").count() > 3
             }
             // With fewer than four cameras the moved one cannot be identified.
-            Self::Moved => {
-                processes
-                    .iter()
-                    .filter(|it| service_of(it) == "capture")
-                    .count()
-                    > 3
-            }
+            Self::Moved => processes.iter().filter(|it| service_of(it) == "capture").count() > 3,
         }
     }
 }

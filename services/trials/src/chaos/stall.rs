@@ -242,10 +242,7 @@ mod tests {
         };
         let missed = |it: Option<StallMeasurement>, every_frame| {
             let limits = judge(&asked, it.as_ref(), every_frame, &outcome).into_iter();
-            limits
-                .filter(|it| !it.held)
-                .map(|it| it.what)
-                .collect::<Vec<_>>()
+            limits.filter(|it| !it.held).map(|it| it.what).collect::<Vec<_>>()
         };
         let with = |rate| {
             Some(StallMeasurement {

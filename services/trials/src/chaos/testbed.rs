@@ -68,9 +68,7 @@ impl Testbed {
             testbed.file = testbed.write_synthetic(options)?;
         }
         if let Some(name) = name {
-            testbed
-                .set
-                .push(format!("name={}", toml::Value::from(name)));
+            testbed.set.push(format!("name={}", toml::Value::from(name)));
         }
         let more = ["results.overlay_every=0", "supervise.max_restarts=1000"];
         testbed.set.extend(more.map(str::to_owned));
@@ -165,12 +163,7 @@ impl Testbed {
         };
         let namespace = &planned.plan().namespace;
         let mut leftovers = resources::shared_files(namespace);
-        leftovers.extend(
-            namespace
-                .root()
-                .exists()
-                .then(|| namespace.root().display().to_string()),
-        );
+        leftovers.extend(namespace.root().exists().then(|| namespace.root().display().to_string()));
         CompletedRun {
             report,
             results,

@@ -136,8 +136,7 @@ impl Machine {
         if self.followed_s <= SHARE * FOLLOWED_S {
             self.followed_s
         } else {
-            self.search_s
-                .clamp(self.followed_s, LOOKS * self.followed_s)
+            self.search_s.clamp(self.followed_s, LOOKS * self.followed_s)
         }
     }
 

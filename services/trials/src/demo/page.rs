@@ -268,15 +268,10 @@ fn accounts(run: &Run<'_>) -> Table {
 /// Strips of overlays of some frames in all views; see [`chosen`].
 fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
     let file = |camera: &String, frame: u64| {
-        folder
-            .join("overlays")
-            .join(camera)
-            .join(format!("{frame:06}.png"))
+        folder.join("overlays").join(camera).join(format!("{frame:06}.png"))
     };
     let is_drawn = |result: &&FrameResult| {
-        run.cameras
-            .iter()
-            .any(|camera| file(camera, result.frame).exists())
+        run.cameras.iter().any(|camera| file(camera, result.frame).exists())
     };
     let drawn: Vec<&FrameResult> = run.results.iter().filter(is_drawn).collect();
     let shown = chosen(&drawn, cost.and_then(|it| it.last_frame));
@@ -293,9 +288,7 @@ fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
             result.frame,
             result.frame as f64 / run.rate_hz
         ),
-        pictures: (0..run.cameras.len())
-            .map(|view| picture(result, view))
-            .collect(),
+        pictures: (0..run.cameras.len()).map(|view| picture(result, view)).collect(),
     };
     shown.iter().map(strip).collect()
 }

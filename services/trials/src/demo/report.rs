@@ -59,9 +59,7 @@ impl Report {
             slowness: run.machine.map_or(1.0, |it| it.slowness()),
             spread: run.machine.map_or(1.0, |it| it.spread()),
             views: run.report.views(),
-            failed: &run
-                .report
-                .unexpected_failures(|it| u32::from(was_killed && it == killed)),
+            failed: &run.report.unexpected_failures(|it| u32::from(was_killed && it == killed)),
             n_unwritten: summary.map(|it| it.writes_failed + it.frames_not_recorded),
         };
         let limits = limits::judge(requested, &measured);

@@ -46,9 +46,7 @@ pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [P
         frames += 1;
     }
     let share = |n: usize, of: usize| (of > 0).then(|| 100.0 * n as f64 / of as f64);
-    let all = right
-        .iter()
-        .fold([0; 2], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
+    let all = right.iter().fold([0; 2], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
     let mean = distances.iter().sum::<f64>() / distances.len() as f64;
     Score {
         frames,

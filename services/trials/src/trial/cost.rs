@@ -81,15 +81,10 @@ impl Cost {
         let ms = |nanos: u64| nanos as f64 / 1e6;
         let injected_at = ms(injected.saturating_sub(session));
         let after = |it: u64| ms(it.saturating_sub(injected));
-        let epochs = results
-            .iter()
-            .filter_map(|it| Some((it, source.epoch(it)?)));
+        let epochs = results.iter().filter_map(|it| Some((it, source.epoch(it)?)));
         let (old, new): (Vec<_>, Vec<_>) = epochs.partition(|it| it.1.0 == 0);
         let (last, first) = (old.last(), new.first());
-        let recovered = times
-            .recovered
-            .filter(|_| source == EpochSource::Unrecorded)
-            .map(after);
+        let recovered = times.recovered.filter(|_| source == EpochSource::Unrecorded).map(after);
         // The pause ends with the first result of the new epoch, or else with the first result after the recovery.
         let is_after_recovery =
             |it: &&FrameResult| recovered.is_some_and(|ms| it.sent_ms >= injected_at + ms);

@@ -73,9 +73,7 @@ fn lines<L: Line>(folder: &Path) -> Result<Vec<L>, Failure> {
 fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<FrameResult> {
     let times = times.into_iter().map(|it| (it.frame, it));
     let times: BTreeMap<u64, TimesLine> = times.collect();
-    let both = frames
-        .iter()
-        .filter_map(|it| Some((it, times.get(&it.frame)?)));
+    let both = frames.iter().filter_map(|it| Some((it, times.get(&it.frame)?)));
     both.map(|(line, time)| {
         let person = line.followed();
         let joint = |name: &str| Some(person?.joints.get(name)?.placed()?.position_m);

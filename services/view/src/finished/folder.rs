@@ -181,9 +181,7 @@ fn each_line(file: &File, mut each: impl FnMut(Head, u64)) -> Result<u64, Failur
     let (mut place, mut n_bad, mut line) = (0, 0, Vec::new());
     loop {
         line.clear();
-        let n = (&mut reader)
-            .take(LONGEST_LINE)
-            .read_until(b'\n', &mut line);
+        let n = (&mut reader).take(LONGEST_LINE).read_until(b'\n', &mut line);
         let n = n.map_err(unreadable)? as u64;
         if n == 0 || line.last() != Some(&b'\n') {
             return Ok(n_bad);
@@ -277,9 +275,7 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
     };
     let places = |placed: &[Option<PlacedJoint>]| {
         let places = placed.iter();
-        places
-            .map(|it| it.as_ref().map(|it| in_world(it.position_m)))
-            .collect()
+        places.map(|it| it.as_ref().map(|it| in_world(it.position_m))).collect()
     };
     let others = line.people.iter().skip(1).map(|other| Other {
         id: other.id,
@@ -289,10 +285,7 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
     });
     let followed = placed(person);
     let views = scene.views.iter().map(|it| Seen {
-        why: line
-            .views_missing
-            .get(&it.name)
-            .map(|why: &Missing| why.text().to_owned()),
+        why: line.views_missing.get(&it.name).map(|why: &Missing| why.text().to_owned()),
         ..Seen::default()
     });
     let why = line.reason.clone().unwrap_or_else(|| line.status.clone());

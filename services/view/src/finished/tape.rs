@@ -54,9 +54,7 @@ impl Tape {
         poses.sort_by_key(|it| it.frame);
         let frame = |(place, entry): (usize, &Entry)| Frame {
             number: entry.frame.unwrap_or(place as u64),
-            has_pose: read_pose(&mut input, entry)
-                .ok()
-                .map(|it| it.status == Status::OK),
+            has_pose: read_pose(&mut input, entry).ok().map(|it| it.status == Status::OK),
             place: place as u64,
         };
         let frames = poses.iter().enumerate().map(frame).collect();
@@ -64,9 +62,7 @@ impl Tape {
             let track = recording.tracks.get(&topic::frame(view));
             let entries = track.into_iter().flat_map(|it| &it.entries);
             let with_pixels = entries.filter(|it| it.len as usize > size_of::<FrameHeader>() + 64);
-            with_pixels
-                .filter_map(|it| Some((it.frame?, *it)))
-                .collect()
+            with_pixels.filter_map(|it| Some((it.frame?, *it))).collect()
         };
         Ok(Self {
             name: path.display().to_string(),

@@ -30,10 +30,8 @@ pub(crate) fn adjusted(
 ) -> Result<Outcome, BoardError> {
     let all: Vec<Vec<(usize, Observation)>> =
         boards.iter().map(|it| observations(task, it)).collect();
-    let seen: Vec<Vec<Observation>> = all
-        .iter()
-        .map(|it| it.iter().map(|it| it.1).collect())
-        .collect();
+    let seen: Vec<Vec<Observation>> =
+        all.iter().map(|it| it.iter().map(|it| it.1).collect()).collect();
     let settings = Settings {
         max_iterations: 100,
         least_gain: 1e-9,

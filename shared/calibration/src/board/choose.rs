@@ -54,9 +54,7 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
     let mut is_taken = vec![false; all.len()];
     for _ in 0..most {
         let gain = |nth: usize| -> f64 {
-            let each = features[nth]
-                .iter()
-                .map(|it| 1.0 / f64::from(1 + times[*it]));
+            let each = features[nth].iter().map(|it| 1.0 / f64::from(1 + times[*it]));
             each.sum()
         };
         let open = (0..all.len()).filter(|nth| !is_taken[*nth]);
@@ -165,34 +163,17 @@ fn spread(sight: &Sight) -> f64 {
     let n = sight.points.len().max(1) as f64;
     let middle = sight.points.iter().map(|it| it.1.coords);
     let middle = middle.sum::<nalgebra::Vector2<f64>>() / n;
-    let square = sight
-        .points
-        .iter()
-        .map(|it| (it.1.coords - middle).norm_squared());
+    let square = sight.points.iter().map(|it| (it.1.coords - middle).norm_squared());
     (square.sum::<f64>() / n).sqrt()
 }
 
 /// How much the far side of a board is smaller than the near one, along its two axes.
 fn tilt(sight: &Sight) -> Option<[f64; 2]> {
-    let map = Homography::fit(
-        sight
-            .on_board
-            .iter()
-            .zip(&sight.points)
-            .map(|(on, at)| (*on, at.1, 1.0)),
-    )?;
+    let map =
+        Homography::fit(sight.on_board.iter().zip(&sight.points).map(|(on, at)| (*on, at.1, 1.0)))?;
     let n = sight.on_board.len() as f64;
-    let middle = sight
-        .on_board
-        .iter()
-        .map(|it| it.coords)
-        .sum::<nalgebra::Vector2<f64>>()
-        / n;
-    let reach = sight
-        .on_board
-        .iter()
-        .map(|it| (it.coords - middle).norm())
-        .fold(0.0, f64::max);
+    let middle = sight.on_board.iter().map(|it| it.coords).sum::<nalgebra::Vector2<f64>>() / n;
+    let reach = sight.on_board.iter().map(|it| (it.coords - middle).norm()).fold(0.0, f64::max);
     let row = map.matrix().row(2).into_owned();
     let depth = row[0] * middle.x + row[1] * middle.y + row[2];
     let share = [row[0] * reach / depth, row[1] * reach / depth];

@@ -26,10 +26,7 @@ const SAME_SHIFT: f64 = 0.15;
 /// The pose that most meetings agree with, then the mean of these.
 pub(crate) fn pair(meetings: &[Meeting]) -> Option<Pair> {
     let step = meetings.len().div_ceil(60).max(1);
-    let candidates = meetings
-        .iter()
-        .step_by(step)
-        .flat_map(|it| it.a_from_b.iter());
+    let candidates = meetings.iter().step_by(step).flat_map(|it| it.a_from_b.iter());
     let cost = |pose: &Isometry3<f64>| -> f64 {
         let each = meetings.iter().map(|meeting| {
             let nearest = meeting.a_from_b.iter().map(|it| apart(pose, it));
@@ -99,17 +96,15 @@ pub(crate) fn standing(n_cameras: usize, pairs: &[([usize; 2], Pair)]) -> Standi
         is_in[first] = true;
         loop {
             let known = |camera: usize| own.iter().find(|it| it.0 == camera).map(|it| it.1);
-            let outward = pairs
-                .iter()
-                .filter_map(|([a, b], pair)| match (known(*a), known(*b)) {
-                    (Some(a_from_first), None) => {
-                        Some((pair.n_agree, *b, pair.a_from_b.inverse() * a_from_first))
-                    }
-                    (None, Some(b_from_first)) => {
-                        Some((pair.n_agree, *a, pair.a_from_b * b_from_first))
-                    }
-                    _ => None,
-                });
+            let outward = pairs.iter().filter_map(|([a, b], pair)| match (known(*a), known(*b)) {
+                (Some(a_from_first), None) => {
+                    Some((pair.n_agree, *b, pair.a_from_b.inverse() * a_from_first))
+                }
+                (None, Some(b_from_first)) => {
+                    Some((pair.n_agree, *a, pair.a_from_b * b_from_first))
+                }
+                _ => None,
+            });
             let Some((_, camera, pose)) = outward.max_by_key(|it| it.0) else {
                 break;
             };

@@ -85,9 +85,7 @@ pub(crate) fn outcome(task: &Task, adjusted: &Adjusted<'_>) -> Outcome {
     Outcome {
         cameras: cameras.collect(),
         pairs: Vec::new(),
-        boards: placed
-            .map(|(board, pose)| (board.frame, pose * back))
-            .collect(),
+        boards: placed.map(|(board, pose)| (board.frame, pose * back)).collect(),
         sigma_px: solved.sigma_px,
         out_of_step: None,
         doubts: Vec::new(),

@@ -37,9 +37,7 @@ pub(crate) fn board_pose(intrinsics: &Intrinsics, points: &[Sighted]) -> Option<
 /// The pose by the linear method alone.
 pub(crate) fn linear(intrinsics: &Intrinsics, points: &[Sighted]) -> Option<Isometry3<f64>> {
     let pairs = points.iter().filter_map(|(on_board, in_picture)| {
-        let ideal = intrinsics
-            .lens
-            .undistort(&intrinsics.normalised(in_picture))?;
+        let ideal = intrinsics.lens.undistort(&intrinsics.normalised(in_picture))?;
         Some((*on_board, ideal, 1.0))
     });
     let map = Homography::fit(pairs)?;

@@ -70,9 +70,7 @@ impl Problem for BoardProblem<'_> {
             let turned = board.rotation * it.on_board.coords;
             let in_world = Point3::from(turned + board.translation.vector);
             let seen = (it.seen, self.sigma_px * it.spread);
-            let observed = self
-                .cameras
-                .observe(it.camera, &in_world, seen, self.loss, &mut term);
+            let observed = self.cameras.observe(it.camera, &in_world, seen, self.loss, &mut term);
             let by_point: Matrix2x3<f64> = observed.by_point;
             for axis in 0..3 {
                 let turn = by_point * Vector3::ith(axis, 1.0).cross(&turned);

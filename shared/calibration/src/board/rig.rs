@@ -37,11 +37,7 @@ pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
         return each_alone(task, &sights, &started);
     }
     let alone = each_alone(task, &sights, &started)?;
-    let lenses: Vec<Intrinsics> = alone
-        .cameras
-        .iter()
-        .map(|it| it.camera.intrinsics)
-        .collect();
+    let lenses: Vec<Intrinsics> = alone.cameras.iter().map(|it| it.camera.intrinsics).collect();
     let placed = placed(task, &sights, &lenses);
     let (pairs, together) = pairs(task, &placed);
     let standing = standing(task.names.len(), &pairs);
@@ -55,9 +51,7 @@ pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
     let cameras: Vec<Camera> = (0..task.names.len())
         .map(|nth| camera_of(task, nth, lenses[nth], poses[nth]))
         .collect();
-    let free: Vec<Free> = (0..cameras.len())
-        .map(|nth| free_of(task, nth, nth != 0))
-        .collect();
+    let free: Vec<Free> = (0..cameras.len()).map(|nth| free_of(task, nth, nth != 0)).collect();
     let frames = choose::frames(&sights, &task.sizes, task.most_frames);
     let found = boards(task, &cameras, &placed, &frames);
     let mut outcome = adjusted(task, cameras.clone(), &free, &found)?;
@@ -115,9 +109,7 @@ fn in_step(
         shown.extend(boards(task, &cameras, &own_placed, &frames));
     }
     shown.sort_by_key(|board| board.frame);
-    let free: Vec<Free> = (0..cameras.len())
-        .map(|nth| free_of(task, nth, nth != 0))
-        .collect();
+    let free: Vec<Free> = (0..cameras.len()).map(|nth| free_of(task, nth, nth != 0)).collect();
     let mut outcome = adjusted(task, cameras, &free, &shown)?;
     // One board a frame, and the corners of every camera once: as it alone sees them, since others were taken at other times.
     outcome.boards.dedup_by_key(|(frame, _)| *frame);
@@ -141,10 +133,7 @@ fn own(nth: usize, sights: &[Sight], placed: &[Placed]) -> (Vec<Sight>, Vec<Plac
 /// The root mean square of all residuals that were used, pixels.
 fn pooled(outcome: &Outcome) -> f64 {
     let all = outcome.cameras.iter().flat_map(|it| &it.residuals);
-    let squares: Vec<f64> = all
-        .filter(|it| !it.is_wrong)
-        .map(|it| it.off.norm_squared())
-        .collect();
+    let squares: Vec<f64> = all.filter(|it| !it.is_wrong).map(|it| it.off.norm_squared()).collect();
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
@@ -177,11 +166,7 @@ fn each_alone(
 ) -> Result<Outcome, BoardError> {
     let mut all: Option<Outcome> = None;
     for (nth, start) in started.iter().enumerate() {
-        let own: Vec<Sight> = sights
-            .iter()
-            .filter(|it| it.camera == nth)
-            .cloned()
-            .collect();
+        let own: Vec<Sight> = sights.iter().filter(|it| it.camera == nth).cloned().collect();
         let frames = choose::frames(&own, &task.sizes, task.most_frames);
         let placed = placed(task, &own, started);
         let cameras: Vec<Camera> = (0..task.names.len())
@@ -214,11 +199,7 @@ fn first_intrinsics(
     camera: usize,
     sights: &[Sight],
 ) -> Result<Intrinsics, BoardError> {
-    let own: Vec<Sight> = sights
-        .iter()
-        .filter(|it| it.camera == camera)
-        .cloned()
-        .collect();
+    let own: Vec<Sight> = sights.iter().filter(|it| it.camera == camera).cloned().collect();
     let name = || task.names[camera].clone();
     let least = if task.known[camera].is_some() {
         1
@@ -260,10 +241,7 @@ struct Placed {
 fn placed(task: &Task, sights: &[Sight], started: &[Intrinsics]) -> Vec<Placed> {
     let mut list = Vec::new();
     for sight in sights {
-        let turned = task
-            .look_alikes
-            .iter()
-            .map(|numbers| sight.renumbered(numbers, &task.board));
+        let turned = task.look_alikes.iter().map(|numbers| sight.renumbered(numbers, &task.board));
         let ways = core::iter::once(sight.clone()).chain(turned);
         let ways: Vec<(Sight, Isometry3<f64>)> = ways
             .filter_map(|way| {

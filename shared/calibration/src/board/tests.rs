@@ -259,9 +259,7 @@ fn what_cannot_be_known_is_refused_with_the_reason() {
     };
     let sights = show.sights(&mut fastrand::Rng::with_seed(3));
     // Cameras 0, 1 and cameras 2, 3 never at the same time.
-    let apart = sights
-        .iter()
-        .filter(|it| (it.camera < 2) == (it.frame % 2 == 0));
+    let apart = sights.iter().filter(|it| (it.camera < 2) == (it.frame % 2 == 0));
     let error = calibrate(&task(&truth, &board, apart.cloned().collect())).unwrap_err();
     assert!(
         error.to_string().contains("cam0, cam1 | cam2, cam3"),
@@ -270,9 +268,7 @@ fn what_cannot_be_known_is_refused_with_the_reason() {
     let none = sights.iter().filter(|it| it.camera != 2).cloned().collect();
     let error = calibrate(&task(&truth, &board, none)).unwrap_err();
     assert!(
-        error
-            .to_string()
-            .contains("\"cam2\" saw the board in 0 pictures"),
+        error.to_string().contains("\"cam2\" saw the board in 0 pictures"),
         "{error}"
     );
     let few = sights.iter().filter(|it| it.frame < 9).cloned().collect();
@@ -299,10 +295,7 @@ fn cameras_out_of_step_are_doubted() {
     }
     match calibrate(&task(&truth, &board, sights)) {
         Ok(outcome) => assert!(
-            outcome
-                .doubts
-                .iter()
-                .any(|it| matches!(it, Doubt::Disagreement { .. })),
+            outcome.doubts.iter().any(|it| matches!(it, Doubt::Disagreement { .. })),
             "{:?}",
             outcome.doubts
         ),
@@ -356,10 +349,7 @@ impl Carried<'_> {
             places[nth].lerp_slerp(&places[nth + 1], share)
         };
         let mut sights = Vec::new();
-        for (nth_frame, frame) in (0..period * (places.len() - 1))
-            .step_by(self.every)
-            .enumerate()
-        {
+        for (nth_frame, frame) in (0..period * (places.len() - 1)).step_by(self.every).enumerate() {
             for (nth, camera) in self.truth.iter().enumerate() {
                 let late = [0.0, 0.8, -0.7][nth % 3];
                 let noise = &mut || noisy(random, 0.2);

@@ -133,11 +133,7 @@ impl Doubt {
 /// Whether the points of a sight span a plane.
 pub(super) fn is_spread(sight: &Sight) -> bool {
     let n = sight.on_board.len() as f64;
-    let sum = sight
-        .on_board
-        .iter()
-        .map(|it| it.coords)
-        .sum::<nalgebra::Vector2<f64>>();
+    let sum = sight.on_board.iter().map(|it| it.coords).sum::<nalgebra::Vector2<f64>>();
     let middle = sum / n;
     let mut scatter = nalgebra::Matrix2::zeros();
     for point in &sight.on_board {
@@ -145,10 +141,7 @@ pub(super) fn is_spread(sight: &Sight) -> bool {
         scatter += offset * offset.transpose();
     }
     let eigenvalues = scatter.symmetric_eigenvalues();
-    let finite = sight
-        .points
-        .iter()
-        .all(|it| it.1.coords.iter().all(|c| c.is_finite()));
+    let finite = sight.points.iter().all(|it| it.1.coords.iter().all(|c| c.is_finite()));
     finite && eigenvalues.min() > 0.01 * eigenvalues.max()
 }
 

@@ -99,9 +99,7 @@ pub enum BoardError {
 
 /// The names of all dictionaries, short: `4x4_50`, `apriltag_36h11`.
 pub fn dictionary_names() -> impl Iterator<Item = String> {
-    builtins::BUILTIN_DICTIONARY_NAMES
-        .iter()
-        .map(|name| short(name))
+    builtins::BUILTIN_DICTIONARY_NAMES.iter().map(|name| short(name))
 }
 
 fn short(name: &str) -> String {
@@ -246,8 +244,7 @@ fn length(text: &str) -> Result<f64, BoardError> {
     };
     let units = [("mm", 1e3), ("cm", 1e2), ("in", 1.0 / 0.0254), ("m", 1.0)];
     let unit = units.iter().find_map(|(name, per_metre)| {
-        text.strip_suffix(name)
-            .map(|number| (number.trim(), *per_metre))
+        text.strip_suffix(name).map(|number| (number.trim(), *per_metre))
     });
     let (number, per_metre) = unit.ok_or_else(invalid)?;
     let value = number.parse::<f64>().map_err(|_not_a_number| invalid())? / per_metre;
@@ -383,9 +380,8 @@ mod tests {
             let mut text: Vec<char> = seeds[nth % 2].chars().collect();
             for _ in 0..random.usize(1..4) {
                 let at = random.usize(0..text.len());
-                text[at] = *random
-                    .choice(&['0', '9', ':', 'x', '.', '-', 'e', '\u{e9}', ' '])
-                    .unwrap();
+                text[at] =
+                    *random.choice(&['0', '9', ':', 'x', '.', '-', 'e', '\u{e9}', ' ']).unwrap();
             }
             let text: String = text.into_iter().collect();
             if let Ok(board) = text.parse::<Board>() {

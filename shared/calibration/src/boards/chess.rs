@@ -51,9 +51,7 @@ pub(crate) fn find(
 
 fn scales(picture: &Picture) -> impl Iterator<Item = (Picture, f64)> {
     let same = Some((picture.clone(), 1.0));
-    let half = picture
-        .halved()
-        .filter(|it| it.width().min(it.height()) >= 200);
+    let half = picture.halved().filter(|it| it.width().min(it.height()) >= 200);
     let half = half.map(|it| (it, 0.5));
     let twice = (picture.width().max(picture.height()) <= 1400).then(|| (picture.doubled(), 2.0));
     [same, half, twice].into_iter().flatten()
@@ -84,11 +82,7 @@ fn grids(picture: &Picture, scale: f64) -> Vec<Grid> {
             corners,
         }
     };
-    detector
-        .detect_all(&corners)
-        .into_iter()
-        .map(grid)
-        .collect()
+    detector.detect_all(&corners).into_iter().map(grid).collect()
 }
 
 /// A grid as the board: which corner is the first, and every corner at sub-pixel.

@@ -76,15 +76,11 @@ impl Homography {
 /// Takes the middle of points to the origin, and their mean distance to the square root of 2.
 fn spread(points: impl Iterator<Item = (Point2<f64>, f64)> + Clone) -> Option<Matrix3<f64>> {
     let total: f64 = points.clone().map(|(_, weight)| weight).sum();
-    let sum = points
-        .clone()
-        .fold(nalgebra::Vector2::zeros(), |sum, (point, weight)| {
-            sum + weight * point.coords
-        });
+    let sum = points.clone().fold(nalgebra::Vector2::zeros(), |sum, (point, weight)| {
+        sum + weight * point.coords
+    });
     let middle = sum / total;
-    let reach: f64 = points
-        .map(|(point, weight)| weight * (point.coords - middle).norm())
-        .sum();
+    let reach: f64 = points.map(|(point, weight)| weight * (point.coords - middle).norm()).sum();
     let scale = core::f64::consts::SQRT_2 * total / reach;
     scale.is_finite().then(|| {
         Matrix3::new(

@@ -87,9 +87,7 @@ fn charuco(board: &Board) -> Layout {
                 continue;
             }
             let at = [column as f64 * side + margin, row as f64 * side + margin];
-            layout
-                .markers
-                .push(marker(layout.markers.len(), at, side * board.ratio));
+            layout.markers.push(marker(layout.markers.len(), at, side * board.ratio));
         }
     }
     layout

@@ -65,9 +65,7 @@ fn content(drawing: &Drawing) -> String {
                 size * POINTS,
                 at[0] * POINTS,
                 (height - at[1]) * POINTS,
-                text.replace('\\', "\\\\")
-                    .replace('(', "\\(")
-                    .replace(')', "\\)")
+                text.replace('\\', "\\\\").replace('(', "\\(").replace(')', "\\)")
             ),
         };
         writeln!(out, "{line}").unwrap_or_default();

@@ -122,10 +122,8 @@ impl Picture {
         for y in 0..height {
             let rows = [2 * y, 2 * y + 1].map(|row| &self.pixels[row * self.width..]);
             for x in 0..width {
-                let sum: u32 = rows
-                    .iter()
-                    .map(|row| u32::from(row[2 * x]) + u32::from(row[2 * x + 1]))
-                    .sum();
+                let sum: u32 =
+                    rows.iter().map(|row| u32::from(row[2 * x]) + u32::from(row[2 * x + 1])).sum();
                 pixels.push(((sum + 2) / 4) as u8);
             }
         }

@@ -115,9 +115,8 @@ fn four_corners(outline: &[Pixel]) -> Option<[Point2<f64>; 4]> {
     if n < 16 {
         return None;
     }
-    let length: f64 = (0..n)
-        .map(|i| (point(outline[(i + 1) % n]) - point(outline[i])).norm())
-        .sum();
+    let length: f64 =
+        (0..n).map(|i| (point(outline[(i + 1) % n]) - point(outline[i])).norm()).sum();
     let first = furthest(outline, |it| (it - point(outline[0])).norm())?.0;
     let second = furthest(outline, |it| (it - point(outline[first])).norm())?.0;
     let (a, b) = (first.min(second), first.max(second));
@@ -196,9 +195,7 @@ fn n_sides(outline: &[Pixel]) -> f64 {
 /// The line through points that run clockwise: a point of it, and its normal to the outside (y down).
 fn line(places: &[Point2<f64>]) -> Option<(Point2<f64>, Vector2<f64>)> {
     let (first, last) = (places.first()?, places.last()?);
-    let sum = places
-        .iter()
-        .fold(Vector2::zeros(), |sum, it| sum + it.coords);
+    let sum = places.iter().fold(Vector2::zeros(), |sum, it| sum + it.coords);
     let middle = sum / places.len() as f64;
     let mut scatter = Matrix2::zeros();
     for place in places {

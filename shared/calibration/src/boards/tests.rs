@@ -157,11 +157,8 @@ fn inverted_and_mirrored_pictures_are_found_and_named() {
     let mirrored = finder(text).find(&shot.picture.mirrored(), Hints::default());
     let mirrored = mirrored.unwrap();
     assert!(mirrored.is_mirrored && !mirrored.is_inverted);
-    let truth: Vec<Point2<f64>> = shot
-        .truth
-        .iter()
-        .map(|it| Point2::new(399.0 - it.x, it.y))
-        .collect();
+    let truth: Vec<Point2<f64>> =
+        shot.truth.iter().map(|it| Point2::new(399.0 - it.x, it.y)).collect();
     assert!(compared(&mirrored, &truth).1 < 0.3);
 }
 

@@ -101,11 +101,7 @@ impl Adjustment {
                 next += 1;
             }
         }
-        let given_focal = cameras
-            .cameras()
-            .iter()
-            .map(|it| it.intrinsics.fx)
-            .collect();
+        let given_focal = cameras.cameras().iter().map(|it| it.intrinsics.fx).collect();
         let mut it = Self {
             cameras,
             given_focal,
@@ -234,9 +230,7 @@ impl Adjustment {
         let at = seen.at - seen.speed * step - self.biases.of(seen.camera, joint);
         let point = &instant.points[seen.point];
         let what = (at, seen.sigma_px);
-        let observed = self
-            .cameras
-            .observe(seen.camera, point, what, Loss::Cauchy(WIDTH), term);
+        let observed = self.cameras.observe(seen.camera, point, what, Loss::Cauchy(WIDTH), term);
         term.counts(instant.shares[seen.point]);
         for axis in 0..3 {
             let column = observed.by_point.column(axis);
@@ -247,8 +241,7 @@ impl Adjustment {
             term.by_shared(parameter, by.as_slice());
         }
         if observed.has_image {
-            self.biases
-                .observed((seen.camera, joint), seen.sigma_px, term);
+            self.biases.observed((seen.camera, joint), seen.sigma_px, term);
         }
     }
 

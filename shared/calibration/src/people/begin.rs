@@ -75,9 +75,7 @@ pub(crate) fn choices(n_chains: usize, offset_s: f64, window_s: f64, as_seen: bo
     }
     all.sort_by(|a, b| {
         let far = |it: &Choice| (it.chain, (it.offset_s - offset_s).abs());
-        far(a)
-            .partial_cmp(&far(b))
-            .unwrap_or(core::cmp::Ordering::Equal)
+        far(a).partial_cmp(&far(b)).unwrap_or(core::cmp::Ordering::Equal)
     });
     all
 }
@@ -86,13 +84,9 @@ impl Study<'_> {
     /// What the chosen cameras see.
     pub(crate) fn sightings(&self, chosen: &[Option<Choice>]) -> Sightings {
         let chains = chosen.iter().enumerate();
-        let chains: Vec<Option<&Chain>> = chains
-            .map(|(camera, it)| self.chains[camera].get((*it)?.chain))
-            .collect();
-        let offsets: Vec<f64> = chosen
-            .iter()
-            .map(|it| it.map_or(0.0, |it| it.offset_s))
-            .collect();
+        let chains: Vec<Option<&Chain>> =
+            chains.map(|(camera, it)| self.chains[camera].get((*it)?.chain)).collect();
+        let offsets: Vec<f64> = chosen.iter().map(|it| it.map_or(0.0, |it| it.offset_s)).collect();
         let mut all = Sightings::new(&chains, &self.times_s, &offsets, self.n_joints);
         for (camera, it) in chosen.iter().enumerate() {
             if it.is_some_and(|it| it.is_exchanged) {

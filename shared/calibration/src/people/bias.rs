@@ -70,8 +70,7 @@ impl Biases {
 
     /// Pixels; 0 where there is none.
     pub(super) fn of(&self, camera: usize, joint: usize) -> Vector2<f64> {
-        self.place(camera, joint)
-            .map_or_else(Vector2::zeros, |it| self.values[it])
+        self.place(camera, joint).map_or_else(Vector2::zeros, |it| self.values[it])
     }
 
     /// The derivatives of what a camera sees of a joint.
@@ -120,9 +119,7 @@ pub(super) fn share_of(residuals: &[Vec<Vector2<f64>>]) -> Option<f64> {
             squares.push(middle.powi(2) - chance);
         }
     }
-    let share = (Sorted::new(squares).upper_median()? / MEDIAN_SQUARE)
-        .max(0.0)
-        .sqrt();
+    let share = (Sorted::new(squares).upper_median()? / MEDIAN_SQUARE).max(0.0).sqrt();
     (share > NOTHING).then(|| share.min(MOST))
 }
 

@@ -45,11 +45,7 @@ pub(super) fn spread(all: &Solved, known: &Covariance) -> Vec<[f64; 2]> {
     let own = known.matrix.view((0, 0), (n, n)).into_owned();
     let eigen = SymmetricEigen::new(own);
     let mut sums = vec![[0.0; 2]; cameras.cameras().len()];
-    for (variance, axis) in eigen
-        .eigenvalues
-        .iter()
-        .zip(eigen.eigenvectors.column_iter())
-    {
+    for (variance, axis) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
         let step = axis * variance.max(0.0).sqrt();
         let moved = cameras.moved(step.as_slice());
         let apart = differences(moved.cameras(), cameras.cameras(), true);
@@ -72,8 +68,7 @@ fn distances(outcome: &Outcome) -> Vec<f64> {
         axis(2).unwrap_or(0.0),
     );
     let each = outcome.cameras.iter();
-    each.map(|it| (it.centre_in_world() - middle).norm())
-        .collect()
+    each.map(|it| (it.centre_in_world() - middle).norm()).collect()
 }
 
 /// Adds to the deviations of the rotations what no block of the recording tells: where a network finds the joints, rigs of few cameras

@@ -239,10 +239,8 @@ fn judge(
     outcome.cameras = placed.collect();
     let to_metres_point = |it: &Option<Point3<f64>>| it.map(|it| to_metres.point(&it));
     outcome.times_s = times_s.to_vec();
-    outcome.skeletons = skeletons
-        .iter()
-        .map(|it| it.iter().map(to_metres_point).collect())
-        .collect();
+    outcome.skeletons =
+        skeletons.iter().map(|it| it.iter().map(to_metres_point).collect()).collect();
     outcome.stature_m = stature_of(&outcome.skeletons).map(|it| it.0);
     let fits = fits(&all.problem, &all.sigmas_px);
     let blocks = blocks(&all.problem, &study.times_s);

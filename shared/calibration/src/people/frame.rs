@@ -209,14 +209,9 @@ pub(crate) fn vertical(
     times_s: &[f64],
     skeletons: &Skeletons,
 ) -> Option<(UnitVector3<f64>, Vertical)> {
-    let upright: Vec<Vector3<f64>> = skeletons
-        .iter()
-        .filter_map(|it| body(it, STRAIGHT))
-        .collect();
-    let all: Vec<Vector3<f64>> = skeletons
-        .iter()
-        .filter_map(|it| body(it, core::f64::consts::PI))
-        .collect();
+    let upright: Vec<Vector3<f64>> = skeletons.iter().filter_map(|it| body(it, STRAIGHT)).collect();
+    let all: Vec<Vector3<f64>> =
+        skeletons.iter().filter_map(|it| body(it, core::f64::consts::PI)).collect();
     let (bodies, source) = if upright.len() >= LEAST {
         (middle(&upright)?, Vertical::Bodies)
     } else {
@@ -251,16 +246,9 @@ fn floor(feet: &[Point3<f64>]) -> Option<UnitVector3<f64>> {
             .map(|it| (it.coords - middle) * (it.coords - middle).transpose() / n)
             .sum();
         let eigen = SymmetricEigen::new(spread);
-        let mut sizes: Vec<f64> = eigen
-            .eigenvalues
-            .iter()
-            .map(|it| it.max(0.0).sqrt())
-            .collect();
+        let mut sizes: Vec<f64> = eigen.eigenvalues.iter().map(|it| it.max(0.0).sqrt()).collect();
         sizes.sort_by(f64::total_cmp);
-        let axis = eigen
-            .eigenvectors
-            .column(eigen.eigenvalues.imin())
-            .into_owned();
+        let axis = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
         let is_floor = sizes[1] > FLOOR_M[0] && sizes[0] < FLOOR_M[1];
         normal = is_floor.then(|| UnitVector3::new_normalize(axis));
         let limit = (2.5 * sizes[0]).max(0.01);
@@ -299,20 +287,14 @@ fn middle(all: &[Vector3<f64>]) -> Option<UnitVector3<f64>> {
 pub(crate) fn bone_spread(skeletons: &Skeletons) -> Option<f64> {
     let mut each = Vec::new();
     for bone in BONES.iter().filter(|it| it.from[0] == it.from[1]) {
-        let lengths: Vec<f64> = skeletons
-            .iter()
-            .filter_map(|it| bone.length(&joints(it)))
-            .collect();
+        let lengths: Vec<f64> =
+            skeletons.iter().filter_map(|it| bone.length(&joints(it))).collect();
         if lengths.len() < 2 * LEAST {
             continue;
         }
         let lengths = Sorted::new(lengths);
         let length = lengths.upper_median()?;
-        let away: Vec<f64> = lengths
-            .values()
-            .iter()
-            .map(|it| (it / length - 1.0).abs())
-            .collect();
+        let away: Vec<f64> = lengths.values().iter().map(|it| (it / length - 1.0).abs()).collect();
         each.push(1.4826 * Sorted::new(away).upper_median()?);
     }
     Sorted::new(each).upper_median()

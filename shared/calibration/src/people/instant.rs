@@ -74,9 +74,8 @@ pub(super) fn instant(
     let joints: Vec<usize> = (0..n_joints).collect();
     for joint in joints {
         let each = seen.iter().enumerate();
-        let each: Vec<(usize, Sight)> = each
-            .filter_map(|(camera, it)| Some((camera, (*it.get(joint)?)?)))
-            .collect();
+        let each: Vec<(usize, Sight)> =
+            each.filter_map(|(camera, it)| Some((camera, (*it.get(joint)?)?))).collect();
         let sigma = |camera: usize, weight: f64| sigmas[camera][joint] / weight.sqrt();
         let observations: Vec<Observation<'_>> = each
             .iter()

@@ -26,9 +26,7 @@ pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) ->
     problem.residuals(&mut |it| all[it.joint].push(it.own.norm() / sizes_px[it.camera]));
     let whole = Sorted::new(all.concat()).upper_median().unwrap_or(1.0);
     let share = |it: &Vec<f64>| {
-        let own = Sorted::new(it.clone())
-            .upper_median()
-            .filter(|_| it.len() >= LEAST);
+        let own = Sorted::new(it.clone()).upper_median().filter(|_| it.len() >= LEAST);
         FITTED * own.unwrap_or(whole) / MEDIAN
     };
     let shares: Vec<f64> = all.iter().map(share).collect();

@@ -78,11 +78,7 @@ fn mean_cost(camera: &Camera, known: &[Known]) -> f64 {
 
 /// The linear solution of six joints, with the nearest rotation.
 fn linear(camera: &Camera, sample: &[Known; 6]) -> Option<Isometry3<f64>> {
-    let centre = sample
-        .iter()
-        .map(|it| it.0.coords)
-        .sum::<nalgebra::Vector3<f64>>()
-        / 6.0;
+    let centre = sample.iter().map(|it| it.0.coords).sum::<nalgebra::Vector3<f64>>() / 6.0;
     let mut normal = SMatrix::<f64, 12, 12>::zeros();
     for (point, seen, _) in sample {
         let seen = normalised(camera, seen);
@@ -97,10 +93,7 @@ fn linear(camera: &Camera, sample: &[Known; 6]) -> Option<Isometry3<f64>> {
         }
     }
     let eigen = SymmetricEigen::new(normal);
-    let vector = eigen
-        .eigenvectors
-        .column(eigen.eigenvalues.imin())
-        .into_owned();
+    let vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
     let mut left = Matrix3::from_fn(|i, j| vector[4 * i + j]);
     let mut right = nalgebra::Vector3::from_fn(|i, _| vector[4 * i + 3]);
     if left.determinant() < 0.0 {
@@ -143,8 +136,7 @@ impl Problem for Resection<'_> {
     fn priors(&self, take: &mut dyn FnMut(&Term)) {
         let mut term = Term::default();
         for (point, seen, sigma) in self.known {
-            self.cameras
-                .observe(0, point, (*seen, *sigma), Loss::Cauchy(2.0), &mut term);
+            self.cameras.observe(0, point, (*seen, *sigma), Loss::Cauchy(2.0), &mut term);
             take(&term);
         }
     }

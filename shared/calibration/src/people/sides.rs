@@ -42,9 +42,7 @@ pub(crate) fn exchange(
             let seen = &sightings.seen[instant];
             let gain = |camera: usize| {
                 let costs = costs(cameras, seen, camera, sigmas_px, sides);
-                costs
-                    .is_exchanged()
-                    .then_some((camera, costs.here - costs.exchanged))
+                costs.is_exchanged().then_some((camera, costs.here - costs.exchanged))
             };
             let worst = (1..=cameras.len()).filter_map(|it| gain(cameras.len() - it));
             let Some((camera, _)) = worst.max_by(|a, b| a.1.total_cmp(&b.1)) else {

@@ -178,8 +178,7 @@ impl Flaws {
     pub(crate) fn films(&self, cameras: &[Camera]) -> Vec<Film> {
         let mut random = Rng::with_seed(self.seed);
         let each = cameras.iter().enumerate();
-        each.map(|(nth, camera)| self.film(nth, camera, &mut random))
-            .collect()
+        each.map(|(nth, camera)| self.film(nth, camera, &mut random)).collect()
     }
 
     fn film(&self, nth: usize, camera: &Camera, random: &mut Rng) -> Film {

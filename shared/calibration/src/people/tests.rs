@@ -241,9 +241,7 @@ fn beside(films: &mut [Film], px: f64) {
     let mut random = fastrand::Rng::with_seed(8);
     for film in films {
         let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
-        let by: Vec<[f64; 2]> = (0..N_JOINTS)
-            .map(|_| [0; 2].map(|_| px * normal()))
-            .collect();
+        let by: Vec<[f64; 2]> = (0..N_JOINTS).map(|_| [0; 2].map(|_| px * normal())).collect();
         for person in film.shots.iter_mut().flat_map(|it| &mut it.people) {
             for (joint, by) in person.joints.iter_mut().zip(&by) {
                 if let Some(it) = joint {

@@ -112,9 +112,7 @@ pub(crate) fn essential_of(b_from_a: &Isometry3<f64>) -> Matrix3<f64> {
 }
 
 fn mean_cost(matches: &[Match], essential: &Matrix3<f64>, sigma: f64) -> f64 {
-    let each = matches
-        .iter()
-        .map(|it| (sampson(it, essential) / sigma).powi(2).ln_1p());
+    let each = matches.iter().map(|it| (sampson(it, essential) / sigma).powi(2).ln_1p());
     each.sum::<f64>() / matches.len() as f64
 }
 
@@ -129,17 +127,11 @@ fn eight_points(sample: &[Match; 8]) -> Option<Matrix3<f64>> {
         normal += row * row.transpose();
     }
     let eigen = SymmetricEigen::new(normal);
-    let vector = eigen
-        .eigenvectors
-        .column(eigen.eigenvalues.imin())
-        .into_owned();
+    let vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
     let matrix = Matrix3::from_fn(|i, j| vector[3 * i + j]);
     let svd = (of_b.transpose() * matrix * of_a).svd(true, true);
     let essential = svd.u? * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0)) * svd.v_t?;
-    essential
-        .iter()
-        .all(|it| it.is_finite())
-        .then_some(essential)
+    essential.iter().all(|it| it.is_finite()).then_some(essential)
 }
 
 /// Moves points to the origin, at a mean distance of √2.

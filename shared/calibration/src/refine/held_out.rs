@@ -34,12 +34,10 @@ pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
                 let pair = [(anchor, chain), (camera, it)];
                 (distance(study, pair, pair.map(choice)), it)
             });
-            each.min_by(|a, b| a.0.total_cmp(&b.0))
-                .unwrap_or((f64::INFINITY, 0))
+            each.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
         };
-        let all: Vec<(f64, usize)> = (0..n)
-            .map(|it| if it == anchor { (0.0, chain) } else { with(it) })
-            .collect();
+        let all: Vec<(f64, usize)> =
+            (0..n).map(|it| if it == anchor { (0.0, chain) } else { with(it) }).collect();
         let sum: f64 = all.iter().map(|it| it.0).sum();
         (sum, all)
     });
@@ -128,8 +126,7 @@ impl Blocks {
         }
         for (block, both) in sums {
             if both.iter().all(|it| it.1 >= LEAST) {
-                self.costs
-                    .insert(block, both.map(|(sum, n)| sum / n as f64));
+                self.costs.insert(block, both.map(|(sum, n)| sum / n as f64));
             }
         }
     }
@@ -137,18 +134,14 @@ impl Blocks {
     /// Median distances of a camera, pixels: before and after.
     pub(super) fn of_camera(&self, camera: usize) -> [f64; 2] {
         let of = |it: &Vec<f64>| Sorted::new(it.clone()).upper_median().unwrap_or(f64::NAN);
-        self.distances
-            .get(camera)
-            .map_or([f64::NAN; 2], |it| [of(&it[0]), of(&it[1])])
+        self.distances.get(camera).map_or([f64::NAN; 2], |it| [of(&it[0]), of(&it[1])])
     }
 
     /// Whether the new rig is better.
     pub(super) fn judge(&self, outcome: &mut Outcome) {
         let all = |nth: usize| {
             let each = self.distances.iter().flat_map(|it| it[nth].iter().copied());
-            Sorted::new(each.collect::<Vec<_>>())
-                .upper_median()
-                .unwrap_or(f64::NAN)
+            Sorted::new(each.collect::<Vec<_>>()).upper_median().unwrap_or(f64::NAN)
         };
         let [before, after] = [all(0), all(1)];
         outcome.held_out_px = [before, after];

@@ -105,10 +105,7 @@ pub fn estimate(
     settings: &Settings,
 ) -> Result<Outcome, FilmError> {
     check(cameras, films, settings)?;
-    let interval_s = films
-        .iter()
-        .filter_map(Film::interval_s)
-        .fold(0.0, f64::max);
+    let interval_s = films.iter().filter_map(Film::interval_s).fold(0.0, f64::max);
     let sigma_s = (SMOOTHING[0] * interval_s).max(SMOOTHING[1]);
     let of_camera = |(film, camera)| tracks(film, camera, settings.n_joints, sigma_s);
     let tracks: Vec<Vec<Track>> = films.iter().zip(cameras).map(of_camera).collect();
@@ -124,9 +121,8 @@ pub fn estimate(
             });
         }
     }
-    let mut active: Vec<usize> = (0..cameras.len())
-        .filter(|it| seen[*it] >= LEAST_SEEN_S)
-        .collect();
+    let mut active: Vec<usize> =
+        (0..cameras.len()).filter(|it| seen[*it] >= LEAST_SEEN_S).collect();
     active.sort_by_key(|it| *it != settings.reference);
     let study = Study {
         cameras,
@@ -216,10 +212,7 @@ impl Study<'_> {
         };
         self.doubt_search(&found, &curves, &mut doubts);
         self.doubt_fit(&problem, &fit, span, &mut doubts);
-        let pairs = curves
-            .iter()
-            .map(|it| pair_report(it, &fit.clocks))
-            .collect();
+        let pairs = curves.iter().map(|it| pair_report(it, &fit.clocks)).collect();
         Outcome {
             cameras: (0..self.cameras.len()).map(camera).collect(),
             pairs,
@@ -256,11 +249,9 @@ impl Study<'_> {
     /// The part of the footage with most movement, by the clocks of the cameras; all of it if it is short.
     fn searched(&self) -> [f64; 2] {
         let spans = self.active.iter().flat_map(|it| &self.tracks[*it]);
-        let ends = spans
-            .map(|it| it.span)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |all, it| {
-                [all[0].min(it[0]), all[1].max(it[1])]
-            });
+        let ends = spans.map(|it| it.span).fold([f64::INFINITY, f64::NEG_INFINITY], |all, it| {
+            [all[0].min(it[0]), all[1].max(it[1])]
+        });
         if ends[1] - ends[0] <= SEARCHED_S || ends[1] < ends[0] {
             return if ends[1] < ends[0] { [0.0, 0.0] } else { ends };
         }
@@ -298,11 +289,7 @@ impl Study<'_> {
         Problem {
             tracks: self.tracks,
             pairs,
-            reference: self
-                .active
-                .first()
-                .copied()
-                .unwrap_or(self.settings.reference),
+            reference: self.active.first().copied().unwrap_or(self.settings.reference),
             mirror: self.settings.mirror.as_deref(),
             n_joints: self.settings.n_joints,
         }

@@ -99,11 +99,8 @@ impl Film {
 
     /// Time between pictures, seconds: the median; none for fewer than two.
     pub(crate) fn interval_s(&self) -> Option<f64> {
-        let mut steps: Vec<f64> = self
-            .shots
-            .array_windows()
-            .map(|[a, b]| b.time_s - a.time_s)
-            .collect();
+        let mut steps: Vec<f64> =
+            self.shots.array_windows().map(|[a, b]| b.time_s - a.time_s).collect();
         steps.sort_by(f64::total_cmp);
         steps.get(steps.len() / 2).copied()
     }

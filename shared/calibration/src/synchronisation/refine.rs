@@ -206,9 +206,8 @@ impl Problem<'_> {
                 let piece =
                     piece.or_insert_with(|| Piece::new(self.pairs[*pair].0, *joint, *block));
                 let residuals = row.over_delay.iter().zip(&biases);
-                let costs: Vec<f64> = residuals
-                    .map(|(residual, bias)| row.weight * cost(residual - bias))
-                    .collect();
+                let costs: Vec<f64> =
+                    residuals.map(|(residual, bias)| row.weight * cost(residual - bias)).collect();
                 piece.add(&costs, *since);
             }
         }
@@ -345,17 +344,11 @@ fn biases(rows: &[Timed], spread: f64) -> Vec<f64> {
     let of_errors = variance_of_median(rows).max(1e-9);
     let share = 1.0 - (of_errors / (of_errors + spread)).sqrt();
     let n_delays = rows.first().map_or(0, |it| it.row.over_delay.len());
-    (0..n_delays)
-        .map(|delay| share * median_at(rows, delay))
-        .collect()
+    (0..n_delays).map(|delay| share * median_at(rows, delay)).collect()
 }
 
 fn median_at(rows: &[Timed], delay: usize) -> f64 {
-    median(
-        rows.iter()
-            .filter_map(|it| it.row.over_delay.get(delay).copied())
-            .collect(),
-    )
+    median(rows.iter().filter_map(|it| it.row.over_delay.get(delay).copied()).collect())
 }
 
 fn median(mut all: Vec<f64>) -> f64 {
@@ -365,11 +358,8 @@ fn median(mut all: Vec<f64>) -> f64 {
 
 /// Residuals with those that are missing between the others; none where more than a third is, or an end.
 fn filled(costs: &[Option<f64>]) -> Option<Vec<f64>> {
-    let known: Vec<(usize, f64)> = costs
-        .iter()
-        .enumerate()
-        .filter_map(|(nth, it)| Some((nth, (*it)?)))
-        .collect();
+    let known: Vec<(usize, f64)> =
+        costs.iter().enumerate().filter_map(|(nth, it)| Some((nth, (*it)?))).collect();
     if 3 * known.len() < 2 * costs.len() {
         return None;
     }

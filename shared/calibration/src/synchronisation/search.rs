@@ -69,10 +69,7 @@ pub(crate) fn search(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Fo
     for it in &mut offsets_s {
         *it -= zero;
     }
-    let mut rivals: Vec<Rival> = groups
-        .iter()
-        .map(|it| rival(curves, it, &offsets_s))
-        .collect();
+    let mut rivals: Vec<Rival> = groups.iter().map(|it| rival(curves, it, &offsets_s)).collect();
     rivals.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
     Found { offsets_s, rivals }
 }
@@ -87,9 +84,7 @@ fn groups(active: &[usize]) -> Vec<Vec<usize>> {
     }
     let chosen = |bits: usize| {
         let each = others.iter().enumerate();
-        each.filter(|(nth, _)| bits >> nth & 1 == 1)
-            .map(|it| *it.1)
-            .collect()
+        each.filter(|(nth, _)| bits >> nth & 1 == 1).map(|it| *it.1).collect()
     };
     (1..1_usize << others.len()).map(chosen).collect()
 }
@@ -106,11 +101,7 @@ fn starts(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Vec<Vec<f64>>
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut starts = vec![spread(n_cameras, &peaks)];
     for &hub in active {
-        let of_hub: Vec<_> = peaks
-            .iter()
-            .filter(|it| it.1.contains(&hub))
-            .copied()
-            .collect();
+        let of_hub: Vec<_> = peaks.iter().filter(|it| it.1.contains(&hub)).copied().collect();
         starts.push(spread(n_cameras, &of_hub));
     }
     starts
@@ -255,9 +246,7 @@ impl<'a> Joint<'a> {
 /// The second-best offset of a group.
 fn rival(curves: &[Curve], group: &[usize], offsets_s: &[f64]) -> Rival {
     let joint = Joint::new(curves, group, offsets_s);
-    let values: Vec<f64> = (-joint.half..=joint.half)
-        .map(|it| joint.value(it))
-        .collect();
+    let values: Vec<f64> = (-joint.half..=joint.half).map(|it| joint.value(it)).collect();
     let now = joint.half as usize;
     let best = values.get(now).copied().unwrap_or(0.0);
     let other = other_peak(&values, now);

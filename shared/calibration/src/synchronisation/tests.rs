@@ -86,9 +86,7 @@ fn sides_that_follow_the_picture_do_not_matter_where_that_is_known() {
     let mut films = films.films(&cameras, &walking);
     for it in films[1].shots.iter_mut().flat_map(|it| &mut it.people) {
         let joints = it.joints.clone();
-        it.joints = crate::synchronisation::testing::mirror()
-            .map(|joint| joints[joint])
-            .to_vec();
+        it.joints = crate::synchronisation::testing::mirror().map(|joint| joints[joint]).to_vec();
     }
     let mirror = Some(crate::synchronisation::testing::mirror().to_vec());
     let settings = Settings {

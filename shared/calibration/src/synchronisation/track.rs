@@ -77,9 +77,7 @@ impl Track {
         let samples = &self.joints[joint];
         let reach = KERNEL_END * self.sigma_s;
         let from = samples.partition_point(|it| it.time_s < time_s - reach);
-        let near = samples[from..]
-            .iter()
-            .take_while(|it| it.time_s <= time_s + reach);
+        let near = samples[from..].iter().take_while(|it| it.time_s <= time_s + reach);
         let (mut n, mut before, mut after) = (0, false, false);
         let mut sums = [0.0; 3];
         let mut moments = [[0.0; 2]; 2];
@@ -135,9 +133,8 @@ pub fn tracks(film: &Film, camera: &Camera, n_joints: usize, sigma_s: f64) -> Ve
     let (mut open, mut done) = (Vec::<Open>::new(), Vec::new());
     for shot in &film.shots {
         let people = shot.people.iter();
-        let mut people: Vec<Option<Seen>> = people
-            .map(|it| seen(it, camera, n_joints, least_size))
-            .collect();
+        let mut people: Vec<Option<Seen>> =
+            people.map(|it| seen(it, camera, n_joints, least_size)).collect();
         let is_old = |it: &Open| shot.time_s - it.last().0 > LONGEST_GAP_S;
         let (old, mut fresh): (Vec<Open>, Vec<Open>) = open.into_iter().partition(is_old);
         done.extend(old);
@@ -150,9 +147,7 @@ pub fn tracks(film: &Film, camera: &Camera, n_joints: usize, sigma_s: f64) -> Ve
     }
     done.extend(open);
     let tracks = done.into_iter();
-    tracks
-        .filter_map(|it| it.finish(n_joints, sigma_s))
-        .collect()
+    tracks.filter_map(|it| it.finish(n_joints, sigma_s)).collect()
 }
 
 /// Gives people to the tracks whose last pictures they are nearest to, the nearest first.
@@ -200,9 +195,7 @@ fn seen(person: &Person, camera: &Camera, n_joints: usize, least_size: f64) -> O
     let ideal = |joint: usize| {
         let it = (*person.joints.get(joint)?)?;
         let is_good = it.at.iter().all(|it| it.is_finite()) && it.score > LEAST_SCORE;
-        let at = camera
-            .undistorted_px(&Point2::from(it.at))
-            .filter(|_| is_good)?;
+        let at = camera.undistorted_px(&Point2::from(it.at)).filter(|_| is_good)?;
         Some(([at.x, at.y], it.score.min(1.0)))
     };
     let joints: Vec<Option<([f64; 2], f64)>> = (0..n_joints).map(ideal).collect();

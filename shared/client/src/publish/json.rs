@@ -121,9 +121,8 @@ pub(crate) mod tests {
 
     #[test]
     fn names_are_left_out_where_they_do_not_fit_and_too_much_is_not_sent() {
-        let long: Vec<String> = (0..32)
-            .map(|it| format!("a joint with a very long name {it}"))
-            .collect();
+        let long: Vec<String> =
+            (0..32).map(|it| format!("a joint with a very long name {it}")).collect();
         let names: Vec<&str> = long.iter().map(String::as_str).collect();
         let text = json_datagram(&frame(&names)).unwrap();
         assert!(text.len() <= MOST_BYTES);

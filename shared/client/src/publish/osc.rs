@@ -99,9 +99,7 @@ fn push(bundle: &mut Vec<u8>, message: &Message) {
 /// A name as part of an address: what has a meaning there, and what is not ASCII, is an underscore.
 fn plain(name: &str) -> String {
     let is_plain = |it: char| it.is_ascii_alphanumeric() || it == '-' || it == '_';
-    name.chars()
-        .map(|it| if is_plain(it) { it } else { '_' })
-        .collect()
+    name.chars().map(|it| if is_plain(it) { it } else { '_' }).collect()
 }
 
 #[cfg(test)]

@@ -372,9 +372,7 @@ fn a_mistake_is_told_with_what_was_found_and_what_to_write() {
     let lines = LINES
         .iter()
         .map(|(line, words)| (format!("{SHORT}\n[capture]\n{line}\n"), "", *words));
-    let edits = EDITS
-        .iter()
-        .map(|(from, to, words)| (SHORT.replace(from, to), "", *words));
+    let edits = EDITS.iter().map(|(from, to, words)| (SHORT.replace(from, to), "", *words));
     let set: &[&str] = &[
         "--set",
         "`paper.workers`",

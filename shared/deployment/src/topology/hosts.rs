@@ -39,11 +39,8 @@ impl Topology {
             };
             self.processes.retain(is_here);
             self.n_workers = 0;
-            let outputs: Vec<String> = self
-                .processes
-                .iter()
-                .flat_map(|it| it.outputs.clone())
-                .collect();
+            let outputs: Vec<String> =
+                self.processes.iter().flat_map(|it| it.outputs.clone()).collect();
             for it in &mut self.processes {
                 it.inputs.retain(|input| outputs.contains(input));
             }

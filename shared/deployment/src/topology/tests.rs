@@ -60,9 +60,7 @@ fn all_views_at_once_have_one_worker_for_every_process_however_many_are_allowed(
             assert_eq!(of_service(topology, "fuse").len(), 1);
             let answers = |it: &Process| {
                 let inputs = it.inputs.iter();
-                inputs
-                    .filter(|input| input.starts_with("pair-pose/"))
-                    .count()
+                inputs.filter(|input| input.starts_with("pair-pose/")).count()
             };
             for it in topology.processes() {
                 let reads = ["triangulate", "results", "record"].contains(&it.service);
@@ -106,11 +104,7 @@ fn the_receivers_of_a_recorded_deployment_with_a_network_are_these() {
     assert_eq!(senders("capture-1"), [""; 0]);
     assert_eq!(senders("pose-1"), ["capture-1"]);
     assert_eq!(senders("quality-1"), ["pose-1", "capture-1"]);
-    let names: Vec<&str> = topology
-        .processes()
-        .iter()
-        .map(|it| it.name.as_str())
-        .collect();
+    let names: Vec<&str> = topology.processes().iter().map(|it| it.name.as_str()).collect();
     let expected = "record results triangulate fuse-0 fuse-1 quality-0 quality-1 quality-2 pose-0 pose-1 pose-2 \
                     capture-0 capture-1 capture-2";
     assert_eq!(names.join(" "), expected);
@@ -341,10 +335,8 @@ fn pictures_of_live_cameras_travel_where_they_are_recorded_only() {
         ..SIZE
     });
     let rooms = recorded.rooms(Mode::Realtime, &sizes, 1);
-    let of_pictures: Vec<&Room> = rooms
-        .iter()
-        .filter(|it| it.content == Content::Picture)
-        .collect();
+    let of_pictures: Vec<&Room> =
+        rooms.iter().filter(|it| it.content == Content::Picture).collect();
     assert_eq!(of_pictures.len(), 1);
     assert_eq!(
         (of_pictures[0].topic.as_str(), of_pictures[0].longest),

@@ -68,10 +68,8 @@ impl Mesh {
                 nalgebra::Vector3::y()
             };
             for place in [a, b, c] {
-                self.places
-                    .push([place.x as f32, place.y as f32, place.z as f32]);
-                self.normals
-                    .push([normal.x as f32, normal.y as f32, normal.z as f32]);
+                self.places.push([place.x as f32, place.y as f32, place.z as f32]);
+                self.normals.push([normal.x as f32, normal.y as f32, normal.z as f32]);
                 self.colours.push(colour.map(linear));
                 self.joints.push([joint as u16, 0, 0, 0]);
             }

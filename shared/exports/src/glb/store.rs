@@ -42,13 +42,7 @@ impl Store {
         let index = self.add(&bytes, Some(VERTICES), REAL, (values.len(), kind));
         let of = |choose: fn(f32, f32) -> f32| -> Vec<f32> {
             (0..N)
-                .map(|it| {
-                    values
-                        .iter()
-                        .map(|all| all[it])
-                        .reduce(choose)
-                        .unwrap_or(0.0)
-                })
+                .map(|it| values.iter().map(|all| all[it]).reduce(choose).unwrap_or(0.0))
                 .collect()
         };
         self.accessors[index]["min"] = json!(of(f32::min));

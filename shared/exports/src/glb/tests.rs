@@ -39,10 +39,7 @@ impl Read {
         let view = &self.json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
         let [at, n] = ["byteOffset", "byteLength"].map(|it| view[it].as_u64().unwrap() as usize);
         let bytes = self.binary[at..at + n].as_chunks().0;
-        bytes
-            .iter()
-            .map(|it| f64::from(f32::from_le_bytes(*it)))
-            .collect()
+        bytes.iter().map(|it| f64::from(f32::from_le_bytes(*it))).collect()
     }
 
     /// What a node has in a frame: its animated value, else its own.
@@ -128,10 +125,7 @@ fn the_skin_reaches_from_joint_to_joint_and_is_not_there_in_a_gap() {
     let bind = read.reals(&skin["inverseBindMatrices"]);
     let primitive = &read.json["meshes"][0]["primitives"][0]["attributes"];
     let places = read.reals(&primitive["POSITION"]);
-    let joint = joints
-        .iter()
-        .position(|it| *it == read.node("right_ankle_bone"))
-        .unwrap();
+    let joint = joints.iter().position(|it| *it == read.node("right_ankle_bone")).unwrap();
     // Eight faces of three vertices for each piece; the first vertex is the tip.
     let first = (joint - N_NODES) * 24;
     let tip = |frame: usize, vertex: usize| {

@@ -78,9 +78,7 @@ fn cameras(out: &mut Html, page: &Page<'_>) {
 }
 
 fn pair_plot(out: &mut Html, names: &[&str], curve: &Curve, pair: &PairReport) {
-    let [a, b] = curve
-        .cameras
-        .map(|it| names.get(it).copied().unwrap_or("?"));
+    let [a, b] = curve.cameras.map(|it| names.get(it).copied().unwrap_or("?"));
     put!(
         out,
         "<h3>{} and {}</h3>\n<p><small>best {} ms, second best {} ms ({} % as good), all cameras together {} ms; {} samples\

@@ -67,8 +67,7 @@ pub fn of_people(
             number(1e3 * it.sd[1], 1),
             focal,
             it.halves.map_or("-".to_owned(), |it| number(it[0], 2)),
-            it.halves
-                .map_or("-".to_owned(), |it| number(1e3 * it[1], 0)),
+            it.halves.map_or("-".to_owned(), |it| number(1e3 * it[1], 0)),
             format!(
                 "{} \u{b1} {}",
                 number(1e3 * it.offset_s[0], 1),
@@ -218,12 +217,7 @@ fn in_space(
     let seconds = (span_s[1] - span_s[0]) / (skeletons.len().max(2) - 1) as f64;
     let each = skeletons.iter().enumerate().step_by(step);
     let moments = each.map(|(nth, it)| {
-        let of = |joint: usize| {
-            it.get(joint)
-                .copied()
-                .flatten()
-                .map(|it| [it.x, it.y, it.z])
-        };
+        let of = |joint: usize| it.get(joint).copied().flatten().map(|it| [it.x, it.y, it.z]);
         Moment {
             frame: nth as u64,
             seconds: seconds * nth as f64,

@@ -40,9 +40,7 @@ fn every_person_has_a_trial_and_all_have_the_same_places() {
     assert_eq!((one.id(), other.id()), (1, 7));
     let found = |trial: &Trial| -> Vec<String> {
         let slots = trial.slots.iter();
-        slots
-            .map(|slot| format!("{} {}", slot.status, slot.points.len()))
-            .collect()
+        slots.map(|slot| format!("{} {}", slot.status, slot.points.len())).collect()
     };
     assert_eq!(
         found(&one),
@@ -78,10 +76,7 @@ fn one_after_the_other_is_one_trial_with_both_identities() {
     let mut table = Vec::new();
     crate::tables::wide(&trial, &mut table).unwrap();
     let table = String::from_utf8(table).unwrap();
-    let rows = table
-        .lines()
-        .skip(1)
-        .map(|row| row.split(',').nth(2).unwrap());
+    let rows = table.lines().skip(1).map(|row| row.split(',').nth(2).unwrap());
     assert_eq!(rows.collect::<Vec<_>>(), ["4", "", "2"]);
 }
 
@@ -188,9 +183,7 @@ fn what_smoothing_has_filled_in_is_marked_in_every_format_that_can() {
 fn keypoints_that_come_later_are_gaps_before() {
     let mut second = line(11, Some(30.0));
     let nose = second.people[0].joints["head"].clone();
-    second.people[0]
-        .keypoints
-        .insert("nose, \"tip\"".to_owned(), nose);
+    second.people[0].keypoints.insert("nose, \"tip\"".to_owned(), nose);
     let trial = gathered(&[line(10, Some(30.0)), second], None).unwrap();
     assert_eq!(trial.extras, ["nose, \"tip\""]);
     assert_eq!(trial.gaps(14), [[10, 10]]);

@@ -81,9 +81,7 @@ fn describing(workload: &Workload) -> f64 {
     let cell = (workload.model.spec().cell_px as f64).powi(2);
     let per_cell = 27.0 * 4.0 * 3.0;
     let levels = workload.layout.levels.iter();
-    levels
-        .map(|it| pixels(it) * (per_pixel + per_cell / cell))
-        .sum()
+    levels.map(|it| pixels(it) * (per_pixel + per_cell / cell)).sum()
 }
 
 /// Multiply-adds of the filters in the cheapest known form: the definition, or tiles of some

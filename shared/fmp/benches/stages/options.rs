@@ -36,9 +36,7 @@ impl Options {
                 "--isa" => options.isas.push(value()?),
                 "--threads" => {
                     let n = value()?.parse();
-                    options
-                        .threads
-                        .push(n.map_err(|it| format!("--threads: {it}"))?);
+                    options.threads.push(n.map_err(|it| format!("--threads: {it}"))?);
                 }
                 "--commit" => options.commit = value()?,
                 // What cargo adds of its own.

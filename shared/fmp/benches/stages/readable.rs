@@ -28,9 +28,7 @@ impl Readable {
         let shrink = clock.measure(|| images = reference::pyramid(model, layout, workload.image()));
         let mut features = Vec::new();
         let hog = clock.measure(|| {
-            let maps = images
-                .iter()
-                .map(|it| reference::features(model, layout, it));
+            let maps = images.iter().map(|it| reference::features(model, layout, it));
             features = maps.collect();
         });
         let at = model.spec().interval.min(layout.levels.len() - 1);

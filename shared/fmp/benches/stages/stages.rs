@@ -208,20 +208,13 @@ impl<'a> Bench<'a> {
             cell_px: model.spec().cell_px,
             pad: layout.pad.map(|it| it + 1),
         };
-        let n_threads = self
-            .pool
-            .as_ref()
-            .map_or(1, rayon::ThreadPool::current_num_threads);
-        let arenas: Vec<_> = (0..n_threads)
-            .map(|_| Mutex::new(Arena::default()))
-            .collect();
+        let n_threads = self.pool.as_ref().map_or(1, rayon::ThreadPool::current_num_threads);
+        let arenas: Vec<_> = (0..n_threads).map(|_| Mutex::new(Arena::default())).collect();
         let maps = layout.levels.iter().map(|it| it.padded[0] * it.padded[1]);
         let maps = maps.map(|it| Mutex::new(vec![0.0; it * fmp::N_CHANNELS]));
         let maps: Vec<_> = maps.collect();
         let chain = |first: usize| {
-            let mut arena = arenas[rayon::current_thread_index().unwrap_or(0)]
-                .lock()
-                .unwrap();
+            let mut arena = arenas[rayon::current_thread_index().unwrap_or(0)].lock().unwrap();
             let Arena {
                 images: [image, halved],
                 shrink,

@@ -73,9 +73,7 @@ fn real(name: &str) -> Option<PathBuf> {
 fn noise(seed: u64) -> impl Iterator<Item = f64> {
     let mut state = seed;
     std::iter::repeat_with(move || {
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (state >> 40) as f64 / (1_u64 << 23) as f64 - 1.0
     })
 }
@@ -86,11 +84,7 @@ fn made_up_model(side: usize) -> Model {
     let mut filter = || Filter {
         rows: side,
         cols: side,
-        weights: noise
-            .by_ref()
-            .take(side * side * N_CHANNELS)
-            .map(|it| it * 0.03)
-            .collect(),
+        weights: noise.by_ref().take(side * side * N_CHANNELS).map(|it| it * 0.03).collect(),
     };
     let spring = |part: usize| Spring {
         w: [0.012, 0.001, 0.014, -0.002],
@@ -139,9 +133,7 @@ impl OtherView {
     pub(crate) fn new(layout: &Layout) -> Self {
         let map = |it: &fmp::LevelLayout| {
             let cells = 0..it.rows * it.cols;
-            cells
-                .map(|at| 0.07 * ((at % it.cols) as f32 / it.cols as f32))
-                .collect()
+            cells.map(|at| 0.07 * ((at % it.cols) as f32 / it.cols as f32)).collect()
         };
         Self {
             maps: layout.levels.iter().map(map).collect(),

@@ -228,9 +228,7 @@ fn released(value: &Value<'_>) -> Result<Released, MatError> {
 }
 
 fn biases(all: &Elements<'_, '_>) -> Result<Vec<f64>, MatError> {
-    (0..all.len())
-        .map(|it| all.get(it, "w")?.scalar())
-        .collect()
+    (0..all.len()).map(|it| all.get(it, "w")?.scalar()).collect()
 }
 
 fn filters(all: &Elements<'_, '_>) -> Result<Vec<Filter>, MatError> {

@@ -95,11 +95,7 @@ mod tests {
             let read = decode(&encode(&model).unwrap()).unwrap();
             assert_eq!(read, spec);
             let bits = |it: &ModelSpec| -> Vec<u64> {
-                it.filters[0]
-                    .weights
-                    .iter()
-                    .map(|it| it.to_bits())
-                    .collect()
+                it.filters[0].weights.iter().map(|it| it.to_bits()).collect()
             };
             assert_eq!(bits(&read), bits(&spec));
         }

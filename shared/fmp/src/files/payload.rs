@@ -132,9 +132,7 @@ impl From<&Edge> for EdgeRecord {
                 Springs::PerTypePair(rows) => SpringsRecord::PerTypePair(
                     rows.iter()
                         .map(|row| {
-                            row.iter()
-                                .map(|it| it.as_ref().map(SpringRecord::from))
-                                .collect()
+                            row.iter().map(|it| it.as_ref().map(SpringRecord::from)).collect()
                         })
                         .collect(),
                 ),

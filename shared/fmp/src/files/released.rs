@@ -128,14 +128,12 @@ impl Released {
 
 /// The 0-based index that `id` stands for, if there is such a thing.
 fn index(part: usize, what: &'static str, id: usize, count: usize) -> Result<usize, ModelError> {
-    id.checked_sub(1)
-        .filter(|&idx| idx < count)
-        .ok_or(ModelError::Missing {
-            part: part + 1,
-            what,
-            index: id,
-            count,
-        })
+    id.checked_sub(1).filter(|&idx| idx < count).ok_or(ModelError::Missing {
+        part: part + 1,
+        what,
+        index: id,
+        count,
+    })
 }
 
 /// A filter from its values as the files hold them: row fastest, channel slowest.
@@ -161,7 +159,5 @@ fn map_pairs<T>(
     ids: &[Vec<usize>],
     mut f: impl FnMut(usize) -> Result<T, ModelError>,
 ) -> Result<Vec<Vec<T>>, ModelError> {
-    ids.iter()
-        .map(|row| row.iter().map(|&id| f(id)).collect())
-        .collect()
+    ids.iter().map(|row| row.iter().map(|&id| f(id)).collect()).collect()
 }

@@ -60,11 +60,7 @@ pub struct SpringRanges {
 /// Sums a model up.
 pub fn describe(model: &Model) -> ModelSummary {
     let spec = model.spec();
-    let edges: Vec<_> = spec
-        .parts
-        .iter()
-        .filter_map(|it| it.edge.as_ref())
-        .collect();
+    let edges: Vec<_> = spec.parts.iter().filter_map(|it| it.edge.as_ref()).collect();
     let springs: Vec<&Spring> = edges
         .iter()
         .flat_map(|edge| match &edge.springs {
@@ -96,9 +92,7 @@ pub fn describe(model: &Model) -> ModelSummary {
         n_biases: biases.len(),
         bias_range: range(biases.iter().copied()),
         n_springs: springs.len(),
-        springs_per_pair: edges
-            .iter()
-            .any(|it| matches!(it.springs, Springs::PerTypePair(_))),
+        springs_per_pair: edges.iter().any(|it| matches!(it.springs, Springs::PerTypePair(_))),
         springs: spring_ranges(&springs),
         root_bias: spec.root_bias,
         threshold: spec.threshold,

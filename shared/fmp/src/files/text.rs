@@ -105,10 +105,7 @@ fn agree<const N: usize>(
     place: TextPosition,
     claims: [(&'static str, usize, usize); N],
 ) -> Result<(), TextError> {
-    match claims
-        .into_iter()
-        .find(|(_, got, expected)| got != expected)
-    {
+    match claims.into_iter().find(|(_, got, expected)| got != expected) {
         None => Ok(()),
         Some((what, got, expected)) => Err(TextError::Disagrees {
             field,

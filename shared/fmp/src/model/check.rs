@@ -33,9 +33,7 @@ pub(super) fn check(spec: &ModelSpec) -> Result<(), ModelError> {
     for (filter_idx, filter) in spec.filters.iter().enumerate() {
         check_filter(|| format!("filter {}", filter_idx + 1), filter)?;
     }
-    spec.mirror
-        .as_ref()
-        .map_or(Ok(()), |mirror| check_mirror(&spec.parts, mirror))
+    spec.mirror.as_ref().map_or(Ok(()), |mirror| check_mirror(&spec.parts, mirror))
 }
 
 const MAX_FILTERS: usize = Model::MAX_PARTS * Model::MAX_TYPES;
@@ -157,10 +155,7 @@ fn check_filter(whose: impl Fn() -> String + Copy, filter: &Filter) -> Result<()
     limit("width", whose, filter.cols, 1, Model::MAX_FILTER)?;
     let n_weights = filter.rows * filter.cols * N_CHANNELS;
     size("weights", whose, filter.weights.len(), n_weights)?;
-    filter
-        .weights
-        .iter()
-        .try_for_each(|&it| number("weight", whose, it))
+    filter.weights.iter().try_for_each(|&it| number("weight", whose, it))
 }
 
 /// Checks that `mirror` exchanges parts in pairs and leaves the tree as it is.

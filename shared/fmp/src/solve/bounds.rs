@@ -45,10 +45,7 @@ impl Solver {
         // In the order in which a sweep meets the parts.
         for part in (0..largest.len()).rev() {
             let edge = self.model.spec().parts[part].edge.as_ref();
-            for part in [Some(part), edge.map(|edge| edge.parent)]
-                .into_iter()
-                .flatten()
-            {
+            for part in [Some(part), edge.map(|edge| edge.parent)].into_iter().flatten() {
                 if !std::mem::replace(&mut begun[part], true) {
                     own += f64::from(largest[part].max(0.0));
                 }

@@ -148,8 +148,7 @@ impl IncrementalSolver<'_> {
         if let Some(bounds) = evidence.bounds().or(self.own_bounds.as_ref()) {
             let uppers = evidence.levels().iter();
             let uppers = uppers.map(|&it| (bounds.upper(it, gain, lowest, n_parts), it));
-            self.order
-                .extend(uppers.filter(|it| !it.0.is_below(lowest)));
+            self.order.extend(uppers.filter(|it| !it.0.is_below(lowest)));
         }
         self.lowest = lowest;
         self.order.sort_unstable_by(|a, b| {

@@ -58,10 +58,7 @@ impl Root {
     /// Highest score first, then lowest level, then row-major order.
     pub fn best_first(&self, other: &Self) -> std::cmp::Ordering {
         let place = |it: &Self| (it.level, it.y, it.x);
-        other
-            .score
-            .total_cmp(&self.score)
-            .then_with(|| place(self).cmp(&place(other)))
+        other.score.total_cmp(&self.score).then_with(|| place(self).cmp(&place(other)))
     }
 }
 
@@ -80,10 +77,7 @@ fn suppress(
             break;
         }
         let boxes = boxes(model, layout, &pose);
-        if picked
-            .iter()
-            .all(|(_, it)| overlap(it, &boxes) <= settings.overlap)
-        {
+        if picked.iter().all(|(_, it)| overlap(it, &boxes) <= settings.overlap) {
             picked.push((pose, boxes));
         }
     }
@@ -91,9 +85,8 @@ fn suppress(
 }
 
 fn boxes(model: &Model, layout: &Layout, pose: &Pose) -> Boxes {
-    let mut all: Boxes = (0..model.n_parts())
-        .map(|part| pose.part_box(model, layout, part))
-        .collect();
+    let mut all: Boxes =
+        (0..model.n_parts()).map(|part| pose.part_box(model, layout, part)).collect();
     all.push(pose.bounding_box(model, layout));
     all
 }

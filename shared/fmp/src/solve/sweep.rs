@@ -228,9 +228,7 @@ impl<'a> Sweep<'a> {
     /// The best root of the level: first cell in row-major order, then first type.
     pub(super) fn best_root(&self) -> Option<Root> {
         let better = |a: Root, b: Root| if b.score > a.score { b } else { a };
-        self.roots()
-            .reduce(better)
-            .filter(|it| it.score > f32::NEG_INFINITY)
+        self.roots().reduce(better).filter(|it| it.score > f32::NEG_INFINITY)
     }
 
     /// The best type of the root at every cell of the window, in row-major order.
@@ -242,9 +240,8 @@ impl<'a> Sweep<'a> {
         cells.map(move |(y, x)| {
             let scores = (0..n_types).map(|it| planes[self.grid.at(it, y, x)] + bias);
             let first = (0, f32::NEG_INFINITY);
-            let (mixture, score) = scores
-                .enumerate()
-                .fold(first, |best, it| if it.1 > best.1 { it } else { best });
+            let (mixture, score) =
+                scores.enumerate().fold(first, |best, it| if it.1 > best.1 { it } else { best });
             Root {
                 score,
                 level: self.level,

@@ -12,10 +12,7 @@ pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
     pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         self.0 >> 33
     }
 
@@ -78,9 +75,8 @@ fn edge(noise: &mut Noise, parent: usize, n_parent: usize, n_types: usize) -> Ed
         anchor: [noise.below(5) as i32 - 2, noise.below(5) as i32 - 2],
     };
     let per_type: Vec<_> = (0..n_types).map(|_| spring()).collect();
-    let per_pair: Vec<Vec<_>> = (0..n_parent)
-        .map(|_| (0..n_types).map(|_| spring()).collect())
-        .collect();
+    let per_pair: Vec<Vec<_>> =
+        (0..n_parent).map(|_| (0..n_types).map(|_| spring()).collect()).collect();
     let never: Vec<Vec<bool>> = (0..n_parent)
         .map(|_| (0..n_types).map(|k| k > 0 && noise.below(4) == 0).collect())
         .collect();
@@ -103,8 +99,7 @@ fn edge(noise: &mut Noise, parent: usize, n_parent: usize, n_types: usize) -> Ed
             pairs
                 .map(|(springs, never)| {
                     let pair = springs.into_iter().zip(never);
-                    pair.map(|(spring, never)| (!never).then_some(spring))
-                        .collect()
+                    pair.map(|(spring, never)| (!never).then_some(spring)).collect()
                 })
                 .collect(),
         )
@@ -144,9 +139,7 @@ impl Evidence {
             pad: [0, 0],
             n_filters: model.n_filters(),
         };
-        let values = (0..layout.n_responses())
-            .map(|_| noise.score() as f32)
-            .collect();
+        let values = (0..layout.n_responses()).map(|_| noise.score() as f32).collect();
         Self {
             levels: (0..sizes.len() as u16).collect(),
             layout,

@@ -190,9 +190,7 @@ fn extractor_and_solver_give_the_result_of_the_reference() {
     // largest responses: 1.3e-5 of them was measured here.
     let mut plain = vec![f32::NAN; found.layout.n_responses()];
     Extractor::direct(Arc::clone(&model)).responses(image, &found.layout, &mut plain);
-    let largest = plain
-        .iter()
-        .fold(0.0_f32, |largest, it| largest.max(it.abs()));
+    let largest = plain.iter().fold(0.0_f32, |largest, it| largest.max(it.abs()));
     let images = reference::pyramid(&model, &found.layout, image);
     for (level, (image, it)) in images.iter().zip(&found.layout.levels).enumerate() {
         let features = reference::features(&model, &found.layout, image);
@@ -222,10 +220,7 @@ fn threads_instruction_sets_and_earlier_images_change_nothing() {
         let mut values = vec![0.0; layout.n_responses()];
         extractor.responses(Rgb8View::new(60, 70, &other).unwrap(), &layout, &mut values);
         for threads in [1, 3] {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let mut got = vec![f32::NAN; want.values.len()];
             let image = Rgb8View::new(SIZE[0], SIZE[1], &data).unwrap();
             pool.install(|| extractor.responses(image, &want.layout, &mut got));

@@ -18,9 +18,7 @@ fn model(noise: &mut Noise, cell_px: usize, interval: usize) -> Arc<Model> {
     let mut filter = |rows: usize, cols: usize| Filter {
         rows,
         cols,
-        weights: (0..rows * cols * N_CHANNELS)
-            .map(|_| noise.score())
-            .collect(),
+        weights: (0..rows * cols * N_CHANNELS).map(|_| noise.score()).collect(),
     };
     let spec = ModelSpec {
         name: "three filters".to_owned(),
@@ -117,9 +115,7 @@ fn bounds(model: &Model, layout: &Layout, scope: &Scope) -> Vec<f64> {
         let (window, it) = (layout.window(scope, level), layout.levels[level]);
         for (panel, filter) in filters.iter().enumerate() {
             let weights = filter.weights.iter().enumerate();
-            let size: f64 = weights
-                .map(|(at, it)| it.abs() * largest(at % N_CHANNELS))
-                .sum();
+            let size: f64 = weights.map(|(at, it)| it.abs() * largest(at % N_CHANNELS)).sum();
             let factors = [[window.rows, window.cols], [it.rows, it.cols]]
                 .map(|size| bank.error_factor(panel, size));
             let bound = (factors[0] + factors[1]) * size;

@@ -19,9 +19,7 @@ fn all_poses(model: &Model, level: u16, [rows, cols]: [usize; 2]) -> Vec<Pose> {
         });
         let extend = |parts: &Vec<Placement>| {
             let parts = parts.clone();
-            placements
-                .clone()
-                .map(move |it| [parts.clone(), vec![it]].concat())
+            placements.clone().map(move |it| [parts.clone(), vec![it]].concat())
         };
         all = all.iter().flat_map(extend).collect();
     }

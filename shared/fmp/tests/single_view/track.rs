@@ -39,10 +39,7 @@ impl Scene {
         let (at, whole) = (at.into(), Scope::whole(&self.layout));
         let mut scope = self.tracker.scope(&self.layout, at);
         let pose = score.map(pose);
-        if self
-            .tracker
-            .needs_full_search(&self.layout, &scope, pose.as_ref())
-        {
+        if self.tracker.needs_full_search(&self.layout, &scope, pose.as_ref()) {
             scope = whole;
         }
         let of = (&*self.model, &self.layout);
@@ -60,9 +57,7 @@ impl Scene {
             frame,
             seconds: Some(frame as f64 / rate_hz),
         };
-        (0..10)
-            .filter(|it| scene.is_full(at(*it), Some(1.0)))
-            .collect()
+        (0..10).filter(|it| scene.is_full(at(*it), Some(1.0))).collect()
     }
 }
 
@@ -93,10 +88,7 @@ fn the_first_frame_and_then_every_so_many_are_searched_in_full() {
 fn a_frame_without_a_pose_is_searched_in_full_and_so_is_the_next() {
     let mut scene = Scene::new(Some(TRACK));
     let found = [Some(1.0), Some(1.0), None, Some(1.0), Some(1.0)];
-    let full: Vec<bool> = (0..)
-        .zip(found)
-        .map(|(it, score)| scene.is_full(it, score))
-        .collect();
+    let full: Vec<bool> = (0..).zip(found).map(|(it, score)| scene.is_full(it, score)).collect();
     assert_eq!(full, [true, false, true, true, false]);
 }
 
@@ -155,10 +147,8 @@ fn a_fallen_score_makes_the_same_frame_be_searched_in_full() {
     let mut scene = Scene::new(Some(TRACK));
     // Little by little counts as well; what the full search finds is the new measure.
     let scores = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375];
-    let full: Vec<bool> = (0..)
-        .zip(scores)
-        .map(|(it, score)| scene.is_full(it, Some(score)))
-        .collect();
+    let full: Vec<bool> =
+        (0..).zip(scores).map(|(it, score)| scene.is_full(it, Some(score))).collect();
     assert_eq!(full, [true, false, false, true, false, false]);
 }
 

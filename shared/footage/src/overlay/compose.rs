@@ -55,7 +55,5 @@ pub fn compose(tiles: &[Tile<'_>], n_columns: usize) -> Canvas {
 /// A line, truncated to a width.
 fn fitting(line: &str, width: usize) -> &str {
     let n_fitting = width / text_width("m");
-    line.char_indices()
-        .nth(n_fitting)
-        .map_or(line, |(end, _)| &line[..end])
+    line.char_indices().nth(n_fitting).map_or(line, |(end, _)| &line[..end])
 }

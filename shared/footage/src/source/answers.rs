@@ -22,10 +22,7 @@ pub(super) fn run_ffprobe(
 ) -> Result<Value, FootageError> {
     let question = Question::about(path, spec, stream, wanted);
     let answers = || ANSWERS.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(known) = question
-        .as_ref()
-        .and_then(|question| answers().get(question).cloned())
-    {
+    if let Some(known) = question.as_ref().and_then(|question| answers().get(question).cloned()) {
         return Ok(known);
     }
     let answer = ask_ffprobe(path, spec, stream, wanted)?;

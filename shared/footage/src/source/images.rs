@@ -34,9 +34,7 @@ impl Images {
     pub(super) fn open(files: Vec<Numbered>, spec: &SourceSpec) -> Result<Self, FootageError> {
         let n_all = files.last().map_or(0, |it| it.frame + 1);
         let n_frames = spec.n_delivered(n_all)?;
-        let end = spec
-            .start
-            .saturating_add(n_frames.saturating_mul(spec.step));
+        let end = spec.start.saturating_add(n_frames.saturating_mul(spec.step));
         let depth = depth(&files)?;
         let is_used = |frame: u64| {
             let is_within = (spec.start..end).contains(&frame);
@@ -87,12 +85,7 @@ impl Images {
 
     /// Skips a frame without opening its image; whether there was such a frame.
     pub(super) fn skip_one(&mut self, frame: u64) -> bool {
-        if self
-            .files
-            .as_slice()
-            .first()
-            .is_some_and(|it| it.frame <= frame)
-        {
+        if self.files.as_slice().first().is_some_and(|it| it.frame <= frame) {
             self.files.next();
         }
         frame < self.end
@@ -102,10 +95,7 @@ impl Images {
 /// How many bits the images use, by some of them all over the sequence; none where they have 8, or use all of 16.
 fn depth(files: &[Numbered]) -> Result<Option<Depth>, FootageError> {
     let mut brightest = None;
-    for it in files
-        .iter()
-        .step_by(files.len().div_ceil(N_BRIGHTEST).max(1))
-    {
+    for it in files.iter().step_by(files.len().div_ceil(N_BRIGHTEST).max(1)) {
         let Some(value) = Encoded::read(&it.path)?.brightest()? else {
             return Ok(None);
         };
@@ -204,10 +194,7 @@ pub fn is_image(path: &Path) -> Result<bool, FootageError> {
     };
     let mut file = std::fs::File::open(path).map_err(failed)?;
     let mut head = Vec::with_capacity(32);
-    (&mut file)
-        .take(32)
-        .read_to_end(&mut head)
-        .map_err(failed)?;
+    (&mut file).take(32).read_to_end(&mut head).map_err(failed)?;
     if head.is_empty() {
         return Err(FootageError::Empty {
             path: path.to_path_buf(),
@@ -215,9 +202,7 @@ pub fn is_image(path: &Path) -> Result<bool, FootageError> {
     }
     let format = image::guess_format(&head).ok();
     if format == Some(image::ImageFormat::Jpeg) {
-        file.take(MAX_PICTURE)
-            .read_to_end(&mut head)
-            .map_err(failed)?;
+        file.take(MAX_PICTURE).read_to_end(&mut head).map_err(failed)?;
         return Ok(!is_jpeg_stream(&head));
     }
     let by_content = format.is_some_and(|format| format.reading_enabled());

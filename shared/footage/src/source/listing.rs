@@ -210,9 +210,7 @@ pub(super) fn runs(mut text: &str) -> Vec<&str> {
 /// The leading run of digits, or the leading run of anything else, and the rest.
 fn split_run(text: &str) -> (&str, &str) {
     let is_number = text.starts_with(|it: char| it.is_ascii_digit());
-    let end = text
-        .find(|it: char| it.is_ascii_digit() != is_number)
-        .unwrap_or(text.len());
+    let end = text.find(|it: char| it.is_ascii_digit() != is_number).unwrap_or(text.len());
     text.split_at(end)
 }
 

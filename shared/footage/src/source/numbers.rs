@@ -25,9 +25,7 @@ pub(super) fn frames(paths: Vec<PathBuf>, numbers: Option<PictureNumbers>) -> Ve
     };
     let frame = |number: u64| {
         let above = number.checked_sub(first)?;
-        above
-            .is_multiple_of(step.max(1))
-            .then(|| above / step.max(1))
+        above.is_multiple_of(step.max(1)).then(|| above / step.max(1))
     };
     let all = paths.into_iter().zip(numbers);
     all.filter_map(|(path, number)| {
@@ -93,14 +91,9 @@ pub enum Counting {
 impl Counting {
     /// * `cameras`: the numbers of every camera, rising; none empty.
     pub fn of(cameras: &[Vec<u64>]) -> Self {
-        let firsts: Vec<u64> = cameras
-            .iter()
-            .filter_map(|it| it.first().copied())
-            .collect();
+        let firsts: Vec<u64> = cameras.iter().filter_map(|it| it.first().copied()).collect();
         let lasts = cameras.iter().filter_map(|it| it.last().copied());
-        let lengths = cameras
-            .iter()
-            .filter_map(|it| Some(it.last()? - it.first()?));
+        let lengths = cameras.iter().filter_map(|it| Some(it.last()? - it.first()?));
         let from = firsts.iter().copied().max().unwrap_or(0);
         let both = (lasts.min().unwrap_or(0) + 1).saturating_sub(from);
         let is_common = 2 * both > lengths.min().unwrap_or(0);
@@ -142,10 +135,7 @@ mod tests {
     use super::*;
 
     fn numbers(names: &[&str]) -> Option<Vec<u64>> {
-        let paths: Vec<PathBuf> = names
-            .iter()
-            .map(|it| PathBuf::from("c1").join(it))
-            .collect();
+        let paths: Vec<PathBuf> = names.iter().map(|it| PathBuf::from("c1").join(it)).collect();
         numbers_of(&paths)
     }
 
@@ -174,10 +164,7 @@ mod tests {
         let paths = ["2.png", "3.png", "6.png"].map(PathBuf::from).to_vec();
         let at = |first, step| -> Vec<u64> {
             let numbers = Some(PictureNumbers { first, step });
-            frames(paths.clone(), numbers)
-                .iter()
-                .map(|it| it.frame)
-                .collect()
+            frames(paths.clone(), numbers).iter().map(|it| it.frame).collect()
         };
         assert_eq!(at(0, 1), [2, 3, 6]);
         assert_eq!(at(3, 1), [0, 3]);

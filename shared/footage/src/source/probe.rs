@@ -83,9 +83,7 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
         times_s: None,
         origin_s: origin(stream, &output["format"], codec),
         is_inter: !INTRA.contains(&codec),
-        is_interlaced: ["tt", "bb", "tb", "bt"]
-            .iter()
-            .any(|it| stream["field_order"] == *it),
+        is_interlaced: ["tt", "bb", "tb", "bt"].iter().any(|it| stream["field_order"] == *it),
         has_fps_mode: is_5_1(output["program_version"]["version"].as_str().unwrap_or("")),
     };
     let is_regular = probe.n_frames > 0 && clock_hz == fraction(&stream["r_frame_rate"]);
@@ -132,17 +130,11 @@ fn film(output: &Value) -> &Value {
 
 /// What the display matrix of a stream asks.
 fn tag(stream: &Value) -> Turn {
-    let data = stream["side_data_list"]
-        .as_array()
-        .map_or(&[][..], Vec::as_slice);
+    let data = stream["side_data_list"].as_array().map_or(&[][..], Vec::as_slice);
     let text = data.iter().find_map(|it| it["displaymatrix"].as_str());
     // "00000000:  0  65536  0", a row a line.
     let rows = text.unwrap_or_default().lines().filter_map(|it| {
-        let mut numbers = it
-            .split_once(':')?
-            .1
-            .split_whitespace()
-            .map(str::parse::<f64>);
+        let mut numbers = it.split_once(':')?.1.split_whitespace().map(str::parse::<f64>);
         Some([numbers.next()?.ok()?, numbers.next()?.ok()?])
     });
     match rows.collect::<Vec<_>>()[..] {
@@ -170,36 +162,25 @@ impl Probe {
         let names = format["format_name"].as_str().unwrap_or_default();
         let has_edits = names.split(',').any(|it| it == "mov" || it == "mp4");
         let seconds = number(&stream["duration"]).filter(|_| has_edits);
-        let shown = self
-            .clock_hz
-            .zip(seconds)
-            .map(|(rate_hz, seconds)| rate_hz * seconds);
+        let shown = self.clock_hz.zip(seconds).map(|(rate_hz, seconds)| rate_hz * seconds);
         shown.is_some_and(|it| it < self.n_frames as f64 - 0.6)
     }
 
     /// Determines the number and the times of the frames from the packets of the stream.
     fn count(&mut self, packets: &[Value], duration_s: Option<f64>) {
         // Packets in front of the first frame that is shown, and behind the last one, are marked `D`, to be discarded.
-        let is_discarded = |packet: &Value| {
-            packet["flags"]
-                .as_str()
-                .is_some_and(|flags| flags.contains('D'))
-        };
+        let is_discarded =
+            |packet: &Value| packet["flags"].as_str().is_some_and(|flags| flags.contains('D'));
         let shown: Vec<&Value> = packets.iter().filter(|it| !is_discarded(it)).collect();
-        let mut times_s: Vec<f64> = shown
-            .iter()
-            .filter_map(|packet| number(&packet["pts_time"]))
-            .collect();
+        let mut times_s: Vec<f64> =
+            shown.iter().filter_map(|packet| number(&packet["pts_time"])).collect();
         times_s.sort_by(f64::total_cmp);
         let first_s = times_s.first().copied().unwrap_or(0.0);
         let last_s = times_s.last().copied().unwrap_or(0.0);
         let n_discarded = (packets.len() - shown.len()) as u64;
-        let n_behind = self
-            .rate_hz
-            .zip(duration_s)
-            .map_or(0.0, |(rate_hz, duration_s)| {
-                ((duration_s - last_s) * rate_hz - 1.0).round()
-            });
+        let n_behind = self.rate_hz.zip(duration_s).map_or(0.0, |(rate_hz, duration_s)| {
+            ((duration_s - last_s) * rate_hz - 1.0).round()
+        });
         self.n_promised = if self.n_frames > 0 {
             self.n_frames.saturating_sub(n_discarded)
         } else {
@@ -232,9 +213,7 @@ impl Probe {
         let above = times.partition_point(|it| *it < time_s);
         let nearest = [above.saturating_sub(1), above.min(times.len() - 1)];
         let distance = |it: &usize| (times[*it] - time_s).abs();
-        let nearest = nearest
-            .into_iter()
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let nearest = nearest.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
         nearest.map(|it| it as u64)
     }
 
@@ -269,10 +248,7 @@ pub(super) fn key_frames(
         .collect();
     shown.sort_by(|a, b| a.0.total_cmp(&b.0));
     let numbered = (0..).zip(shown);
-    Ok(numbered
-        .filter(|it| it.1.1.contains('K'))
-        .map(|it| it.0)
-        .collect())
+    Ok(numbered.filter(|it| it.1.1.contains('K')).map(|it| it.0).collect())
 }
 
 pub(super) fn number(value: &Value) -> Option<f64> {

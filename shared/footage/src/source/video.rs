@@ -285,9 +285,7 @@ fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
         // Of all frames from the first to the last, so that one that is missing between those that are chosen is noticed.
         let all = SourceSpec {
             step: 1,
-            count: spec
-                .count
-                .map(|count| (count - 1).saturating_mul(spec.step).saturating_add(1)),
+            count: spec.count.map(|count| (count - 1).saturating_mul(spec.step).saturating_add(1)),
             ..spec.clone()
         };
         let small = "crop=2:2:0:0:exact=1".to_owned();

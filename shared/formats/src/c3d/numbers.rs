@@ -50,12 +50,11 @@ impl<'a> Bytes<'a> {
         what: &'static str,
     ) -> Result<&'a [u8], C3dError> {
         let end = at.checked_add(n);
-        end.and_then(|end| self.bytes.get(at..end))
-            .ok_or(C3dError::Short {
-                what,
-                needed: (at as u64).saturating_add(n as u64),
-                got: self.bytes.len() as u64,
-            })
+        end.and_then(|end| self.bytes.get(at..end)).ok_or(C3dError::Short {
+            what,
+            needed: (at as u64).saturating_add(n as u64),
+            got: self.bytes.len() as u64,
+        })
     }
 
     fn array<const N: usize>(&self, at: usize, what: &'static str) -> Result<[u8; N], C3dError> {

@@ -92,9 +92,7 @@ impl<'a> Parameters<'a> {
         let n_sizes = usize::from(self.bytes.u8(body + 1, WHAT)?);
         let sizes = self.bytes.slice(body + 2, n_sizes, WHAT)?;
         let width = usize::from(kind.unsigned_abs());
-        let product = sizes
-            .iter()
-            .try_fold(width, |n, &it| n.checked_mul(usize::from(it)));
+        let product = sizes.iter().try_fold(width, |n, &it| n.checked_mul(usize::from(it)));
         let what = "a parameter with more values than can be counted";
         let n = product.ok_or(C3dError::Parameter { at, what })?;
         let first = body + 2 + n_sizes;
@@ -160,6 +158,5 @@ impl<'a> Parameters<'a> {
 /// Latin-1 text, without surrounding blanks.
 fn text(bytes: &[u8]) -> String {
     let all: String = bytes.iter().map(|&it| char::from(it)).collect();
-    all.trim_matches(|it: char| it == '\0' || it.is_whitespace())
-        .to_owned()
+    all.trim_matches(|it: char| it == '\0' || it.is_whitespace()).to_owned()
 }

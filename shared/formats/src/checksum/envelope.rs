@@ -83,9 +83,7 @@ impl Envelope {
     /// [`EnvelopeError`]; truncated bytes and bytes with a changed one are always refused.
     pub fn open<'a>(&self, bytes: &'a [u8]) -> Result<&'a [u8], EnvelopeError> {
         let expected = self.magic;
-        let rest = bytes
-            .strip_prefix(&expected)
-            .ok_or(EnvelopeError::Magic { expected })?;
+        let rest = bytes.strip_prefix(&expected).ok_or(EnvelopeError::Magic { expected })?;
         let too_short = || EnvelopeError::Length {
             got: bytes.len() as u64,
             expected: HEADER_BYTES as u64,

@@ -115,12 +115,11 @@ fn row(text: &str, line: usize, markers: usize) -> Result<Vec<Option<[f64; 3]>>,
             return Ok(f64::NAN);
         }
         let column = column + 1;
-        text.parse()
-            .map_err(|_error: std::num::ParseFloatError| TrcError::Number {
-                line,
-                column,
-                text: text.to_owned(),
-            })
+        text.parse().map_err(|_error: std::num::ParseFloatError| TrcError::Number {
+            line,
+            column,
+            text: text.to_owned(),
+        })
     };
     (0..markers)
         .map(|marker| {

@@ -133,8 +133,7 @@ impl Cameras {
     /// The parameter of a camera's focal length; none where it is held.
     pub fn focal_parameter(&self, camera: usize) -> Option<usize> {
         let own = self.first[camera]..self.first[camera + 1];
-        own.into_iter()
-            .find(|it| self.numbers[*it].1 == Number::Focal)
+        own.into_iter().find(|it| self.numbers[*it].1 == Number::Focal)
     }
 
     /// The parameters of a camera.

@@ -60,11 +60,7 @@ fn compared<P: Problem>(
 ) -> f64 {
     let back = Step {
         shared: by.shared.iter().map(|it| -it).collect(),
-        locals: by
-            .locals
-            .iter()
-            .map(|it| it.iter().map(|it| -it).collect())
-            .collect(),
+        locals: by.locals.iter().map(|it| it.iter().map(|it| -it).collect()).collect(),
     };
     let analytic = terms(problem, local, of);
     let forwards = terms(&problem.moved(by), local, &|it| it.residuals().to_vec());

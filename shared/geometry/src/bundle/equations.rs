@@ -201,8 +201,7 @@ impl Equations {
         let locals: Vec<Vec<f64>> = each.map(of_block).collect();
         let shared: Vec<f64> = shared.iter().copied().collect();
         let mut all = shared.iter().chain(locals.iter().flatten());
-        all.all(|it| it.is_finite())
-            .then_some(Step { shared, locals })
+        all.all(|it| it.is_finite()).then_some(Step { shared, locals })
     }
 
     /// By how much the quadratic says that a step lowers the cost.

@@ -58,9 +58,7 @@ struct Cloud {
 
 impl Cloud {
     fn new(n_cameras: usize, n_points: usize, lens: LensModel, free: Free) -> Self {
-        let cameras: Vec<Camera> = (0..n_cameras)
-            .map(|it| camera(it, n_cameras, lens))
-            .collect();
+        let cameras: Vec<Camera> = (0..n_cameras).map(|it| camera(it, n_cameras, lens)).collect();
         let mut random = fastrand_like(7);
         let mut point = || Point3::new(2.0 * random() - 1.0, 2.0 * random() - 1.0, 2.0 * random());
         let points: Vec<Point3<f64>> = (0..n_points).map(|_| point()).collect();
@@ -94,10 +92,7 @@ impl Cloud {
                 by(size)
             })
             .collect();
-        let locals = self
-            .points
-            .iter()
-            .map(|_| (0..3).map(|_| by(0.2)).collect());
+        let locals = self.points.iter().map(|_| (0..3).map(|_| by(0.2)).collect());
         self.moved(&Step {
             shared,
             locals: locals.collect(),
@@ -109,9 +104,7 @@ impl Cloud {
 fn fastrand_like(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (state >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
@@ -134,9 +127,7 @@ impl Problem for Cloud {
         for (camera, seen) in self.seen[local].iter().enumerate() {
             let Some(seen) = *seen else { continue };
             let point = &self.points[local];
-            let observed = self
-                .cameras
-                .observe(camera, point, (seen, 0.5), self.loss, &mut term);
+            let observed = self.cameras.observe(camera, point, (seen, 0.5), self.loss, &mut term);
             for axis in 0..3 {
                 term.by_local(axis, observed.by_point.column(axis).as_slice());
             }

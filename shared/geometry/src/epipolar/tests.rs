@@ -53,10 +53,7 @@ fn the_curve_stays_in_the_image_and_reaches_its_border() {
     let inside = |p: &Point2<f64>| (-0.5..=639.5).contains(&p.x) && (-0.5..=479.5).contains(&p.y);
     assert!(curve.iter().all(inside));
     for end in [curve[0], curve[49]] {
-        let margin = (end.x + 0.5)
-            .min(639.5 - end.x)
-            .min(end.y + 0.5)
-            .min(479.5 - end.y);
+        let margin = (end.x + 0.5).min(639.5 - end.x).min(end.y + 0.5).min(479.5 - end.y);
         assert!(margin < 1e-6, "{end} is {margin} px from the border");
     }
 }

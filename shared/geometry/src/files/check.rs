@@ -35,9 +35,7 @@ pub fn check(rig: &Rig) -> Vec<Finding> {
         findings.push(Finding::UpUnknown);
     }
     for camera in cameras {
-        let degrees = upright_roll(camera, rig)
-            .map(f64::to_degrees)
-            .filter(|d| d.abs() > 100.0);
+        let degrees = upright_roll(camera, rig).map(f64::to_degrees).filter(|d| d.abs() > 100.0);
         findings.extend(degrees.map(|degrees| Finding::UpsideDown {
             camera: camera.name.clone(),
             degrees,
@@ -116,9 +114,7 @@ fn lens_strength(camera: &Camera) -> Option<Finding> {
         Some([bent, straight].map(|tangent| tangent.atan().to_degrees()))
     });
     let is_implausible = |it: &[f64; 2]| it[1] > 0.1 && !(0.5..=2.0).contains(&ratio(*it));
-    let worst = angles
-        .filter(is_implausible)
-        .min_by(|a, b| ratio(*a).total_cmp(&ratio(*b)));
+    let worst = angles.filter(is_implausible).min_by(|a, b| ratio(*a).total_cmp(&ratio(*b)));
     worst.map(|[bent_degrees, straight_degrees]| Finding::LensStrength {
         camera: camera.name.clone(),
         straight_degrees,
@@ -135,10 +131,7 @@ fn far_away(camera: &Camera) -> Option<Finding> {
 fn pair_distance(a: &Camera, b: &Camera) -> Option<Finding> {
     let cameras = [a.name.clone(), b.name.clone()];
     let metres = (a.centre_in_world() - b.centre_in_world()).norm();
-    let angle = a
-        .camera_from_world
-        .rotation
-        .angle_to(&b.camera_from_world.rotation);
+    let angle = a.camera_from_world.rotation.angle_to(&b.camera_from_world.rotation);
     if metres < 1e-6 && angle < 1e-6 {
         return Some(Finding::SamePose { cameras });
     }
@@ -163,9 +156,7 @@ fn nothing_shared(cameras: &[Camera]) -> Option<Finding> {
     const STEPS: usize = 8;
     const DEPTHS: usize = 40;
     let first = cameras.first()?.centre_in_world();
-    let far = cameras
-        .iter()
-        .map(|camera| (camera.centre_in_world() - first).norm());
+    let far = cameras.iter().map(|camera| (camera.centre_in_world() - first).norm());
     let size = far.fold(0.0, f64::max);
     let depth = |nth: usize| 0.02 * size * 1000_f64.powf(nth as f64 / DEPTHS as f64);
     let is_shared = |camera: &Camera, pixel: &Point2<f64>| {

@@ -8,11 +8,7 @@ use super::{Format, own, panoptic, pose2sim};
 ///
 /// `None` for anything that no reader accepts.
 pub fn detect(path: &Path, text: &str) -> Option<Format> {
-    let extension = path
-        .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_ascii_lowercase();
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let start = text.trim_start_matches('\u{feff}').trim_start();
     match extension.as_str() {
         "cal" => return Some(Format::HumanEva),
@@ -28,10 +24,7 @@ pub fn detect(path: &Path, text: &str) -> Option<Format> {
         return if panoptic::is_panoptic(text) {
             Some(Format::Panoptic)
         } else {
-            has_lens
-                .iter()
-                .any(|key| text.contains(key))
-                .then_some(Format::OpenCv)
+            has_lens.iter().any(|key| text.contains(key)).then_some(Format::OpenCv)
         };
     }
     if start.starts_with('<') {
@@ -44,11 +37,7 @@ pub fn detect(path: &Path, text: &str) -> Option<Format> {
             Format::Pose2Sim
         });
     }
-    match start
-        .split_whitespace()
-        .map(str::parse::<f64>)
-        .collect::<Result<Vec<_>, _>>()
-    {
+    match start.split_whitespace().map(str::parse::<f64>).collect::<Result<Vec<_>, _>>() {
         Ok(numbers) if numbers.len() == 22 => Some(Format::HumanEva),
         Ok(numbers) if numbers.len() == 19 => Some(Format::Umpm),
         _ if own::is_own(text) => Some(Format::Own),

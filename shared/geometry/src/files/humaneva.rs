@@ -87,10 +87,6 @@ pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
         intrinsics.cy,
         0.0,
     ];
-    let all = head
-        .iter()
-        .chain(&kc)
-        .chain(rotation.as_flattened())
-        .chain(millimetres.iter());
+    let all = head.iter().chain(&kc).chain(rotation.as_flattened()).chain(millimetres.iter());
     Ok(numbers::joined(all, "\n") + "\n")
 }

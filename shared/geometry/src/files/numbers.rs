@@ -202,10 +202,7 @@ pub(super) fn blank_separated(text: &str) -> Result<Vec<f64>, ParseError> {
 
 /// Numbers with the fewest digits that parse back to the same value, separated by `between`.
 pub(super) fn joined(numbers: impl IntoIterator<Item = impl Debug>, between: &str) -> String {
-    let words: Vec<String> = numbers
-        .into_iter()
-        .map(|number| format!("{number:?}"))
-        .collect();
+    let words: Vec<String> = numbers.into_iter().map(|number| format!("{number:?}")).collect();
     words.join(between)
 }
 

@@ -67,9 +67,7 @@ enum LensKind {
 pub(super) fn is_own(text: &str) -> bool {
     text.parse::<toml::Table>()
         .is_ok_and(|table| table.get("format").and_then(toml::Value::as_str) == Some(FORMAT))
-        || text
-            .lines()
-            .any(|line| line.starts_with("format = \"parallax-rig\""))
+        || text.lines().any(|line| line.starts_with("format = \"parallax-rig\""))
 }
 
 /// Reads a rig file. The image size of `options` is ignored: the file has it. A unit in `options` overrides metres,
@@ -95,11 +93,7 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
             expected: "a [[camera]] table for each view",
         });
     }
-    let up = file
-        .up
-        .map(|up| numbers::direction("up", up))
-        .transpose()?
-        .or(options.up);
+    let up = file.up.map(|up| numbers::direction("up", up)).transpose()?.or(options.up);
     let cameras = file
         .camera
         .into_iter()

@@ -65,10 +65,7 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
             expected: "an object with K, R and t in the list cameras for each view",
         });
     }
-    let cameras = file
-        .cameras
-        .into_iter()
-        .map(|fields| camera(fields, options));
+    let cameras = file.cameras.into_iter().map(|fields| camera(fields, options));
     let cameras = cameras.collect::<Result<Vec<_>, _>>()?;
     let down = UnitVector3::new_unchecked(-Vector3::y());
     Rig::new(cameras, options.up.or(Some(down)), "").map_err(ParseError::Rig)

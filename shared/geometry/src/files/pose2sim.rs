@@ -15,8 +15,7 @@ use crate::{Camera, Rig};
 
 /// Whether a text is TOML with at least one camera.
 pub(super) fn is_pose2sim(text: &str) -> bool {
-    text.parse::<Table>()
-        .is_ok_and(|table| !camera_tables(&table).is_empty())
+    text.parse::<Table>().is_ok_and(|table| !camera_tables(&table).is_empty())
 }
 
 /// Reads a camera file.
@@ -26,12 +25,10 @@ pub(super) fn is_pose2sim(text: &str) -> bool {
 /// See [`ParseError`]. Tables with `ignore = true` are no cameras; cameras without rotation and translation, as Caliscope leaves those that
 /// it could not place, are left out.
 pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
-    let table: Table = text
-        .parse()
-        .map_err(|error: toml::de::Error| ParseError::Syntax {
-            format: "TOML",
-            source: Box::new(error),
-        })?;
+    let table: Table = text.parse().map_err(|error: toml::de::Error| ParseError::Syntax {
+        format: "TOML",
+        source: Box::new(error),
+    })?;
     let cameras = camera_tables(&table)
         .into_iter()
         .map(|(key, fields)| camera(key, &fields, options))
@@ -46,14 +43,8 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
 
 /// The tables that are cameras, each with its default name.
 fn camera_tables(table: &Table) -> Vec<(String, Fields<'_>)> {
-    let top = table
-        .iter()
-        .map(|(key, value)| (key.clone(), key.clone(), value));
-    let nested = table
-        .get("cameras")
-        .and_then(Value::as_table)
-        .into_iter()
-        .flatten();
+    let top = table.iter().map(|(key, value)| (key.clone(), key.clone(), value));
+    let nested = table.get("cameras").and_then(Value::as_table).into_iter().flatten();
     let nested = nested.map(|(key, value)| (format!("cameras.{key}"), nested_name(key), value));
     top.chain(nested)
         .filter_map(|(path, name, value)| {
@@ -96,11 +87,7 @@ fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Ent
         numbers::pixels(&size_field, width)?,
         numbers::pixels(&size_field, height)?,
     ];
-    let fisheye = fields
-        .table
-        .get("fisheye")
-        .and_then(Value::as_bool)
-        .unwrap_or(false);
+    let fisheye = fields.table.get("fisheye").and_then(Value::as_bool).unwrap_or(false);
     let coefficients = fields.list("distortions")?;
     let lens = numbers::lens(&fields.field("distortions"), &coefficients, fisheye)?;
     let intrinsics = numbers::intrinsics(
@@ -185,9 +172,7 @@ fn camera_table(camera: &Camera, unit: Unit) -> Result<String, UnwritableRig> {
 
 /// A name as the key of a table: bare where it can be, else a basic string.
 fn quoted_key(name: &str) -> String {
-    let bare = name
-        .bytes()
-        .all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
+    let bare = name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
     if bare && !name.is_empty() {
         return name.to_owned();
     }

@@ -191,9 +191,8 @@ fn every_format_is_detected_and_read_from_disk() {
     }
     for (format, extension) in [(Format::HumanEva, "cal"), (Format::Umpm, "ini")] {
         write(folder.path(), format, &rig).expect("writable");
-        let paths: Vec<_> = (0..3)
-            .map(|i| folder.path().join(format!("cam{i}.{extension}")))
-            .collect();
+        let paths: Vec<_> =
+            (0..3).map(|i| folder.path().join(format!("cam{i}.{extension}"))).collect();
         let paths: Vec<_> = paths.iter().map(PathBuf::as_path).collect();
         let options = ReadOptions {
             size: Some([640, 480]),
@@ -300,9 +299,7 @@ fn qualisys_lengths_are_in_64ths_of_a_pixel_but_distortion_is_not() {
     assert!((centre.coords - Vector3::new(1.0, -2.0, 0.5)).norm() < 1e-12);
     // Right is x, the picture's up is the world's z, and so it looks along y.
     assert!((camera.axis_in_world().into_inner() - Vector3::y()).norm() < 1e-12);
-    let above = camera
-        .project(&nalgebra::Point3::new(1.0, 3.0, 0.6))
-        .expect("in front");
+    let above = camera.project(&nalgebra::Point3::new(1.0, 3.0, 0.6)).expect("in front");
     assert!(above.y < 960.0);
 }
 
@@ -321,11 +318,7 @@ fn caliscope_cameras_in_a_nested_table_are_read() {
         },
     );
     let rig = rig.expect("a file");
-    let names: Vec<&str> = rig
-        .cameras()
-        .iter()
-        .map(|camera| camera.name.as_str())
-        .collect();
+    let names: Vec<&str> = rig.cameras().iter().map(|camera| camera.name.as_str()).collect();
     assert_eq!(names, ["cam_10", "two"]);
     assert_eq!(rig.cameras()[0].camera_from_world.translation.z, 0.001);
     assert_eq!(
@@ -340,21 +333,11 @@ fn a_correct_rig_has_no_findings_and_no_epipolar_error() {
     assert_eq!(check(&rig), []);
     let points: Vec<Vec<_>> = (0..20)
         .map(|i| nalgebra::Point3::new(0.05 * f64::from(i) - 0.5, 0.3, 0.02 * f64::from(i)))
-        .map(|point| {
-            rig.cameras()
-                .iter()
-                .map(|camera| camera.project(&point))
-                .collect()
-        })
+        .map(|point| rig.cameras().iter().map(|camera| camera.project(&point)).collect())
         .collect();
     let report = epipolar_check(&rig, &points);
     assert_eq!((report.pairs.len(), report.cameras.len()), (6, 4));
-    assert!(
-        report
-            .pairs
-            .iter()
-            .all(|pair| pair.median_px < 1e-6 && pair.n_points == 20)
-    );
+    assert!(report.pairs.iter().all(|pair| pair.median_px < 1e-6 && pair.n_points == 20));
 }
 
 #[test]
@@ -362,22 +345,14 @@ fn a_moved_camera_has_the_largest_epipolar_error() {
     let rig = ring_rig(4, BARREL);
     let points: Vec<Vec<_>> = (0..20)
         .map(|i| nalgebra::Point3::new(0.05 * f64::from(i) - 0.5, 0.3, 0.02 * f64::from(i)))
-        .map(|point| {
-            rig.cameras()
-                .iter()
-                .map(|camera| camera.project(&point))
-                .collect()
-        })
+        .map(|point| rig.cameras().iter().map(|camera| camera.project(&point)).collect())
         .collect();
     let mut cameras = rig.cameras().to_vec();
     cameras[2].camera_from_world =
         nalgebra::Isometry3::rotation(Vector3::x() * 0.03) * cameras[2].camera_from_world;
     let moved = Rig::new(cameras, None, "").expect("a rig");
     let report = epipolar_check(&moved, &points);
-    let worst = report
-        .cameras
-        .iter()
-        .max_by(|a, b| a.median_px.total_cmp(&b.median_px));
+    let worst = report.cameras.iter().max_by(|a, b| a.median_px.total_cmp(&b.median_px));
     assert_eq!(worst.map(|worst| worst.camera), Some(2));
 }
 
@@ -404,11 +379,7 @@ fn implausible_rigs_have_findings() {
             .any(|f| matches!(f, Finding::Distance { metres, .. } if *metres > 4000.0))
     );
     let stretched = findings(|camera| camera.intrinsics.fy *= 2.0);
-    assert!(
-        stretched
-            .iter()
-            .any(|f| matches!(f, Finding::Aspect { .. }))
-    );
+    assert!(stretched.iter().any(|f| matches!(f, Finding::Aspect { .. })));
     let long =
         findings(|camera| (camera.intrinsics.fx, camera.intrinsics.fy) = (70_000.0, 70_000.0));
     assert!(
@@ -416,11 +387,7 @@ fn implausible_rigs_have_findings() {
             .any(|f| matches!(f, Finding::FieldOfView { degrees, .. } if *degrees < 1.0))
     );
     let inverted = findings(|camera| camera.camera_from_world = camera.camera_from_world.inverse());
-    assert!(
-        inverted
-            .iter()
-            .any(|f| matches!(f, Finding::LooksElsewhere { .. }))
-    );
+    assert!(inverted.iter().any(|f| matches!(f, Finding::LooksElsewhere { .. })));
     let turned = findings(|camera| {
         let turn = nalgebra::Isometry3::rotation(Vector3::z() * 3.0);
         camera.camera_from_world = turn * camera.camera_from_world;
@@ -434,11 +401,7 @@ fn implausible_rigs_have_findings() {
         let k = [-1.5, 0.0, 0.0, 0.0, 0.0, 0.0];
         camera.intrinsics.lens = Lens::new(LensModel::BrownConrady { k, p: [0.0; 2] });
     });
-    assert!(
-        folded
-            .iter()
-            .any(|f| matches!(f, Finding::LensRange { .. }))
-    );
+    assert!(folded.iter().any(|f| matches!(f, Finding::LensRange { .. })));
     let cameras = ring_rig(2, BARREL).cameras().to_vec();
     let mut twin = cameras[0].clone();
     twin.name = "twin".to_owned();

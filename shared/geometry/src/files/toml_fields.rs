@@ -87,11 +87,7 @@ fn list(field: &str, value: &Value) -> Result<Vec<f64>, ParseError> {
             found: other.to_string(),
         }),
     };
-    as_list(field, value)?
-        .iter()
-        .enumerate()
-        .map(number)
-        .collect()
+    as_list(field, value)?.iter().enumerate().map(number).collect()
 }
 
 fn as_list<'a>(field: &str, value: &'a Value) -> Result<&'a [Value], ParseError> {

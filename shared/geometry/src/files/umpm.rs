@@ -62,9 +62,8 @@ pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
         }
     };
     let pose = &camera.camera_from_world;
-    let mut lines: Vec<Vec<f64>> = numbers::rows(&intrinsics.matrix())
-        .map(|row| row.to_vec())
-        .into();
+    let mut lines: Vec<Vec<f64>> =
+        numbers::rows(&intrinsics.matrix()).map(|row| row.to_vec()).into();
     lines.push(distortion.to_vec());
     lines.push(pose.rotation.scaled_axis().iter().copied().collect());
     lines.push(
@@ -73,8 +72,5 @@ pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
             .copied()
             .collect(),
     );
-    Ok(lines
-        .iter()
-        .map(|line| numbers::joined(line, " ") + "\n")
-        .collect())
+    Ok(lines.iter().map(|line| numbers::joined(line, " ") + "\n").collect())
 }

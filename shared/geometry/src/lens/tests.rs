@@ -72,14 +72,8 @@ fn a_barrel_lens_ends_where_its_polynomial_stops_growing() {
         lens.max_radius()
     );
     assert!(lens.distort(&Point2::new(turning * 1.001, 0.0)).is_none());
-    assert!(
-        lens.undistort(&Point2::new(turning * 2.0 / 3.0 * 1.001, 0.0))
-            .is_none()
-    );
-    assert!(
-        lens.undistort(&Point2::new(turning * 2.0 / 3.0 * 0.999, 0.0))
-            .is_some()
-    );
+    assert!(lens.undistort(&Point2::new(turning * 2.0 / 3.0 * 1.001, 0.0)).is_none());
+    assert!(lens.undistort(&Point2::new(turning * 2.0 / 3.0 * 0.999, 0.0)).is_some());
 }
 
 #[test]

@@ -104,18 +104,11 @@ fn refuses_a_quaternion_that_is_not_of_unit_length() {
 fn refuses_mirrors_and_scales_as_rotations() {
     let mirror = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, -1.0));
     assert_eq!(
-        rotation_from_matrix(&mirror)
-            .expect_err("a mirror")
-            .determinant,
+        rotation_from_matrix(&mirror).expect_err("a mirror").determinant,
         -1.0
     );
     let scaled = Matrix3::identity() * 1.01;
-    assert!(
-        rotation_from_matrix(&scaled)
-            .expect_err("a scale")
-            .deviation
-            > 0.02
-    );
+    assert!(rotation_from_matrix(&scaled).expect_err("a scale").deviation > 0.02);
     rotation_from_matrix(&Matrix3::from_element(f64::NAN)).expect_err("no numbers");
 }
 

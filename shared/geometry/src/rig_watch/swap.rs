@@ -149,10 +149,7 @@ impl SwapWatch {
 
     /// All pairs with so many frames, those first that fit best if they are exchanged.
     pub(super) fn best(&self, n_frames: usize) -> Vec<Swap> {
-        let usable = self
-            .tried
-            .iter()
-            .filter(|(_, frames)| frames.len() >= n_frames);
+        let usable = self.tried.iter().filter(|(_, frames)| frames.len() >= n_frames);
         let mut all: Vec<Swap> = usable
             .filter_map(|(views, frames)| {
                 let column = |index: usize| median(frames.iter().map(|row| row[index]).collect());

@@ -78,11 +78,7 @@ fn watch(
 const NO_CAMERA: [usize; 0] = [];
 
 fn suspected(watch: &RigWatch) -> Vec<usize> {
-    watch
-        .suspects()
-        .iter()
-        .map(|suspect| suspect.view)
-        .collect()
+    watch.suspects().iter().map(|suspect| suspect.view).collect()
 }
 
 proptest! {

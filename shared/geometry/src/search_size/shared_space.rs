@@ -134,11 +134,7 @@ fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) ->
     let fewer = (2..=n_sharing).rev();
     let found = fewer.clone().find_map(|n| of(n, bound));
     // For a camera that is aimed elsewhere than the others.
-    found.or_else(|| {
-        BOUNDS
-            .iter()
-            .find_map(|it| fewer.clone().find_map(|n| of(n, *it)))
-    })
+    found.or_else(|| BOUNDS.iter().find_map(|it| fewer.clone().find_map(|n| of(n, *it))))
 }
 
 /// Places on the rays of all cameras that at least two of them see.

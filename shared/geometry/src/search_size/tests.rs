@@ -215,11 +215,7 @@ fn people_far_from_large_cameras_are_smaller_than_is_good_and_that_is_known() {
     }
     // A small picture costs little, and is not enlarged.
     let got = search_sizes(&rig(ring(4, [640, 480], 350.0, 5.0, 2.0)));
-    assert!(
-        got.cameras
-            .iter()
-            .all(|it| it.scale == 1.0 && !it.is_limited())
-    );
+    assert!(got.cameras.iter().all(|it| it.scale == 1.0 && !it.is_limited()));
 }
 
 #[test]

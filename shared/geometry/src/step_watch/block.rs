@@ -124,10 +124,7 @@ impl Block {
     /// The offset of every camera; `None` for one without enough movement, and `None` at all if that are all, or if some cameras
     /// cannot be compared with the others.
     pub(super) fn estimates(&self) -> Option<Vec<Option<Estimate>>> {
-        let slopes = self
-            .pairs
-            .iter()
-            .filter_map(|it| Some((it.views, it.slope()?)));
+        let slopes = self.pairs.iter().filter_map(|it| Some((it.views, it.slope()?)));
         let slopes: Vec<([usize; 2], Slope)> = slopes.collect();
         let linked = linked(self.n_views, slopes.iter().map(|it| it.0))?;
         // Every pair says the difference of its two offsets. What no pair says is kept at 0.

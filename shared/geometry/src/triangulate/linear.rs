@@ -74,9 +74,5 @@ fn solve(views: &Views<'_>, used: Subset, near: Option<&Point3<f64>>) -> Option<
         }
     }
     let solution = origin + normal.cholesky()?.solve(&right);
-    solution
-        .coords
-        .iter()
-        .all(|c| c.is_finite())
-        .then_some(solution)
+    solution.coords.iter().all(|c| c.is_finite()).then_some(solution)
 }

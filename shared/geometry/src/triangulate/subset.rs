@@ -24,9 +24,8 @@ pub(super) fn search(
             Ok(ref bad) => bad.worst_px,
             Err(_) => f64::INFINITY,
         };
-        let smaller = (used.count() > needed)
-            .then(|| leave_one_out(views, used, settings))
-            .flatten();
+        let smaller =
+            (used.count() > needed).then(|| leave_one_out(views, used, settings)).flatten();
         let Some(smaller) = smaller else {
             fitted?;
             return Err(TriangulateError::Inconsistent {
@@ -45,9 +44,7 @@ fn leave_one_out(views: &Views<'_>, used: Subset, settings: &Settings) -> Option
     for view in used.iter() {
         let rest = used.without(view);
         if let Ok(candidate) = fit(views, rest, settings)
-            && best
-                .as_ref()
-                .is_none_or(|(_, fit)| candidate.worst_px < fit.worst_px)
+            && best.as_ref().is_none_or(|(_, fit)| candidate.worst_px < fit.worst_px)
         {
             best = Some((rest, candidate));
         }

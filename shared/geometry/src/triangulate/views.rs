@@ -86,10 +86,7 @@ impl<'a> Views<'a> {
     pub(super) fn residuals(&self, in_world: &Point3<f64>) -> [f64; MAX_VIEWS] {
         let mut residuals = [f64::NAN; MAX_VIEWS];
         for (seen, slot) in self.observations.iter().zip(&mut residuals) {
-            let error = seen
-                .camera
-                .project(in_world)
-                .map(|image| image - seen.point_px);
+            let error = seen.camera.project(in_world).map(|image| image - seen.point_px);
             *slot = error.as_ref().map_or(f64::NAN, Vector2::norm);
         }
         residuals

@@ -63,10 +63,8 @@ pub fn sheet(picture: &Picture, sight: &Sight<'_>) -> Result<Canvas, LookError> 
     };
     let mut joints = Canvas::from_rgb(size, plain.as_flattened());
     let peaks = maps.peaks();
-    let points: Vec<[f64; 2]> = peaks
-        .iter()
-        .map(|it| it.map_or([f64::NAN; 2], |it| in_tile(it.at)))
-        .collect();
+    let points: Vec<[f64; 2]> =
+        peaks.iter().map(|it| it.map_or([f64::NAN; 2], |it| in_tile(it.at))).collect();
     draw_limbs(&mut joints, &points, &limbs());
     let mut tiles = vec![(joints, network.card().name.clone())];
     for (joint, (named, peak)) in PARSE14.joints.iter().zip(peaks).enumerate() {
@@ -82,10 +80,8 @@ pub fn sheet(picture: &Picture, sight: &Sight<'_>) -> Result<Canvas, LookError> 
         tile.ring(in_tile(peak.at), 5.0, 1.5, footage::CENTRE);
         tiles.push((tile, caption(named.name, peak)));
     }
-    let tiles: Vec<Tile<'_>> = tiles
-        .iter()
-        .map(|(picture, caption)| Tile { picture, caption })
-        .collect();
+    let tiles: Vec<Tile<'_>> =
+        tiles.iter().map(|(picture, caption)| Tile { picture, caption }).collect();
     Ok(compose(&tiles, N_COLUMNS))
 }
 

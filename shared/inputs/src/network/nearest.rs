@@ -145,9 +145,7 @@ fn of_maps(output: &Port, n: usize, further: usize, layout: Layout) -> Option<us
         (Layout::Planes, second, [third, fourth]),
         (Layout::Pixels, fourth, [second, third]),
     ];
-    let rated = found
-        .into_iter()
-        .filter(|(_, channels, sides)| is_maps(channels, *sides));
+    let rated = found.into_iter().filter(|(_, channels, sides)| is_maps(channels, *sides));
     let rated = rated.map(|(order, channels, _)| {
         let known = if channels.may_be(n + further) {
             4
@@ -164,11 +162,7 @@ fn of_maps(output: &Port, n: usize, further: usize, layout: Layout) -> Option<us
 /// How many sides are these, if all of them can be.
 fn agreeing(port: &Port, sides: &[usize]) -> Option<usize> {
     let fits = port.sides.len() == sides.len()
-        && port
-            .sides
-            .iter()
-            .zip(sides)
-            .all(|(side, n)| side.may_be(*n));
+        && port.sides.iter().zip(sides).all(|(side, n)| side.may_be(*n));
     let fixed = |it: &&Side| matches!(it, Side::Fixed(_));
     fits.then(|| port.sides.iter().filter(fixed).count())
 }

@@ -36,8 +36,7 @@ fn a_card_is_found_beside_the_network_or_in_it_or_where_it_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("net.onnx");
     let mut net = network();
-    net.metadata
-        .push((METADATA_KEY.to_owned(), CARD.replace("NAME", "inside")));
+    net.metadata.push((METADATA_KEY.to_owned(), CARD.replace("NAME", "inside")));
     fs::write(&path, net.file()).unwrap();
     let found = |given: Option<&Path>| {
         let file = NetworkFile::open(&path, given).unwrap();
@@ -81,9 +80,7 @@ fn a_network_without_a_card_or_cut_short_is_refused() {
         "{refused}"
     );
     fs::write(&card, CARD.replace("width", "wide")).unwrap();
-    let refused = NetworkFile::open(&path, Some(&card))
-        .unwrap_err()
-        .to_string();
+    let refused = NetworkFile::open(&path, Some(&card)).unwrap_err().to_string();
     assert!(
         refused.contains("card.toml") && refused.contains("wide"),
         "{refused}"

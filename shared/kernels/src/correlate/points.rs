@@ -67,12 +67,8 @@ impl Points {
 
     /// The finite points in the order of the transformed values.
     fn finite(&self) -> Vec<f64> {
-        let pairs = self.positive[..self.n_pairs]
-            .iter()
-            .map(|&it| f64::from(it));
-        std::iter::once(0.0)
-            .chain(pairs.flat_map(|it| [it, -it]))
-            .collect()
+        let pairs = self.positive[..self.n_pairs].iter().map(|&it| f64::from(it));
+        std::iter::once(0.0).chain(pairs.flat_map(|it| [it, -it])).collect()
     }
 
     /// `G`, `tile x taps`: what a line of a filter is multiplied with.
@@ -125,10 +121,7 @@ impl Points {
     pub(super) fn amplification(&self, taps: usize) -> f64 {
         let (a, b) = (self.of_products(self.tile() + 1 - taps), self.of_cells());
         let g = self.of_filter(taps);
-        let sums: Vec<f64> = b
-            .iter()
-            .map(|row| row.iter().map(|it| it.abs()).sum())
-            .collect();
+        let sums: Vec<f64> = b.iter().map(|row| row.iter().map(|it| it.abs()).sum()).collect();
         let of = |row: &Vec<f64>, c: usize| -> f64 {
             let terms = row.iter().zip(&g).zip(&sums);
             terms.map(|((a, g), sum)| (a * g[c]).abs() * sum).sum()
@@ -194,10 +187,8 @@ mod tests {
     fn all_constants_are_exact_in_single_precision() {
         for n_pairs in [3, 4] {
             let points = Points::new(n_pairs);
-            let exact: Vec<f64> = points.positive[..n_pairs]
-                .iter()
-                .map(|&p| f64::from(p))
-                .collect();
+            let exact: Vec<f64> =
+                points.positive[..n_pairs].iter().map(|&p| f64::from(p)).collect();
             for (k, p) in exact.iter().enumerate() {
                 for (i, powers) in points.powers.iter().enumerate() {
                     assert_eq!(f64::from(powers[k]), power(*p, i));

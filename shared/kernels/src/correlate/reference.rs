@@ -28,9 +28,7 @@ pub fn correlate_f64(
         };
         (0..filter.rows).map(row).sum()
     };
-    (0..size[0] * size[1])
-        .map(|at| response(at / size[1], at % size[1]))
-        .collect()
+    (0..size[0] * size[1]).map(|at| response(at / size[1], at % size[1])).collect()
 }
 
 /// The response map of one filter, the given way.
@@ -59,9 +57,7 @@ fn direct(filter: Template<'_>, Level { map, size }: Level<'_>) -> Vec<f32> {
         }
         sum
     };
-    (0..size[0] * size[1])
-        .map(|at| response(at / size[1], at % size[1]))
-        .collect()
+    (0..size[0] * size[1]).map(|at| response(at / size[1], at % size[1])).collect()
 }
 
 /// `A^T ((sum over channels of (B^T d B) . (G w G^T))) A` on every tile.
@@ -91,9 +87,8 @@ fn tiled(form: &Form, filter: Template<'_>, Level { map, size }: Level<'_>) -> V
                 }
             }
             let columns = (0..n).map(|b| products.iter().map(|it| it[b]).collect());
-            let columns: Vec<_> = columns
-                .map(|it: Vec<f32>| of_products(form, &it, rows))
-                .collect();
+            let columns: Vec<_> =
+                columns.map(|it: Vec<f32>| of_products(form, &it, rows)).collect();
             for i in 0..rows.min(size[0] - y) {
                 let row: Vec<_> = columns.iter().map(|it| it[i]).collect();
                 let row = of_products(form, &row, cols);
@@ -112,10 +107,7 @@ fn of_cells(form: &Form, line: &[f32]) -> Vec<f32> {
     let polynomial = |coefficients: &[f32], first: usize| {
         let values = line[first..].iter().step_by(2);
         let mut low: Vec<_> = coefficients.iter().zip(values.clone()).collect();
-        let mut sum = *values
-            .clone()
-            .nth(low.len())
-            .expect("a value for the highest power");
+        let mut sum = *values.clone().nth(low.len()).expect("a value for the highest power");
         while let Some((c, value)) = low.pop() {
             sum = c.mul_add(*value, sum);
         }

@@ -9,9 +9,7 @@ use crate::sized;
 fn noise(seed: u64, n: usize) -> Vec<f64> {
     let mut state = seed.wrapping_mul(2654435761) | 1;
     std::iter::repeat_with(|| {
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (state >> 40) as f64 / (1_u64 << 23) as f64 - 1.0
     })
     .take(n)
@@ -77,11 +75,7 @@ impl Problem {
     /// Responses `levels x filters` of some panels.
     fn responses(&self, bank: &FilterBank, panels: Range<usize>) -> Vec<Vec<f32>> {
         let n_filters = bank.filters(panels.clone()).len();
-        let areas: Vec<_> = self
-            .maps
-            .iter()
-            .map(|(size, _)| size[0] * size[1])
-            .collect();
+        let areas: Vec<_> = self.maps.iter().map(|(size, _)| size[0] * size[1]).collect();
         let mut out = vec![f32::NAN; n_filters * areas.iter().sum::<usize>()];
         bank.correlate(
             panels,
@@ -90,15 +84,9 @@ impl Problem {
             &mut CorrelateWorkspace::default(),
         );
         let mut rest = &out[..];
-        let each = areas
-            .iter()
-            .flat_map(|area| std::iter::repeat_n(*area, n_filters));
-        each.map(|area| {
-            rest.split_off(..area)
-                .map(<[f32]>::to_vec)
-                .unwrap_or_default()
-        })
-        .collect()
+        let each = areas.iter().flat_map(|area| std::iter::repeat_n(*area, n_filters));
+        each.map(|area| rest.split_off(..area).map(<[f32]>::to_vec).unwrap_or_default())
+            .collect()
     }
 
     fn method(filter: [usize; 2], size: [usize; 2]) -> Method {
@@ -109,8 +97,7 @@ impl Problem {
         let of = |level: Level<'_>| {
             let all = self.templates().into_iter();
             let all = all.map(|it| (Self::method([it.rows, it.cols], level.size), it));
-            all.map(|(way, it)| reference::correlate(way, it, level))
-                .collect::<Vec<_>>()
+            all.map(|(way, it)| reference::correlate(way, it, level)).collect::<Vec<_>>()
         };
         self.levels().flat_map(of).collect()
     }
@@ -142,18 +129,10 @@ fn share_of_bound(problem: &Problem, bank: &FilterBank, got: &[Vec<f32>]) -> f64
             let map_size = [level.map.rows, level.map.cols];
             let want = correlate_f64(filter, map_size, &cells, level.size);
             let panels = 0..bank.n_panels();
-            let panel = panels
-                .clone()
-                .find(|&it| bank.filters(it..it + 1).contains(&index));
+            let panel = panels.clone().find(|&it| bank.filters(it..it + 1).contains(&index));
             let factor = bank.error_factor(panel.unwrap_or(0), level.size);
             let sums: Vec<f64> = (0..N_CHANNELS)
-                .map(|k| {
-                    filter.weights[k..]
-                        .iter()
-                        .step_by(N_CHANNELS)
-                        .map(|w| w.abs())
-                        .sum()
-                })
+                .map(|k| filter.weights[k..].iter().step_by(N_CHANNELS).map(|w| w.abs()).sum())
                 .collect();
             let got = got.next().map_or(&[][..], |it| it);
             assert_eq!(got.len(), want.len());

@@ -78,18 +78,14 @@ impl Body for Hog<'_> {
             workspace.votes.count(image, block, [rows, cols]);
             let next = block % 3;
             if let Some(row) = block.checked_sub(1) {
-                workspace
-                    .votes
-                    .add_upper(&mut workspace.histograms[row % 3], stride);
+                workspace.votes.add_upper(&mut workspace.histograms[row % 3], stride);
                 workspace.energies_of(row, stride);
                 if (2..inner_rows + 2).contains(&row) {
                     let line = (row - 2 + shape.pad[0]) * map_cols + shape.pad[1];
                     workspace.features_above(row, stride, &mut map[line..][..inner_cols]);
                 }
             }
-            workspace
-                .votes
-                .put_lower(&mut workspace.histograms[next], stride);
+            workspace.votes.put_lower(&mut workspace.histograms[next], stride);
         }
     }
 }
@@ -180,10 +176,7 @@ fn normalise(
         }
         channels[N_ORIENTATIONS + o] = clipped_sum(&value, norms, &mut unused);
     }
-    for (channel, sum) in channels[N_ORIENTATIONS + N_UNSIGNED..]
-        .iter_mut()
-        .zip(texture)
-    {
+    for (channel, sum) in channels[N_ORIENTATIONS + N_UNSIGNED..].iter_mut().zip(texture) {
         *channel = sum.map(|it| TEXTURE as f32 * it);
     }
 }

@@ -66,9 +66,7 @@ fn votes_of_block(
         let first = block[axis] * cell_px;
         let pixels = (first..first + cell_px).filter_map(move |it| {
             let pixel = it.checked_sub(cell_px.div_ceil(2))?;
-            (1..=cells[axis] * cell_px - 2)
-                .contains(&pixel)
-                .then_some(pixel)
+            (1..=cells[axis] * cell_px - 2).contains(&pixel).then_some(pixel)
         });
         pixels.map(move |it| {
             (

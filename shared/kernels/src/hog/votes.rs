@@ -33,8 +33,7 @@ impl Votes {
         self.shares.clear();
         for [up, down] in pixels.clone().map(|it| it.map(|it| it as f32)) {
             for [left, right] in pixels.clone().map(|it| it.map(|it| it as f32)) {
-                self.shares
-                    .push([left * up, right * up, left * down, right * down]);
+                self.shares.push([left * up, right * up, left * down, right * down]);
             }
         }
         self.lengths.clear();

@@ -115,8 +115,7 @@ impl<S: Simd> Sum<'_, S> {
         if let Some(term) = self.own.term {
             scores = self.simd.plus(scores, self.one, load(term));
         }
-        self.constant
-            .map_or(scores, |it| self.simd.plus(scores, self.one, it))
+        self.constant.map_or(scores, |it| self.simd.plus(scores, self.one, it))
     }
 }
 

@@ -13,11 +13,9 @@ pub(super) fn add_message(rule: &MessageRule, grid: Grid, child: &[f32], parent:
     for (l, choices) in rule.choices.iter().enumerate() {
         for y in 0..grid.rows {
             for x in 0..grid.cols {
-                let value = choices
-                    .iter()
-                    .fold(f32::NEG_INFINITY, |best, &(spring, bias)| {
-                        best.max(transformed[spring][y * grid.cols + x] + bias)
-                    });
+                let value = choices.iter().fold(f32::NEG_INFINITY, |best, &(spring, bias)| {
+                    best.max(transformed[spring][y * grid.cols + x] + bias)
+                });
                 parent[grid.at(l, y, x)] += value;
             }
         }

@@ -39,8 +39,7 @@ impl Case {
         let mut of_parent = vec![ScoreRange::NONE; self.rule.choices.len()];
         let ranges = self.ranges();
         let child = self.scores(&ranges);
-        self.rule
-            .add_message(isa, child, (&mut parent, &mut of_parent), workspace);
+        self.rule.add_message(isa, child, (&mut parent, &mut of_parent), workspace);
         (parent, of_parent)
     }
 

@@ -48,10 +48,7 @@ impl Pass {
     pub(super) fn n_candidates(&self, n: usize, block: usize) -> usize {
         let parents = (0..n).step_by(block).map(|first| block.min(n - first));
         let offsets = self.blocks.iter().map(|it| (it.end - it.start) as usize);
-        parents
-            .zip(offsets)
-            .map(|(parents, offsets)| parents * offsets)
-            .sum()
+        parents.zip(offsets).map(|(parents, offsets)| parents * offsets).sum()
     }
 
     /// The first offset that a block tries, and what the spring adds at this and the following ones.

@@ -27,8 +27,7 @@ fn area_taps(from: usize, to: usize) -> Vec<Taps> {
             taps.first = whole - 1;
             taps.weights.push((whole as f64 - begin) * scale);
         }
-        taps.weights
-            .extend(std::iter::repeat_n(scale, last.saturating_sub(whole)));
+        taps.weights.extend(std::iter::repeat_n(scale, last.saturating_sub(whole)));
         if end - last as f64 > 1e-3 && last < from {
             taps.weights.push((end - last as f64) * scale);
         }

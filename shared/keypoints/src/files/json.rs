@@ -30,9 +30,7 @@ fn without_nan(text: &[u8]) -> Cow<'_, [u8]> {
     let mut changed = Vec::new();
     let (mut copied, mut at, mut in_string) = (0, 0, false);
     while at < text.len() {
-        let word = WORDS
-            .iter()
-            .find(|word| !in_string && text[at..].starts_with(word));
+        let word = WORDS.iter().find(|word| !in_string && text[at..].starts_with(word));
         if let Some(word) = word {
             changed.extend_from_slice(&text[copied..at]);
             changed.extend_from_slice(b"null");

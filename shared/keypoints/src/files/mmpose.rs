@@ -146,9 +146,7 @@ impl Meta {
             source,
         })?;
         let known = NameSet::of_number(names.n());
-        Ok(known
-            .filter(|known| names.names().starts_with(known.names()))
-            .or(Some(names)))
+        Ok(known.filter(|known| names.names().starts_with(known.names())).or(Some(names)))
     }
 }
 

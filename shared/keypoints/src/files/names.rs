@@ -58,10 +58,7 @@ impl NameSet {
         if !(1..=MAX_KEYPOINTS).contains(&names.len()) {
             return Err(NamesError::Number { n: names.len() });
         }
-        let twice = names
-            .iter()
-            .enumerate()
-            .find(|(nth, it)| names[..*nth].contains(it));
+        let twice = names.iter().enumerate().find(|(nth, it)| names[..*nth].contains(it));
         if let Some((_, name)) = twice {
             return Err(NamesError::Twice { name: name.clone() });
         }

@@ -73,9 +73,7 @@ fn other_keys(text: &[u8]) -> Result<(), FileError> {
         let has_body = BODY.iter().any(|key| person.contains_key(*key));
         let is_list = |value: &serde_json::Value| value.as_array().is_some_and(|it| it.len() > 2);
         let full = person.iter().filter(|(_, value)| is_list(value));
-        let keys: Vec<String> = full
-            .map(|(key, _)| key.chars().take(64).collect())
-            .collect();
+        let keys: Vec<String> = full.map(|(key, _)| key.chars().take(64).collect()).collect();
         if !has_body && !keys.is_empty() {
             return Err(FileError::OtherKeys {
                 entry: format!("people[{nth}]"),
@@ -143,11 +141,7 @@ mod tests {
 
     #[test]
     fn names_of_the_caller_go_before_the_number() {
-        let names = NameSet::new(
-            (0..24)
-                .map(|it| format!("k{it}"))
-                .chain(["neck".to_owned()]),
-        );
+        let names = NameSet::new((0..24).map(|it| format!("k{it}")).chain(["neck".to_owned()]));
         let names = names.unwrap();
         let frame = parse(file(&[&[1.0; 75]]).as_bytes(), Some(&names)).unwrap();
         assert_eq!(frame.names, Some(names));

@@ -62,10 +62,7 @@ impl Angle {
                 Self::ElbowFlexion(side),
             ]
         };
-        trunk
-            .into_iter()
-            .chain(SIDES.into_iter().flat_map(of_side))
-            .collect()
+        trunk.into_iter().chain(SIDES.into_iter().flat_map(of_side)).collect()
     }
 
     /// Whether it is one with the vertical.
@@ -147,12 +144,7 @@ impl Angle {
     fn hip(self, side: Side, points: &[Vector3<f64>]) -> Option<f64> {
         let thigh = thigh(side, points)?;
         if let Self::HipAbduction(_) = self {
-            return Some(
-                (outwards(side) * thigh.z)
-                    .clamp(-1.0, 1.0)
-                    .asin()
-                    .to_degrees(),
-            );
+            return Some((outwards(side) * thigh.z).clamp(-1.0, 1.0).asin().to_degrees());
         }
         is_told(thigh.x, thigh.y).then(|| thigh.x.atan2(-thigh.y).to_degrees())
     }

@@ -172,11 +172,8 @@ fn toes_up_is_dorsiflexion() {
 #[test]
 fn without_feet_or_a_vertical_their_angles_are_missing() {
     let pose: Vec<_> = standing();
-    let no_feet: Vec<_> = pose
-        .iter()
-        .filter(|it| !matches!(it.0, Role::Heel(_)))
-        .copied()
-        .collect();
+    let no_feet: Vec<_> =
+        pose.iter().filter(|it| !matches!(it.0, Role::Heel(_))).copied().collect();
     assert_eq!(
         of(&no_feet, Angle::AnkleDorsiflexion(Left)),
         Err(Unknown::Missing)
@@ -189,20 +186,14 @@ fn without_feet_or_a_vertical_their_angles_are_missing() {
 fn an_angle_that_nothing_is_known_of_is_none() {
     let pose = standing();
     let all = angles(&estimates(&pose, 0.8), None);
-    let knee = all
-        .iter()
-        .find(|it| it.0 == Angle::KneeFlexion(Left))
-        .unwrap();
+    let knee = all.iter().find(|it| it.0 == Angle::KneeFlexion(Left)).unwrap();
     assert_eq!(knee.1, Err(Unknown::Uncertain));
     let mut unknown = estimates(&pose, 0.01);
     for it in &mut unknown {
         it.1.covariance = Some(Matrix3::from_element(f64::NAN));
     }
     let all = angles(&unknown, None);
-    let knee = all
-        .iter()
-        .find(|it| it.0 == Angle::KneeFlexion(Left))
-        .unwrap();
+    let knee = all.iter().find(|it| it.0 == Angle::KneeFlexion(Left)).unwrap();
     assert_eq!(knee.1.unwrap().sd_degrees, None);
 }
 
@@ -236,9 +227,7 @@ fn what_the_covariances_make_of_an_angle_is_what_sampling_makes_of_it() {
             (it.0, it.1 + Vector3::from_fn(|_, _| sd_m * normal()))
         };
         let moved: Vec<_> = pose.iter().map(|it| noise(it, &mut normal)).collect();
-        for (at, it) in angles(&estimates(&moved, 1e-4), Some(Vector3::z_axis()))
-            .iter()
-            .enumerate()
+        for (at, it) in angles(&estimates(&moved, 1e-4), Some(Vector3::z_axis())).iter().enumerate()
         {
             let centre = all[at].1.unwrap().degrees;
             sums[at] += (it.1.unwrap().degrees - centre).powi(2);

@@ -103,9 +103,7 @@ pub fn read_lines(
     let mut nth = 0;
     loop {
         text.clear();
-        let n = reader
-            .read_line(&mut text)
-            .map_err(|error| in_file(&path, &error))?;
+        let n = reader.read_line(&mut text).map_err(|error| in_file(&path, &error))?;
         if n == 0 {
             return Ok(None);
         }

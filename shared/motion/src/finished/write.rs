@@ -60,11 +60,7 @@ fn smoothed_line(mut line: FrameLine, at: usize, run: &Run, motions: &[Motion]) 
     };
     let measured = core::mem::take(&mut line.people);
     let ids: Vec<u64> = measured.iter().map(|person| person.id).collect();
-    let known = |id: u64| {
-        run.people
-            .iter()
-            .position(|person| person.ids.contains(&id))
-    };
+    let known = |id: u64| run.people.iter().position(|person| person.ids.contains(&id));
     let there = measured.into_iter().filter_map(|person| {
         let nth = known(person.id)?;
         smoothed(&run.people[nth], &motions[nth], Some(person))

@@ -83,10 +83,7 @@ impl Models {
         }
         let Some((position, covariance)) = measured else {
             for it in models.iter_mut() {
-                it.belief
-                    .mean
-                    .fixed_rows_mut::<3>(6)
-                    .scale_mut((-dt / CALM_S).exp());
+                it.belief.mean.fixed_rows_mut::<3>(6).scale_mut((-dt / CALM_S).exp());
             }
             let is_near = time_s - self.measured_s <= fill_s;
             let state = State::Filled;
@@ -116,11 +113,7 @@ impl Models {
             *delay = delay_s(gain, dt);
         }
         let shares = shares(models);
-        let delay_s: f64 = shares
-            .iter()
-            .zip(delays)
-            .map(|(share, it)| share * it)
-            .sum();
+        let delay_s: f64 = shares.iter().zip(delays).map(|(share, it)| share * it).sum();
         (
             said(models, State::Measured).ok_or(Absent::Gap),
             Some(delay_s),
@@ -188,10 +181,7 @@ impl Model {
 
 /// The share of every filter.
 fn shares(models: &[Model; N_MODELS]) -> [f64; N_MODELS] {
-    let best = models
-        .iter()
-        .map(|it| it.score)
-        .fold(f64::NEG_INFINITY, f64::max);
+    let best = models.iter().map(|it| it.score).fold(f64::NEG_INFINITY, f64::max);
     let odds = models.each_ref().map(|it| (it.score - best).exp());
     let sum: f64 = odds.iter().sum();
     odds.map(|it| it / sum)
@@ -210,14 +200,11 @@ fn said(models: &[Model; N_MODELS], state: State) -> Option<Estimate> {
         let own = it.belief.position_covariance() * it.scale;
         covariance += (own + away * away.transpose()) * share;
     }
-    position
-        .iter()
-        .all(|it| it.is_finite())
-        .then_some(Estimate {
-            position,
-            covariance: Some(covariance),
-            state,
-        })
+    position.iter().all(|it| it.is_finite()).then_some(Estimate {
+        position,
+        covariance: Some(covariance),
+        state,
+    })
 }
 
 /// By how much a filter with this gain delays movement at [`DELAY_HZ`], seconds: its phase there. Negative where it runs ahead.
@@ -228,8 +215,6 @@ fn delay_s(gain: Vector3<f64>, dt: f64) -> f64 {
     let turn = 2.0 * PI * DELAY_HZ * dt;
     let back = Complex::new(turn.cos(), -turn.sin());
     let system = Matrix3::<Complex<f64>>::identity() - feedback * back;
-    let response = system
-        .try_inverse()
-        .map(|it| it * gain.map(|it| Complex::new(it, 0.0)));
+    let response = system.try_inverse().map(|it| it * gain.map(|it| Complex::new(it, 0.0)));
     response.map_or(0.0, |it| -it[0].im.atan2(it[0].re) / (2.0 * PI * DELAY_HZ))
 }

@@ -84,9 +84,7 @@ fn covariances_that_are_wrong_by_a_factor_are_scaled() {
 fn what_the_covariances_say_is_how_far_off_the_smoothed_positions_are() {
     let recorded = recorded(60.0, 0.02, 0.02, 20.0);
     let got = crate::smooth(&recorded, &Settings::default());
-    let told = got.joints[0]
-        .iter()
-        .map(|it| it.unwrap().covariance.unwrap().trace());
+    let told = got.joints[0].iter().map(|it| it.unwrap().covariance.unwrap().trace());
     let told = (told.sum::<f64>() / recorded.times.len() as f64).sqrt();
     let error = error_m(&recorded, &got.joints[0]);
     assert!((0.75..1.35).contains(&(told / error)), "{told} {error}");

@@ -292,9 +292,7 @@ impl Learned {
         let it = &self.weights;
         demand(in_range(it.alpha), "weights.alpha", "a number from 0")?;
         demand(in_range(it.beta), "weights.beta", "a number from 0")?;
-        let cap = it
-            .max_distance_cells
-            .is_none_or(|it| it.is_finite() && it > 0.0);
+        let cap = it.max_distance_cells.is_none_or(|it| it.is_finite() && it > 0.0);
         demand(
             cap,
             "weights.max_distance_cells",
@@ -303,10 +301,7 @@ impl Learned {
         let smoothing = self.smoothing.is_finite() && self.smoothing > 0.0;
         demand(smoothing, "smoothing", "a number above 0")?;
         let tau = self.tau_tenths.len() == n_parts
-            && self
-                .tau_tenths
-                .iter()
-                .all(|it| it.is_finite() && *it >= 0.0);
+            && self.tau_tenths.iter().all(|it| it.is_finite() && *it >= 0.0);
         demand(tau, "tau_tenths", "a number from 0 for every part")?;
         self.check_tables()?;
         self.check_joints(n_parts)

@@ -108,8 +108,7 @@ impl JointFit {
         let left = 1.0 - weights.sum();
         let defaults = default_row(parts);
         let row = weights.iter().zip(defaults);
-        row.map(|(weight, own)| rounded(weight + left * own))
-            .collect()
+        row.map(|(weight, own)| rounded(weight + left * own)).collect()
     }
 
     /// Mean squared error of another fit's maps on the samples of this one, in units of the person's size;
@@ -184,9 +183,8 @@ mod tests {
     fn samples(n: usize, seed: u64) -> Vec<(Vec<[f64; 2]>, [f64; 2])> {
         let mut dice = fastrand::Rng::with_seed(seed);
         let mut person = || {
-            let centres: Vec<[f64; 2]> = (0..N_PARTS)
-                .map(|_| [dice.f64() * 100.0 + 30.0, dice.f64() * 200.0])
-                .collect();
+            let centres: Vec<[f64; 2]> =
+                (0..N_PARTS).map(|_| [dice.f64() * 100.0 + 30.0, dice.f64() * 200.0]).collect();
             let wrist = [0, 1].map(|it| 1.2 * centres[6][it] - 0.2 * centres[4][it]);
             (centres, wrist)
         };

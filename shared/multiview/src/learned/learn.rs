@@ -160,19 +160,14 @@ impl Learner {
             });
             self.named.len() - 1
         });
-        self.named[at]
-            .counts
-            .add(&self.shape, part, types, exchanged);
+        self.named[at].counts.add(&self.shape, part, types, exchanged);
     }
 
     /// A type counts if its part and the parent, to which it is relative, are right.
     fn is_right(&self, view: &ViewObservation, part: usize) -> bool {
         let parent = PARENT.get(part).copied().flatten().unwrap_or(part);
-        let right = |it: usize| {
-            view.errors
-                .get(it)
-                .is_some_and(|it| *it <= self.settings.max_error)
-        };
+        let right =
+            |it: usize| view.errors.get(it).is_some_and(|it| *it <= self.settings.max_error);
         right(part) && right(parent)
     }
 

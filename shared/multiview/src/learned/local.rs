@@ -145,13 +145,10 @@ fn left_out(settings: Local, sets: &[Vec<Marked>]) -> Vec<f64> {
     for fold in 0..FOLDS {
         let deal = |is_in: bool| -> Vec<Vec<&Marked>> {
             let of_set = |set: &Vec<Marked>| -> Vec<usize> {
-                (0..set.len())
-                    .filter(|it| (it % FOLDS == fold) == is_in)
-                    .collect()
+                (0..set.len()).filter(|it| (it % FOLDS == fold) == is_in).collect()
             };
             let sets = sets.iter().map(|set| (set, of_set(set)));
-            sets.map(|(set, at)| at.into_iter().map(|it| &set[it]).collect())
-                .collect()
+            sets.map(|(set, at)| at.into_iter().map(|it| &set[it]).collect()).collect()
         };
         let rows = settings.learn(&deal(false));
         for (people, (sum, n)) in deal(true).iter().zip(&mut sums) {
@@ -160,9 +157,7 @@ fn left_out(settings: Local, sets: &[Vec<Marked>]) -> Vec<f64> {
             *n += people.len() as f64;
         }
     }
-    sums.iter()
-        .map(|(sum, n)| sum / f64::max(*n, 1.0))
-        .collect()
+    sums.iter().map(|(sum, n)| sum / f64::max(*n, 1.0)).collect()
 }
 
 /// A joint of one person, everything relative to its own part, in units of the person's size.
@@ -209,9 +204,7 @@ fn sample(
     let (own, size) = (centre(own(joint)), size(&person.joints));
     Sample {
         around: [0, 1].map(|axis| {
-            let relative = around
-                .iter()
-                .map(|&it| (centre(it)[axis] - own[axis]) / size);
+            let relative = around.iter().map(|&it| (centre(it)[axis] - own[axis]) / size);
             DVector::from_iterator(around.len(), relative)
         }),
         joint: [0, 1].map(|axis| (turned(mark)[axis] - own[axis]) / size),

@@ -81,9 +81,7 @@ impl Tally {
 
 /// The best of some points; among equals the first.
 pub fn best(points: &[Point]) -> Option<&Point> {
-    points
-        .iter()
-        .reduce(|best, it| if it.area > best.area { it } else { best })
+    points.iter().reduce(|best, it| if it.area > best.area { it } else { best })
 }
 
 impl Grid {

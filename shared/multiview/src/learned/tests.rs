@@ -18,9 +18,7 @@ fn shape() -> Shape {
 fn observation(types: impl Fn(usize) -> u8, error: f32, exchanged: bool) -> ViewObservation {
     ViewObservation {
         types: (0..N_PARTS).map(types).collect(),
-        centres: (0..N_PARTS)
-            .map(|it| [it as f64, 10.0 * it as f64])
-            .collect(),
+        centres: (0..N_PARTS).map(|it| [it as f64, 10.0 * it as f64]).collect(),
         errors: vec![error; N_PARTS],
         exchanged,
         size: 100.0,
@@ -35,9 +33,7 @@ fn learner() -> Learner {
 fn learned(learner: &Learner) -> Learned {
     let weights = Weights::default();
     let rig = Some("hall");
-    learner
-        .learned("0".repeat(16), weights, rig, Some(0.01))
-        .unwrap()
+    learner.learned("0".repeat(16), weights, rig, Some(0.01)).unwrap()
 }
 
 /// Adds two views at an angle, `n` times.
@@ -142,11 +138,7 @@ fn tables_of_a_named_rig_follow_the_cameras() {
     let (a, b, tables) = &tables[0];
     assert_eq!((*a, *b), (0, 2));
     assert!(tables.joint.value(3, 2, 0) > 0.8);
-    assert!(
-        learned
-            .of_rig("cellar", &["left", "right"], Appearance::Joint)
-            .is_none()
-    );
+    assert!(learned.of_rig("cellar", &["left", "right"], Appearance::Joint).is_none());
 }
 
 #[test]

@@ -208,15 +208,12 @@ fn names_that_follow_the_picture_are_brought_together_whichever_views_exchange_t
                 bumps[view].maxima.swap(right, left);
             }
         }
-        let views = cameras
-            .iter()
-            .zip(&bumps)
-            .map(|(camera, evidence)| SpaceView {
-                camera,
-                evidence,
-                exchanged: [false; 2],
-                front: [0.0; 2],
-            });
+        let views = cameras.iter().zip(&bumps).map(|(camera, evidence)| SpaceView {
+            camera,
+            evidence,
+            exchanged: [false; 2],
+            front: [0.0; 2],
+        });
         let views: Vec<SpaceView<'_>> = views.collect();
         let mut found = solve_person(&views, &settings).unwrap().pose;
         // The names are those of the first view.
@@ -322,11 +319,8 @@ fn whoever_is_the_same_person_in_most_views_is_chosen() {
             seen(&cameras[2], [0.0; 2], 0.5),
         ],
     ];
-    let views: Vec<(&Camera, &[SeenPerson])> = cameras
-        .iter()
-        .zip(&people)
-        .map(|(camera, it)| (camera, &it[..]))
-        .collect();
+    let views: Vec<(&Camera, &[SeenPerson])> =
+        cameras.iter().zip(&people).map(|(camera, it)| (camera, &it[..])).collect();
     assert_eq!(same_person(&views, false), [Some(1), Some(0), Some(1)]);
     assert_eq!(
         same_person(&views[..1], false),
@@ -348,9 +342,7 @@ impl EitherLeg {
             let places = [left, right].map(|it| bumps.at[it].unwrap());
             let heats: [f32; 2] = [1.0, 0.8];
             let both = places.into_iter().zip(heats);
-            let both: Vec<_> = both
-                .map(|(at, heat)| (at, (heat + EPS as f32).ln()))
-                .collect();
+            let both: Vec<_> = both.map(|(at, heat)| (at, (heat + EPS as f32).ln())).collect();
             bumps.maxima[right].clone_from(&both);
             bumps.maxima[left] = both;
         }

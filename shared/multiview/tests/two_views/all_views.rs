@@ -52,9 +52,7 @@ fn fuse(scene: &Scene, settings: &Settings, start: &Start) -> AllViewsEstimate {
 /// The energy of given poses, computed independently.
 fn energy(scene: &Scene, settings: &Settings, start: &Start, poses: &[Pose]) -> f64 {
     let n = poses.len();
-    let own: f64 = (0..n)
-        .map(|view| oracle::own(scene, view, &poses[view]))
-        .sum();
+    let own: f64 = (0..n).map(|view| oracle::own(scene, view, &poses[view])).sum();
     let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));
     let between = pairs.map(|[a, b]| {
         let exchanged = start.exchanged[a] != start.exchanged[b];

@@ -230,24 +230,19 @@ impl Scene {
                 let height = noise.within(-1.0, 1.0);
                 let lens = noise.pick(&lenses());
                 let camera = camera(bearing, height, layout.image_size, lens);
-                let values = (0..layout.n_responses())
-                    .map(|_| noise.within(-1.0, 1.0) as f32)
-                    .collect();
+                let values =
+                    (0..layout.n_responses()).map(|_| noise.within(-1.0, 1.0) as f32).collect();
                 let mut view = View {
                     levels: (0..layout.levels.len() as u16).collect(),
                     plan: ViewPlan::new(camera, Arc::clone(&model), layout),
                     values,
                     candidates: Vec::new(),
-                    sigma_px: (noise.unit() < 0.7).then(|| {
-                        (0..N_PARTS)
-                            .map(|_| noise.within(0.0, 12.0) as f32)
-                            .collect()
-                    }),
+                    sigma_px: (noise.unit() < 0.7)
+                        .then(|| (0..N_PARTS).map(|_| noise.within(0.0, 12.0) as f32).collect()),
                     tau_px: None,
                 };
                 view.candidates = (0..3).map(|_| pose(noise, &solver, &view)).collect();
-                view.candidates
-                    .push(solver.best(&view.evidence(), None).unwrap());
+                view.candidates.push(solver.best(&view.evidence(), None).unwrap());
                 view.candidates.reverse();
                 view
             })

@@ -45,9 +45,8 @@ fn seen(people: &[([f64; 2], f32)]) -> Vec<Option<Sightings>> {
     let view = |view: usize| {
         let camera = camera(view);
         let all = people.iter();
-        let mut all: Vec<Sighting> = all
-            .map(|(place, heat)| sighting(&camera, *place, *heat))
-            .collect();
+        let mut all: Vec<Sighting> =
+            all.map(|(place, heat)| sighting(&camera, *place, *heat)).collect();
         let n = all.len().max(1);
         all.rotate_left(view % n);
         (!all.is_empty()).then_some(Sightings {
@@ -83,11 +82,7 @@ fn everybody_is_told_with_the_candidate_of_every_view() {
         found.sort_unstable();
         assert_eq!((found, frame.n_seen), (vec![1, 2], 2));
         // Person p is candidate (p - v) mod 2 of view v.
-        let mut candidates: Vec<_> = frame
-            .people
-            .iter()
-            .map(|it| it.candidates.clone())
-            .collect();
+        let mut candidates: Vec<_> = frame.people.iter().map(|it| it.candidates.clone()).collect();
         candidates.sort();
         let [even, odd] = [0, 1].map(|first| {
             let each = (0..N_VIEWS).map(|view| Some((view + first) % 2));

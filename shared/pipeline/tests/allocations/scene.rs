@@ -69,8 +69,7 @@ impl Scene {
 
     pub(crate) fn evidence(&self) -> Vec<Responses<'_>> {
         let each = self.values.iter();
-        each.map(|values| Responses::new(&self.layout, values, &self.levels))
-            .collect()
+        each.map(|values| Responses::new(&self.layout, values, &self.levels)).collect()
     }
 }
 

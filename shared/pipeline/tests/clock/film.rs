@@ -85,9 +85,7 @@ fn scene_of(rig: RigChoice, action: Action, seed: u64) -> Arc<Scene> {
     };
     let mut made = MADE.lock().expect("no test panics in here");
     let make = || Arc::new(Scene::new(&settings).expect("a scene"));
-    let scene = made
-        .entry((is_ring, action.name(), seed))
-        .or_insert_with(make);
+    let scene = made.entry((is_ring, action.name(), seed)).or_insert_with(make);
     Arc::clone(scene)
 }
 

@@ -25,9 +25,8 @@ enum By {
 /// * `skews_ms`: of the cameras, from the first on, again and again.
 fn error_mm(film: &mut Film, skews_ms: &[f64], by: By) -> f64 {
     let cameras = film.cameras().to_vec();
-    let skews_s: Vec<f64> = (0..cameras.len())
-        .map(|view| skews_ms[view % skews_ms.len()] * 1e-3)
-        .collect();
+    let skews_s: Vec<f64> =
+        (0..cameras.len()).map(|view| skews_ms[view % skews_ms.len()] * 1e-3).collect();
     let mut tracks = vec![Tracks::default(); cameras.len()];
     let (mut sum, mut n) = (0.0, 0.0);
     for frame in 0..90 {
@@ -55,9 +54,8 @@ fn error_mm(film: &mut Film, skews_ms: &[f64], by: By) -> f64 {
                 sigma_px: seen[joint].1,
             });
             let observations: Vec<Observation<'_>> = observations.collect();
-            let found: Point3<f64> = triangulate(&observations, &Settings::default())
-                .expect("a point")
-                .in_world;
+            let found: Point3<f64> =
+                triangulate(&observations, &Settings::default()).expect("a point").in_world;
             (sum, n) = (sum + (found - truth).norm(), n + 1.0);
         }
     }

@@ -94,11 +94,7 @@ fn nothing_is_said_of_a_person_who_does_not_move() {
     for frame in 0..600 {
         let views = cameras.iter().map(|camera| {
             let noise = film.noise();
-            Some(
-                film.see(camera, 1.0, &noise)
-                    .map(|it| [it.x, it.y])
-                    .to_vec(),
-            )
+            Some(film.see(camera, 1.0, &noise).map(|it| [it.x, it.y]).to_vec())
         });
         watch.note(
             f64::from(frame) / RATE_HZ,

@@ -62,11 +62,7 @@ fn left_and_right_are_the_mean_of_both() {
     let [plain, mirrored] = both(&network("Relu"), &card);
     let n = 12 * 16;
     let (left, right) = (&plain[0][..n], &plain[0][n..2 * n]);
-    let mean: Vec<f32> = left
-        .iter()
-        .zip(right)
-        .map(|(a, b)| f32::midpoint(*a, *b))
-        .collect();
+    let mean: Vec<f32> = left.iter().zip(right).map(|(a, b)| f32::midpoint(*a, *b)).collect();
     assert_eq!(mirrored[0][..n], mean[..]);
     assert_eq!(mirrored[0][n..2 * n], mean[..]);
     assert_eq!(mirrored[0][2 * n..], plain[0][2 * n..]);

@@ -6,10 +6,8 @@ use keypoints::{Card, Codec, Layout};
 use super::FitError;
 
 fn listed(ports: &[Port]) -> String {
-    let names: Vec<String> = ports
-        .iter()
-        .map(|it| format!("`{}` {}", it.name, written(&it.sides)))
-        .collect();
+    let names: Vec<String> =
+        ports.iter().map(|it| format!("`{}` {}", it.name, written(&it.sides))).collect();
     names.join(", ")
 }
 
@@ -17,14 +15,11 @@ fn listed(ports: &[Port]) -> String {
 pub(crate) fn input_of(input_card: &keypoints::Input, inputs: &[Port]) -> Result<String, FitError> {
     let input = match (&input_card.name, inputs) {
         (Some(name), _) => {
-            inputs
-                .iter()
-                .find(|it| it.name == *name)
-                .ok_or_else(|| FitError::Name {
-                    what: "input",
-                    wanted: name.clone(),
-                    has: listed(inputs),
-                })?
+            inputs.iter().find(|it| it.name == *name).ok_or_else(|| FitError::Name {
+                what: "input",
+                wanted: name.clone(),
+                has: listed(inputs),
+            })?
         }
         (None, [input]) => input,
         (None, _) => {

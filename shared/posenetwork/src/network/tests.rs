@@ -28,10 +28,8 @@ pub(super) fn sides(sides: &[usize]) -> Vec<Side> {
 /// Gives what `operator` makes of its input as three maps.
 pub(super) fn network(operator: &str) -> Network {
     let mut net = Network::default();
-    net.inputs
-        .push(("picture".to_owned(), sides(&[1, 3, 16, 12])));
-    net.outputs
-        .push(("maps".to_owned(), sides(&[1, 3, 16, 12])));
+    net.inputs.push(("picture".to_owned(), sides(&[1, 3, 16, 12])));
+    net.outputs.push(("maps".to_owned(), sides(&[1, 3, 16, 12])));
     net.node(operator, &["picture"], "maps", vec![]);
     net
 }
@@ -90,8 +88,7 @@ fn of_several_inputs_or_outputs_the_card_names_one() {
         "{said}"
     );
     let mut net = network("Relu");
-    net.outputs
-        .push(("again".to_owned(), sides(&[1, 3, 16, 12])));
+    net.outputs.push(("again".to_owned(), sides(&[1, 3, 16, 12])));
     net.node("Relu", &["maps"], "again", vec![]);
     let said = refused(&net, CARD);
     assert!(
@@ -145,9 +142,7 @@ fn values_that_are_no_numbers_are_refused_when_they_come() {
     let image = [1; 3 * 12 * 16];
     let image = Rgb8View::new(12, 16, &image).unwrap();
     let mut workspace = Workspace::default();
-    let refused = network
-        .look(image, [0.0, 0.0, 12.0, 16.0], &mut workspace)
-        .unwrap_err();
+    let refused = network.look(image, [0.0, 0.0, 12.0, 16.0], &mut workspace).unwrap_err();
     assert!(
         matches!(
             refused,
@@ -195,9 +190,7 @@ fn columns_and_rows_are_read_from_two_outputs() {
     let (net, simcc) = distributions();
     let found = keypoints(&net, &simcc, &[[5, 9]]);
     assert_eq!((found[2].at, found[2].score), ([5.0, 9.0], 1.0));
-    let exchanged = simcc
-        .replace("\"across\"", "\"x\"")
-        .replace("\"down\"", "\"across\"");
+    let exchanged = simcc.replace("\"across\"", "\"x\"").replace("\"down\"", "\"across\"");
     let exchanged = exchanged.replace("\"x\"", "\"down\"");
     assert_eq!(
         refused(&net, &exchanged),

@@ -122,9 +122,7 @@ fn there_are_as_many_seats_as_guests_and_one_that_is_left_is_free() {
     let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
     let namespace = Namespace::below("full", base.path()).unwrap();
     fs::create_dir(namespace.root()).unwrap();
-    let mut seats: Vec<File> = (0..MOST_GUESTS)
-        .map(|_| seat(&namespace).unwrap())
-        .collect();
+    let mut seats: Vec<File> = (0..MOST_GUESTS).map(|_| seat(&namespace).unwrap()).collect();
     let error = seat(&namespace).unwrap_err();
     let pid = std::process::id().to_string();
     assert!(

@@ -74,10 +74,7 @@ impl Meter {
     /// * `view`: of which view, if of one.
     pub fn spent(&mut self, span: Span, view: Option<usize>, nanos: u64) {
         let view = number_of(view);
-        let existing = self
-            .rows
-            .iter()
-            .position(|row| row.span == span && row.view == view);
+        let existing = self.rows.iter().position(|row| row.span == span && row.view == view);
         let index = existing.unwrap_or(self.rows.len());
         if index == self.rows.len() {
             if index == MAX_ROWS {
@@ -181,8 +178,7 @@ impl Meter {
 }
 
 fn number_of(view: Option<usize>) -> u32 {
-    view.and_then(|it| u32::try_from(it).ok())
-        .unwrap_or(NO_VIEW)
+    view.and_then(|it| u32::try_from(it).ok()).unwrap_or(NO_VIEW)
 }
 
 /// Truncates a name between characters.
@@ -235,13 +231,8 @@ mod tests {
         meter.spent(Span::WAITING, Some(0), 2000);
         meter.spent(Span::COMPUTING, None, 3000);
         meter.spent(Span::WAITING, Some(1), 1000);
-        let rows: Vec<_> = (0..meter.n_rows())
-            .filter_map(|index| meter.row(index))
-            .collect();
-        let counts: Vec<_> = rows
-            .iter()
-            .map(|row| (row.span, row.view, row.count))
-            .collect();
+        let rows: Vec<_> = (0..meter.n_rows()).filter_map(|index| meter.row(index)).collect();
+        let counts: Vec<_> = rows.iter().map(|row| (row.span, row.view, row.count)).collect();
         let expected = [
             (Span::WAITING, 1, 2),
             (Span::WAITING, 0, 1),

@@ -285,9 +285,7 @@ fn queue_of(message: &Metrics) -> Result<Option<[u32; 2]>, ReadingError> {
 fn name_of(bytes: &[u8; MAX_NAME]) -> Result<String, ReadingError> {
     let len = bytes.iter().position(|it| *it == 0).unwrap_or(MAX_NAME);
     let (name, rest) = bytes.split_at(len);
-    let name = core::str::from_utf8(name)
-        .ok()
-        .filter(|_| rest.iter().all(|it| *it == 0));
+    let name = core::str::from_utf8(name).ok().filter(|_| rest.iter().all(|it| *it == 0));
     name.map(str::to_owned).ok_or(ReadingError::Name)
 }
 

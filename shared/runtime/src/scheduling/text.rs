@@ -57,9 +57,7 @@ impl Scheduling {
                 self.cores = cores.collect::<Result<_, _>>().ok()?;
             }
             Some((name, priority)) => {
-                let policy = Policy::ALL
-                    .into_iter()
-                    .find(|policy| policy.name() == name)?;
+                let policy = Policy::ALL.into_iter().find(|policy| policy.name() == name)?;
                 let priority = priority.parse().ok()?;
                 self.real_time = Some(RealTime { policy, priority });
             }

@@ -199,9 +199,7 @@ pub fn video_devices() -> io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in fs::read_dir("/dev")? {
         let name = entry?.file_name();
-        let number = name
-            .to_str()
-            .and_then(|it| it.strip_prefix("video")?.parse::<u32>().ok());
+        let number = name.to_str().and_then(|it| it.strip_prefix("video")?.parse::<u32>().ok());
         found.extend(number.map(|it| (it, Path::new("/dev").join(name))));
     }
     found.sort();

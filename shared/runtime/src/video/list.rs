@@ -92,10 +92,7 @@ impl VideoControl {
                 format!("{least} to {most}")
             };
         }
-        let all = self
-            .choices
-            .iter()
-            .map(|(it, name)| format!("{it} ({name})"));
+        let all = self.choices.iter().map(|(it, name)| format!("{it} ({name})"));
         all.collect::<Vec<_>>().join(", ")
     }
 

@@ -50,10 +50,7 @@ impl VideoDevice {
         }
         if [set.width, set.height] != size {
             let sizes = offered.iter().filter(|it| it.format == format);
-            let sizes: Vec<String> = sizes
-                .flat_map(|it| &it.sizes)
-                .map(VideoSize::text)
-                .collect();
+            let sizes: Vec<String> = sizes.flat_map(|it| &it.sizes).map(VideoSize::text).collect();
             let wanted = format!("{}x{} in {format}", size[0], size[1]);
             return Err(self.not_offered("size", wanted, sizes.join(", ")));
         }

@@ -73,9 +73,7 @@ impl VideoDevice {
             stream.give_back(index)?;
         }
         let mut kind = raw::Kind(raw::VIDEO_CAPTURE);
-        stream
-            .device
-            .ask(raw::STREAMON, "start to stream", &mut kind)?;
+        stream.device.ask(raw::STREAMON, "start to stream", &mut kind)?;
         Ok(stream)
     }
 }

@@ -18,10 +18,7 @@ pub(crate) struct Deployment {
 
 impl Deployment {
     pub(crate) fn new(plans: &[TopicPlan]) -> Self {
-        let base = tempfile::Builder::new()
-            .prefix("px")
-            .tempdir_in("/dev/shm")
-            .unwrap();
+        let base = tempfile::Builder::new().prefix("px").tempdir_in("/dev/shm").unwrap();
         let lock = namespace(base.path()).acquire().unwrap();
         let stop = Stop::new().unwrap();
         let bus = Bus::open(lock.namespace(), "supervisor", &stop).unwrap();

@@ -158,9 +158,7 @@ fn chair(it: Stance, phase: i64, random: &mut Random) -> Stance {
     let rest = |it: Stance, random: &mut Random| match random.unit() {
         share if share < 0.5 => it.arms([24.0, 8.0, -8.0], 62.0),
         share if share < 0.75 => it.arms([42.0, 8.0, -42.0], 98.0),
-        _ => it
-            .arm(0, [26.0, 14.0, 8.0], 84.0)
-            .arm(1, [24.0, 8.0, -8.0], 60.0),
+        _ => it.arm(0, [26.0, 14.0, 8.0], 84.0).arm(1, [24.0, 8.0, -8.0], 60.0),
     };
     match phase {
         0 => it,
@@ -196,9 +194,7 @@ fn grab(it: Stance, phase: i64, random: &mut Random) -> Stance {
         1 => it.arms([24.0, 8.0, -14.0], 86.0).look(15.0, 0.0),
         2 => {
             let turn = random.range(-25.0, 25.0);
-            it.arms([122.0, 8.0, 0.0], 28.0)
-                .trunk(-4.0, 0.0, turn)
-                .look(-18.0, turn)
+            it.arms([122.0, 8.0, 0.0], 28.0).trunk(-4.0, 0.0, turn).look(-18.0, turn)
         }
         _ => {
             let side = usize::from(random.chance(0.5));

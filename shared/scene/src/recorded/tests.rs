@@ -40,9 +40,7 @@ fn a_subject_reproduces_the_subjects_own_recording() {
         for nth in [0, 17, 54, 99] {
             let seconds = f64::from(nth) / 25.0;
             let got = bones.joints(&it.frames(seconds));
-            let expected = motion
-                .bones
-                .joints(&motion.bones.frames(&motion.pose(seconds)));
+            let expected = motion.bones.joints(&motion.bones.frames(&motion.pose(seconds)));
             for joint in 0..N_JOINTS {
                 // Joints alone do not determine where the trunk bends; the path may be moved as a whole.
                 let error =

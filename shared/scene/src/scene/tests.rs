@@ -75,9 +75,7 @@ fn visible_joints_lie_on_the_mask_and_the_box_encloses_the_mask() {
             let on = near.filter(|(x, y)| {
                 *x >= 0 && *y >= 0 && *x < size.width as i64 && *y < size.height as i64
             });
-            let on = on
-                .map(|(x, y)| mask[y as usize * size.width + x as usize])
-                .max();
+            let on = on.map(|(x, y)| mask[y as usize * size.width + x as usize]).max();
             assert!(
                 on > Some(0),
                 "{action:?}: a visible joint beside the person"
@@ -141,12 +139,7 @@ fn a_person_covers_pixels_and_casts_a_shadow() {
     let mask = view.mask();
     let (mut covered, mut darker) = (0, 0);
     for (index, share) in mask.iter().enumerate() {
-        let grey = |it: &[u8]| {
-            it[3 * index..][..3]
-                .iter()
-                .map(|it| i32::from(*it))
-                .sum::<i32>()
-        };
+        let grey = |it: &[u8]| it[3 * index..][..3].iter().map(|it| i32::from(*it)).sum::<i32>();
         let difference = grey(&rgb) - grey(&view.backdrop.bytes);
         match share {
             0 => darker += i32::from(difference < -20),
@@ -286,10 +279,7 @@ fn people_who_pass_walk_about_and_keep_a_distance() {
         let from = path[0];
         let farthest = path.iter().map(|place| (place - from).norm());
         assert!(farthest.fold(0.0, f64::max) > 1.0, "somebody does not walk");
-        closest = path
-            .iter()
-            .map(|place| place.xy().norm())
-            .fold(closest, f64::min);
+        closest = path.iter().map(|place| place.xy().norm()).fold(closest, f64::min);
     }
     assert!(nearest > 0.35, "two are {nearest} m apart");
     assert!(closest < 0.8, "nobody comes near the middle: {closest}");

@@ -66,21 +66,13 @@ impl Solid {
                 ends: [a, b],
                 radii,
             } => [
-                a.coords
-                    .add_scalar(-radii[0])
-                    .inf(&b.coords.add_scalar(-radii[1])),
-                a.coords
-                    .add_scalar(radii[0])
-                    .sup(&b.coords.add_scalar(radii[1])),
+                a.coords.add_scalar(-radii[0]).inf(&b.coords.add_scalar(-radii[1])),
+                a.coords.add_scalar(radii[0]).sup(&b.coords.add_scalar(radii[1])),
             ],
             Self::Ellipsoid { frame, radii } => {
                 let turn = frame.rotation.to_rotation_matrix();
                 let reach = Vector3::from_fn(|row, _| {
-                    turn.matrix()
-                        .row(row)
-                        .transpose()
-                        .component_mul(radii)
-                        .norm()
+                    turn.matrix().row(row).transpose().component_mul(radii).norm()
                 });
                 let centre = frame.translation.vector;
                 [centre - reach, centre + reach]

@@ -193,10 +193,7 @@ impl<'a> Judgement<'a> {
 
     /// Sum of the deviations of a joint's bones.
     fn strain(&self, joint: usize) -> f64 {
-        let of_joint = BONES
-            .iter()
-            .zip(&self.z)
-            .filter(|it| it.0.mask() >> joint & 1 == 1);
+        let of_joint = BONES.iter().zip(&self.z).filter(|it| it.0.mask() >> joint & 1 == 1);
         of_joint.filter_map(|it| *it.1).map(f64::abs).sum()
     }
 

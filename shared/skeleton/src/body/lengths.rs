@@ -84,9 +84,7 @@ impl Lengths {
 
     /// The number of bones, of the 14, whose length is known.
     pub fn n_learned(&self) -> usize {
-        (0..N_BONES)
-            .filter(|bone| self.bone(*bone).is_some())
-            .count()
+        (0..N_BONES).filter(|bone| self.bone(*bone).is_some()).count()
     }
 
     pub(crate) fn of_kind(&self, kind: Kind) -> Option<Learned> {

@@ -63,10 +63,8 @@ pub fn refine(joints: &Joints, covariances: &Covariances, lengths: Option<&Lengt
             return problem.unchanged();
         };
         let steps = [1.0, 0.5, 0.25, 0.125].map(|share| best.towards(&target, share));
-        let Some((next, next_cost)) = steps
-            .iter()
-            .map(|next| (next, problem.cost(next)))
-            .find(|it| it.1 < cost)
+        let Some((next, next_cost)) =
+            steps.iter().map(|next| (next, problem.cost(next))).find(|it| it.1 < cost)
         else {
             break;
         };
@@ -77,9 +75,7 @@ pub fn refine(joints: &Joints, covariances: &Covariances, lengths: Option<&Lengt
             break;
         }
     }
-    problem
-        .result(&best, iterations)
-        .unwrap_or_else(|| problem.unchanged())
+    problem.result(&best, iterations).unwrap_or_else(|| problem.unchanged())
 }
 
 type Normal = Cholesky<f64, Const<N_ROWS>>;
@@ -255,10 +251,7 @@ impl Problem {
 fn usable(given: Option<Matrix3<f64>>) -> [Matrix3<f64>; 2] {
     let inverse = |it: &Matrix3<f64>| {
         let inverse = it.cholesky()?.inverse();
-        inverse
-            .iter()
-            .all(|entry| entry.is_finite())
-            .then_some(inverse)
+        inverse.iter().all(|entry| entry.is_finite()).then_some(inverse)
     };
     let least = Matrix3::from_diagonal_element(LEAST_VARIANCE);
     let given = given

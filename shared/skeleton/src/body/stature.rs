@@ -37,13 +37,7 @@ pub fn stature(joints: &Joints) -> Option<Stature> {
 pub(crate) fn of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<Stature> {
     let mut sorted = Votes::new(lengths)?;
     let metres = sorted.median();
-    let model = 1.0
-        / sorted
-            .votes()
-            .iter()
-            .map(|it| it[1] * it[1])
-            .sum::<f64>()
-            .sqrt();
+    let model = 1.0 / sorted.votes().iter().map(|it| it[1] * it[1]).sum::<f64>().sqrt();
     let n = sorted.n as f64;
     for vote in sorted.votes_mut() {
         vote[0] = (vote[0] - metres).abs();
@@ -94,8 +88,7 @@ impl Votes {
     }
 
     fn sort(&mut self) {
-        self.votes_mut()
-            .sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+        self.votes_mut().sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
     }
 
     /// The value at half of the weight, linear between the middles of the weights.

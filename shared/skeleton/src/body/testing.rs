@@ -115,10 +115,7 @@ pub(crate) fn mirrored<T: Copy>(joints: &[T; N_JOINTS]) -> [T; N_JOINTS] {
 
 /// Mean distance of joints, metres.
 pub(crate) fn error(a: &Joints, b: &Joints) -> f64 {
-    let pairs = a
-        .iter()
-        .zip(b)
-        .filter_map(|(a, b)| Some((a.as_ref()? - b.as_ref()?).norm()));
+    let pairs = a.iter().zip(b).filter_map(|(a, b)| Some((a.as_ref()? - b.as_ref()?).norm()));
     let (sum, n) = pairs.fold((0.0, 0.0), |(sum, n), it| (sum + it, n + 1.0));
     sum / n
 }

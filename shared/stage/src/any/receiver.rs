@@ -114,15 +114,11 @@ impl Receiver {
                     ..received
                 })
             }),
-            Port::ViewQuality(port) => port
-                .receive()?
-                .and_then(|message| of(bytes_of(&message), &[])),
-            Port::PairPose(port) => port
-                .receive()?
-                .and_then(|message| of(bytes_of(&message), &[])),
-            Port::People(port) => port
-                .receive()?
-                .and_then(|message| of(bytes_of(&message), &[])),
+            Port::ViewQuality(port) => {
+                port.receive()?.and_then(|message| of(bytes_of(&message), &[]))
+            }
+            Port::PairPose(port) => port.receive()?.and_then(|message| of(bytes_of(&message), &[])),
+            Port::People(port) => port.receive()?.and_then(|message| of(bytes_of(&message), &[])),
             Port::Skeletons(port) => {
                 let received = port.receive_by(|skeletons| {
                     let [head, people] = split_skeletons(skeletons);

@@ -52,10 +52,7 @@ impl<T> Last<T> {
     /// The latest message about this frame or an earlier one, if it is fresh, and its age in frames.
     pub fn of(&self, input: usize, frame: u64, captured_at: u64) -> Option<(u64, &T)> {
         let messages = self.of_input.get(input)?;
-        let latest = messages
-            .iter()
-            .rev()
-            .find(|message| message.frame <= frame)?;
+        let latest = messages.iter().rev().find(|message| message.frame <= frame)?;
         let age = captured_at.saturating_sub(latest.captured_at);
         (age <= self.max_age_nanos).then_some((frame - latest.frame, &latest.item))
     }

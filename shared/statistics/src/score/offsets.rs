@@ -73,9 +73,7 @@ pub fn offsets<'a>(
     let row = |(joint, both): &(&'static str, &[usize])| {
         let shares = [0, 1].map(|axis| {
             let of_person = |it: &Option<[Option<[f64; 2]>; N_JOINTS]>| {
-                let joints = it
-                    .iter()
-                    .flat_map(|it| both.iter().filter_map(|&at| it[at]));
+                let joints = it.iter().flat_map(|it| both.iter().filter_map(|&at| it[at]));
                 Share::of(joints.map(|it| it[axis]))
             };
             people.iter().map(of_person).collect::<Vec<_>>()

@@ -169,11 +169,7 @@ impl Validator<'_> {
     }
 
     fn unique(&mut self, person: &Person, name: Option<String>) -> Result<(), Fault> {
-        let bits = person
-            .joints
-            .iter()
-            .map(|joint| joint.map(f64::to_bits))
-            .collect();
+        let bits = person.joints.iter().map(|joint| joint.map(f64::to_bits)).collect();
         match self.seen.entry((person.image.clone(), bits)) {
             Entry::Occupied(before) => {
                 let before = before.get().clone();

@@ -46,11 +46,7 @@ pub fn parse_line(line: &str) -> Result<(Person, Option<String>), Fault> {
             .zip(&line.joints)
             .map(|(visible, joint)| *visible && joint.is_some())
             .collect(),
-        joints: line
-            .joints
-            .into_iter()
-            .map(|joint| joint.unwrap_or([f64::NAN; 2]))
-            .collect(),
+        joints: line.joints.into_iter().map(|joint| joint.unwrap_or([f64::NAN; 2])).collect(),
     };
     Ok((person, line.name))
 }

@@ -153,9 +153,7 @@ fn annotation_file(path: &Path) -> Result<PathBuf, DatasetError> {
         };
     }
     let has_known_name = is_called(path, LABELS) || is_called(path, JOINTS);
-    let has_lines = path
-        .extension()
-        .is_some_and(|it| it == "jsonl" || it == "json");
+    let has_lines = path.extension().is_some_and(|it| it == "jsonl" || it == "json");
     if has_known_name || has_lines {
         Ok(path.to_owned())
     } else {
@@ -191,9 +189,7 @@ fn numbered_images(folder: &Path, digits: &[usize]) -> ImageOf {
         .collect();
     let is_used = |n_digits: usize, ending: &str| {
         names.iter().any(|name| {
-            let number = name
-                .strip_prefix("im")
-                .and_then(|rest| rest.strip_suffix(ending));
+            let number = name.strip_prefix("im").and_then(|rest| rest.strip_suffix(ending));
             number.is_some_and(|digits| {
                 digits.len() == n_digits && digits.bytes().all(|byte| byte.is_ascii_digit())
             })

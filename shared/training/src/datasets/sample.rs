@@ -109,13 +109,7 @@ mod tests {
     /// A grey image with a round dot at the last joint, smooth so that sampling does not move it.
     fn sample_with_dot(size: Size, joint: [usize; 2]) -> Sample {
         let mut image = Picture::filled(size, [64; 3]);
-        for (at, pixel) in image
-            .rgb_mut()
-            .as_chunks_mut::<3>()
-            .0
-            .iter_mut()
-            .enumerate()
-        {
+        for (at, pixel) in image.rgb_mut().as_chunks_mut::<3>().0.iter_mut().enumerate() {
             let [x, y] = [at % size.width, at / size.width];
             let squared = x.abs_diff(joint[0]).pow(2) + y.abs_diff(joint[1]).pow(2);
             *pixel = [64 + (190.0 * (squared as f64 / -4.5).exp()).round() as u8; 3];

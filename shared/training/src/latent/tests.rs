@@ -93,10 +93,7 @@ fn the_best_pose_near_the_marks_is_found() {
         for level in 0..layout.levels.len() as u16 {
             let of = |part| placements(&model, &layout, level, part, types.as_ref());
             let (heads, trunks, legs) = (of(0), of(1), of(2));
-            for (head, trunk) in heads
-                .iter()
-                .flat_map(|h| trunks.iter().map(move |t| (h, t)))
-            {
+            for (head, trunk) in heads.iter().flat_map(|h| trunks.iter().map(move |t| (h, t))) {
                 for leg in &legs {
                     let parts = vec![*head, *trunk, *leg];
                     let pose = Pose {
@@ -182,9 +179,7 @@ fn the_worst_wrong_pose_maximises_score_plus_loss() {
     let layout = Layout::new(&model, 71, 80).unwrap();
     let pyramid = FeaturePyramid::new(&model, picture.view(), &layout);
     let right = best_near(&model, &pyramid, &layout, &marked, OVERLAP).unwrap();
-    let wrong = Confuser::new(model.clone())
-        .worst(&picture, &marked, 3.0)
-        .unwrap();
+    let wrong = Confuser::new(model.clone()).worst(&picture, &marked, 3.0).unwrap();
     let lost = |pose: &Pose| loss(&model, &layout, &marked, 3.0).of_pose(&model, pose);
     let with_loss = |pose: &Pose| score(&v, &pyramid, pose) + lost(pose);
     assert!(lost(&right) < 0.75, "{}", lost(&right));

@@ -97,10 +97,7 @@ pub(crate) fn begun(
 }
 
 fn is_gain(parameter: &Parameter) -> bool {
-    parameter
-        .name
-        .rsplit_once('.')
-        .is_some_and(|name| name.1 == "gain")
+    parameter.name.rsplit_once('.').is_some_and(|name| name.1 == "gain")
 }
 
 /// Standardised weights as weights and gains.
@@ -129,18 +126,12 @@ fn numbers(constants: &[TensorProto], of: &Parameter) -> Result<Vec<f32>, BeginE
     let Parameter { name, dims, .. } = of;
     let half = format!("{name}.half");
     let named = |tensor: &&TensorProto| {
-        tensor
-            .name
-            .as_ref()
-            .is_some_and(|own| *own == *name || *own == half)
+        tensor.name.as_ref().is_some_and(|own| *own == *name || *own == half)
     };
-    let constant = constants
-        .iter()
-        .find(named)
-        .ok_or_else(|| BeginError::Missing {
-            name: name.clone(),
-            expected: dims.clone(),
-        })?;
+    let constant = constants.iter().find(named).ok_or_else(|| BeginError::Missing {
+        name: name.clone(),
+        expected: dims.clone(),
+    })?;
     let fits = |(got, expected): (&i64, &usize)| usize::try_from(*got) == Ok(*expected);
     if constant.dims.len() != dims.len() || !constant.dims.iter().zip(dims).all(fits) {
         return Err(BeginError::Size {
@@ -154,15 +145,11 @@ fn numbers(constants: &[TensorProto], of: &Parameter) -> Result<Vec<f32>, BeginE
     let values: Vec<f32> = match constant.data_type {
         Some(DataType::FLOAT16) => {
             let (each, _) = bytes.as_chunks::<2>();
-            each.iter()
-                .map(|half| value_of_half(u16::from_le_bytes(*half)))
-                .collect()
+            each.iter().map(|half| value_of_half(u16::from_le_bytes(*half))).collect()
         }
         Some(DataType::FLOAT) => {
             let (each, _) = bytes.as_chunks::<4>();
-            each.iter()
-                .map(|value| f32::from_le_bytes(*value))
-                .collect()
+            each.iter().map(|value| f32::from_le_bytes(*value)).collect()
         }
         _ => Vec::new(),
     };

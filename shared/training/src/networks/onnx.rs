@@ -36,10 +36,7 @@ pub fn write(network: &impl Network, parameters: &[Parameter], document: Documen
             name: document.name,
             producer: Some(("parallax".to_owned(), env!("CARGO_PKG_VERSION").to_owned())),
             metadata: document.metadata,
-            inputs: inputs
-                .iter()
-                .map(|(name, dims)| batched(name, dims))
-                .collect(),
+            inputs: inputs.iter().map(|(name, dims)| batched(name, dims)).collect(),
             ..Graph::default()
         },
         has_half_weights: document.has_half_weights,
@@ -158,8 +155,7 @@ impl<'a> Writer<'a> {
         let (n, cells) = (columns.len(), along.centres.len());
         let columns = columns.iter().map(|column| *column as i64);
         self.graph.ints(&index, columns.collect());
-        self.graph
-            .floats(&centre, &[1, 1, cells], along.centres.clone());
+        self.graph.floats(&centre, &[1, 1, cells], along.centres.clone());
         self.graph.floats(&scale, &[1], vec![along.factor]);
         let axis = vec![("axis", Attribute::Int(1))];
         let places = self.node("Gather", &[&list.name, &index], axis, vec![n]);
@@ -190,9 +186,7 @@ impl<'a> Writer<'a> {
                 let factors: Vec<f32> = factors
                     .map(|(scale, variance)| scale / (variance + EPSILON_OF_BATCH).sqrt())
                     .collect();
-                let channels = weight
-                    .values
-                    .chunks_exact(weight.values.len() / factors.len());
+                let channels = weight.values.chunks_exact(weight.values.len() / factors.len());
                 let weights = channels.zip(&factors);
                 let bias = shift.iter().zip(mean).zip(&factors);
                 Folded {
@@ -201,9 +195,7 @@ impl<'a> Writer<'a> {
                             channel.iter().map(move |value| value * factor)
                         })
                         .collect(),
-                    bias: bias
-                        .map(|((shift, mean), factor)| shift - mean * factor)
-                        .collect(),
+                    bias: bias.map(|((shift, mean), factor)| shift - mean * factor).collect(),
                 }
             }
         }

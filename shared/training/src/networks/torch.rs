@@ -76,11 +76,7 @@ fn tensors(parameters: &[Parameter], learned: &dyn Fn(usize) -> bool) -> Vec<Ten
 
 /// The values in the order of the dimensions.
 fn numbers(value: &Tensor) -> Vec<f32> {
-    let flat = value
-        .detach()
-        .to_kind(Kind::Float)
-        .contiguous()
-        .flatten(0, -1);
+    let flat = value.detach().to_kind(Kind::Float).contiguous().flatten(0, -1);
     Vec::try_from(flat).unwrap_or_default()
 }
 
@@ -115,9 +111,7 @@ impl<'a> Forward<'a> {
         let inputs = network.inputs().into_iter().zip(&shown.inputs);
         Self {
             n: shown.n,
-            inputs: inputs
-                .map(|((name, dims), values)| (name, dims, values.as_slice()))
-                .collect(),
+            inputs: inputs.map(|((name, dims), values)| (name, dims, values.as_slice())).collect(),
             parameters,
             tensors,
             numbers: match precision {
@@ -203,10 +197,7 @@ impl Ops for Forward<'_> {
         let (dims, values) = found.map_or((vec![0], &[][..]), |(_, dims, values)| {
             (dims.clone(), *values)
         });
-        let dims: Vec<i64> = core::iter::once(self.n)
-            .chain(dims)
-            .map(|dim| dim as i64)
-            .collect();
+        let dims: Vec<i64> = core::iter::once(self.n).chain(dims).map(|dim| dim as i64).collect();
         let values = tensor(values, &dims);
         Rc::new(if dims.len() == 4 {
             channels_last(&values).to_kind(self.numbers)
@@ -223,10 +214,8 @@ impl Ops for Forward<'_> {
 
     fn conv(&mut self, map: &Rc<Tensor>, name: &str, conv: Conv) -> Rc<Tensor> {
         let weight = self.weight(name, conv.scaling);
-        let bias = (conv.scaling != Scaling::Batch).then(|| {
-            self.parameter(&format!("{name}.bias"))
-                .to_kind(self.numbers)
-        });
+        let bias = (conv.scaling != Scaling::Batch)
+            .then(|| self.parameter(&format!("{name}.bias")).to_kind(self.numbers));
         let [stride, half] = [conv.stride, conv.kernel / 2].map(|size| size as i64);
         let groups = if conv.by_channel { conv.channels } else { 1 };
         let map = map.conv2d(&weight, bias, stride, half, 1, groups as i64);

@@ -311,13 +311,11 @@ impl<T: Task> Trainer<T> {
             dice: order::dice(nth, !self.task.seed()),
         };
         let mut cost = None;
-        let lesson = self
-            .computer
-            .learn(&network, running, &shown, &mut |outputs| {
-                let costed = self.task.cost(nth, &truth, outputs);
-                cost = Some((shown.n, costed.cost));
-                costed.gradients
-            });
+        let lesson = self.computer.learn(&network, running, &shown, &mut |outputs| {
+            let costed = self.task.cost(nth, &truth, outputs);
+            cost = Some((shown.n, costed.cost));
+            costed.gradients
+        });
         memory.change(&lesson, self.task.step(nth));
         cost
     }

@@ -118,11 +118,7 @@ impl<'a> Trainer<'a> {
                 (*person as usize) < self.plan.n_people()
             }
         };
-        if !it
-            .examples
-            .iter()
-            .all(|it| known(&it.0) && it.1 >= 0.0 && it.1.is_finite())
-        {
+        if !it.examples.iter().all(|it| known(&it.0) && it.1 >= 0.0 && it.1.is_finite()) {
             return damaged("an example is of a person or an image that is not there");
         }
         Ok(())

@@ -153,10 +153,7 @@ impl Trainer<'_> {
             let mut order: Vec<usize> = (0..n).collect();
             let salt = (round * self.settings.passes + pass) * 2 + salt;
             fastrand::Rng::with_seed(self.seed_of(usize::MAX - salt)).shuffle(&mut order);
-            let n_batches = self
-                .album
-                .n_backgrounds()
-                .div_ceil(self.settings.batch.max(1));
+            let n_batches = self.album.n_backgrounds().div_ceil(self.settings.batch.max(1));
             let size = n.div_ceil(n_batches);
             let batch = order.into_iter().skip(batch * size).take(size);
             batch.collect::<Vec<_>>()

@@ -157,8 +157,7 @@ fn off(model: &Model, person: usize) -> f64 {
     let centres = poses[0].centres(&model, &layout);
     let parts = Figures::parts(person);
     let off = centres.iter().zip(&parts);
-    off.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
-        .fold(0.0, f64::max)
+    off.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
 }
 
 #[test]

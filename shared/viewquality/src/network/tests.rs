@@ -17,16 +17,13 @@ const SHAPE: TileShape = TileShape {
 fn of_evidence() -> inference::onnx::Network {
     let k = n_evidence(N_PARTS);
     let mut net = inference::onnx::Network::default();
-    net.inputs
-        .push(("evidence".to_owned(), vec![Side::Fixed(1), Side::Fixed(k)]));
-    net.outputs
-        .push(("sigma".to_owned(), vec![Side::Fixed(1), Side::Fixed(2)]));
+    net.inputs.push(("evidence".to_owned(), vec![Side::Fixed(1), Side::Fixed(k)]));
+    net.outputs.push(("sigma".to_owned(), vec![Side::Fixed(1), Side::Fixed(2)]));
     let mut weights = vec![0.0; 2 * k];
     (weights[0], weights[3]) = (1.0, 1.0);
     net.floats("w", &[k, 2], weights);
     net.node("MatMul", &["evidence", "w"], "sigma", vec![]);
-    net.metadata
-        .push(("parallax.evidence".to_owned(), "1".to_owned()));
+    net.metadata.push(("parallax.evidence".to_owned(), "1".to_owned()));
     net
 }
 
@@ -68,8 +65,7 @@ fn a_network_may_take_both() {
         "evidence".to_owned(),
         vec![Side::Named("n"), Side::Named("k")],
     ));
-    net.metadata
-        .push(("parallax.evidence".to_owned(), "1".to_owned()));
+    net.metadata.push(("parallax.evidence".to_owned(), "1".to_owned()));
     net.nodes.last_mut().unwrap().output = "seen".to_owned();
     net.floats("v", &[k, 2], vec![1.0; 2 * k]);
     net.node("MatMul", &["evidence", "v"], "known", vec![]);
@@ -91,8 +87,7 @@ fn the_card_of_a_file_is_read() {
     let entries = card.entries().into_iter();
     net.metadata = entries.map(|(name, it)| (name.to_owned(), it)).collect();
     assert_eq!(*read(&net).unwrap().card(), card);
-    net.metadata
-        .push(("parallax.tau".to_owned(), "1".to_owned()));
+    net.metadata.push(("parallax.tau".to_owned(), "1".to_owned()));
     assert_eq!(
         rejection(&net),
         "`parallax.tau` is `1`, expected 2 finite numbers from 0"
@@ -108,8 +103,7 @@ fn a_tile_without_fixed_size_has_the_size_in_the_card() {
         "`tile` of the network is [n, 3, h, w], expected [n, 3, H, W] of known height and width, or \
          `parallax.tile`"
     );
-    net.metadata
-        .push(("parallax.tile".to_owned(), "8x6".to_owned()));
+    net.metadata.push(("parallax.tile".to_owned(), "8x6".to_owned()));
     let expected = TileShape {
         height: 8,
         width: 6,
@@ -120,8 +114,7 @@ fn a_tile_without_fixed_size_has_the_size_in_the_card() {
 #[test]
 fn rejects_wrong_shapes_with_the_shape_found_and_expected() {
     let mut net = of_colours();
-    net.metadata
-        .push(("parallax.tile".to_owned(), "160x64".to_owned()));
+    net.metadata.push(("parallax.tile".to_owned(), "160x64".to_owned()));
     assert_eq!(
         rejection(&net),
         "`tile` of the network is [n, 3, 4, 3], expected [n, 3, 160, 64]"

@@ -32,10 +32,7 @@ pub fn score(detector: &Detector, samples: &[Sample]) -> Score {
         let length = right.hypot(towards).max(0.3);
         f64::from(2.0 * (evidence[0] * right + evidence[1] * towards) / length)
     };
-    let ratios: Vec<f64> = samples
-        .par_iter()
-        .map_init(Workspace::default, log_ratio)
-        .collect();
+    let ratios: Vec<f64> = samples.par_iter().map_init(Workspace::default, log_ratio).collect();
     let surprise: f64 = ratios.iter().map(|it| (-it).exp().ln_1p()).sum();
     Score {
         n: ratios.len(),

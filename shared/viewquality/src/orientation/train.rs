@@ -100,10 +100,8 @@ pub fn train(
             let done = step as f32 / n_steps as f32;
             let warm = ((step as f32 + 1.0) / WARM_UP).min(1.0);
             let rate = settings.rate * warm * (1.0 + (std::f32::consts::PI * done).cos()) / 2.0;
-            let varied: Vec<(&Sample, Crop, u64)> = batch
-                .iter()
-                .map(|&at| (&samples[at], vary(&mut rng), rng.u64(..)))
-                .collect();
+            let varied: Vec<(&Sample, Crop, u64)> =
+                batch.iter().map(|&at| (&samples[at], vary(&mut rng), rng.u64(..))).collect();
             loss += trainer.step(&varied, rate);
             step += 1;
         }
@@ -151,10 +149,7 @@ fn beginning(samples: &[Sample], settings: &Settings, rng: &mut Rng) -> Network 
             *variance += (value - mean).powi(2) * share;
         }
     }
-    let inverse = variance
-        .iter()
-        .map(|it: &f32| 1.0 / it.sqrt().max(MIN_DEVIATION))
-        .collect();
+    let inverse = variance.iter().map(|it: &f32| 1.0 / it.sqrt().max(MIN_DEVIATION)).collect();
     let mut normal = |deviation: f32| {
         let radius = (-2.0 * (1.0 - rng.f64()).ln()).sqrt();
         (radius * (std::f64::consts::TAU * rng.f64()).cos()) as f32 * deviation
@@ -217,11 +212,7 @@ impl Trainer {
         for (((sample, crop, seed), sums), of_sums) in batch.iter().zip(&sums).zip(&mut of_sums) {
             let mut kept = vec![1.0; hidden];
             leave_out(&mut kept, UNITS_OUT, seed ^ 0x37);
-            let units: Vec<f32> = sums
-                .iter()
-                .zip(&kept)
-                .map(|(it, k)| it.max(0.0) * k)
-                .collect();
+            let units: Vec<f32> = sums.iter().zip(&kept).map(|(it, k)| it.max(0.0) * k).collect();
             let evidence = network.outputs(&units);
             let [right, towards] = sample.front;
             let front = [if crop.mirrored { -right } else { right }, towards];
@@ -361,8 +352,7 @@ mod tests {
         };
         let on = |n: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build();
-            pool.unwrap()
-                .install(|| train(&samples, &settings, |_| true))
+            pool.unwrap().install(|| train(&samples, &settings, |_| true))
         };
         assert!(on(1) == on(3), "other numbers on three threads");
     }

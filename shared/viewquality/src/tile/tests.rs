@@ -86,9 +86,7 @@ fn beyond_the_frame_its_border_is_repeated() {
 
 #[test]
 fn stripes_finer_than_the_tile_become_grey() {
-    let data: Vec<u8> = (0..64 * 64)
-        .flat_map(|i| [255 * (i % 2) as u8; 3])
-        .collect();
+    let data: Vec<u8> = (0..64 * 64).flat_map(|i| [255 * (i % 2) as u8; 3]).collect();
     let shape = TileShape {
         height: 4,
         width: 4,

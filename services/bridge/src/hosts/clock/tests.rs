@@ -22,8 +22,7 @@ struct Other {
 impl Other {
     fn theirs(&self, ours: u64) -> u64 {
         let drifted = (ours as f64 * self.drift).round() as i64;
-        ours.strict_add_signed(self.offset)
-            .strict_add_signed(drifted)
+        ours.strict_add_signed(self.offset).strict_add_signed(drifted)
     }
 
     fn exchange(&mut self, asked_at: u64) -> Exchange {

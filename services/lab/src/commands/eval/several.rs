@@ -92,10 +92,7 @@ fn everybody_in_lines(report: &Everybody) -> String {
         )
     });
     let people: String = people.collect();
-    let ap = report
-        .ap
-        .iter()
-        .map(|(mm, ap)| format!("{ap:.1} at {mm} mm"));
+    let ap = report.ap.iter().map(|(mm, ap)| format!("{ap:.1} at {mm} mm"));
     format!(
         "{people}everybody: mean of 14 joints {} mm, recall at 500 mm {:.1} %, average precision {} %\n\
          {} changes of an id ({:.2} a minute), {} ids given, {:.2} people put out a frame, {:.2} there, {} frames; intervals: 95 %, over \
@@ -142,11 +139,8 @@ fn chosen(asked: &[usize], n_views: usize) -> Result<Vec<usize>, Failure> {
 
 fn in_lines(report: &Report) -> String {
     let actor = |actor: &ActorReport| {
-        let parts: Vec<String> = actor
-            .parts
-            .iter()
-            .map(|(name, share)| format!("{name} {share:.1}"))
-            .collect();
+        let parts: Vec<String> =
+            actor.parts.iter().map(|(name, share)| format!("{name} {share:.1}")).collect();
         format!(
             "actor {}: found in {} of {} frames, PCP3D {} %, MPJPE {} mm; {}\n",
             actor.actor,

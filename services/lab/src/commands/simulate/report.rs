@@ -142,10 +142,7 @@ mod tests {
             [200.0, 1.5, 0.5, 0.25]
         );
         let mut poses = report();
-        poses["processor_s"]
-            .as_object_mut()
-            .unwrap()
-            .remove("pose-2");
+        poses["processor_s"].as_object_mut().unwrap().remove("pose-2");
         let got = of_run(&poses, Some(&hosts)).unwrap();
         assert_eq!(
             [got.pose_bytes, got.frame_bytes],

@@ -54,8 +54,7 @@ fn fatal(name: &str) -> Result<Fatal, String> {
     }
     let known = FaultKind::ALL.map(FaultKind::name).join(", ");
     let kind = FaultKind::by_name(name);
-    kind.map(Fatal::One)
-        .ok_or_else(|| format!("expected all, or some of {known}"))
+    kind.map(Fatal::One).ok_or_else(|| format!("expected all, or some of {known}"))
 }
 
 impl People {

@@ -101,10 +101,7 @@ pub(super) fn tick(value: f64) -> String {
 pub(super) fn top(most: f64) -> f64 {
     let tenth = 10_f64.powf(most.max(0.01).log10().floor());
     let steps = [1.0, 1.2, 1.6, 2.0, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
-    let fits = steps
-        .into_iter()
-        .map(|it| it * tenth)
-        .find(|it| *it >= most - 1e-9);
+    let fits = steps.into_iter().map(|it| it * tenth).find(|it| *it >= most - 1e-9);
     fits.unwrap_or(10.0 * tenth)
 }
 

@@ -49,16 +49,11 @@ impl Arguments {
 
 fn size(text: &str) -> Result<[usize; 2], String> {
     let side = |side: &str| side.parse().ok().filter(|side| (40..=4096).contains(side));
-    let sides = text
-        .split_once('x')
-        .and_then(|(w, h)| Some([side(w)?, side(h)?]));
+    let sides = text.split_once('x').and_then(|(w, h)| Some([side(w)?, side(h)?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, 40 to 4096 pixels each".to_owned())
 }
 
 fn rate(text: &str) -> Result<f64, String> {
-    let rate = text
-        .parse()
-        .ok()
-        .filter(|rate| (0.0..=1000.0).contains(rate));
+    let rate = text.parse().ok().filter(|rate| (0.0..=1000.0).contains(rate));
     rate.ok_or_else(|| "expected 0 to 1000 hertz".to_owned())
 }

@@ -125,9 +125,7 @@ fn frames(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Points>>>, Failure> {
         if line.facing == Some(Facing::Behind) && parts.len() == skeleton::N_PARTS {
             parts = skeleton::MIRROR.iter().map(|nth| parts[*nth]).collect();
         }
-        let views = frames
-            .entry(line.frame)
-            .or_insert_with(|| vec![None; cameras.len()]);
+        let views = frames.entry(line.frame).or_insert_with(|| vec![None; cameras.len()]);
         views[camera] = Some(parts);
     }
     Ok(frames.into_values().collect())

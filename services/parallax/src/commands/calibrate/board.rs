@@ -166,20 +166,12 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 fn settings(arguments: &Arguments) -> Result<BoardSettings, Failure> {
     let board = arguments.board.clone();
     let board = board.ok_or("--board is missing").or_fail(ExitKind::Usage)?;
-    let frames = arguments
-        .timestamps
-        .as_deref()
-        .map(read_frames)
-        .transpose()?;
+    let frames = arguments.timestamps.as_deref().map(read_frames).transpose()?;
     let options = ReadOptions {
         lenses_suffice: true,
         ..ReadOptions::default()
     };
-    let known = arguments
-        .known
-        .as_ref()
-        .map(|it| inputs::rig(&[it], &options))
-        .transpose()?;
+    let known = arguments.known.as_ref().map(|it| inputs::rig(&[it], &options)).transpose()?;
     Ok(BoardSettings {
         board,
         cameras: cameras(arguments),
@@ -208,11 +200,8 @@ fn settings(arguments: &Arguments) -> Result<BoardSettings, Failure> {
 
 /// One camera for each path; several pictures are one camera where intrinsics alone are wanted.
 fn cameras(arguments: &Arguments) -> Vec<CameraFootage> {
-    let each: Vec<CameraFootage> = arguments
-        .footage
-        .iter()
-        .map(|it| CameraFootage::of(it))
-        .collect();
+    let each: Vec<CameraFootage> =
+        arguments.footage.iter().map(|it| CameraFootage::of(it)).collect();
     let is_picture = |it: &CameraFootage| {
         let path = PathBuf::from(&it.paths[0]);
         path.is_file() && footage::is_image(&path).unwrap_or(false)

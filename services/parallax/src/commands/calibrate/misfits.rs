@@ -63,10 +63,7 @@ fn drawn(walk: &Walk, misfit: &Misfit) -> Result<Option<Vec<u8>>, Failure> {
         count: None,
         ..launch::cameras::source(camera, &walk.deployment.capture)
     };
-    let rate_hz = Source::open(&whole)
-        .or_fail(ExitKind::Input)?
-        .info()
-        .frame_rate_hz;
+    let rate_hz = Source::open(&whole).or_fail(ExitKind::Input)?.info().frame_rate_hz;
     let Some(rate_hz) = rate_hz else {
         return Ok(None);
     };

@@ -138,15 +138,10 @@ fn by_board(
     globals: Globals,
 ) -> Result<nalgebra::Isometry3<f64>, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let cameras: Vec<CameraFootage> = arguments
-        .footage
-        .iter()
-        .map(|it| CameraFootage::of(it))
-        .collect();
-    let places: Vec<usize> = cameras
-        .iter()
-        .map(|it| camera_named(rig, &it.name))
-        .collect::<Result<_, _>>()?;
+    let cameras: Vec<CameraFootage> =
+        arguments.footage.iter().map(|it| CameraFootage::of(it)).collect();
+    let places: Vec<usize> =
+        cameras.iter().map(|it| camera_named(rig, &it.name)).collect::<Result<_, _>>()?;
     let settings = LookSettings {
         every: Some(1),
         first: Some(arguments.frames),

@@ -90,10 +90,7 @@ fn distance(text: &str) -> Result<(String, String, f64), String> {
     let expected = || format!("expected CAMERA:CAMERA=METRES, got {text:?}");
     let (pair, metres) = text.rsplit_once('=').ok_or_else(expected)?;
     let (a, b) = pair.split_once(':').ok_or_else(expected)?;
-    let metres = metres
-        .parse()
-        .ok()
-        .filter(|it| (0.01..=1000.0).contains(it));
+    let metres = metres.parse().ok().filter(|it| (0.01..=1000.0).contains(it));
     Ok((a.to_owned(), b.to_owned(), metres.ok_or_else(expected)?))
 }
 
@@ -101,10 +98,7 @@ fn distance(text: &str) -> Result<(String, String, f64), String> {
 fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
     let rig = inputs::rig_of(&deployment)?;
-    let lacking = deployment
-        .cameras
-        .iter()
-        .find(|it| rig.camera(&it.name).is_none());
+    let lacking = deployment.cameras.iter().find(|it| rig.camera(&it.name).is_none());
     let Some(camera) = lacking else {
         return Ok(());
     };
@@ -179,13 +173,7 @@ fn warn(cautions: &[Doubt], names: &[&str]) -> Result<(), Failure> {
 
 /// How well the worst camera is known.
 fn how_sure(outcome: &Outcome) -> String {
-    let worst = |axis: usize| {
-        outcome
-            .reports
-            .iter()
-            .map(|it| it.sd[axis])
-            .fold(0.0, f64::max)
-    };
+    let worst = |axis: usize| outcome.reports.iter().map(|it| it.sd[axis]).fold(0.0, f64::max);
     format!(
         ", cameras known to {:.2} degrees and {:.0} mm",
         worst(0),
@@ -308,11 +296,7 @@ fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
 
 fn as_json(outcome: &Outcome, names: &[&str], finders: &[String]) -> Value {
     let finite = |it: f64| it.is_finite().then_some(it);
-    let each = names
-        .iter()
-        .zip(&outcome.cameras)
-        .zip(&outcome.reports)
-        .zip(finders);
+    let each = names.iter().zip(&outcome.cameras).zip(&outcome.reports).zip(finders);
     let cameras: Vec<Value> = each
         .map(|(((name, camera), it), finder)| {
             let centre = camera.centre_in_world();
@@ -371,9 +355,7 @@ fn write_page(
     about.extend(found.map(|(name, finder)| (format!("joints of {name}"), finder.clone())));
     about.push((
         "scale".to_owned(),
-        source_of_scale(arguments)
-            .trim_start_matches(", ")
-            .to_owned(),
+        source_of_scale(arguments).trim_start_matches(", ").to_owned(),
     ));
     about.push(("vertical".to_owned(), vertical(outcome).to_owned()));
     let offsets_s: Vec<f64> = outcome.reports.iter().map(|it| it.offset_s[0]).collect();

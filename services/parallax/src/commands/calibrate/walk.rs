@@ -64,11 +64,7 @@ pub(super) struct Walk {
 impl Walk {
     /// The names of the cameras.
     pub(super) fn names(&self) -> Vec<&str> {
-        self.found
-            .cameras
-            .iter()
-            .map(|it| it.name.as_str())
-            .collect()
+        self.found.cameras.iter().map(|it| it.name.as_str()).collect()
     }
 }
 
@@ -103,9 +99,7 @@ pub(super) fn walk(
         }
     }
     let offsets = deployment.cameras.iter();
-    let offsets_s = offsets
-        .map(|it| 1e-3 * it.offset_ms.unwrap_or(0.0))
-        .collect();
+    let offsets_s = offsets.map(|it| 1e-3 * it.offset_ms.unwrap_or(0.0)).collect();
     Ok(Walk {
         deployment,
         found,

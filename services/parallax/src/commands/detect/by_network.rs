@@ -144,9 +144,7 @@ impl Detector<'_> {
         };
         let n = found.len();
         let detections = if n == 1 { "detection" } else { "detections" };
-        let frame = picture
-            .frame
-            .map_or(String::new(), |it| format!(" frame {it}"));
+        let frame = picture.frame.map_or(String::new(), |it| format!(" frame {it}"));
         output::line(format_args!(
             "{}{frame}: {n} {detections} by the network; {how}{turned}",
             picture.path.display()
@@ -260,9 +258,7 @@ impl Person {
         let person = Self {
             outline,
             keypoints: keypoints_json(&sight)?,
-            joints: joints
-                .map(|it| it.map_or([f64::NAN; 2], |it| it.at))
-                .collect(),
+            joints: joints.map(|it| it.map_or([f64::NAN; 2], |it| it.at)).collect(),
             score: scores.iter().sum::<f64>() / scores.len().max(1) as f64,
         };
         Ok((person, next))

@@ -25,10 +25,8 @@ pub(super) fn json() -> String {
     let statuses: Vec<&str> = statuses().map(Status::reason).collect();
     let sides = [Sides::AS_SEEN, Sides::SURE, Sides::UNSURE].map(Sides::name);
     let kept = [Kept::SOLVED, Kept::START].map(Kept::name);
-    let limits: Map<String, Value> = limits()
-        .into_iter()
-        .map(|(name, it)| (name.to_owned(), it.into()))
-        .collect();
+    let limits: Map<String, Value> =
+        limits().into_iter().map(|(name, it)| (name.to_owned(), it.into())).collect();
     let joint_sets: Map<String, Value> = JointSet::ALL.into_iter().map(joint_set).collect();
     let whole = value!({
         "joint_sets": joint_sets, "kept": kept, "limits": limits, "sides": sides, "statuses": statuses,

@@ -283,19 +283,13 @@ mod tests {
 
     #[test]
     fn too_little_space_for_a_few_frames_is_refused() {
-        let refused = forecast(1_723_999_999, [false; 2])
-            .check(Path::new("a"))
-            .unwrap_err();
+        let refused = forecast(1_723_999_999, [false; 2]).check(Path::new("a")).unwrap_err();
         assert_eq!(
             refused.to_string(),
             "there is no room for a: 10 frames of 172.4 MB take 1.7 GB, 1.7 GB are free"
         );
-        forecast(1_724_000_000, [false; 2])
-            .check(Path::new("a"))
-            .unwrap();
-        forecast(1_723_999_999, [false, true])
-            .check(Path::new("a"))
-            .unwrap();
+        forecast(1_724_000_000, [false; 2]).check(Path::new("a")).unwrap();
+        forecast(1_723_999_999, [false, true]).check(Path::new("a")).unwrap();
         let few = Forecast {
             n_frames: Some(2),
             ..forecast(400_000_000, [false; 2])

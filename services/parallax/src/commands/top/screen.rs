@@ -51,10 +51,7 @@ pub(super) fn show(namespace: &Namespace, stop: &Stop, pause: Duration) -> Resul
         first = page.first;
         let page_len = page.len;
         let left = pause.saturating_sub(updated_at.elapsed());
-        for key in terminal
-            .keys(left.min(POLL_INTERVAL))
-            .or_fail(ExitKind::Run)?
-        {
+        for key in terminal.keys(left.min(POLL_INTERVAL)).or_fail(ExitKind::Run)? {
             match key {
                 Key::Quit => return Ok(false),
                 Key::NextPage => first += page_len,
@@ -162,10 +159,7 @@ mod tests {
 
     #[test]
     fn a_long_text_is_shown_page_by_page_and_the_last_page_is_full() {
-        let text = (0..10)
-            .map(|nth| format!("line {nth}"))
-            .collect::<Vec<_>>()
-            .join("\n");
+        let text = (0..10).map(|nth| format!("line {nth}")).collect::<Vec<_>>().join("\n");
         let (lines, shown) = drawn(&text, 4, [80, 5]);
         assert_eq!(lines[..4], ["line 4", "line 5", "line 6", "line 7"]);
         assert!(lines[4].starts_with("lines 5 to 8 of 10; "), "{lines:?}");

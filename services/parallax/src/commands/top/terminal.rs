@@ -81,12 +81,10 @@ impl Terminal {
     /// Returns whether the terminal has been closed.
     pub(super) fn is_gone(&self) -> bool {
         let out = io::stdout();
-        [out.as_fd(), input(self.keyboard.as_ref())]
-            .into_iter()
-            .any(|side| {
-                events(side, PollFlags::empty(), Duration::ZERO)
-                    .is_ok_and(|found| found.intersects(PollFlags::HUP | PollFlags::ERR))
-            })
+        [out.as_fd(), input(self.keyboard.as_ref())].into_iter().any(|side| {
+            events(side, PollFlags::empty(), Duration::ZERO)
+                .is_ok_and(|found| found.intersects(PollFlags::HUP | PollFlags::ERR))
+        })
     }
 
     /// Waits for keys and returns them.

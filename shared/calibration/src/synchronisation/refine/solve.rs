@@ -154,9 +154,8 @@ impl<'a> Sums<'a> {
             }
             let delay_s: f64 = entries.iter().map(|(nth, by)| by * at[*nth]).sum();
             let [slope, curvature] = piece.parabola(delay_s / self.step_s, self.step_s);
-            let block = blocks
-                .entry((piece.joint, piece.block))
-                .or_insert_with(|| DVector::zeros(size));
+            let block =
+                blocks.entry((piece.joint, piece.block)).or_insert_with(|| DVector::zeros(size));
             for &(i, of_i) in entries.iter().filter(|it| !self.fixed[it.0]) {
                 gradient[i] += of_i * slope;
                 block[i] += of_i * slope;
@@ -225,10 +224,7 @@ impl<'a> Sums<'a> {
         };
         let each: Vec<DVector<f64>> = (0..n).map(without).collect();
         let n = n as f64;
-        let mean = each
-            .iter()
-            .fold(DVector::zeros(found.len()), |sum, it| sum + it)
-            / n;
+        let mean = each.iter().fold(DVector::zeros(found.len()), |sum, it| sum + it) / n;
         let squares = each.iter().map(|it| (it - &mean).map(|it| it * it));
         let sum = squares.fold(DVector::zeros(found.len()), |sum, it| sum + it);
         // So few parts tell a variance badly.

@@ -180,9 +180,7 @@ impl Beginnings {
         let is_shared = |hop: &&i64| {
             let of_other = other.peaks.iter();
             (span[0]..span[1]).contains(*hop)
-                && of_other
-                    .clone()
-                    .any(|it| (**hop + offset - it).abs() <= TOGETHER)
+                && of_other.clone().any(|it| (**hop + offset - it).abs() <= TOGETHER)
         };
         self.peaks.iter().filter(is_shared).count()
     }
@@ -191,11 +189,7 @@ impl Beginnings {
 impl Match {
     fn of(first_s: f64, cosines: Vec<f64>) -> Self {
         let or_none = |it: &f64| if it.is_finite() { *it } else { 0.0 };
-        let known: Vec<f64> = cosines
-            .iter()
-            .copied()
-            .filter(|it| it.is_finite())
-            .collect();
+        let known: Vec<f64> = cosines.iter().copied().filter(|it| it.is_finite()).collect();
         let n = known.len().max(1) as f64;
         let mean = known.iter().sum::<f64>() / n;
         let spread = (known.iter().map(|it| (it - mean).powi(2)).sum::<f64>() / n).sqrt();

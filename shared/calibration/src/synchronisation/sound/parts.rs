@@ -36,8 +36,7 @@ struct Line {
 
 impl Drift {
     fn determined(&self) -> Option<Line> {
-        self.line
-            .filter(|it| it.error * it.length_s <= MOST_ERROR_S)
+        self.line.filter(|it| it.error * it.length_s <= MOST_ERROR_S)
     }
 
     /// Its standard error, where it is determined.
@@ -103,11 +102,7 @@ pub(super) fn parts(
     let slope = median(slopes(&points));
     let at_zero_s = median(points.iter().map(|it| it[1] - slope * it[0]).collect());
     let away_s = |it: &[f64; 2]| (it[1] - at_zero_s - slope * it[0]).abs();
-    let mut far: Vec<f64> = points
-        .iter()
-        .map(away_s)
-        .filter(|it| *it > most_s)
-        .collect();
+    let mut far: Vec<f64> = points.iter().map(away_s).filter(|it| *it > most_s).collect();
     let too_many = far.len() as f64 > MOST_AWAY * points.len() as f64;
     far.sort_by(f64::total_cmp);
     let contradiction_s = far.last().filter(|_| too_many).map(|it| [*it, most_s]);
@@ -122,11 +117,7 @@ pub(super) fn parts(
 fn slopes(points: &[[f64; 2]]) -> Vec<f64> {
     let mut slopes = Vec::new();
     for (nth, a) in points.iter().enumerate() {
-        slopes.extend(
-            points[nth + 1..]
-                .iter()
-                .map(|b| (b[1] - a[1]) / (b[0] - a[0])),
-        );
+        slopes.extend(points[nth + 1..].iter().map(|b| (b[1] - a[1]) / (b[0] - a[0])));
     }
     slopes
 }
@@ -144,15 +135,9 @@ fn fitted(points: &[[f64; 2]]) -> Option<Line> {
     let n = points.len() as f64;
     let [x, y] = [0, 1].map(|axis| points.iter().map(|it| it[axis]).sum::<f64>() / n);
     let spread: f64 = points.iter().map(|it| (it[0] - x).powi(2)).sum();
-    let slope = points
-        .iter()
-        .map(|it| (it[0] - x) * (it[1] - y))
-        .sum::<f64>()
-        / spread;
+    let slope = points.iter().map(|it| (it[0] - x) * (it[1] - y)).sum::<f64>() / spread;
     let at_zero_s = y - slope * x;
-    let residuals = points
-        .iter()
-        .map(|it| (it[1] - at_zero_s - slope * it[0]).powi(2));
+    let residuals = points.iter().map(|it| (it[1] - at_zero_s - slope * it[0]).powi(2));
     let variance = (residuals.sum::<f64>() / (n - 2.0)).max(HEARD_S.powi(2));
     let ends = points.iter().map(|it| it[0]);
     let [first, last] = [

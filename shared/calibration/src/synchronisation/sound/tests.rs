@@ -70,10 +70,7 @@ impl Room {
             Sound {
                 rate_hz: RATE_HZ,
                 begins_s: 0.0,
-                samples: heard
-                    .iter()
-                    .map(|it| it.clamp(-32e3, 32e3) as i16)
-                    .collect(),
+                samples: heard.iter().map(|it| it.clamp(-32e3, 32e3) as i16).collect(),
             }
         })
         .collect()

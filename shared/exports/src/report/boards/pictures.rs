@@ -46,12 +46,7 @@ pub(super) fn corners(camera: &CameraOutcome) -> Html {
         middle[0],
         middle[1]
     );
-    for it in camera
-        .residuals
-        .iter()
-        .step_by(step)
-        .filter(|it| !it.is_wrong && is_known(it))
-    {
+    for it in camera.residuals.iter().step_by(step).filter(|it| !it.is_wrong && is_known(it)) {
         let at =
             [0, 1].map(|axis| middle[axis] + (PIXEL * it.off[axis]).clamp(-0.5 * PLOT, 0.5 * PLOT));
         put!(

@@ -38,9 +38,7 @@ struct Frame {
 impl Frame {
     fn of(points: &[Vector2<f64>]) -> Self {
         let finite = points.iter().filter(|it| it.iter().all(|c| c.is_finite()));
-        let low = finite
-            .clone()
-            .fold(Vector2::repeat(f64::MAX), |low, it| low.inf(it));
+        let low = finite.clone().fold(Vector2::repeat(f64::MAX), |low, it| low.inf(it));
         let high = finite.fold(Vector2::repeat(f64::MIN), |high, it| high.sup(it));
         let extent = (high - low).max().max(1e-6);
         Self {
@@ -71,10 +69,7 @@ fn view(out: &mut Html, page: &Page<'_>, map: &Matrix2x3<f64>) {
         .boards
         .iter()
         .step_by(step)
-        .map(|(_, pose)| {
-            page.outline
-                .map(|it| map * (pose * Point3::new(it.x, it.y, 0.0)).coords)
-        })
+        .map(|(_, pose)| page.outline.map(|it| map * (pose * Point3::new(it.x, it.y, 0.0)).coords))
         .collect();
     let ends = cameras.iter().flat_map(|it| [it.0, it.1]);
     let all: Vec<Vector2<f64>> = ends.chain(boards.iter().flatten().copied()).collect();

@@ -49,11 +49,7 @@ pub(crate) fn model(spec: &ModelSpec) -> Mat {
 
 /// `biasid`, `filterid`, `defid`, `parent` of a part.
 fn component(part: &PartSpec, biases: &mut Vec<f64>, springs: &mut Vec<Mat>) -> [Mat; 4] {
-    let filter_ids = part
-        .filter_of_type
-        .iter()
-        .map(|&it| it as f64 + 1.0)
-        .collect();
+    let filter_ids = part.filter_of_type.iter().map(|&it| it as f64 + 1.0).collect();
     let Some(edge) = &part.edge else {
         let nothing = Mat::Numbers(vec![0, 0], vec![]);
         return [number(1.0), row(filter_ids), nothing, number(0.0)];
@@ -92,7 +88,5 @@ fn component(part: &PartSpec, biases: &mut Vec<f64>, springs: &mut Vec<Mat>) -> 
 }
 
 fn parent_id(part: &PartSpec) -> f64 {
-    part.edge
-        .as_ref()
-        .map_or(0.0, |edge| edge.parent as f64 + 1.0)
+    part.edge.as_ref().map_or(0.0, |edge| edge.parent as f64 + 1.0)
 }

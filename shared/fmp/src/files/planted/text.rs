@@ -109,11 +109,8 @@ fn springs(springs: &[Spring]) -> String {
 
 fn components(spec: &ModelSpec, owned: &Owned) -> String {
     let (n_parts, n_types) = (spec.parts.len(), n_types(spec));
-    let filter_ids = (0..n_types).flat_map(|own| {
-        spec.parts
-            .iter()
-            .map(move |part| part.filter_of_type[own] + 1)
-    });
+    let filter_ids = (0..n_types)
+        .flat_map(|own| spec.parts.iter().map(move |part| part.filter_of_type[own] + 1));
     let parents = spec
         .parts
         .iter()

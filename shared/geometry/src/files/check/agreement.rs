@@ -59,17 +59,14 @@ pub fn epipolar_check(rig: &Rig, points: &[Vec<Option<Point2<f64>>>]) -> Epipola
             }));
         }
     }
-    let cameras = of_camera
-        .into_iter()
-        .enumerate()
-        .filter_map(|(camera, errors)| {
-            let n_points = errors.len();
-            Sorted::new(errors).median().map(|median_px| CameraError {
-                camera,
-                n_points,
-                median_px,
-            })
-        });
+    let cameras = of_camera.into_iter().enumerate().filter_map(|(camera, errors)| {
+        let n_points = errors.len();
+        Sorted::new(errors).median().map(|median_px| CameraError {
+            camera,
+            n_points,
+            median_px,
+        })
+    });
     EpipolarReport {
         pairs,
         cameras: cameras.collect(),

@@ -93,12 +93,10 @@ impl Storage {
         if text.trim_start().starts_with('<') {
             return xml::parse(text).map(Self);
         }
-        yaml::parse(text)
-            .map(Self)
-            .map_err(|error| ParseError::Syntax {
-                format: "YAML",
-                source: Box::new(error),
-            })
+        yaml::parse(text).map(Self).map_err(|error| ParseError::Syntax {
+            format: "YAML",
+            source: Box::new(error),
+        })
     }
 
     /// Adds the entries of another storage; an entry that exists already is kept.
@@ -115,18 +113,12 @@ impl Storage {
 
     /// Whether an entry has the name of a camera as its suffix.
     pub(super) fn has_suffixed(&self) -> bool {
-        self.0
-            .keys()
-            .any(|key| key.starts_with("K_") || key.starts_with("Rot_"))
+        self.0.keys().any(|key| key.starts_with("K_") || key.starts_with("Rot_"))
     }
 
     /// The names of the cameras: the list, or what follows `K_`.
     pub(super) fn camera_names(&self) -> Result<Vec<String>, ParseError> {
-        let keys = self
-            .0
-            .keys()
-            .filter_map(|key| key.strip_prefix("K_"))
-            .map(str::to_owned);
+        let keys = self.0.keys().filter_map(|key| key.strip_prefix("K_")).map(str::to_owned);
         match self.names() {
             None => Ok(keys.collect()),
             Some(Entry::List(names)) => names.iter().map(name).collect(),
@@ -136,8 +128,7 @@ impl Storage {
 
     /// The first entry that has one of `keys` for its name.
     pub(super) fn find<'k>(&self, keys: &'k [String]) -> Option<(&'k str, &Entry)> {
-        keys.iter()
-            .find_map(|key| Some((key.as_str(), self.0.get(key)?)))
+        keys.iter().find_map(|key| Some((key.as_str(), self.0.get(key)?)))
     }
 
     /// The numbers under one of `keys`.

@@ -49,17 +49,11 @@ fn the_valid_files_are_read() {
     let options = ReadOptions::default();
     let files = valid_files();
     assert_eq!(
-        own::parse(&files[0], &options)
-            .expect("own")
-            .cameras()
-            .len(),
+        own::parse(&files[0], &options).expect("own").cameras().len(),
         2
     );
     assert_eq!(
-        qualisys::parse(&files[6], &options)
-            .expect("qualisys")
-            .cameras()
-            .len(),
+        qualisys::parse(&files[6], &options).expect("qualisys").cameras().len(),
         1
     );
 }

@@ -34,10 +34,7 @@ fn person(at: Vector3<f64>, turn: f64, arms: [f64; 2]) -> Vec<Point3<f64>> {
         );
     }
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), turn);
-    points
-        .into_iter()
-        .map(|point| Point3::from(turn * point + at))
-        .collect()
+    points.into_iter().map(|point| Point3::from(turn * point + at)).collect()
 }
 
 /// Detections of a person by several cameras, frame by frame.
@@ -60,10 +57,7 @@ impl Film {
             chance();
         });
         Self {
-            grid: cameras
-                .iter()
-                .map(|_| [2.0 * chance(), 2.0 * chance()])
-                .collect(),
+            grid: cameras.iter().map(|_| [2.0 * chance(), 2.0 * chance()]).collect(),
             lost: vec![[0; 2]; cameras.len()],
             cameras: cameras.to_vec(),
             chance: Box::new(chance),
@@ -132,9 +126,7 @@ fn reported(real: &[Camera], believed: Vec<Camera>, seed: u64, n_frames: usize) 
     let mut film = Film::new(real, seed, true);
     let mut watch = RigWatch::new(believed);
     (0..n_frames).for_each(|_| watch.note(&film.next()));
-    (0..real.len())
-        .filter(|view| watch.is_reported(*view))
-        .collect()
+    (0..real.len()).filter(|view| watch.is_reported(*view)).collect()
 }
 
 #[test]

@@ -68,9 +68,7 @@ fn the_category_of_people_gives_the_names_and_others_are_passed_over() {
     let strange = text.replace("left_hip", "k0");
     assert!(refused(&strange).contains("category 1"));
     let given = NameSet::of_set("coco-17").unwrap();
-    let told = parse(text.as_bytes(), Some(&given))
-        .unwrap_err()
-        .to_string();
+    let told = parse(text.as_bytes(), Some(&given)).unwrap_err().to_string();
     assert!(
         told.contains("annotations[0].keypoints") && told.contains("6 numbers, expected 51"),
         "{told}"

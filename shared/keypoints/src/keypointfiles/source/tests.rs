@@ -126,9 +126,8 @@ fn one_file_in_the_layout_of_coco_has_all_frames() {
     let source = KeypointSource::open(&folder.path().join("results.json"), None).unwrap();
     assert_eq!((source.n_frames(), source.names().n()), (3, 17));
     let mut people = Vec::new();
-    let of: Vec<Option<usize>> = (0..4)
-        .map(|it| source.of_frame(it, &mut people).unwrap())
-        .collect();
+    let of: Vec<Option<usize>> =
+        (0..4).map(|it| source.of_frame(it, &mut people).unwrap()).collect();
     assert_eq!(of, [Some(1), None, Some(1), None]);
     let error = KeypointSource::open(&folder.path().join("frame.json"), None).unwrap_err();
     assert!(error.to_string().contains("frame.json: expected"));
@@ -158,9 +157,7 @@ fn the_other_25_keypoints_of_openpose_are_not_taken_for_the_usual_ones() {
         let folder = folder(files);
         let names = names.map(|it| NameSet::of_set(it).unwrap());
         let opened = KeypointSource::open(folder.path(), names);
-        opened
-            .map(|it| it.names().clone())
-            .map_err(|it| it.to_string())
+        opened.map(|it| it.names().clone()).map_err(|it| it.to_string())
     };
     let taken = open(
         &[("1.json", &usual), ("2.json", &usual), ("3.json", &other)],

@@ -19,9 +19,7 @@ fn moved(joints: &Joints, joint: usize, by: [f64; 3]) -> Joints {
 fn dropped(joints: &Joints) -> Vec<usize> {
     let verdict = verdict(joints);
     assert_eq!(verdict.nobody, None);
-    (0..N_JOINTS)
-        .filter(|joint| verdict.dropped[*joint])
-        .collect()
+    (0..N_JOINTS).filter(|joint| verdict.dropped[*joint]).collect()
 }
 
 #[test]
@@ -73,11 +71,7 @@ fn a_child_is_possible_with_noise() {
     let mut random = fastrand::Rng::with_seed(2);
     let person = testing::walking(0.95);
     let n_nobody = (0..300)
-        .filter(|_| {
-            verdict(&testing::noisy(&person, 0.04, 0.02, &mut random))
-                .nobody
-                .is_some()
-        })
+        .filter(|_| verdict(&testing::noisy(&person, 0.04, 0.02, &mut random)).nobody.is_some())
         .count();
     assert!(n_nobody < 6, "{n_nobody}");
 }

@@ -40,9 +40,7 @@ impl State {
     }
 
     fn bone(&self, bone: usize) -> Vector3<f64> {
-        let [a, b] = BONES[bone]
-            .from
-            .map(|joint| Point3::from(self.joints[joint]));
+        let [a, b] = BONES[bone].from.map(|joint| Point3::from(self.joints[joint]));
         self.joints[BONES[bone].to] - nalgebra::center(&a, &b).coords
     }
 }
@@ -144,10 +142,7 @@ impl Row {
             Of::Learned { bone, .. } => add(bone, 1.0),
             Of::Share { bone } => {
                 add(bone, 1.0);
-                it.by_stature = -BONES[bone]
-                    .kind
-                    .proportion()
-                    .length_by_stature(state.stature);
+                it.by_stature = -BONES[bone].kind.proportion().length_by_stature(state.stature);
             }
             Of::Sides { right, left } => {
                 add(right, 1.0);

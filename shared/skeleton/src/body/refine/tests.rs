@@ -116,9 +116,7 @@ fn covariances_are_the_inverse_of_the_normal_matrix() {
     let mut normal = SMatrix::<f64, 43, 43>::zeros();
     for joint in 0..N_JOINTS {
         let weight = problem.weights[joint];
-        normal
-            .view_mut((3 * joint, 3 * joint), (3, 3))
-            .copy_from(&weight);
+        normal.view_mut((3 * joint, 3 * joint), (3, 3)).copy_from(&weight);
     }
     normal[(42, 42)] = 1.0 / STATURE_VARIANCE;
     for (row, loss) in problem.rows.iter().flatten().zip(problem.losses) {
@@ -162,9 +160,7 @@ fn the_result_is_a_minimum() {
             stature: 1.2 + f64::from(mm) / 1000.0,
             ..*state
         };
-        (0..1000)
-            .map(|mm| problem.cost(&of(mm)))
-            .fold(f64::INFINITY, f64::min)
+        (0..1000).map(|mm| problem.cost(&of(mm))).fold(f64::INFINITY, f64::min)
     };
     let least = cost(&state);
     for joint in 0..N_JOINTS {

@@ -80,12 +80,10 @@ pub(crate) fn read(file: &Path, options: &Options) -> Result<Sequence, SequenceE
     let mut cameras = Vec::new();
     let mut views = Vec::new();
     for entry in &description.camera {
-        let camera = all
-            .camera(&entry.name)
-            .ok_or_else(|| SequenceError::NoCamera {
-                path: rig_file.clone(),
-                name: entry.name.clone(),
-            })?;
+        let camera = all.camera(&entry.name).ok_or_else(|| SequenceError::NoCamera {
+            path: rig_file.clone(),
+            name: entry.name.clone(),
+        })?;
         cameras.push(camera.clone());
         views.push(View {
             camera: entry.name.clone(),
@@ -99,13 +97,9 @@ pub(crate) fn read(file: &Path, options: &Options) -> Result<Sequence, SequenceE
         SequenceError::Cameras { path, source }
     })?;
     let (joints, frames) = truth(file, folder, &description.truth, options)?;
-    let action = description
-        .action
-        .unwrap_or_else(|| description.name.clone());
+    let action = description.action.unwrap_or_else(|| description.name.clone());
     Ok(Sequence {
-        dataset: description
-            .dataset
-            .unwrap_or_else(|| description.name.clone()),
+        dataset: description.dataset.unwrap_or_else(|| description.name.clone()),
         name: description.name,
         subject: description.subject,
         action,
@@ -150,16 +144,10 @@ fn truth(
     };
     let columns = truth.markers.iter().map(column);
     let columns: Vec<usize> = columns.collect::<Result<_, _>>()?;
-    let place = |point: Point| {
-        truth
-            .world_from_file
-            .map(|axis| metres * point[axis as usize])
-    };
+    let place = |point: Point| truth.world_from_file.map(|axis| metres * point[axis as usize]);
     let frame = |row: usize| {
         let index = truth.first_frame + row as u64;
-        let joints = columns
-            .iter()
-            .map(|&column| trc.frames[row][column].map(place));
+        let joints = columns.iter().map(|&column| trc.frames[row][column].map(place));
         Frame {
             number: index,
             index,

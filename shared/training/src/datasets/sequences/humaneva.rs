@@ -95,9 +95,7 @@ pub(crate) fn read_subject(
 }
 
 fn trial(folder: &Path, action: &str) -> PathBuf {
-    folder
-        .join("Mocap_Data")
-        .join(format!("{action}_{TRIAL}.c3d"))
+    folder.join("Mocap_Data").join(format!("{action}_{TRIAL}.c3d"))
 }
 
 fn read(folder: &Path, test: &PaperTest, options: &Options) -> Result<Sequence, SequenceError> {
@@ -112,9 +110,7 @@ fn read(folder: &Path, test: &PaperTest, options: &Options) -> Result<Sequence, 
     })?;
     let frame = |number: u64| {
         let joints = body.joints(sync.motion_at(number))?;
-        let joints = joints
-            .iter()
-            .map(|joint| Some(joint.map(|value| value * metres)));
+        let joints = joints.iter().map(|joint| Some(joint.map(|value| value * metres)));
         Some(Frame {
             number,
             index: number - 1,

@@ -72,9 +72,8 @@ pub fn read_motion(
     let trial = trial.part(file, options)?;
     let columns = Columns::new(file, &trial, &table, options)?;
     let names = PARSE14.joints.iter().map(|it| it.name);
-    let joints: Vec<Vec<[f64; 3]>> = names
-        .map(|joint| columns.joint(&table, joint))
-        .collect::<Result<_, _>>()?;
+    let joints: Vec<Vec<[f64; 3]>> =
+        names.map(|joint| columns.joint(&table, joint)).collect::<Result<_, _>>()?;
     let toes = if table.has_toes() {
         let [right, left] = ["right toes", "left toes"].map(|joint| columns.joint(&table, joint));
         Some((right?, left?))
@@ -84,9 +83,7 @@ pub fn read_motion(
     let n = trial.frames.len();
     let motion = Motion {
         rate_hz: trial.rate_hz,
-        joints: (0..n)
-            .map(|frame| core::array::from_fn(|joint| joints[joint][frame]))
-            .collect(),
+        joints: (0..n).map(|frame| core::array::from_fn(|joint| joints[joint][frame])).collect(),
         toes: toes.map(|(right, left)| right.into_iter().zip(left).map(<[_; 2]>::from).collect()),
     };
     check::check(file, &motion)?;
@@ -139,9 +136,7 @@ impl<'a> Columns<'a> {
                     }
                 })?;
             let upright = points.into_iter().map(|point| table.upright(point));
-            let points = upright
-                .map(|point| point.map(|value| value * metres))
-                .collect();
+            let points = upright.map(|point| point.map(|value| value * metres)).collect();
             of_marker.push((name.to_owned(), points));
         }
         Ok(Self { path, of_marker })

@@ -43,11 +43,7 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
         let what = format!("{format:?} {version}, expected \"parallax-truth\" 2");
         return Err(invalid(&path, 1, what));
     }
-    if !header
-        .joints
-        .iter()
-        .eq(PARSE14.joints.iter().map(|it| it.name))
-    {
+    if !header.joints.iter().eq(PARSE14.joints.iter().map(|it| it.name)) {
         return Err(invalid(&path, 1, "joints other than the 14 of PARSE"));
     }
     let mut frames = Vec::new();
@@ -72,11 +68,7 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
     }
     let view = |camera: &String| View {
         camera: camera.clone(),
-        source: folder
-            .join("cameras")
-            .join(camera)
-            .to_string_lossy()
-            .into_owned(),
+        source: folder.join("cameras").join(camera).to_string_lossy().into_owned(),
         first: 0,
         source_offset_px: None,
     };

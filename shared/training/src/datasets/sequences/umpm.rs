@@ -53,9 +53,8 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
             Alignment::OneLate => index.checked_sub(1)?,
         };
         let points = &trial.frame(nth * POSES_PER_FRAME)[..n_joints];
-        let joints = points
-            .iter()
-            .map(|joint| joint.map(|point| point.map(|value| value * metres)));
+        let joints =
+            points.iter().map(|joint| joint.map(|point| point.map(|value| value * metres)));
         Some(Frame {
             number: index as u64 + 1,
             index: index as u64,

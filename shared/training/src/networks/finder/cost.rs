@@ -135,9 +135,8 @@ mod tests {
         };
         (truth.heat[3], truth.heat[8], truth.heat[5]) = (1.0, 1.0, -1.0);
         truth.sides[2] = 0.0;
-        let mut found: Vec<f32> = (0..2 * CHANNELS * cells)
-            .map(|_| 3.0 * rng.f32() - 1.5)
-            .collect();
+        let mut found: Vec<f32> =
+            (0..2 * CHANNELS * cells).map(|_| 3.0 * rng.f32() - 1.5).collect();
         // Where a side is that of the truth, the cost has a corner.
         for (nth, side) in truth.sides.iter().enumerate() {
             let [sample, within] = [nth / (4 * cells), nth % (4 * cells)];

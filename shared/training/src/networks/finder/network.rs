@@ -96,9 +96,7 @@ impl Network for Shape {
 /// The parameters of an untrained network, which finds nobody.
 pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
     let mut all = parameters::initial(shape, seed);
-    let bias = all
-        .iter_mut()
-        .find(|parameter| parameter.name == "boxes.bias");
+    let bias = all.iter_mut().find(|parameter| parameter.name == "boxes.bias");
     if let Some(bias) = bias {
         bias.values[0] = HEAT_BIAS;
         bias.values[1..].copy_from_slice(&SIDE_BIAS);

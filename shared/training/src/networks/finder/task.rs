@@ -198,10 +198,8 @@ impl Task for FinderTask<'_> {
     fn batch(&self, nth: usize) -> Batch<Shape, Truth> {
         let n = self.settings.batch;
         let network = self.shape_at(nth);
-        let seen: Vec<FinderSample> = (0..n)
-            .into_par_iter()
-            .map(|at| self.sample(nth * n + at, &network))
-            .collect();
+        let seen: Vec<FinderSample> =
+            (0..n).into_par_iter().map(|at| self.sample(nth * n + at, &network)).collect();
         let joined = |part: &dyn Fn(&FinderSample) -> &[f32]| -> Vec<f32> {
             seen.iter().flat_map(part).copied().collect()
         };
@@ -240,10 +238,8 @@ impl Task for FinderTask<'_> {
         let n = CHANNELS * shape.cells().pow(2);
         let mut tally = Tally::default();
         for pictures in self.kept.chunks(JUDGED_AT_ONCE) {
-            let seen: Vec<FinderSample> = pictures
-                .par_iter()
-                .map(|picture| plain(picture, shape))
-                .collect();
+            let seen: Vec<FinderSample> =
+                pictures.par_iter().map(|picture| plain(picture, shape)).collect();
             let outputs = find(&shown(&seen));
             let found = outputs.first().map_or(&[][..], Vec::as_slice);
             for (picture, found) in pictures.iter().zip(found.chunks_exact(n)) {

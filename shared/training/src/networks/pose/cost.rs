@@ -180,10 +180,7 @@ mod tests {
             places: numbers(n * N_KEYPOINTS * 2),
         };
         truth.places[4] = f32::NAN;
-        let maps: Vec<f32> = numbers(truth.maps.len())
-            .iter()
-            .map(|x| 8.0 * x - 4.0)
-            .collect();
+        let maps: Vec<f32> = numbers(truth.maps.len()).iter().map(|x| 8.0 * x - 4.0).collect();
         check(&maps, &|maps| truth.of_maps(maps));
         check(&numbers(n * 2), &|front| truth.of_front(front));
         let logarithms: Vec<f32> = numbers(n * N_KEYPOINTS).iter().map(|x| x - 2.0).collect();

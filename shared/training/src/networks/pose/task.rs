@@ -86,10 +86,8 @@ impl<'a> KeptApart<'a> {
     /// In turn [`RUN`] for the one and for the other: neighbours in a list can be pictures of one person. All for both where
     /// they are too few.
     fn new(people: &'a [Person]) -> Self {
-        let (calibrating, judged): (Vec<_>, Vec<_>) = people
-            .iter()
-            .enumerate()
-            .partition(|(at, _)| (at / RUN).is_multiple_of(2));
+        let (calibrating, judged): (Vec<_>, Vec<_>) =
+            people.iter().enumerate().partition(|(at, _)| (at / RUN).is_multiple_of(2));
         let people_of = |numbered: Vec<(usize, &'a Person)>| -> Vec<&'a Person> {
             numbered.into_iter().map(|(_, person)| person).collect()
         };
@@ -386,10 +384,8 @@ fn truth(seen: &[NetworkSample], shape: &Shape) -> Truth {
 
 fn score(find: &dyn Fn(&Shown) -> Vec<Vec<f32>>, shape: &Shape, people: &[&Person]) -> Score {
     let judged = people.chunks(JUDGED_AT_ONCE).flat_map(|people| {
-        let seen: Vec<NetworkSample> = people
-            .par_iter()
-            .filter_map(|person| plain(person, shape))
-            .collect();
+        let seen: Vec<NetworkSample> =
+            people.par_iter().filter_map(|person| plain(person, shape)).collect();
         let found = Found::new(find(&shown(&seen)));
         let each = seen.iter().enumerate();
         let each = each.map(|(at, seen)| judged(&found, seen, (at, shape.cells())));

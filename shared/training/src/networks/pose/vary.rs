@@ -309,10 +309,8 @@ pub(in crate::networks) fn recolour(rgb: &mut [[f32; 3]], grey: f32, rng: &mut R
 }
 
 fn sample(person: &Person, shape: &Shape, view: &View, rgb: &[[f32; 3]]) -> NetworkSample {
-    let picture = (0..3).flat_map(|channel| {
-        rgb.iter()
-            .map(move |pixel| (pixel[channel] - MEAN) / DEVIATION)
-    });
+    let picture =
+        (0..3).flat_map(|channel| rgb.iter().map(move |pixel| (pixel[channel] - MEAN) / DEVIATION));
     let picture = picture.collect();
     let targets = if view.is_mirrored {
         exchange_sides(&person.targets)

@@ -53,20 +53,13 @@ impl Judgement {
         };
         for (part, tau) in tau.iter().enumerate() {
             let expected: Vec<f32> = predicted[..n].iter().map(|values| values[part]).collect();
-            let actual: Vec<f32> = truth
-                .iter()
-                .map(|sample| sample.errors_px[part] / sample.height_px)
-                .collect();
+            let actual: Vec<f32> =
+                truth.iter().map(|sample| sample.errors_px[part] / sample.height_px).collect();
             let beyond: Vec<bool> = actual.iter().map(|error| error > tau).collect();
-            let off = expected
-                .iter()
-                .zip(&actual)
-                .map(|(a, b)| f64::from((a - b).abs()));
+            let off = expected.iter().zip(&actual).map(|(a, b)| f64::from((a - b).abs()));
             let n_beyond = beyond.iter().filter(|is_beyond| **is_beyond).count();
             judgement.area.push(area(&expected, &beyond));
-            judgement
-                .rank_correlation
-                .push(rank_correlation(&expected, &actual));
+            judgement.rank_correlation.push(rank_correlation(&expected, &actual));
             judgement.inaccuracy.push(off.sum::<f64>() / n as f64);
             judgement.beyond.push(n_beyond as f64 / n as f64);
         }

@@ -83,11 +83,7 @@ impl Samples {
             let sound = sample.picture.len() == 3 * rows * cols
                 && sample.evidence.len() == n_evidence(N_PARTS)
                 && sample.errors_px.len() == N_PARTS
-                && sample
-                    .evidence
-                    .iter()
-                    .chain(&sample.errors_px)
-                    .all(|value| value.is_finite())
+                && sample.evidence.iter().chain(&sample.errors_px).all(|value| value.is_finite())
                 && sample.height_px.is_finite()
                 && sample.height_px > 0.0;
             if !sound {

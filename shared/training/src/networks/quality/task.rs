@@ -185,9 +185,7 @@ impl<'a> QualityTask<'a> {
     fn judgement(&self, predicted: &[Vec<f32>], samples: &[&Sample]) -> Judgement {
         let unit: viewquality::Unit = self.settings.unit.into();
         let share = |value: &f32| unit.error(*value, 1.0).unwrap_or(0.0);
-        let shares = predicted
-            .iter()
-            .map(|values| values.iter().map(share).collect());
+        let shares = predicted.iter().map(|values| values.iter().map(share).collect());
         Judgement::new(&shares.collect::<Vec<Vec<f32>>>(), samples, &self.tau)
     }
 }
@@ -338,9 +336,7 @@ impl Trainer<QualityTask<'_>> {
         let settings = self.task().settings;
         let kind = settings.network;
         let card = Card {
-            tile: kind
-                .tile()
-                .map(|[height, width]| TileShape { height, width }),
+            tile: kind.tile().map(|[height, width]| TileShape { height, width }),
             colours: Normalisation::IMAGENET,
             evidence: kind.sees_evidence().then_some(EVIDENCE_VERSION),
             unit: settings.unit.into(),
@@ -350,9 +346,7 @@ impl Trainer<QualityTask<'_>> {
         let entries = card.entries().into_iter();
         self.file(Document {
             name: kind.name().to_owned(),
-            metadata: entries
-                .map(|(key, value)| (key.to_owned(), value))
-                .collect(),
+            metadata: entries.map(|(key, value)| (key.to_owned(), value)).collect(),
             has_half_weights: false,
             ..Document::default()
         })

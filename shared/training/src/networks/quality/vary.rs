@@ -183,11 +183,7 @@ fn blur(planes: &mut [f32], tile: TileShape, deviation: f32) {
         line.extend((0..n).map(|at| plane[first + at * step]));
         for i in 0..n {
             let near = |k: usize| (i as i64 + k as i64 - reach).clamp(0, n as i64 - 1) as usize;
-            let sum = weights
-                .iter()
-                .enumerate()
-                .map(|(k, w)| w * line[near(k)])
-                .sum();
+            let sum = weights.iter().enumerate().map(|(k, w)| w * line[near(k)]).sum();
             plane[first + i * step] = sum;
         }
     };

@@ -142,11 +142,7 @@ mod tests {
     fn every_convolution_gets_its_weights() {
         let read = parse(&file(|_| ())).unwrap();
         assert_eq!(read.len(), 26);
-        let of = |name: &str| {
-            read.iter()
-                .find(|parameter| parameter.name == name)
-                .unwrap()
-        };
+        let of = |name: &str| read.iter().find(|parameter| parameter.name == name).unwrap();
         assert_eq!(of("conv1_1.weight").dims, [64, 3, 3, 3]);
         assert_eq!(of("conv3_2.bias").values, [12.0; 256]);
         assert_eq!(of("conv5_3.weight").values[0], 28.0);

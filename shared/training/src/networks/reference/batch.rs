@@ -63,9 +63,7 @@ impl Normalisation {
         for (channel, (mean, inverse)) in self.means.iter().zip(&self.inverse).enumerate() {
             let runs = (0..self.n).map(|sample| self.run(sample, channel));
             let shift: f32 = runs.clone().map(|run| sum(&gradient[run])).sum();
-            let along: f32 = runs
-                .map(|run| dot(&gradient[run.clone()], &from[run]))
-                .sum();
+            let along: f32 = runs.map(|run| dot(&gradient[run.clone()], &from[run])).sum();
             of.scale.push((along - mean * shift) * inverse);
             of.shift.push(shift);
         }

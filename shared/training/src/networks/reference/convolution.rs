@@ -153,9 +153,8 @@ impl Sizes {
     pub(super) fn forward(&self, map: &[f32], weights: &[f32], bias: Option<&[f32]>) -> Vec<f32> {
         let n = map.len() / self.n_from();
         let mut all = vec![0.0; n * self.n_to()];
-        let samples = all
-            .par_chunks_exact_mut(self.n_to())
-            .zip(map.par_chunks_exact(self.n_from()));
+        let samples =
+            all.par_chunks_exact_mut(self.n_to()).zip(map.par_chunks_exact(self.n_from()));
         samples.for_each_init(Vec::new, |columns, (to, map)| {
             if let Some(bias) = bias {
                 for (channel, bias) in to.chunks_exact_mut(self.cells_to()).zip(bias) {
@@ -239,9 +238,7 @@ impl Sizes {
         let mut of_bias = vec![0.0; self.to[0]];
         let mut columns = Vec::new();
         let mut of_map = of_map.chunks_exact_mut(self.n_from());
-        let samples = map
-            .chunks_exact(self.n_from())
-            .zip(gradient.chunks_exact(self.n_to()));
+        let samples = map.chunks_exact(self.n_from()).zip(gradient.chunks_exact(self.n_to()));
         for (map, gradient) in samples {
             let channels = gradient.chunks_exact(self.cells_to());
             for (bias, channel) in of_bias.iter_mut().zip(channels) {

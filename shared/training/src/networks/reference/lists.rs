@@ -6,14 +6,11 @@ use crate::networks::ops::joined;
 
 impl<'a> Record<'a> {
     pub(super) fn centre(&mut self, list: At, name: &str) -> At {
-        let [mean, factor] = self
-            .parameters(name, ["mean", "factor"])
-            .map(|at| self.of_parameter(at));
+        let [mean, factor] =
+            self.parameters(name, ["mean", "factor"]).map(|at| self.of_parameter(at));
         let values = self.values(list).iter();
         let columns = mean.iter().zip(factor).cycle();
-        let values = values
-            .zip(columns)
-            .map(|(value, (mean, factor))| (value - mean) * factor);
+        let values = values.zip(columns).map(|(value, (mean, factor))| (value - mean) * factor);
         let (dims, values) = (self.dims(list).to_vec(), values.collect());
         self.derived(list, (dims, values), move |_, gradient| {
             let columns = factor.iter().cycle();
@@ -110,9 +107,8 @@ impl<'a> Record<'a> {
         let Some(dice) = &mut self.dice else {
             return list;
         };
-        let factors: Vec<f32> = (0..n)
-            .map(|_| if dice.f32() < share { 0.0 } else { kept })
-            .collect();
+        let factors: Vec<f32> =
+            (0..n).map(|_| if dice.f32() < share { 0.0 } else { kept }).collect();
         let values = each(self.values(list), &factors, |a, b| a * b);
         let dims = self.dims(list).to_vec();
         self.derived(list, (dims, values), move |_, gradient| {

@@ -181,9 +181,8 @@ impl<'a> Record<'a> {
         self.derived(maps, (dims, values), move |_, gradient| {
             by_sample(n, size, |sample, to| {
                 let all = sample * size..(sample + 1) * size;
-                let pairs = kept[all.clone()]
-                    .chunks_exact(cells)
-                    .zip(gradient[all].chunks_exact(cells));
+                let pairs =
+                    kept[all.clone()].chunks_exact(cells).zip(gradient[all].chunks_exact(cells));
                 for (to, (weights, gradient)) in to.chunks_exact_mut(cells).zip(pairs) {
                     let mean = dot(weights, gradient);
                     for (to, (weight, gradient)) in to.iter_mut().zip(weights.iter().zip(gradient))
@@ -307,9 +306,7 @@ fn of_standardised(weights: &[f32], gains: &[f32], gradient: &[f32]) -> OfStanda
         weights: Vec::with_capacity(weights.len()),
         gains: Vec::with_capacity(gains.len()),
     };
-    let channels = weights
-        .chunks_exact(n_inputs)
-        .zip(gradient.chunks_exact(n_inputs));
+    let channels = weights.chunks_exact(n_inputs).zip(gradient.chunks_exact(n_inputs));
     for ((channel, gradient), gain) in channels.zip(gains) {
         let mean = channel.iter().sum::<f32>() / n_inputs as f32;
         let off: Vec<f32> = channel.iter().map(|value| value - mean).collect();

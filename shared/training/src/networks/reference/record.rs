@@ -75,9 +75,7 @@ impl<'a> Record<'a> {
             parameters,
             learned: &[],
             dice: None,
-            inputs: inputs
-                .map(|((name, dims), values)| (name, dims, values.as_slice()))
-                .collect(),
+            inputs: inputs.map(|((name, dims), values)| (name, dims, values.as_slice())).collect(),
             values: Vec::new(),
             next: 0,
             statistics: Vec::new(),

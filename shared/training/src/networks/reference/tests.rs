@@ -194,10 +194,8 @@ fn lesson_by(
     network: &One,
     (parameters, shown): (&[Parameter], &Shown),
 ) -> (f64, Lesson) {
-    let learned: Vec<bool> = parameters
-        .iter()
-        .map(|parameter| parameter.role != Role::Fixed)
-        .collect();
+    let learned: Vec<bool> =
+        parameters.iter().map(|parameter| parameter.role != Role::Fixed).collect();
     let running = Running {
         parameters,
         learned: &learned,
@@ -210,9 +208,7 @@ fn lesson_by(
         for output in outputs {
             let factors = numbers(output.len(), &mut dice);
             let each = output.iter().zip(&factors);
-            cost += each
-                .map(|(value, factor)| f64::from(*value) * f64::from(*factor))
-                .sum::<f64>();
+            cost += each.map(|(value, factor)| f64::from(*value) * f64::from(*factor)).sum::<f64>();
             gradients.push(factors);
         }
         gradients
@@ -264,9 +260,7 @@ fn every_operation_that_leads_to_the_map_learns_it() {
             network,
             One::Fixed | One::Join | One::Centred | One::Prelu | One::Dropout
         );
-        let gradients = lesson(&network, &parameters(&network), &shown(&network, 2))
-            .1
-            .gradients;
+        let gradients = lesson(&network, &parameters(&network), &shown(&network, 2)).1.gradients;
         assert_eq!(gradients[0].is_some(), sees_map, "{network:?}");
     }
 }

@@ -49,9 +49,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let learning = &arguments.learning;
     let mut settings: Settings = learning.read()?;
-    settings.steps = learning
-        .steps
-        .map_or(settings.steps, |steps| steps as usize);
+    settings.steps = learning.steps.map_or(settings.steps, |steps| steps as usize);
     settings.seed = learning.seed.map_or(settings.seed, u64::from);
     settings.check().or_fail(ExitKind::Config)?;
     if learning.print_settings {

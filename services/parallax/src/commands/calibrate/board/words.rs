@@ -58,10 +58,7 @@ pub(super) fn table(calibrated: &Calibrated) -> Result<(), Failure> {
 }
 
 fn pictures(calibrated: &Calibrated, camera: usize) -> Option<usize> {
-    calibrated
-        .looked
-        .as_ref()
-        .map(|it| it.cameras[camera].n_pictures)
+    calibrated.looked.as_ref().map(|it| it.cameras[camera].n_pictures)
 }
 
 fn focal_sd(camera: &CameraOutcome) -> Option<f64> {
@@ -78,32 +75,27 @@ fn distance(calibrated: &Calibrated, [a, b]: [usize; 2]) -> f64 {
 pub(super) fn json(calibrated: &Calibrated) -> Value {
     let doubts = calibrated.doubts();
     let finite = |it: f64| it.is_finite().then_some(it);
-    let cameras = calibrated
-        .outcome
-        .cameras
-        .iter()
-        .enumerate()
-        .map(|(nth, it)| {
-            let wrong = it.residuals.iter().filter(|it| it.is_wrong).count();
-            let number = |it: &calibration::board::Known| {
-                let value = json!({ "value": finite(it.value), "sd": finite(it.sd) });
-                (it.name.clone(), value)
-            };
-            let numbers: Map<String, Value> = it.numbers.iter().map(number).collect();
-            json!({
-                "name": calibrated.task.names[nth],
-                "size_px": it.camera.intrinsics.size,
-                "pictures": pictures(calibrated, nth),
-                "boards": it.n_boards[0],
-                "boards_used": it.n_boards[1],
-                "corners": it.residuals.len() - wrong,
-                "left_out": wrong,
-                "rms_px": finite(it.rms_px),
-                "rms_of_all_px": finite(it.rms_of_all_px),
-                "coverage": it.coverage,
-                "numbers": numbers,
-            })
-        });
+    let cameras = calibrated.outcome.cameras.iter().enumerate().map(|(nth, it)| {
+        let wrong = it.residuals.iter().filter(|it| it.is_wrong).count();
+        let number = |it: &calibration::board::Known| {
+            let value = json!({ "value": finite(it.value), "sd": finite(it.sd) });
+            (it.name.clone(), value)
+        };
+        let numbers: Map<String, Value> = it.numbers.iter().map(number).collect();
+        json!({
+            "name": calibrated.task.names[nth],
+            "size_px": it.camera.intrinsics.size,
+            "pictures": pictures(calibrated, nth),
+            "boards": it.n_boards[0],
+            "boards_used": it.n_boards[1],
+            "corners": it.residuals.len() - wrong,
+            "left_out": wrong,
+            "rms_px": finite(it.rms_px),
+            "rms_of_all_px": finite(it.rms_of_all_px),
+            "coverage": it.coverage,
+            "numbers": numbers,
+        })
+    });
     let pairs = calibrated.outcome.pairs.iter().map(|it| {
         json!({
             "cameras": it.cameras.map(|nth| &calibrated.task.names[nth]),
@@ -136,11 +128,6 @@ pub(super) fn about(arguments: &Arguments, calibrated: &Calibrated) -> Vec<(Stri
     if let Some(known) = &arguments.known {
         about.push(("intrinsics kept of".to_owned(), known.display().to_string()));
     }
-    about.extend(
-        calibrated
-            .notes
-            .iter()
-            .map(|it| ("note".to_owned(), it.clone())),
-    );
+    about.extend(calibrated.notes.iter().map(|it| ("note".to_owned(), it.clone())));
     about
 }

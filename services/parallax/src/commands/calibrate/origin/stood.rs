@@ -85,13 +85,12 @@ fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result
         }
         let seen = PARSE14.from_parts(&parts);
         let [low, high] =
-            seen.iter()
-                .fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |all, it| {
-                    [
-                        [0, 1].map(|axis| all[0][axis].min(it[axis])),
-                        [0, 1].map(|axis| all[1][axis].max(it[axis])),
-                    ]
-                });
+            seen.iter().fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |all, it| {
+                [
+                    [0, 1].map(|axis| all[0][axis].min(it[axis])),
+                    [0, 1].map(|axis| all[1][axis].max(it[axis])),
+                ]
+            });
         let size = (high[0] - low[0]).max(high[1] - low[1]).max(1.0);
         let both = seen.iter().zip(&skeletons[skeleton]);
         let both = both.filter_map(|(seen, joint)| {

@@ -23,12 +23,7 @@ fn entry(node: Node<'_, '_>, is_top: bool) -> Entry {
     let children: Vec<Node<'_, '_>> = node.children().filter(Node::is_element).collect();
     if is_top && !children.is_empty() {
         if children.iter().all(|child| child.tag_name().name() == "_") {
-            return Entry::List(
-                children
-                    .into_iter()
-                    .map(|child| entry(child, false))
-                    .collect(),
-            );
+            return Entry::List(children.into_iter().map(|child| entry(child, false)).collect());
         }
         let named = children.into_iter().map(|child| {
             let name = child.tag_name().name().to_owned();
@@ -52,9 +47,7 @@ fn entry(node: Node<'_, '_>, is_top: bool) -> Entry {
 
 fn numbers(node: Node<'_, '_>) -> Entry {
     let words = node.text().unwrap_or_default().split_whitespace();
-    let number = |word: &str| {
-        word.parse()
-            .map_or_else(|_| Entry::Text(word.to_owned()), Entry::Number)
-    };
+    let number =
+        |word: &str| word.parse().map_or_else(|_| Entry::Text(word.to_owned()), Entry::Number);
     Entry::List(words.map(number).collect())
 }

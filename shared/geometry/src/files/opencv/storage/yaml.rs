@@ -135,10 +135,7 @@ impl<'t> Reader<'t> {
 
     fn count(&mut self, n: usize, at: Span) -> Result<(), YamlError> {
         let line = at.start.line();
-        self.n_left = self
-            .n_left
-            .checked_sub(n)
-            .ok_or(YamlError::TooLong { line })?;
+        self.n_left = self.n_left.checked_sub(n).ok_or(YamlError::TooLong { line })?;
         Ok(())
     }
 }

@@ -147,11 +147,7 @@ impl<'a> Body<'a> {
             return None;
         }
         let (low, high) = (at.floor() as usize - 1, at.ceil() as usize - 1);
-        let is_seen = |&it: &usize| {
-            [low, high]
-                .iter()
-                .all(|f| seen(self.trial, *f, it).is_some())
-        };
+        let is_seen = |&it: &usize| [low, high].iter().all(|f| seen(self.trial, *f, it).is_some());
         if !self.markers.iter().all(is_seen) {
             return None;
         }

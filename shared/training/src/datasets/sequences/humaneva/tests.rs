@@ -31,9 +31,8 @@ fn subject(folder: &Path) -> PathBuf {
         let offset = folder.join("Sync_Data").join(format!("{name}.ofs"));
         std::fs::write(offset, format!("{image}\n100.0\n2.0\n")).unwrap();
     }
-    let places: Vec<_> = (1..=1300)
-        .map(|it| Isometry3::translation(f64::from(it), 0.0, 0.0))
-        .collect();
+    let places: Vec<_> =
+        (1..=1300).map(|it| Isometry3::translation(f64::from(it), 0.0, 0.0)).collect();
     let mut walk = person(&places);
     let lost = walk.labels.iter().position(|it| it == "C7").unwrap();
     for frame in 101..=104 {

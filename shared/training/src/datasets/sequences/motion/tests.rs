@@ -112,8 +112,7 @@ fn read_by(
 /// The message without the folder.
 fn refused(got: Result<Motion, MotionError>) -> String {
     let text = got.unwrap_err().to_string();
-    text.split_once("a.")
-        .map_or(text.clone(), |it| it.1.to_owned())
+    text.split_once("a.").map_or(text.clone(), |it| it.1.to_owned())
 }
 
 fn assert_near(got: &[f64; 3], expected: &[f64; 3], tolerance: f64) {
@@ -241,9 +240,7 @@ fn impossible_motion_is_refused_with_a_likely_cause() {
     let by = |table: &str| refused(read_by("a.c3d", c3d("mm", 1000.0), Some(table), &options));
     let got = by(&own_table("unit = \"m\""));
     assert!(got.contains("another unit?"), "{got}");
-    let sides = own_table("")
-        .replace("[\"left", "[\"L")
-        .replace("[\"right", "[\"left");
+    let sides = own_table("").replace("[\"left", "[\"L").replace("[\"right", "[\"left");
     let got = by(&sides.replace("[\"L", "[\"right"));
     assert!(got.contains("left and right are exchanged"), "{got}");
     // The same upside down.

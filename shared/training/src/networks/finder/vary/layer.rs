@@ -138,9 +138,7 @@ pub(super) fn boxes(layers: &[Layer<'_>]) -> Vec<Around> {
             let whole = layer.in_sample(person);
             let cut = whole.cut(layer.window);
             let above = layers[nth + 1..].iter();
-            let hidden = above
-                .map(|above| cut.cut(above.window).area())
-                .fold(0.0, f32::max);
+            let hidden = above.map(|above| cut.cut(above.window).area()).fold(0.0, f32::max);
             let seen = (cut.area() - hidden).max(0.0) / whole.area().max(1e-3);
             if seen > UNSEEN {
                 let [_, top, _, bottom] = cut.outline;

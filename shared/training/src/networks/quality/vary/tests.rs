@@ -16,9 +16,7 @@ fn sample() -> Sample {
         group: String::new(),
         source: String::new(),
         picture: vec![0; 3 * rows * cols],
-        evidence: (0..n_evidence(N_PARTS))
-            .map(|at| at as f32 / 100.0)
-            .collect(),
+        evidence: (0..n_evidence(N_PARTS)).map(|at| at as f32 / 100.0).collect(),
         height_px: 200.0,
         errors_px: (0..N_PARTS).map(|part| part as f32).collect(),
     };
