@@ -29,7 +29,7 @@ fn folder() -> PathBuf {
 
 fn names(folder: &Path) -> Vec<PathBuf> {
     let mut paths: Vec<PathBuf> =
-        fs::read_dir(folder).unwrap().map(|it| it.unwrap().path()).collect();
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     paths
 }
@@ -63,7 +63,7 @@ fn every_target_stands_its_seeds_and_their_mutations() {
     for (name, target) in TARGETS {
         let seeds: Vec<Vec<u8>> = names(&folder().join("seeds").join(name))
             .iter()
-            .map(|it| fs::read(it).unwrap())
+            .map(|name| fs::read(name).unwrap())
             .collect();
         assert!(!seeds.is_empty(), "{name} has no seeds");
         for seed in &seeds {

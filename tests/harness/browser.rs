@@ -61,7 +61,7 @@ pub fn too_wide(html: &str, folder: &Path, width: u32) -> io::Result<Option<Vec<
     let measured = measured
         .ok_or_else(|| io::Error::other(format!("the page was not measured: {dom:.300}")))?;
     Ok(Some(
-        measured.split(';').filter(|it| !it.is_empty()).map(str::to_owned).collect(),
+        measured.split(';').filter(|part| !part.is_empty()).map(str::to_owned).collect(),
     ))
 }
 

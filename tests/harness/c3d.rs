@@ -53,7 +53,7 @@ pub fn write(trial: &Trial, processor: Processor, integer_scale: Option<f32>) ->
         n(trial.frames.len()),
         0,
     ];
-    file.extend(words.iter().flat_map(|&it| out.word(it)));
+    file.extend(words.iter().flat_map(|&word| out.word(word)));
     file.extend(out.real(integer_scale.unwrap_or(-1.0)));
     file.extend(out.word(n(first_data)));
     file.extend(out.word(u16::from(trial.n_analog > 0)));

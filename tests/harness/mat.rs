@@ -64,12 +64,12 @@ fn matrix(name: &str, value: &Mat) -> Vec<u8> {
         Mat::Structs(fields, values) => (2, vec![1, values.len() / fields.len()]),
         Mat::Numbers(sizes, _) => (6, sizes.clone()),
     };
-    let sizes: Vec<u8> = sizes.iter().flat_map(|&it| (it as i32).to_le_bytes()).collect();
+    let sizes: Vec<u8> = sizes.iter().flat_map(|&size| (size as i32).to_le_bytes()).collect();
     let mut body = element(6, &[class, 0, 0, 0, 0, 0, 0, 0]);
     body.extend(element(5, &sizes));
     body.extend(element(1, name.as_bytes()));
     match value {
-        Mat::Cell(values) => body.extend(values.iter().flat_map(|it| matrix("", it))),
+        Mat::Cell(values) => body.extend(values.iter().flat_map(|value| matrix("", value))),
         Mat::Structs(fields, values) => {
             body.extend(element(5, &32_i32.to_le_bytes()));
             let padded = |it: &&str| format!("{it:\0<32}").into_bytes();
@@ -77,15 +77,15 @@ fn matrix(name: &str, value: &Mat) -> Vec<u8> {
                 1,
                 &fields.iter().flat_map(padded).collect::<Vec<_>>(),
             ));
-            body.extend(values.iter().flat_map(|it| matrix("", it)));
+            body.extend(values.iter().flat_map(|value| matrix("", value)));
         }
-        Mat::Numbers(_, values) if values.iter().all(|&it| f64::from(it as u8) == it) => {
+        Mat::Numbers(_, values) if values.iter().all(|&value| f64::from(value as u8) == value) => {
             // MATLAB stores numbers in the narrowest type that holds them.
-            let bytes: Vec<u8> = values.iter().map(|&it| it as u8).collect();
+            let bytes: Vec<u8> = values.iter().map(|&value| value as u8).collect();
             body.extend(element(2, &bytes));
         }
         Mat::Numbers(_, values) => {
-            let bytes: Vec<u8> = values.iter().flat_map(|it| it.to_le_bytes()).collect();
+            let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
             body.extend(element(9, &bytes));
         }
     }

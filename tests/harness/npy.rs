@@ -99,7 +99,7 @@ fn parse(bytes: &[u8]) -> Result<Array, String> {
 }
 
 fn fixed<const N: usize>(bytes: &[u8], at: usize) -> Result<[u8; N], String> {
-    let found = bytes.get(at..at + N).and_then(|it| it.try_into().ok());
+    let found = bytes.get(at..at + N).and_then(|byte| byte.try_into().ok());
     found.ok_or_else(|| "truncated header".to_owned())
 }
 
@@ -111,7 +111,7 @@ fn field<'a>(header: &'a str, before: &str, after: &str) -> Result<&'a str, Stri
 
 fn numbers<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
     let (chunks, _) = data.as_chunks::<N>();
-    chunks.iter().map(|it| number(*it)).collect()
+    chunks.iter().map(|chunk| number(*chunk)).collect()
 }
 
 fn last_axis_fastest(shape: &[usize], first_axis_fastest: &[f64]) -> Vec<f64> {

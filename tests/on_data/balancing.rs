@@ -209,7 +209,7 @@ pub(crate) fn compare(
         .zip(truth)
         // A joint that could not be triangulated counts as an error of one metre.
         .map(|(joint, truth)| {
-            joint.as_ref().map_or(100.0, |it| 100.0 * (it.in_world - truth).norm())
+            joint.as_ref().map_or(100.0, |joint| 100.0 * (joint.in_world - truth).norm())
         })
         .collect();
     let mut errors = Errors {
@@ -220,7 +220,7 @@ pub(crate) fn compare(
     for (view, camera) in cameras.iter().enumerate() {
         let seen: Vec<[f64; 2]> = truth
             .iter()
-            .map(|it| camera.project(it).map_or([f64::NAN; 2], |it| [it.x, it.y]))
+            .map(|truth| camera.project(truth).map_or([f64::NAN; 2], |it| [it.x, it.y]))
             .collect();
         let target = torso(&seen);
         let off = |centres: &[[f64; 2]]| {
@@ -232,14 +232,14 @@ pub(crate) fn compare(
         // A view that has no part in the frame is on no object.
         let fused = got.skeleton.views[view].as_ref();
         errors.wrong_single += usize::from(off(&single));
-        errors.wrong_fused += usize::from(fused.is_some_and(|it| off(&it.pose.centres_px)));
+        errors.wrong_fused += usize::from(fused.is_some_and(|fused| off(&fused.pose.centres_px)));
     }
     errors
 }
 
 /// Middle of hips and shoulders.
 fn torso(joints: &[[f64; 2]]) -> [f64; 2] {
-    [0, 1].map(|axis| [2, 3, 8, 9].iter().map(|&it| joints[it][axis]).sum::<f64>() / 4.0)
+    [0, 1].map(|axis| [2, 3, 8, 9].iter().map(|&i| joints[i][axis]).sum::<f64>() / 4.0)
 }
 
 /// The 14 joints of every frame in the world: TRC(X, Y, Z) is world(y, z, x).

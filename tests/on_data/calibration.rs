@@ -230,7 +230,7 @@ fn the_rigs_in_configs_agree_with_the_original_files() {
 
 #[test]
 fn the_cameras_of_panoptic_are_on_a_dome_above_its_floor() {
-    let Some(folder) = shared_dir().map(|it| it.join("data/panoptic")) else {
+    let Some(folder) = shared_dir().map(|shared_dir| shared_dir.join("data/panoptic")) else {
         return;
     };
     let file = folder.join("camera_parameters.json");

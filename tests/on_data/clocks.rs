@@ -21,12 +21,16 @@ pub(crate) fn recorded(shared: &std::path::Path) -> (Vec<Film>, usize) {
         let mut found = Vec::new();
         let shots = (0..source.n_frames()).map(|frame| {
             source.of_frame(frame, &mut found).unwrap();
-            let joint = |it: &keypoints::Keypoint| Joint {
-                at: it.at,
-                score: it.score,
+            let joint = |keypoint: &keypoints::Keypoint| Joint {
+                at: keypoint.at,
+                score: keypoint.score,
             };
             let people = found.iter().map(|person| Person {
-                joints: person.keypoints.iter().map(|it| it.as_ref().map(joint)).collect(),
+                joints: person
+                    .keypoints
+                    .iter()
+                    .map(|keypoint| keypoint.as_ref().map(joint))
+                    .collect(),
             });
             Shot {
                 time_s: frame as f64 / RATE_HZ,
@@ -44,14 +48,14 @@ pub(crate) fn recorded(shared: &std::path::Path) -> (Vec<Film>, usize) {
 fn resampled(film: &Film, first: f64, pace: f64) -> Film {
     let last = film.shots.len() - 1;
     let times = (0..).map(|nth| first + pace * f64::from(nth));
-    let times = times.take_while(|it| *it <= last as f64);
+    let times = times.take_while(|time| *time <= last as f64);
     let shots = times.enumerate().map(|(nth, at)| {
         let (frame, share) = (at.floor() as usize, at.fract());
         let next = &film.shots[(frame + 1).min(last)];
         let people = film.shots[frame].people.iter();
         Shot {
             time_s: nth as f64 / RATE_HZ,
-            people: people.filter_map(|it| between(it, &next.people, share)).collect(),
+            people: people.filter_map(|person| between(person, &next.people, share)).collect(),
         }
     });
     Film {
@@ -133,7 +137,7 @@ fn shifts_of_the_balancing_cameras_are_found_within_five_milliseconds() {
             .collect();
         println!("seed {seed}: off by {off_ms:.2?} ms; {:?}", outcome.doubts);
         if outcome.doubts.is_empty() {
-            errors.extend(off_ms[1..].iter().map(|it| it.abs()));
+            errors.extend(off_ms[1..].iter().map(|off_ms| off_ms.abs()));
         } else {
             n_refused += 1;
         }

@@ -28,7 +28,7 @@ fn upright(source: Size) -> Affine {
 
 /// Mean grey level.
 fn mean(rgb: &[u8]) -> f64 {
-    rgb.iter().map(|&it| f64::from(it)).sum::<f64>() / rgb.len() as f64
+    rgb.iter().map(|&rgb| f64::from(rgb)).sum::<f64>() / rgb.len() as f64
 }
 
 /// Reads a video to the end; returns the mean times of decoding and warping a frame.
@@ -59,7 +59,7 @@ fn read(path: &str, width: usize) -> [Duration; 2] {
             "{path} {index}: {}",
             mean(&out)
         );
-        assert!(out.iter().any(|&it| it > 230), "{path} {index}");
+        assert!(out.iter().any(|&value| value > 230), "{path} {index}");
     }
     assert_eq!(source.next_frame().unwrap(), None, "{path}");
     [waited / 100, warped / 100]

@@ -37,7 +37,7 @@ struct Shot {
 impl Shot {
     fn new(extractor: &Extractor, solver: &Solver, camera: &Camera, rgb: &[u8]) -> Self {
         let model = solver.model();
-        let [width, height] = camera.intrinsics.size.map(|it| it as usize);
+        let [width, height] = camera.intrinsics.size.map(|size| size as usize);
         let layout = Arc::new(Layout::new(model, width, height).unwrap());
         let mut responses = vec![0.0; layout.n_responses()];
         let image = Rgb8View::new(width, height, rgb).unwrap();
@@ -132,9 +132,10 @@ impl Case<'_> {
             "{name}: bounds rule out levels: {effort:?}"
         );
         let n = estimate.iterations.len();
-        let [begin, first, all] = [0, 1, n].map(|n| pools.each_ref().map(|it| self.fastest(it, n)));
-        let each = [0, 1].map(|it| (all[it] - begin[it]) / n as f64);
-        let first = [0, 1].map(|it| first[it] - begin[it]);
+        let [begin, first, all] =
+            [0, 1, n].map(|n| pools.each_ref().map(|pool| self.fastest(pool, n)));
+        let each = [0, 1].map(|i| (all[i] - begin[i]) / n as f64);
+        let first = [0, 1].map(|i| first[i] - begin[i]);
         let exchanged = if self.start.exchanged {
             "exchanged"
         } else {
@@ -184,12 +185,12 @@ fn measure(name: &str, solver: &Solver, shots: &[Shot], tables: Option<&TypeTabl
                 shots: [&shots[a], &shots[b]],
                 tables,
                 start: PairStart {
-                    candidates: [a, b].map(|it| start.candidates[it]),
+                    candidates: [a, b].map(|i| start.candidates[i]),
                     exchanged,
                 },
             };
             let of_case = case.measure(&format!("{name} {a}-{b}"), &pools);
-            sums = [0, 1, 2].map(|it| sums[it] + of_case[it]);
+            sums = [0, 1, 2].map(|i| sums[i] + of_case[i]);
         }
     }
     let effort = solver.statistics().since(&before);
@@ -205,7 +206,7 @@ fn measure(name: &str, solver: &Solver, shots: &[Shot], tables: Option<&TypeTabl
 /// A picture and its camera at another size.
 fn framed(camera: &Camera, source: [usize; 2], rgb: &[u8], size: [u32; 2]) -> (Camera, Vec<u8>) {
     let out = Size::new(size[0] as usize, size[1] as usize);
-    let from = source.map(|it| it as u32);
+    let from = source.map(|source| source as u32);
     let framing = Framing::new(camera, from, None, OutSize::Exact(size), 0.0).unwrap();
     let source = Size::new(source[0], source[1]);
     let mut warp = Warp::new(source, out, &framing.source_from_output(), Fill::Black).unwrap();
@@ -256,7 +257,7 @@ fn bounds_and_threads_do_not_change_the_solutions_of_real_pairs() {
             &folder.join("S1_Walking_1_C1_im0080.bmp"),
             &folder.join("S1_Walking_1_C2_im0080.bmp"),
         ],
-        &["C1", "C2"].map(|it| humaneva(&shared, it, -1.0)),
+        &["C1", "C2"].map(|name| humaneva(&shared, name, -1.0)),
         &tables(&shared, "he", ["C1", "C2"]),
     );
     let folder = shared.join("data/umpm");
@@ -267,7 +268,7 @@ fn bounds_and_threads_do_not_change_the_solutions_of_real_pairs() {
             &folder.join("p1_triangle_1_l_im1920.png"),
             &folder.join("p1_triangle_1_r_im1920.png"),
         ],
-        &["l", "r"].map(|it| umpm(&shared, it, 0.0)),
+        &["l", "r"].map(|name| umpm(&shared, name, 0.0)),
         &tables(&shared, "umpm", ["L", "R"]),
     );
     balancing(&shared, &rig());

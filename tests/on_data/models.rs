@@ -50,7 +50,7 @@ fn the_released_models_have_the_documented_values() {
     let Some(he) = summary(MODELS[0]) else { return };
     let umpm = summary(MODELS[1]).unwrap();
     let parse = summary(MODELS[2]).unwrap();
-    let rounded = |it: f64| (it * 1e6).round() / 1e6;
+    let rounded = |value: f64| (value * 1e6).round() / 1e6;
     assert_eq!(
         [he.threshold, he.root_bias].map(rounded),
         [0.991387, -2.514749]
@@ -158,7 +158,7 @@ fn the_conditional_type_tables_of_a_pair_have_one_joint_distribution() {
         let (joint, disagreement) = Compatibility::joint_from_conditionals(&there, &back).unwrap();
         assert!(disagreement < 1e-5, "{disagreement}");
         for part in 0..26 {
-            let sum: f64 = (0..36).map(|it| joint.value(part, it / 6, it % 6)).sum();
+            let sum: f64 = (0..36).map(|i| joint.value(part, i / 6, i % 6)).sum();
             assert!((sum - 1.0).abs() < 1e-9, "part {part}: {sum}");
         }
         let conditional = joint.conditional();

@@ -13,7 +13,7 @@ fn read(file: &Path) -> C3d {
 
 /// * `step_mm`: the unit of the integers; reals may be more precise.
 fn assert_same_points(dir: &Path, files: [&str; 6], step_mm: f64) {
-    let trials = files.map(|it| read(&dir.join(it)));
+    let trials = files.map(|file| read(&dir.join(file)));
     let first = &trials[0];
     assert!(first.n_frames() > 50 && first.n_points() > 20);
     let mut n_seen = 0;
@@ -68,7 +68,7 @@ fn files_of_other_laboratories_are_read_and_an_empty_one_is_refused() {
     assert_eq!((walk.n_points(), walk.rate_hz()), (41, 120.0));
     assert_eq!(walk.n_frames(), 1854);
     let span = |axis: usize| {
-        let seen = (0..walk.n_frames()).flat_map(|it| walk.frame(it)).flatten();
+        let seen = (0..walk.n_frames()).flat_map(|i| walk.frame(i)).flatten();
         seen.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
             [low.min(it[axis]), high.max(it[axis])]
         })
@@ -102,11 +102,14 @@ fn files_of_other_laboratories_are_read_and_an_empty_one_is_refused() {
 /// The largest height of the person, and the spread of the length of a leg, metres.
 fn height_and_leg_noise(motion: &Motion) -> (f64, f64) {
     let norm = |a: [f64; 3], b: [f64; 3]| {
-        let square = (0..3).map(|it| (a[it] - b[it]).powi(2));
+        let square = (0..3).map(|i| (a[i] - b[i]).powi(2));
         square.sum::<f64>().sqrt()
     };
-    let tops = motion.joints.iter().map(|it| it[13][2] - it[0][2].min(it[5][2]));
-    let shins = motion.joints.iter().map(|it| norm(it[3], it[4]) + norm(it[4], it[5]));
+    let tops = motion.joints.iter().map(|joint| joint[13][2] - joint[0][2].min(joint[5][2]));
+    let shins = motion
+        .joints
+        .iter()
+        .map(|joint| norm(joint[3], joint[4]) + norm(joint[4], joint[5]));
     let mut shins: Vec<f64> = shins.collect();
     shins.sort_by(f64::total_cmp);
     let at = |share: f64| shins[(share * (shins.len() - 1) as f64) as usize];

@@ -92,7 +92,7 @@ fn lines_off(cameras: &[Camera; 2], run: &Value) -> f64 {
     let theirs = from_zero.transpose() * matrix(&run["F_lineInB_of_pointInA"]) * from_zero;
     let [width, height] = cameras[1].intrinsics.size.map(f64::from);
     let across =
-        |steps: u32, side: f64| (0..steps).map(move |it| side * f64::from(it) / f64::from(steps));
+        |steps: u32, side: f64| (0..steps).map(move |i| side * f64::from(i) / f64::from(steps));
     let mut off = 0.0_f64;
     for in_a in across(16, width).flat_map(|x| across(12, height).map(move |y| Point2::new(x, y))) {
         let lines = [ours, theirs].map(|it| epipolar_line(&it, &in_a).unwrap());
@@ -114,12 +114,17 @@ fn run_file(shared: &Path, name: &str) -> Value {
 fn epipolar_lines_agree_with_the_runs() {
     let Some(shared) = shared_dir() else { return };
     let he = run_file(&shared, "mv_C1_C2");
-    let off = |shift| lines_off(&["C1", "C2"].map(|it| humaneva(&shared, it, shift)), &he);
+    let off = |shift| {
+        lines_off(
+            &["C1", "C2"].map(|name| humaneva(&shared, name, shift)),
+            &he,
+        )
+    };
     println!("HumanEva: {:.1e} px, {:.1e} px", off(-1.0), off(0.0));
     // The runs assumed that HumanEva's principal point counts pixels from 1, ...
     assert!(off(-1.0) < 1e-3 && off(0.0) > 0.3);
     let l_r = run_file(&shared, "umpm_mv_L_R");
-    let off = |shift| lines_off(&["l", "r"].map(|it| umpm(&shared, it, shift)), &l_r);
+    let off = |shift| lines_off(&["l", "r"].map(|name| umpm(&shared, name, shift)), &l_r);
     println!("UMPM: {:.1e} px, {:.1e} px", off(0.0), off(-1.0));
     // ... and UMPM's from 0. UMPM's rotations have six digits only and are not exactly orthogonal; we
     // orthogonalise them and the runs did not.
@@ -158,7 +163,7 @@ impl Pair {
             let picture = Picture::read(path);
             Evidence::of(&extractor, solver.model(), &picture)
         });
-        let solo = evidence.each_ref().map(|it| solver.best(&it.view(), None).unwrap());
+        let solo = evidence.each_ref().map(|evidence| solver.best(&evidence.view(), None).unwrap());
         let plans = [0, 1].map(|view| {
             let layout = Arc::new(evidence[view].view().layout().clone());
             ViewPlan::new(cameras[view].clone(), Arc::clone(solver.model()), layout)
@@ -177,7 +182,7 @@ impl Pair {
         Self::new(
             &shared.join("data/models/humaneva_fmp.txt"),
             [&image("C1"), &image("C2")],
-            &["C1", "C2"].map(|it| humaneva(shared, it, -1.0)),
+            &["C1", "C2"].map(|name| humaneva(shared, name, -1.0)),
         )
     }
 
@@ -187,7 +192,7 @@ impl Pair {
         Self::new(
             &shared.join("data/models/umpm_fmp.txt"),
             [&image("l"), &image("r")],
-            &["l", "r"].map(|it| umpm(shared, it, 0.0)),
+            &["l", "r"].map(|name| umpm(shared, name, 0.0)),
         )
     }
 
@@ -279,7 +284,7 @@ fn compare(pair: &Pair, run: &Value, name: &str, ours: &PairEstimate) {
     );
     assert!(ours.converged, "{name}");
     assert!(score_off < 2e-3, "{name}: {score_off:.1e}");
-    assert!(same.iter().all(|it| *it >= 25), "{name}: {same:?}");
+    assert!(same.iter().all(|value| *value >= 25), "{name}: {same:?}");
 }
 
 #[test]
@@ -289,7 +294,7 @@ fn released_runs_on_humaneva_are_reproduced() {
     let tables = tables(&shared, "he", ["C1", "C2"]);
     let settings = Settings::released();
     let names = ["mv_C1_C2", "mvptc_C1_C2", "mvptcavs_C1_C2"];
-    let runs = names.map(|it| run_file(&shared, it));
+    let runs = names.map(|name| run_file(&shared, name));
 
     let ours = pair.fuse(&settings, [0, 1], None, [None; 2]);
     compare(&pair, &runs[0], names[0], &ours);
@@ -298,7 +303,7 @@ fn released_runs_on_humaneva_are_reproduced() {
 
     let text = std::fs::read_to_string(shared.join("data/humaneva/error_predictions_he.csv"));
     let predictions = Table::parse(&text.unwrap(), 26).unwrap();
-    let sigma_px = ["C1", "C2"].map(|it| predictions.get("S1", "Walking", 80, it));
+    let sigma_px = ["C1", "C2"].map(|name| predictions.get("S1", "Walking", 80, name));
     let settings = Settings {
         tau_px: Tau::humaneva().px().to_vec(),
         rescue_px: TrainingErrors::HUMANEVA.median_px.to_vec(),
@@ -338,7 +343,7 @@ fn the_energy_of_the_paper_never_decreases_on_real_pairs() {
     let Some(shared) = shared_dir() else { return };
     for pair in [Pair::humaneva(&shared), Pair::umpm(&shared)] {
         let ours = pair.fuse(&Settings::default(), [0, 1], None, [None; 2]);
-        let energies: Vec<f64> = ours.iterations.iter().map(|it| it.score).collect();
+        let energies: Vec<f64> = ours.iterations.iter().map(|iteration| iteration.score).collect();
         println!("{energies:.5?}");
         assert!(energies.is_sorted() && ours.converged, "{energies:?}");
         assert_eq!(energies.last(), Some(&ours.energy));

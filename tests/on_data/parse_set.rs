@@ -44,7 +44,7 @@ fn pcp_on_images_101_to_200_agrees_with_the_original_program() {
         })
         .collect();
     let report = |found: fn(&Outcome) -> &Joints| {
-        evaluate(outcomes.iter().map(|it| (Some(found(it)), &it.truth)))
+        evaluate(outcomes.iter().map(|outcome| (Some(found(outcome)), &outcome.truth)))
     };
     let (ours, theirs) = (report(|it| &it.ours), report(|it| &it.theirs));
     let covering = report(|it| &it.theirs_covering);
@@ -60,7 +60,10 @@ fn pcp_on_images_101_to_200_agrees_with_the_original_program() {
         [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|it| report.pcp(it).percent())
     };
     // As recorded in the reference; its PCK is recorded for all 205 images only: 73.1.
-    assert_eq!(pcp(&theirs).map(|it| (it * 10.0).round()), [713.0, 634.0]);
+    assert_eq!(
+        pcp(&theirs).map(|value| (value * 10.0).round()),
+        [713.0, 634.0]
+    );
     assert!((covering.pck(0).percent() - 73.1).abs() < 1.0);
     for (got, expected) in pcp(&ours).into_iter().zip(pcp(&theirs)) {
         assert!((got - expected).abs() <= 0.3, "PCP {got}");
@@ -74,13 +77,13 @@ fn outcome(model: &Model, solver: &Solver, evidence: &Evidence, theirs: &Value) 
     let evidence = evidence.view();
     let pose = solver.best(&evidence, None).unwrap();
     let best = &theirs["detections"][0];
-    let number = |it: &Value| it.as_f64().unwrap();
-    let centre = |it: &Value| {
+    let number = |value: &Value| value.as_f64().unwrap();
+    let centre = |value: &Value| {
         [["x1", "x2"], ["y1", "y2"]]
-            .map(|[a, b]| f64::midpoint(number(&it[a]), number(&it[b])) - 1.0)
+            .map(|[a, b]| f64::midpoint(number(&value[a]), number(&value[b])) - 1.0)
     };
-    let parts_of = |it: &Value| -> Vec<[f64; 2]> {
-        it["parts"].as_array().unwrap().iter().map(centre).collect()
+    let parts_of = |value: &Value| -> Vec<[f64; 2]> {
+        value["parts"].as_array().unwrap().iter().map(centre).collect()
     };
     let joints_of = |parts: &[[f64; 2]]| Joints::try_from(PARSE14.from_parts(parts)).unwrap();
     let their_parts = parts_of(best);
@@ -90,7 +93,7 @@ fn outcome(model: &Model, solver: &Solver, evidence: &Evidence, theirs: &Value) 
         .as_array()
         .unwrap()
         .iter()
-        .map(|it| [number(&it[0]) - 1.0, number(&it[1]) - 1.0])
+        .map(|array| [number(&array[0]) - 1.0, number(&array[1]) - 1.0])
         .collect();
     Outcome {
         truth: Joints::try_from(truth).unwrap(),

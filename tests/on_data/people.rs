@@ -23,7 +23,7 @@ fn in_order(films: &[Film]) -> (Vec<Film>, Vec<usize>) {
     let mut rows: Vec<Vec<(usize, f64)>> = joint_rows(names).into_iter().flatten().collect();
     let extra = names.iter().enumerate().filter(|it| !is_joint(it.1));
     let extra: Vec<(usize, &String)> = extra.collect();
-    rows.extend(extra.iter().map(|it| vec![(it.0, 1.0)]));
+    rows.extend(extra.iter().map(|extra| vec![(extra.0, 1.0)]));
     let n = PARSE14.joints.len();
     let mut sides: Vec<usize> = (0..rows.len()).collect();
     for [right, left] in SIDES {
@@ -34,30 +34,30 @@ fn in_order(films: &[Film]) -> (Vec<Film>, Vec<usize>) {
         sides[n + nth] = n + other.unwrap_or(nth);
     }
     // Every joint is a keypoint of this set.
-    assert!(rows.iter().all(|it| it.len() == 1));
+    assert!(rows.iter().all(|row| row.len() == 1));
     let joint = |person: &Person, row: &[(usize, f64)]| person.joints[row[0].0];
-    let person = |it: &Person| Person {
-        joints: rows.iter().map(|row| joint(it, row)).collect::<Vec<Option<Joint>>>(),
+    let person = |person: &Person| Person {
+        joints: rows.iter().map(|row| joint(person, row)).collect::<Vec<Option<Joint>>>(),
     };
-    let shot = |it: &Shot| Shot {
-        time_s: it.time_s,
-        people: it.people.iter().map(person).collect(),
+    let shot = |shot: &Shot| Shot {
+        time_s: shot.time_s,
+        people: shot.people.iter().map(person).collect(),
     };
-    let film = |it: &Film| Film {
-        shots: it.shots.iter().map(shot).collect(),
+    let film = |film: &Film| Film {
+        shots: film.shots.iter().map(shot).collect(),
     };
     (films.iter().map(film).collect(), sides)
 }
 
 /// The same frames of all cameras.
 fn sample(films: &[Film], seed: u64) -> Vec<Film> {
-    let n = films.iter().map(|it| it.shots.len()).min().unwrap();
+    let n = films.iter().map(|film| film.shots.len()).min().unwrap();
     let mut frames: Vec<usize> = (0..n).collect();
     fastrand::Rng::with_seed(seed).shuffle(&mut frames);
     frames.truncate(DRAWN);
     frames.sort_unstable();
     let of = |film: &Film| Film {
-        shots: frames.iter().map(|it| film.shots[*it].clone()).collect(),
+        shots: frames.iter().map(|frame| film.shots[*frame].clone()).collect(),
     };
     films.iter().map(of).collect()
 }

@@ -90,7 +90,8 @@ fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_bett
         }
     }
     for (what, shares) in ["too large", "beside the person"].into_iter().zip(&shares) {
-        let mean = |nth: usize| shares.iter().map(|it| it[nth]).sum::<f64>() / shares.len() as f64;
+        let mean =
+            |nth: usize| shares.iter().map(|share| share[nth]).sum::<f64>() / shares.len() as f64;
         let [first, last] = [mean(0), mean(1)];
         println!("boxes {what} cover {first:.2} of the true ones, those after them {last:.2}");
         assert!(last > first + 0.1, "{what}: {shares:.2?}");

@@ -311,7 +311,7 @@ fn compare_levels(
     let (mut above, mut worst) = (0, 0.0_f64);
     for (level, row) in table.iter().enumerate() {
         let it = &evidence.layout().levels[level];
-        let size = ["score_rows", "score_cols"].map(|it| row[it].as_u64().unwrap() as usize);
+        let size = ["score_rows", "score_cols"].map(|name| row[name].as_u64().unwrap() as usize);
         assert_eq!([it.rows, it.cols], size, "{name}: size of level {level}");
         let roots = solver.root_scores(evidence, level as u16, None);
         above += roots.iter().filter(|&&it| it >= -1.0).count() as u64;

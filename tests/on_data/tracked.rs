@@ -83,7 +83,7 @@ fn tracking_is_nearly_as_accurate_as_a_full_search() {
 }
 
 fn image(clip: &Clip, view: usize, frame: usize) -> Rgb8View<'_> {
-    let [width, height] = SIZE.map(|it| it as usize);
+    let [width, height] = SIZE.map(|size| size as usize);
     Rgb8View::new(width, height, &clip.frames[view][frame]).unwrap()
 }
 
@@ -94,7 +94,7 @@ fn search(model: &Arc<Model>, clip: &Clip, track: Option<TrackSettings>) -> Sear
         n_candidates: 1,
         ..ViewSettings::default()
     };
-    let [width, height] = SIZE.map(|it| it as usize);
+    let [width, height] = SIZE.map(|size| size as usize);
     let layout = Arc::new(fmp::Layout::new(model, width, height).unwrap());
     let step = ViewStep::new(Arc::clone(model), Arc::clone(&layout), settings);
     let mut responses = vec![0.0; layout.n_responses()];
@@ -134,7 +134,7 @@ fn same(a: &Searched, b: &Searched) -> f64 {
 
 /// Median and 90th percentile of the distance between joints and the projected reference, pixels.
 fn errors(model: &Model, clip: &Clip, truth: &[Vec<Point3<f64>>], got: &Searched) -> [f64; 2] {
-    let [width, height] = SIZE.map(|it| it as usize);
+    let [width, height] = SIZE.map(|size| size as usize);
     let layout = fmp::Layout::new(model, width, height).unwrap();
     let mut all = Vec::new();
     for (camera, poses) in clip.cameras.iter().zip(&got.poses) {

@@ -68,7 +68,7 @@ fn module_of(file: &Path) -> Module {
     let name = file.with_extension("");
     let mut parts: Module = name.iter().map(|part| part.to_string_lossy().into_owned()).collect();
     let is_root = parts.len() == 1 && ["lib", "main"].contains(&parts[0].as_str());
-    if is_root || parts.last().is_some_and(|it| it == "mod") {
+    if is_root || parts.last().is_some_and(|part| part == "mod") {
         parts.pop();
     }
     parts
@@ -116,7 +116,7 @@ fn imports(text: &str) -> (Vec<Import>, String) {
     let (mut found, mut others) = (Vec::new(), String::new());
     let mut rest = text;
     while let Some(at) = rest.find("use ") {
-        let line = rest[..at].rfind('\n').map_or(0, |it| it + 1);
+        let line = rest[..at].rfind('\n').map_or(0, |value| value + 1);
         let before = rest[line..at].trim();
         let Some(end) = rest[at..].find(';') else {
             break;
@@ -210,12 +210,12 @@ fn absolute(path: &[String], module: &Module) -> Module {
 fn paths(text: &str) -> Vec<Vec<String>> {
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     let (imports, text) = imports(text);
-    let mut all: Vec<Vec<String>> = imports.into_iter().map(|it| it.path).collect();
+    let mut all: Vec<Vec<String>> = imports.into_iter().map(|import| import.path).collect();
     for start in ["crate::", "self::", "super::"] {
         for (at, _) in text.match_indices(start) {
             let is_start = !text[..at].ends_with(|c: char| is_name(c) || c == ':' || c == '$');
             let end = text[at..].find(|c: char| !(is_name(c) || c == ':'));
-            let path = &text[at..end.map_or(text.len(), |it| at + it)];
+            let path = &text[at..end.map_or(text.len(), |value| at + value)];
             let names = path.split("::").filter(|name| !name.is_empty());
             if is_start {
                 all.push(names.map(str::to_owned).collect());
@@ -278,8 +278,8 @@ fn circles(needs: &BTreeMap<&Module, BTreeSet<&Module>>) -> Vec<Vec<String>> {
             continue;
         }
         let others = reachable.iter().copied();
-        let circle: Vec<&Module> = others.filter(|it| reached[it].contains(module)).collect();
-        circles.push(circle.iter().map(|it| it.join("/")).collect());
+        let circle: Vec<&Module> = others.filter(|other| reached[other].contains(module)).collect();
+        circles.push(circle.iter().map(|circle| circle.join("/")).collect());
         seen.extend(circle);
     }
     circles

@@ -298,7 +298,8 @@ impl Sending<'_> {
 
     fn acknowledge(&mut self) {
         while let Ok((view, content, sequence)) = self.acks.try_recv() {
-            let is_meant = |it: &Lane| it.view == view as usize && content_of(&it.port) == content;
+            let is_meant =
+                |lane: &Lane| lane.view == view as usize && content_of(&lane.port) == content;
             let Some(index) = self.lanes.iter().position(is_meant) else {
                 continue;
             };
@@ -435,7 +436,7 @@ fn next(port: &Port) -> Result<Option<(u64, Status, Item)>, Failure> {
             };
             let data = received.data.unwrap_or_default();
             let message = Message::parse(port.kind(), &data).ok();
-            let envelope = message.and_then(|it| Envelope::of(port.kind(), it.head));
+            let envelope = message.and_then(|message| Envelope::of(port.kind(), message.head));
             let envelope = envelope.unwrap_or(Envelope {
                 stamp: Stamp::default(),
                 timing: Timing::default(),

@@ -82,7 +82,7 @@ pub fn join(
             _ => {}
         }
         drop(lock);
-        if said.is_none_or(|it| it.elapsed() > SAY_EVERY) {
+        if said.is_none_or(|said| said.elapsed() > SAY_EVERY) {
             if said.is_some() {
                 let what = if address.keys.is_some() {
                     " (does it run, is it reachable, are its keys of the same authority, and is the common name of our certificate that of this host?)"
@@ -164,5 +164,5 @@ pub fn status(address: &Address, limit: Duration) -> Result<Option<String>, Link
         }
     }
     link.close();
-    Ok(answer.and_then(|it| String::from_utf8(it).ok()))
+    Ok(answer.and_then(|answer| String::from_utf8(answer).ok()))
 }

@@ -78,7 +78,7 @@ pub fn make_keys(folder: &Path, hosts: &[(String, Vec<String>)]) -> Result<Vec<P
     use rcgen::{BasicConstraints, CertificateParams, DnType, IsCa, Issuer, KeyPair};
 
     let file = |name: &str, ending: &str| folder.join(format!("{name}.{ending}"));
-    let names = || core::iter::once("ca").chain(hosts.iter().map(|it| it.0.as_str()));
+    let names = || core::iter::once("ca").chain(hosts.iter().map(|host| host.0.as_str()));
     let mut all = names().flat_map(|name| [file(name, "pem"), file(name, "key")]);
     if let Some(exists) = all.find(|it| it.exists()) {
         return Err(KeyError::Exists(exists));
@@ -88,34 +88,34 @@ pub fn make_keys(folder: &Path, hosts: &[(String, Vec<String>)]) -> Result<Vec<P
         message: error.to_string(),
     };
     let make = |host: &str, names: Vec<String>| {
-        let mut params = CertificateParams::new(names).map_err(|it| failed(host, &it))?;
+        let mut params = CertificateParams::new(names).map_err(|error| failed(host, &error))?;
         params.distinguished_name.push(DnType::CommonName, host);
         Ok::<_, KeyError>(params)
     };
     let mut params = make("Parallax hosts", Vec::new())?;
     params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
-    let key = KeyPair::generate().map_err(|it| failed("ca", &it))?;
-    let authority = params.self_signed(&key).map_err(|it| failed("ca", &it))?;
+    let key = KeyPair::generate().map_err(|error| failed("ca", &error))?;
+    let authority = params.self_signed(&key).map_err(|error| failed("ca", &error))?;
     let mut files = vec![
         (file("ca", "pem"), authority.pem()),
         (file("ca", "key"), key.serialize_pem()),
     ];
     let issuer = Issuer::new(params, key);
     for (host, names) in hosts {
-        let key = KeyPair::generate().map_err(|it| failed(host, &it))?;
+        let key = KeyPair::generate().map_err(|error| failed(host, &error))?;
         let params = make(
             host,
             [host.clone()].into_iter().chain(names.clone()).collect(),
         )?;
         let signed = params.signed_by(&key, &issuer);
-        let signed = signed.map_err(|it| failed(host, &it))?;
+        let signed = signed.map_err(|error| failed(host, &error))?;
         files.push((file(host, "pem"), signed.pem()));
         files.push((file(host, "key"), key.serialize_pem()));
     }
     for (file, text) in &files {
         write_private(file, text)?;
     }
-    Ok(files.into_iter().map(|it| it.0).collect())
+    Ok(files.into_iter().map(|file| file.0).collect())
 }
 
 /// Without the feature there are none.

@@ -36,9 +36,9 @@ impl Link {
             );
         }
         let config = zenoh::Config::from_json5(&config(address).to_string());
-        let config = config.map_err(|it| failed(it.to_string()))?;
+        let config = config.map_err(|error| failed(error.to_string()))?;
         let session = zenoh::open(config).wait();
-        Ok(Self(session.map_err(|it| failed(it.to_string()))?))
+        Ok(Self(session.map_err(|error| failed(error.to_string()))?))
     }
 
     /// Sends something; what there is no room for is dropped: what must not be lost is acknowledged.
@@ -237,7 +237,7 @@ mod tests {
                 } else {
                     [json!([]), json!([at])]
                 };
-                let got = ["listen", "connect"].map(|it| text[it]["endpoints"].clone());
+                let got = ["listen", "connect"].map(|name| text[name]["endpoints"].clone());
                 assert_eq!(got, expected);
                 let tls = &text["transport"]["link"]["tls"];
                 assert_eq!(tls["enable_mtls"].as_bool(), keys.then_some(true));
@@ -260,7 +260,7 @@ mod tests {
         let names = ["desk", "rack", "shelf"];
         let of_desk = vec!["127.0.0.1".to_owned()];
         let made: Vec<(String, Vec<String>)> =
-            names.iter().map(|it| ((*it).to_owned(), of_desk.clone())).collect();
+            names.iter().map(|name| ((*name).to_owned(), of_desk.clone())).collect();
         crate::keys::make_keys(folder.path(), &made).unwrap();
         let at = format!("127.0.0.1:{}", port());
         // `who` has the certificate of `keys`.

@@ -142,7 +142,7 @@ impl Checked {
 /// A body of poses and maps: the length of the poses (`u32`, little endian), the poses as in a recording without the zeros at their end,
 /// which are most of them, and the maps.
 pub(crate) fn join(poses: &[u8], maps: &[u8]) -> Vec<u8> {
-    let end = poses.iter().rposition(|it| *it != 0).map_or(0, |it| it + 1);
+    let end = poses.iter().rposition(|pose| *pose != 0).map_or(0, |index| index + 1);
     let mut body = Vec::with_capacity(4 + end + maps.len());
     body.extend_from_slice(&(end as u32).to_le_bytes());
     body.extend_from_slice(&poses[..end]);

@@ -177,7 +177,7 @@ impl Receiving<'_> {
     /// Until the next frame of a view is given up.
     fn until_due(&self) -> Duration {
         let now = now_nanos();
-        let open = self.views.iter().filter(|it| !it.has_ended);
+        let open = self.views.iter().filter(|view| !view.has_ended);
         let due = open.map(|it| {
             let is_there = self.remotes[it.remote].is_there(now);
             it.arrivals.due_nanos(is_there).saturating_sub(now)
@@ -189,7 +189,7 @@ impl Receiving<'_> {
     fn publish(&mut self, arrived: &Arrived) -> Result<(), Failure> {
         let health = self.service.health();
         health.received(1);
-        let Some(index) = self.views.iter().position(|it| it.index == arrived.view()) else {
+        let Some(index) = self.views.iter().position(|view| view.index == arrived.view()) else {
             return Ok(());
         };
         let remote = &self.remotes[self.views[index].remote];
@@ -287,7 +287,7 @@ impl Receiving<'_> {
         if !is_last && !self.report.is_due(REPORT_EVERY) {
             return;
         }
-        let views = self.views.iter().map(|it| (it.index, it.remote, it.arrivals.tally()));
+        let views = self.views.iter().map(|view| (view.index, view.remote, view.arrivals.tally()));
         self.report.write(&self.remotes, &views.collect::<Vec<_>>(), is_last);
     }
 }

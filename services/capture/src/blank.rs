@@ -68,7 +68,7 @@ impl Blank {
         let sides = size.split_once('x');
         let (width, height) = sides.ok_or_else(|| layout("no width and height"))?;
         let [mut n_frames, mut rate_hz] = [None, None];
-        for option in options.split('&').filter(|it| !it.is_empty()) {
+        for option in options.split('&').filter(|part| !part.is_empty()) {
             match option.split_once('=') {
                 Some(("frames", value)) => n_frames = Some(value),
                 Some(("rate", value)) => rate_hz = Some(value),
@@ -105,7 +105,7 @@ fn within<T: core::str::FromStr + PartialOrd + fmt::Display>(
     [least, most]: [T; 2],
 ) -> Result<T, BlankError> {
     let number = text.parse::<T>().ok();
-    let number = number.filter(|it| *it >= least && *it <= most);
+    let number = number.filter(|number| *number >= least && *number <= most);
     number.ok_or_else(|| BlankError::Value {
         key,
         got: format!("{:?}", text.chars().take(32).collect::<String>()),

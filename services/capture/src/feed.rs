@@ -87,7 +87,8 @@ impl Feed {
             return Ok(BlankFeed::look(&blank, spec)?);
         }
         if Recorded::is_recorded(&spec.path) {
-            let info = Recorded::parse(&spec.path).and_then(|it| RecordedFeed::look(&it, spec));
+            let info =
+                Recorded::parse(&spec.path).and_then(|value| RecordedFeed::look(&value, spec));
             return info.map_err(|source| not_recorded(spec, source));
         }
         if !Address::is_address(&spec.path) {
@@ -111,7 +112,8 @@ impl Feed {
             return Ok(Self::Blank(Box::new(BlankFeed::open(&blank, spec)?)));
         }
         if Recorded::is_recorded(&spec.path) {
-            let feed = Recorded::parse(&spec.path).and_then(|it| RecordedFeed::open(&it, spec));
+            let feed =
+                Recorded::parse(&spec.path).and_then(|value| RecordedFeed::open(&value, spec));
             let feed = feed.map_err(|source| not_recorded(spec, source))?;
             return Ok(Self::Recorded(Box::new(feed)));
         }
@@ -344,7 +346,7 @@ mod tests {
         let info = Feed::look(&part).unwrap();
         assert_eq!((info.n_frames, info.frame_rate_hz), (3, Some(20.0 / 3.0)));
         assert_eq!(info.size, Size::new(32, 16));
-        let of = |skip| frames(&part, skip).into_iter().map(|it| it.0);
+        let of = |skip| frames(&part, skip).into_iter().map(|frame| frame.0);
         assert_eq!(of(0).collect::<Vec<u64>>(), [1, 4, 7]);
         assert_eq!(of(2).collect::<Vec<u64>>(), [7]);
         assert_eq!(of(9).count(), 0);

@@ -112,7 +112,7 @@ impl Live<'_, '_> {
             return Ok(());
         }
         let place = self.grid.place(picture.at_nanos, self.at);
-        let Some(nth) = place.filter(|it| *it < n_frames) else {
+        let Some(nth) = place.filter(|place| *place < n_frames) else {
             self.counts.n_surplus += 1;
             return Ok(());
         };
@@ -220,7 +220,7 @@ impl Live<'_, '_> {
             camera = self.wanted.name,
             skew_ms = skew as f64 * 1e-6,
             max_skew_ms = self.wanted.max_skew_nanos as f64 * 1e-6,
-            drift_ppm = self.phase.drift_ppb().map(|it| it as f64 * 1e-3),
+            drift_ppm = self.phase.drift_ppb().map(|drift_ppb| drift_ppb as f64 * 1e-3),
             "the pictures of this camera are far from the instants of the frames"
         );
     }
@@ -239,7 +239,7 @@ impl Live<'_, '_> {
             drift_ppb: self.phase.drift_ppb().unwrap_or(UNMEASURED),
             delay_nanos: tally.delay_nanos.unwrap_or(UNMEASURED),
             timed_by: tally.timed_by,
-            rate_microhertz: tally.rate_hz.map_or(0, |it| (it * 1e6).round() as u64),
+            rate_microhertz: tally.rate_hz.map_or(0, |rate_hz| (rate_hz * 1e6).round() as u64),
             ..self.counts
         };
         self.camera.report(counts);

@@ -72,7 +72,7 @@ fn others(known: &[String]) -> String {
 impl Recorded {
     /// Whether a source is meant to be a recording.
     pub fn is_recorded(source: &str) -> bool {
-        let is_file = Path::new(source).extension().is_some_and(|it| it == "mcap");
+        let is_file = Path::new(source).extension().is_some_and(|extension| extension == "mcap");
         source.contains(MARK) || is_file
     }
 
@@ -205,18 +205,19 @@ impl RecordedFeed {
         };
         let format = PixelFormat::of_letters(picture.format);
         let (stride, size) = (picture.bytes_per_row as usize, self.table.size);
-        Ok(format.is_some_and(|it| it.to_rgb(message.elements, stride, size, &mut self.rgb)))
+        Ok(format
+            .is_some_and(|format| format.to_rgb(message.elements, stride, size, &mut self.rgb)))
     }
 
     /// The next picture of a stream that is wanted; none if the next one is of another connection.
     ///
     /// * `first`: the next of the table.
     fn next_of_stream(&mut self, first: Picture) -> Result<Option<Picture>, FootageError> {
-        let is_open = |it: &Open| it.connection == first.connection;
+        let is_open = |open: &Open| open.connection == first.connection;
         if !self.stream.as_ref().is_some_and(is_open) {
             let wanted = self.table.first_at(self.next).max(self.at);
             let wanted = self.table.pictures.get(wanted).copied();
-            let wanted = wanted.filter(|it| it.connection == first.connection);
+            let wanted = wanted.filter(|wanted| wanted.connection == first.connection);
             let pieces = pieces::from(&self.path, &self.table, &wanted.unwrap_or(first));
             let pieces = pieces.map_err(|source| FootageError::Io {
                 path: self.path.clone(),

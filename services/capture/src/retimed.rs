@@ -143,7 +143,7 @@ impl Retimed {
             return Ok(None);
         }
         let wanted = times.wanted();
-        while times.shown.is_none_or(|it| it < wanted) {
+        while times.shown.is_none_or(|shown| shown < wanted) {
             if wanted > times.next {
                 self.feed.skip(wanted - times.next)?;
                 times.next = wanted;
@@ -213,7 +213,7 @@ mod tests {
         let timelines = Timeline::all(&[clock(20.0, 0.0), clock(10.0, 0.21)]);
         let plain = pictures(&SourceSpec::new(PATH), None, 0);
         let found = pictures(&SourceSpec::new(PATH), Some(&timelines[0]), 0);
-        let frames: Vec<u64> = (0..found.len() as u64).map(|it| 4 + 2 * it).collect();
+        let frames: Vec<u64> = (0..found.len() as u64).map(|i| 4 + 2 * i).collect();
         assert_eq!(frames, [4, 6, 8, 10, 12, 14, 16, 18]);
         for ((nth, it), frame) in found.iter().enumerate().zip(frames) {
             assert_eq!(it.0, nth as u64);
@@ -225,7 +225,10 @@ mod tests {
             ..SourceSpec::new(PATH)
         };
         let part = pictures(&part, Some(&timelines[0]), 1);
-        assert_eq!(part.iter().map(|it| it.0).collect::<Vec<_>>(), [3, 5, 7]);
+        assert_eq!(
+            part.iter().map(|part| part.0).collect::<Vec<_>>(),
+            [3, 5, 7]
+        );
         assert!(part[0].1 == plain[10].1);
     }
 }

@@ -108,7 +108,7 @@ impl Supply {
 
     /// How long after its instant the picture of a frame was taken, nanoseconds; 0 for cameras without a clock of their own.
     pub(crate) fn rest_nanos(&self, index: u64) -> i64 {
-        self.timeline.map_or(0, |it| it.rest_nanos(index))
+        self.timeline.map_or(0, |timeline| timeline.rest_nanos(index))
     }
 
     /// The picture of the last [`Self::step`], RGB, row major.

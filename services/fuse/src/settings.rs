@@ -13,13 +13,13 @@ use viewquality::TrainingErrors;
 /// * `learned`: the content of the file `consistency`; its weights are those of the paper's energy where this
 ///   says nothing else.
 pub fn settings(config: &Config, frame_scale: f32, learned: Option<&Learned>) -> Settings {
-    let scaled = |px: Vec<f32>| px.into_iter().map(|it| it * frame_scale).collect();
+    let scaled = |px: Vec<f32>| px.into_iter().map(|px| px * frame_scale).collect();
     let (energy, defaults) = match config.energy {
         Energy::Paper => (EnergyKind::Paper, Settings::default()),
         Energy::Released => (EnergyKind::Released, Settings::released()),
     };
     let weights = learned.filter(|_| config.energy == Energy::Paper);
-    let weights = weights.map(|it| it.weights);
+    let weights = weights.map(|weight| weight.weights);
     let defaults = match weights {
         None => defaults,
         Some(it) => Settings {
@@ -36,7 +36,7 @@ pub fn settings(config: &Config, frame_scale: f32, learned: Option<&Learned>) ->
         alpha: config.alpha.unwrap_or(defaults.alpha),
         beta: config.beta.unwrap_or(defaults.beta),
         tau_px: scaled(tau_px(&config.tau)),
-        tau_tenths: tau_tenths.map_or_else(Vec::new, |it| it.tau_tenths.clone()),
+        tau_tenths: tau_tenths.map_or_else(Vec::new, |tau_tenth| tau_tenth.tau_tenths.clone()),
         rescue_px: scaled(rescue_px(&config.tau)),
         switch: match config.switch {
             Switch::Either => SwitchBy::Either,

@@ -68,12 +68,12 @@ pub struct Forecast {
 /// fewer where it has more to do, unless its views are given.
 pub fn forecast(costs: &Costs, load: &Load) -> Forecast {
     let n_far = load.n_hosts.saturating_sub(1);
-    if let Some(near) = load.near.filter(|it| n_far > 0 && *it <= load.n_cameras) {
+    if let Some(near) = load.near.filter(|near| n_far > 0 && *near <= load.n_cameras) {
         return with_views(costs, load, near, n_far);
     }
     let options = (0..=load.n_cameras).filter(|near| n_far > 0 || *near == load.n_cameras);
     let all = options.map(|near| with_views(costs, load, near, n_far));
-    let worst = |it: &Forecast| it.cores[0].max(it.cores[1]);
+    let worst = |forecast: &Forecast| forecast.cores[0].max(forecast.cores[1]);
     let best = all.min_by(|a, b| worst(a).total_cmp(&worst(b)));
     best.unwrap_or_else(|| with_views(costs, load, load.n_cameras, n_far))
 }
@@ -134,7 +134,7 @@ fn with_views(costs: &Costs, load: &Load, near: usize, n_far: usize) -> Forecast
         latency_ms: capture + pose + fusing + link_ms,
         link_ms,
         fits: cores.into_iter().all(is_free)
-            && bytes_s.into_iter().all(|it| it <= 0.8 * load.network_bytes_s),
+            && bytes_s.into_iter().all(|bytes_s| bytes_s <= 0.8 * load.network_bytes_s),
     }
 }
 

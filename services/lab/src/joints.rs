@@ -50,7 +50,7 @@ pub fn train(
 ) -> Result<Learned, Failure> {
     let search = Search::new(Arc::clone(model));
     let sets = found(chosen, &search, stop, console)?;
-    let people: Vec<Vec<Marked>> = sets.iter().map(|it| it.people.clone()).collect();
+    let people: Vec<Vec<Marked>> = sets.iter().map(|set| set.people.clone()).collect();
     let tried = try_all(&people);
     if stop.is_requested() {
         return Err(Failure::new(ExitKind::Interrupted, "stopped"));
@@ -58,7 +58,7 @@ pub fn train(
     let Some((settings, errors)) = best_local(&tried) else {
         return Err(Failure::new(ExitKind::Run, "there are no settings to try"));
     };
-    let all: Vec<Vec<&Marked>> = people.iter().map(|it| it.iter().collect()).collect();
+    let all: Vec<Vec<&Marked>> = people.iter().map(|person| person.iter().collect()).collect();
     let rows = settings.learn(&all);
     let of_set = |((set, people), after): ((&Found, &Vec<&Marked>), &f64)| LearnedSet {
         name: set.name.clone(),
@@ -96,7 +96,8 @@ fn found(
             console.message(&format!("left out: {problem}: {}", problem.fault));
         }
         let people = read.people.into_iter();
-        let people: Vec<Person> = people.map(|it| sides.of(it, table.joint_mirror())).collect();
+        let people: Vec<Person> =
+            people.map(|person| sides.of(person, table.joint_mirror())).collect();
         let marked: Result<Vec<Option<Marked>>, Failure> = people
             .par_iter()
             .map(|person| {
@@ -128,7 +129,7 @@ fn found(
 /// The best detection on a person, if there is one.
 fn marked(search: &Search, person: &Person) -> Result<Option<Marked>, Failure> {
     let [_, on_person] = judged::find(search, person)?;
-    let centres = on_person.and_then(|it| it.try_into().ok());
+    let centres = on_person.and_then(|on_person| on_person.try_into().ok());
     Ok(centres.map(|centres| Marked {
         centres,
         joints: judged::truth(person),

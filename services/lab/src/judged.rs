@@ -114,7 +114,7 @@ pub fn check(model: &fmp::Model, name: &str) -> Result<(), Failure> {
 
 /// The joints of a person; there are 14, or the data set would have been refused.
 pub(crate) fn truth(person: &Person) -> Joints {
-    core::array::from_fn(|it| person.joints.get(it).copied().unwrap_or([f64::NAN; 2]))
+    core::array::from_fn(|i| person.joints.get(i).copied().unwrap_or([f64::NAN; 2]))
 }
 
 /// The centres of the parts of a detection.
@@ -135,20 +135,20 @@ pub(crate) fn find(search: &Search, person: &Person) -> Result<[Option<Centres>;
     });
     let boxes: Vec<_> = found.iter().map(|it| around(model, it, &layout)).collect();
     let [x, y] = [0, 1].map(|axis| {
-        let values = person.joints.iter().map(|it| it[axis]);
+        let values = person.joints.iter().map(|joint| joint[axis]);
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
             [low.min(it), high.max(it)]
         })
     });
     let covering = best_covering(&boxes, [x[0], y[0], x[1], y[1]], COVERED);
     let centres = |pose: &Pose| pose.centres(model, &layout);
-    let covering = covering.and_then(|it| found.get(it));
+    let covering = covering.and_then(|covering| found.get(covering));
     Ok([best.as_ref().map(centres), covering.map(centres)])
 }
 
 /// Score of a pose, and the box around all its parts.
 fn around(model: &fmp::Model, pose: &Pose, layout: &Layout) -> (f64, [f64; 4]) {
-    let boxes = (0..N_PARTS).map(|it| pose.part_box(model, layout, it));
+    let boxes = (0..N_PARTS).map(|i| pose.part_box(model, layout, i));
     let whole = boxes.reduce(|a, b| {
         [
             a[0].min(b[0]),
@@ -194,15 +194,15 @@ pub fn numbers(report: &Report) -> Value {
 
 /// The mean offsets of joints for programs.
 pub fn offset_numbers(offsets: &[Offset]) -> Value {
-    let each = offsets.iter().map(|it| {
+    let each = offsets.iter().map(|offset| {
         json!({
-            "joint": it.joint,
-            "found": it.n_found,
-            "of": it.n,
-            "along": it.mean[0],
-            "along_interval": it.interval[0],
-            "across": it.mean[1],
-            "across_interval": it.interval[1],
+            "joint": offset.joint,
+            "found": offset.n_found,
+            "of": offset.n,
+            "along": offset.mean[0],
+            "along_interval": offset.interval[0],
+            "across": offset.mean[1],
+            "across_interval": offset.interval[1],
         })
     });
     each.collect()

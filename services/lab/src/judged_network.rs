@@ -139,6 +139,6 @@ impl NetworkReader {
 fn at_peaks(peaks: &[Option<Keypoint>]) -> Joints {
     core::array::from_fn(|joint| {
         let peak = peaks.get(joint).copied().flatten();
-        peak.map_or([f64::NAN; 2], |it| it.at)
+        peak.map_or([f64::NAN; 2], |peak| peak.at)
     })
 }

@@ -93,7 +93,7 @@ pub fn train(
     let work = Work { stop };
     let (mut samples, mut judged) = marked::samples(job, &work)?;
     let n_photographs = samples.len();
-    let n_behind = samples.iter().filter(|it| it.front[1] < 0.0).count();
+    let n_behind = samples.iter().filter(|sample| sample.front[1] < 0.0).count();
     console.message(&format!(
         "{n_photographs} photographs of people, {n_behind} from behind"
     ));

@@ -124,7 +124,7 @@ fn of_scene<T>(
         let before = all.len();
         for frame in 0..u64::from(scenes.frames) {
             let truth = view.picture(frame, &mut rgb);
-            let joints = truth.pixels.map(|it| it.unwrap_or([f64::NAN; 2]));
+            let joints = truth.pixels.map(|pixel| pixel.unwrap_or([f64::NAN; 2]));
             let shown = Shown {
                 group: &group,
                 source: format!(

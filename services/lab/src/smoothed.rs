@@ -96,7 +96,7 @@ fn truth(
         );
         return Err(Failure::new(ExitKind::Usage, what).with_hint("name the folder of one of them"));
     };
-    let first = sequence.views.first().map_or(0, |it| it.first);
+    let first = sequence.views.first().map_or(0, |view| view.first);
     let mut all = vec![vec![None; frames.len()]; recorded.joints.len()];
     let mut n_known = 0;
     for frame in &sequence.frames {
@@ -145,7 +145,9 @@ pub fn compare(
         block: rate_hz.round().max(1.0) as usize,
         ..Bootstrap::default()
     };
-    let n = tried.first().map_or(0.0, |it| it.iter().map(|it| it.0.position_m.n).sum());
+    let n = tried
+        .first()
+        .map_or(0.0, |tried| tried.iter().map(|it| it.0.position_m.n).sum());
     Comparison {
         n_compared: n as usize,
         rows: rows(&tried, &bootstrap),
@@ -178,10 +180,10 @@ fn tried(
     for (joint, truth) in truth.iter().enumerate() {
         let path = |track: &Option<Motion>| -> Option<Vec<Option<Vector3<f64>>>> {
             let track = &track.as_ref()?.joints[joint];
-            Some(track.iter().map(|it| it.ok().map(|it| it.position)).collect())
+            Some(track.iter().map(|track| track.ok().map(|it| it.position)).collect())
         };
         let paths: Vec<_> = tracks.iter().map(path).collect();
-        let has_all = |at: usize| paths.iter().flatten().all(|it| it[at].is_some());
+        let has_all = |at: usize| paths.iter().flatten().all(|path| path[at].is_some());
         let counted: Vec<bool> = (0..n).map(|at| truth[at].is_some() && has_all(at)).collect();
         for (path, tried) in paths.iter().zip(&mut all) {
             let Some(path) = path else { continue };
@@ -217,7 +219,7 @@ fn rows(tried: &[Vec<Tried>], bootstrap: &Bootstrap) -> Vec<Row> {
             let interval = bootstrap.interval(&shares)?;
             Some(Mean {
                 mean: Share::mean(&shares)? * factor,
-                interval: interval.map(|it| it * factor),
+                interval: interval.map(|interval| interval * factor),
             })
         };
         Row {
@@ -234,7 +236,7 @@ fn rows(tried: &[Vec<Tried>], bootstrap: &Bootstrap) -> Vec<Row> {
         }
     };
     let rows = METHODS.iter().zip(tried).map(row);
-    rows.filter(|it| it.position_mm.is_some()).collect()
+    rows.filter(|row| row.position_mm.is_some()).collect()
 }
 
 impl Row {

@@ -158,7 +158,7 @@ impl Job {
 
     /// The name of a sequence.
     fn name(&self, subject: u64, action: Action) -> String {
-        let recorded = self.recording.as_ref().map(|it| it.name.as_str());
+        let recorded = self.recording.as_ref().map(|recording| recording.name.as_str());
         format!("s{subject}-{}", recorded.unwrap_or(action.name()))
     }
 

@@ -12,7 +12,7 @@ use serde_json::Value;
 /// Three views of a synthetic walking figure, as a sequence of `n_frames` with ground truth.
 fn case(n_frames: usize, n_true: usize) -> Case {
     let case = Case::new("eval", &[n_frames; 3], PLAIN);
-    let markers: Vec<String> = (0..14).map(|it| format!("M{it}")).collect();
+    let markers: Vec<String> = (0..14).map(|i| format!("M{i}")).collect();
     let row = |frame: usize| {
         let joints = planted::joints(frame).concat();
         let cells: Vec<String> = joints.iter().map(ToString::to_string).collect();
@@ -65,7 +65,7 @@ fn eval(case: &Case, more: &[&str]) -> Ended {
 
 fn reports(case: &Case) -> Vec<String> {
     let files = ["report.html", "report.json", "report.tex"];
-    let read = |it: &str| fs::read_to_string(case.path("out").join(it)).unwrap();
+    let read = |text: &str| fs::read_to_string(case.path("out").join(text)).unwrap();
     files.map(read).to_vec()
 }
 
@@ -79,8 +79,8 @@ fn people(case: &Case) -> &'static str {
     for camera in planted::rig(3).cameras() {
         for frame in 0..3 {
             let at = planted::joints(frame).into_iter();
-            let at = at.map(|it| camera.project(&it.into()).unwrap());
-            let joints: Vec<[f64; 2]> = at.map(|it| [it.x, it.y]).collect();
+            let at = at.map(|at| camera.project(&at.into()).unwrap());
+            let joints: Vec<[f64; 2]> = at.map(|at| [at.x, at.y]).collect();
             let image = format!("{}/{frame:04}.png", camera.name);
             let line = serde_json::json!({ "image": image, "joints": joints });
             lines += &(line.to_string() + "\n");

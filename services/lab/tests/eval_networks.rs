@@ -26,7 +26,7 @@ fn network() -> Network {
     let mut net = Network::default();
     net.inputs.push(("picture".to_owned(), sides([1, 3, 64, 48])));
     net.outputs.push(("maps".to_owned(), sides([1, 14, 16, 12])));
-    let weights = (0..14 * 3).map(|it| (it * 5 % 7) as f32 / 7.0 - 0.3).collect();
+    let weights = (0..14 * 3).map(|i| (i * 5 % 7) as f32 / 7.0 - 0.3).collect();
     net.floats("weights", &[14, 3, 1, 1], weights);
     let four = || Attribute::Ints(vec![4, 4]);
     let attributes = vec![("kernel_shape", four()), ("strides", four())];
@@ -77,7 +77,7 @@ fn every_stress_has_a_row_for_every_way_of_solving() {
     assert_eq!(rows[28]["method"], "as run");
     for row in &rows {
         assert_eq!(row["n_frames"], 2, "{row}");
-        let [from, to] = [0, 1].map(|it| row["limbs_mm_interval"][it].as_f64().unwrap());
+        let [from, to] = [0, 1].map(|i| row["limbs_mm_interval"][i].as_f64().unwrap());
         let mean = row["limbs_mm"].as_f64().unwrap();
         assert!((0.0..=2000.0).contains(&mean), "{row}");
         assert!(from <= mean + 1e-9 && mean <= to + 1e-9, "{row}");
@@ -102,7 +102,7 @@ fn a_detector_that_finds_nobody_leaves_every_joint_unfound() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let rows: Vec<Value> = serde_json::from_str(ended.stdout.trim()).unwrap();
     assert!(
-        rows.iter().all(|it| it["pcp3d"] == 0.0 && it["limbs_mm"] == 2000.0),
+        rows.iter().all(|row| row["pcp3d"] == 0.0 && row["limbs_mm"] == 2000.0),
         "{rows:?}"
     );
 }

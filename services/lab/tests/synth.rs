@@ -83,7 +83,7 @@ fn the_default_model_finds_the_person() {
     let header = Header::parse(lines.next().unwrap()).unwrap();
     let frame = Frame::parse(lines.next().unwrap(), &header).unwrap();
     let pictures = header.cameras.iter();
-    let pictures: Vec<String> = pictures.map(|it| format!("walk/cameras/{it}")).collect();
+    let pictures: Vec<String> = pictures.map(|picture| format!("walk/cameras/{picture}")).collect();
     let pictures: Vec<&str> = pictures.iter().map(String::as_str).collect();
     let best = ["--network", "none", "--max", "1", "--json"];
     let detect = [&["detect"], &pictures[..], &best].concat();
@@ -93,7 +93,7 @@ fn the_default_model_finds_the_person() {
     for (line, view) in ended.stdout.lines().zip(&frame.views) {
         let found: serde_json::Value = serde_json::from_str(line).unwrap();
         let neck = &found["detections"][0]["joints"]["neck"];
-        let [u, v] = [0, 1].map(|it| neck[it].as_f64().unwrap_or(f64::INFINITY));
+        let [u, v] = [0, 1].map(|i| neck[i].as_f64().unwrap_or(f64::INFINITY));
         let [x, y] = view.pixels[12].unwrap();
         let [_, top, _, bottom] = view.outline.unwrap();
         n_found += usize::from((u - x).hypot(v - y) < 0.1 * (bottom - top));
@@ -115,7 +115,7 @@ fn a_run_among_others_follows_one_person_and_counts_all() {
         "results.overlay_every=0",
         "supervise.deadline_ms=20000",
     ];
-    let sets = sets.iter().flat_map(|it| ["--set", it]);
+    let sets = sets.iter().flat_map(|set| ["--set", set]);
     let arguments: Vec<&str> = ["run", file].into_iter().chain(sets).collect();
     let ended = case.start(&arguments).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stdout);
@@ -166,15 +166,16 @@ fn a_live_scene_keeps_up_with_the_clock() {
         "results.overlay_every=0",
         "supervise.deadline_ms=20000",
     ];
-    let sets = sets.iter().flat_map(|it| ["--set", it]);
+    let sets = sets.iter().flat_map(|set| ["--set", set]);
     let arguments: Vec<&str> = ["run", file].into_iter().chain(sets).collect();
     let mut started = case.start(&arguments);
     let lines = || -> Vec<serde_json::Value> {
-        let files = ["times.jsonl", "times.jsonl.part"].map(|it| case.path("live/out").join(it));
-        let text = files.iter().find_map(|it| fs::read_to_string(it).ok());
+        let files =
+            ["times.jsonl", "times.jsonl.part"].map(|name| case.path("live/out").join(name));
+        let text = files.iter().find_map(|file| fs::read_to_string(file).ok());
         let text = text.unwrap_or_default();
         let whole = text.rsplit_once('\n').map_or("", |it| it.0);
-        let lines = whole.lines().map(|it| serde_json::from_str(it).unwrap());
+        let lines = whole.lines().map(|line| serde_json::from_str(line).unwrap());
         lines.collect()
     };
     let shots = || -> Vec<(f64, f64)> {
@@ -183,7 +184,7 @@ fn a_live_scene_keeps_up_with_the_clock() {
             let views: Vec<_> = line["views"].as_object().unwrap().values().cloned().collect();
             views
                 .into_iter()
-                .filter_map(move |it| Some((frame, it["camera"]["captured_ms"].as_f64()?)))
+                .filter_map(move |view| Some((frame, view["camera"]["captured_ms"].as_f64()?)))
         });
         views.collect()
     };
@@ -224,7 +225,7 @@ fn the_ground_truth_is_the_projection_by_the_exact_rig() {
     let text = fs::read_to_string(case.path("flawed/truth.jsonl")).unwrap();
     let mut lines = text.lines();
     let header = Header::parse(lines.next().unwrap()).unwrap();
-    let frames: Vec<Frame> = lines.map(|it| Frame::parse(it, &header).unwrap()).collect();
+    let frames: Vec<Frame> = lines.map(|line| Frame::parse(line, &header).unwrap()).collect();
     assert_eq!(frames.len(), 3);
     let mut off = BTreeSet::new();
     for frame in &frames {
@@ -301,7 +302,7 @@ fn several_sequences_have_a_folder_each_and_one_list_of_people() {
         let pictures = read
             .problems
             .iter()
-            .filter(|it| matches!(it.fault, training::datasets::Fault::Image(_)));
+            .filter(|problem| matches!(problem.fault, training::datasets::Fault::Image(_)));
         assert_eq!(pictures.count(), 0, "every picture is there");
     }
 }
@@ -309,7 +310,7 @@ fn several_sequences_have_a_folder_each_and_one_list_of_people() {
 /// The joints of a sequence as a TRC file has them, y up.
 fn trc(case: &Case, folder: &str, rate: u32) -> String {
     let names = skeleton::PARSE14.joints.iter();
-    let names: Vec<String> = names.map(|it| it.name.replace(' ', "_")).collect();
+    let names: Vec<String> = names.map(|name| name.name.replace(' ', "_")).collect();
     let rows = truth(case, folder).1.into_iter().map(|frame| {
         let cells = frame.joints.iter().flat_map(|[x, y, z]| [y, z, x]);
         let cells: Vec<String> = cells.map(f64::to_string).collect();
@@ -329,7 +330,7 @@ fn truth(case: &Case, folder: &str) -> (Header, Vec<Frame>) {
     let text = fs::read_to_string(case.path(folder).join("truth.jsonl")).unwrap();
     let mut lines = text.lines();
     let header = Header::parse(lines.next().unwrap()).unwrap();
-    let frames = lines.map(|it| Frame::parse(it, &header).unwrap()).collect();
+    let frames = lines.map(|line| Frame::parse(line, &header).unwrap()).collect();
     (header, frames)
 }
 
@@ -370,8 +371,8 @@ fn recorded_motion_is_performed_by_another_person() {
             [9, 10],
             [10, 11],
         ] {
-            let along = |it: &Frame| {
-                let [a, b] = [from, to].map(|joint| nalgebra::Vector3::from(it.joints[joint]));
+            let along = |frame: &Frame| {
+                let [a, b] = [from, to].map(|joint| nalgebra::Vector3::from(frame.joints[joint]));
                 b - a
             };
             let angle = along(got).angle(&along(recorded));

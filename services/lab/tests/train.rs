@@ -166,7 +166,7 @@ fn assert_ended(ended: &Ended, status: i32, words: &[&str]) {
 
 fn events(ended: &Ended) -> Vec<Value> {
     let lines = ended.stdout.lines();
-    lines.map(|it| serde_json::from_str(it).unwrap()).collect()
+    lines.map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 fn is_gone(path: &Path) -> bool {
@@ -188,7 +188,7 @@ fn a_trained_model_finds_other_figures_with_any_threads_and_after_kills() {
     assert_ended(&two, 0, &[]);
     assert!(drawn.model("one/m.fmp") == drawn.model("two/m.fmp"));
     let events = events(&two);
-    let of = |kind: &str| events.iter().filter(|it| it["event"] == kind).count();
+    let of = |kind: &str| events.iter().filter(|event| event["event"] == kind).count();
     assert_eq!([of("data"), of("step"), of("summary")], [1, 14, 1]);
     let summary = events.last().unwrap();
     assert_eq!(summary["data"]["people"], 14);
@@ -240,7 +240,7 @@ fn an_interrupted_training_reports_how_to_continue_and_refuses_foreign_state() {
 /// Adds a bad line at the beginning, and one line for every kind of bad label at the end.
 fn add_bad_labels(drawn: &Drawn) {
     let sound = fs::read_to_string(drawn.path("people.jsonl")).unwrap();
-    let outside = FIGURE.map(|it| [it[0] + 60.0, it[1]]);
+    let outside = FIGURE.map(|figure| [figure[0] + 60.0, figure[1]]);
     let one_place = [[40.0; 2]; 14];
     let named = |image: &str| {
         let mut line = line(image, &FIGURE);
@@ -276,9 +276,14 @@ fn bad_labels_are_reported_and_counted_or_fatal() {
         &["people.jsonl, line 16", "px outside", "negatives/9.png"],
     );
     let events = events(&ended);
-    let left_out = events.iter().filter(|it| it["event"] == "left-out");
+    let left_out = events.iter().filter(|event| event["event"] == "left-out");
     let told: Vec<_> = left_out
-        .map(|it| (it["row"].as_str().unwrap(), it["kind"].as_str().unwrap()))
+        .map(|left_out| {
+            (
+                left_out["row"].as_str().unwrap(),
+                left_out["kind"].as_str().unwrap(),
+            )
+        })
         .collect();
     let expected = [
         ("line 16", "outside"),

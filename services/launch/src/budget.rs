@@ -24,19 +24,19 @@ impl Budget {
     /// * `limit_ms`: the budget, milliseconds.
     /// * `latency`: the latency report of the run; none if there is none.
     pub fn new(limit_ms: f64, latency: Option<&LatencyReport>) -> Self {
-        let measured = latency.map(|it| it.end_to_end);
-        let measured = measured.filter(|it| it.count > 0);
+        let measured = latency.map(|latency| latency.end_to_end);
+        let measured = measured.filter(|measured| measured.count > 0);
         Self {
             limit_ms,
-            n_frames: measured.map_or(0, |it| it.count),
-            p99_ms: measured.map(|it| it.p99_ms),
+            n_frames: measured.map_or(0, |measured| measured.count),
+            p99_ms: measured.map(|measured| measured.p99_ms),
             table: latency.map_or_else(String::new, table),
         }
     }
 
     /// Whether frames were measured and the budget was met.
     pub fn is_held(&self) -> bool {
-        self.p99_ms.is_some_and(|it| it <= self.limit_ms)
+        self.p99_ms.is_some_and(|p99_ms| p99_ms <= self.limit_ms)
     }
 
     /// Whether frames were measured and the budget was exceeded.

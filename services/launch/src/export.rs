@@ -117,12 +117,12 @@ pub fn export(
 ) -> Result<Vec<Written>, Failure> {
     let trials = &origin.trials[..];
     check(origin, job)?;
-    let cameras = if job.formats.iter().any(|it| it.needs_cameras()) {
+    let cameras = if job.formats.iter().any(|format| format.needs_cameras()) {
         origin.cameras()?
     } else {
         Vec::new()
     };
-    let mut pictures = if job.formats.iter().any(|it| matches!(it, Format::Mp4)) {
+    let mut pictures = if job.formats.iter().any(|format| matches!(format, Format::Mp4)) {
         Pictures::all(origin)?
     } else {
         Vec::new()
@@ -197,7 +197,7 @@ pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
         "rate_hz": trial.rate_hz,
         "irregular_times": trial.n_irregular,
         "repeated_frames": trial.n_repeated,
-        "up_in_world": trial.up_in_world.map(|it| [it.x, it.y, it.z]),
+        "up_in_world": trial.up_in_world.map(|up_in_world| [up_in_world.x, up_in_world.y, up_in_world.z]),
         "points": labels,
         "people": trials.iter().map(person).collect::<Vec<Value>>(),
         "flaws": origin.flaws,
@@ -208,7 +208,7 @@ pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
 /// Refuses what the run does not tell.
 fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
     let lacks = |needs: fn(Format) -> bool| {
-        let all = job.formats.iter().copied().filter(|it| needs(*it));
+        let all = job.formats.iter().copied().filter(|format| needs(*format));
         let names: Vec<&str> = all.map(Format::name).collect();
         (!names.is_empty()).then(|| names.join(", "))
     };
@@ -240,7 +240,7 @@ fn paths(format: Format, job: &Job, trials: &[Trial], pictures: &[Pictures]) -> 
         Format::OpenPose => vec![name("-openpose")],
         Format::Mp4 => {
             let views = pictures.iter();
-            views.map(|it| name(&format!("-{}.mp4", it.view.name))).collect()
+            views.map(|view| name(&format!("-{}.mp4", view.view.name))).collect()
         }
     }
 }

@@ -80,7 +80,7 @@ pub fn films(
         Poses::Unknown => inputs::lenses_of(deployment)?,
     };
     let cameras = cameras(deployment, &rig)?;
-    let finders = (0..cameras.len()).map(|it| finder(deployment, it));
+    let finders = (0..cameras.len()).map(|i| finder(deployment, i));
     let finders: Vec<Finder> = finders.collect::<Result<_, Failure>>()?;
     let names: Vec<Vec<String>> = finders.iter().map(Finder::names).collect();
     let extra = extra(&names);
@@ -122,16 +122,16 @@ pub fn films(
 ///
 /// A camera is live, or not in the rig.
 pub fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failure> {
-    let of_entry = |it: &deployment::capture::Camera| {
-        if crate::cameras::is_live(&it.source) {
+    let of_entry = |camera: &deployment::capture::Camera| {
+        if crate::cameras::is_live(&camera.source) {
             let message = format!(
                 "camera {:?} is live: nothing of it can be compared with others",
-                it.name
+                camera.name
             );
             let failure = Failure::new(ExitKind::Config, message);
             return Err(failure.with_hint("name footage that was recorded with it"));
         }
-        inputs::camera_of(rig, &it.name, deployment).cloned()
+        inputs::camera_of(rig, &camera.name, deployment).cloned()
     };
     deployment.cameras.iter().map(of_entry).collect()
 }
@@ -188,7 +188,7 @@ type Rows = Vec<Option<Vec<(usize, f64)>>>;
 
 fn rows(names: &[String], extra: &[String]) -> Rows {
     let of_extra = |wanted: &String| {
-        let at = names.iter().position(|it| it == wanted)?;
+        let at = names.iter().position(|name| name == wanted)?;
         Some(vec![(at, 1.0)])
     };
     let mut rows = joint_rows(names);
@@ -316,7 +316,7 @@ impl Reader<'_> {
             self.console.advance(1);
             shots.push(Shot {
                 time_s: frame.index as f64 / rate_hz,
-                people: people.iter().map(|it| self.person(it)).collect(),
+                people: people.iter().map(|person| self.person(person)).collect(),
             });
         }
         Ok(Film { shots })
@@ -357,8 +357,8 @@ impl Part {
     /// The frames, of so many.
     fn frames(self, n_frames: u64, rate_hz: f64) -> Range<u64> {
         let start = ((self.from_s * rate_hz).round() as u64).min(n_frames);
-        let most = self.seconds.map(|it| (it * rate_hz).round() as u64);
-        let end = most.map_or(n_frames, |it| start.saturating_add(it).min(n_frames));
+        let most = self.seconds.map(|second| (second * rate_hz).round() as u64);
+        let end = most.map_or(n_frames, |most| start.saturating_add(most).min(n_frames));
         start..end
     }
 }

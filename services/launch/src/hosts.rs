@@ -38,7 +38,7 @@ pub fn choose<'a>(
             }
         };
     }
-    let known: Vec<&str> = deployment.hosts.iter().map(|it| it.name.as_str()).collect();
+    let known: Vec<&str> = deployment.hosts.iter().map(|host| host.name.as_str()).collect();
     let short = machine.split('.').next().unwrap_or(machine);
     let name = named.unwrap_or(short);
     let Some(host) = deployment.host(name) else {
@@ -49,7 +49,7 @@ pub fn choose<'a>(
         let failure = Failure::new(ExitKind::Usage, message);
         return Err(failure.with_hint("say which one this machine is: --host NAME"));
     };
-    let has_keypoints = deployment.cameras.iter().find(|it| it.keypoints.is_some());
+    let has_keypoints = deployment.cameras.iter().find(|camera| camera.keypoints.is_some());
     if let Some(camera) = has_keypoints {
         let message = format!(
             "camera {:?} has `keypoints`, and the deployment has hosts: files of keypoints are for one machine",
@@ -70,7 +70,7 @@ pub fn choose<'a>(
 ///
 /// A key is missing.
 pub fn address(deployment: &Deployment, host: &Host) -> Result<Address, Failure> {
-    let fusing = deployment.fusing_host().and_then(|it| it.address.clone());
+    let fusing = deployment.fusing_host().and_then(|fusing_host| fusing_host.address.clone());
     let keys = match &deployment.link.keys {
         Some(folder) if !deployment.link.insecure => {
             Some(KeyFiles::find(folder, &host.name).map_err(|error| {
@@ -83,7 +83,7 @@ pub fn address(deployment: &Deployment, host: &Host) -> Result<Address, Failure>
     Ok(Address {
         deployment: deployment.name.clone(),
         host: host.name.clone(),
-        hosts: deployment.hosts.iter().map(|it| it.name.clone()).collect(),
+        hosts: deployment.hosts.iter().map(|host| host.name.clone()).collect(),
         address: fusing.unwrap_or_default(),
         listens: host.fuses,
         keys,
@@ -130,14 +130,14 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     }
     let hosts = deployment.hosts.iter();
     let views: Vec<String> =
-        hosts.map(|it| format!("{}: {}", it.name, it.views.join(" "))).collect();
+        hosts.map(|host| format!("{}: {}", host.name, host.views.join(" "))).collect();
     all.add("views of hosts", views.join("\n").as_bytes());
     let settings = serde_json::to_vec(&(
         &deployment.capture,
         &deployment.link.carry,
         &deployment.unit,
         deployment.up,
-        deployment.cameras.iter().map(|it| &it.name).collect::<Vec<_>>(),
+        deployment.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
     ));
     all.add("capture", &settings.or_fail(ExitKind::Run)?);
     Ok(all)
@@ -170,7 +170,7 @@ pub fn part(deployment: &Deployment, host: &Host) -> Deployment {
 /// The name under which the processes of a host share memory.
 pub(crate) fn namespace(resolved: &Resolved) -> String {
     let deployment = &resolved.deployment;
-    match resolved.own_host().filter(|it| !it.fuses) {
+    match resolved.own_host().filter(|own_host| !own_host.fuses) {
         Some(host) => deployment.name_on(host),
         None => deployment.name.clone(),
     }
@@ -187,10 +187,10 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
     let capture = &deployment.capture;
     let step = capture.frame_step.max(1);
     let rate_hz = capture.frame_rate_hz.unwrap_or(1.0) / step as f64;
-    let sizes = prepared.views.iter().map(|it| it.framing.out_size());
+    let sizes = prepared.views.iter().map(|view| view.framing.out_size());
     let role = if host.fuses {
         let topology = resolved.topology();
-        let others = deployment.hosts.iter().filter(|it| !it.fuses);
+        let others = deployment.hosts.iter().filter(|host| !host.fuses);
         let topic = |view: usize| match deployment.link.carry {
             Carry::Frames => topic::frame(view),
             Carry::Poses => topic::view_pose(view),
@@ -198,9 +198,9 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
         let views = 0..prepared.views.len();
         bridge::Role::Near(bridge::Near {
             hosts: others
-                .map(|it| NearHost {
-                    name: it.name.clone(),
-                    views: deployment.views_of(it),
+                .map(|other| NearHost {
+                    name: other.name.clone(),
+                    views: deployment.views_of(other),
                 })
                 .collect(),
             n_frames: resolved.n_frames(),

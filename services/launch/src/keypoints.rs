@@ -64,10 +64,10 @@ pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
             }
             known.push(network);
             let card = inputs::network_card(deployment, index)?;
-            as_seen |= card.as_ref().is_some_and(|it| it.keypoints.sides == Sides::Seen);
-            card.map(|it| it.names()).unwrap_or_default()
+            as_seen |= card.as_ref().is_some_and(|card| card.keypoints.sides == Sides::Seen);
+            card.map(|card| card.names()).unwrap_or_default()
         };
-        let names = names.into_iter().filter(|it| !::keypoints::is_joint(it));
+        let names = names.into_iter().filter(|name| !::keypoints::is_joint(name));
         for name in names {
             if !extra.contains(&name) {
                 extra.push(name);
@@ -89,7 +89,7 @@ pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
 /// Number of frames of the keypoints of every camera, from the first frame of the footage on; none for a camera without them.
 pub(crate) fn lengths(deployment: &Deployment) -> Result<Vec<Option<u64>>, Failure> {
     let cameras = deployment.cameras.iter();
-    cameras.map(|it| Ok(of_camera(it)?.map(|it| it.n_frames()))).collect()
+    cameras.map(|camera| Ok(of_camera(camera)?.map(|it| it.n_frames()))).collect()
 }
 
 /// The deployment with grey footage for every camera without a source: of the size that the rig says, as long as its keypoints.
@@ -101,7 +101,7 @@ pub(crate) fn with_pictures(
     mut deployment: Deployment,
     lengths: &[Option<u64>],
 ) -> Result<Deployment, Failure> {
-    if deployment.cameras.iter().all(|it| !it.source.is_empty()) {
+    if deployment.cameras.iter().all(|camera| !camera.source.is_empty()) {
         return Ok(deployment);
     }
     let rig = inputs::lenses_of(&deployment)?;
@@ -142,7 +142,7 @@ pub(crate) fn check_lengths(resolved: &Resolved, lengths: &[Option<u64>]) -> Vec
     let cameras = cameras.zip(&resolved.footage).zip(lengths);
     let odd = cameras.filter_map(|((camera, footage), n_frames)| {
         let n_frames = (*n_frames)?;
-        let n_frames = footage.timeline.map_or(n_frames, |it| it.n_instants(n_frames));
+        let n_frames = footage.timeline.map_or(n_frames, |timeline| timeline.n_instants(n_frames));
         let (used, known) = (footage.n_frames, used_of(n_frames, capture));
         let what = match used.cmp(&known) {
             core::cmp::Ordering::Equal => return None,

@@ -96,7 +96,7 @@ impl Live {
 /// The file cannot be read, the name is none, or not exactly one deployment runs.
 pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
     if let Some(named) = named {
-        let is_file = Path::new(named).extension().is_some_and(|it| it == "toml");
+        let is_file = Path::new(named).extension().is_some_and(|extension| extension == "toml");
         let name = if is_file {
             load::read(Path::new(named), &[])?.deployment.name
         } else {
@@ -107,12 +107,12 @@ pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
     let mut running = deployments(&Namespace::usual_base())?;
     running.retain(|it| it.supervisor.is_some());
     if running.len() > 1 {
-        let names: Vec<&str> = running.iter().map(|it| it.namespace.name()).collect();
+        let names: Vec<&str> = running.iter().map(|running| running.namespace.name()).collect();
         let message = format!("{} deployments run: {}", names.len(), names.join(", "));
         return Err(Failure::new(ExitKind::Usage, message).with_hint("name one of them"));
     }
     let none = || Failure::new(ExitKind::Usage, "no deployment runs");
-    running.pop().map(|it| it.namespace).ok_or_else(none)
+    running.pop().map(|running| running.namespace).ok_or_else(none)
 }
 
 /// What a running deployment says about itself: its settings, without passwords of cameras.

@@ -9,7 +9,7 @@ use crate::views::ViewReport;
 /// * `summary`: the summary that the process `results` wrote.
 /// * `views`: the reports of all views.
 pub fn reason(summary: &Summary, views: &[ViewReport]) -> Option<String> {
-    if views.iter().all(|it| it.frames == 0) {
+    if views.iter().all(|view| view.frames == 0) {
         return Some("the footage has no frame".to_owned());
     }
     if summary.frames == 0 {
@@ -23,7 +23,7 @@ pub fn reason(summary: &Summary, views: &[ViewReport]) -> Option<String> {
     if summary.frames_with_pose > 0 {
         return None;
     }
-    if views.iter().all(|it| it.used == 0) {
+    if views.iter().all(|view| view.used == 0) {
         return Some(format!(
             "nobody was found in any of {} frames of any view: is somebody there, upright and large enough? `parallax detect` shows what is \
              found in a picture",

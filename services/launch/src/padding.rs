@@ -8,10 +8,14 @@ const MIN_SHARE: f64 = 0.1;
 /// * `frame`: width and height of the frames, pixels.
 /// * `cameras`: name, and width and height of the image in pixels, of every camera.
 pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option<String> {
-    let padded = cameras.iter().filter(|it| share(it.1, frame) > MIN_SHARE);
+    let padded = cameras.iter().filter(|camera| share(camera.1, frame) > MIN_SHARE);
     let padded: Vec<(&str, [u32; 2])> = padded.copied().collect();
     let (_, image) = *padded.first()?;
-    let names: Vec<&str> = padded.iter().filter(|it| it.1 == image).map(|it| it.0).collect();
+    let names: Vec<&str> = padded
+        .iter()
+        .filter(|padded| padded.1 == image)
+        .map(|padded| padded.0)
+        .collect();
     let [width, height] = fitting(image, frame);
     Some(format!(
         "{:.0} % of every {}x{} frame of {} is padding, for the camera's image is {}x{}: searched in vain, and the person \
@@ -42,7 +46,7 @@ fn share(image: [u32; 2], frame: [usize; 2]) -> f64 {
 /// The size of the image scaled to fit into the frame, pixels.
 fn fitting(image: [u32; 2], frame: [usize; 2]) -> [u32; 2] {
     let scale = scale(image, frame);
-    image.map(|it| (f64::from(it) * scale).round().max(1.0) as u32)
+    image.map(|image| (f64::from(image) * scale).round().max(1.0) as u32)
 }
 
 #[cfg(test)]
@@ -61,7 +65,7 @@ mod tests {
     fn the_same_aspect_ratio_needs_no_padding() {
         for frame in [[640, 480], [320, 240], [1280, 960]] {
             assert!(share([640, 480], frame).abs() < 1e-9, "{frame:?}");
-            assert_eq!(fitting([640, 480], frame), frame.map(|it| it as u32));
+            assert_eq!(fitting([640, 480], frame), frame.map(|frame| frame as u32));
         }
     }
 }

@@ -52,17 +52,17 @@ pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolv
     let deployment = &crate::cameras::settled(deployment)?;
     let is_here = |camera: usize| {
         let name = &deployment.cameras[camera].name;
-        host.is_none_or(|it| it.views.contains(name))
+        host.is_none_or(|host| host.views.contains(name))
     };
     let footage = crate::cameras::footage(deployment, &is_here);
     let found = keypoints::found(deployment)?;
     let mut resolved = Resolved {
-        footage: footage.map_err(|it| inputs::of_deployment(it, deployment))?,
+        footage: footage.map_err(|error| inputs::of_deployment(error, deployment))?,
         deployment: deployment.clone(),
         search_size: None,
         extra_keypoints: found.extra,
         sides_as_seen: found.as_seen,
-        host: host.map(|it| it.name.clone()),
+        host: host.map(|host| host.name.clone()),
         recording: None,
         replay: None,
     };
@@ -92,7 +92,7 @@ fn check_names_and_sizes(
     is_here: &dyn Fn(usize) -> bool,
 ) -> Result<(), Failure> {
     let rig = inputs::rig_of(&resolved.deployment)?;
-    for camera in (0..resolved.deployment.cameras.len()).filter(|it| is_here(*it)) {
+    for camera in (0..resolved.deployment.cameras.len()).filter(|i| is_here(*i)) {
         framing(resolved, &rig, camera)?;
     }
     Ok(())
@@ -124,7 +124,7 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
         pipeline::Views::All => "solved at once".to_owned(),
     };
     let size = resolved.search_size.as_ref();
-    let size = size.map_or_else(String::new, |it| format!("\n{}", it.text()));
+    let size = size.map_or_else(String::new, |size| format!("\n{}", size.text()));
     Ok(format!(
         "{} views, {pairs}, {n_frames}, a model of {} parts{size}",
         prepared.views.len(),
@@ -159,10 +159,10 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
         // The others' views, and what is fused, are elsewhere.
         let uses =
             |it: &Process, topic: &String| it.inputs.contains(topic) || it.outputs.contains(topic);
-        rooms.retain(|room| topology.processes().iter().any(|it| uses(it, &room.topic)));
+        rooms.retain(|room| topology.processes().iter().any(|process| uses(process, &room.topic)));
     }
-    let between = rooms.into_iter().map(|it| topic_of(it, delivery));
-    let of_processes = names.iter().flat_map(|it| process_topics(it));
+    let between = rooms.into_iter().map(|room| topic_of(room, delivery));
+    let of_processes = names.iter().flat_map(|name| process_topics(name));
     between.chain(of_processes).collect()
 }
 
@@ -171,10 +171,10 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
 fn picture_bytes(resolved: &Resolved, view: usize) -> usize {
     const TABLES: usize = 1 << 16;
     let recording = resolved.recording.as_ref();
-    let is_kept = recording.is_some_and(|it| it.pictures.contains(&view));
+    let is_kept = recording.is_some_and(|recording| recording.pictures.contains(&view));
     let size = resolved.footage.get(view).filter(|_| is_kept);
-    size.map_or(0, |it| {
-        let [width, height] = it.size.map(|side| side as usize);
+    size.map_or(0, |size| {
+        let [width, height] = size.size.map(|side| side as usize);
         width * height * 3 + TABLES
     })
 }
@@ -266,7 +266,7 @@ pub(crate) fn plan(
     log: Level,
 ) -> Result<Plan, Failure> {
     let processes = processes(resolved, file);
-    let names: Vec<String> = processes.iter().map(|it| it.name.clone()).collect();
+    let names: Vec<String> = processes.iter().map(|process| process.name.clone()).collect();
     let settings = &resolved.deployment.supervise;
     let session = now_nanos();
     Ok(Plan {

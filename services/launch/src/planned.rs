@@ -78,7 +78,7 @@ impl Planned {
 
     /// The names of its processes.
     pub fn processes(&self) -> impl Iterator<Item = &str> {
-        self.plan.processes.iter().map(|it| it.name.as_str())
+        self.plan.processes.iter().map(|process| process.name.as_str())
     }
 
     /// The same run, which has begun elsewhere.

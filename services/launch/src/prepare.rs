@@ -65,7 +65,7 @@ impl Prepared {
         let model = inputs::model_or_shipped(deployment.paper.model.as_deref())?;
         let rig = inputs::rig_of(deployment)?;
         let (mut views, mut sizes) = (Vec::new(), Vec::new());
-        let names = deployment.cameras.iter().map(|it| it.name.as_str());
+        let names = deployment.cameras.iter().map(|camera| camera.name.as_str());
         let framings =
             names.enumerate().map(|(index, name)| (name, framing(resolved, &rig, index)));
         let framings = inputs::advice::of_all(framings.collect())?;
@@ -79,10 +79,10 @@ impl Prepared {
             });
         }
         let settings = settings(deployment, &model, &views)?;
-        let named = views.iter().map(|it| it.name.as_str()).zip(sizes);
+        let named = views.iter().map(|view| view.name.as_str()).zip(sizes);
         let named: Vec<_> = named.collect();
         let size = deployment.capture.size;
-        let padding = size.and_then(|it| padding::warning(it, &named));
+        let padding = size.and_then(|size| padding::warning(size, &named));
         Ok(Self {
             pairs: resolved.topology().pairs().to_vec(),
             up_in_world: rig.up_in_world(),
@@ -160,7 +160,7 @@ impl Prepared {
 
     /// The plans of all views.
     pub fn plans(&self) -> Vec<Arc<ViewPlan>> {
-        self.views.iter().map(|it| Arc::clone(&it.plan)).collect()
+        self.views.iter().map(|view| Arc::clone(&view.plan)).collect()
     }
 }
 
@@ -176,7 +176,7 @@ pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Fr
     let entry = &deployment.cameras[index];
     let camera = inputs::camera_of(rig, &entry.name, deployment)?;
     let out_size = match (deployment.capture.size, deployment.capture.scale) {
-        (Some(size), _) => OutSize::Exact(size.map(|it| it as u32)),
+        (Some(size), _) => OutSize::Exact(size.map(|size| size as u32)),
         (None, Some(scale)) => OutSize::Scale(scale),
         (None, None) => {
             let chosen = resolved.search_size.as_ref();
@@ -213,11 +213,11 @@ fn settings(
     model: &Model,
     views: &[View],
 ) -> Result<EstimatorSettings, Failure> {
-    let scales = views.iter().map(|it| frame_scale(&it.framing));
+    let scales = views.iter().map(|view| frame_scale(&view.framing));
     let frame_scale = scales.sum::<f64>() / views.len().max(1) as f64;
     let consistency = deployment.paper.consistency.as_ref();
     let learned = inputs::learned(consistency.map(|named| named.file().as_path()), model)?;
-    let names: Vec<&str> = views.iter().map(|it| it.name.as_str()).collect();
+    let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
     let tables = inputs::pair_tables(&deployment.paper, learned.as_ref(), model, &names)?;
     let mut config = deployment.paper.clone();
     if let deployment::paper::Tau::File(tau) = &config.tau {

@@ -330,10 +330,10 @@ fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let topology = resolved.topology();
     let deployment = &resolved.deployment;
-    let views = prepared.views.iter().map(|it| results::View {
-        name: it.name.clone(),
-        framing: it.framing.clone(),
-        layout: Arc::new(it.plan.layout().clone()),
+    let views = prepared.views.iter().map(|view| results::View {
+        name: view.name.clone(),
+        framing: view.framing.clone(),
+        layout: Arc::new(view.plan.layout().clone()),
     });
     let scene = results::Scene {
         views: views.collect(),
@@ -371,7 +371,7 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
             fused: topology.fused(),
             has_quality: resolved.deployment.has_quality(),
             pictures: plan.pictures.clone(),
-            processes: topology.processes().iter().map(|it| it.name.clone()).collect(),
+            processes: topology.processes().iter().map(|process| process.name.clone()).collect(),
             elsewhere: topology.topics_elsewhere(),
         },
         queue_bytes: plan.queue_mb.saturating_mul(1_000_000),
@@ -434,8 +434,9 @@ mod tests {
             without_foxglove: true,
         };
         let topology = Topology::new(&loaded.deployment, Some(&recording), None);
-        let services = topology.processes().iter().map(|it| it.service);
-        let mut found: Vec<Name> = services.map(|it| Name::of_name(it).unwrap()).collect();
+        let services = topology.processes().iter().map(|process| process.service);
+        let mut found: Vec<Name> =
+            services.map(|service| Name::of_name(service).unwrap()).collect();
         found.dedup();
         let mut all = Name::ALL.to_vec();
         assert_eq!(all.pop(), Some(Name::Replay), "no process of its own");

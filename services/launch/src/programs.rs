@@ -25,20 +25,20 @@ pub(crate) fn description(
 
 fn running(resolved: &Resolved, prepared: &Prepared, session: u64) -> Running {
     let joints = prepared.settings.skeleton.joints;
-    let views = prepared.views.iter().map(|it| {
-        let [width, height] = it.framing.out_size();
+    let views = prepared.views.iter().map(|view| {
+        let [width, height] = view.framing.out_size();
         RunningView {
             height,
-            name: it.name.clone(),
+            name: view.name.clone(),
             width,
         }
     });
     Running {
         format: Running::VERSION,
         frame_step: resolved.deployment.capture.frame_step,
-        joints: joints.joints.iter().map(|it| it.name.to_owned()).collect(),
+        joints: joints.joints.iter().map(|joint| joint.name.to_owned()).collect(),
         keypoints: resolved.extra_keypoints.clone(),
-        limbs: joints.limbs.iter().map(|it| [it.0, it.1]).collect(),
+        limbs: joints.limbs.iter().map(|limb| [limb.0, limb.1]).collect(),
         lossless: resolved.delivery() == Delivery::Lossless,
         name: resolved.deployment.name.clone(),
         output: resolved.deployment.output.clone(),

@@ -46,7 +46,7 @@ pub fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure
     Ok(About {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         session: 0,
-        began_unix_nanos: since.map_or(0, |it| it.as_nanos() as u64),
+        began_unix_nanos: since.map_or(0, |since| since.as_nanos() as u64),
         settings: footage::without_passwords(
             &serde_json::to_string(&settings).or_fail(ExitKind::Run)?,
         ),
@@ -61,7 +61,7 @@ pub fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure
 pub fn stage(prepared: &Prepared) -> record::Stage {
     let views = prepared.views.iter();
     record::Stage {
-        cameras: views.map(|it| it.framing.camera().clone()).collect(),
+        cameras: views.map(|view| view.framing.camera().clone()).collect(),
         joints: prepared.settings.skeleton.joints,
     }
 }
@@ -184,7 +184,7 @@ pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
         chunks.len()
     );
     let named = damaged.iter().take(MAX_LISTED).map(|message| {
-        let frame = message.frame.map_or(String::new(), |it| format!(", frame {it}"));
+        let frame = message.frame.map_or(String::new(), |frame| format!(", frame {frame}"));
         let Damaged {
             topic,
             offset,
@@ -205,7 +205,7 @@ pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
 pub fn damaged_json(damaged: &[Damaged]) -> Value {
     let damaged = damaged
         .iter()
-        .map(|it| json!({ "topic": it.topic, "frame": it.frame, "offset": it.offset, "chunk": it.chunk }));
+        .map(|damaged| json!({ "topic": damaged.topic, "frame": damaged.frame, "offset": damaged.offset, "chunk": damaged.chunk }));
     damaged.collect()
 }
 
@@ -255,7 +255,7 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
             "\n  {n} messages do not belong to their topic, and were skipped"
         )?;
     }
-    for (topic, it) in recording.counts.iter().filter(|it| it.1.lost > 0) {
+    for (topic, it) in recording.counts.iter().filter(|count| count.1.lost > 0) {
         write!(
             text,
             "\n  {topic}: {} recorded, {} lost",
@@ -269,7 +269,7 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
 pub fn json(file: &Path, recording: &Recording) -> Value {
     let extent = &recording.extent;
     let topics = recording.tracks.iter().map(|(topic, it)| {
-        let lost = recording.counts.get(topic).map(|it| it.lost);
+        let lost = recording.counts.get(topic).map(|count| count.lost);
         let entry = json!({ "messages": it.entries.len(), "lost": lost });
         (topic.clone(), entry)
     });
@@ -278,7 +278,7 @@ pub fn json(file: &Path, recording: &Recording) -> Value {
         "bytes": extent.file_bytes,
         "bytes_read": extent.whole_bytes,
         "complete": extent.is_complete,
-        "damage": extent.damage.iter().map(|it| json!({ "offset": it.offset, "what": it.what })).collect::<Vec<_>>(),
+        "damage": extent.damage.iter().map(|damage| json!({ "offset": damage.offset, "what": damage.what })).collect::<Vec<_>>(),
         "missing": extent.missing,
         "malformed": extent.n_malformed,
         "messages": recording.n_messages(),

@@ -52,7 +52,7 @@ pub const SERVICES: [&str; 6] = [
 impl Resolved {
     /// Number of frames to use: that of the longest footage.
     pub fn n_frames(&self) -> u64 {
-        self.footage.iter().map(|it| it.n_frames).max().unwrap_or(0)
+        self.footage.iter().map(|footage| footage.n_frames).max().unwrap_or(0)
     }
 
     /// Whether it runs until it is stopped: it has a live camera, and no number of frames.
@@ -63,13 +63,13 @@ impl Resolved {
     /// Whether it has a live camera.
     pub fn has_live(&self) -> bool {
         let mut cameras = self.deployment.cameras.iter();
-        cameras.any(|it| crate::cameras::is_live(&it.source))
+        cameras.any(|camera| crate::cameras::is_live(&camera.source))
     }
 
     /// Views with a live camera.
     pub fn live_views(&self) -> Vec<usize> {
         let cameras = self.deployment.cameras.iter().enumerate();
-        let live = cameras.filter(|it| crate::cameras::is_live(&it.1.source));
+        let live = cameras.filter(|camera| crate::cameras::is_live(&camera.1.source));
         live.map(|it| it.0).collect()
     }
 
@@ -90,9 +90,9 @@ impl Resolved {
             return Some(self.instants_hz());
         }
         let known = self.footage.iter().filter_map(|it| it.frame_rate_hz);
-        let all: Vec<f64> = known.map(|it| it * step).collect();
+        let all: Vec<f64> = known.map(|value| value * step).collect();
         // If the files contradict each other, the setting of the deployment counts.
-        let agree = all.iter().all(|it| (it / all[0] - 1.0).abs() < 1e-3);
+        let agree = all.iter().all(|value| (value / all[0] - 1.0).abs() < 1e-3);
         let given = capture.frame_rate_hz.filter(|_| !agree);
         given.or_else(|| all.first().copied())
     }
@@ -168,6 +168,6 @@ impl Resolved {
 
     /// Whether this is a host with cameras that leaves the results to another.
     pub fn is_far(&self) -> bool {
-        self.own_host().is_some_and(|it| !it.fuses)
+        self.own_host().is_some_and(|own_host| !own_host.fuses)
     }
 }

@@ -79,13 +79,14 @@ fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
         }
         path.canonicalize().unwrap_or(path)
     };
-    let all: Vec<PathBuf> = deployment.cameras.iter().map(|it| canonical(&it.source)).collect();
+    let all: Vec<PathBuf> =
+        deployment.cameras.iter().map(|camera| canonical(&camera.source)).collect();
     for (nth, source) in all.iter().enumerate() {
         let is_blank = Blank::is_blank(&deployment.cameras[nth].source);
         let Some(first) = all[..nth].iter().position(|it| it == source && !is_blank) else {
             continue;
         };
-        let [a, b] = [first, nth].map(|it| &deployment.cameras[it].name);
+        let [a, b] = [first, nth].map(|i| &deployment.cameras[i].name);
         let message = format!(
             "cameras {a:?} and {b:?} have one source, {}",
             footage::without_passwords(&source.to_string_lossy())
@@ -99,20 +100,20 @@ fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
 /// Applies the checks of `parallax calib check` to the cameras of the deployment.
 fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
     let rig = inputs::rig_of(deployment)?;
-    let named = deployment.cameras.iter().filter_map(|it| rig.camera(&it.name));
+    let named = deployment.cameras.iter().filter_map(|camera| rig.camera(&camera.name));
     let used = Rig::new(named.cloned().collect(), rig.up_in_world(), rig.source());
     // A camera that the rig does not contain is reported elsewhere, by name.
     let Ok(used) = used else {
         return Ok(Vec::new());
     };
     let findings = check_rig(&used);
-    let is_confirmed = |it: &Finding| {
-        let is_distance = matches!(it, Finding::Distance { .. });
+    let is_confirmed = |finding: &Finding| {
+        let is_distance = matches!(finding, Finding::Distance { .. });
         is_distance && deployment.unit.is_some()
     };
     let (refused, rest): (Vec<&Finding>, Vec<&Finding>) = findings
         .iter()
-        .partition(|it| it.severity() == Severity::Error && !is_confirmed(it));
+        .partition(|finding| finding.severity() == Severity::Error && !is_confirmed(finding));
     if let Some(first) = refused.first() {
         let more = match refused.len() - 1 {
             0 => String::new(),
@@ -123,7 +124,9 @@ fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
         return Err(failure.with_hint(hint(first)));
     }
     let warnings = rest.into_iter().filter(|it| it.severity() >= Severity::Warning);
-    Ok(warnings.map(|it| format!("{}: {it}", deployment.rig.display())).collect())
+    Ok(warnings
+        .map(|warning| format!("{}: {warning}", deployment.rig.display()))
+        .collect())
 }
 
 /// The hint for a finding.
@@ -179,8 +182,8 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
 /// Names the cameras of which nothing says how many frames a second they have, beside others; none if there are none.
 fn without_rate(resolved: &Resolved) -> Option<String> {
     let views = resolved.deployment.cameras.iter().zip(&resolved.footage);
-    let unknown = views.filter(|it| it.1.frame_rate_hz.is_none());
-    let names: Vec<&str> = unknown.map(|it| it.0.name.as_str()).collect();
+    let unknown = views.filter(|view| view.1.frame_rate_hz.is_none());
+    let names: Vec<&str> = unknown.map(|unknown| unknown.0.name.as_str()).collect();
     (!names.is_empty()).then(|| {
         format!(
             "nothing says how many frames per second {} has: taken are those of the other cameras; `capture.frame_rate_hz` says it",
@@ -205,8 +208,8 @@ fn check_lengths(resolved: &Resolved) -> Option<String> {
     if resolved.has_live() {
         return None;
     }
-    let names = resolved.deployment.cameras.iter().map(|it| it.name.as_str());
-    let lengths = resolved.footage.iter().map(|it| it.n_frames);
+    let names = resolved.deployment.cameras.iter().map(|camera| camera.name.as_str());
+    let lengths = resolved.footage.iter().map(|footage| footage.n_frames);
     shorter(&names.zip(lengths).collect::<Vec<_>>())
 }
 
@@ -266,7 +269,7 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
             if !(own.has_contrast && theirs.has_contrast) {
                 continue;
             }
-            let [a, b] = [other, nth].map(|it| &deployment.cameras[it].name);
+            let [a, b] = [other, nth].map(|i| &deployment.cameras[i].name);
             if own.rgb == theirs.rgb {
                 let message = format!(
                     "the first {} pictures of cameras {a:?} and {b:?} are equal, bit for bit, which two cameras never see",
@@ -350,7 +353,7 @@ fn grid(rgb: &[u8], [width, height]: [usize; 2]) -> Vec<f64> {
     for (row, line) in rgb.chunks_exact(3 * width).enumerate() {
         for (column, pixel) in line.chunks_exact(3).enumerate() {
             let cell = &mut cells[row * CELLS / height * CELLS + column * CELLS / width];
-            let sum: u32 = pixel.iter().map(|it| u32::from(*it)).sum();
+            let sum: u32 = pixel.iter().map(|pixel| u32::from(*pixel)).sum();
             *cell = [cell[0] + f64::from(sum) / 3.0, cell[1] + 1.0];
         }
     }

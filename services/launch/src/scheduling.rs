@@ -82,7 +82,7 @@ mod tests {
     /// A system with cores 0 and 1 that denies real-time priorities.
     fn rehearse(requested: &Scheduling) -> Vec<Denied> {
         let allowed = vec![0, 1];
-        let too_many = requested.cores.iter().any(|it| !allowed.contains(it));
+        let too_many = requested.cores.iter().any(|core| !allowed.contains(core));
         let cores = too_many.then(|| Denied::Cores {
             asked: requested.cores.clone(),
             allowed,
@@ -117,7 +117,7 @@ mod tests {
             cores.starts_with("pose-1: cannot run on cores 1,7: 0,1 may be used; going on without"),
             "{cores}"
         );
-        let got = processes.map(|it| it.scheduling.to_string());
+        let got = processes.map(|process| process.scheduling.to_string());
         assert_eq!(got, ["cores=1", "cores=1 spin", ""]);
     }
 

@@ -46,17 +46,17 @@ impl SearchSize {
         if capture.size.is_some() || capture.scale.is_some() {
             return None;
         }
-        let named = deployment.cameras.iter().map(|it| rig.camera(&it.name));
+        let named = deployment.cameras.iter().map(|camera| rig.camera(&camera.name));
         let named: Option<Vec<_>> = named.map(Option::<&Camera>::cloned).collect();
         let used = Rig::new(named?, rig.up_in_world(), rig.source()).ok()?;
         let chosen = search_sizes(&used);
-        let cameras = chosen.cameras.into_iter().map(|it| CameraSize {
-            person_in_frame_px: it.person_in_frame_px(),
-            is_limited: it.is_limited(),
-            name: it.camera,
-            scale: it.scale,
-            frame_size: it.frame_size,
-            person_px: it.person_px,
+        let cameras = chosen.cameras.into_iter().map(|camera| CameraSize {
+            person_in_frame_px: camera.person_in_frame_px(),
+            is_limited: camera.is_limited(),
+            name: camera.camera,
+            scale: camera.scale,
+            frame_size: camera.frame_size,
+            person_px: camera.person_px,
         });
         Some(Self {
             cameras: cameras.collect(),
@@ -84,7 +84,8 @@ impl SearchSize {
                 None => groups.push(vec![it]),
             }
         }
-        let chosen: Vec<String> = groups.iter().map(|it| describe(it, groups.len() > 1)).collect();
+        let chosen: Vec<String> =
+            groups.iter().map(|group| describe(group, groups.len() > 1)).collect();
         let why = match self.n_sharing {
             0 => "no two cameras share a space in which a person can stand, so the frames are as large as time permits"
                 .to_owned(),
@@ -98,14 +99,14 @@ impl SearchSize {
 
     /// A warning if a person is too small in some frames, with what to set.
     pub fn warning(&self) -> Option<String> {
-        let px = |it: &CameraSize| it.person_in_frame_px.unwrap_or(f64::INFINITY);
+        let px = |camera_size: &CameraSize| camera_size.person_in_frame_px.unwrap_or(f64::INFINITY);
         let small = self.cameras.iter();
-        let small = small.filter(|it| it.is_limited || px(it) < USABLE_PX[0]);
+        let small = small.filter(|small| small.is_limited || px(small) < USABLE_PX[0]);
         let small: Vec<&CameraSize> = small.collect();
         let first = small.first()?;
-        let seen: Vec<[f64; 2]> = small.iter().map(|it| [it.scale, px(it)]).collect();
+        let seen: Vec<[f64; 2]> = small.iter().map(|small| [small.scale, px(small)]).collect();
         let scale = better_scale(&seen)?;
-        let names: Vec<&str> = small.iter().map(|it| it.name.as_str()).collect();
+        let names: Vec<&str> = small.iter().map(|small| small.name.as_str()).collect();
         let mut text = format!(
             "a person is about {:.0} px high in the frames of {}, where {} to {} are good: ",
             px(first),
@@ -136,15 +137,15 @@ impl SearchSize {
 /// * `is_named`: whether to name them.
 fn describe(cameras: &[&CameraSize], is_named: bool) -> String {
     let first = cameras[0];
-    let names: Vec<&str> = cameras.iter().map(|it| it.name.as_str()).collect();
+    let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
     let names = if is_named {
         format!(" for {}", names.join(", "))
     } else {
         String::new()
     };
     let [width, height] = first.frame_size;
-    let px = range(cameras.iter().filter_map(|it| it.person_px));
-    let in_frame = range(cameras.iter().filter_map(|it| it.person_in_frame_px));
+    let px = range(cameras.iter().filter_map(|camera| camera.person_px));
+    let in_frame = range(cameras.iter().filter_map(|camera| camera.person_in_frame_px));
     let scale = (first.scale * 1e4).round() / 1e4;
     match (px, in_frame) {
         (Some(px), Some(in_frame)) => format!(
@@ -174,9 +175,9 @@ mod tests {
         let cameras = cameras.map(|((scale, person_px, is_limited), name)| CameraSize {
             name: name.to_owned(),
             scale: *scale,
-            frame_size: [1920.0, 1080.0].map(|it: f64| (it * scale).round() as u32),
+            frame_size: [1920.0, 1080.0].map(|value: f64| (value * scale).round() as u32),
             person_px: *person_px,
-            person_in_frame_px: person_px.map(|it| it * scale),
+            person_in_frame_px: person_px.map(|person_px| person_px * scale),
             is_limited: *is_limited,
         });
         SearchSize {

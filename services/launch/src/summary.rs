@@ -78,22 +78,25 @@ impl Report {
     pub fn new(resolved: &Resolved, session: u64, outcome: &Outcome, elapsed: Duration) -> Self {
         let folder = &resolved.deployment.output;
         let cameras = resolved.deployment.cameras.iter();
-        let cameras: Vec<&str> = cameras.map(|it| it.name.as_str()).collect();
+        let cameras: Vec<&str> = cameras.map(|camera| camera.name.as_str()).collect();
         let recorded = Recorded::read(folder, session, &cameras);
         let processes = &outcome.processes;
-        let given_up = processes.iter().filter(|it| it.state == supervise::State::GivenUp);
-        let restarted = processes.iter().filter(|it| it.restarts > 0);
+        let given_up =
+            processes.iter().filter(|process| process.state == supervise::State::GivenUp);
+        let restarted = processes.iter().filter(|process| process.restarts > 0);
         Self {
             name: resolved.deployment.name.clone(),
             folder: folder.display().to_string(),
             n_frames: views::n_reached(resolved, outcome),
             seconds: elapsed.as_secs_f64(),
             interrupted: outcome.interrupted,
-            given_up: given_up.map(|it| it.name.clone()).collect(),
-            restarts: restarted.map(|it| (it.name.clone(), it.restarts)).collect(),
+            given_up: given_up.map(|given_up| given_up.name.clone()).collect(),
+            restarts: restarted
+                .map(|restarted| (restarted.name.clone(), restarted.restarts))
+                .collect(),
             peaks: processes
                 .iter()
-                .map(|it| (it.name.clone(), it.counts.peak_memory_bytes))
+                .map(|process| (process.name.clone(), process.counts.peak_memory_bytes))
                 .collect(),
             processor_s: processes
                 .iter()
@@ -102,11 +105,11 @@ impl Report {
                     Some((it.name.clone(), f64::from(last.cpu_millis) * 1e-3))
                 })
                 .collect(),
-            n_dropped: processes.iter().map(|it| it.counts.n_dropped).sum(),
+            n_dropped: processes.iter().map(|process| process.counts.n_dropped).sum(),
             refused: processes
                 .iter()
-                .filter(|it| it.counts.refused.iter().any(|n| *n > 0))
-                .map(|it| (it.name.clone(), it.counts.refused))
+                .filter(|process| process.counts.refused.iter().any(|n| *n > 0))
+                .map(|process| (process.name.clone(), process.counts.refused))
                 .collect(),
             without_gpu: processes
                 .iter()
@@ -119,7 +122,7 @@ impl Report {
                 .deployment
                 .supervise
                 .latency_budget_ms
-                .map(|it| Budget::new(it, recorded.latency())),
+                .map(|latency_budget_ms| Budget::new(latency_budget_ms, recorded.latency())),
             search_size: resolved.search_size.clone(),
             // A network sees everybody in a window of its own size.
             outside: recorded
@@ -142,7 +145,8 @@ impl Report {
     /// * `n_faults`: the number of faults injected into a process.
     pub fn unexpected_failures(&self, n_faults: impl Fn(&str) -> u32) -> Vec<String> {
         let restarted = self.restarts.iter();
-        let unexpected = restarted.filter(|(name, n)| *n > n_faults(name)).map(|it| &it.0);
+        let unexpected =
+            restarted.filter(|(name, n)| *n > n_faults(name)).map(|restarted| &restarted.0);
         let mut failed: Vec<String> = unexpected.chain(&self.given_up).cloned().collect();
         failed.sort();
         failed.dedup();
@@ -186,7 +190,7 @@ impl Report {
             Some(ExitKind::Limit)
         } else if self.interrupted {
             Some(ExitKind::Interrupted)
-        } else if budget.is_some_and(|it| !it.is_held()) {
+        } else if budget.is_some_and(|budget| !budget.is_held()) {
             Some(ExitKind::Limit)
         } else {
             self.is_degraded().then_some(ExitKind::Degraded)
@@ -202,15 +206,15 @@ impl Report {
             && (self.no_results_reason().is_some()
                 || !self.given_up.is_empty()
                 || !self.restarts.is_empty()
-                || self.recorded.summary().is_none_or(|it| self.is_lossy(it))
+                || self.recorded.summary().is_none_or(|summary| self.is_lossy(summary))
                 || !self.doubts().is_empty()
-                || self.views.iter().any(|it| it.is_lost(self.is_lossless)))
+                || self.views.iter().any(|view| view.is_lost(self.is_lossless)))
     }
 
     /// Why the results should not be trusted, by themselves.
     fn doubts(&self) -> Vec<Doubt> {
         let summary = self.recorded.summary();
-        summary.map_or_else(Vec::new, |it| it.trust.doubts())
+        summary.map_or_else(Vec::new, |summary| summary.trust.doubts())
     }
 
     /// Whether frames were lost or the cameras contradict each other.
@@ -390,7 +394,7 @@ impl Report {
         let used = summary.views_used.iter();
         let used: Vec<String> = used.map(|(view, n)| format!("{view} {n}")).collect();
         writeln!(text, "  views used    {}", used.join(", "))?;
-        for view in self.views.iter().filter(|it| it.used < it.frames) {
+        for view in self.views.iter().filter(|view| view.used < view.frames) {
             writeln!(text, "    {view}")?;
         }
         Ok(())
@@ -404,7 +408,7 @@ impl Report {
             text.push_str(&cameras::contradicted(it));
         }
         for (camera, fit) in self.suspected() {
-            let px = |it: Option<f64>| it.unwrap_or(f64::NAN);
+            let px = |value: Option<f64>| value.unwrap_or(f64::NAN);
             writeln!(
                 text,
                 "  calibration   {camera} does not stand where it says: cameras are {:.0} px apart with it, {:.0} px without",
@@ -476,7 +480,7 @@ fn measured(outcome: &Outcome) -> BTreeMap<String, Value> {
         let reading = reading.inspect_err(|error| {
             tracing::warn!(process = it.name, %error, "unreadable times and counts");
         });
-        let value = reading.map_or(Value::Null, |it| live::measured(&it));
+        let value = reading.map_or(Value::Null, |reading| live::measured(&reading));
         Some((it.name.clone(), value))
     });
     measured.collect()

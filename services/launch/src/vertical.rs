@@ -59,7 +59,7 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
     if rig.up_in_world().is_some() || !deployment.capture.upright {
         return Ok(None);
     }
-    let named = deployment.cameras.iter().filter_map(|it| rig.camera(&it.name));
+    let named = deployment.cameras.iter().filter_map(|camera| rig.camera(&camera.name));
     let cameras: Vec<Camera> = named.cloned().collect();
     if let Some(found) = keypoints::find(deployment, &cameras)? {
         return Ok(Some(found));
@@ -114,7 +114,7 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
 
 /// The hypothesis with the highest score; of equal ones the first.
 fn choose(tried: &[Hypothesis]) -> Option<Hypothesis> {
-    let score = |it: &Hypothesis| it.score.unwrap_or(f64::NEG_INFINITY);
+    let score = |hypothesis: &Hypothesis| hypothesis.score.unwrap_or(f64::NEG_INFINITY);
     let best = tried.iter().map(score).fold(f64::NEG_INFINITY, f64::max);
     tried.iter().find(|it| score(it) >= best - SAME_SCORE).copied()
 }
@@ -124,11 +124,11 @@ fn text(up: &UnitVector3<f64>) -> String {
 }
 
 fn reason(best: &Hypothesis, tried: &[Hypothesis], cameras: &[Camera]) -> String {
-    let off = cameras.iter().map(|it| roll_degrees(it, &best.up).abs());
+    let off = cameras.iter().map(|camera| roll_degrees(camera, &best.up).abs());
     let off = off.fold(0.0, f64::max);
-    let others = tried.iter().filter(|it| it.up != best.up);
+    let others = tried.iter().filter(|tried| tried.up != best.up);
     let next = others.max_by(|a, b| {
-        let score = |it: &Hypothesis| it.score.unwrap_or(f64::NEG_INFINITY);
+        let score = |hypothesis: &Hypothesis| hypothesis.score.unwrap_or(f64::NEG_INFINITY);
         score(a).total_cmp(&score(b))
     });
     let people = match (best.score, next.and_then(|it| Some((it.up, it.score?)))) {
@@ -152,7 +152,7 @@ fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
     let axis =
         |camera: &Camera, axis: Vector3<f64>| camera.camera_from_world.rotation.inverse() * axis;
     let all = |along: Vector3<f64>| -> Vec<Vector3<f64>> {
-        cameras.iter().map(|it| axis(it, along)).collect()
+        cameras.iter().map(|camera| axis(camera, along)).collect()
     };
     let (right, down) = (all(Vector3::x()), all(Vector3::y()));
     let level = common_normal(&right, -down.iter().sum::<Vector3<f64>>());
@@ -160,8 +160,8 @@ fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
     let world = world_axes();
     let found = [level, upright].map(|it| it.map(snapped));
     let [level, upright] = found;
-    let likely = level.into_iter().chain(upright).chain(upright.map(|it| -it));
-    let opposite = level.map(|it| -it);
+    let likely = level.into_iter().chain(upright).chain(upright.map(|upright| -upright));
+    let opposite = level.map(|level| -level);
     let mut directions: Vec<UnitVector3<f64>> = Vec::new();
     for direction in likely.chain(world).chain(opposite) {
         if directions
@@ -221,7 +221,7 @@ fn common_normal(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3
 /// The roll that turns a camera's image upright, degrees; 0 if the camera looks along the vertical.
 fn roll_degrees(camera: &Camera, up: &UnitVector3<f64>) -> f64 {
     let rig = Rig::new(vec![camera.clone()], Some(*up), "");
-    let roll = rig.ok().and_then(|it| upright_roll(camera, &it));
+    let roll = rig.ok().and_then(|rig| upright_roll(camera, &rig));
     roll.unwrap_or(0.0).to_degrees()
 }
 
@@ -245,9 +245,9 @@ impl<'a> Images<'a> {
         let model = inputs::model_or_shipped(deployment.paper.model.as_deref())?;
         // Nobody can be found in the grey pictures of cameras that have keypoints alone.
         let views = deployment.cameras.iter();
-        let views = views.filter(|it| !Blank::is_blank(&it.source)).take(MAX_VIEWS);
+        let views = views.filter(|view| !Blank::is_blank(&view.source)).take(MAX_VIEWS);
         let views = views.filter_map(|entry| {
-            let camera = cameras.iter().find(|it| it.name == entry.name)?;
+            let camera = cameras.iter().find(|camera| camera.name == entry.name)?;
             View::new(entry, camera, &deployment.capture)
         });
         Ok(Self {
@@ -259,7 +259,7 @@ impl<'a> Images<'a> {
     /// The mean score of the people found with a direction as up; none if nobody was found.
     fn score(&mut self, up: UnitVector3<f64>) -> Option<f64> {
         let search = &self.search;
-        let scores = self.views.iter_mut().filter_map(|it| it.score(search, up));
+        let scores = self.views.iter_mut().filter_map(|view| view.score(search, up));
         let scores: Vec<f64> = scores.collect();
         let n = scores.len();
         (n > 0).then(|| scores.iter().sum::<f64>() / n as f64)
@@ -312,7 +312,7 @@ impl<'a> View<'a> {
         // A square, which fits the image at every roll.
         let scale = (MAX_SIDE_PX / width.max(height)).min(1.0);
         let side = (scale * width.max(height)).round() as u32;
-        let source = [self.size.width, self.size.height].map(|it| it as u32);
+        let source = [self.size.width, self.size.height].map(|value| value as u32);
         let roll = degrees.to_radians();
         let out = OutSize::Exact([side; 2]);
         let framing = Framing::new(self.camera, source, self.offset, out, roll).ok()?;
@@ -378,7 +378,7 @@ mod tests {
         for roll in [90.0, -90.0] {
             let cameras = ring(&[roll; 4], up);
             let near = [0, 1, 2].map(|nth| off_degrees(&cameras, up, nth));
-            assert!(near.iter().any(|it| *it < 4.0), "{near:?}");
+            assert!(near.iter().any(|value| *value < 4.0), "{near:?}");
         }
     }
 

@@ -48,7 +48,7 @@ impl ViewReport {
         let n_reached = n_reached(resolved, outcome);
         let cameras = resolved.deployment.cameras.iter().zip(&resolved.footage);
         let views = cameras.enumerate().map(|(view, (camera, footage))| {
-            let counts = ["capture", "pose"].map(|it| counts(format!("{it}-{view}")));
+            let counts = ["capture", "pose"].map(|name| counts(format!("{name}-{view}")));
             let n_frames = if resolved.is_endless() {
                 n_reached
             } else {
@@ -68,12 +68,12 @@ impl ViewReport {
         summary: Option<&Summary>,
     ) -> Self {
         // Without a summary no frame is known to be used.
-        let reasons = summary.and_then(|it| it.views_missing.get(name));
+        let reasons = summary.and_then(|summary| summary.views_missing.get(name));
         let missing: Vec<(Missing, u64)> = reasons.cloned().into_iter().flatten().collect();
-        let used = summary.and_then(|it| it.views_present.get(name));
+        let used = summary.and_then(|summary| summary.views_present.get(name));
         let used = used.copied().unwrap_or(0);
-        let empty = missing.iter().filter(|it| it.0.is_answer());
-        let empty: u64 = empty.map(|it| it.1).sum();
+        let empty = missing.iter().filter(|missing| missing.0.is_answer());
+        let empty: u64 = empty.map(|empty| empty.1).sum();
         // The last count of a killed process may be missing.
         let answered = pose.n_sent.max(used + empty);
         let not_processed =
@@ -115,10 +115,10 @@ pub(crate) fn n_reached(resolved: &Resolved, outcome: &Outcome) -> u64 {
     let cameras = outcome
         .processes
         .iter()
-        .filter(|it| ["capture", "bridge"].contains(&it.service.as_str()));
-    let last = cameras.filter_map(|it| it.last.as_ref().filter(|it| it.n_sent > 0));
+        .filter(|process| ["capture", "bridge"].contains(&process.service.as_str()));
+    let last = cameras.filter_map(|camera| camera.last.as_ref().filter(|it| it.n_sent > 0));
     let last = last.map(|it| it.last_frame.saturating_sub(capture.start_frame)).max();
-    last.map_or(0, |it| it / capture.frame_step.max(1) + 1)
+    last.map_or(0, |value| value / capture.frame_step.max(1) + 1)
 }
 
 impl fmt::Display for ViewReport {

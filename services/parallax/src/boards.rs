@@ -62,9 +62,9 @@ impl CameraFootage {
 fn stem(path: &str) -> String {
     let path = PathBuf::from(path);
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let plain = stem.chars().map(|it| {
-        if it.is_ascii_alphanumeric() || "-_.".contains(it) {
-            it
+    let plain = stem.chars().map(|c| {
+        if c.is_ascii_alphanumeric() || "-_.".contains(c) {
+            c
         } else {
             '_'
         }
@@ -116,7 +116,7 @@ pub struct Looked {
 impl Looked {
     /// All sights.
     pub fn sights(&self) -> Vec<Sight> {
-        self.cameras.iter().flat_map(|it| it.sights.clone()).collect()
+        self.cameras.iter().flat_map(|camera| camera.sights.clone()).collect()
     }
 
     /// The cameras whose pictures are mirrored.

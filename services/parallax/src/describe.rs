@@ -52,7 +52,7 @@ impl<'a> Placed<'a> {
             .pose
             .centres(self.model, self.layout)
             .into_iter()
-            .map(|it| self.at(it))
+            .map(|centre| self.at(centre))
             .collect();
         let parts: Vec<Value> =
             centres.iter().enumerate().map(|(part, it)| self.part(part, *it)).collect();
@@ -90,7 +90,7 @@ impl<'a> Placed<'a> {
 /// The joints of a pose by name; null if the model lacks parts that the set needs.
 fn joints_of(centres: &[[f64; 2]], joints: &NamedJoints) -> Value {
     let set = joints.set;
-    let needed = set.joints.iter().flat_map(|it| it.parts).max().map_or(0, |it| it + 1);
+    let needed = set.joints.iter().flat_map(|joint| joint.parts).max().map_or(0, |part| part + 1);
     if centres.len() < needed {
         return Value::Null;
     }
@@ -108,6 +108,6 @@ fn joints_of(centres: &[[f64; 2]], joints: &NamedJoints) -> Value {
 
 /// Parses the name of a joint set.
 pub(crate) fn joint_set(name: &str) -> Result<&'static JointSet, String> {
-    let known = || JointSet::ALL.map(|it| it.name).join(", ");
+    let known = || JointSet::ALL.map(|joint_set| joint_set.name).join(", ");
     JointSet::by_name(name).ok_or_else(|| format!("expected one of {}", known()))
 }

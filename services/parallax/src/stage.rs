@@ -16,7 +16,7 @@ fn taken(from: Stage) -> &'static str {
 
 /// A parser of the names of stages, with their explanation in `--help`.
 pub(crate) fn parser() -> MapValueParser<PossibleValuesParser, fn(String) -> Stage> {
-    let values = Stage::ALL.map(|it| PossibleValue::new(it.name()).help(taken(it)));
+    let values = Stage::ALL.map(|stage| PossibleValue::new(stage.name()).help(taken(stage)));
     // The parser has checked that this is the name of a stage.
     let stage: fn(String) -> Stage = |name| Stage::of_name(&name).unwrap_or(Stage::Capture);
     PossibleValuesParser::new(values).map(stage)

@@ -38,7 +38,7 @@ fn check(rows: &[Row]) {
             stderr,
         } = case.start(row.arguments).wait();
         case.assert_nothing_left();
-        let lacks = row.words.iter().find(|it| !stderr.contains(**it));
+        let lacks = row.words.iter().find(|word| !stderr.contains(**word));
         if status.code() != Some(row.code) || lacks.is_some() || !stdout.is_empty() {
             wrong.push(format!(
                 "{}: {status}, expected {}; lacks {lacks:?}\n{stdout}{stderr}",
@@ -54,21 +54,23 @@ fn deployment_files() {
     check(&[
         Row {
             what: "unknown key",
-            broken: |it| it.edit("deployment.toml", "workers", "wrokers"),
+            broken: |fixture| fixture.edit("deployment.toml", "workers", "wrokers"),
             arguments: DRY,
             code: 3,
             words: &["deployment.toml:21", "wrokers", "did you mean `workers`"],
         },
         Row {
             what: "no such file",
-            broken: |it| fs::remove_file(it.path("deployment.toml")).unwrap(),
+            broken: |fixture| fs::remove_file(fixture.path("deployment.toml")).unwrap(),
             arguments: DRY,
             code: 4,
             words: &["deployment.toml", "No such file"],
         },
         Row {
             what: "frames of fewer than 40 pixels",
-            broken: |it| it.edit("deployment.toml", "upright", "size = [96, 39]\nupright"),
+            broken: |fixture| {
+                fixture.edit("deployment.toml", "upright", "size = [96, 39]\nupright")
+            },
             arguments: DRY,
             code: 4,
             words: &["view \"a\"", "96x39", "40"],
@@ -81,16 +83,16 @@ fn footage() {
     check(&[
         Row {
             what: "empty first image",
-            broken: |it| it.write("b/0000.png", ""),
+            broken: |fixture| fixture.write("b/0000.png", ""),
             arguments: RUN,
             code: 4,
             words: &["b/0000.png", "0 bytes"],
         },
         Row {
             what: "images of one pixel",
-            broken: |it| {
+            broken: |fixture| {
                 for name in ["b/0000.png", "b/0001.png"] {
-                    picture(1, 1).save(it.path(name)).unwrap();
+                    picture(1, 1).save(fixture.path(name)).unwrap();
                 }
             },
             arguments: DRY,
@@ -114,7 +116,7 @@ fn an_image_of_another_size_is_named_and_affects_its_own_frame_only() {
     }
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let missing = case.lines("pose3d.jsonl").into_iter();
-    let missing: Vec<_> = missing.map(|it| it["views_missing"].clone()).collect();
+    let missing: Vec<_> = missing.map(|missing| missing["views_missing"].clone()).collect();
     let none = serde_json::json!({});
     let expected = [none.clone(), serde_json::json!({ "b": "wrong size" }), none];
     assert_eq!(missing, expected, "the next frame is there again");
@@ -124,9 +126,9 @@ fn an_image_of_another_size_is_named_and_affects_its_own_frame_only() {
 fn models() {
     check(&[Row {
         what: "some other file",
-        broken: |it| {
-            let picture = fs::read(it.path("a/0000.png")).unwrap();
-            it.write("model.plx", picture);
+        broken: |fixture| {
+            let picture = fs::read(fixture.path("a/0000.png")).unwrap();
+            fixture.write("model.plx", picture);
         },
         arguments: DRY,
         code: 4,
@@ -139,7 +141,9 @@ fn calibrations() {
     check(&[
         Row {
             what: "for another image size",
-            broken: |it| it.edit("rig.toml", "size_px = [96, 128]", "size_px = [128, 96]"),
+            broken: |fixture| {
+                fixture.edit("rig.toml", "size_px = [96, 128]", "size_px = [128, 96]")
+            },
             arguments: DRY,
             code: 5,
             words: &[
@@ -151,14 +155,14 @@ fn calibrations() {
         },
         Row {
             what: "without one of the cameras",
-            broken: |it| it.edit("deployment.toml", "name = \"b\"", "name = \"z\""),
+            broken: |fixture| fixture.edit("deployment.toml", "name = \"b\"", "name = \"z\""),
             arguments: RUN,
             code: 5,
             words: &["rig.toml", "no camera \"z\"", "a, b"],
         },
         Row {
             what: "absent",
-            broken: |it| fs::remove_file(it.path("rig.toml")).unwrap(),
+            broken: |fixture| fs::remove_file(fixture.path("rig.toml")).unwrap(),
             arguments: RUN,
             code: 4,
             words: &["rig.toml", "parallax calib convert"],
@@ -171,15 +175,15 @@ fn tables_of_expected_errors() {
     check(&[
         Row {
             what: "expected errors without one of the views",
-            broken: |it| {
-                it.edit(
+            broken: |fixture| {
+                fixture.edit(
                     "deployment.toml",
                     "workers = 2",
                     "workers = 2\nerrors = { table = \"q.csv\" }",
                 );
                 let parts: Vec<String> = (1..27).map(|part| format!("part_{part}")).collect();
                 let (parts, row) = (parts.join(","), ",1".repeat(26));
-                it.write(
+                fixture.write(
                     "q.csv",
                     format!("frame,view,{parts}\n0,a{row}\n0,C2{row}\n"),
                 );
@@ -190,10 +194,10 @@ fn tables_of_expected_errors() {
         },
         Row {
             what: "a name for a camera that is not there",
-            broken: |it| {
+            broken: |fixture| {
                 let errors = "workers = 2\n\
                     errors = { table = \"q.csv\", views = { z = \"C1\" } }";
-                it.edit("deployment.toml", "workers = 2", errors);
+                fixture.edit("deployment.toml", "workers = 2", errors);
             },
             arguments: DRY,
             code: 3,
@@ -207,10 +211,10 @@ fn thresholds() {
     check(&[
         Row {
             what: "thresholds with a NaN",
-            broken: |it| {
+            broken: |fixture| {
                 let tau = "workers = 2\ntau = { file = \"tau.txt\" }";
-                it.edit("deployment.toml", "workers = 2", tau);
-                it.write("tau.txt", "1 2\n3 nan");
+                fixture.edit("deployment.toml", "workers = 2", tau);
+                fixture.write("tau.txt", "1 2\n3 nan");
             },
             arguments: DRY,
             code: 4,
@@ -218,8 +222,8 @@ fn thresholds() {
         },
         Row {
             what: "thresholds of a model of other parts",
-            broken: |it| {
-                it.edit(
+            broken: |fixture| {
+                fixture.edit(
                     "deployment.toml",
                     "workers = 2",
                     "workers = 2\ntau = [1, 2]",
@@ -236,14 +240,14 @@ fn thresholds() {
 fn part_type_tables() {
     check(&[Row {
         what: "part-type table with a NaN",
-        broken: |it| {
+        broken: |fixture| {
             let tables = "workers = 2\n[[paper.compatibility]]\nviews = [\"a\", \"b\"]\n\
                               files = [\"ab.csv\", \"ba.csv\"]";
-            it.edit("deployment.toml", "workers = 2", tables);
+            fixture.edit("deployment.toml", "workers = 2", tables);
             let rows: Vec<String> = (2..54).map(|row| format!("{},0.5,0.5\n", row / 2)).collect();
             let rows = rows.concat();
-            it.write("ab.csv", &rows);
-            it.write("ba.csv", rows.replacen("2,0.5,0.5", "2,NaN,0.5", 1));
+            fixture.write("ab.csv", &rows);
+            fixture.write("ba.csv", rows.replacen("2,0.5,0.5", "2,NaN,0.5", 1));
         },
         arguments: DRY,
         code: 4,
@@ -263,14 +267,14 @@ fn single_images() {
         },
         Row {
             what: "0 bytes",
-            broken: |it| it.write("it.png", ""),
+            broken: |fixture| fixture.write("it.png", ""),
             arguments: DETECT,
             code: 4,
             words: &["it.png", "0 bytes"],
         },
         Row {
             what: "39 pixels high",
-            broken: |it| picture(96, 39).save(it.path("it.png")).unwrap(),
+            broken: |fixture| picture(96, 39).save(fixture.path("it.png")).unwrap(),
             arguments: DETECT,
             code: 4,
             words: &["it.png", "96x39", "40"],
@@ -324,6 +328,6 @@ fn picture(width: u32, height: u32) -> DynamicImage {
 /// Replaces the first line of the rig that begins with a key.
 fn replace_line(case: &Case, key: &str, line: &str) {
     let text = fs::read_to_string(case.path("rig.toml")).unwrap();
-    let old = text.lines().find(|it| it.starts_with(key)).unwrap();
+    let old = text.lines().find(|line| line.starts_with(key)).unwrap();
     case.write("rig.toml", text.replacen(old, line, 1));
 }

@@ -36,7 +36,7 @@ fn two_processes_read_every_message_at_the_same_place_without_copying() {
     assert_eq!(ended.status.code(), Some(0), "{}\n{report:#}", ended.stderr);
     let rows = report["numbers"].as_array().unwrap();
     let kinds: Vec<(&Value, &Value)> =
-        rows.iter().map(|it| (&it["receiver"], &it["bytes"])).collect();
+        rows.iter().map(|row| (&row["receiver"], &row["bytes"])).collect();
     let expected = [
         (&json!("event"), &json!(64)),
         (&json!("event"), &json!(115_584)),
@@ -97,7 +97,7 @@ fn measuring_more_cameras_than_exist_is_refused() {
 /// The bytes that the ports of a process have copied, from its log.
 fn copied_bytes(stderr: &str, process: &str) -> usize {
     let said = format!(" {process}: ports have done their work copied_bytes=");
-    let found = stderr.lines().find_map(|it| it.split_once(&said));
+    let found = stderr.lines().find_map(|line| line.split_once(&said));
     let (_, bytes) = found.unwrap();
     bytes.trim().parse().unwrap()
 }
@@ -123,7 +123,7 @@ fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
     }
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let evidence = report["recorded"]["summary"]["evidence_bytes_per_frame"].as_object();
-    let evidence: u64 = evidence.unwrap().values().map(|it| it.as_u64().unwrap()).sum();
+    let evidence: u64 = evidence.unwrap().values().map(|value| value.as_u64().unwrap()).sum();
     let fuse = copied_bytes(&ended.stderr, "fuse-0");
     let read = 2 * (N_FRAMES + 1) * size_of::<ViewPose>();
     let sent = (N_FRAMES + 1) * size_of::<PairPose>();

@@ -120,7 +120,7 @@ fn blocks_marked_to_run_succeed_in_an_empty_folder() {
 /// How many files a run has left, all of which have to be in the reference.
 fn results_are_described(folder: &Path) -> usize {
     let reference = fs::read_to_string(root().join("docs/reference/files.md")).unwrap();
-    let is_result = |file: &PathBuf| file.parent().is_some_and(|it| it.ends_with("out"));
+    let is_result = |file: &PathBuf| file.parent().is_some_and(|folder| folder.ends_with("out"));
     let files: Vec<PathBuf> = files_below(folder, "").into_iter().filter(is_result).collect();
     for file in &files {
         let name = file.file_name().unwrap().to_str().unwrap();
@@ -343,7 +343,7 @@ fn all_blocks() -> Vec<(String, Block)> {
 /// Every command line of every `sh` block, with its place.
 fn command_lines() -> Vec<(String, Line)> {
     let of_block = |(place, block): (String, Block)| {
-        let found = if block.info.first().is_some_and(|it| it == "sh") {
+        let found = if block.info.first().is_some_and(|info| info == "sh") {
             lines(&block.text)
         } else {
             Vec::new()

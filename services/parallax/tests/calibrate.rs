@@ -68,7 +68,7 @@ fn a_room_from_people_is_made_step_by_step() {
     let ended = new(&["--people", "1.8", "--sync"]);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let lines = ended.stdout.lines();
-    let steps: Vec<&str> = lines.filter(|it| it.starts_with("parallax")).collect();
+    let steps: Vec<&str> = lines.filter(|line| line.starts_with("parallax")).collect();
     let people = "parallax calibrate people room/deployment.toml --set rig=lenses.toml --height-m 1.8 --out room/rig.toml \
                   --report room/rig.html --window 2";
     assert_eq!(
@@ -161,7 +161,7 @@ mod long {
         let worst = |file: &str| {
             let found = rig(&case.path(file));
             let apart = differences(found.cameras(), truth.cameras(), true);
-            let turns = apart.iter().map(|it| it.turn.to_degrees());
+            let turns = apart.iter().map(|apart| apart.turn.to_degrees());
             turns.fold(0.0, f64::max)
         };
         let [before, after] = [worst("room/turned.toml"), worst("better.toml")];

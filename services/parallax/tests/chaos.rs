@@ -34,7 +34,7 @@ fn a_missed_limit_of_a_scenario_is_named_and_has_its_own_exit_code() {
     assert_eq!(ended.status.code(), Some(6), "{}\n{report:#}", ended.stderr);
     assert_eq!(report["held"], false);
     let limits = report["scenarios"][0]["limits"].as_array().unwrap();
-    let back = limits.iter().find(|it| it["what"] == "back after, ms");
+    let back = limits.iter().find(|limit| limit["what"] == "back after, ms");
     assert_eq!(back.unwrap()["held"], false, "{report:#}");
 }
 
@@ -130,7 +130,7 @@ mod long {
         );
         // With lossless delivery senders wait for a suspended results process, and nothing is lost.
         let limits = stall["limits"].as_array().unwrap().iter();
-        let written = limits.clone().find(|it| it["what"] == "results written");
+        let written = limits.clone().find(|limit| limit["what"] == "results written");
         assert_eq!(written.unwrap()["measured"], "80", "{stall:#}");
         assert_eq!(
             case.lines("pose3d.jsonl").len(),
@@ -147,10 +147,14 @@ mod long {
         let [unplug, clock, stall] = &report["scenarios"].as_array().unwrap()[..] else {
             panic!("{}\n{report:#}", ended.stderr)
         };
-        let flagged = |it: &Value| {
-            let causes = it["measured"]["flagged"].as_array().unwrap().iter();
-            let causes =
-                causes.map(|it| (it[0].as_str().unwrap().to_owned(), it[1].as_u64().unwrap()));
+        let flagged = |value: &Value| {
+            let causes = value["measured"]["flagged"].as_array().unwrap().iter();
+            let causes = causes.map(|cause| {
+                (
+                    cause[0].as_str().unwrap().to_owned(),
+                    cause[1].as_u64().unwrap(),
+                )
+            });
             causes.collect::<Vec<_>>()
         };
         for (it, n_causes) in [(unplug, 1), (clock, 3)] {
@@ -164,7 +168,7 @@ mod long {
             assert!(it["measured"]["back_ms"].is_number(), "{it:#}");
             let camera = &it["measured"]["camera"];
             let views = it["run"]["views"].as_array().unwrap();
-            let view = views.iter().find(|it| it["name"] == *camera).unwrap();
+            let view = views.iter().find(|view| view["name"] == *camera).unwrap();
             for (cause, n) in flagged {
                 assert!(
                     view["faults"][&cause].as_u64() >= Some(n),

@@ -27,8 +27,8 @@ fn demo(name: &str, more: &[&str]) -> (Case, Ended, Value) {
 /// The limits that were missed.
 fn missed(report: &Value) -> Vec<&str> {
     let limits = report["limits"].as_array().unwrap();
-    let missed = limits.iter().filter(|it| it["held"] == false);
-    missed.map(|it| it["what"].as_str().unwrap()).collect()
+    let missed = limits.iter().filter(|limit| limit["held"] == false);
+    missed.map(|missed| missed["what"].as_str().unwrap()).collect()
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn a_killed_camera_is_restarted_and_the_report_counts_the_lost_frames() {
         "a given rate needs no measurement"
     );
     assert_eq!(report["frame_rate_hz"], rate_hz);
-    let number = |it: &Value| it.as_f64().unwrap_or(f64::NAN);
+    let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
     let killed = &report["killed"];
     assert_eq!(report["killed_camera"], "c3");
     assert!(
@@ -86,7 +86,7 @@ fn a_killed_camera_is_restarted_and_the_report_counts_the_lost_frames() {
     assert!((5.0..400.0).contains(&mpjpe), "{accuracy:#}");
     for view in report["run"]["views"].as_array().unwrap() {
         let parts = ["used", "empty", "late", "dropped", "lost", "unanswered"];
-        let sum: u64 = parts.iter().map(|it| view[it].as_u64().unwrap()).sum();
+        let sum: u64 = parts.iter().map(|part| view[part].as_u64().unwrap()).sum();
         assert_eq!(sum, 20, "{view:#}");
     }
 
@@ -108,12 +108,12 @@ fn lines(case: &Case, name: &str) -> Vec<Value> {
 
 fn counts_are_those_of_the_results(case: &Case, report: &Value, page: &str) {
     let is_found = |joint: &Value| joint["position_m"].is_array();
-    let is_posed = |it: &&Value| {
-        it["people"][0]["joints"]
+    let is_posed = |value: &&Value| {
+        value["people"][0]["joints"]
             .as_object()
-            .is_some_and(|it| it.values().any(is_found))
+            .is_some_and(|object| object.values().any(is_found))
     };
-    let is_whole = |it: &&Value| it["views_missing"] == json!({});
+    let is_whole = |value: &&Value| value["views_missing"] == json!({});
     let poses = lines(case, "pose3d.jsonl");
     let posed = poses.iter().filter(is_posed);
     let whole = posed.clone().filter(is_whole).count();
@@ -137,7 +137,7 @@ fn a_killed_camera_was_lost_and_not_late(case: &Case, killed: &Value) {
     for it in lines(case, "pose3d.jsonl") {
         let frame = it["frame"].as_f64().unwrap();
         let sent = times.iter().find(|time| time["frame"] == it["frame"]);
-        let sent_ms = sent.and_then(|it| it["sent_ms"].as_f64()).unwrap_or(0.0);
+        let sent_ms = sent.and_then(|sent| sent["sent_ms"].as_f64()).unwrap_or(0.0);
         if last < frame && frame < first && sent_ms > restarted_ms {
             assert_eq!(
                 it["views_missing"]["c3"], "process lost",

@@ -26,7 +26,7 @@ fn detect(case: &Case, more: &[&str]) -> (Ended, Vec<Value>) {
     let plain = ["detect", "--model", "model.plx", "--json"];
     let ended = case.start(&[&plain, more].concat()).wait();
     let lines = ended.stdout.lines();
-    let lines = lines.map(|it| serde_json::from_str(it).unwrap()).collect();
+    let lines = lines.map(|line| serde_json::from_str(line).unwrap()).collect();
     (ended, lines)
 }
 
@@ -39,7 +39,7 @@ fn a_damaged_file_is_named_and_the_others_are_searched() {
     case.write("a/0002.bmp", "");
     let (ended, lines) = detect(&case, &["a", "absent.png"]);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
-    let images = lines.iter().map(|it| it["image"].as_str().unwrap());
+    let images = lines.iter().map(|line| line["image"].as_str().unwrap());
     let images: Vec<_> = images.collect();
     assert_eq!(images, ["a/0000.png", "a/0001.png", "a/0002.png"]);
     for words in ["0001.jpg", "0002.bmp", "absent.png", "3 of 6 files"] {
@@ -112,10 +112,10 @@ fn a_large_picture_is_searched_at_a_reported_smaller_size() {
     };
     assert_eq!([&large["width"], &large["height"]], [384, 512]);
     assert_eq!(large["searched"], small["searched"]);
-    let best = |it: &Value| it["detections"][0].clone();
+    let best = |value: &Value| value["detections"][0].clone();
     let (large, small) = (best(large), best(small));
     assert_eq!(large["score"], small["score"], "four pixels are one again");
-    let number = |it: &Value| it.as_f64().unwrap();
+    let number = |value: &Value| value.as_f64().unwrap();
     for (large, small) in [
         (&large["parts"][3]["x"], &small["parts"][3]["x"]),
         (&large["parts"][7]["box"][3], &small["parts"][7]["box"][3]),
@@ -152,7 +152,7 @@ fn a_video_is_searched_frame_by_frame() {
     ];
     let (ended, lines) = detect(&case, &more);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let frames: Vec<_> = lines.iter().map(|it| it["frame"].as_u64()).collect();
+    let frames: Vec<_> = lines.iter().map(|line| line["frame"].as_u64()).collect();
     assert_eq!(frames, [Some(0), Some(2), Some(4)]);
     for frame in [0, 2, 4] {
         assert!(
@@ -169,5 +169,5 @@ fn made(pattern: &Path, clip: &Path) -> bool {
     let pictures = ["-v", "error", "-framerate", "10", "-i"];
     let mut command = Command::new("ffmpeg");
     command.args(pictures).arg(pattern).arg(clip);
-    command.status().is_ok_and(|it| it.success())
+    command.status().is_ok_and(|status| status.success())
 }

@@ -44,7 +44,7 @@ fn case(name: &str) -> Case {
     case.write("net.onnx", crate::networks::network("Relu").file());
     case.write("net.toml", crate::networks::CARD);
     let mut picture = image::RgbImage::new(128, 96);
-    for (row, column) in (0..8).flat_map(|row| (0..8).map(move |it| (row, it))) {
+    for (row, column) in (0..8).flat_map(|row| (0..8).map(move |i| (row, i))) {
         picture.put_pixel(64 + column, 48 + row, image::Rgb([255; 3]));
     }
     picture.save(case.path("people.png")).unwrap();
@@ -62,8 +62,8 @@ fn parsed(ended: &Ended) -> Value {
 
 /// A box of the detector in the picture, which is twice as large as its input.
 fn in_picture(nth: usize) -> Value {
-    let side = |it: f32| (f64::from(it) + 0.5) * 2.0 - 0.5;
-    json!(BOXES[nth][..4].iter().map(|it| side(*it)).collect::<Vec<_>>())
+    let side = |value: f32| (f64::from(value) + 0.5) * 2.0 - 0.5;
+    json!(BOXES[nth][..4].iter().map(|bounds| side(*bounds)).collect::<Vec<_>>())
 }
 
 const DETECT: [&str; 6] = [

@@ -47,7 +47,7 @@ mod long {
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         for camera in ["c1", "c2", "c3", "c4"] {
             let empty = empty_room(&case, camera);
-            for frame in (0..N_FRAMES).filter(|it| !THERE.contains(it)) {
+            for frame in (0..N_FRAMES).filter(|i| !THERE.contains(i)) {
                 let mut noisy = empty.clone();
                 // Pictures that are the same would be those of a frozen camera.
                 let mut random = fastrand::Rng::with_seed(frame as u64);

@@ -36,7 +36,7 @@ fn done(case: &Case, source: &str, more: &[&str]) -> Value {
 
 /// `[frame][joint]`, metres in the world; none in a gap.
 fn found(case: &Case) -> Vec<Vec<Option<[f64; 3]>>> {
-    let names = skeleton::PARSE14.joints.iter().map(|it| it.name);
+    let names = skeleton::PARSE14.joints.iter().map(|joint| joint.name);
     let of_line = |line: &Value| {
         let place = |name: &str| {
             let at = line["people"][0]["joints"][name]["position_m"].as_array()?;
@@ -101,7 +101,7 @@ fn check_positions(case: &Case) {
     for (frame, due) in found.iter().enumerate() {
         for (joint, due) in due.iter().enumerate() {
             let [x, y, z] = due.unwrap_or([f64::NAN; 3]);
-            let mm = c3d.frame(frame)[joint].map(|it| it.map(|it| it / 1e3));
+            let mm = c3d.frame(frame)[joint].map(|it| it.map(|value| value / 1e3));
             for (read, due) in [(mm, [x, y, z]), (trc.frames[frame][joint], [y, z, x])] {
                 assert_eq!(
                     read.is_none(),
@@ -135,7 +135,7 @@ fn read_by_python<'a>(folder: &Path, formats: &[&'a str]) -> Vec<(&'a str, Value
     // Some of them print notices of their own before.
     let text = String::from_utf8_lossy(&read.stdout);
     let said: Value = serde_json::from_str(text.lines().last().unwrap_or_default()).unwrap();
-    let all = formats.iter().map(|&it| (it, said[it].clone()));
+    let all = formats.iter().map(|&format| (format, said[format].clone()));
     let (lacking, found): (Vec<_>, Vec<_>) = all.partition(|it| it.1.is_null());
     for (format, _) in lacking {
         eprintln!("skipped: Python has no package that reads {format} (see .ci/run)");
@@ -189,7 +189,7 @@ fn programs_of_others_open_gaps_and_long_files() {
     };
     let rows = frames.iter().enumerate().map(|(nth, frame)| {
         // y up.
-        let turned = frame.iter().map(|it| it.map(|[x, y, z]| [y, z, x]));
+        let turned = frame.iter().map(|frame| frame.map(|[x, y, z]| [y, z, x]));
         formats::trc::row(nth as u64 + 1, nth as f64 / 60.0, turned)
     });
     let text = heading.to_string() + &rows.collect::<String>();
@@ -215,7 +215,7 @@ fn programs_of_others_open_gaps_and_long_files() {
     formats::c3d::write(
         &mut file,
         &heading,
-        (1..=70_000).map(|it| vec![Some(marker(it))]),
+        (1..=70_000).map(|i| vec![Some(marker(i))]),
     )
     .unwrap();
     fs::write(folder.path().join("long.c3d"), file).unwrap();
@@ -265,7 +265,7 @@ fn joints_have_the_names_of_opensim_models_where_asked_for() {
 
 /// `[frame][joint]` as another program reads it, and null in gaps.
 fn check_points(format: &str, said: &Value, found: &[Vec<Option<[f64; 3]>>]) {
-    let joints = skeleton::PARSE14.joints.iter().map(|it| it.name);
+    let joints = skeleton::PARSE14.joints.iter().map(|joint| joint.name);
     if format == "c3d" {
         assert_eq!(
             (&said["units"], &said["rate"]),
@@ -300,7 +300,7 @@ const bytes = new Uint8Array(require('fs').readFileSync(process.argv[1]));\n\
 validator.validateBytes(bytes).then((it) => console.log(JSON.stringify(it.issues)));\n";
     let file = folder.join("pose3d.glb");
     let read = Command::new("node").args(["-e", SCRIPT]).arg(file).output();
-    let has = |it: &Output| it.status.code() != Some(9);
+    let has = |output: &Output| output.status.code() != Some(9);
     let Some(read) = read.ok().filter(has) else {
         eprintln!("skipped: Node has no gltf-validator (npm install gltf-validator, NODE_PATH)");
         return;

@@ -46,7 +46,7 @@ impl Signalled {
     }
 
     fn frames(&self) -> Vec<u64> {
-        let frames = self.lines.iter().map(|it| it["frame"].as_u64().unwrap());
+        let frames = self.lines.iter().map(|line| line["frame"].as_u64().unwrap());
         frames.collect()
     }
 
@@ -57,8 +57,9 @@ impl Signalled {
 
     /// Checks that frames without a result have one of the expected reasons, are counted, and are fewer than `n`.
     fn assert_reasons(&self, expected: &[&str], n: usize) {
-        let without = self.lines.iter().filter(|it| it["status"] == "no result");
-        let reasons: Vec<&str> = without.map(|it| it["reason"].as_str().unwrap()).collect();
+        let without = self.lines.iter().filter(|line| line["status"] == "no result");
+        let reasons: Vec<&str> =
+            without.map(|without| without["reason"].as_str().unwrap()).collect();
         assert!(reasons.len() < n, "{reasons:?}");
         let known = |it: &&str| expected.contains(it);
         assert!(reasons.iter().all(known), "{reasons:?}");
@@ -69,15 +70,15 @@ impl Signalled {
 
     /// The views present in those frames that lack a view.
     fn incomplete(&self) -> Vec<&Value> {
-        let views = self.lines.iter().map(|it| &it["views_present"]);
-        views.filter(|it| **it != json!(["a", "b", "c"])).collect()
+        let views = self.lines.iter().map(|line| &line["views_present"]);
+        views.filter(|view| **view != json!(["a", "b", "c"])).collect()
     }
 }
 
 /// A table of expected errors of the three views.
 fn expected_errors() -> String {
     let model = common::planted::model();
-    let parts = (0..model.n_parts()).map(|it| format!("part_{}", it + 1));
+    let parts = (0..model.n_parts()).map(|i| format!("part_{}", i + 1));
     let parts: Vec<String> = parts.collect();
     let mut table = format!("view,frame,{}\n", parts.join(","));
     for view in ["a", "b", "c"] {
@@ -177,7 +178,7 @@ fn a_killed_fusion_worker_loses_its_pairs_of_a_few_frames_only() {
         pairs.iter().all(|pairs| pairs.as_u64() > Some(0)),
         "{pairs:?}"
     );
-    let n_without = pairs.iter().filter(|it| ***it != json!(3)).count();
+    let n_without = pairs.iter().filter(|pair| ***pair != json!(3)).count();
     assert!(n_without < 20, "{pairs:?}");
     assert_eq!(pairs.last(), Some(&&json!(3)), "it is not back");
 }
@@ -197,7 +198,7 @@ fn every_frame_of_a_live_run_has_one_line_after_triangulation_is_killed() {
     let frames = run.frames();
     let expected: Vec<u64> = (0..frames.len() as u64).collect();
     assert_eq!(frames, expected, "{}", run.stderr);
-    for it in run.lines.iter().filter(|it| it["status"] == "no result") {
+    for it in run.lines.iter().filter(|line| line["status"] == "no result") {
         assert!(!it["reason"].as_str().unwrap().is_empty(), "{it}");
         assert_eq!(it["views_missing"].as_object().unwrap().len(), 3, "{it}");
     }
@@ -233,7 +234,7 @@ fn a_live_run_continues_without_a_suspended_view_until_it_is_back() {
     signal("STOP", started.pid_of("pose --index 1").into());
     started.until("lost frames", |_| {
         let lines = case.lines("pose3d.jsonl");
-        lines.iter().any(|it| it["views_missing"]["b"] == "process lost")
+        lines.iter().any(|line| line["views_missing"]["b"] == "process lost")
     });
     fs::rename(case.path("away.plx"), case.path("model.plx")).unwrap();
     let ended = started.wait();
@@ -249,16 +250,16 @@ fn a_live_run_continues_without_a_suspended_view_until_it_is_back() {
 
 /// Checks that view `b` was late, then lost with its process, and is back.
 fn assert_back_after_a_gap(lines: &[Value]) {
-    let n_without_b = lines.iter().filter(|it| it["views_present"] == json!(["a", "c"]));
+    let n_without_b = lines.iter().filter(|line| line["views_present"] == json!(["a", "c"]));
     assert!(n_without_b.count() > 3, "{lines:?}");
     let reasons: BTreeSet<&str> =
-        lines.iter().filter_map(|it| it["views_missing"]["b"].as_str()).collect();
+        lines.iter().filter_map(|line| line["views_missing"]["b"].as_str()).collect();
     for reason in ["late", "process lost"] {
         assert!(reasons.contains(reason), "{reasons:?}");
     }
     let last = |holds: fn(&Value) -> bool| lines.iter().rposition(holds);
-    let lost = last(|it| it["views_missing"]["b"] == "process lost");
-    let there = last(|it| it["views_missing"]["b"].is_null());
+    let lost = last(|value| value["views_missing"]["b"] == "process lost");
+    let there = last(|value| value["views_missing"]["b"].is_null());
     assert!(there > lost, "it is not back: {lines:?}");
 }
 

@@ -27,7 +27,7 @@ fn a_full_disk_ends_no_process_and_unwritten_results_are_counted() {
     // Every frame was computed, not every one was written, and no process was restarted.
     assert_eq!(report["restarts"], json!([]), "{}", ended.stderr);
     let [n_written, n_lost] =
-        ["frames", "frames_not_recorded"].map(|it| summary[it].as_u64().unwrap());
+        ["frames", "frames_not_recorded"].map(|name| summary[name].as_u64().unwrap());
     assert_eq!(n_written + n_lost, 40);
     assert!(n_written > 0 && n_lost > 0, "{summary:#}");
     assert!(summary["writes_failed"].as_u64() > Some(10), "{summary:#}");
@@ -39,7 +39,7 @@ fn a_full_disk_ends_no_process_and_unwritten_results_are_counted() {
         let text = fs::read_to_string(case.path("copy").join(name)).unwrap();
         assert!(text.ends_with('\n'), "{name} ends in the middle of a line");
         let lines = text.lines().map(serde_json::from_str::<Value>);
-        let frames: Vec<u64> = lines.map(|it| it.unwrap()["frame"].as_u64().unwrap()).collect();
+        let frames: Vec<u64> = lines.map(|line| line.unwrap()["frame"].as_u64().unwrap()).collect();
         assert!(frames.len() > 3 && frames.is_sorted(), "{frames:?}");
         assert!(frames.last() < Some(&39), "the disk was not full");
         assert!(name.starts_with("pose2d") || frames.len() as u64 == n_written);

@@ -30,9 +30,9 @@ mod long {
         let rig = files::read(&path, &files::ReadOptions::default()).unwrap();
         let picture = Isometry3::from_parts(Translation3::identity(), half(Vector3::z_axis()));
         // The tangential distortion of these lenses is below a tenth of a pixel: it is not turned.
-        let camera = |it: &Camera| Camera {
-            camera_from_world: picture * it.camera_from_world * turned.inverse(),
-            ..it.clone()
+        let camera = |camera: &Camera| Camera {
+            camera_from_world: picture * camera.camera_from_world * turned.inverse(),
+            ..camera.clone()
         };
         let cameras = rig.cameras().iter().map(camera).collect();
         let rig = Rig::new(cameras, rig.up_in_world(), rig.source()).unwrap();
@@ -55,7 +55,7 @@ mod long {
     /// Median distance of the joints that were found from the truth, metres, and the share that was found.
     fn judged(case: &Case, turned: &Isometry3<f64>) -> (f64, f64) {
         let truth = std::fs::read_to_string(case.path("room/truth.jsonl")).unwrap();
-        let mut lines = truth.lines().map(|it| serde_json::from_str::<Value>(it).unwrap());
+        let mut lines = truth.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
         let names = lines.next().unwrap()["joints"].clone();
         let mut places = BTreeMap::new();
         for line in lines {
@@ -156,7 +156,7 @@ mod long {
         // Measured: 0.016 m, all; a search of every frame gives 0.017 m.
         assert!(error < 0.03 && share > 0.95, "{error} m, {share}");
         let lines = case.lines("pose2d.jsonl");
-        let n_searched = lines.iter().filter(|it| it["search"] == "full").count();
+        let n_searched = lines.iter().filter(|line| line["search"] == "full").count();
         assert!(
             n_searched * 10 < lines.len(),
             "{n_searched} of {}",

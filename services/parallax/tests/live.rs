@@ -29,7 +29,7 @@ fn processes(case: &Case) -> Vec<Value> {
 /// The times of one stage of a process, of one view or of all.
 fn times<'a>(process: &'a Value, stage: &str, view: Option<u64>) -> Option<&'a Value> {
     let times = process["measured"]["times"].as_array().unwrap();
-    let is_meant = |it: &&Value| it["stage"] == stage && it["view"].as_u64() == view;
+    let is_meant = |value: &&Value| value["stage"] == stage && value["view"].as_u64() == view;
     times.iter().find(is_meant)
 }
 
@@ -60,7 +60,7 @@ fn every_process_and_view_of_a_run_is_shown_with_rates_and_times() {
     started.until("three frames", |_| case.lines("pose3d.jsonl").len() >= 3);
 
     let shown = processes(&case);
-    let names: Vec<&str> = shown.iter().map(|it| it["process"].as_str().unwrap()).collect();
+    let names: Vec<&str> = shown.iter().map(|shown| shown["process"].as_str().unwrap()).collect();
     assert_eq!(names, PROCESSES);
     shown.iter().for_each(assert_plausible);
     for (view, name) in [(0, "a"), (1, "b")] {
@@ -87,7 +87,7 @@ fn every_process_and_view_of_a_run_is_shown_with_rates_and_times() {
     let top = top.wait_among_others();
     assert_eq!(top.status.code(), Some(0), "{}", top.stderr);
     for name in PROCESSES {
-        let lines = top.stdout.lines().filter(|it| it.starts_with(name));
+        let lines = top.stdout.lines().filter(|line| line.starts_with(name));
         assert_eq!(lines.count(), 2, "{name}: {}", top.stdout);
     }
     for title in [
@@ -125,7 +125,7 @@ fn whoever_looks_at_a_run_that_begins_sees_all_its_processes() {
         });
         let shown: Value = serde_json::from_str(&shown).unwrap();
         let shown = shown["deployment"]["processes"].as_array().unwrap();
-        let names = shown.iter().map(|it| it["process"].as_str().unwrap());
+        let names = shown.iter().map(|shown| shown["process"].as_str().unwrap());
         assert!(names.eq(PROCESSES), "{shown:#?}");
         signal("INT", started.id());
         started.wait();
@@ -146,7 +146,10 @@ fn a_process_that_was_killed_is_shown_with_its_restart() {
         states.push(pose["state"].to_string());
         pose["state"] == "runs" && pose["measured"]["restarts"] == 1
     });
-    assert!(states.iter().all(|it| it != "\"silent\""), "{states:?}");
+    assert!(
+        states.iter().all(|state| state != "\"silent\""),
+        "{states:?}"
+    );
     signal("INT", started.id());
     assert_eq!(started.wait().status.code(), Some(130));
     case.assert_nothing_left();

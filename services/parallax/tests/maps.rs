@@ -74,7 +74,7 @@ fn network(bias: f32) -> Network {
     net.inputs.push(("picture".to_owned(), sides([1, 3, 128, 96])));
     net.outputs.push(("maps".to_owned(), sides([1, N, 128, 96])));
     let weights = directions().into_iter().flatten();
-    let weights = weights.map(|it| 4.0 * it as f32);
+    let weights = weights.map(|weight| 4.0 * weight as f32);
     net.floats("weights", &[N, 3, 1, 1], weights.collect());
     net.floats("bias", &[N], vec![bias; N]);
     let one = vec![("kernel_shape", Attribute::Ints(vec![1, 1]))];
@@ -120,7 +120,7 @@ fn joints(frame: usize) -> [Point3<f64>; N] {
 /// The joints at a time in frames, metres.
 pub(crate) fn joints_at(frame: f64) -> [Point3<f64>; N] {
     let by = Vector3::new(0.005 * frame, 0.15 * (0.5 * frame).sin(), 0.0);
-    STANDING.map(|it| Point3::from(it) + by)
+    STANDING.map(|standing| Point3::from(standing) + by)
 }
 
 /// The joint whose name a view gives to a joint; 14: it is not seen.
@@ -132,7 +132,7 @@ pub(crate) fn as_it_is(joint: usize) -> usize {
 
 /// Left is called right.
 pub(crate) fn exchanged(joint: usize) -> usize {
-    let pair = skeleton::SIDES.iter().find(|it| it.contains(&joint));
+    let pair = skeleton::SIDES.iter().find(|side| side.contains(&joint));
     pair.map_or(joint, |[a, b]| a + b - joint)
 }
 
@@ -142,14 +142,15 @@ pub(crate) fn without_a_wrist(joint: usize) -> usize {
 
 /// The picture of a camera in a frame: dots on grey; the joints of the last of which are in front.
 pub(crate) fn picture(camera: &Camera, frame: usize, named: Named) -> Canvas {
-    let [width, height] = SIZE.map(|it| it as usize);
+    let [width, height] = SIZE.map(|size| size as usize);
     let mut canvas = Canvas::new(Size::new(width, height), [128; 3]);
     for (joint, place) in joints(frame).iter().enumerate() {
         if named(joint) == N {
             continue;
         }
         let at = camera.project(place).unwrap();
-        let colour = directions()[named(joint)].map(|it| (128.0 + 110.0 * it).round() as u8);
+        let colour =
+            directions()[named(joint)].map(|direction| (128.0 + 110.0 * direction).round() as u8);
         canvas.disc(at.coords.into(), 4.0, colour);
     }
     canvas
@@ -168,7 +169,7 @@ pub(crate) fn case(name: &str, views: [Option<Named>; 4]) -> Case {
     for (camera, named) in rig.cameras().iter().zip(views) {
         for frame in 0..N_FRAMES {
             let file = case.path(&camera.name).join(format!("{frame:04}.png"));
-            let [width, height] = SIZE.map(|it| it as usize);
+            let [width, height] = SIZE.map(|size| size as usize);
             let canvas = match named {
                 Some(named) => picture(camera, frame, named),
                 // Never the same twice: the camera is not frozen.
@@ -192,7 +193,7 @@ fn found(case: &Case) -> Vec<(String, f64)> {
     let frames = text.lines().map(|line| {
         let line: Value = serde_json::from_str(line).unwrap();
         let truth = joints(line["frame"].as_u64().unwrap() as usize);
-        let names = skeleton::PARSE14.joints.iter().map(|it| it.name);
+        let names = skeleton::PARSE14.joints.iter().map(|joint| joint.name);
         let distance = |(name, truth): (&str, &Point3<f64>)| {
             let at = &line["people"][0]["joints"][name]["position_m"];
             let axis = |nth: usize| at[nth].as_f64();
@@ -225,7 +226,7 @@ fn a_network_and_a_detector_are_all_that_a_deployment_needs() {
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         all_are_near(&case, NEAR_M);
         let lines = std::fs::read_to_string(case.path("out/pose2d.jsonl")).unwrap();
-        ["full", "tracked"].map(|it| lines.matches(&format!("\"search\":\"{it}\"")).count())
+        ["full", "tracked"].map(|name| lines.matches(&format!("\"search\":\"{name}\"")).count())
     };
     // Pictures of a folder may be of any time: boxes are looked for in every one. At 20 a second in the first and in every tenth, by the
     // views in turn: in frames 10, 8, 5 and 3 for the second time.
@@ -336,7 +337,7 @@ fn what_belongs_to_the_papers_method_is_refused_beside_a_network() {
 fn place(name: &str, frame: f64) -> Point3<f64> {
     let joints = joints_at(frame);
     let named = |name: &str| {
-        let number = skeleton::PARSE14.joints.iter().position(|it| it.name == name);
+        let number = skeleton::PARSE14.joints.iter().position(|joint| joint.name == name);
         joints[number.unwrap()]
     };
     let by = |x: f64, z: f64| Vector3::new(x, 0.0, z);
@@ -374,9 +375,9 @@ fn with_skewed_keypoints(
             // None is there where this is not the first time.
             let _gone = std::fs::remove_file(folder.join(format!("{frame:04}.png")));
             let names = names(view);
-            let numbers = names.iter().map(|it| {
+            let numbers = names.iter().map(|name| {
                 let taken = frame as f64 + skews[view];
-                let at = camera.project(&place(it, taken)).unwrap();
+                let at = camera.project(&place(name, taken)).unwrap();
                 format!("{:.2},{:.2},0.9", at.x, at.y)
             });
             let numbers: Vec<String> = numbers.collect();
@@ -396,7 +397,7 @@ fn with_skewed_keypoints(
         }
     }
     let own = std::fs::read_to_string(case.path("deployment.toml")).unwrap();
-    let name = own.lines().find(|it| it.starts_with("name")).unwrap();
+    let name = own.lines().find(|line| line.starts_with("name")).unwrap();
     case.write("deployment.toml", text.replacen("name = \"dots\"", name, 1));
 }
 
@@ -428,7 +429,7 @@ fn what_keypoints_have_beside_the_joints_is_written_by_name() {
         other.unwrap_or_else(|| name.to_owned())
     };
     with_keypoints(&case, "halpe-26", |view| {
-        HALPE_26.map(|it| named(view, it)).to_vec()
+        HALPE_26.map(|halpe_26| named(view, halpe_26)).to_vec()
     });
     let ended = run(&case, &[]);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -479,7 +480,7 @@ fn pictures_of_other_moments_are_moved_to_the_instants_of_their_frames() {
         errors.push(errors_mm(&case));
     }
     let text = std::fs::read_to_string(case.path("deployment.toml")).unwrap();
-    let untold = text.lines().filter(|it| !it.starts_with("skew_ms"));
+    let untold = text.lines().filter(|line| !line.starts_with("skew_ms"));
     case.write("deployment.toml", untold.collect::<Vec<_>>().join("\n"));
     run(&case, &[]);
     errors.push(errors_mm(&case));

@@ -42,7 +42,7 @@ fn model() -> Model {
         if let Some(edge) = &mut it.edge {
             edge.bias = vec![vec![0.0; N_TYPES]; N_TYPES];
             if let fmp::Springs::PerChildType(springs) = &mut edge.springs {
-                *springs = (0..N_TYPES).map(|it| springs[it % 2]).collect();
+                *springs = (0..N_TYPES).map(|i| springs[i % 2]).collect();
             }
         }
     }
@@ -59,7 +59,7 @@ fn model() -> Model {
 
 /// A picture of noise, in which there are poses on every level.
 fn noise(seed: u64) -> Canvas {
-    let [width, height] = SIZE.map(|it| it as usize);
+    let [width, height] = SIZE.map(|size| size as usize);
     let mut random = fastrand::Rng::with_seed(seed);
     let rgb: Vec<u8> = std::iter::repeat_with(|| random.u8(..)).take(width * height * 3).collect();
     Canvas::from_rgb(Size::new(width, height), &rgb)

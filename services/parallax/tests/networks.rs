@@ -50,7 +50,7 @@ fn case(name: &str) -> Case {
     case.write("card.toml", CARD);
     let mut picture = image::RgbImage::new(96, 128);
     for (channel, [left, top]) in BLOCKS.into_iter().enumerate() {
-        for (row, column) in (0..8).flat_map(|row| (0..8).map(move |it| (row, it))) {
+        for (row, column) in (0..8).flat_map(|row| (0..8).map(move |i| (row, i))) {
             picture.get_pixel_mut(left + column, top + row).0[channel] = 255;
         }
     }
@@ -245,11 +245,11 @@ fn with_the_network_that_ships_everybody_is_found_once_and_where_they_are() {
     let rig = case.path("room/rig.toml");
     let rig = geometry::files::read(&rig, &geometry::files::ReadOptions::default()).unwrap();
     let truth = std::fs::read_to_string(case.path("room/truth.jsonl")).unwrap();
-    let mut truth = truth.lines().map(|it| serde_json::from_str::<Value>(it).unwrap());
+    let mut truth = truth.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
     let names = truth.next().unwrap()["joints"].clone();
     let places = truth.next().unwrap()["joints"].clone();
     let named = |name: &str| {
-        let number = names.as_array().unwrap().iter().position(|it| it == name);
+        let number = names.as_array().unwrap().iter().position(|array| array == name);
         let at: Vec<f64> = serde_json::from_value(places[number.unwrap()].clone()).unwrap();
         nalgebra::Point3::new(at[0], at[1], at[2])
     };
@@ -288,7 +288,7 @@ fn a_network_is_judged_on_marked_people() {
     // The head and the hips where the blocks are, to the middle of a cell of the maps; what the network does not know elsewhere.
     let mut marks = [[8.0, 120.0]; 14];
     for (joint, block) in [(13, 0), (3, 1), (2, 2)] {
-        marks[joint] = BLOCKS[block].map(|it| f64::from(it) + 3.5);
+        marks[joint] = BLOCKS[block].map(|block| f64::from(block) + 3.5);
     }
     let person = serde_json::json!({"image": "blocks.png", "joints": marks});
     case.write("people.jsonl", format!("{person}\n"));
@@ -301,7 +301,7 @@ fn a_network_is_judged_on_marked_people() {
     assert!(report["peaks"]["intervals"]["pck"]["0.2"][0].is_number());
     assert_eq!(of("peaks", "knee"), 0.0, "{report}");
     let expected = &report["expected_errors"];
-    let [n, n_far] = ["joints", "off_by_half_a_head"].map(|it| expected[it].as_u64().unwrap());
+    let [n, n_far] = ["joints", "off_by_half_a_head"].map(|name| expected[name].as_u64().unwrap());
     assert!(n > n_far && n <= 14, "{expected}");
     let ended = run(&case, &[&judge[..], &card].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);

@@ -32,7 +32,7 @@ fn try_all(rows: &[Row]) {
             stderr,
         } = case.start(arguments).wait();
         case.assert_nothing_left();
-        let lacks = words.iter().find(|it| !stderr.contains(**it));
+        let lacks = words.iter().find(|word| !stderr.contains(**word));
         if status.code() != Some(*code) || lacks.is_some() {
             wrong.push(format!(
                 "{what}: {status}, expected {code}; lacks {lacks:?}\n{stdout}{stderr}"
@@ -50,8 +50,9 @@ fn move_cameras(case: &Case, to: impl Fn(f64) -> f64) {
             return line.to_owned();
         };
         let numbers = numbers.trim_end_matches(']').split(',');
-        let moved: Vec<String> =
-            numbers.map(|it| format!("{:?}", to(it.trim().parse().unwrap()))).collect();
+        let moved: Vec<String> = numbers
+            .map(|number| format!("{:?}", to(number.trim().parse().unwrap())))
+            .collect();
         format!("translation_metres = [{}]", moved.join(", "))
     };
     let lines: Vec<String> = text.lines().map(line).collect();
@@ -123,8 +124,8 @@ const CALIBRATIONS: &[Row] = &[
 const SETTINGS: &[Row] = &[
     (
         "no deadline",
-        |it| {
-            it.edit(
+        |fixture| {
+            fixture.edit(
                 "deployment.toml",
                 "[results]",
                 "[supervise]\ndeadline_ms = 0\n[results]",
@@ -136,8 +137,8 @@ const SETTINGS: &[Row] = &[
     ),
     (
         "no patience",
-        |it| {
-            it.edit(
+        |fixture| {
+            fixture.edit(
                 "deployment.toml",
                 "[results]",
                 "[supervise]\nhang_limit_s = 0\n[results]",
@@ -149,8 +150,8 @@ const SETTINGS: &[Row] = &[
     ),
     (
         "a doubtful deadline",
-        |it| {
-            it.edit(
+        |fixture| {
+            fixture.edit(
                 "deployment.toml",
                 "[results]",
                 "[supervise]\ndeadline_ms = 5\n[results]",
@@ -188,7 +189,7 @@ fn footage_of_another_camera_is_refused_or_reported() {
     try_all(&[
         (
             "one source for two cameras",
-            |it| it.edit("deployment.toml", "source = \"b\"", "source = \"a\""),
+            |fixture| fixture.edit("deployment.toml", "source = \"b\"", "source = \"a\""),
             CHECK,
             3,
             &[
@@ -198,16 +199,16 @@ fn footage_of_another_camera_is_refused_or_reported() {
         ),
         (
             "the same by another name",
-            |it| it.edit("deployment.toml", "source = \"b\"", "source = \"./c/../a\""),
+            |fixture| fixture.edit("deployment.toml", "source = \"b\"", "source = \"./c/../a\""),
             RUN,
             3,
             &["cameras \"a\" and \"b\" have one source"],
         ),
         (
             "copies of one footage",
-            |it| {
+            |fixture| {
                 for frame in ["0000.png", "0001.png"] {
-                    fs::copy(it.path("a").join(frame), it.path("c").join(frame)).unwrap();
+                    fs::copy(fixture.path("a").join(frame), fixture.path("c").join(frame)).unwrap();
                 }
             },
             RUN,
@@ -297,7 +298,7 @@ fn a_dry_run_fails_where_the_run_would_not_begin() {
 fn an_unspecified_vertical_is_estimated_and_reported() {
     let case = Case::new("upright", &[2; 3], PLAIN);
     let text = fs::read_to_string(case.path("rig.toml")).unwrap();
-    let without: Vec<&str> = text.lines().filter(|it| !it.starts_with("up = ")).collect();
+    let without: Vec<&str> = text.lines().filter(|line| !line.starts_with("up = ")).collect();
     assert!(without.len() < text.lines().count());
     case.write("rig.toml", without.join("\n"));
     case.edit("deployment.toml", "upright = false", "upright = true");

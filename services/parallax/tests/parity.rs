@@ -183,7 +183,7 @@ fn concurrent_deployments_do_not_interfere() {
         Case::new("left", &[12; 2], PLAIN),
         Case::new("right", &[9; 3], PLAIN),
     ];
-    let started = cases.each_ref().map(|it| it.start(&["run", "deployment.toml"]));
+    let started = cases.each_ref().map(|case| case.start(&["run", "deployment.toml"]));
     for started in started {
         let ended = started.wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 /// The frame numbers of a run's results.
 fn frames(lines: &[Value]) -> Vec<u64> {
-    lines.iter().map(|it| it["frame"].as_u64().unwrap()).collect()
+    lines.iter().map(|line| line["frame"].as_u64().unwrap()).collect()
 }
 
 #[test]
@@ -48,7 +48,7 @@ fn signals_to_all_processes_at_once_end_the_run_in_order() {
         let case = Case::new(name, &[400; 2], PACED);
         let mut started = case.start(&["run", "deployment.toml"]);
         started.until("three frames", |_| case.lines("pose3d.jsonl").len() >= 3);
-        let children = processes(case.folder()).into_iter().map(|it| it.0.into());
+        let children = processes(case.folder()).into_iter().map(|process| process.0.into());
         let run = started.id();
         let children: Vec<i64> = children.filter(|_| to_all).collect();
         for sent in signals {
@@ -85,8 +85,8 @@ fn a_killed_pose_process_is_restarted_and_its_gap_is_reported() {
         ended.stderr
     );
     let all = json!(["a", "b", "c"]);
-    let without = lines.iter().filter(|it| it["views_present"] != all);
-    let without: Vec<_> = without.map(|it| it["views_missing"].clone()).collect();
+    let without = lines.iter().filter(|line| line["views_present"] != all);
+    let without: Vec<_> = without.map(|without| without["views_missing"].clone()).collect();
     assert!(
         without.iter().all(|it| *it == json!({ "b": "process lost" })),
         "{without:?}"
@@ -163,7 +163,7 @@ fn a_killed_results_process_stops_no_other_and_counts_missed_frames() {
 
 #[test]
 fn an_output_folder_belongs_to_one_run_at_a_time() {
-    let [first, second] = ["first", "second"].map(|it| Case::new(it, &[400; 2], PACED));
+    let [first, second] = ["first", "second"].map(|name| Case::new(name, &[400; 2], PACED));
     let mut started = first.start(&["run", "deployment.toml"]);
     started.until("three frames", |_| first.lines("pose3d.jsonl").len() >= 3);
     let out = first.path("out");

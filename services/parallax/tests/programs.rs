@@ -107,7 +107,7 @@ fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
         }
     };
     let prefix = runtime::Namespace::new(&case.name).unwrap();
-    let pictures = || held.views.iter().filter_map(|it| it.picture.as_ref());
+    let pictures = || held.views.iter().filter_map(|view| view.picture.as_ref());
     assert_eq!(pictures().count(), 2);
     for picture in pictures() {
         assert!(picture.is_in_place());
@@ -117,7 +117,7 @@ fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
             "{file}"
         );
     }
-    let pixels = || pictures().map(|it| it.pixels().to_vec()).collect::<Vec<_>>();
+    let pixels = || pictures().map(|picture| picture.pixels().to_vec()).collect::<Vec<_>>();
     let before = pixels();
     let so_far = case.lines("pose3d.jsonl").len();
     until(|| case.lines("pose3d.jsonl").len() > so_far + 25);
@@ -128,7 +128,7 @@ fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let lines = case.lines("pose3d.jsonl");
     assert_eq!(lines.len(), 160);
-    assert!(lines.iter().all(|it| it["views_missing"] == serde_json::json!({})));
+    assert!(lines.iter().all(|line| line["views_missing"] == serde_json::json!({})));
     case.assert_nothing_left();
 }
 
@@ -216,7 +216,7 @@ fn datagrams_say_where_joints_are_and_the_run_is_as_without() {
         assert_eq!(value["deployment"], case.name);
         for joint in value["joints"].as_object().unwrap().values() {
             assert!(
-                joint.is_string() || joint.as_array().is_some_and(|it| it.len() == 4),
+                joint.is_string() || joint.as_array().is_some_and(|array| array.len() == 4),
                 "{joint}"
             );
         }
@@ -243,7 +243,7 @@ mod long {
     /// Whether a Python has all that its tests need.
     fn is_able(python: &str) -> bool {
         let imports = Command::new(python).args(["-c", "import iceoryx2, numpy, pytest"]).output();
-        imports.is_ok_and(|it| it.status.success())
+        imports.is_ok_and(|import| import.status.success())
     }
 
     #[test]

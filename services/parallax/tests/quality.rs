@@ -33,11 +33,11 @@ fn network(tau: f32) -> Network {
     net.inputs.push(("evidence".to_owned(), evidence));
     let sigma = vec![Side::Named("n"), Side::Fixed(N_PARTS)];
     net.outputs.push(("sigma".to_owned(), sigma));
-    let red = |it: usize| if it < N_PARTS { 0.05 } else { 0.0 };
+    let red = |value: usize| if value < N_PARTS { 0.05 } else { 0.0 };
     net.floats("w", &[3, N_PARTS], (0..3 * N_PARTS).map(red).collect());
-    let bias = (0..N_PARTS).map(|it| it as f32 / 800.0);
+    let bias = (0..N_PARTS).map(|i| i as f32 / 800.0);
     net.floats("b", &[N_PARTS], bias.collect());
-    let first = |it: usize| if it < N_PARTS { 0.01 } else { 0.0 };
+    let first = |value: usize| if value < N_PARTS { 0.01 } else { 0.0 };
     net.floats("v", &[k, N_PARTS], (0..k * N_PARTS).map(first).collect());
     net.node("GlobalAveragePool", &["tile"], "mean", vec![]);
     net.node("Flatten", &["mean"], "flat", vec![]);
@@ -79,7 +79,7 @@ fn the_service_and_the_library_predict_the_same() {
     let network = viewquality::Network::parse(file, N_PARTS).unwrap();
     let mut forecaster = Forecaster::new(network);
     let (rig, model) = (planted::rig(2), planted::model());
-    let [width, height] = planted::SIZE.map(|it| it as usize);
+    let [width, height] = planted::SIZE.map(|size| size as usize);
     // No frame waits for the network: on a loaded machine one may have gone on without it.
     let mut n_late = 0;
     for (view, camera) in rig.cameras().iter().enumerate() {
@@ -98,7 +98,7 @@ fn the_service_and_the_library_predict_the_same() {
             };
             let forecast = forecaster.run(&seen).unwrap();
             assert!(
-                forecast.sigma_px.iter().any(|it| *it > 0.0),
+                forecast.sigma_px.iter().any(|value| *value > 0.0),
                 "nothing to compare"
             );
             let line = &lines[frame * 2 + view];
@@ -116,7 +116,7 @@ fn the_service_and_the_library_predict_the_same() {
 
 /// The candidates of every view, each for its own frame.
 fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>> {
-    let [width, height] = planted::SIZE.map(|it| it as usize);
+    let [width, height] = planted::SIZE.map(|size| size as usize);
     let say = |(plan, frame): (&Arc<ViewPlan>, &usize)| {
         let (step, layout) = step_of(plan);
         let mut responses = vec![0.0; layout.n_responses()];
@@ -137,7 +137,7 @@ fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>>
 #[test]
 fn a_joint_follows_the_views_with_small_expected_errors() {
     let (rig, model) = (planted::rig(4), planted::model());
-    let plans = rig.cameras().iter().map(|it| pipeline::plan(&model, it));
+    let plans = rig.cameras().iter().map(|camera| pipeline::plan(&model, camera));
     let plans: Vec<_> = plans.collect::<Result<_, _>>().unwrap();
     let joints = |answers: &[Option<ViewResult>], error_weight: f64| -> Vec<Point3<f64>> {
         let settings = SkeletonSettings {
@@ -223,7 +223,7 @@ mod long {
     /// Lines about a view.
     fn of_view(case: &Case, name: &str) -> Vec<Value> {
         let lines = case.lines("pose2d.jsonl");
-        lines.into_iter().filter(|it| it["view"] == name).collect()
+        lines.into_iter().filter(|line| line["view"] == name).collect()
     }
 
     #[test]
@@ -237,8 +237,8 @@ mod long {
         let mut started = case.start(&["run", "deployment.toml", "--json"]);
         let used = || -> Vec<Option<u64>> {
             let lines = of_view(&case, "b").into_iter();
-            let fused = lines.filter(|it| !it["fused"].is_null());
-            fused.map(|it| it["sigma_used"].as_u64()).collect()
+            let fused = lines.filter(|line| !line["fused"].is_null());
+            fused.map(|fused| fused["sigma_used"].as_u64()).collect()
         };
         started.until("predictions", |_| used().contains(&Some(0)));
         let stopped = started.pid_of("quality --index 1");
@@ -246,7 +246,7 @@ mod long {
         signal("STOP", stopped.into());
         let after = || used().split_off(n_before);
         started.until("the last prediction while it is fresh", |_| {
-            after().iter().flatten().any(|it| *it > 0)
+            after().iter().flatten().any(|value| *value > 0)
         });
         started.until("and none when it no longer is", |_| {
             after().last() == Some(&None)
@@ -256,7 +256,7 @@ mod long {
         let report: Value = serde_json::from_str(&ended.stdout).unwrap();
         assert_eq!(report["restarts"], json!([]), "{}", ended.stderr);
         let of_other = of_view(&case, "a");
-        let n_of_other = of_other.iter().filter(|it| !it["sigma_used"].is_null());
+        let n_of_other = of_other.iter().filter(|value| !value["sigma_used"].is_null());
         assert!(n_of_other.count() > 5, "the other view has its own");
     }
 }

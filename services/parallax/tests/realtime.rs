@@ -30,12 +30,12 @@ impl Finished {
                 count("frames"),
                 "{view}"
             );
-            let is_in = |it: &&Value| {
-                let present = it["views_present"].as_array().unwrap();
+            let is_in = |value: &&Value| {
+                let present = value["views_present"].as_array().unwrap();
                 assert_ne!(
                     present.contains(&view["name"]),
-                    it["views_missing"].get(view["name"].as_str().unwrap()).is_some(),
-                    "present, or missing for a reason: {it}"
+                    value["views_missing"].get(view["name"].as_str().unwrap()).is_some(),
+                    "present, or missing for a reason: {value}"
                 );
                 present.contains(&view["name"])
             };

@@ -71,7 +71,7 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     let other = ["--from", "fuse", "--out", "other", "--set"];
     let ended = replayed(&case, &[&other[..], &["paper.alpha=0.2"]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let [before, after] = ["out", "other"].map(|it| text(&case.path(it), "pose3d.jsonl"));
+    let [before, after] = ["out", "other"].map(|name| text(&case.path(name), "pose3d.jsonl"));
     assert!(before != after);
     let ended = replayed(&case, &[&other[..], &["paper.candidates=1"]].concat());
     assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
@@ -95,7 +95,7 @@ fn a_truncated_recording_is_replayed_up_to_its_end() {
         "{}",
         ended.stderr
     );
-    let [before, after] = ["out", "part"].map(|it| text(&case.path(it), "pose3d.jsonl"));
+    let [before, after] = ["out", "part"].map(|name| text(&case.path(name), "pose3d.jsonl"));
     let same = before.lines().zip(after.lines()).take_while(|it| it.0 == it.1);
     assert!(same.count() >= 2, "{before}\n{after}");
     assert!(after.lines().count() < 8, "{after}");
@@ -115,7 +115,7 @@ fn omitted_messages_and_existing_files_are_reported() {
     }
     let ended = replayed(&case, &["--from", "triangulate", "--speed", "4"]);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let [before, after] = ["out", "run-replay"].map(|it| text(&case.path(it), "pose3d.jsonl"));
+    let [before, after] = ["out", "run-replay"].map(|name| text(&case.path(name), "pose3d.jsonl"));
     assert_eq!(before, after);
 
     let again = ["record", "deployment.toml", "--out", "run.mcap"];
@@ -148,7 +148,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     let mut file = fs::read(case.path("run.mcap")).unwrap();
     let recording = recording::scan(&mut std::io::Cursor::new(&file)).unwrap();
     let poses = &recording.tracks["view-pose/v8/1"].entries;
-    let entry = poses.iter().find(|it| it.frame == Some(3)).unwrap();
+    let entry = poses.iter().find(|pose| pose.frame == Some(3)).unwrap();
     // Behind stamp and times, in the content. Six bytes of a pose move a joint.
     let at = (entry.offset + entry.len / 2) as usize;
     file[at..at + 6].iter_mut().for_each(|it| *it ^= 0x15);
@@ -172,7 +172,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     let frames = damaged.iter().filter_map(|one| one["frame"].as_u64());
     let hurt: Vec<u64> = frames.collect();
     let first = *hurt.iter().min().unwrap();
-    let [before, after] = ["out", "less"].map(|it| text(&case.path(it), "pose3d.jsonl"));
+    let [before, after] = ["out", "less"].map(|name| text(&case.path(name), "pose3d.jsonl"));
     for (frame, (before, after)) in before.lines().zip(after.lines()).enumerate() {
         let line: Value = serde_json::from_str(after).unwrap();
         let missing = line["views_missing"].as_object().unwrap().len();
@@ -207,7 +207,7 @@ fn a_sender_that_starts_after_the_last_result_is_not_blocked() {
     started.until("all results", |folder| {
         let text = |name: &str| fs::read_to_string(folder.join("late").join(name));
         let text = text("pose3d.jsonl").or_else(|_| text("pose3d.jsonl.part"));
-        text.is_ok_and(|it| it.lines().count() == N_FRAMES)
+        text.is_ok_and(|text| text.lines().count() == N_FRAMES)
     });
     signal("CONT", pid.into());
     let ended = started.wait();

@@ -16,7 +16,7 @@ fn status(case: &Case) -> Option<Value> {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let all: Value = serde_json::from_str(&ended.stdout).unwrap();
     let all = all["deployments"].as_array().unwrap();
-    all.iter().find(|it| it["name"] == case.name).cloned()
+    all.iter().find(|value| value["name"] == case.name).cloned()
 }
 
 #[test]

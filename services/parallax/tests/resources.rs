@@ -76,7 +76,7 @@ fn a_file_that_cannot_grow_is_counted_and_ends_no_process() {
     let limit = "--fsize=1000:1000";
     let set = std::process::Command::new("prlimit").args(["--pid", &record, limit]).status();
     assert!(
-        set.is_ok_and(|it| it.success()),
+        set.is_ok_and(|set| set.success()),
         "prlimit belongs to util-linux"
     );
     let ended = started.wait();
@@ -130,7 +130,7 @@ fn files_of_a_run_are_accessible_to_their_owner_only_with_any_umask() {
         );
         if found.is_dir() {
             let inner = fs::read_dir(&path).unwrap();
-            folders.extend(inner.map(|it| it.unwrap().path()));
+            folders.extend(inner.map(|inner| inner.unwrap().path()));
         } else {
             n_files += 1;
         }
@@ -152,7 +152,7 @@ fn truncated_shared_memory_is_reported_and_ends_no_process_by_a_signal() {
         if name.starts_with(namespace.prefix()) {
             // A file may disappear during the listing.
             let file = fs::OpenOptions::new().write(true).open(entry.path());
-            file.and_then(|it| it.set_len(0)).ok();
+            file.and_then(|file| file.set_len(0)).ok();
         }
     }
     // Usually it ends at once. It may also wait for a truncated file, which it notices after a minute.
@@ -225,7 +225,7 @@ fn leftovers_of_another_user_are_named_with_a_remedy() {
 fn sockets(pid: u32) -> BTreeSet<String> {
     let entries = fs::read_dir(format!("/proc/{pid}/fd"));
     let links = entries.into_iter().flatten().flatten();
-    let links = links.filter_map(|it| fs::read_link(it.path()).ok());
+    let links = links.filter_map(|link| fs::read_link(link.path()).ok());
     let inode = |link: std::path::PathBuf| {
         let text = link.to_str()?.strip_prefix("socket:[")?;
         Some(text.strip_suffix(']')?.to_owned())

@@ -12,7 +12,7 @@ use common::{Case, PACED};
 /// A line of `/proc/PID/status`.
 fn status_of(pid: u32, key: &str) -> String {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
-    let line = status.lines().find_map(|it| it.strip_prefix(key));
+    let line = status.lines().find_map(|line| line.strip_prefix(key));
     line.unwrap().trim().to_owned()
 }
 
@@ -58,7 +58,7 @@ fn a_dry_run_shows_cores_and_priority_of_every_process() {
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let lines: Vec<Vec<&str>> =
-        ended.stdout.lines().map(|it| it.split_whitespace().collect()).collect();
+        ended.stdout.lines().map(|line| line.split_whitespace().collect()).collect();
     for expected in [
         &["pose-0", "spin"][..],
         &["fuse-0", "cores=0", "spin"],
@@ -103,7 +103,7 @@ fn without_rights(case: &Case) -> Option<Output> {
     let mut command = Command::new("prlimit");
     let output = command.current_dir(case.folder()).args(words).output().ok()?;
     let stderr = String::from_utf8_lossy(&output.stderr);
-    let is_tool = ["prlimit:", "setpriv:"].iter().any(|it| stderr.starts_with(it));
+    let is_tool = ["prlimit:", "setpriv:"].iter().any(|name| stderr.starts_with(name));
     (!is_tool).then_some(output)
 }
 

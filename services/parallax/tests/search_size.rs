@@ -60,7 +60,7 @@ fn deployment(case: &Case, sizes: &[[u32; 2]], focal: f64, units_per_metre: f64)
 fn said(case: &Case) -> String {
     let ended = case.start(DRY).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let size = ended.stdout.lines().find(|it| it.starts_with("capture.scale"));
+    let size = ended.stdout.lines().find(|line| line.starts_with("capture.scale"));
     size.unwrap().to_owned()
 }
 
@@ -129,8 +129,8 @@ fn run(case: &Case, more: &[&str]) -> (Value, String) {
 /// How high the person of a view is in the three frames of `pose2d.jsonl`, pixels: the median.
 fn height_in_results(case: &Case, view: &str) -> f64 {
     let lines = case.lines("pose2d.jsonl");
-    let of_view = lines.iter().filter(|it| it["view"] == view);
-    let mut heights: Vec<f64> = of_view.map(|it| side(&it["fused"]["parts"])).collect();
+    let of_view = lines.iter().filter(|line| line["view"] == view);
+    let mut heights: Vec<f64> = of_view.map(|value| side(&value["fused"]["parts"])).collect();
     heights.sort_by(f64::total_cmp);
     assert_eq!(heights.len(), 3);
     heights[1]
@@ -140,7 +140,7 @@ fn height_in_results(case: &Case, view: &str) -> f64 {
 fn side(parts: &Value) -> f64 {
     let parts = parts.as_array().unwrap();
     let extent = |axis: &str| {
-        let values = parts.iter().map(|it| it[axis].as_f64().unwrap());
+        let values = parts.iter().map(|part| part[axis].as_f64().unwrap());
         let most = values.clone().fold(f64::MIN, f64::max);
         most - values.fold(f64::MAX, f64::min)
     };

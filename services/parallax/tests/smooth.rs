@@ -39,8 +39,8 @@ fn case() -> Case {
         let name = &camera.name;
         for frame in 0..N_FRAMES {
             let joints = scene.joints(frame as f64 / RATE_HZ).into_iter();
-            let numbers = joints.map(|it| {
-                let at = camera.project(&Point3::from(it)).unwrap();
+            let numbers = joints.map(|joint| {
+                let at = camera.project(&Point3::from(joint)).unwrap();
                 let mut off = || (0..6).map(|_| random.f64() - 0.5).sum::<f64>() * 8.0;
                 format!("{:.2},{:.2},0.9", at.x + off(), at.y + off())
             });
@@ -83,7 +83,7 @@ fn assert_angles(case: &Case) {
     let angles = fs::read_to_string(case.path("out/angles.csv")).unwrap();
     let knee = angles
         .lines()
-        .find(|it| it.starts_with("40,") && it.contains("right knee flexion"));
+        .find(|line| line.starts_with("40,") && line.contains("right knee flexion"));
     let cells: Vec<&str> = knee.unwrap().split(',').collect();
     assert!(
         cells[4].parse::<f64>().is_ok() && cells[5].parse::<f64>().is_ok(),
@@ -116,7 +116,7 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
     let said: Value = serde_json::from_str(&ended.stdout).unwrap();
     let rows = said["methods"].as_array().unwrap();
     let [raw_row, rts] =
-        ["raw", "rts"].map(|name| rows.iter().find(|it| it["method"] == name).unwrap());
+        ["raw", "rts"].map(|name| rows.iter().find(|row| row["method"] == name).unwrap());
     assert!(
         mean(rts, "position_mm") < 0.85 * mean(raw_row, "position_mm"),
         "{said:#}"
@@ -133,7 +133,14 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
     );
     let smoothed = lines(&case, "out/pose3d-smooth.jsonl");
     assert_eq!(smoothed.len(), N_FRAMES);
-    assert!(smoothed[40].people[0].states.values().filter(|it| *it == "measured").count() > 10);
+    assert!(
+        smoothed[40].people[0]
+            .states
+            .values()
+            .filter(|value| *value == "measured")
+            .count()
+            > 10
+    );
     assert_angles(&case);
     // Without `smooth` the next run has nothing smoothed, not what an earlier one has left.
     let off = [
@@ -268,7 +275,7 @@ fn missing() -> JointLine {
 }
 
 fn text(lines: impl IntoIterator<Item = FrameLine>) -> String {
-    lines.into_iter().map(|it| runfiles::to_line(&it).unwrap()).collect()
+    lines.into_iter().map(|line| runfiles::to_line(&line).unwrap()).collect()
 }
 
 #[test]
@@ -280,10 +287,10 @@ fn what_a_folder_lacks_is_said_and_by_exit_code() {
     let whole_text = text((0..50).map(whole));
     let cut = whole_text[..whole_text.len() - 30].to_owned();
     let torn = whole_text.replacen("\"frame\":20", "\"frame\":\"x\"", 1);
-    let nothing = text((0..9).map(|it| line(it, at(it), missing())));
-    let nan = text((0..50).map(|it| line(it, at(it), placed(it as f64 * 0.01, f64::NAN))));
+    let nothing = text((0..9).map(|i| line(i, at(i), missing())));
+    let nan = text((0..50).map(|i| line(i, at(i), placed(i as f64 * 0.01, f64::NAN))));
     let back = text([0, 1, 3, 2, 4].map(whole));
-    let no_times = text((0..50).map(|it| line(it, None, placed(0.0, 1e-4))));
+    let no_times = text((0..50).map(|i| line(i, None, placed(0.0, 1e-4))));
     let rows: [(&str, &[&str], i32, &str); 11] = [
         (&whole_text, &[], 0, ""),
         (

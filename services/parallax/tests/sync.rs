@@ -51,8 +51,8 @@ pub(crate) fn case(
         let name = &camera.name;
         for frame in 0..n_frames {
             let joints = scene.joints(time_s(view, frame)).into_iter();
-            let numbers = joints.map(|it| {
-                let at = camera.project(&Point3::from(it)).unwrap();
+            let numbers = joints.map(|joint| {
+                let at = camera.project(&Point3::from(joint)).unwrap();
                 format!("{:.2},{:.2},0.9", at.x, at.y)
             });
             let person = numbers.collect::<Vec<String>>().join(",");
@@ -159,7 +159,7 @@ fn video(case: &Case, name: &str, sounds_s: &[f64], length_s: f64) -> bool {
             *sample = (level * (random.f64() - 0.5)) as i16;
         }
     }
-    let bytes: Vec<u8> = samples.iter().flat_map(|it| it.to_le_bytes()).collect();
+    let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
     case.write(&format!("{name}.raw"), bytes);
     let made = Command::new("ffmpeg")
         .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i"])
@@ -171,7 +171,7 @@ fn video(case: &Case, name: &str, sounds_s: &[f64], length_s: f64) -> bool {
     if made.is_err() {
         eprintln!("skipped: there is no ffmpeg on the PATH");
     }
-    made.is_ok_and(|it| it.success())
+    made.is_ok_and(|made| made.success())
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn clocks_are_found_by_the_sounds_of_the_videos() {
     let case = case(&scene, rig, N_FRAMES, |_, _| 0.5);
     let sounds_s = [2.1, 2.9, 4.4, 4.95, 6.3, 8.0, 8.45, 9.9];
     for (camera, begin_s) in rig.cameras().iter().zip(BEGIN_S) {
-        let own: Vec<f64> = sounds_s.iter().map(|it| it - begin_s).collect();
+        let own: Vec<f64> = sounds_s.iter().map(|sounds_s| sounds_s - begin_s).collect();
         if !video(&case, &camera.name, &own, 11.0) {
             return;
         }

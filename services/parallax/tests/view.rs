@@ -63,7 +63,7 @@ impl View {
         let mut text = Vec::new();
         let _read = stream.read_to_end(&mut text);
         let text = String::from_utf8_lossy(&text).into_owned();
-        let status = text.split(' ').nth(1).and_then(|it| it.parse().ok());
+        let status = text.split(' ').nth(1).and_then(|part| part.parse().ok());
         (status.unwrap_or(0), text)
     }
 
@@ -118,17 +118,17 @@ fn a_page_follows_a_run_from_before_its_begin_until_after_its_end() {
     let case = Case::new("view", &[160; 2], PACED);
     let view = View::start(&case, &["deployment.toml"]);
     let mut page = view.open();
-    page.text("hello", |it| it["mode"] == "waiting");
+    page.text("hello", |value| value["mode"] == "waiting");
     let run = case.start(&["run", "deployment.toml", "--json"]);
-    let hello = page.text("hello", |it| it["mode"] == "live");
+    let hello = page.text("hello", |value| value["mode"] == "live");
     assert_eq!(hello["scene"]["views"].as_array().map(Vec::len), Some(2));
     page.ask(&json!({ "pictures": [1, 99] }));
     page.ask(&json!({ "record": true }));
-    let first = page.text("moment", |it| it["why"].is_null());
+    let first = page.text("moment", |value| value["why"].is_null());
     let n_joints = hello["scene"]["joints"].as_array().map(Vec::len);
     assert_eq!(first["joints"].as_array().map(Vec::len), n_joints);
-    let later = page.text("moment", |it| {
-        it["why"].is_null() && it["frame"] != first["frame"]
+    let later = page.text("moment", |value| {
+        value["why"].is_null() && value["frame"] != first["frame"]
     });
     assert_ne!(later["joints"], first["joints"], "the figure moves");
     let (seen, frame, size) = page.picture();
@@ -139,12 +139,12 @@ fn a_page_follows_a_run_from_before_its_begin_until_after_its_end() {
     let lines = page.text("epipolar", |_| true);
     assert_eq!(lines["lines"][0][1], 1, "{lines}");
     assert_eq!(lines["lines"].as_array().map(Vec::len), Some(1));
-    let state = page.text("state", |it| it["recording"].is_object());
+    let state = page.text("state", |value| value["recording"].is_object());
     assert!(state["processes"].as_array().unwrap().len() >= 7, "{state}");
     page.ask(&json!({ "record": false }));
-    let is_kept = |it: &Value| it["what"].as_str().unwrap().starts_with("recorded to");
+    let is_kept = |value: &Value| value["what"].as_str().unwrap().starts_with("recorded to");
     page.text("event", is_kept);
-    page.text("hello", |it| it["mode"] == "waiting");
+    page.text("hello", |value| value["mode"] == "waiting");
     view.end();
     let ended = run.wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -155,13 +155,13 @@ fn a_page_follows_a_run_from_before_its_begin_until_after_its_end() {
 /// A page about what that run has left: its folder, its recording, and either cut off.
 fn finished(case: &Case) {
     let out = fs::read_dir(case.path("out")).unwrap();
-    let names = out.map(|it| it.unwrap().file_name().into_string().unwrap());
-    let recording = names.into_iter().find(|it| it.starts_with("recording-")).unwrap();
+    let names = out.map(|out| out.unwrap().file_name().into_string().unwrap());
+    let recording = names.into_iter().find(|name| name.starts_with("recording-")).unwrap();
     let recording = format!("out/{recording}");
     for (subject, has_pictures) in [("out", false), (recording.as_str(), true)] {
         let view = View::start(case, &[subject]);
         let mut page = view.open();
-        let hello = page.text("hello", |it| it["mode"] == "finished");
+        let hello = page.text("hello", |value| value["mode"] == "finished");
         let n = hello["n"].as_u64().unwrap();
         assert!(n > 3, "{hello}");
         page.ask(&json!({ "pictures": [0], "at": n / 2 }));
@@ -180,8 +180,11 @@ fn finished(case: &Case) {
         let whole = fs::read(case.path(name)).unwrap();
         case.write(name, &whole[..whole.len() / 2 + 7]);
         let view = View::start(case, &[subject]);
-        let hello = view.open().text("hello", |it| it["mode"] == "finished");
-        assert!(hello["n"].as_u64().is_some_and(|it| it > 0), "{hello}");
+        let hello = view.open().text("hello", |value| value["mode"] == "finished");
+        assert!(
+            hello["n"].as_u64().is_some_and(|number| number > 0),
+            "{hello}"
+        );
         view.end();
     }
     fs::create_dir(case.path("empty")).unwrap();
@@ -189,7 +192,7 @@ fn finished(case: &Case) {
         let ended = case.start(&["view", "--port", "0", wrong]).wait_among_others();
         let code = ended.status.code();
         assert!(
-            code.is_some_and(|it| (1..=4).contains(&it)),
+            code.is_some_and(|code| (1..=4).contains(&code)),
             "{wrong}: {code:?}"
         );
     }
@@ -217,7 +220,7 @@ fn other_sites_strange_requests_and_nonsense_are_refused_and_the_page_goes_on() 
     assert!([0, 400, 431].contains(&status), "{status}");
     let mut pages: Vec<Page> = (0..20).map(|_| view.open()).collect();
     for page in &mut pages {
-        page.text("hello", |it| it["mode"] == "waiting");
+        page.text("hello", |value| value["mode"] == "waiting");
         page.ask(&json!({ "pictures": [0] }));
     }
     let mut wild = view.open();
@@ -229,7 +232,7 @@ fn other_sites_strange_requests_and_nonsense_are_refused_and_the_page_goes_on() 
     for _ in 0..64 {
         let _refused = deep.socket.send(Message::Binary(vec![0; 99].into()));
     }
-    view.open().text("hello", |it| it["mode"] == "waiting");
+    view.open().text("hello", |value| value["mode"] == "waiting");
     // Without a token nothing but the loopback.
     let short = case.path("short");
     fs::write(&short, "short").unwrap();

@@ -188,14 +188,18 @@ impl Foxglove {
     }
 
     fn entity(&self, person: &SkeletonMessage, frame: u64, time: &Value) -> Value {
-        let found = |it: &Joint3d| {
-            let is_finite = it.in_world.iter().chain(&it.covariance).all(|it| it.is_finite());
-            it.status == Status::OK && is_finite
+        let found = |joint3d: &Joint3d| {
+            let is_finite = joint3d
+                .in_world
+                .iter()
+                .chain(&joint3d.covariance)
+                .all(|value| value.is_finite());
+            joint3d.status == Status::OK && is_finite
         };
         let joints = person.listed_joints().iter();
         let joints: Vec<Option<&Joint3d>> =
             joints.map(|it| Some(it).filter(|it| found(it))).collect();
-        let names = self.stage.joints.joints.iter().map(|it| it.name);
+        let names = self.stage.joints.joints.iter().map(|joint| joint.name);
         let named = joints.iter().zip(names);
         let named = named.filter_map(|(joint, name)| Some(((*joint)?, name)));
         let mut spheres = Vec::new();
@@ -210,8 +214,8 @@ impl Foxglove {
             let [Some(from_joint), Some(to_joint)] = ends else {
                 continue;
             };
-            let names = [from, to].map(|it| self.stage.joints.joints[it].name);
-            let side = names.into_iter().find(|it| is_sided(it)).unwrap_or("");
+            let names = [from, to].map(|i| self.stage.joints.joints[i].name);
+            let side = names.into_iter().find(|name| is_sided(name)).unwrap_or("");
             for joint in [from_joint, to_joint] {
                 points.push(vector(joint.in_world));
                 colours.push(colour(side, 1.0));
@@ -260,12 +264,12 @@ fn ellipsoid(joint: &Joint3d) -> Option<Value> {
     let [xx, xy, xz, yy, yz, zz] = joint.covariance;
     let covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     let eigen = covariance.symmetric_eigen();
-    let diameters = eigen.eigenvalues.map(|it| 2.0 * SPREAD * it.max(0.0).sqrt());
+    let diameters = eigen.eigenvalues.map(|eigenvalue| 2.0 * SPREAD * eigenvalue.max(0.0).sqrt());
     let mut axes = eigen.eigenvectors;
     if axes.determinant() < 0.0 {
         axes.column_mut(0).neg_mut();
     }
-    let is_sane = diameters.iter().all(|it| it.is_finite() && *it <= LARGEST_M);
+    let is_sane = diameters.iter().all(|diameter| diameter.is_finite() && *diameter <= LARGEST_M);
     if !is_sane || diameters.max() <= 0.0 {
         return None;
     }

@@ -34,7 +34,7 @@ impl Topics {
     pub(crate) fn channels(&self, without: Without) -> Vec<Channel> {
         let mut channels = Vec::new();
         // What comes from another host is published by the bridge, whose heartbeats count all of it together.
-        let is_here = |it: &String| self.processes.contains(it);
+        let is_here = |text: &String| self.processes.contains(text);
         let mut add = |kind, name: String, sender: Option<String>| {
             if !self.elsewhere.contains(&name) {
                 let sender = sender.filter(is_here);

@@ -53,7 +53,7 @@ pub(crate) fn write_all(task: Task, outlet: &Outlet) {
     } = task;
     let foreign = foxglove.as_ref().map_or_else(Vec::new, Foxglove::topics);
     let begun = Writer::begin_with(file, &about, &topics, &foreign);
-    let kinds: Vec<Option<Kind>> = topics.iter().map(|it| Kind::of_topic(it)).collect();
+    let kinds: Vec<Option<Kind>> = topics.iter().map(|topic| Kind::of_topic(topic)).collect();
     let mut writer = begun.inspect_err(log_error).ok();
     let mut flushed = Instant::now();
     while let Ok(item) = outlet.next(FLUSH_PERIOD) {

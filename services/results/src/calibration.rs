@@ -22,9 +22,9 @@ pub(crate) struct Calibration {
 
 impl Calibration {
     pub(crate) fn new(scene: &Scene) -> Self {
-        let cameras = scene.views.iter().map(|it| it.framing.camera().clone());
+        let cameras = scene.views.iter().map(|view| view.framing.camera().clone());
         let cameras: Vec<Camera> = cameras.collect();
-        let framings = scene.views.iter().map(|it| it.framing.clone());
+        let framings = scene.views.iter().map(|view| view.framing.clone());
         let n = scene.views.len();
         Self {
             steps: StepWatch::new(cameras.clone()),
@@ -55,8 +55,8 @@ impl Calibration {
         self.follow_steps(scene, record, &points);
         for (view, fit) in self.fits.iter_mut().enumerate() {
             let scale = scene.views[view].source_scale();
-            fit.residual_px = self.watch.residual_px(view).map(|it| it * scale);
-            fit.without_px = self.watch.without_px(view).map(|it| it * scale);
+            fit.residual_px = self.watch.residual_px(view).map(|value| value * scale);
+            fit.without_px = self.watch.without_px(view).map(|value| value * scale);
             // With the footage of another camera, every camera contradicts the calibration; and one that is late sees a person
             // who walks ahead of where the others do. One that was moved does not look late.
             let is_named =
@@ -137,7 +137,7 @@ impl Calibration {
 
     /// Logs it once, as soon as it is known.
     fn tell_contradiction(&mut self, scene: &Scene) {
-        let names = || scene.views.iter().map(|it| it.name.clone());
+        let names = || scene.views.iter().map(|view| view.name.clone());
         let Some(it) = self.contradicted(names()).filter(|_| !self.is_contradiction_told) else {
             return;
         };
@@ -207,7 +207,7 @@ mod tests {
         for frame in 0..100 {
             it.add(&scene, &record(frame));
         }
-        let names = scene.views.iter().map(|it| it.name.clone());
+        let names = scene.views.iter().map(|view| view.name.clone());
         let fits = it.fits(names);
         assert_eq!(fits["left"], CameraFit::default());
         assert_eq!(fits.len(), 2);

@@ -126,7 +126,7 @@ impl Folder {
 
     /// Leaves a file the name of a part.
     pub fn leave(&mut self, name: &str) {
-        self.parts.retain(|it| it != name);
+        self.parts.retain(|part| part != name);
     }
 
     /// Begins a folder in the folder, empty unless it is resumed.
@@ -263,7 +263,7 @@ fn other_than_pictures(folder: &Path, deep: usize) -> io::Result<Option<PathBuf>
         }
         let name = entry.file_name().into_string().unwrap_or_default();
         let number = name.split_once('.').filter(|it| matches!(it.1, "png" | "png.part"));
-        if !number.is_some_and(|it| it.0.bytes().all(|digit| digit.is_ascii_digit())) {
+        if !number.is_some_and(|number| number.0.bytes().all(|digit| digit.is_ascii_digit())) {
             return Ok(Some(path));
         }
     }

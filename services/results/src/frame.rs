@@ -113,7 +113,7 @@ impl FrameRecord {
 
     /// The candidates of a view, best first; none if it had none, or sent what cannot be read.
     pub(crate) fn candidates(&self, scene: &Scene, view: usize) -> Vec<Own> {
-        let Some(message) = self.views.get(view).and_then(|it| it.pose.as_ref()) else {
+        let Some(message) = self.views.get(view).and_then(|view| view.pose.as_ref()) else {
             return Vec::new();
         };
         let read = if scene.has_maps {

@@ -83,8 +83,8 @@ pub(crate) fn height_px(fused: &FusedView) -> Option<f64> {
 fn median(counts: &BTreeMap<u32, u64>) -> Option<f64> {
     let half = counts.values().sum::<u64>().div_ceil(2);
     let mut n = 0;
-    let found = counts.iter().find(|it| {
-        n += it.1;
+    let found = counts.iter().find(|count| {
+        n += count.1;
         n >= half
     });
     found.map(|it| f64::from(*it.0))
@@ -117,16 +117,16 @@ mod tests {
         heights.add(&scene, &other);
         other.people[0].status = Status::NO_DETECTION;
         heights.add(&scene, &other);
-        let names = || scene.views.iter().map(|it| it.name.clone());
+        let names = || scene.views.iter().map(|view| view.name.clone());
         let both = heights.medians(names());
         assert_eq!(
             both,
-            ["left", "right"].map(|it| (it.to_owned(), Some(120.0))).into()
+            ["left", "right"].map(|name| (name.to_owned(), Some(120.0))).into()
         );
         assert_eq!(Heights::new(2).medians(names())["left"], None);
         let lying = FusedView {
             n_parts: 2,
-            centres_px: core::array::from_fn(|it| [70.0 * it as f64, 1.0]),
+            centres_px: core::array::from_fn(|i| [70.0 * i as f64, 1.0]),
             ..FusedView::default()
         };
         assert_eq!(height_px(&lying), Some(70.0));

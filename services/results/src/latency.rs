@@ -53,9 +53,9 @@ impl Latency {
     ///
     /// Those of the histograms, for bounds that are fixed here: none.
     pub fn new(n_workers: usize) -> Result<Self, CreationError> {
-        let stages = STAGES.map(|it| (Kind::Stage, it));
-        let transport = HOPS.map(|it| (Kind::Transport, it));
-        let waiting = HOPS.map(|it| (Kind::Waiting, it));
+        let stages = STAGES.map(|stage| (Kind::Stage, stage));
+        let transport = HOPS.map(|hop| (Kind::Transport, hop));
+        let waiting = HOPS.map(|hop| (Kind::Waiting, hop));
         let mut histograms = BTreeMap::new();
         for key in stages.into_iter().chain(transport).chain(waiting).chain([(Kind::EndToEnd, "")])
         {
@@ -75,13 +75,13 @@ impl Latency {
             let timings = [
                 (
                     "capture",
-                    view.frame.filter(|it| it.status == Status::OK).map(|it| it.timing),
+                    view.frame.filter(|frame| frame.status == Status::OK).map(|frame| frame.timing),
                 ),
                 (
                     "pose",
-                    view.pose.filter(|it| it.status == Status::OK).map(|it| it.timing),
+                    view.pose.filter(|pose| pose.status == Status::OK).map(|pose| pose.timing),
                 ),
-                ("quality", view.quality.map(|it| it.timing)),
+                ("quality", view.quality.map(|quality| quality.timing)),
             ];
             for (stage, timing) in timings {
                 if let Some(timing) = timing {
@@ -89,7 +89,7 @@ impl Latency {
                 }
             }
         }
-        for pair in record.fused.iter().filter(|it| it.status == Status::OK) {
+        for pair in record.fused.iter().filter(|fused| fused.status == Status::OK) {
             self.note(Kind::Stage, "fuse", computation(pair.timing));
         }
         if record.skeletons.status == Status::OK {
@@ -105,17 +105,17 @@ impl Latency {
         let result = record.skeletons.timing;
         let pair = record.fused.iter().max_by_key(|it| it.timing.sent_at_nanos)?;
         let view = (0..record.views.len())
-            .filter(|it| record.views[*it].pose.is_some())
-            .max_by_key(|it| record.views[*it].pose.map(|it| it.timing.sent_at_nanos))?;
+            .filter(|i| record.views[*i].pose.is_some())
+            .max_by_key(|i| record.views[*i].pose.map(|pose| pose.timing.sent_at_nanos))?;
         let pose = record.views[view].pose?.timing;
         let frame = record.views[view].frame?.timing;
         let worker = pair.index % self.n_workers;
         // The same worker may have sent another pair of this frame just before.
-        let same_worker = record.fused.iter().filter(|it| {
-            it.index % self.n_workers == worker
-                && it.timing.sent_at_nanos <= pair.timing.received_at_nanos
+        let same_worker = record.fused.iter().filter(|fused| {
+            fused.index % self.n_workers == worker
+                && fused.timing.sent_at_nanos <= pair.timing.received_at_nanos
         });
-        let busy = same_worker.map(|it| it.timing.sent_at_nanos).max();
+        let busy = same_worker.map(|same_worker| same_worker.timing.sent_at_nanos).max();
         let busy = busy.max(self.sent.get(&("fuse", worker)).copied());
         self.hop(
             HOPS[2],
@@ -173,9 +173,9 @@ impl Latency {
     /// How the time so far divides.
     pub fn report(&self) -> LatencyReport {
         let of = |kind| {
-            let those = self.histograms.iter().filter(move |it| it.0.0 == kind);
+            let those = self.histograms.iter().filter(move |histogram| histogram.0.0 == kind);
             those
-                .filter(|it| !it.1.is_empty())
+                .filter(|those| !those.1.is_empty())
                 .map(|(key, it)| (key.1.to_owned(), percentiles(it)))
                 .collect::<BTreeMap<_, _>>()
         };
@@ -186,7 +186,7 @@ impl Latency {
             transport: of(Kind::Transport),
             waiting: of(Kind::Waiting),
             end_to_end: of(Kind::EndToEnd).remove("").unwrap_or_default(),
-            share_not_computation: share(self.total.computation).map(|it| 1.0 - it),
+            share_not_computation: share(self.total.computation).map(|value| 1.0 - value),
             share_transport: share(self.total.transport),
             share_waiting: share(self.total.waiting),
         }

@@ -123,7 +123,7 @@ impl Output {
     /// The first frame that has no line yet; none if there is no line.
     pub fn next_frame(&self) -> Option<u64> {
         let step = self.scene.frame_step.max(1);
-        self.tally.last_frame().map(|it| it.saturating_add(step))
+        self.tally.last_frame().map(|last_frame| last_frame.saturating_add(step))
     }
 
     /// Writes frames without a result, with the reason. Frames before them that no message was about are written, too.
@@ -158,7 +158,7 @@ impl Output {
 
     /// Writes the line of a frame; without it nothing else of the frame is written, and it does not count as written.
     fn begin_frame(&mut self, line: FrameLine) -> bool {
-        let smoothed = self.smoothing.as_mut().map_or(Ok(()), |it| it.frame(&line));
+        let smoothed = self.smoothing.as_mut().map_or(Ok(()), |smoothing| smoothing.frame(&line));
         let written = append(&mut self.pose3d_jsonl, [line]);
         let is_written = written.is_ok();
         self.note(smoothed);
@@ -170,7 +170,7 @@ impl Output {
     fn rows(&mut self, frame: &Skeletons) {
         let row = trc::row(&self.scene, self.tally.n_lines(), frame);
         let rows = self.pose3d_csv.append(&pose3d::csv_rows(&self.scene, frame));
-        let row = self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row));
+        let row = self.trc_rows.as_mut().map_or(Ok(()), |trc_row| trc_row.append(&row));
         self.note(rows);
         self.note(row);
     }
@@ -287,10 +287,10 @@ impl Output {
 
     fn whole(&self, summary: Summary, latency: LatencyReport, session: u64) -> RunSummary {
         let scene = &self.scene;
-        let views = scene.views.iter().map(|it| ViewSummary {
-            frame_size: it.framing.out_size(),
-            name: it.name.clone(),
-            source_from_frame: it.framing.source_from_output(),
+        let views = scene.views.iter().map(|view| ViewSummary {
+            frame_size: view.framing.out_size(),
+            name: view.name.clone(),
+            source_from_frame: view.framing.source_from_output(),
         });
         let axes = match scene.up_in_world {
             Some(_) => "y up",

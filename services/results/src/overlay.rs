@@ -90,7 +90,7 @@ fn draw_keypoints(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view
     let people = record.skeletons.listed().iter();
     for (name, it) in people.flat_map(|person| pose3d::keypoints(scene, person)) {
         let place = pose3d::is_placed(it).then(|| Point3::from(it.in_world));
-        if let Some(at) = place.and_then(|it| camera.project(&it)) {
+        if let Some(at) = place.and_then(|place| camera.project(&place)) {
             canvas.disc(at.into(), 1.5 * width, side_of(name).colour());
         }
     }
@@ -109,12 +109,12 @@ fn side_of(name: &str) -> Side {
 /// Where the part's point in every other view may lie in this one.
 fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize, part: usize) {
     let to = scene.views[view].framing.camera();
-    for other in (0..scene.views.len()).filter(|it| *it != view) {
+    for other in (0..scene.views.len()).filter(|i| *i != view) {
         let poses = fused(record, other).filter(|fused| part < fused.n_parts as usize);
         for fused in poses {
             let point = Point2::from(fused.centres_px[part]);
             let curve = epipolar_curve(scene.views[other].framing.camera(), to, &point, N_POINTS);
-            let curve: Vec<[f64; 2]> = curve.iter().map(|it| [it.x, it.y]).collect();
+            let curve: Vec<[f64; 2]> = curve.iter().map(|curve| [curve.x, curve.y]).collect();
             canvas.polyline(&curve, thin(canvas), ACCENT);
         }
     }
@@ -122,7 +122,7 @@ fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: us
 
 /// The joints of a pose; none if the model has other parts than the joint set is made of.
 pub(crate) fn joints_of(scene: &Scene, parts: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
-    let n_parts = scene.joints.joints.iter().flat_map(|it| it.parts).max()? + 1;
+    let n_parts = scene.joints.joints.iter().flat_map(|joint| joint.parts).max()? + 1;
     (parts.len() >= n_parts).then(|| scene.joints.from_parts(parts))
 }
 
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn something_is_drawn() {
         let canvas = draw(&scene(), &with_picture(), 0, 0).unwrap();
-        assert!(canvas.rgb().iter().any(|it| *it > 0));
+        assert!(canvas.rgb().iter().any(|value| *value > 0));
     }
 
     #[test]
@@ -190,9 +190,9 @@ mod tests {
         record.skeletons.people[0].keypoints[0].in_world = [0.1, 0.1, 1.0];
         record.skeletons.people[0].keypoints[1].status = Status::TOO_FEW_VIEWS;
         let with = draw(&scene, &record, 0, 0).unwrap();
-        let pixels = |it: &Canvas| -> Vec<[u8; 3]> { it.rgb().as_chunks().0.to_vec() };
+        let pixels = |canvas: &Canvas| -> Vec<[u8; 3]> { canvas.rgb().as_chunks().0.to_vec() };
         let (with, without) = (pixels(&with), pixels(&without));
-        let changed: Vec<usize> = (0..with.len()).filter(|&it| with[it] != without[it]).collect();
+        let changed: Vec<usize> = (0..with.len()).filter(|&i| with[i] != without[i]).collect();
         assert!(!changed.is_empty());
         // A pixel of the frame is two of the footage, whose middle is (79.5, 59.5): the point lies at 4 m.
         for it in changed {

@@ -22,7 +22,7 @@ pub(crate) fn readings(
     let best = record.own(scene, view).filter(|own| own.is_clear)?;
     let named = best.centres_px;
     let mirror = scene.model.spec().mirror.as_deref();
-    let exchanged = mirror.map(|it| it.iter().map(|part| named[*part]).collect());
+    let exchanged = mirror.map(|mirror| mirror.iter().map(|part| named[*part]).collect());
     Some([named.clone(), exchanged.unwrap_or(named)])
 }
 
@@ -35,7 +35,7 @@ pub(crate) fn is_exchanged(
 ) -> bool {
     let sum = |parts: &[[f64; 2]]| -> f64 {
         let distances = distances(scene, record, view, parts);
-        distances.iter().map(|it| it[0]).sum()
+        distances.iter().map(|distance| distance[0]).sum()
     };
     sum(&readings[1]) < sum(&readings[0])
 }
@@ -47,15 +47,15 @@ pub(crate) fn distances_m(scene: &Scene, record: &FrameRecord) -> Vec<f64> {
         let readings = readings(scene, record, view)?;
         let is_exchanged = is_exchanged(scene, record, view, &readings);
         let distances = distances(scene, record, view, &readings[usize::from(is_exchanged)]);
-        let mut metres: Vec<f64> = distances.iter().map(|it| it[1]).collect();
+        let mut metres: Vec<f64> = distances.iter().map(|distance| distance[1]).collect();
         metres.sort_by(f64::total_cmp);
         Some(metres).filter(|it| !it.is_empty())
     };
     let views: Vec<Vec<f64>> = (0..scene.views.len()).filter_map(of_view).collect();
     let is_same = |metres: &Vec<f64>| metres[metres.len() / 2] < SAME_PERSON_M;
-    let are_agreed = views.iter().filter(|it| is_same(it)).count() >= 2;
-    let counted = views.iter().filter(|it| is_same(it) || !are_agreed);
-    counted.flatten().map(|it| it.min(MOST_M)).collect()
+    let are_agreed = views.iter().filter(|view| is_same(view)).count() >= 2;
+    let counted = views.iter().filter(|view| is_same(view) || !are_agreed);
+    counted.flatten().map(|counted| counted.min(MOST_M)).collect()
 }
 
 /// Distances of a view's joints from those of the solution, pixels of the frame and metres, where both are known.
@@ -152,7 +152,10 @@ mod tests {
         ];
         record.skeletons.people[0].joints[0].in_world = right;
         let all = distances_m(&scene, &record);
-        assert!(all.len() == 3 && all.iter().all(|it| *it < 1e-6), "{all:?}");
+        assert!(
+            all.len() == 3 && all.iter().all(|value| *value < 1e-6),
+            "{all:?}"
+        );
         // A view that saw somebody a metre beside is left out.
         let aside = Camera {
             camera_from_world: nalgebra::Isometry3::translation(0.5, 0.0, 3.0),

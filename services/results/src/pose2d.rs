@@ -20,9 +20,9 @@ pub(crate) fn lines(scene: &Scene, record: &FrameRecord) -> impl Iterator<Item =
 fn line(scene: &Scene, record: &FrameRecord, view: usize) -> ViewLine {
     let it = &scene.views[view];
     let fused = record.fused(view);
-    let answer = record.views.get(view).and_then(|it| it.pose.as_ref());
-    let status = answer.map_or("nothing came", |it| it.status.reason());
-    let search = answer.filter(|it| it.status == Status::OK);
+    let answer = record.views.get(view).and_then(|view| view.pose.as_ref());
+    let status = answer.map_or("nothing came", |answer| answer.status.reason());
+    let search = answer.filter(|answer| answer.status == Status::OK);
     let scale = it.source_scale();
     let sigma = record.sigma_px(scene, view);
     ViewLine {
@@ -30,7 +30,7 @@ fn line(scene: &Scene, record: &FrameRecord, view: usize) -> ViewLine {
         facing: fused.filter(|_| !scene.has_maps).map(facing),
         frame: record.frame(),
         fused: fused.map(|fused| fused_pose(it, fused)),
-        search: search.map(|it| it.searched.name().to_owned()),
+        search: search.map(|search| search.searched.name().to_owned()),
         sigma_px: sigma.map(|sigma| sigma.iter().map(|px| f64::from(*px) * scale).collect()),
         sigma_used: record.sigma_used(view),
         single: single(scene, record, view),
@@ -78,7 +78,7 @@ fn single(scene: &Scene, record: &FrameRecord, view: usize) -> Option<SinglePose
 }
 
 fn finite(number: f64) -> Option<f64> {
-    Some(number).filter(|it| it.is_finite())
+    Some(number).filter(|value| value.is_finite())
 }
 
 #[cfg(test)]

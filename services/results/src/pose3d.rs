@@ -34,7 +34,7 @@ pub(crate) fn keypoints<'a>(
 
 /// Whether a joint has a position that can be written down.
 pub(crate) fn is_placed(joint: &Joint3d) -> bool {
-    joint.status == Status::OK && joint.in_world.iter().all(|it| it.is_finite())
+    joint.status == Status::OK && joint.in_world.iter().all(|value| value.is_finite())
 }
 
 /// The line of a result.
@@ -84,7 +84,7 @@ fn person_line(scene: &Scene, person: &SkeletonMessage) -> PersonLine {
 /// The line of a frame that has no result: the reason, and why every view has no part in it.
 pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
     let views = scene.views.iter().enumerate();
-    let why = |view: usize| it.views.get(view).map_or(it.reason.as_str(), |it| it.reason());
+    let why = |view: usize| it.views.get(view).map_or(it.reason.as_str(), |view| view.reason());
     FrameLine {
         frame: it.frame,
         people: Vec::new(),
@@ -102,7 +102,7 @@ fn owned(names: Vec<&str>) -> Vec<String> {
 }
 
 fn finite(number: f64) -> Option<f64> {
-    Some(number).filter(|it| it.is_finite())
+    Some(number).filter(|value| value.is_finite())
 }
 
 /// A person without any joint, for the rows of a frame with nobody.
@@ -162,7 +162,7 @@ pub(crate) fn csv_rows(scene: &Scene, frame: &Skeletons) -> String {
 }
 
 fn rows_of(scene: &Scene, frame: u64, person: &SkeletonMessage) -> String {
-    let time = scene.time_s(frame).map_or(String::new(), |it| format!("{it:.6}"));
+    let time = scene.time_s(frame).map_or(String::new(), |time_s| format!("{time_s:.6}"));
     let id = match person.id {
         0 => String::new(),
         id => id.to_string(),

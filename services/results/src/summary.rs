@@ -32,14 +32,14 @@ pub(crate) struct Tally {
 
 impl Tally {
     pub(crate) fn new(scene: &Scene) -> Self {
-        let names = || scene.views.iter().map(|it| it.name.clone());
+        let names = || scene.views.iter().map(|view| view.name.clone());
         Self {
             summary: Summary {
-                views_present: names().map(|it| (it, 0)).collect(),
-                views_missing: names().map(|it| (it, BTreeMap::new())).collect(),
-                searches: names().map(|it| (it, BTreeMap::new())).collect(),
-                evidence_bytes_per_frame: names().map(|it| (it, 0)).collect(),
-                views_used: names().map(|it| (it, 0)).collect(),
+                views_present: names().map(|name| (name, 0)).collect(),
+                views_missing: names().map(|name| (name, BTreeMap::new())).collect(),
+                searches: names().map(|name| (name, BTreeMap::new())).collect(),
+                evidence_bytes_per_frame: names().map(|name| (name, 0)).collect(),
+                views_used: names().map(|name| (name, 0)).collect(),
                 ..Summary::default()
             },
             squared_px: (0.0, 0),
@@ -107,7 +107,7 @@ impl Tally {
         self.trusted.add(record.followed(), scene.joints.limbs, seen);
         self.people.add(frame);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
-            *count = it.frame.as_ref().map_or(*count, |it| it.n_dropped);
+            *count = it.frame.as_ref().map_or(*count, |frame| frame.n_dropped);
         }
     }
 
@@ -116,7 +116,7 @@ impl Tally {
         for ((view, it), [bytes, n]) in views {
             let searched = it
                 .pose
-                .filter(|it| it.status == Status::OK || it.status == Status::NO_DETECTION);
+                .filter(|pose| pose.status == Status::OK || pose.status == Status::NO_DETECTION);
             let Some(pose) = searched else { continue };
             *bytes = bytes.saturating_add(pose.evidence_bytes);
             *n += 1;
@@ -194,7 +194,7 @@ impl Tally {
     /// What was seen so far.
     pub(crate) fn summary(&self) -> Summary {
         let (sum, n) = self.squared_px;
-        let names = self.summary.views_used.iter().map(|it| &it.0);
+        let names = self.summary.views_used.iter().map(|views_used| &views_used.0);
         Summary {
             reprojection_px: (n > 0).then(|| (sum / n as f64).sqrt()),
             frames_dropped_by_capture: self.dropped.iter().sum(),

@@ -29,9 +29,9 @@ pub(crate) fn row(scene: &Scene, row: u64, frame: &Skeletons) -> String {
 /// * `n_rows`: rows that follow.
 pub(crate) fn header(scene: &Scene, rate_hz: f64, n_rows: u64) -> String {
     let rate_hz = rate_hz / scene.frame_step.max(1) as f64;
-    let joints = scene.joints.joints.iter().map(|it| it.name);
+    let joints = scene.joints.joints.iter().map(|joint| joint.name);
     let names = joints.chain(scene.extra_keypoints.iter().map(String::as_str));
-    let names: Vec<String> = names.map(|it| it.replace(' ', "_")).collect();
+    let names: Vec<String> = names.map(|name| name.replace(' ', "_")).collect();
     let heading = formats::trc::Heading {
         file_name: "pose3d.trc",
         rate_hz,

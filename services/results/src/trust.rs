@@ -130,7 +130,8 @@ impl Trusted {
 
     /// The scatter of the lengths of the bones, metres.
     fn bone_scatter_m(&self) -> Option<f64> {
-        let scatters: Vec<f64> = self.lengths.values().filter_map(|it| scatter_m(it)).collect();
+        let scatters: Vec<f64> =
+            self.lengths.values().filter_map(|value| scatter_m(value)).collect();
         (!scatters.is_empty()).then(|| scatters.iter().sum::<f64>() / scatters.len() as f64)
     }
 
@@ -140,12 +141,12 @@ impl Trusted {
         let (sum, n) = self.squared;
         let half = self.deviations.values().sum::<u64>().div_ceil(2);
         let mut counted = 0;
-        let median = self.deviations.iter().find(|it| {
-            counted += it.1;
+        let median = self.deviations.iter().find(|deviation| {
+            counted += deviation.1;
             counted >= half
         });
         Trust {
-            body_deviation: median.map(|it| f64::from(*it.0) * STEP),
+            body_deviation: median.map(|median| f64::from(*median.0) * STEP),
             bone_scatter_m: self.bone_scatter_m(),
             disagreement_m: (self.distances.1 > 0)
                 .then(|| self.distances.0 / self.distances.1 as f64),
@@ -160,7 +161,7 @@ impl Trusted {
 }
 
 fn place(pose: &SkeletonMessage, joint: usize) -> Option<Vector3<f64>> {
-    let joint = pose.joints.get(joint).filter(|it| is_placed(it))?;
+    let joint = pose.joints.get(joint).filter(|joint| is_placed(joint))?;
     Some(joint.in_world.into())
 }
 

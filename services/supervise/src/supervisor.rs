@@ -197,7 +197,7 @@ impl Supervisor<'_> {
             let watch = &self.watches[index];
             let is_lost = |name: &String| {
                 let mut others = self.watches.iter();
-                others.any(|it| it.spec.name == *name && it.is_lost())
+                others.any(|other| other.spec.name == *name && other.is_lost())
             };
             let senders = &watch.spec.senders;
             let is_idle = !watch.is_finished() && watch.is_idle(&self.plan.policy, now);

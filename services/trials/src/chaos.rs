@@ -134,7 +134,7 @@ fn once(
     let scenario = Scenario::Once(fault, service).name();
     let planned = testbed.plan(&scenario, &[])?;
     let processes: Vec<&str> = planned.processes().collect();
-    let candidates = processes.into_iter().filter(|it| service_of(it) == service);
+    let candidates = processes.into_iter().filter(|process| service_of(process) == service);
     let process = Rng::with_seed(options.seed).choice(candidates.collect::<Vec<_>>());
     let process = process.unwrap_or(service).to_owned();
     let at_frame = frame_at(&planned, INJECT_AFTER);
@@ -153,7 +153,7 @@ fn once(
         planned.session(),
         &run.results,
     );
-    let n_faults = |it: &str| u32::from(it == process && times.injected.is_some());
+    let n_faults = |text: &str| u32::from(text == process && times.injected.is_some());
     let outcome = run.outcome(n_faults);
     let policy = planned.plan().policy;
     let hang = match fault {
@@ -180,7 +180,7 @@ fn supervisor(testbed: &Testbed, options: &Options) -> Result<Verdict, Failure> 
     };
     let planned = testbed.plan(&scenario, &[])?;
     let run = testbed.run(&planned, &mut |_| None);
-    let sent = run.results.iter().map(|it| it.sent_ms);
+    let sent = run.results.iter().map(|result| result.sent_ms);
     killed.result_ms = sent.reduce(f64::min);
     let mut outcome = run.outcome(|_| 0);
     outcome.failure = failure.or(outcome.failure);

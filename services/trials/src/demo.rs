@@ -113,14 +113,14 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
     let report = planned.run(verbosity.quiet, &stop, &mut |event| {
         injector
             .as_mut()
-            .and_then(|it| it.handle(event, now_nanos(), ProcessFault::inject))
+            .and_then(|injector| injector.handle(event, now_nanos(), ProcessFault::inject))
     })?;
     if report.kind() == Some(ExitKind::Interrupted) {
         return Ok(None);
     }
     let after = gauge.as_mut().map(Gauge::measure).transpose()?;
     let cameras = synthetic.rig.cameras().iter();
-    let cameras: Vec<String> = cameras.map(|it| it.name.clone()).collect();
+    let cameras: Vec<String> = cameras.map(|camera| camera.name.clone()).collect();
     let results = results::read(&loaded.deployment.output, &cameras)?;
     let run = Run {
         cameras: &cameras,
@@ -130,7 +130,7 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
         machine: before.zip(after).map(|(before, after)| before.slower(after)),
         processes: &processes,
         report: &report,
-        truth: &synthetic.truth(results.iter().map(|it| it.frame))?,
+        truth: &synthetic.truth(results.iter().map(|result| result.frame))?,
         results: &results,
         killed: injector.as_ref().map(Injector::times),
         session: planned.session(),

@@ -145,9 +145,9 @@ impl Board {
         take(&inner.state);
         take(&inner.moment);
         let shown = inner.pictures.iter().zip(pictures);
-        shown.filter(|it| *it.1).for_each(|it| take(it.0));
-        let events = inner.events.iter().filter(|it| it.0 > seen);
-        new.extend(events.map(|it| it.1.clone()));
+        shown.filter(|shown| *shown.1).for_each(|it| take(it.0));
+        let events = inner.events.iter().filter(|event| event.0 > seen);
+        new.extend(events.map(|event| event.1.clone()));
         (inner.version, new)
     }
 

@@ -63,7 +63,7 @@ impl Finished {
         json!({
             "type": "hello", "mode": "finished", "name": name, "scene": scene.json(),
             "n": frames.len(), "line": pieces(frames), "notes": notes,
-            "first": frames.first().map(|it| it.number), "last": frames.last().map(|it| it.number),
+            "first": frames.first().map(|frame| frame.number), "last": frames.last().map(|frame| frame.number),
         })
     }
 
@@ -105,7 +105,7 @@ pub(crate) struct Frame {
 fn pieces(frames: &[Frame]) -> String {
     let per = frames.len().div_ceil(MOST_PIECES).max(1);
     let piece = |frames: &[Frame]| {
-        let is_all = |has: bool| frames.iter().all(|it| it.has_pose == Some(has));
+        let is_all = |has: bool| frames.iter().all(|frame| frame.has_pose == Some(has));
         match (is_all(true), is_all(false)) {
             (true, _) => '1',
             (_, true) => '0',

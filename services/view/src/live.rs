@@ -31,7 +31,7 @@ pub(crate) fn follow(named: Option<&str>, pictures_per_second: u32, board: &Boar
             Ok(session) => {
                 let ended = watch(session, board, stop);
                 said = None;
-                ended.err().map(|it| it.to_string())
+                ended.err().map(|error| error.to_string())
             }
             Err(why) => Some(why.to_string()),
         };

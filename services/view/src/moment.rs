@@ -173,18 +173,18 @@ pub(crate) fn rounded(value: f64, per: f64) -> f64 {
 
 /// To a tenth of a millimetre.
 pub(crate) fn in_world(point: [f64; 3]) -> [f64; 3] {
-    point.map(|it| rounded(it, 1e4))
+    point.map(|point| rounded(point, 1e4))
 }
 
 /// To a tenth of a pixel.
 pub(crate) fn in_view(point: [f64; 2]) -> [f64; 2] {
-    point.map(|it| rounded(it, 10.0))
+    point.map(|point| rounded(point, 10.0))
 }
 
 /// To a hundredth of a square millimetre; none where it is not known.
 pub(crate) fn spread(covariance: [f64; 6]) -> Option<[f64; 6]> {
-    let is_known = covariance.iter().all(|it| it.is_finite());
-    is_known.then(|| covariance.map(|it| rounded(it, 1e8)))
+    let is_known = covariance.iter().all(|value| value.is_finite());
+    is_known.then(|| covariance.map(|covariance| rounded(covariance, 1e8)))
 }
 
 #[cfg(test)]

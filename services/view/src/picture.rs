@@ -64,7 +64,7 @@ fn reduced(size: [usize; 2], rgb: &[u8]) -> Option<([usize; 2], Vec<u8>)> {
             }
         }
         let n = (n_rows * by.min(width)).max(1) as u32;
-        pixels.extend(sums.iter().map(|it| ((it + n / 2) / n).min(255) as u8));
+        pixels.extend(sums.iter().map(|sum| ((sum + n / 2) / n).min(255) as u8));
     }
     Some((small, pixels))
 }
@@ -76,7 +76,7 @@ mod tests {
     #[test]
     fn a_large_picture_becomes_the_means_of_squares() {
         // Columns of 0 and 200 in turn, 1000 pixels wide: three by three of them have a mean of 67 or 133.
-        let rgb: Vec<u8> = (0..1000 * 6).flat_map(|it| [200 * (it % 2) as u8, 9, 255]).collect();
+        let rgb: Vec<u8> = (0..1000 * 6).flat_map(|i| [200 * (i % 2) as u8, 9, 255]).collect();
         let (size, small) = reduced([1000, 6], &rgb).unwrap();
         assert_eq!(size, [333, 2]);
         assert_eq!(small.len(), 333 * 2 * 3);

@@ -90,7 +90,7 @@ fn bind(listen: &Listen) -> Result<TcpListener, Failure> {
 
 /// The address of the page for a browser.
 fn url(address: SocketAddr, token: Option<&str>) -> String {
-    let token = token.map_or_else(String::new, |it| format!("?token={it}"));
+    let token = token.map_or_else(String::new, |token| format!("?token={token}"));
     format!("http://{address}/{token}")
 }
 

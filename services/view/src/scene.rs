@@ -49,15 +49,15 @@ impl Scene {
     /// The model or the calibration cannot be read or used.
     pub(crate) fn of_frames(resolved: &Resolved) -> Result<Self, Failure> {
         let prepared = Prepared::new(resolved)?;
-        let views = prepared.views.iter().map(|it| {
-            let camera = it.framing.camera();
+        let views = prepared.views.iter().map(|view| {
+            let camera = view.framing.camera();
             View {
-                name: it.name.clone(),
+                name: view.name.clone(),
                 size: camera.intrinsics.size,
                 camera: Some(camera.clone()),
             }
         });
-        let up = prepared.up_in_world.map(|it| it.into_inner().into());
+        let up = prepared.up_in_world.map(|up_in_world| up_in_world.into_inner().into());
         Ok(Self {
             name: resolved.deployment.name.clone(),
             views: views.collect(),
@@ -92,12 +92,12 @@ impl Scene {
 
     /// What the page has to know about it.
     pub(crate) fn json(&self) -> Value {
-        let joints = self.joints.joints.iter().map(|it| it.name);
-        let views = self.views.iter().map(|it| {
-            let camera = it.camera.as_ref();
-            let at = camera.map(|it| <[f64; 3]>::from(it.centre_in_world().coords));
-            let axis = camera.map(|it| <[f64; 3]>::from(it.axis_in_world().into_inner()));
-            json!({ "name": it.name, "size": it.size, "at": at, "axis": axis })
+        let joints = self.joints.joints.iter().map(|joint| joint.name);
+        let views = self.views.iter().map(|view| {
+            let camera = view.camera.as_ref();
+            let at = camera.map(|camera| <[f64; 3]>::from(camera.centre_in_world().coords));
+            let axis = camera.map(|camera| <[f64; 3]>::from(camera.axis_in_world().into_inner()));
+            json!({ "name": view.name, "size": view.size, "at": at, "axis": axis })
         });
         json!({
             "name": self.name,
@@ -114,7 +114,7 @@ impl Scene {
     ///
     /// * `centres`: of the parts, pixels.
     pub(crate) fn joints_of(&self, centres: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
-        let last = self.joints.joints.iter().flat_map(|it| it.parts).max()?;
+        let last = self.joints.joints.iter().flat_map(|joint| joint.parts).max()?;
         (centres.len() > *last).then(|| self.joints.from_parts(centres))
     }
 
@@ -127,8 +127,8 @@ impl Scene {
     ) -> Vec<(usize, usize, Vec<[f64; 2]>)> {
         let mut lines = Vec::new();
         for (view, point) in points {
-            let from = self.views.get(*view).and_then(|it| it.camera.as_ref());
-            let Some(from) = from.filter(|_| point.iter().all(|it| it.is_finite())) else {
+            let from = self.views.get(*view).and_then(|view| view.camera.as_ref());
+            let Some(from) = from.filter(|_| point.iter().all(|value| value.is_finite())) else {
                 continue;
             };
             for (other, it) in self.views.iter().enumerate() {
@@ -136,8 +136,8 @@ impl Scene {
                     continue;
                 };
                 let curve = epipolar_curve(from, to, &Point2::from(*point), N_POINTS);
-                let tenths = |it: f64| (10.0 * it).round() / 10.0;
-                let curve = curve.iter().map(|it| [tenths(it.x), tenths(it.y)]);
+                let tenths = |value: f64| (10.0 * value).round() / 10.0;
+                let curve = curve.iter().map(|curve| [tenths(curve.x), tenths(curve.y)]);
                 lines.push((*view, other, curve.collect()));
             }
         }

@@ -114,7 +114,7 @@ fn file(path: &str) -> Answer {
 /// The token in what stands behind `?`; tokens have no characters that are written in another way there.
 fn token_in(query: Option<&str>) -> &str {
     let pairs = query.unwrap_or_default().split('&');
-    let mut tokens = pairs.filter_map(|it| it.strip_prefix("token="));
+    let mut tokens = pairs.filter_map(|pair| pair.strip_prefix("token="));
     tokens.next().unwrap_or_default()
 }
 
@@ -130,7 +130,7 @@ fn is_same(token: &str, other: &str) -> bool {
 /// * `has_token`: whether pages have to know a token, so that any name of this machine will do.
 fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {
     let mut hosts = headers.get_all(HOST).iter();
-    let host = hosts.next().and_then(|it| it.to_str().ok());
+    let host = hosts.next().and_then(|host| host.to_str().ok());
     let host = host.filter(|_| hosts.next().is_none());
     let host = host.ok_or("the request has no host, or several")?;
     if !has_token && !is_loopback(host) {
@@ -140,7 +140,7 @@ fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {
         return Ok(());
     };
     let origin = origin.to_str().unwrap_or_default();
-    let site = ["http://", "https://"].iter().find_map(|it| origin.strip_prefix(it));
+    let site = ["http://", "https://"].iter().find_map(|name| origin.strip_prefix(name));
     if site == Some(host) {
         Ok(())
     } else {
@@ -151,11 +151,11 @@ fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {
 /// Whether a host, with its port, is a name of the loopback. Any port: a tunnel has its own.
 fn is_loopback(host: &str) -> bool {
     let name = match host.rsplit_once(':') {
-        Some((name, port)) if port.bytes().all(|it| it.is_ascii_digit()) => name,
+        Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
         _ => host,
     };
-    let is_address = |name: &str| name.parse().is_ok_and(|it: IpAddr| it.is_loopback());
-    let inner = name.strip_prefix('[').and_then(|it| it.strip_suffix(']'));
+    let is_address = |name: &str| name.parse().is_ok_and(|value: IpAddr| value.is_loopback());
+    let inner = name.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
     name.eq_ignore_ascii_case("localhost") || is_address(inner.unwrap_or(name))
 }
 
@@ -229,11 +229,11 @@ mod tests {
 
     #[test]
     fn the_page_loads_files_that_are_served_and_finds_every_element_that_it_asks_for() {
-        let scripts = MODULES.map(|it| it.1);
+        let scripts = MODULES.map(|module| module.1);
         for text in scripts.iter().chain([&INDEX]) {
             for piece in text.split("\"./").skip(1) {
                 let name = format!("/{}", piece.split('"').next().unwrap());
-                let is_served = MODULES.iter().any(|it| it.0 == name)
+                let is_served = MODULES.iter().any(|module| module.0 == name)
                     || ["/stage.js", "/look.css", "/view.css"].contains(&name.as_str());
                 assert!(is_served, "{name}");
             }

@@ -230,7 +230,7 @@ impl Page {
     fn lines(&self, points: &[(usize, [f64; 2])]) -> Message {
         let points = &points[..points.len().min(MOST_POINTS)];
         let scene = self.board().scene();
-        let lines = scene.map_or_else(Vec::new, |it| it.epipolar_lines(points));
+        let lines = scene.map_or_else(Vec::new, |scene| scene.epipolar_lines(points));
         text(&json!({ "type": "epipolar", "lines": lines }))
     }
 }
@@ -247,7 +247,8 @@ fn read(finished: &Arc<Finished>, at: usize, shown: &[bool; MAX_VIEWS]) -> Vec<M
     };
     let views = (0..MAX_VIEWS).filter(|view| shown[*view]);
     let pictures = views.filter_map(|view| finished.picture(moment.frame, view));
-    let mut messages: Vec<Message> = pictures.map(|it| Message::Binary(it.into())).collect();
+    let mut messages: Vec<Message> =
+        pictures.map(|picture| Message::Binary(picture.into())).collect();
     messages.push(Message::Text(moment.text().into()));
     messages
 }
@@ -330,7 +331,7 @@ mod tests {
             u32::from(!is_question),
             "{question:?}"
         );
-        let answers = answers.iter().map(|it| serde_json::from_str(it.to_text().unwrap()));
+        let answers = answers.iter().map(|answer| serde_json::from_str(answer.to_text().unwrap()));
         let answers: Vec<Value> = answers.collect::<Result<_, _>>().unwrap();
         assert!(answers.len() <= 1, "{question:?}: {answers:?}");
         answers
@@ -345,10 +346,10 @@ mod tests {
             .as_array()
             .unwrap()
             .iter()
-            .map(|it| [it[0].as_u64().unwrap(), it[1].as_u64().unwrap()])
+            .map(|array| [array[0].as_u64().unwrap(), array[1].as_u64().unwrap()])
             .collect();
         assert!(
-            between.contains(&[0, 1]) && between.iter().all(|it| it.iter().all(|it| *it < 2)),
+            between.contains(&[0, 1]) && between.iter().all(|it| it.iter().all(|value| *value < 2)),
             "{between:?}"
         );
         let refused = ask(&mut page, r#"{"pictures":[-1]}"#);
@@ -406,8 +407,8 @@ mod tests {
             ask(&mut page, &String::from_utf8_lossy(&bytes));
         }
         let site = page.site.clone();
-        assert!((0..MAX_VIEWS).any(|it| site.board.wants(it)));
+        assert!((0..MAX_VIEWS).any(|i| site.board.wants(i)));
         drop(page);
-        assert!((0..MAX_VIEWS).all(|it| !site.board.wants(it)));
+        assert!((0..MAX_VIEWS).all(|i| !site.board.wants(i)));
     }
 }

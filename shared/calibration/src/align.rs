@@ -56,8 +56,8 @@ pub fn aligned(from: &[Camera], to: &[Camera], with_scale: bool) -> Option<Simil
     let sign = (u * v_t).determinant().signum();
     let matrix = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
-    let middle = |it: &[Camera]| {
-        let sum: Vector3<f64> = it.iter().map(|it| it.centre_in_world().coords).sum();
+    let middle = |cameras: &[Camera]| {
+        let sum: Vector3<f64> = cameras.iter().map(|it| it.centre_in_world().coords).sum();
         sum / n
     };
     let [of_from, of_to] = [middle(from), middle(to)];

@@ -61,8 +61,9 @@ impl Sight {
         corners: impl Iterator<Item = (usize, Point2<f64>)>,
         board: &[Point2<f64>],
     ) -> Self {
-        let points: Vec<(usize, Point2<f64>)> = corners.filter(|it| it.0 < board.len()).collect();
-        let on_board = points.iter().map(|it| board[it.0]).collect();
+        let points: Vec<(usize, Point2<f64>)> =
+            corners.filter(|corner| corner.0 < board.len()).collect();
+        let on_board = points.iter().map(|point| board[point.0]).collect();
         Self {
             camera,
             frame,
@@ -178,7 +179,7 @@ pub struct CameraOutcome {
 impl CameraOutcome {
     /// The share of corners that were left out.
     pub fn wrong_share(&self) -> f64 {
-        let wrong = self.residuals.iter().filter(|it| it.is_wrong).count();
+        let wrong = self.residuals.iter().filter(|residual| residual.is_wrong).count();
         wrong as f64 / self.residuals.len().max(1) as f64
     }
 }
@@ -249,7 +250,7 @@ pub enum BoardError {
     /// Cameras that are not connected by boards seen together.
     #[error(
         "no board connects these groups of cameras: {}; show it to a camera of each at the same time",
-        .groups.iter().map(|it| it.join(", ")).collect::<Vec<_>>().join(" | ")
+        .groups.iter().map(|group| group.join(", ")).collect::<Vec<_>>().join(" | ")
     )]
     Apart {
         /// The groups, by name.

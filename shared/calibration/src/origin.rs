@@ -162,7 +162,7 @@ fn frame(origin: Point3<f64>, along: Vector3<f64>, up: Vector3<f64>) -> Isometry
 
 fn mean_centre(rig: &Rig) -> Point3<f64> {
     let cameras = rig.cameras();
-    let sum: Vector3<f64> = cameras.iter().map(|it| it.centre_in_world().coords).sum();
+    let sum: Vector3<f64> = cameras.iter().map(|camera| camera.centre_in_world().coords).sum();
     Point3::from(sum / cameras.len() as f64)
 }
 
@@ -173,9 +173,9 @@ fn mean_centre(rig: &Rig) -> Point3<f64> {
 /// [`OriginError::Rig`].
 pub fn rebased(rig: &Rig, new_from_old: &Isometry3<f64>, source: &str) -> Result<Rig, OriginError> {
     let old_from_new = new_from_old.inverse();
-    let cameras = rig.cameras().iter().map(|it| Camera {
-        camera_from_world: it.camera_from_world * old_from_new,
-        ..it.clone()
+    let cameras = rig.cameras().iter().map(|camera| Camera {
+        camera_from_world: camera.camera_from_world * old_from_new,
+        ..camera.clone()
     });
     let text = match rig.source() {
         "" => source.to_owned(),
@@ -224,9 +224,9 @@ mod tests {
         let truth = rig();
         let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -1.1, 0.7));
         let away = Isometry3::from_parts(Translation3::new(4.0, 1.0, -2.0), rotation);
-        let cameras = truth.cameras().iter().map(|it| Camera {
-            camera_from_world: it.camera_from_world * away.inverse(),
-            ..it.clone()
+        let cameras = truth.cameras().iter().map(|camera| Camera {
+            camera_from_world: camera.camera_from_world * away.inverse(),
+            ..camera.clone()
         });
         let moved = Rig::new(cameras.collect(), None, "moved").unwrap();
         (truth, moved)

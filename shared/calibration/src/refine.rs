@@ -142,7 +142,7 @@ pub fn refine(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome,
         sides: &settings.sides,
     };
     let choices = chosen(&study, &settings.offsets_s);
-    study.choices = choices.iter().map(|it| vec![*it]).collect();
+    study.choices = choices.iter().map(|choice| vec![*choice]).collect();
     match better(&study, &choices, settings, &mut outcome) {
         Ok(all) => finish(&mut outcome, (cameras, &study), &all),
         Err(doubt) => outcome.doubts.push(doubt),
@@ -187,7 +187,7 @@ fn better(
                 .times_s
                 .iter()
                 .copied()
-                .filter(|it| half_of(*it, span) == wanted)
+                .filter(|times_s| half_of(*times_s, span) == wanted)
                 .collect(),
             ..study.clone()
         };
@@ -320,9 +320,9 @@ fn disagreement(rigs: &[Vec<Camera>], all: &Solved, settings: &Settings, outcome
     let skeletons = all.skeletons(settings.n_joints);
     let points: Vec<_> = skeletons.iter().flatten().flatten().collect();
     let axis = |axis: usize| {
-        Sorted::new(points.iter().map(|it| it[axis]).collect::<Vec<_>>()).upper_median()
+        Sorted::new(points.iter().map(|point| point[axis]).collect::<Vec<_>>()).upper_median()
     };
-    let middle = [0, 1, 2].map(|it| axis(it).unwrap_or(0.0)).into();
+    let middle = [0, 1, 2].map(|i| axis(i).unwrap_or(0.0)).into();
     for (camera, (a, b)) in one.iter().zip(other).enumerate() {
         let apart = difference(a, b);
         let distance = nalgebra::distance(&a.centre_in_world(), &middle);

@@ -53,9 +53,9 @@ pub(crate) fn pose(message: &ViewPose) -> bool {
     let n_keypoints = message.n_keypoints as usize;
     n_candidates <= MAX_CANDIDATES
         && n_keypoints <= MAX_VIEW_KEYPOINTS
-        && message.candidates[..n_candidates]
-            .iter()
-            .all(|it| usize::from(it.n_parts) <= MAX_PARTS && it.score.is_finite())
+        && message.candidates[..n_candidates].iter().all(|candidate| {
+            usize::from(candidate.n_parts) <= MAX_PARTS && candidate.score.is_finite()
+        })
 }
 
 /// Whether a picture is as large as its header says; one without pixels may be empty.

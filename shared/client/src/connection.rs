@@ -84,7 +84,7 @@ impl Connection {
 
     /// The numbers of the views that were asked for.
     pub(crate) fn views(&self) -> impl Iterator<Item = usize> + Clone {
-        self.views.iter().map(|it| it.view)
+        self.views.iter().map(|view| view.view)
     }
 
     /// Whether the deployment is ending.
@@ -221,11 +221,11 @@ fn numbers(running: &Running, wish: &Wish) -> Result<Vec<usize>, ClientError> {
     };
     let mut numbers = Vec::new();
     for camera in cameras {
-        let number = running.views.iter().position(|it| it.name == *camera);
+        let number = running.views.iter().position(|view| view.name == *camera);
         numbers.push(number.ok_or_else(|| ClientError::NoCamera {
             deployment: running.name.clone(),
             camera: camera.clone(),
-            cameras: running.views.iter().map(|it| it.name.clone()).collect(),
+            cameras: running.views.iter().map(|view| view.name.clone()).collect(),
         })?);
     }
     numbers.sort_unstable();

@@ -71,14 +71,14 @@ impl<P> Joiner<P> {
 
     pub(crate) fn add_pose(&mut self, nth: usize, message: Box<ViewPose>, now: Instant) {
         let frame = self.frame(&message.stamp, now);
-        if let Some(parts) = frame.and_then(|it| it.views.get_mut(nth)) {
+        if let Some(parts) = frame.and_then(|frame| frame.views.get_mut(nth)) {
             parts.pose = Some(message);
         }
     }
 
     pub(crate) fn add_picture(&mut self, nth: usize, stamp: &Stamp, picture: P, now: Instant) {
         let frame = self.frame(stamp, now);
-        if let Some(parts) = frame.and_then(|it| it.views.get_mut(nth)) {
+        if let Some(parts) = frame.and_then(|frame| frame.views.get_mut(nth)) {
             parts.picture = Some(picture);
         }
     }
@@ -116,7 +116,12 @@ impl<P> Joiner<P> {
     ///
     /// A skeleton is the last that is sent about a frame: it says that the rest is there, or will not be.
     pub(crate) fn take(&mut self, now: Instant) -> Vec<Gathered<P>> {
-        let last = self.pending.values().rev().find(|it| self.is_over(it, now)).map(|it| it.frame);
+        let last = self
+            .pending
+            .values()
+            .rev()
+            .find(|value| self.is_over(value, now))
+            .map(|value| value.frame);
         let Some(last) = last else {
             return Vec::new();
         };
@@ -146,7 +151,7 @@ impl<P> Joiner<P> {
         let (poses, pictures) = (self.wish.poses, self.wish.pictures);
         it.views
             .iter()
-            .all(|it| (!poses || it.pose.is_some()) && (!pictures || it.picture.is_some()))
+            .all(|view| (!poses || view.pose.is_some()) && (!pictures || view.picture.is_some()))
     }
 }
 
@@ -210,12 +215,19 @@ mod tests {
         assert_eq!(joiner.take(now).len(), 0);
         joiner.add_pose(0, pose(2), now);
         joiner.add_pose(1, pose(2), now);
-        let frames: Vec<_> = joiner.take(now).iter().map(|it| (it.frame, it.is_complete)).collect();
+        let frames: Vec<_> = joiner
+            .take(now)
+            .iter()
+            .map(|joiner| (joiner.frame, joiner.is_complete))
+            .collect();
         assert_eq!(frames, [(1, false), (2, true)]);
         joiner.add_pose(0, pose(3), now);
         let later = now + Duration::from_secs(1);
-        let frames: Vec<_> =
-            joiner.take(later).iter().map(|it| (it.frame, it.is_complete)).collect();
+        let frames: Vec<_> = joiner
+            .take(later)
+            .iter()
+            .map(|joiner| (joiner.frame, joiner.is_complete))
+            .collect();
         assert_eq!(frames, [(3, false)]);
     }
 
@@ -234,7 +246,7 @@ mod tests {
                     2 => joiner.add_skeletons(Box::new(skeletons(frame)), now),
                     nth => joiner.add_pose(nth, pose(frame), now),
                 }
-                frames.extend(joiner.take(now).iter().map(|it| it.frame));
+                frames.extend(joiner.take(now).iter().map(|joiner| joiner.frame));
                 prop_assert!(joiner.pending.len() <= MOST_PENDING);
             }
             prop_assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");

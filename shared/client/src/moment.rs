@@ -264,7 +264,7 @@ impl Moment {
 
     /// Whether any of its pictures lies where its sender wrote it.
     pub(crate) fn is_in_place(&self) -> bool {
-        let mut pictures = self.views.iter().filter_map(|it| it.picture.as_ref());
+        let mut pictures = self.views.iter().filter_map(|view| view.picture.as_ref());
         pictures.any(Picture::is_in_place)
     }
 }

@@ -101,7 +101,7 @@ impl Client {
         wish: &Wish,
         connection: Option<Connection>,
     ) -> Result<Self, ClientError> {
-        let running = connection.as_ref().map(|it| Arc::clone(&it.running));
+        let running = connection.as_ref().map(|connection| Arc::clone(&connection.running));
         let shared = Arc::new(Shared {
             inner: Mutex::new(Inner {
                 ready: VecDeque::new(),

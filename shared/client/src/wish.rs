@@ -60,7 +60,7 @@ impl Wish {
     /// Only of these cameras; of all without it.
     #[must_use]
     pub fn of_cameras(mut self, names: &[&str]) -> Self {
-        self.cameras = Some(names.iter().map(|it| (*it).to_owned()).collect());
+        self.cameras = Some(names.iter().map(|name| (*name).to_owned()).collect());
         self
     }
 

@@ -44,7 +44,7 @@ type Edit = (Range<usize>, String);
 pub fn with_clocks(text: &str, clocks: &[ClockKeys]) -> Result<String, ClocksError> {
     let document = DeTable::parse(text).map_err(|_odd| ClocksError::Syntax)?;
     let cameras = document.get_ref().iter().find(|it| it.0.get_ref() == "camera");
-    let cameras = cameras.and_then(|it| it.1.get_ref().as_array());
+    let cameras = cameras.and_then(|camera| camera.1.get_ref().as_array());
     let mut edits: Vec<Edit> = Vec::new();
     for clock in clocks {
         let mut tables = cameras.into_iter().flatten();
@@ -57,7 +57,7 @@ pub fn with_clocks(text: &str, clocks: &[ClockKeys]) -> Result<String, ClocksErr
         })?;
         edits.extend(edits_of(text, table, clock));
     }
-    edits.sort_by_key(|it| core::cmp::Reverse(it.0.start));
+    edits.sort_by_key(|edit| core::cmp::Reverse(edit.0.start));
     let mut changed = text.to_owned();
     for (range, by) in edits {
         changed.replace_range(range, &by);
@@ -136,16 +136,16 @@ fn is_as_meant(text: &str, changed: &str, clocks: &[ClockKeys]) -> bool {
         for table in [&mut before, &mut after] {
             let cameras = table.get_mut("camera").and_then(Value::as_array_mut);
             let mut cameras = cameras.into_iter().flatten();
-            let camera =
-                cameras.find(|it| it.get("name").and_then(Value::as_str) == Some(&clock.name));
+            let camera = cameras
+                .find(|camera| camera.get("name").and_then(Value::as_str) == Some(&clock.name));
             let Some(camera) = camera.and_then(Value::as_table_mut) else {
                 return false;
             };
-            let offset = camera.remove("offset_ms").and_then(|it| it.as_float());
-            let drift = camera.remove("drift_ppm").and_then(|it| it.as_float());
-            values.push((offset, drift.filter(|it| *it != 0.0)));
+            let offset = camera.remove("offset_ms").and_then(|camera| camera.as_float());
+            let drift = camera.remove("drift_ppm").and_then(|camera| camera.as_float());
+            values.push((offset, drift.filter(|drift| *drift != 0.0)));
         }
-        let as_written = |it: f64| number(it).parse::<f64>().ok();
+        let as_written = |value: f64| number(value).parse::<f64>().ok();
         let wanted = clock.drift_ppm.and_then(as_written).filter(|it| *it != 0.0);
         if values[1] != (as_written(clock.offset_ms), wanted) {
             return false;

@@ -66,11 +66,11 @@ impl Loaded {
     /// A value that TOML cannot hold, such as a whole number beyond 64 bits with sign.
     pub fn entries(&self) -> Result<Vec<Entry>, toml::ser::Error> {
         let table = Table::try_from(&self.deployment)?;
-        let entry = |it: Key| Entry {
-            value: lookup(&table, &it.name).cloned(),
-            origin: self.origin(&it.name),
-            key: it.name,
-            meaning: it.meaning,
+        let entry = |key: Key| Entry {
+            value: lookup(&table, &key.name).cloned(),
+            origin: self.origin(&key.name),
+            key: key.name,
+            meaning: key.meaning,
         };
         Ok(keys().into_iter().map(entry).collect())
     }

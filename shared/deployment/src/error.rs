@@ -143,7 +143,7 @@ mod tests {
                     said.starts_with(&format!("a.toml:1: `{key}`: expected ")),
                     "{said}"
                 );
-                let word = words.iter().find(|it| said.contains(**it));
+                let word = words.iter().find(|word| said.contains(**word));
                 assert_eq!(word, None, "{key} = {value}: {said}");
             }
         }

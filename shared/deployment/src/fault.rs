@@ -63,7 +63,7 @@ pub struct Fault {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{text:?} is no fault: expected KIND@FROM+COUNT, for example freeze@30+20, KIND one of {}",
-    FaultKind::ALL.map(|it| it.1).join(", ")
+    FaultKind::ALL.map(|fault_kind| fault_kind.1).join(", ")
 )]
 pub struct FaultError {
     /// The text.
@@ -110,12 +110,12 @@ impl FromStr for Fault {
         let parse = || {
             let (name, rest) = text.trim().split_once('@')?;
             let (from, count) = rest.split_once('+')?;
-            let kind = FaultKind::ALL.iter().find(|it| it.1 == name)?.0;
+            let kind = FaultKind::ALL.iter().find(|fault_kind| fault_kind.1 == name)?.0;
             let [from, count] = [from, count].map(|it| it.parse().ok());
             Some(Self {
                 kind,
                 from: from?,
-                count: count.filter(|it| *it > 0)?,
+                count: count.filter(|count| *count > 0)?,
             })
         };
         parse().ok_or_else(|| FaultError {

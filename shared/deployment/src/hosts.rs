@@ -74,12 +74,12 @@ impl Link {
 impl Deployment {
     /// The host of that name.
     pub fn host(&self, name: &str) -> Option<&Host> {
-        self.hosts.iter().find(|it| it.name == name)
+        self.hosts.iter().find(|host| host.name == name)
     }
 
     /// The host that fuses.
     pub fn fusing_host(&self) -> Option<&Host> {
-        self.hosts.iter().find(|it| it.fuses)
+        self.hosts.iter().find(|host| host.fuses)
     }
 
     /// The views of a host, ascending.
@@ -92,7 +92,7 @@ impl Deployment {
     /// The host that a view belongs to.
     pub fn host_of(&self, view: usize) -> Option<&Host> {
         let name = &self.cameras.get(view)?.name;
-        self.hosts.iter().find(|it| it.views.contains(name))
+        self.hosts.iter().find(|host| host.views.contains(name))
     }
 
     /// Whether the maps of networks cross between hosts with the poses, as Gaussians.
@@ -120,7 +120,7 @@ pub(crate) fn check(it: &Deployment) -> Result<(), Complaint> {
     )?;
     names(it)?;
     views(it)?;
-    let fusing: Vec<&Host> = it.hosts.iter().filter(|it| it.fuses).collect();
+    let fusing: Vec<&Host> = it.hosts.iter().filter(|host| host.fuses).collect();
     demand(
         fusing.len() == 1,
         "host.fuses",
@@ -135,7 +135,8 @@ pub(crate) fn check(it: &Deployment) -> Result<(), Complaint> {
 }
 
 fn names(it: &Deployment) -> Result<(), Complaint> {
-    let good = |it: char| it.is_ascii_lowercase() || it.is_ascii_digit() || it == '-';
+    let good =
+        |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '-';
     for (index, host) in it.hosts.iter().enumerate() {
         let name = &host.name;
         demand(
@@ -204,9 +205,9 @@ fn address(host: &Host) -> Result<(), Complaint> {
     };
     let parts = address.rsplit_once(':');
     let is_good = parts.is_some_and(|(name, port)| {
-        let of_name = |it: char| it.is_ascii_alphanumeric() || "-._:[]".contains(it);
+        let of_name = |letter: char| letter.is_ascii_alphanumeric() || "-._:[]".contains(letter);
         let port: Option<u16> = port.parse().ok();
-        !name.is_empty() && name.chars().all(of_name) && port.is_some_and(|it| it > 0)
+        !name.is_empty() && name.chars().all(of_name) && port.is_some_and(|port| port > 0)
     });
     demand(
         is_good,
@@ -230,7 +231,7 @@ fn real_time(it: &Deployment) -> Result<(), Complaint> {
         "left out",
         "frames per second of all cameras, where there are hosts",
     )?;
-    let has_clocks = it.cameras.iter().any(|it| it.offset_ms.is_some());
+    let has_clocks = it.cameras.iter().any(|camera| camera.offset_ms.is_some());
     demand(
         !has_clocks,
         "camera.offset_ms",

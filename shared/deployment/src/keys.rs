@@ -24,7 +24,7 @@ pub fn keys() -> Vec<Key> {
     let top = fields_of::<Deployment>().iter();
     let mut keys = Vec::new();
     for name in top {
-        match SECTIONS.iter().find(|it| it.0 == *name) {
+        match SECTIONS.iter().find(|section| section.0 == *name) {
             Some((section, fields)) => keys.extend(
                 fields().iter().map(|name| schema.key(&format!("{section}."), section, name)),
             ),
@@ -38,14 +38,14 @@ pub fn keys() -> Vec<Key> {
 pub(crate) fn camera_keys() -> Vec<Key> {
     let schema = Shapes(schema());
     let fields = fields_of::<capture::Camera>().iter();
-    fields.map(|it| schema.key("", "camera", it)).collect()
+    fields.map(|field| schema.key("", "camera", field)).collect()
 }
 
 /// The keys of a `[[host]]`, without their section.
 pub(crate) fn host_keys() -> Vec<Key> {
     let schema = Shapes(schema());
     let fields = fields_of::<hosts::Host>().iter();
-    fields.map(|it| schema.key("", "host", it)).collect()
+    fields.map(|field| schema.key("", "host", field)).collect()
 }
 
 #[cfg(test)]
@@ -61,12 +61,12 @@ mod tests {
         let defaults = Loaded::defaults(&[]).unwrap().deployment;
         for (section, value) in &Table::try_from(defaults).unwrap() {
             let names: Vec<String> = match value {
-                Value::Table(inner) => inner.keys().map(|it| format!("{section}.{it}")).collect(),
+                Value::Table(inner) => inner.keys().map(|key| format!("{section}.{key}")).collect(),
                 _ => vec![section.clone()],
             };
             for name in names {
                 assert!(
-                    keys.iter().any(|it| it.name == name),
+                    keys.iter().any(|key| key.name == name),
                     "{name} is not listed"
                 );
             }
@@ -86,7 +86,8 @@ mod tests {
 
     #[test]
     fn a_camera_can_have_keypoints_in_place_of_footage() {
-        let names: Vec<String> = camera_keys().into_iter().map(|it| it.name).collect();
+        let names: Vec<String> =
+            camera_keys().into_iter().map(|camera_key| camera_key.name).collect();
         assert_eq!(
             names[..4],
             ["name", "source", "keypoints", "keypoint_names"]
@@ -101,16 +102,16 @@ mod tests {
 
     #[test]
     fn keys_are_in_the_order_of_their_sections() {
-        let names: Vec<String> = keys().into_iter().map(|it| it.name).collect();
+        let names: Vec<String> = keys().into_iter().map(|key| key.name).collect();
         assert_eq!(names[..3], ["name", "rig", "unit"]);
         assert_eq!(names.last().unwrap(), "runtime.lock_memory");
         let sections: Vec<&str> =
             names.iter().filter_map(|it| Some(it.split_once('.')?.0)).collect();
         let mut unique = sections.clone();
         unique.dedup();
-        assert_eq!(unique, SECTIONS.map(|it| it.0));
+        assert_eq!(unique, SECTIONS.map(|section| section.0));
         assert!(
-            !names.iter().any(|it| it.starts_with("record")),
+            !names.iter().any(|name| name.starts_with("record")),
             "{names:?}"
         );
     }

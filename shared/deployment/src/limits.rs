@@ -80,7 +80,11 @@ impl Deployment {
                  120 is usual"
             ));
         }
-        if let Some(rate) = self.capture.frame_rate_hz.filter(|it| !(1.0..=1000.0).contains(it)) {
+        if let Some(rate) = self
+            .capture
+            .frame_rate_hz
+            .filter(|frame_rate_hz| !(1.0..=1000.0).contains(frame_rate_hz))
+        {
             doubts.push(format!(
                 "`capture.frame_rate_hz` is {rate} frames per second: cameras have 1 to 1000"
             ));
@@ -99,7 +103,7 @@ impl Deployment {
 
 impl Runtime {
     fn doubts(&self) -> Vec<String> {
-        let high = self.priority.iter().filter(|it| *it.1 == 99);
+        let high = self.priority.iter().filter(|priority| *priority.1 == 99);
         let said = high.map(|(name, _)| {
             format!(
                 "`runtime.priority` of {name} is 99, above that of the system's own threads: up to 98 leaves those in charge"

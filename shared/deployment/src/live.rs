@@ -26,7 +26,7 @@ pub(crate) fn settle(
         }
     }
     let mut cameras = it.cameras.iter();
-    let Some(camera) = cameras.find(|it| machine.is_live(&it.source)) else {
+    let Some(camera) = cameras.find(|camera| machine.is_live(&camera.source)) else {
         return Ok(());
     };
     let name = &camera.name;
@@ -87,7 +87,7 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
     )?;
     let sides = camera.size.unwrap_or([1, 1]);
     demand(
-        sides.iter().all(|it| (1..=16_384).contains(it)),
+        sides.iter().all(|side| (1..=16_384).contains(side)),
         "camera.size",
         &format!("{sides:?}"),
         "1 to 16384 each",
@@ -119,7 +119,7 @@ fn keys_of_kind(camera: &Camera) -> Result<(), Complaint> {
         "none: it is for RTSP cameras",
     )?;
     let scheme = camera.source.split(':').next().unwrap_or_default();
-    let is_rtsp = ["rtsp", "rtsps"].iter().any(|it| scheme.eq_ignore_ascii_case(it));
+    let is_rtsp = ["rtsp", "rtsps"].iter().any(|name| scheme.eq_ignore_ascii_case(name));
     demand(
         is_rtsp || camera.clock.is_none(),
         "camera.clock",
@@ -179,7 +179,7 @@ mod tests {
             "name = 'a'\nrig = 'r'\noutput = 'o'\n{top}\n[[camera]]\nname = 'b'\nsource = '/dev/video0'\n{camera}\n\
              [[camera]]\nname = 'c'\nsource = 's.mp4'\n{other}\n"
         );
-        Loaded::parse(&text, Path::new("d.toml"), &[], &Room).map(|it| it.deployment)
+        Loaded::parse(&text, Path::new("d.toml"), &[], &Room).map(|value| value.deployment)
     }
 
     #[test]

@@ -36,8 +36,8 @@ impl Loaded {
         let malformed = |error: &toml::de::Error| malformed(file, text, error);
         let in_file: Result<Table, _> = toml::from_str(text);
         // The complaints of the structs tell more than those of a table: they go first.
-        let mut deployment: Deployment = toml::from_str(text).map_err(|it| malformed(&it))?;
-        let in_file = in_file.map_err(|it| malformed(&it))?;
+        let mut deployment: Deployment = toml::from_str(text).map_err(|error| malformed(&error))?;
+        let in_file = in_file.map_err(|error| malformed(&error))?;
         let on_command_line = overrides(set)?;
         let mut given = in_file.clone();
         if !on_command_line.is_empty() {
@@ -45,9 +45,9 @@ impl Loaded {
             let read = given.clone().try_into();
             deployment = read.map_err(|error| of_set(&error))?;
         }
-        let placed = |it: Complaint| {
-            let at = place(file, text, span_of(text, &it.key));
-            it.at(at)
+        let placed = |complaint: Complaint| {
+            let at = place(file, text, span_of(text, &complaint.key));
+            complaint.at(at)
         };
         if let Some(stranger) = method::stranger(deployment.method, &given) {
             let place = if method::stranger(deployment.method, &in_file).is_some() {
@@ -106,9 +106,9 @@ impl Loaded {
             let message = stranger.message;
             return Err(ConfigError::Malformed { place, message });
         }
-        fits(&deployment, &on_command_line).map_err(|it| it.at("--set".to_owned()))?;
+        fits(&deployment, &on_command_line).map_err(|error| error.at("--set".to_owned()))?;
         deployment.resolve(&machine.folder_of(Path::new("")), machine);
-        rules::check(&deployment).map_err(|it| it.at("--set".to_owned()))?;
+        rules::check(&deployment).map_err(|error| error.at("--set".to_owned()))?;
         Ok(Self {
             deployment,
             in_file,
@@ -156,7 +156,7 @@ fn overrides(set: &[String]) -> Result<Table, ConfigError> {
         let value = format!("it = {value}")
             .parse::<Table>()
             .ok()
-            .and_then(|mut it| it.remove("it"))
+            .and_then(|mut value| value.remove("it"))
             .unwrap_or_else(|| Value::String(value.to_owned()));
         let nested = key.trim().rsplit('.').fold(value, |inner, name| {
             Value::Table(Table::from_iter([(name.to_owned(), inner)]))

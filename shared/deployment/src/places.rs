@@ -9,7 +9,7 @@ use crate::{ConfigError, slips};
 
 /// `file:line` of a span; the file alone where there is none.
 pub(super) fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> String {
-    let Some(before) = span.and_then(|it| text.get(..it.start)) else {
+    let Some(before) = span.and_then(|span| text.get(..span.start)) else {
         return file.display().to_string();
     };
     let line = 1 + before.matches('\n').count();
@@ -36,8 +36,8 @@ pub(super) fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
 pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> ConfigError {
     let place = place(file, text, error.span());
     let at = error.span();
-    let line = at.as_ref().and_then(|it| {
-        let begin = text.get(..it.start)?.rfind('\n').map_or(0, |it| it + 1);
+    let line = at.as_ref().and_then(|at| {
+        let begin = text.get(..at.start)?.rfind('\n').map_or(0, |text| text + 1);
         text[begin..].lines().next()
     });
     if let Some(message) = slips::other_file(text).or_else(|| slips::of_line(line?)) {
@@ -58,7 +58,7 @@ pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> Con
 /// What is wrong with an option `--set`, with its key.
 pub(super) fn of_set(error: &toml::de::Error) -> ConfigError {
     let said = error.to_string();
-    let key = said.split("in `").nth(1).and_then(|it| it.split('`').next());
+    let key = said.split("in `").nth(1).and_then(|part| part.split('`').next());
     ConfigError::explain("--set".to_owned(), error.message(), key)
 }
 
@@ -73,7 +73,7 @@ fn within(table: &DeTable<'_>, span: &Range<usize>) -> Option<String> {
         let inner = match value.get_ref() {
             DeValue::Table(it) => within(it, span),
             DeValue::Array(entries) => {
-                entries.iter().find_map(|it| within(it.get_ref().as_table()?, span))
+                entries.iter().find_map(|entry| within(entry.get_ref().as_table()?, span))
             }
             _ => None,
         };
@@ -81,7 +81,7 @@ fn within(table: &DeTable<'_>, span: &Range<usize>) -> Option<String> {
         if let Some(inner) = inner {
             return Some(format!("{name}.{inner}"));
         }
-        let holds = |it: Range<usize>| it.start <= span.start && span.end <= it.end;
+        let holds = |range: Range<usize>| range.start <= span.start && span.end <= range.end;
         holds(value.span()).then(|| name.clone().into_owned())
     })
 }

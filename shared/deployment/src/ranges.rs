@@ -48,7 +48,7 @@ pub(crate) const RANGES: [(&str, f64, f64); 26] = [
 
 /// The least and the most of a key; of one without a row, none.
 pub(crate) fn range(key: &str) -> [f64; 2] {
-    let row = RANGES.iter().find(|it| it.0 == key);
+    let row = RANGES.iter().find(|range| range.0 == key);
     row.map_or([f64::NEG_INFINITY, f64::INFINITY], |&(_, least, most)| {
         [least, most]
     })

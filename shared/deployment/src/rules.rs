@@ -42,7 +42,8 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
 }
 
 fn name(name: &str) -> Result<(), Complaint> {
-    let good = |it: char| it.is_ascii_lowercase() || it.is_ascii_digit() || it == '-';
+    let good =
+        |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '-';
     demand(
         (1..=32).contains(&name.len()) && name.chars().all(good),
         "name",
@@ -310,7 +311,7 @@ fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Comp
     let is_one = services.iter().any(|&(service, n)| {
         name == service || (0..n).any(|index| name == process_name(service, Some(index)))
     });
-    let names: Vec<&str> = services.iter().map(|it| it.0).collect();
+    let names: Vec<&str> = services.iter().map(|service| service.0).collect();
     let names = names.join(", ");
     let expected = format!("{names}, or one process of these, such as pose-0");
     demand(is_one, key, &format!("{name:?}"), &expected)

@@ -50,7 +50,7 @@ fn numbers_of(schema: &Value, key: &str) -> Option<Vec<String>> {
         }
         let kinds = [&node["type"]];
         let mut kinds = kinds.into_iter().chain(node["type"].as_array().into_iter().flatten());
-        if kinds.any(|it| it == "integer" || it == "number") {
+        if kinds.any(|kind| kind == "integer" || kind == "number") {
             found.push(at);
         }
     }
@@ -60,7 +60,7 @@ fn numbers_of(schema: &Value, key: &str) -> Option<Vec<String>> {
 /// A pointer to what a reference refers to; anything else is itself.
 fn resolved(schema: &Value, at: String) -> Option<String> {
     let reference = schema.pointer(&at)?["$ref"].as_str();
-    Some(reference.map_or(at, |it| it.trim_start_matches('#').to_owned()))
+    Some(reference.map_or(at, |reference| reference.trim_start_matches('#').to_owned()))
 }
 
 /// A whole number without a point.
@@ -126,7 +126,7 @@ impl Shapes {
         let schema = self.resolved(schema);
         for choice in ["anyOf", "oneOf"] {
             if let Some(choices) = schema[choice].as_array() {
-                let all = choices.iter().filter(|it| it["type"] != "null");
+                let all = choices.iter().filter(|choice| choice["type"] != "null");
                 return all.map(|it| self.takes(it)).collect::<Vec<_>>().join(" or ");
             }
         }
@@ -139,7 +139,7 @@ impl Shapes {
         }
         let types = schema["type"].as_array();
         let kind = types.map_or(&schema["type"], |types| {
-            let mut known = types.iter().filter(|it| *it != "null");
+            let mut known = types.iter().filter(|kind| *kind != "null");
             known.next().unwrap_or(&Value::Null)
         });
         match kind.as_str().unwrap_or_default() {
@@ -185,17 +185,17 @@ mod tests {
     #[test]
     fn every_number_has_the_range_that_the_rules_have() {
         let schema = schema();
-        for (key, least, most) in RANGES.into_iter().filter(|it| it.0 != "camera") {
+        for (key, least, most) in RANGES.into_iter().filter(|range| range.0 != "camera") {
             let places = numbers_of(&schema, key).unwrap_or_default();
             assert!(!places.is_empty(), "{key} has no number");
             for place in places {
                 let number = schema.pointer(&place).unwrap();
-                let bounds = ["minimum", "maximum"].map(|it| number[it].as_f64());
+                let bounds = ["minimum", "maximum"].map(|name| number[name].as_f64());
                 assert_eq!(bounds, [Some(least), Some(most)], "{place}");
             }
         }
-        for key in crate::keys().iter().filter(|it| it.takes.contains("number")) {
-            let has_range = RANGES.iter().any(|it| it.0 == key.name);
+        for key in crate::keys().iter().filter(|key| key.takes.contains("number")) {
+            let has_range = RANGES.iter().any(|range| range.0 == key.name);
             let needs_none = WITHOUT_RANGE.contains(&key.name.as_str());
             assert!(has_range != needs_none, "{}: what may it be?", key.name);
         }
@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn what_a_key_takes_is_told_in_words() {
         let keys = crate::keys();
-        let takes = |name: &str| keys.iter().find(|it| it.name == name).unwrap().takes.clone();
+        let takes = |name: &str| keys.iter().find(|key| key.name == name).unwrap().takes.clone();
         assert_eq!(takes("paper.workers"), "whole number");
         assert_eq!(takes("paper.energy"), "\"paper\" or \"released\"");
         assert_eq!(takes("paper.errors"), "text or table");

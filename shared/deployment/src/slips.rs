@@ -2,7 +2,8 @@
 
 /// What is to be said of a whole text that is none of a deployment; none where it may be one.
 pub(super) fn other_file(text: &str) -> Option<&'static str> {
-    let begins = |head: &str| text.lines().any(|it| it.trim_end() == head || it.starts_with(head));
+    let begins =
+        |head: &str| text.lines().any(|line| line.trim_end() == head || line.starts_with(head));
     if begins("format = \"parallax-rig\"") {
         return Some("this is a rig file: name the deployment file, whose `rig` it is");
     }
@@ -16,7 +17,7 @@ pub(super) fn other_file(text: &str) -> Option<&'static str> {
         "[filtering]",
         "[kinematics]",
     ];
-    let n = sections.iter().filter(|it| begins(it)).count();
+    let n = sections.iter().filter(|section| begins(section)).count();
     (n >= 3 && !begins("[[camera]]")).then_some(
         "this is a configuration of Pose2Sim: a deployment names the cameras, their videos and the calibration. `parallax new FOLDER \
          --camera cam01=videos/cam01.mp4 --camera cam02=videos/cam02.mp4 --rig calibration/Calib.toml` writes one of the same files",
@@ -31,7 +32,7 @@ pub(super) fn of_line(line: &str) -> Option<&'static str> {
     }
     let inside = value.strip_prefix('[')?.split(']').next()?;
     let mut words = inside.split_whitespace();
-    let is_number = |it: &str| it.parse::<f64>().is_ok();
+    let is_number = |text: &str| text.parse::<f64>().is_ok();
     let has_no_commas = inside.split_whitespace().count() > 1 && words.all(is_number);
     has_no_commas.then_some("the numbers of a list need commas between them: [0, 0, 1]")
 }

@@ -35,15 +35,15 @@ pub struct Timeline {
 impl Timeline {
     /// The timelines of all cameras.
     pub fn all(clocks: &[OwnClock]) -> Vec<Self> {
-        let begin = clocks.iter().map(|it| it.offset_s);
+        let begin = clocks.iter().map(|clock| clock.offset_s);
         let begin = begin.fold(f64::NEG_INFINITY, f64::max);
-        let rates = clocks.iter().map(|it| it.rate_hz / (1.0 + it.drift));
+        let rates = clocks.iter().map(|clock| clock.rate_hz / (1.0 + clock.drift));
         let instants_hz = rates.fold(f64::INFINITY, f64::min);
-        let of_camera = |it: &OwnClock| Self {
-            rate_hz: it.rate_hz,
+        let of_camera = |own_clock: &OwnClock| Self {
+            rate_hz: own_clock.rate_hz,
             instants_hz,
-            first_s: (begin - it.offset_s) / (1.0 + it.drift),
-            pace: 1.0 / (1.0 + it.drift),
+            first_s: (begin - own_clock.offset_s) / (1.0 + own_clock.drift),
+            pace: 1.0 / (1.0 + own_clock.drift),
         };
         clocks.iter().map(of_camera).collect()
     }
@@ -87,7 +87,9 @@ impl Deployment {
     /// Whether the footage of a camera has an offset or a drift, so that frames are brought to common instants.
     pub fn has_clocks(&self) -> bool {
         let mut cameras = self.cameras.iter();
-        cameras.any(|it| it.offset_ms.is_some() || it.drift_ppm.is_some_and(|it| it != 0.0))
+        cameras.any(|camera| {
+            camera.offset_ms.is_some() || camera.drift_ppm.is_some_and(|drift_ppm| drift_ppm != 0.0)
+        })
     }
 
     /// The clock of a camera's footage.
@@ -132,7 +134,7 @@ mod tests {
         let [first, second] = [all[0], all[1]];
         assert_eq!((second.frame(0), second.rest_nanos(0)), (0, 0));
         assert_eq!((first.frame(0), first.rest_nanos(0)), (10, -6_666_667));
-        assert_eq!([100, 5].map(|it| first.n_instants(it)), [90, 0]);
+        assert_eq!([100, 5].map(|i| first.n_instants(i)), [90, 0]);
         assert_eq!(second.n_instants(100), 100);
     }
 

@@ -75,13 +75,13 @@ pub(crate) fn services(deployment: &Deployment) -> Vec<(&'static str, usize)> {
         Stage::Fuse => deployment.most_workers(),
         Stage::Triangulate => 0,
     };
-    let stages = Stage::ALL.map(|it| (it.name(), of_stage(it)));
+    let stages = Stage::ALL.map(|stage| (stage.name(), of_stage(stage)));
     stages.into_iter().chain([(RESULTS, 0)]).collect()
 }
 
 /// The name of a process in its deployment: `pose-1`, or `results` where there is one of its service alone.
 pub(crate) fn process_name(service: &str, index: Option<usize>) -> String {
-    index.map_or(service.to_owned(), |it| format!("{service}-{it}"))
+    index.map_or(service.to_owned(), |index| format!("{service}-{index}"))
 }
 
 /// The file that every message of a run is recorded in.
@@ -175,15 +175,15 @@ impl Topology {
         };
         let is_replayed = |service: &str| {
             let stage = Stage::of_name(service);
-            let first = replay.map(|it| it.from);
+            let first = replay.map(|replay| replay.from);
             stage.zip(first).is_some_and(|(stage, first)| stage < first)
         };
         let builder = Builder {
             topology: &topology,
             has_quality: deployment.has_quality(),
             has_network: deployment.predicts_errors(),
-            with_evidence: recording.is_some_and(|it| !it.without_evidence),
-            pictures: recording.map_or(&[], |it| &it.pictures),
+            with_evidence: recording.is_some_and(|recording| !recording.without_evidence),
+            pictures: recording.map_or(&[], |recording| &recording.pictures),
         };
         let mut processes = builder.processes(recording.is_some());
         for it in &mut processes {
@@ -203,7 +203,7 @@ impl Topology {
 
     /// The process of that name.
     pub fn process(&self, name: &str) -> Option<&Process> {
-        self.processes.iter().find(|it| it.name == name)
+        self.processes.iter().find(|process| process.name == name)
     }
 
     /// The processes that send to another: each publishes a topic that it subscribes to.
@@ -269,7 +269,7 @@ impl Topology {
     }
 
     fn count(&self, is_meant: impl Fn(&Process) -> bool) -> usize {
-        self.processes.iter().filter(|it| is_meant(it)).count()
+        self.processes.iter().filter(|process| is_meant(process)).count()
     }
 }
 
@@ -427,7 +427,7 @@ fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
 
 /// The two cameras, ascending.
 fn indices(deployment: &Deployment, names: &[String; 2]) -> Option<[usize; 2]> {
-    let index = |name: &String| deployment.cameras.iter().position(|it| it.name == *name);
+    let index = |name: &String| deployment.cameras.iter().position(|camera| camera.name == *name);
     let [first, second] = [index(&names[0])?, index(&names[1])?];
     Some([first.min(second), first.max(second)])
 }

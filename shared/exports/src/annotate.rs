@@ -23,7 +23,7 @@ pub fn draw(canvas: &mut Canvas, trials: &[Trial], slot: usize, view: &ViewCamer
         return;
     };
     let status = &trial.slots[slot].status;
-    let time = trial.time_s(slot).map_or(String::new(), |it| format!(" {it:.3} s"));
+    let time = trial.time_s(slot).map_or(String::new(), |time_s| format!(" {time_s:.3} s"));
     let what = match &**status {
         "ok" => "",
         "" => " no result",
@@ -42,7 +42,7 @@ fn best(trials: &[Trial], slot: usize) -> Option<&Trial> {
 /// Draws a person; returns the upper left corner of what the view sees of it.
 fn person(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) -> Option<[f64; 2]> {
     let seen: Vec<Option<Seen>> =
-        trial.points(slot).map(|it| it.and_then(|it| view.see(it))).collect();
+        trial.points(slot).map(|point| point.and_then(|it| view.see(it))).collect();
     let names: Vec<&str> = trial.names().collect();
     let n_joints = trial.joints.joints.len();
     let width = line_width(canvas.size());
@@ -140,7 +140,7 @@ mod tests {
         let with = drawn(&trial, 0);
         trial.slots[0] = crate::Slot::default();
         let without = drawn(&trial, 0);
-        let lit = |rgb: &[u8]| rgb.iter().filter(|it| **it > 60).count();
+        let lit = |rgb: &[u8]| rgb.iter().filter(|rgb| **rgb > 60).count();
         assert!(lit(&with) > lit(&without) + 500 && lit(&without) > 100);
     }
 
@@ -155,7 +155,7 @@ mod tests {
         let lit = |trials: &[Trial], slot: usize| {
             let mut canvas = Canvas::new(Size::new(320, 240), [0; 3]);
             draw(&mut canvas, trials, slot, &camera());
-            canvas.rgb().iter().filter(|it| **it > 60).count()
+            canvas.rgb().iter().filter(|rgb| **rgb > 60).count()
         };
         assert!(lit(&pair, 0) > lit(&pair[..1], 0) + 500);
         assert!(lit(&pair, 1) > lit(&pair[..1], 1) + 500);

@@ -41,7 +41,7 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
         held.take(slot, posed, &is_there);
         let root = posed.place[0] * CM;
         write!(out, "{:.5} {:.5} {:.5}", root.x, root.y, root.z)?;
-        for index in (0..N_NODES).filter(|&it| has_channels(it, &is_there)) {
+        for index in (0..N_NODES).filter(|&i| has_channels(i, &is_there)) {
             let next = unwrapped(zxy(&posed.turn[index]), angles[index]);
             angles[index] = next;
             let [z, x, y] = next.map(f64::to_degrees);
@@ -56,7 +56,7 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
 fn is_there(lengths: &[Option<f64>; N_NODES]) -> [bool; N_NODES] {
     let mut is_there = [true; N_NODES];
     for (index, node) in NODES.iter().enumerate().skip(1) {
-        let parent = node.parent.is_none_or(|it| is_there[it]);
+        let parent = node.parent.is_none_or(|parent| is_there[parent]);
         let own = match (node.landmark, node.aim) {
             (None, Some(child)) => lengths[child].is_some(),
             _ => lengths[index].is_some(),
@@ -67,7 +67,7 @@ fn is_there(lengths: &[Option<f64>; N_NODES]) -> [bool; N_NODES] {
 }
 
 fn children(index: usize, is_there: &[bool; N_NODES]) -> impl Iterator<Item = usize> {
-    (0..N_NODES).filter(move |&it| is_there[it] && NODES[it].parent == Some(index))
+    (0..N_NODES).filter(move |&i| is_there[i] && NODES[i].parent == Some(index))
 }
 
 /// Ends of the tree have no channels.
@@ -129,7 +129,7 @@ fn zxy(turn: &UnitQuaternion<f64>) -> [f64; 3] {
 /// The same angles, each as near as whole turns bring it to the last ones, so that programs may interpolate.
 fn unwrapped(angles: [f64; 3], last: [f64; 3]) -> [f64; 3] {
     let turn = core::f64::consts::TAU;
-    core::array::from_fn(|it| angles[it] + ((last[it] - angles[it]) / turn).round() * turn)
+    core::array::from_fn(|i| angles[i] + ((last[i] - angles[i]) / turn).round() * turn)
 }
 
 /// Frames in which something stays as it was.
@@ -144,8 +144,8 @@ struct Held {
 
 impl Held {
     fn take(&mut self, slot: usize, posed: &Posed, is_there: &[bool; N_NODES]) {
-        let turning = (0..N_NODES).filter(|&it| has_channels(it, is_there));
-        let n_held = turning.clone().filter(|&it| !posed.is_turn_seen[it]).count();
+        let turning = (0..N_NODES).filter(|&i| has_channels(i, is_there));
+        let n_held = turning.clone().filter(|&turning| !posed.is_turn_seen[turning]).count();
         if n_held == 0 && posed.seen[0].is_some() {
             return;
         }

@@ -108,10 +108,10 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
 fn places_at_rest(lengths: &[Option<f64>; N_NODES]) -> [Vector3<f64>; N_NODES] {
     let mut places = [Vector3::zeros(); N_NODES];
     for (index, node) in NODES.iter().enumerate().skip(1) {
-        let from = node.parent.map_or_else(Vector3::zeros, |it| places[it]);
+        let from = node.parent.map_or_else(Vector3::zeros, |parent| places[parent]);
         places[index] = from + Vector3::from(node.rest) * lengths[index].unwrap_or(UNSEEN_M);
     }
-    let lowest = places.iter().map(|it| it.y).fold(0.0, f64::min);
+    let lowest = places.iter().map(|place| place.y).fold(0.0, f64::min);
     for place in &mut places {
         place.y -= lowest;
     }
@@ -125,7 +125,10 @@ const fn in_file(node: usize) -> usize {
 
 fn bones(lengths: &[Option<f64>; N_NODES], rest: &[Vector3<f64>; N_NODES]) -> Vec<Piece> {
     let all = NODES.iter().enumerate().filter_map(|(index, node)| {
-        let (length, parent) = (lengths[index].filter(|it| *it > SHORTEST_M)?, node.parent?);
+        let (length, parent) = (
+            lengths[index].filter(|length| *length > SHORTEST_M)?,
+            node.parent?,
+        );
         let width = (0.25 * length).clamp(0.03, 0.09);
         let along = UnitQuaternion::rotation_between(&Vector3::y(), &node.rest.into());
         let down = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI);
@@ -181,13 +184,13 @@ fn mesh(pieces: &[Piece]) -> Mesh {
 /// The skin: all nodes of the tree, then those of the pieces.
 fn skin(store: &mut Store, rest: &[Vector3<f64>; N_NODES], pieces: &[Piece]) -> Value {
     let of_tree = rest.iter().map(|it| Matrix4::new_translation(&-it));
-    let of_pieces = pieces.iter().map(|it| {
-        let shrink = Matrix4::new_nonuniform_scaling(&it.scale.map(|side| 1.0 / side));
-        shrink * it.in_scene.inverse().to_homogeneous()
+    let of_pieces = pieces.iter().map(|piece| {
+        let shrink = Matrix4::new_nonuniform_scaling(&piece.scale.map(|side| 1.0 / side));
+        shrink * piece.in_scene.inverse().to_homogeneous()
     });
     let matrices: Vec<f32> = of_tree
         .chain(of_pieces)
-        .flat_map(|it| it.as_slice().iter().map(|it| *it as f32).collect::<Vec<_>>())
+        .flat_map(|it| it.as_slice().iter().map(|value| *value as f32).collect::<Vec<_>>())
         .collect();
     let joints: Vec<usize> = (0..N_NODES + pieces.len()).map(in_file).collect();
     json!({
@@ -215,7 +218,7 @@ fn nodes(trial: &Trial, rest: &[Vector3<f64>; N_NODES], pieces: &[Piece]) -> Vec
     };
     let mut nodes = vec![json!({ "name": trial.name, "children": children(0) })];
     for (index, node) in NODES.iter().enumerate() {
-        let from = node.parent.map_or_else(Vector3::zeros, |it| rest[it]);
+        let from = node.parent.map_or_else(Vector3::zeros, |parent| rest[parent]);
         let mut value = json!({ "name": node.name, "translation": real3(rest[index] - from) });
         let children = children(in_file(index));
         if !children.is_empty() {
@@ -223,12 +226,12 @@ fn nodes(trial: &Trial, rest: &[Vector3<f64>; N_NODES], pieces: &[Piece]) -> Vec
         }
         nodes.push(value);
     }
-    nodes.extend(pieces.iter().map(|it| {
+    nodes.extend(pieces.iter().map(|piece| {
         json!({
-            "name": it.name,
-            "translation": real3(it.rest.translation.vector),
-            "rotation": real4(&it.rest.rotation),
-            "scale": real3(it.scale),
+            "name": piece.name,
+            "translation": real3(piece.rest.translation.vector),
+            "rotation": real4(&piece.rest.rotation),
+            "scale": real3(piece.scale),
         })
     }));
     nodes.push(json!({ "name": "body", "mesh": 0, "skin": 0 }));
@@ -262,7 +265,7 @@ impl Tracks {
             scales: vec![Vec::new(); pieces.len()],
             marks: vec![Vec::new(); pieces.len()],
         };
-        let at_rest = lengths.map(|it| it.or(Some(UNSEEN_M)));
+        let at_rest = lengths.map(|length| length.or(Some(UNSEEN_M)));
         let mut poser = Poser::new(trial, &at_rest);
         let world = trial.y_up_from_world();
         let mut last = [Quaternion::identity(); N_NODES];
@@ -279,7 +282,7 @@ impl Tracks {
             for (nth, piece) in pieces.iter().enumerate() {
                 match piece.of {
                     Of::Bone(node) => {
-                        let ends = anchor(node).and_then(|it| posed.seen[it]).zip(posed.seen[node]);
+                        let ends = anchor(node).and_then(|i| posed.seen[i]).zip(posed.seen[node]);
                         let width = piece.scale.x;
                         let scale =
                             ends.map(|(from, to)| Vector3::new(width, (to - from).norm(), width));
@@ -290,8 +293,10 @@ impl Tracks {
                         let n = tracks.marks[nth].len();
                         let held = tracks.marks[nth].get(n.wrapping_sub(3)..).map(<[f32]>::to_vec);
                         let rest = || real3(piece.rest.translation.vector).to_vec();
-                        let place = place
-                            .map_or_else(|| held.unwrap_or_else(rest), |it| real3(it).to_vec());
+                        let place = place.map_or_else(
+                            || held.unwrap_or_else(rest),
+                            |place| real3(place).to_vec(),
+                        );
                         tracks.marks[nth].extend(place);
                         let size = f64::from(u8::from(trial.point(slot, point).is_some()));
                         tracks.scales[nth].extend(real3(Vector3::repeat(size)));
@@ -353,7 +358,7 @@ fn extras(trial: &Trial) -> Value {
     let of_point = |(nth, label): (usize, String)| {
         let deviations: Vec<Option<f64>> = (0..trial.slots.len())
             .map(|slot| trial.point(slot, nth).and_then(Point::deviation_m))
-            .map(|it| it.map(|it| (it * 1e5).round() / 1e5))
+            .map(|it| it.map(|value| (value * 1e5).round() / 1e5))
             .collect();
         let value = json!({ "standard_deviation_m": deviations, "gaps": trial.gaps(nth), "filled": trial.filled(nth) });
         (label, value)

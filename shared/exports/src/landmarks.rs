@@ -15,15 +15,15 @@ impl Landmarks {
     pub(crate) fn of(trial: &Trial) -> Self {
         let at = |name: &str| trial.names().position(|it| it == name);
         let points = LANDMARKS.map(|(landmark, names)| {
-            let one = names.iter().find_map(|it| at(it));
+            let one = names.iter().find_map(|name| at(name));
             (landmark, one.into_iter().collect())
         });
         let mut all = Self {
             points: points.into(),
         };
         // A set without a pelvis has it in the middle of the hips.
-        let hips = ["left hip", "right hip"].map(|it| all.points_of(it).to_vec());
-        if all.points_of("pelvis").is_empty() && hips.iter().all(|it| it.len() == 1) {
+        let hips = ["left hip", "right hip"].map(|name| all.points_of(name).to_vec());
+        if all.points_of("pelvis").is_empty() && hips.iter().all(|hip| hip.len() == 1) {
             all.points[0].1 = hips.concat();
         }
         all
@@ -31,7 +31,7 @@ impl Landmarks {
 
     /// The points whose mean is the landmark; none where there is none.
     pub(crate) fn points_of(&self, landmark: &str) -> &[usize] {
-        let found = self.points.iter().find(|it| it.0 == landmark);
+        let found = self.points.iter().find(|point| point.0 == landmark);
         found.map_or(&[], |it| &it.1)
     }
 

@@ -21,8 +21,11 @@ pub(crate) const LANDMARKS: [(&str, &[&str]); 15] = [
 
 /// The landmark of a joint of HumanEva-I's set; any other name as it is.
 fn plain_name(joint: &str) -> &str {
-    let is_humaneva = joint.contains(|it: char| it.is_ascii_uppercase());
-    let found = LANDMARKS.iter().filter(|_| is_humaneva).find(|it| it.1.contains(&joint));
+    let is_humaneva = joint.contains(|letter: char| letter.is_ascii_uppercase());
+    let found = LANDMARKS
+        .iter()
+        .filter(|_| is_humaneva)
+        .find(|landmark| landmark.1.contains(&joint));
     found.map_or(joint, |it| it.0)
 }
 
@@ -51,7 +54,7 @@ fn opensim(name: &str) -> String {
     if name == "pelvis" {
         return "Hip".to_owned();
     }
-    let mut words: Vec<&str> = name.split([' ', '_']).filter(|it| !it.is_empty()).collect();
+    let mut words: Vec<&str> = name.split([' ', '_']).filter(|part| !part.is_empty()).collect();
     if let [side @ ("left" | "right"), _, ..] = &mut words[..] {
         *side = if *side == "left" { "l" } else { "r" };
     }
@@ -101,21 +104,31 @@ mod tests {
             "LHeel",
             "RHeel",
         ];
-        let own = HALPE_26.map(|it| if it == "head top" { "head" } else { it });
+        let own = HALPE_26.map(|halpe_26| {
+            if halpe_26 == "head top" {
+                "head"
+            } else {
+                halpe_26
+            }
+        });
         assert_eq!(own.map(|it| Naming::OpenSim.apply(it)), due);
     }
 
     #[test]
     fn joints_of_every_set_keep_different_names() {
         for set in JointSet::ALL {
-            let names = set.joints.iter().map(|it| Naming::OpenSim.apply(it.name));
+            let names = set.joints.iter().map(|joint| Naming::OpenSim.apply(joint.name));
             let names: Vec<String> = names.collect();
             for (nth, name) in names.iter().enumerate() {
                 assert!(!names[..nth].contains(name), "{}: {name} twice", set.name);
                 assert!(!name.contains(' '), "{name}");
             }
             for due in ["RAnkle", "LKnee", "RShoulder", "LWrist", "Head"] {
-                assert!(names.iter().any(|it| it == due), "{}: {names:?}", set.name);
+                assert!(
+                    names.iter().any(|name| name == due),
+                    "{}: {names:?}",
+                    set.name
+                );
             }
         }
     }

@@ -32,7 +32,7 @@ fn person(trial: &Trial, id: Option<u64>, slot: usize, view: &ViewCamera) -> Opt
             let deviation = seen.deviation_px().unwrap_or(f64::NAN);
             [seen.at[0], seen.at[1], share, deviation]
         });
-        numbers.extend([x, y, share].map(|it| (it * 1e4).round() / 1e4));
+        numbers.extend([x, y, share].map(|value| (value * 1e4).round() / 1e4));
         deviations.push((deviation * 1e2).round() / 1e2);
     }
     let id = id.map_or(Value::from(-1), Value::from);
@@ -63,15 +63,15 @@ fn keypoint(
         [] => vec![trial.names().position(|it| it == name)?],
         points => points.to_vec(),
     };
-    let all: Option<Vec<_>> = points.iter().map(|&it| trial.point(slot, it)).collect();
+    let all: Option<Vec<_>> = points.iter().map(|&point| trial.point(slot, point)).collect();
     let all = all?;
     let n = all.len() as f64;
     let mut mean = **all.first()?;
     mean.in_world = landmarks.at(trial, slot, name).unwrap_or(mean.in_world);
     if all.len() > 1 {
         // The errors of its joints are taken as independent.
-        mean.covariance = core::array::from_fn(|it| {
-            all.iter().map(|point| point.covariance[it]).sum::<f64>() / (n * n)
+        mean.covariance = core::array::from_fn(|i| {
+            all.iter().map(|point| point.covariance[i]).sum::<f64>() / (n * n)
         });
         mean.views = all.iter().fold(u32::MAX, |both, it| both & it.views);
     }
@@ -100,7 +100,7 @@ mod tests {
         let read = openpose::parse(text.as_bytes(), None).unwrap().people;
         assert_eq!(read.len(), 1);
         let knee = BODY_25.iter().position(|it| *it == "left knee").unwrap();
-        let index = trial.names().position(|it| it == "left knee").unwrap();
+        let index = trial.names().position(|name| name == "left knee").unwrap();
         let due = view.see(trial.point(1, index).unwrap()).unwrap();
         let found = read[0].keypoints[knee].unwrap();
         for axis in 0..2 {

@@ -60,40 +60,46 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
         let mut group = file.next_row_group()?;
         let frames: Vec<i64> = places
             .iter()
-            .map(|it| i64::try_from(trial.frame(it.0)).unwrap_or(i64::MAX))
+            .map(|place| i64::try_from(trial.frame(place.0)).unwrap_or(i64::MAX))
             .collect();
         column::<Int64Type, _>(&mut group, &frames, None)?;
-        numbers(&mut group, places.iter().map(|it| trial.time_s(it.0)))?;
+        numbers(&mut group, places.iter().map(|place| trial.time_s(place.0)))?;
         let ids = || places.iter().map(|place| trial.id_at(place.0));
         let known: Vec<i64> =
             ids().flatten().map(|id| i64::try_from(id).unwrap_or(i64::MAX)).collect();
         let levels: Vec<i16> = ids().map(|id| i16::from(id.is_some())).collect();
         column::<Int64Type, _>(&mut group, &known, Some(&levels))?;
-        texts(&mut group, places.iter().map(|it| names[it.1].clone()))?;
+        texts(
+            &mut group,
+            places.iter().map(|place| names[place.1].clone()),
+        )?;
         let point = |it: &(usize, usize)| trial.point(it.0, it.1);
         for axis in 0..3 {
             numbers(
                 &mut group,
-                places.iter().map(|it| Some(point(it)?.in_world[axis])),
-            )?;
-        }
-        numbers(&mut group, places.iter().map(|it| point(it)?.deviation_m()))?;
-        for entry in 0..6 {
-            numbers(
-                &mut group,
-                places.iter().map(|it| Some(point(it)?.covariance[entry])),
+                places.iter().map(|place| Some(point(place)?.in_world[axis])),
             )?;
         }
         numbers(
             &mut group,
-            places.iter().map(|it| point(it)?.reprojection_px),
+            places.iter().map(|place| point(place)?.deviation_m()),
         )?;
-        let named = |it: &Point| views(trial, it);
+        for entry in 0..6 {
+            numbers(
+                &mut group,
+                places.iter().map(|place| Some(point(place)?.covariance[entry])),
+            )?;
+        }
+        numbers(
+            &mut group,
+            places.iter().map(|place| point(place)?.reprojection_px),
+        )?;
+        let named = |point: &Point| views(trial, point);
         texts(
             &mut group,
-            places.iter().map(|it| point(it).map_or(String::new(), named)),
+            places.iter().map(|place| point(place).map_or(String::new(), named)),
         )?;
-        let states = places.iter().map(|it| state(trial, it.0, it.1).to_owned());
+        let states = places.iter().map(|place| state(trial, place.0, place.1).to_owned());
         texts(&mut group, states)?;
         group.close()?;
     }
@@ -117,7 +123,7 @@ fn numbers<W: Write + Send>(
     group: &mut SerializedRowGroupWriter<'_, W>,
     all: impl Iterator<Item = Option<f64>>,
 ) -> Result<(), ParquetError> {
-    let all: Vec<Option<f64>> = all.map(|it| it.filter(|it| it.is_finite())).collect();
+    let all: Vec<Option<f64>> = all.map(|it| it.filter(|value| value.is_finite())).collect();
     let levels: Vec<i16> = all.iter().map(|it| i16::from(it.is_some())).collect();
     let values: Vec<f64> = all.into_iter().flatten().collect();
     column::<DoubleType, _>(group, &values, Some(&levels))

@@ -39,18 +39,18 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
         software: ["Parallax", env!("CARGO_PKG_VERSION")],
     };
     let turn = trial.z_up_from_world();
-    let marker = |it: &Point| Marker {
-        position: (turn * it.in_world * 1e3).into(),
+    let marker = |point: &Point| Marker {
+        position: (turn * point.in_world * 1e3).into(),
         // The format says that a residual of 0 is a point that was not measured.
-        residual: if it.is_filled {
+        residual: if point.is_filled {
             0.0
         } else {
-            1e3 * it.deviation_m().unwrap_or(0.0)
+            1e3 * point.deviation_m().unwrap_or(0.0)
         },
-        cameras: (it.views & C3D_CAMERAS) as u8,
+        cameras: (point.views & C3D_CAMERAS) as u8,
     };
     let frames = (0..trial.slots.len()).map(|slot| {
-        let points = trial.points(slot).map(|it| it.map(marker));
+        let points = trial.points(slot).map(|point| point.map(marker));
         points.collect()
     });
     formats::c3d::write(&mut out, &heading, frames)?;
@@ -69,8 +69,11 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
 
 /// TRC: metres, y up, as `pose3d.trc` of a run.
 pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
-    let labels: Vec<String> =
-        trial.labels().iter().map(|it| it.replace(['\t', '\n', '\r'], "_")).collect();
+    let labels: Vec<String> = trial
+        .labels()
+        .iter()
+        .map(|label| label.replace(['\t', '\n', '\r'], "_"))
+        .collect();
     let heading = formats::trc::Heading {
         file_name: &format!("{}.trc", trial.name),
         rate_hz: rate(trial)?,
@@ -81,7 +84,7 @@ pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     write!(out, "{heading}")?;
     let turn = trial.y_up_from_world();
     for slot in 0..trial.slots.len() {
-        let points = trial.points(slot).map(|it| it.map(|it| (turn * it.in_world).into()));
+        let points = trial.points(slot).map(|point| point.map(|it| (turn * it.in_world).into()));
         let time_s = trial.time_s(slot).unwrap_or(0.0);
         out.write_all(formats::trc::row(slot as u64 + 1, time_s, points).as_bytes())?;
     }

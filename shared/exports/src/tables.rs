@@ -28,12 +28,12 @@ const LONG: [&str; 17] = [
 
 /// A number as short as it can be and still be the same; empty where there is none.
 fn cell(number: Option<f64>) -> String {
-    let number = number.filter(|it| it.is_finite());
-    number.map_or(String::new(), |it| it.to_string())
+    let number = number.filter(|number| number.is_finite());
+    number.map_or(String::new(), |number| number.to_string())
 }
 
 fn place(point: Option<&Point>) -> [String; 4] {
-    let axis = |axis: usize| cell(point.map(|it| it.in_world[axis]));
+    let axis = |axis: usize| cell(point.map(|point| point.in_world[axis]));
     let deviation = cell(point.and_then(Point::deviation_m));
     [axis(0), axis(1), axis(2), deviation]
 }
@@ -72,9 +72,9 @@ pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
             let point = trial.point(slot, nth);
             let mut row = vec![frame.clone(), time_s.clone(), person.clone(), name.clone()];
             row.extend(place(point));
-            row.extend((0..6).map(|it| cell(point.map(|point| point.covariance[it]))));
-            row.push(cell(point.and_then(|it| it.reprojection_px)));
-            row.push(point.map_or(String::new(), |it| views(trial, it)));
+            row.extend((0..6).map(|i| cell(point.map(|point| point.covariance[i]))));
+            row.push(cell(point.and_then(|point| point.reprojection_px)));
+            row.push(point.map_or(String::new(), |point| views(trial, point)));
             row.push(state(trial, slot, nth).to_owned());
             table.write_record(&row)?;
         }
@@ -108,6 +108,6 @@ pub(crate) fn state(trial: &Trial, slot: usize, point: usize) -> &str {
 /// The views that a point is from.
 pub(crate) fn views(trial: &Trial, point: &Point) -> String {
     let named = trial.views.iter().enumerate();
-    let seen = named.filter(|it| it.0 < 32 && point.views >> it.0 & 1 == 1);
+    let seen = named.filter(|named| named.0 < 32 && point.views >> named.0 & 1 == 1);
     seen.map(|it| it.1.as_str()).collect::<Vec<_>>().join("+")
 }

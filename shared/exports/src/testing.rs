@@ -60,7 +60,7 @@ pub(crate) fn line(frame: u64, rate_hz: Option<f64>) -> FrameLine {
         reason: None,
         seen: None,
         status: FrameLine::OK.to_owned(),
-        time_s: rate_hz.map(|it| frame as f64 / it),
+        time_s: rate_hz.map(|rate_hz| frame as f64 / rate_hz),
         views_missing: BTreeMap::new(),
         views_present: Vec::new(),
     }

@@ -152,7 +152,7 @@ impl<'a> Poser<'a> {
             }
             places[node] = parent_place + parent_turn * posed.place[node];
             let turn = match (node, NODES[node].aim) {
-                (0, _) => facing(&posed.seen).map(|it| parent_turn.inverse() * it),
+                (0, _) => facing(&posed.seen).map(|value| parent_turn.inverse() * value),
                 (_, Some(child)) => towards(&posed.seen, node, child)
                     .map(|to| arc(&NODES[child].rest.into(), &(parent_turn.inverse() * to))),
                 (_, None) => Some(UnitQuaternion::identity()),
@@ -221,7 +221,7 @@ pub(crate) fn lengths(trial: &Trial) -> [Option<f64>; N_NODES] {
     for slot in 0..trial.slots.len() {
         let seen = seen(trial, &landmarks, &none, slot);
         for (node, lengths) in all.iter_mut().enumerate() {
-            let ends = anchor(node).and_then(|it| seen[it]).zip(seen[node]);
+            let ends = anchor(node).and_then(|i| seen[i]).zip(seen[node]);
             lengths.extend(ends.map(|(from, to)| (to - from).norm()));
         }
     }
@@ -260,8 +260,8 @@ mod tests {
             for node in 0..N_NODES {
                 let (turn, place) = NODES[node]
                     .parent
-                    .map_or((UnitQuaternion::identity(), Point3::origin()), |it| {
-                        (turns[it], places[it])
+                    .map_or((UnitQuaternion::identity(), Point3::origin()), |parent| {
+                        (turns[parent], places[parent])
                     });
                 turns[node] = turn * posed.turn[node];
                 places[node] = place + turn * posed.place[node];

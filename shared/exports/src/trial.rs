@@ -37,7 +37,7 @@ impl Point {
     pub fn covariance(&self) -> Option<Matrix3<f64>> {
         let [xx, xy, xz, yy, yz, zz] = self.covariance;
         let all = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-        all.iter().all(|it| it.is_finite()).then_some(all)
+        all.iter().all(|value| value.is_finite()).then_some(all)
     }
 
     /// Root mean square distance that it is expected to be off, metres; none where that is not known.
@@ -97,19 +97,19 @@ pub struct Trial {
 impl Trial {
     /// Names of all points: joints, then extra keypoints.
     pub fn names(&self) -> impl Iterator<Item = &str> {
-        let joints = self.joints.joints.iter().map(|it| it.name);
+        let joints = self.joints.joints.iter().map(|joint| joint.name);
         joints.chain(self.extras.iter().map(String::as_str))
     }
 
     /// Names of all points in files of text.
     pub fn written_names(&self) -> Vec<String> {
-        self.names().map(|it| self.naming.apply(it)).collect()
+        self.names().map(|name| self.naming.apply(name)).collect()
     }
 
     /// The same with underscores for blanks, as formats of motion capture want.
     pub fn labels(&self) -> Vec<String> {
         let names = self.written_names().into_iter();
-        names.map(|it| it.replace(' ', "_")).collect()
+        names.map(|name| name.replace(' ', "_")).collect()
     }
 
     /// The lowest identity of the person.
@@ -161,7 +161,7 @@ impl Trial {
 
     fn runs(&self, is_in: impl Fn(usize) -> bool) -> Vec<[u64; 2]> {
         let mut runs: Vec<[u64; 2]> = Vec::new();
-        for slot in (0..self.slots.len()).filter(|&it| is_in(it)) {
+        for slot in (0..self.slots.len()).filter(|&i| is_in(i)) {
             let frame = self.frame(slot);
             match runs.last_mut() {
                 Some(run) if run[1] + self.frame_step == frame => run[1] = frame,
@@ -324,7 +324,7 @@ impl Gathering {
             Some(JointLine::Missing { status }) => return Err(Gap(status.as_str().into())),
             Some(JointLine::Placed(placed)) => placed,
         };
-        let is_place = |it: &f64| it.is_finite() && it.abs() <= MAX_COORDINATE;
+        let is_place = |value: &f64| value.is_finite() && value.abs() <= MAX_COORDINATE;
         if !placed.position_m.iter().all(is_place) {
             return Err(Gap("out of range".into()));
         }
@@ -332,7 +332,9 @@ impl Gathering {
         Ok(Point {
             in_world: placed.position_m.into(),
             covariance: placed.covariance_m2,
-            reprojection_px: placed.reprojection_px.filter(|it| it.is_finite()),
+            reprojection_px: placed
+                .reprojection_px
+                .filter(|reprojection_px| reprojection_px.is_finite()),
             views: views.fold(0, |all, it| all | 1_u32.checked_shl(it).unwrap_or(0)),
             is_filled: person
                 .states
@@ -343,7 +345,7 @@ impl Gathering {
 
     /// The number of a view.
     fn view(&mut self, name: &str) -> u32 {
-        let at = self.views.iter().position(|it| it == name);
+        let at = self.views.iter().position(|view| view == name);
         let at = at.unwrap_or_else(|| {
             self.views.push(name.to_owned());
             self.views.len() - 1

@@ -46,7 +46,7 @@ impl ViewCamera {
             let it = jacobian * it * jacobian.transpose();
             [it[(0, 0)], it[(0, 1)], it[(1, 1)]]
         });
-        at.iter().all(|it| it.is_finite()).then_some(Seen { at, covariance })
+        at.iter().all(|value| value.is_finite()).then_some(Seen { at, covariance })
     }
 
     /// Whether a pixel lies in the picture.

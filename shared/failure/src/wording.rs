@@ -18,7 +18,7 @@ pub use table::Table;
 #[must_use]
 pub fn shell(word: impl Display) -> String {
     let word = word.to_string();
-    let is_plain = |it: char| it.is_alphanumeric() || "-_./:,=@%+".contains(it);
+    let is_plain = |letter: char| letter.is_alphanumeric() || "-_./:,=@%+".contains(letter);
     if !word.is_empty() && word.chars().all(is_plain) {
         return word;
     }

@@ -25,13 +25,13 @@ pub(crate) fn cuts(source: &Source<'_>, first: usize, cuts: &mut Vec<Cut>) {
     cuts.resize(levels.len(), nothing);
     for (octave, level) in levels.enumerate().rev() {
         let of_axis = |axis: usize| {
-            let below = cuts.get(octave + 1).map(|it| it.on(axis));
+            let below = cuts.get(octave + 1).map(|cut| cut.on(axis));
             // As many cells as become one on the smallest level of the chain.
             let grid = source.cell_px << (cuts.len() - 1 - octave);
             let own = needed(source, level, axis);
-            let twice = below.map(|it| {
-                let begin = it.start.saturating_sub(source.cell_px);
-                2 * begin..2 * (it.end + source.cell_px)
+            let twice = below.map(|below| {
+                let begin = below.start.saturating_sub(source.cell_px);
+                2 * begin..2 * (below.end + source.cell_px)
             });
             let both = match (own, twice) {
                 (Some(a), Some(b)) => a.start.min(b.start)..a.end.max(b.end),
@@ -48,7 +48,7 @@ pub(crate) fn cuts(source: &Source<'_>, first: usize, cuts: &mut Vec<Cut>) {
     }
     // The sizes that halving the first cut gives.
     for octave in 1..cuts.len() {
-        let half = |it: Range<usize>| it.start / 2..it.end.div_ceil(2);
+        let half = |range: Range<usize>| range.start / 2..range.end.div_ceil(2);
         cuts[octave] = Cut {
             x: half(cuts[octave - 1].x.clone()),
             y: half(cuts[octave - 1].y.clone()),

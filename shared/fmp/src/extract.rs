@@ -43,10 +43,10 @@ impl Extractor {
     fn with(pack: fn(Isa, &[Template<'_>]) -> FilterBank, isa: Isa, model: Arc<Model>) -> Self {
         let filters = model.spec().filters.iter();
         let templates: Vec<_> = filters
-            .map(|it| Template {
-                rows: it.rows,
-                cols: it.cols,
-                weights: &it.weights,
+            .map(|filter| Template {
+                rows: filter.rows,
+                cols: filter.cols,
+                weights: &filter.weights,
             })
             .collect();
         let bank = pack(isa, &templates);
@@ -141,7 +141,7 @@ impl Extractor {
 
     /// Makes room for every thread.
     fn reserve(&self, layout: &Layout, n_threads: usize) {
-        let cols = layout.levels.iter().map(|it| it.cols).max().unwrap_or(0);
+        let cols = layout.levels.iter().map(|level| level.cols).max().unwrap_or(0);
         let mut buffers = lock(&self.buffers);
         let n_buffers = buffers.len().max(n_threads);
         buffers.resize_with(n_buffers, CorrelateWorkspace::default);
@@ -188,7 +188,7 @@ impl Extractor {
     fn work(&self, source: &Source<'_>, part: &Part) -> usize {
         let windows = part.levels.clone();
         let windows = windows.map(|level| source.layout.window(source.scope, level));
-        let area: usize = windows.map(|it| it.rows * it.cols).sum();
+        let area: usize = windows.map(|window| window.rows * window.cols).sum();
         area * self.bank.filters(part.panels.clone()).len()
     }
 

@@ -139,7 +139,7 @@ pub fn write(path: &Path, model: &Model) -> Result<(), ModelFileError> {
 
 fn parse(path: &Path, bytes: &[u8]) -> Result<ModelSpec, ModelFileError> {
     let path = path.to_owned();
-    let stem = path.file_stem().map(|it| it.to_string_lossy().into_owned());
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     if bytes.starts_with(&own::MAGIC) {
         return own::decode(bytes).map_err(|source| ModelFileError::Own { path, source });
     }
@@ -162,9 +162,9 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<ModelSpec, ModelFileError> {
 /// The first characters, those that cannot be shown as dots.
 fn beginning(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(16)]);
-    let shown = |it: char| {
-        let is_odd = it.is_control() || it == char::REPLACEMENT_CHARACTER;
-        if is_odd { '.' } else { it }
+    let shown = |letter: char| {
+        let is_odd = letter.is_control() || letter == char::REPLACEMENT_CHARACTER;
+        if is_odd { '.' } else { letter }
     };
     text.chars().map(shown).collect()
 }

@@ -123,9 +123,9 @@ impl Layout {
 
     /// Number of response values of all levels and filters.
     pub fn n_responses(&self) -> usize {
-        self.levels
-            .last()
-            .map_or(0, |it| it.offset + it.rows * it.cols * self.n_filters)
+        self.levels.last().map_or(0, |level| {
+            level.offset + level.rows * level.cols * self.n_filters
+        })
     }
 
     /// Where the response map of a filter lies in the array of responses.

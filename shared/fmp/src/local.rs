@@ -37,7 +37,7 @@ pub fn local_scores(model: &Model, evidence: &Responses<'_>, pose: &Pose) -> Vec
         let at = |filter: usize| evidence.map(level, filter)[row * window.cols + col];
         let response = at(filters[own]);
         let others = filters.iter().enumerate().filter(|it| it.0 != own);
-        let best_other = others.map(|it| at(*it.1)).reduce(f32::max);
+        let best_other = others.map(|other| at(*other.1)).reduce(f32::max);
         let map = evidence.map(level, filters[own]);
         let (mut sum, mut count) = (0.0, 0.0);
         for y in row.saturating_sub(REACH)..(row + REACH + 1).min(window.rows) {
@@ -49,7 +49,7 @@ pub fn local_scores(model: &Model, evidence: &Responses<'_>, pose: &Pose) -> Vec
         LocalScore {
             response,
             contrast: response - sum / count,
-            margin: best_other.map_or(0.0, |it| response - it),
+            margin: best_other.map_or(0.0, |best_other| response - best_other),
         }
     };
     (0..pose.parts.len()).map(local).collect()

@@ -33,7 +33,7 @@ pub fn pyramid(model: &Model, layout: &Layout, image: Rgb8View<'_>) -> Vec<Plane
 pub fn features(model: &Model, layout: &Layout, image: &Planes) -> Vec<f64> {
     let shape = HogShape {
         cell_px: model.spec().cell_px,
-        pad: layout.pad.map(|it| it + 1),
+        pad: layout.pad.map(|pad| pad + 1),
     };
     hog_f64(image, shape)
 }
@@ -126,7 +126,7 @@ pub fn solve(model: &Model, responses: &[Vec<f64>], size: [usize; 2]) -> Solutio
     let parts = &model.spec().parts;
     let own = |part: &crate::PartSpec| {
         let filters = part.filter_of_type.iter();
-        filters.map(|&it| responses[it].clone()).collect::<Vec<_>>()
+        filters.map(|&filter| responses[filter].clone()).collect::<Vec<_>>()
     };
     let mut scores: Vec<_> = parts.iter().map(own).collect();
     let mut all_messages = vec![Vec::new(); parts.len()];

@@ -42,7 +42,7 @@ impl<'a> Responses<'a> {
             "one value per cell"
         );
         assert!(
-            levels.iter().all(|it| scope.levels().contains(it)),
+            levels.iter().all(|level| scope.levels().contains(level)),
             "levels of the scope"
         );
         Self {

@@ -95,7 +95,7 @@ impl Scope {
 
     /// All levels and the whole image.
     pub fn whole(layout: &Layout) -> Self {
-        let [width, height] = layout.image_size.map(|it| it as u32);
+        let [width, height] = layout.image_size.map(|image_size| image_size as u32);
         Self {
             levels: [0, layout.levels.len() as u16],
             region: Region {
@@ -217,6 +217,6 @@ impl Window {
 
     /// Whether all parts of a pose of the level lie on these cells.
     pub fn contains_all(&self, pose: &Pose) -> bool {
-        pose.parts.iter().all(|it| self.contains(*it))
+        pose.parts.iter().all(|part| self.contains(*part))
     }
 }

@@ -196,7 +196,7 @@ impl Solver {
         extra: Option<&dyn ExtraTerms>,
     ) -> Vec<f32> {
         let sweeps = self.sweep_levels(evidence, &[level], extra, |sweep| {
-            sweep.roots().map(|it| it.score).collect()
+            sweep.roots().map(|root| root.score).collect()
         });
         sweeps.into_iter().next().unwrap_or_default()
     }
@@ -247,12 +247,13 @@ impl Solver {
     /// A workspace that fits `bytes` of planes as closely as any that is there, or the largest.
     fn workspace(&self, bytes: usize) -> Workspace {
         let mut pool = lock(&self.workspaces);
-        let fit = |it: &Workspace| {
-            let held = it.bytes();
+        let fit = |workspace: &Workspace| {
+            let held = workspace.bytes();
             (held < bytes, held.abs_diff(bytes))
         };
-        let closest = (0..pool.len()).min_by_key(|&it| fit(&pool[it]));
-        let mut found = closest.map_or_else(Workspace::default, |it| pool.swap_remove(it));
+        let closest = (0..pool.len()).min_by_key(|&i| fit(&pool[i]));
+        let mut found =
+            closest.map_or_else(Workspace::default, |closest| pool.swap_remove(closest));
         found.forget();
         found
     }
@@ -374,9 +375,9 @@ impl Search<'_> {
 
 /// The message rule of the child of `edge`.
 fn rule(edge: &Edge, n_parent_types: usize, n_types: usize) -> MessageRule {
-    let spring = |it: &Spring| kernels::Spring {
-        w: it.w,
-        anchor: it.anchor,
+    let spring = |spring: &Spring| kernels::Spring {
+        w: spring.w,
+        anchor: spring.anchor,
     };
     let mut springs = Vec::new();
     let mut choices = vec![Vec::new(); n_parent_types];

@@ -31,7 +31,7 @@ impl Source<'_> {
     pub(crate) fn shape(&self) -> HogShape {
         HogShape {
             cell_px: self.cell_px,
-            pad: self.layout.pad.map(|it| it + 1),
+            pad: self.layout.pad.map(|pad| pad + 1),
         }
     }
 }

@@ -157,11 +157,12 @@ impl Tracker {
 impl Last {
     /// Whether a frame may be searched near this frame's pose only.
     fn allows_tracking_to(&self, settings: &TrackSettings, at: FrameTime) -> bool {
-        let step = at.frame.checked_sub(self.at.frame).filter(|it| *it > 0);
+        let step = at.frame.checked_sub(self.at.frame).filter(|difference| *difference > 0);
         let age = at.frame.saturating_sub(self.full.at.frame);
-        let within = |from: FrameTime, most: f64| seconds(from, at).is_none_or(|it| it <= most);
-        let is_recent = |most: f64| seconds(self.full.at, at).is_none_or(|it| it < most);
-        step.is_some_and(|it| it <= settings.max_gap)
+        let within =
+            |from: FrameTime, most: f64| seconds(from, at).is_none_or(|second| second <= most);
+        let is_recent = |most: f64| seconds(self.full.at, at).is_none_or(|second| second < most);
+        step.is_some_and(|value| value <= settings.max_gap)
             && age < settings.full_every
             && within(self.at, settings.max_gap_s)
             && is_recent(settings.full_every_s)
@@ -170,10 +171,10 @@ impl Last {
     /// The surroundings of this frame's pose, if any of it lies in the image.
     fn near(&self, settings: &TrackSettings, layout: &Layout, at: FrameTime) -> Option<Scope> {
         let [x1, y1, x2, y2] = self.around;
-        let moved = seconds(self.at, at).map_or(0.0, |it| settings.speed * it);
+        let moved = seconds(self.at, at).map_or(0.0, |second| settings.speed * second);
         let margin = settings.margin.max(moved) * (x2 - x1).max(y2 - y1);
         let range = |begin: f64, end: f64, side: usize| {
-            let inside = |it: f64| it.clamp(0.0, side as f64) as u32;
+            let inside = |value: f64| value.clamp(0.0, side as f64) as u32;
             [
                 inside((begin - margin).floor()),
                 inside((end + margin).ceil() + 1.0),

@@ -104,7 +104,7 @@ impl VideoWriter {
             self.size
         );
         let stdin = self.stdin.as_mut();
-        match stdin.map(|it| it.write_all(rgb)) {
+        match stdin.map(|stdin| stdin.write_all(rgb)) {
             Some(Ok(())) => Ok(()),
             Some(Err(error)) => Err(self.failed(&error.to_string())),
             None => Err(self.failed("it has ended")),

@@ -73,8 +73,8 @@ fn of_head(head: &str) -> Option<Answer> {
         return None;
     }
     let field = |name: &str| {
-        let mut fields = head.lines().filter_map(|it| it.split_once(':'));
-        let found = fields.find(|it| it.0.trim().eq_ignore_ascii_case(name))?;
+        let mut fields = head.lines().filter_map(|line| line.split_once(':'));
+        let found = fields.find(|field| field.0.trim().eq_ignore_ascii_case(name))?;
         Some(found.1.trim().to_ascii_lowercase())
     };
     let kind = field("content-type")?;

@@ -110,7 +110,7 @@ impl<R: Read> Cutter<R> {
             // The segment has no end: what it holds follows.
             if id != id::SEGMENT {
                 let begin = bytes.len();
-                let length = length.filter(|it| *it <= MAX_BYTES);
+                let length = length.filter(|length| *length <= MAX_BYTES);
                 let length = length.ok_or(io::ErrorKind::InvalidData)?;
                 // Memory for what is there, whatever the length says.
                 let n = (&mut self.input).take(length).read_to_end(&mut bytes)?;
@@ -191,7 +191,7 @@ fn split(bytes: &[u8]) -> Option<(u32, &[u8], &[u8])> {
     let n_length = rest.first()?.leading_zeros() as usize + 1;
     let length = number(rest.get(..n_length).filter(|_| n_length <= 8)?)?;
     let rest = &rest[n_length..];
-    let length = usize::try_from(length).ok().filter(|it| *it <= rest.len())?;
+    let length = usize::try_from(length).ok().filter(|value| *value <= rest.len())?;
     let (inside, after) = rest.split_at(length);
     Some((id, inside, after))
 }
@@ -207,7 +207,10 @@ fn looked_into(mut cluster: &[u8]) -> (u64, bool) {
                 base = all.cast_signed();
                 continue;
             }
-            id::SIMPLE_BLOCK => (inside, inside.get(3).is_some_and(|it| it & 0x80 != 0)),
+            id::SIMPLE_BLOCK => (
+                inside,
+                inside.get(3).is_some_and(|inside| inside & 0x80 != 0),
+            ),
             id::BLOCK_GROUP => group(inside),
             _ => continue,
         };
@@ -273,7 +276,7 @@ mod tests {
         ];
         let pieces = cut(&[head(), pictures.concat()].concat());
         let kinds: Vec<(PieceKind, u64)> =
-            pieces.iter().map(|it| (it.kind, it.nanos / 1_000_000)).collect();
+            pieces.iter().map(|piece| (piece.kind, piece.nanos / 1_000_000)).collect();
         let expected = [
             (PieceKind::Head, 0),
             (PieceKind::Key, 43),
@@ -310,7 +313,7 @@ mod tests {
             let whole = [head(), cluster(1, true, &[7; 60]), cluster(2, false, &[8; 40])].concat();
             let pieces = cut(&whole[..n.min(whole.len())]);
             prop_assert!(pieces.len() <= 3);
-            prop_assert!(pieces.iter().all(|it| whole.windows(it.bytes.len()).any(|w| w == it.bytes)));
+            prop_assert!(pieces.iter().all(|piece| whole.windows(piece.bytes.len()).any(|w| w == piece.bytes)));
         }
     }
 }

@@ -84,8 +84,11 @@ impl PixelFormat {
                 Self::Uyvy => pairs(from, line, [1, 0, 3, 2]),
                 Self::Nv12 => nv12(from, &bytes[stride * (size.height + row / 2)..], line),
                 Self::Rgb => line.copy_from_slice(&from[..line.len()]),
-                Self::Bgr => each(line, from.chunks_exact(3).map(|it| [it[2], it[1], it[0]])),
-                Self::Grey | Self::Jpeg => each(line, from.iter().map(|it| [*it; 3])),
+                Self::Bgr => each(
+                    line,
+                    from.chunks_exact(3).map(|chunk| [chunk[2], chunk[1], chunk[0]]),
+                ),
+                Self::Grey | Self::Jpeg => each(line, from.iter().map(|from| [*from; 3])),
             }
         }
         true
@@ -134,7 +137,7 @@ fn nv12(brightness: &[u8], colour: &[u8], line: &mut [u8]) {
 /// BT.601, 16 to 235, rounded.
 fn rgb_of(y: u8, u: u8, v: u8) -> [u8; 3] {
     let [y, u, v] = [i32::from(y) - 16, i32::from(u) - 128, i32::from(v) - 128];
-    let to_byte = |it: i32| ((it + 128) >> 8).clamp(0, 255) as u8;
+    let to_byte = |value: i32| ((value + 128) >> 8).clamp(0, 255) as u8;
     [
         to_byte(298 * y + 409 * v),
         to_byte(298 * y - 100 * u - 208 * v),

@@ -14,14 +14,14 @@ pub(crate) fn output_within(mut command: Command, limit: Duration) -> io::Result
         .stderr(Stdio::piped())
         .spawn()?;
     let pipes: [Option<Box<dyn Read + Send>>; 2] = [
-        child.stdout.take().map(|it| Box::new(it) as _),
-        child.stderr.take().map(|it| Box::new(it) as _),
+        child.stdout.take().map(|stdout| Box::new(stdout) as _),
+        child.stderr.take().map(|stderr| Box::new(stderr) as _),
     ];
     let read = |pipe: Option<Box<dyn Read + Send>>| {
         std::thread::Builder::new().spawn(move || {
             let mut bytes = Vec::new();
             // What could be read up to an error counts.
-            pipe.map(|mut it| it.read_to_end(&mut bytes).ok());
+            pipe.map(|mut pipe| pipe.read_to_end(&mut bytes).ok());
             bytes
         })
     };
@@ -49,7 +49,7 @@ pub(crate) fn output_within(mut command: Command, limit: Duration) -> io::Result
 /// The version of `ffmpeg`; empty if it does not tell.
 pub(crate) fn version_of(ffmpeg: &PathBuf) -> String {
     let said = Command::new(ffmpeg).arg("-version").stdin(Stdio::null()).output();
-    let said = said.map(|it| it.stdout).unwrap_or_default();
+    let said = said.map(|said| said.stdout).unwrap_or_default();
     let text = String::from_utf8_lossy(&said);
     text.split_whitespace().nth(2).unwrap_or_default().to_owned()
 }

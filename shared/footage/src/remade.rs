@@ -57,7 +57,7 @@ impl RemadeStream {
         let fed = thread.spawn(move || {
             // A decoder that has ended takes no more.
             let mut pieces = pieces;
-            pieces.all(|it| stdin.write_all(&it).is_ok());
+            pieces.all(|piece| stdin.write_all(&piece).is_ok());
         });
         fed.map_err(not_started)?;
         Ok(Self {

@@ -94,7 +94,7 @@ impl Offsets {
         if self.0.len() < N_EQUAL || span > EQUAL_NANOS {
             return None;
         }
-        let above: i64 = self.0.iter().map(|it| it - least).sum();
+        let above: i64 = self.0.iter().map(|value| value - least).sum();
         Some(least + above / N_EQUAL as i64)
     }
 }
@@ -314,7 +314,7 @@ mod tests {
             .output()
             .unwrap();
         let told = read(&written.stdout);
-        let steps = told.windows(2).map(|it| it[1].presented - it[0].presented);
+        let steps = told.windows(2).map(|pair| pair[1].presented - pair[0].presented);
         assert_eq!(steps.collect::<Vec<_>>(), [100 * MS; 29]);
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
         let age_s = now.unwrap().as_secs_f64() - told[29].unix as f64 * 1e-9;

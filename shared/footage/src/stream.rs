@@ -159,7 +159,9 @@ impl StreamSpec {
             asked => asked,
         }?;
         let complaint = asked.may_be_picture.then(answer).flatten();
-        complaint.map_or(Ok((asked.size, asked.rate_hz)), |it| Err(self.failed(&it)))
+        complaint.map_or(Ok((asked.size, asked.rate_hz)), |complaint| {
+            Err(self.failed(&complaint))
+        })
     }
 
     fn ask(&self) -> Result<Asked, FootageError> {
@@ -186,8 +188,8 @@ impl StreamSpec {
         if size.rgb_bytes() == 0 {
             return Err(self.failed("it has no video"));
         }
-        let rates = ["r_frame_rate", "avg_frame_rate"].map(|it| fraction(&stream[it]));
-        let is_usual = |it: &f64| (RATES_HZ[0]..=RATES_HZ[1]).contains(it);
+        let rates = ["r_frame_rate", "avg_frame_rate"].map(|name| fraction(&stream[name]));
+        let is_usual = |value: &f64| (RATES_HZ[0]..=RATES_HZ[1]).contains(value);
         Ok(Asked {
             size,
             rate_hz: rates.into_iter().flatten().find(is_usual),
@@ -215,7 +217,7 @@ impl StreamSpec {
         } else {
             None
         };
-        let to_tell = times.as_ref().map(|it| format!("pipe\\:{}", it.1.as_raw_fd()));
+        let to_tell = times.as_ref().map(|time| format!("pipe\\:{}", time.1.as_raw_fd()));
         let mut child = Command::new(&self.ffmpeg)
             .args(["-nostdin", "-v", "error"])
             .args(self.input_options())
@@ -292,7 +294,7 @@ impl StreamSpec {
         let is_rtsp = self.is_rtsp();
         let listens = self.address.contains("listen");
         if is_rtsp {
-            options.extend(self.transport.map_or(&[][..], |it| match it {
+            options.extend(self.transport.map_or(&[][..], |transport| match transport {
                 Transport::Tcp => &["-rtsp_transport", "tcp"],
                 Transport::Udp => &["-rtsp_transport", "udp"],
             }));

@@ -229,7 +229,7 @@ fn files_that_are_not_videos_are_refused() {
     for name in ["text.mp4", "text.txt", "-text.mkv", "noise.avi"] {
         let path = folder.path().join(name);
         let noise: Vec<u8> =
-            (0_u32..5000).map(|it| (it.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+            (0_u32..5000).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
         let text = b"this is a text, whatever its name says\n";
         fs::write(
             &path,
@@ -300,7 +300,7 @@ fn frames_of_damaged_video(start: u64, step: u64) -> Vec<(u64, [u8; 3])> {
     let path = clip::encode(folder.path(), "damaged.mp4", &options);
     let mut bytes = fs::read(&path).unwrap();
     let middle = bytes.len() / 2;
-    let noise = (0..400_u32).map(|it| ((it * it * 31) >> 3) as u8);
+    let noise = (0..400_u32).map(|i| ((i * i * 31) >> 3) as u8);
     bytes[middle..middle + 400].copy_from_slice(&noise.collect::<Vec<_>>());
     fs::write(&path, bytes).unwrap();
     let spec = SourceSpec {
@@ -325,10 +325,10 @@ fn frames_that_cannot_be_decoded_do_not_shift_the_others() {
     }
     let whole = frames_of_damaged_video(0, 1);
     assert!((30..60).contains(&whole.len()), "{} frames", whole.len());
-    assert_eq!(whole.last().map(|it| it.0), Some(59));
+    assert_eq!(whole.last().map(|whole| whole.0), Some(59));
     assert!(whole.is_sorted_by(|a, b| a.0 < b.0));
     // The last group of pictures is not damaged, and every frame shows its own number.
-    for (index, corner) in whole.iter().filter(|it| it.0 >= 50) {
+    for (index, corner) in whole.iter().filter(|whole| whole.0 >= 50) {
         let picture = clip::frame(*index as usize).into_raw();
         let expected = &picture[picture.len() - 3..];
         let off = corner.iter().zip(expected).map(|(a, b)| a.abs_diff(*b));
@@ -338,7 +338,7 @@ fn frames_that_cannot_be_decoded_do_not_shift_the_others() {
         );
     }
     let third = frames_of_damaged_video(1, 3);
-    let expected = whole.iter().filter(|it| it.0 % 3 == 1);
+    let expected = whole.iter().filter(|whole| whole.0 % 3 == 1);
     assert_eq!(third, expected.copied().collect::<Vec<_>>());
 }
 

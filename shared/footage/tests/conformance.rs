@@ -9,7 +9,7 @@ use footage::{FrameView, Source, SourceKind, SourceSpec};
 const N_FRAMES: usize = 12;
 
 fn clip_frames(n: usize) -> Vec<Vec<u8>> {
-    (0..n).map(|it| clip::frame(it).into_raw()).collect()
+    (0..n).map(|i| clip::frame(i).into_raw()).collect()
 }
 
 /// Checks everything that every source must do; `expected` are all frames of the footage.
@@ -65,7 +65,7 @@ fn check_chosen_frames(
     let spec = SourceSpec {
         start: start as u64,
         step: step as u64,
-        count: count.map(|it| it as u64),
+        count: count.map(|count| count as u64),
         ..spec.clone()
     };
     let indices = (start..expected.len()).step_by(step);

@@ -84,7 +84,7 @@ fn a_stream_that_was_kept_gives_the_same_pictures_again() {
     }
     let (pictures, pieces) = live();
     assert!(pictures.len() >= 3, "{}", pictures.len());
-    let n_heads = pieces.iter().filter(|it| it.kind == PieceKind::Head).count();
+    let n_heads = pieces.iter().filter(|piece| piece.kind == PieceKind::Head).count();
     assert!(
         n_heads >= 1,
         "before every picture that needs no other: {n_heads}"

@@ -23,7 +23,7 @@ fn pixel(canvas: &Canvas, x: usize, y: usize) -> [u8; 3] {
 /// How much colour is on a black picture, in pixels of full colour.
 fn amount(canvas: &Canvas) -> f64 {
     let reds = canvas.rgb().iter().step_by(3);
-    reds.map(|&it| f64::from(it)).sum::<f64>() / f64::from(INK[0])
+    reds.map(|&red| f64::from(red)).sum::<f64>() / f64::from(INK[0])
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn limbs_have_the_colour_of_their_side_and_missing_points_are_left_out() {
 #[test]
 fn a_composed_sheet_contains_every_picture() {
     let colours = [[10, 0, 0], [0, 20, 0], [0, 0, 30]];
-    let pictures = colours.map(|it| Canvas::new(SIZE, it));
+    let pictures = colours.map(|colour| Canvas::new(SIZE, colour));
     let small = Canvas::new(Size::new(7, 9), INK);
     let mut tiles: Vec<Tile<'_>> = pictures
         .iter()

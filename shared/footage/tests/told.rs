@@ -34,7 +34,7 @@ fn indices(spec: &SourceSpec) -> Vec<u64> {
 /// Replaces bytes behind the name of a box.
 fn patch(from: &Path, to: &str, (name, skipped): (&[u8; 4], usize), bytes: &[u8]) -> PathBuf {
     let mut file = fs::read(from).unwrap();
-    let at = file.windows(4).position(|it| it == name).unwrap() + 4 + skipped;
+    let at = file.windows(4).position(|window| window == name).unwrap() + 4 + skipped;
     file[at..at + bytes.len()].copy_from_slice(bytes);
     let to = from.with_file_name(to);
     fs::write(&to, file).unwrap();
@@ -70,7 +70,7 @@ fn films_are_turned_as_their_display_matrix_asks_where_that_is_wanted() {
         let (info, stored) = frames(&spec(&film));
         assert_eq!(info.size, SIZE, "pixels are left as they are stored");
         assert!(
-            due.is_none_or(|it| it == info.tag),
+            due.is_none_or(|due| due == info.tag),
             "{matrix:?}: {}",
             info.tag
         );
@@ -95,7 +95,7 @@ fn every_photograph_of_a_folder_is_turned_as_its_own_tag_asks() {
         let mut file = Vec::new();
         let encoder = JpegEncoder::new(&mut file);
         let picture = frame(nth);
-        let [width, height] = [SIZE.width, SIZE.height].map(|it| it as u32);
+        let [width, height] = [SIZE.width, SIZE.height].map(|value| value as u32);
         let written = encoder.write_image(&picture, width, height, ExtendedColorType::Rgb8);
         written.unwrap();
         let file = testkit::exif::tagged(&file, value);
@@ -203,7 +203,7 @@ fn a_stream_without_a_container_has_all_its_pictures_and_no_rate_that_nobody_tol
         );
         let tells = name == "film.m2v";
         assert_eq!(info.frame_rate_hz, tells.then_some(25.0), "{name}");
-        assert!(all.windows(2).all(|it| it[0].1 != it[1].1), "{name}");
+        assert!(all.windows(2).all(|pair| pair[0].1 != pair[1].1), "{name}");
         let told = SourceSpec {
             frame_rate_hz: Some(60.0),
             start: 2,

@@ -27,7 +27,7 @@ fn warp(source: Size, rgb: &[u8], output: Size, map: &Affine, fill: Fill) -> Vec
 /// Turns by `degrees` and shrinks by `scale`, about the centres of both images.
 fn turn(source: Size, output: Size, degrees: f64, scale: f64) -> Affine {
     let (sin, cos) = degrees.to_radians().sin_cos();
-    let centre = |it: usize| (it as f64 - 1.0) / 2.0;
+    let centre = |value: usize| (value as f64 - 1.0) / 2.0;
     let linear = [[scale * cos, -scale * sin], [scale * sin, scale * cos]];
     let [cx, cy] = [centre(output.width), centre(output.height)];
     let towards = [centre(source.width), centre(source.height)];
@@ -248,10 +248,10 @@ impl Reference<'_> {
     /// `None` where rounding the position of the centre is ambiguous.
     fn pixel(&self, x: usize, y: usize) -> Option<[f64; 3]> {
         let centre = self.map.map(|[a, b, t]| (a * x as f64 + b * y as f64 + t) * 32.0);
-        if centre.iter().any(|it| ((it + 0.5) - (it + 0.5).round()).abs() < 1e-5) {
+        if centre.iter().any(|value| ((value + 0.5) - (value + 0.5).round()).abs() < 1e-5) {
             return None;
         }
-        let offset = |it: usize| (it as f64 + 0.5) / self.n as f64 - 0.5;
+        let offset = |value: usize| (value as f64 + 0.5) / self.n as f64 - 0.5;
         Some(std::array::from_fn(|channel| {
             let samples = (0..self.n * self.n).map(|sample| {
                 let (dx, dy) = (offset(sample % self.n), offset(sample / self.n));

@@ -261,7 +261,7 @@ fn numbers<'a>(rest: &mut Bytes<'a>, sizes: &[i32]) -> Result<Numbers<'a>, Conta
         });
     }
     Ok(Numbers {
-        sizes: sizes.iter().map(|&it| it as usize).collect(),
+        sizes: sizes.iter().map(|&size| size as usize).collect(),
         storage,
         bytes,
     })
@@ -312,7 +312,7 @@ fn structs<'a>(
         sizes: vec![length],
         got: names.len(),
     };
-    let length = usize::try_from(length).ok().filter(|&it| it > 0);
+    let length = usize::try_from(length).ok().filter(|&value| value > 0);
     let length = length.ok_or_else(wrong)?;
     let fields: Vec<String> = names
         .chunks(length)
@@ -376,7 +376,7 @@ impl<'a> Bytes<'a> {
 
     fn word(&mut self, what: &'static str) -> Result<u32, ContainerError> {
         let bytes = self.take(4, what)?;
-        Ok(bytes.first_chunk().map_or(0, |&it| u32::from_le_bytes(it)))
+        Ok(bytes.first_chunk().map_or(0, |&first_chunk| u32::from_le_bytes(first_chunk)))
     }
 
     /// The next element: its type and its bytes; skips the padding.

@@ -112,13 +112,13 @@ impl core::str::FromStr for Unit {
             "in" => Some(Self::Inches),
             _ => None,
         };
-        let name = text.trim_start_matches(|it: char| it.is_ascii_digit() || it == '.');
+        let name = text.trim_start_matches(|letter: char| letter.is_ascii_digit() || letter == '.');
         let number = &text[..text.len() - name.len()];
         let unit = named(name.trim());
         let found = match (number, unit) {
             ("", unit) => unit,
             (number, Some(unit)) => {
-                let metres = number.parse().ok().map(|it: f64| it / unit.per_metre());
+                let metres = number.parse().ok().map(|value: f64| value / unit.per_metre());
                 metres.filter(|metres| (1e-6..=1e3).contains(metres)).map(Self::Length)
             }
             (_, None) => None,

@@ -254,7 +254,7 @@ impl Rig {
         if let Some(LeftOut { why, .. }) = self.left_out.iter().find(|it| it.camera == name) {
             return format!("no place of camera {name:?}: {why}");
         }
-        let names: Vec<&str> = self.cameras.iter().map(|it| &*it.name).collect();
+        let names: Vec<&str> = self.cameras.iter().map(|camera| &*camera.name).collect();
         format!("no camera {name:?}; it has {}", names.join(", "))
     }
 

@@ -59,13 +59,13 @@ pub struct SearchSize {
 impl SearchSize {
     /// How high the person stands in the frame, pixels.
     pub fn person_in_frame_px(&self) -> Option<f64> {
-        self.person_px.map(|it| it * self.scale)
+        self.person_px.map(|person_px| person_px * self.scale)
     }
 
     /// Whether the person is smaller than [`GOOD_PX`], for the sake of time.
     pub fn is_limited(&self) -> bool {
         let px = self.person_in_frame_px();
-        self.scale < self.wanted && px.is_some_and(|it| it < GOOD_PX[0])
+        self.scale < self.wanted && px.is_some_and(|px| px < GOOD_PX[0])
     }
 }
 
@@ -86,13 +86,13 @@ pub struct SearchSizes {
 /// the largest frame within that limit. The same cameras give the same sizes, whatever their footage is.
 pub fn search_sizes(rig: &Rig) -> SearchSizes {
     let found = heights(rig);
-    let sizes = rig.cameras().iter().map(|it| it.intrinsics.size);
+    let sizes = rig.cameras().iter().map(|camera| camera.intrinsics.size);
     let limits: Vec<f64> = sizes.map(largest).collect();
     let common = common(&found.median_px, &limits);
     let cameras = rig.cameras().iter().zip(&found.median_px).zip(limits);
     let cameras = cameras.map(|((camera, person_px), limit)| {
         let own = |limit| person_px.map_or(limit, |px| nearest(px, limit));
-        let scale = common.map_or_else(|| own(limit), |it| it.min(limit));
+        let scale = common.map_or_else(|| own(limit), |common| common.min(limit));
         SearchSize {
             camera: camera.name.clone(),
             scale,
@@ -111,23 +111,23 @@ pub fn search_sizes(rig: &Rig) -> SearchSizes {
 fn common(person_px: &[Option<f64>], limits: &[f64]) -> Option<f64> {
     let known: Vec<f64> = person_px.iter().flatten().copied().collect();
     let limits = person_px.iter().zip(limits).filter(|it| it.0.is_some());
-    let limit = limits.map(|it| *it.1).fold(1.0, f64::min);
+    let limit = limits.map(|limit| *limit.1).fold(1.0, f64::min);
     let is_good = |scale: f64| {
-        let mut px = known.iter().map(|it| it * scale);
+        let mut px = known.iter().map(|value| value * scale);
         px.all(|it| (GOOD_PX[0]..=GOOD_PX[1]).contains(&it))
     };
     let off = |scale: f64| {
         let logs = known.iter().map(|px| (px * scale / AIM_PX).ln());
         logs.sum::<f64>().abs()
     };
-    let good = SCALES.into_iter().filter(|it| *it <= limit && is_good(*it));
+    let good = SCALES.into_iter().filter(|scale| *scale <= limit && is_good(*scale));
     good.filter(|_| !known.is_empty()).min_by(|a, b| off(*a).total_cmp(&off(*b)))
 }
 
 /// The scale up to a limit that brings a height nearest to what is aimed at.
 fn nearest(person_px: f64, limit: f64) -> f64 {
     let off = |scale: f64| (person_px * scale / AIM_PX).ln().abs();
-    let within = SCALES.into_iter().filter(|it| *it <= limit);
+    let within = SCALES.into_iter().filter(|scale| *scale <= limit);
     let nearest = within.min_by(|a, b| off(*a).total_cmp(&off(*b)));
     nearest.unwrap_or(limit)
 }
@@ -135,13 +135,13 @@ fn nearest(person_px: f64, limit: f64) -> f64 {
 /// The largest scale at which a frame is not too large to search.
 fn largest(image: [u32; 2]) -> f64 {
     let pixels = |scale: f64| at_scale(image, scale).into_iter().map(u64::from).product::<u64>();
-    let largest = SCALES.into_iter().find(|it| pixels(*it) <= MOST_PIXELS);
+    let largest = SCALES.into_iter().find(|scale| pixels(*scale) <= MOST_PIXELS);
     largest.unwrap_or_else(|| (MOST_PIXELS as f64 / pixels(1.0) as f64).sqrt())
 }
 
 /// Width and height of a frame, as [`OutSize::Scale`](crate::OutSize::Scale) rounds them.
 fn at_scale(image: [u32; 2], scale: f64) -> [u32; 2] {
-    image.map(|it| (f64::from(it) * scale).round().max(1.0) as u32)
+    image.map(|image| (f64::from(image) * scale).round().max(1.0) as u32)
 }
 
 /// The scale that brings people to the height that is aimed at, as a number to write down.

@@ -52,7 +52,7 @@ impl Tracks {
     /// * `taken_s`: when it was taken, seconds.
     /// * `points_px`: in the same order in every picture; `None` for one that is unknown.
     pub fn note(&mut self, taken_s: f64, points_px: Vec<Option<Point2<f64>>>) {
-        if self.noted.back().is_some_and(|it| taken_s <= it.0) {
+        if self.noted.back().is_some_and(|noted| taken_s <= noted.0) {
             self.noted.clear();
         }
         if !taken_s.is_finite() {
@@ -82,7 +82,7 @@ impl Tracks {
         let before = known.next()??;
         let velocity = between(before, (taken_s, at))?;
         let earlier = known.next().flatten().and_then(|it| between(it, before));
-        let change = earlier.map_or(0.0, |it| (it.px_per_s - velocity.px_per_s).norm());
+        let change = earlier.map_or(0.0, |earlier| (earlier.px_per_s - velocity.px_per_s).norm());
         let is_person =
             velocity.px_per_s.norm() <= MOST_SPEED * height_px && change <= MOST_CHANGE * height_px;
         is_person.then_some(velocity)
@@ -93,7 +93,8 @@ fn between((from_s, from): (f64, Point2<f64>), (to_s, to): (f64, Point2<f64>)) -
     let gap_s = to_s - from_s;
     let px_per_s = (to - from) / gap_s;
     let is_near = gap_s > 0.0 && gap_s <= LONGEST_GAP_S;
-    (is_near && px_per_s.iter().all(|it| it.is_finite())).then_some(Velocity { px_per_s, gap_s })
+    (is_near && px_per_s.iter().all(|px_per_s| px_per_s.is_finite()))
+        .then_some(Velocity { px_per_s, gap_s })
 }
 
 /// Where a point was at the instant of its frame, pixels, and the standard deviation that is to be added to its own.

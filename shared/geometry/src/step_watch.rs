@@ -173,12 +173,12 @@ impl StepWatch {
             return None;
         }
         let n = kept.len() as f64;
-        let weight = |it: &Estimate| 1.0 / it.variance.max(MIN_ERROR_S * MIN_ERROR_S);
+        let weight = |estimate: &Estimate| 1.0 / estimate.variance.max(MIN_ERROR_S * MIN_ERROR_S);
         let all: f64 = kept.iter().map(weight).sum();
         let sum: f64 = kept.iter().map(|it| weight(it) * it.offset_s).sum();
         let offset = sum / all;
         // What the samples tell of themselves, or how the estimates scatter, whichever is more.
-        let off = |it: &Estimate| (weight(it) * (it.offset_s - offset)).powi(2);
+        let off = |estimate: &Estimate| (weight(estimate) * (estimate.offset_s - offset)).powi(2);
         let scatter = kept.iter().map(off).sum::<f64>() * n / (n - 1.0) / (all * all);
         let error = scatter.max(1.0 / all).sqrt().max(MIN_ERROR_S);
         Some(Step {
@@ -197,7 +197,7 @@ impl View {
     fn new(camera: &Camera, points_px: &[[f64; 2]], instant_s: f64, skew_s: f64) -> Option<Self> {
         let points: Vec<Option<Point2<f64>>> =
             points_px.iter().map(|px| camera.undistort(&Point2::from(*px))).collect();
-        let side = longer_side(points.iter().flatten().map(|it| [it.x, it.y]))?;
+        let side = longer_side(points.iter().flatten().map(|point| [point.x, point.y]))?;
         let seconds = instant_s + skew_s;
         seconds.is_finite().then_some(Self {
             seconds,

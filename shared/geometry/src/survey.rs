@@ -87,7 +87,9 @@ fn shared(cameras: &[Camera], focus: &Point3<f64>) -> Option<Shared> {
         along().flat_map(move |x| along().flat_map(move |y| along().map(move |z| [x, y, z])));
     let offsets = steps.map(|step| Vector3::from(step.map(f64::from)) * STEP_M);
     let (mut n_points, mut corners) = (0_u32, None);
-    for offset in offsets.filter(|it| cameras.iter().all(|camera| sees(camera, &(focus + it)))) {
+    for offset in
+        offsets.filter(|offset| cameras.iter().all(|camera| sees(camera, &(focus + offset))))
+    {
         n_points += 1;
         let [low, high] = corners.unwrap_or([offset; 2]);
         corners = Some([low.inf(&offset), high.sup(&offset)]);

@@ -130,7 +130,7 @@ impl Network {
         self.constants.push(Constant {
             name: stored.clone(),
             shape: shape.to_vec(),
-            values: Values::F16(values.iter().map(|it| half::bits_of(*it)).collect()),
+            values: Values::F16(values.iter().map(|value| half::bits_of(*value)).collect()),
         });
         self.node(
             "Cast",

@@ -165,7 +165,9 @@ impl Engine for Loaded {
             let value = found.get(*name);
             let value = value.ok_or_else(|| format!("the network has no output `{name}`"))?;
             let sides = match value.dtype() {
-                ValueType::Tensor { shape, .. } => shape.iter().map(|&it| usize::try_from(it)),
+                ValueType::Tensor { shape, .. } => {
+                    shape.iter().map(|&shape| usize::try_from(shape))
+                }
                 _ => return Err(format!("the output `{name}` is no tensor").into()),
             };
             let shape: Vec<usize> = sides.collect::<Result<_, _>>()?;
@@ -173,7 +175,7 @@ impl Engine for Loaded {
             take(Output {
                 index,
                 shape: &shape,
-                values: values.map(|it| it.1),
+                values: values.map(|value| value.1),
             });
         }
         Ok(())

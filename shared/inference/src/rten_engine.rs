@@ -59,13 +59,13 @@ impl Engine for Rten {
             ));
         }
         let ids: Result<Vec<NodeId>, EngineError> =
-            outputs.iter().map(|it| self.id(self.model.output_ids(), it)).collect();
+            outputs.iter().map(|output| self.id(self.model.output_ids(), output)).collect();
         let options = RunOptions::default().with_thread_pool(Some(Arc::clone(&self.threads)));
         let found = self.model.run(given, &ids?, Some(options))?;
         for (index, value) in found.iter().enumerate() {
             let tensor: Option<TensorView<'_, f32>> = Value::as_tensor_view(value);
             let shape = value.shape();
-            let tensor = tensor.map(|it| it.to_contiguous());
+            let tensor = tensor.map(|tensor| tensor.to_contiguous());
             take(Output {
                 index,
                 shape: &shape,
@@ -83,7 +83,7 @@ fn name(model: &Model, id: NodeId) -> &str {
 
 fn port(model: &Model, id: NodeId) -> Port {
     let sides = model.node_info(id).and_then(|info| info.shape());
-    let sides = sides.unwrap_or_default().into_iter().map(|it| match it {
+    let sides = sides.unwrap_or_default().into_iter().map(|side| match side {
         Dimension::Fixed(n) => Side::Fixed(n),
         Dimension::Symbolic(name) => Side::Named(name),
     });

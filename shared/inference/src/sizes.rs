@@ -63,7 +63,7 @@ fn check_graph(graph: &GraphProto, deep: usize) -> Result<(), TooLarge> {
         let value = node.attribute.iter().find_map(|it| it.t.as_ref());
         let ints = node.attribute.iter().find(|it| !it.ints.is_empty());
         if let ("Constant", Some(name)) = (op(node), node.output.first()) {
-            let numbers = value.map(whole).or(ints.map(|it| it.ints.clone()));
+            let numbers = value.map(whole).or(ints.map(|int| int.ints.clone()));
             constants.insert(name, numbers.unwrap_or_default());
         }
     }
@@ -74,8 +74,8 @@ fn check_graph(graph: &GraphProto, deep: usize) -> Result<(), TooLarge> {
                 check_graph(inner, deeper)?;
             }
         }
-        let inputs = INPUTS.iter().find(|it| it.0 == op(node));
-        for input in inputs.map_or(&[][..], |it| it.1) {
+        let inputs = INPUTS.iter().find(|input| input.0 == op(node));
+        for input in inputs.map_or(&[][..], |input| input.1) {
             let name = node.input.get(*input).map(String::as_str);
             let values = name.and_then(|name| constants.get(name));
             check_values(
@@ -93,7 +93,7 @@ fn check_attribute(node: &NodeProto, attribute: &AttributeProto) -> Result<(), T
     if !ATTRIBUTES.contains(&name) {
         return Ok(());
     }
-    let floats = attribute.floats.iter().map(|it| *it as i64);
+    let floats = attribute.floats.iter().map(|float| *float as i64);
     let values = attribute.ints.iter().copied().chain(attribute.i);
     let values: Vec<i64> = values.chain(floats).collect();
     check_values(node, &format!("attribute {name:?}"), &values)
@@ -107,11 +107,11 @@ fn check_values(node: &NodeProto, what: &str, values: &[i64]) -> Result<(), TooL
         value,
         most,
     };
-    let side = values.iter().find(|it| it.saturating_abs() > LARGEST_SIDE);
+    let side = values.iter().find(|value| value.saturating_abs() > LARGEST_SIDE);
     if let Some(side) = side.filter(|_| op(node) != "Reshape") {
         return Err(too_large(*side, LARGEST_SIDE));
     }
-    let sides = values.iter().filter(|it| **it > 0);
+    let sides = values.iter().filter(|value| **value > 0);
     let product = sides.fold(1_i64, |product, side| product.saturating_mul(*side));
     if product > MOST_VALUES {
         return Err(too_large(product, MOST_VALUES));
@@ -122,21 +122,21 @@ fn check_values(node: &NodeProto, what: &str, values: &[i64]) -> Result<(), TooL
 /// The values of a short tensor, rounded up to whole numbers.
 fn whole(tensor: &TensorProto) -> Vec<i64> {
     const FLOAT: i32 = 1;
-    let raw = tensor.raw_data.as_ref().map(|it| it.borrow());
+    let raw = tensor.raw_data.as_ref().map(|raw_value| raw_value.borrow());
     let raw = raw.as_deref().map_or(&[][..], Vec::as_slice);
     if raw.len() > 1024 {
         return Vec::new();
     }
-    let floats = tensor.float_data.iter().map(|it| it.ceil() as i64);
+    let floats = tensor.float_data.iter().map(|float_value| float_value.ceil() as i64);
     let stated = tensor.int64_data.iter().copied();
-    let stated = stated.chain(tensor.int32_data.iter().map(|it| i64::from(*it)));
-    let is_float = tensor.data_type.is_some_and(|it| it.0 == FLOAT);
+    let stated = stated.chain(tensor.int32_data.iter().map(|int32_value| i64::from(*int32_value)));
+    let is_float = tensor.data_type.is_some_and(|data_type| data_type.0 == FLOAT);
     let raw: Vec<i64> = if is_float {
         let values = raw.as_chunks::<4>().0.iter();
-        values.map(|it| f32::from_le_bytes(*it).ceil() as i64).collect()
+        values.map(|value| f32::from_le_bytes(*value).ceil() as i64).collect()
     } else {
         let values = raw.as_chunks::<8>().0.iter();
-        values.map(|it| i64::from_le_bytes(*it)).collect()
+        values.map(|value| i64::from_le_bytes(*value)).collect()
     };
     stated.chain(floats).chain(raw).take(64).collect()
 }

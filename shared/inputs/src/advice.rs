@@ -62,7 +62,7 @@ pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
     if text.trim().is_empty() {
         return Some(format!("{} is empty", path.display()));
     }
-    let begins = |key: &str| text.lines().any(|it| it.starts_with(key));
+    let begins = |key: &str| text.lines().any(|line| line.starts_with(key));
     if begins("rig =") && begins("[[camera]]") {
         return Some(
             "this is a deployment file; the rig is the file that its `rig` names".to_owned(),
@@ -73,7 +73,10 @@ pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
 
 /// The failure to create a folder for results.
 pub(crate) fn on_folder(folder: &Path, error: &io::Error) -> Failure {
-    let in_the_way = folder.ancestors().find(|it| it.exists()).filter(|it| !it.is_dir());
+    let in_the_way = folder
+        .ancestors()
+        .find(|folder| folder.exists())
+        .filter(|folder| !folder.is_dir());
     let message = match in_the_way {
         Some(file) => format!(
             "cannot make the folder {}: {} is a file",

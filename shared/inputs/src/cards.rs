@@ -93,7 +93,7 @@ impl CardText {
     /// The card of a network in its own entry.
     fn within(description: &Description) -> Option<Self> {
         let mut entries = description.metadata.iter().rev();
-        let entry = entries.find(|it| it.0 == METADATA_KEY);
+        let entry = entries.find(|entry| entry.0 == METADATA_KEY);
         entry.map(|(_, text)| Self {
             text: text.clone(),
             place: CardPlace::Metadata,

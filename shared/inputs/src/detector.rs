@@ -31,7 +31,7 @@ impl DetectorFile {
             session,
             card,
         } = read;
-        let card = card.map(|it| it.read(&path, DetectorCard::parse));
+        let card = card.map(|card| card.read(&path, DetectorCard::parse));
         Ok(Self {
             card: card.transpose()?,
             path,

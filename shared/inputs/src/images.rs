@@ -36,8 +36,8 @@ pub fn listed(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 
 /// Whether a file has an image's name.
 pub fn has_image_name(path: &Path) -> bool {
-    let extension = path.extension().and_then(|it| it.to_str()).unwrap_or_default();
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     ["png", "jpg", "jpeg", "bmp"]
         .iter()
-        .any(|it| extension.eq_ignore_ascii_case(it))
+        .any(|name| extension.eq_ignore_ascii_case(name))
 }

@@ -60,15 +60,15 @@ impl Joints {
     /// * `learned`: a consistency file; a map of its own counts before the file of joints that ships.
     pub fn map(&self, learned: Option<&Learned>, set: &JointSet) -> Option<Arc<JointMap>> {
         let learned = learned.filter(|_| is_shipped(&self.from));
-        let learned = learned.and_then(|it| it.joint_map(set));
+        let learned = learned.and_then(|learned| learned.joint_map(set));
         learned.or_else(|| self.file.as_ref()?.map(set))
     }
 
     /// A text that differs for different joints.
     pub fn fingerprint(&self) -> String {
-        let text = self.file.as_ref().and_then(|it| it.write().ok());
-        text.map_or_else(String::new, |it| {
-            format!("{:016x}", formats::checksum::fnv1a(it.as_bytes()))
+        let text = self.file.as_ref().and_then(|file| file.write().ok());
+        text.map_or_else(String::new, |text| {
+            format!("{:016x}", formats::checksum::fnv1a(text.as_bytes()))
         })
     }
 }

@@ -234,7 +234,7 @@ pub fn pair_tables(
     model: &Model,
     cameras: &[&str],
 ) -> Result<PairTables, Failure> {
-    let index = |name: &String| cameras.iter().position(|it| it == name);
+    let index = |name: &String| cameras.iter().position(|camera| camera == name);
     let mut of_pairs = Vec::new();
     for entry in &config.compatibility {
         let [Some(first), Some(second)] = entry.views.each_ref().map(index) else {

@@ -86,7 +86,7 @@ pub fn network_card(deployment: &Deployment, camera: usize) -> Result<Option<Car
         (file, None),
         &library(&deployment.network, deployment.device)?,
     )?;
-    Ok(network.card().map(|it| it.0.clone()))
+    Ok(network.card().map(|card| card.0.clone()))
 }
 
 /// Loads the detector of a deployment, and tries it once.

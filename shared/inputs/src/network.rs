@@ -70,7 +70,7 @@ impl NetworkFile {
             session,
             card,
         } = read;
-        let card = card.map(|it| it.read(&path, Card::parse));
+        let card = card.map(|card| card.read(&path, Card::parse));
         Ok(Self {
             card: card.transpose()?,
             path,

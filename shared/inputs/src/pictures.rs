@@ -38,14 +38,14 @@ impl Picture {
     /// For people: the name of the file, and the frame.
     pub fn title(&self) -> String {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        let frame = self.frame.map(|it| format!(" {it}"));
+        let frame = self.frame.map(|frame| format!(" {frame}"));
         format!("{name}{}", frame.unwrap_or_default())
     }
 
     /// For the names of files: that of the file without its ending, and the frame.
     pub fn stem(&self) -> String {
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-        let frame = self.frame.map(|it| format!("-{it:06}"));
+        let frame = self.frame.map(|frame| format!("-{frame:06}"));
         format!("{stem}{}", frame.unwrap_or_default())
     }
 }
@@ -122,7 +122,7 @@ pub fn count(path: &Path, frames: Frames) -> usize {
         return 1;
     }
     let source = Source::open(&spec(path, frames));
-    source.map_or(1, |it| it.info().n_frames as usize)
+    source.map_or(1, |source| source.info().n_frames as usize)
 }
 
 /// What is searched of a picture.
@@ -208,11 +208,11 @@ impl Searched {
 /// The size with the longest side that is allowed, and the same shape.
 fn bounded(size: Size, longest: Option<usize>) -> Size {
     let side = size.width.max(size.height);
-    let Some(longest) = longest.filter(|it| *it < side) else {
+    let Some(longest) = longest.filter(|longest| *longest < side) else {
         return size;
     };
     let scale = longest as f64 / side as f64;
-    let smaller = |it: usize| ((it as f64 * scale).round() as usize).max(1);
+    let smaller = |value: usize| ((value as f64 * scale).round() as usize).max(1);
     Size::new(smaller(size.width), smaller(size.height))
 }
 

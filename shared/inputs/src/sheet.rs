@@ -89,7 +89,7 @@ impl Sheet {
         let caption = match found {
             None => format!("{name} -"),
             Some(skeleton) => {
-                let smaller = |it: &[f64; 2]| it.map(|it| (it + 0.5) * scale - 0.5);
+                let smaller = |it: &[f64; 2]| it.map(|value| (value + 0.5) * scale - 0.5);
                 let points: Vec<_> = skeleton.points.iter().map(smaller).collect();
                 draw_limbs(&mut canvas, &points, &skeleton.limbs);
                 format!("{name} {:.2}", skeleton.score)
@@ -130,8 +130,8 @@ impl Sheet {
             return self.path.clone();
         }
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-        let ending = self.path.extension().map(|it| it.to_string_lossy());
-        let ending = ending.map_or(String::new(), |it| format!(".{it}"));
+        let ending = self.path.extension().map(|extension| extension.to_string_lossy());
+        let ending = ending.map_or(String::new(), |ending| format!(".{ending}"));
         let name = format!("{stem}-{}{ending}", self.page);
         self.path.with_file_name(name)
     }
@@ -140,7 +140,7 @@ impl Sheet {
 /// Size of the thumbnail of an image, and thumbnail pixels per pixel.
 fn shrunk(size: Size) -> (Size, f64) {
     let scale = SIDE_PX as f64 / size.width.max(size.height).max(1) as f64;
-    let side = |it: usize| ((it as f64 * scale).round() as usize).max(1);
+    let side = |value: usize| ((value as f64 * scale).round() as usize).max(1);
     (Size::new(side(size.width), side(size.height)), scale)
 }
 
@@ -169,7 +169,7 @@ mod tests {
             sheet.finish().unwrap();
             let entries = std::fs::read_dir(&folder).unwrap();
             let mut names: Vec<_> =
-                entries.map(|it| it.unwrap().file_name().into_string().unwrap()).collect();
+                entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
             names.sort();
             assert_eq!(names, expected);
         }
@@ -199,7 +199,7 @@ mod tests {
             .map(|(x, y, _)| [x, y])
             .collect();
         let ends = |axis: usize| {
-            let values = || blue.iter().map(|it| it[axis]);
+            let values = || blue.iter().map(|blue| blue[axis]);
             (values().min().unwrap(), values().max().unwrap())
         };
         let top = page.height() - 50 - 8;

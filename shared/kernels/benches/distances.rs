@@ -17,7 +17,7 @@ fn main() {
             .collect::<Vec<[f64; 3]>>()
     };
     let (ends, from) = (grid(0.2), grid(0.0));
-    let scores: Vec<f64> = (0..ends.len()).map(|it| ((it * 7) % 17) as f64).collect();
+    let scores: Vec<f64> = (0..ends.len()).map(|i| ((i * 7) % 17) as f64).collect();
     let points = ScoredPoints::new(ends.iter().copied(), &scores);
     let spring = LengthSpring {
         mean: 0.3,

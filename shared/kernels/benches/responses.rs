@@ -14,7 +14,7 @@ use rustix::time::{ClockId, clock_gettime};
 const N_FILTERS: usize = 156;
 
 fn main() {
-    let repetitions = std::env::args().find_map(|it| it.parse().ok()).unwrap_or(20);
+    let repetitions = std::env::args().find_map(|arg| arg.parse().ok()).unwrap_or(20);
     for isa in Isa::available() {
         // Without multiply-adds in hardware it takes minutes.
         if isa == Isa::available()[0] && Isa::available().len() > 1 {
@@ -50,14 +50,14 @@ fn sizes([width, height]: [usize; 2], side: usize) -> Vec<[usize; 2]> {
     let n = 1 + (10.0 * shorter.log2()).floor() as i32;
     let size = |level: i32| {
         let scale = 2_f64.powf(-f64::from(level) / 10.0) / 4.0;
-        [height, width].map(|it| (it as f64 * scale).round() as usize - 2 + side - 1)
+        [height, width].map(|value| (value as f64 * scale).round() as usize - 2 + side - 1)
     };
     (0..n).map(size).collect()
 }
 
 /// Values in 0..1 that look random.
 fn noise(n: usize) -> Vec<f32> {
-    let hash = |it: usize| (it as u32).wrapping_mul(2654435761).rotate_left(13);
+    let hash = |value: usize| (value as u32).wrapping_mul(2654435761).rotate_left(13);
     let value = |it| hash(it).wrapping_mul(2246822519) as f32 / u32::MAX as f32;
     (0..n).map(value).collect()
 }
@@ -66,7 +66,7 @@ fn measure(isa: Isa, image: [usize; 2], side: usize, repetitions: usize) {
     let n_taps = side * side * N_CHANNELS;
     let weights: Vec<f64> = noise(N_FILTERS * n_taps)
         .into_iter()
-        .map(|it| f64::from(it) * 0.1 - 0.05)
+        .map(|value| f64::from(value) * 0.1 - 0.05)
         .collect();
     let templates: Vec<_> = weights
         .chunks_exact(n_taps)

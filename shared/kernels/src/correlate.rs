@@ -146,7 +146,7 @@ impl FilterBank {
     /// If there are no such panels.
     pub fn filters(&self, panels: Range<usize>) -> Range<usize> {
         let panels = &self.panels[panels];
-        let first = panels.first().map_or(0, |it| it.filters.start);
+        let first = panels.first().map_or(0, |panel| panel.filters.start);
         first..panels.last().map_or(0, |it| it.filters.end)
     }
 
@@ -204,7 +204,7 @@ impl FilterBank {
                 size[0] + filter[0] <= map.rows + 1 && size[1] + filter[1] <= map.cols + 1
             };
             assert!(
-                panels.iter().all(|it| room(it.filter)),
+                panels.iter().all(|panel| room(panel.filter)),
                 "all placements lie on the map"
             );
             n += n_filters * size[0] * size[1];
@@ -246,9 +246,9 @@ impl Panel {
     fn new(first: usize, filter: [usize; 2], tiled: bool) -> Self {
         let n_taps = filter[0] * filter[1] * N_CHANNELS;
         let tiled = tiled && filter.iter().all(|side| TILED_SIDES.contains(side));
-        let rows = |it: usize| {
+        let rows = |i: usize| {
             let area = if tiled {
-                Form::new(FORMS[it], filter).area()
+                Form::new(FORMS[i], filter).area()
             } else {
                 0
             };
@@ -310,9 +310,9 @@ struct Correlate<'a, I> {
 impl<'a, I: Iterator<Item = Level<'a>> + Clone> Kernel for Correlate<'_, I> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let first_filter = self.panels.first().map_or(0, |it| it.filters.start);
+        let first_filter = self.panels.first().map_or(0, |panel| panel.filters.start);
         for panels in self.panels.chunk_by(|a, b| a.filter == b.filter) {
-            let forms = FORMS.map(|it| Form::new(it, panels[0].filter));
+            let forms = FORMS.map(|form| Form::new(form, panels[0].filter));
             let mut at = 0;
             for level in self.levels.clone() {
                 let place = (at, level.size);
@@ -380,5 +380,5 @@ fn make_room(row: &mut Vec<Row>, cols: usize) {
 #[inline(always)]
 fn blocks(total: usize, largest: usize) -> impl Iterator<Item = Range<usize>> {
     let n = total.div_ceil(largest);
-    (0..n).map(move |it| it * total / n..(it + 1) * total / n)
+    (0..n).map(move |i| i * total / n..(i + 1) * total / n)
 }

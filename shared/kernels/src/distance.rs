@@ -129,7 +129,7 @@ impl Body for Best<'_> {
             totals,
             found,
         } = self;
-        let [x, y, z] = at.each_ref().map(|it| it.as_chunks::<LANES>().0);
+        let [x, y, z] = at.each_ref().map(|at| at.as_chunks::<LANES>().0);
         let scores = scores.as_chunks::<LANES>().0;
         let all = totals.as_chunks_mut::<LANES>().0;
         let mut most = [f64::NEG_INFINITY; LANES];
@@ -149,8 +149,8 @@ impl Body for Best<'_> {
         let most = most.into_iter().fold(f64::NEG_INFINITY, larger);
         let mut of_best = all.iter().enumerate().filter_map(|(chunk, totals)| {
             // Counted, not searched: all at a time.
-            let n_best = totals.iter().filter(|it| **it == most).count();
-            let lane = (n_best > 0).then(|| totals.iter().position(|it| *it == most))??;
+            let n_best = totals.iter().filter(|total| **total == most).count();
+            let lane = (n_best > 0).then(|| totals.iter().position(|total| *total == most))??;
             Some((chunk * LANES + lane, totals[lane]))
         });
         *found = of_best.next().unwrap_or((0, f64::NEG_INFINITY));
@@ -184,7 +184,7 @@ mod tests {
             let points: Vec<[f64; 3]> = (0..n).map(|_| point()).collect();
             let from: Vec<[f64; 3]> = (0..crate::sized(50, 3)).map(|_| point()).collect();
             // Few different scores, so that several points are equally good.
-            let scores: Vec<f64> = (0..n).map(|it| f64::from(it as u32 % 3)).collect();
+            let scores: Vec<f64> = (0..n).map(|i| f64::from(i as u32 % 3)).collect();
             let one = ScoredPoints::new(points.iter().copied(), &scores);
             let wanted = one.best_reference(from.iter().copied(), &spring);
             for isa in Isa::available() {

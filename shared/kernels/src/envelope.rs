@@ -36,7 +36,7 @@ pub fn transform_f64(plane: &[f64], [rows, cols]: [usize; 2], spring: &Spring) -
         y: Vec::with_capacity(plane.len()),
     };
     for row in down.chunks_exact(cols.max(1)) {
-        let scores: Vec<_> = row.iter().map(|it| it.0).collect();
+        let scores: Vec<_> = row.iter().map(|row| row.0).collect();
         for (score, x) in line(&scores, spring.x()) {
             out.score.push(score);
             out.x.push(x);
@@ -99,7 +99,7 @@ mod tests {
             w in (0.01..0.3, -0.2..0.2, 0.01..0.3, -0.2..0.2),
             anchor in [-5..6_i32, -5..6_i32],
         ) {
-            let plane: Vec<_> = values[..rows * cols].iter().map(|&it| f64::from(it) * 0.1).collect();
+            let plane: Vec<_> = values[..rows * cols].iter().map(|&value| f64::from(value) * 0.1).collect();
             let spring = Spring { w: w.into(), anchor };
             let got = transform_f64(&plane, [rows, cols], &spring);
             for p in 0..rows * cols {

@@ -82,7 +82,7 @@ impl HogShape {
     /// Fills the padding of a map of `cells`, and returns the size of what is inside, if anything.
     fn pad_map(&self, cells: [usize; 2], map: &mut [[f32; N_CHANNELS]]) -> Option<[usize; 2]> {
         let [pad_rows, pad_cols] = self.pad;
-        let [inner_rows, inner_cols] = cells.map(|it| it.saturating_sub(2));
+        let [inner_rows, inner_cols] = cells.map(|cell| cell.saturating_sub(2));
         let mut padding = [0.0; N_CHANNELS];
         padding[N_CHANNELS - 1] = 1.0;
         let lines = map.chunks_exact_mut((inner_cols + 2 * pad_cols).max(1));
@@ -234,7 +234,7 @@ mod tests {
         #[test]
         fn a_mirrored_image_has_mirrored_features(cells in [3..9_usize, 3..9_usize], seed in any::<u64>()) {
             // Samples of which no two gradients are alike, so that no orientation is a draw.
-            let [width, height] = cells.map(|it| 4 * it);
+            let [width, height] = cells.map(|cell| 4 * cell);
             let mut state = seed | 1;
             let samples = std::iter::repeat_with(|| {
                 state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -257,14 +257,14 @@ mod tests {
 
         #[test]
         fn adding_a_constant_to_the_image_changes_nothing(image in images(), offset in 1..50_u8) {
-            let brighter = image.data().iter().map(|it| it + f64::from(offset)).collect();
+            let brighter = image.data().iter().map(|value| value + f64::from(offset)).collect();
             let brighter = Planes::from_samples(image.width(), image.height(), brighter);
             prop_assert_eq!(hog_f64(&brighter, SHAPE), hog_f64(&image, SHAPE));
         }
 
         #[test]
         fn inverting_the_contrast_keeps_the_insensitive_channels(image in images()) {
-            let negative = image.data().iter().map(|it| 255.0 - it).collect();
+            let negative = image.data().iter().map(|value| 255.0 - value).collect();
             let negative = Planes::from_samples(image.width(), image.height(), negative);
             let (a, b) = (hog_f64(&negative, SHAPE), hog_f64(&image, SHAPE));
             for (a, b) in a.chunks_exact(N_CHANNELS).zip(b.chunks_exact(N_CHANNELS)) {

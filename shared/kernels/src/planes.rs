@@ -270,7 +270,7 @@ mod tests {
         ) {
             let [width, height] = size;
             // Shares near 1 are those of the pyramid.
-            let smaller = |it: usize, share: f64| ((it as f64 * share.sqrt()).round() as usize).max(1);
+            let smaller = |value: usize, share: f64| ((value as f64 * share.sqrt()).round() as usize).max(1);
             let to = [smaller(width, share[0]), smaller(height, share[1])];
             let bytes = noise(seed, misaligned + 3 * width * height);
             let image = Rgb8View::new(width, height, &bytes[misaligned..]).unwrap();
@@ -293,11 +293,11 @@ mod tests {
             seed in any::<u64>(),
         ) {
             let [width, height] = size;
-            let to = [0, 1].map(|it| ((size[it] as f64 * share[it]).round() as usize).max(1));
+            let to = [0, 1].map(|i| ((size[i] as f64 * share[i]).round() as usize).max(1));
             let bytes = noise(seed, 3 * width * height);
             let image = Rgb8View::new(width, height, &bytes).unwrap();
             let [x, y] = [0, 1].map(|axis| {
-                let at = cut[axis].map(|it| (it * to[axis] as f64) as usize);
+                let at = cut[axis].map(|cut| (cut * to[axis] as f64) as usize);
                 at[0].min(at[1])..at[0].max(at[1]) + 1
             });
             let part = PartOfResized { size: to, x, y };
@@ -321,7 +321,7 @@ mod tests {
             seed in any::<u64>(),
         ) {
             let samples = noise(seed, 3 * size[0] * size[1]);
-            let samples = samples.into_iter().map(|it| f64::from(it) / 1.1).collect();
+            let samples = samples.into_iter().map(|sample| f64::from(sample) / 1.1).collect();
             let image = Planes::from_samples(size[0], size[1], samples);
             let want = reduce_by_taps(&image);
             let mut workspace = ShrinkWorkspace::default();
@@ -341,11 +341,11 @@ mod tests {
         let mut workspace = ShrinkWorkspace::default();
         resize(Isa::best(), image, [17, 12], &mut workspace, &mut out);
         assert_eq!([out.width(), out.height()], [17, 12]);
-        assert!(out.data().iter().all(|it| (it - 77.0).abs() < 1e-9));
+        assert!(out.data().iter().all(|value| (value - 77.0).abs() < 1e-9));
         let mut half = used();
         reduce(Isa::best(), &out, &mut workspace, &mut half);
         assert_eq!([half.width(), half.height()], [9, 6]);
-        assert!(half.data().iter().all(|it| (it - 77.0).abs() < 1e-9));
+        assert!(half.data().iter().all(|value| (value - 77.0).abs() < 1e-9));
     }
 
     /// Rows so long that some samples are covered by less than a thousandth, others by a little more.

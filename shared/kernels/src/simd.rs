@@ -190,7 +190,8 @@ mod tests {
         for isa in Isa::available() {
             let mut got = Vec::new();
             isa.run(Arithmetic(&mut got));
-            let bits = |values: &[f32]| values.iter().map(|it| it.to_bits()).collect::<Vec<_>>();
+            let bits =
+                |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
             assert_eq!(bits(&got), bits(&want), "{isa:?}");
         }
     }
@@ -201,7 +202,7 @@ mod tests {
     impl Kernel for Places {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) {
-            let row: [f32; ROW] = std::array::from_fn(|it| it as f32);
+            let row: [f32; ROW] = std::array::from_fn(|i| i as f32);
             for at in 0..=ROW - S::LANES {
                 // SAFETY: the last register ends where the row does.
                 let value = unsafe { simd.load_at(&row, at) };

@@ -386,7 +386,8 @@ impl Card {
                 demand(fits, "output.nats", nats, || "0.01 to 1000".to_owned())
             }
             Codec::Keypoints { fields, .. } => {
-                let count = |wanted: ListField| fields.iter().filter(|it| **it == wanted).count();
+                let count =
+                    |wanted: ListField| fields.iter().filter(|field| **field == wanted).count();
                 let fits = count(ListField::X) == 1
                     && count(ListField::Y) == 1
                     && count(ListField::Score) <= 1
@@ -407,7 +408,7 @@ impl Card {
             });
         }
         if let Some(set) = set {
-            let known = SETS.map(|it| it.0);
+            let known = SETS.map(|set| set.0);
             let is_known = known.contains(&set.as_str());
             return demand(is_known, "keypoints.set", &format!("{set:?}"), || {
                 format!("one of {}", known.join(", "))
@@ -425,7 +426,7 @@ impl Card {
         demand(
             twice.is_none(),
             "keypoints.names",
-            &twice.map_or("", |it| it.1),
+            &twice.map_or("", |twice| twice.1),
             || "every name once".to_owned(),
         )
     }
@@ -446,11 +447,11 @@ pub(crate) fn check_input(input: &Input) -> Result<(), CardError> {
         scale,
         || "more than 0".to_owned(),
     )?;
-    let is_finite = mean.iter().all(|it| it.is_finite());
+    let is_finite = mean.iter().all(|value| value.is_finite());
     demand(is_finite, "input.mean", &format!("{mean:?}"), || {
         "three finite numbers".to_owned()
     })?;
-    let divides = std.iter().all(|it| it.is_finite() && *it > 0.0);
+    let divides = std.iter().all(|value| value.is_finite() && *value > 0.0);
     demand(divides, "input.std", &format!("{std:?}"), || {
         "three numbers above 0".to_owned()
     })

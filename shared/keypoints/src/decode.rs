@@ -196,7 +196,7 @@ impl<'a> HeatMaps<'a> {
                 }
             }
             Refine::Parabola => {
-                let [before, here, after] = [before, here, after].map(|it| it.max(1e-6).ln());
+                let [before, here, after] = [before, here, after].map(|value| value.max(1e-6).ln());
                 let curve = before - 2.0 * here + after;
                 if curve < 0.0 {
                     (0.5 * (before - after) / curve).clamp(-0.5, 0.5)
@@ -313,11 +313,11 @@ impl<'a> List<'a> {
     pub fn keypoints(&self, input: [usize; 2], unit: ListUnit, score: Score) -> Vec<Keypoint> {
         let scale = match unit {
             ListUnit::Pixel => [1.0; 2],
-            ListUnit::Share => input.map(|it| it as f64),
+            ListUnit::Share => input.map(|input| input as f64),
         };
         let keypoint = |values: &[f32]| {
             let get = |wanted: ListField| {
-                let place = self.fields.iter().position(|it| *it == wanted)?;
+                let place = self.fields.iter().position(|field| *field == wanted)?;
                 Some(f64::from(values[place]))
             };
             let [x, y] = [ListField::X, ListField::Y].map(|it| get(it).unwrap_or(0.0));
@@ -332,7 +332,7 @@ impl<'a> List<'a> {
 }
 
 pub(crate) fn finite(values: &[f32]) -> Result<(), OutputError> {
-    match values.iter().position(|it| !it.is_finite()) {
+    match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
         Some(index) => Err(OutputError::NotANumber {
             index,

@@ -124,8 +124,8 @@ impl DetectorCard {
             strides, person, ..
         } = &card.output
         {
-            let fits =
-                (1..=8).contains(&strides.len()) && strides.iter().all(|it| (1..=256).contains(it));
+            let fits = (1..=8).contains(&strides.len())
+                && strides.iter().all(|stride| (1..=256).contains(stride));
             demand(fits, "output.strides", &format!("{strides:?}"), || {
                 "one to eight numbers from 1 to 256".to_owned()
             })?;
@@ -163,9 +163,9 @@ impl DetectorCard {
                 if values.len() != 5 * n {
                     return Err(other(shape, "[1, n, 5]".to_owned()));
                 }
-                let one = |it: &[f32]| PersonBox {
-                    outline: [0, 1, 2, 3].map(|side| f64::from(it[side])),
-                    score: f64::from(it[4]),
+                let one = |values: &[f32]| PersonBox {
+                    outline: [0, 1, 2, 3].map(|side| f64::from(values[side])),
+                    score: f64::from(values[4]),
                 };
                 values.chunks_exact(5).map(one).collect()
             }
@@ -188,7 +188,7 @@ impl DetectorCard {
     /// * `strides`: pixels of the input for a cell of each grid, at least 1.
     pub fn n_cells(&self, strides: &[usize]) -> usize {
         let [width, height] = [self.input.width, self.input.height];
-        strides.iter().map(|it| (width / it) * (height / it)).sum()
+        strides.iter().map(|stride| (width / stride) * (height / stride)).sum()
     }
 
     fn of_centres(
@@ -237,8 +237,8 @@ impl DetectorCard {
                 let stride = stride as f64;
                 let middle = [raw(0) + column as f64, raw(1) + row as f64];
                 (
-                    middle.map(|it| it * stride),
-                    [raw(2), raw(3)].map(|it| it.exp() * stride),
+                    middle.map(|middle| middle * stride),
+                    [raw(2), raw(3)].map(|value| value.exp() * stride),
                 )
             };
             PersonBox {
@@ -310,7 +310,7 @@ impl DetectorCard {
                 }
             }
         }
-        sum.map(|it| it as f32 / n)
+        sum.map(|sum| sum as f32 / n)
     }
 }
 
@@ -362,7 +362,7 @@ output = { codec = "yolox", strides = [16, 32] }
         let found = card.boxes(&values, &[1, 10, 7]).unwrap();
         let outlines: Vec<[f64; 4]> = found.iter().map(|it| it.outline).collect();
         assert_eq!(found.len(), 2, "{found:?}");
-        let near = |a: [f64; 4], b: [f64; 4]| (0..4).all(|it| (a[it] - b[it]).abs() < 1e-4);
+        let near = |a: [f64; 4], b: [f64; 4]| (0..4).all(|i| (a[i] - b[i]).abs() < 1e-4);
         assert!(near(outlines[0], [16.0, 8.0, 32.0, 40.0]), "{outlines:?}");
         assert!(near(outlines[1], [32.0, 0.0, 64.0, 32.0]), "{outlines:?}");
         assert!((found[0].score - 0.72).abs() < 1e-6);
@@ -432,7 +432,7 @@ output = { codec = "yolox", strides = [16, 32] }
         let mut values = vec![f32::NAN; 3 * 64 * 32];
         let step = card.fill(&[0, 0, 0, 64, 64, 64], [2, 1], &mut values);
         assert_eq!(step, 1.0 / 32.0);
-        let line: Vec<f32> = [0, 15, 16, 31, 32, 48, 63].map(|it| values[it]).to_vec();
+        let line: Vec<f32> = [0, 15, 16, 31, 32, 48, 63].map(|i| values[i]).to_vec();
         assert_eq!(line, [0.0, 0.0, 1.0, 31.0, 33.0, 64.0, 64.0]);
     }
 

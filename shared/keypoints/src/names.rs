@@ -295,7 +295,7 @@ pub fn joint_rows(names: &[String]) -> Vec<Option<Vec<(usize, f64)>>> {
 
 /// Whether a keypoint is a joint of `skeleton::PARSE14` by its name; all others are extra keypoints.
 pub fn is_joint(name: &str) -> bool {
-    name == "head top" || PARSE14.joints.iter().any(|it| it.name == name)
+    name == "head top" || PARSE14.joints.iter().any(|joint| joint.name == name)
 }
 
 /// The name on the other side of the body: `left heel` of `right heel`; `None` for a name without a side.
@@ -312,7 +312,7 @@ mod tests {
     use super::*;
 
     fn owned(names: &[&str]) -> Vec<String> {
-        names.iter().map(|&it| it.to_owned()).collect()
+        names.iter().map(|&name| name.to_owned()).collect()
     }
 
     #[test]
@@ -321,7 +321,7 @@ mod tests {
             let rows = joint_rows(&owned(names));
             for (joint, row) in PARSE14.joints.iter().zip(rows) {
                 let row = row.unwrap_or_else(|| panic!("{set}: {}", joint.name));
-                let sum: f64 = row.iter().map(|it| it.1).sum();
+                let sum: f64 = row.iter().map(|row| row.1).sum();
                 assert!((sum - 1.0).abs() < 1e-12, "{set}: {}", joint.name);
             }
         }
@@ -343,7 +343,7 @@ mod tests {
     #[test]
     fn halpe_begins_as_coco_does_and_lsp_is_the_skeletons() {
         assert_eq!(HALPE_26[..17], COCO_17);
-        let joints = PARSE14.joints.iter().map(|it| it.name);
+        let joints = PARSE14.joints.iter().map(|joint| joint.name);
         let same = joints.zip(LSP_14).filter(|(a, b)| a == b).count();
         assert_eq!(same, 13, "all but the name of the top of the head");
     }
@@ -352,7 +352,7 @@ mod tests {
     fn keypoints_that_are_no_joints_are_extra() {
         let extra = |names: &[&'static str]| -> Vec<&str> {
             let names = names.iter().copied();
-            names.filter(|it| !is_joint(it)).collect()
+            names.filter(|name| !is_joint(name)).collect()
         };
         assert_eq!(extra(&LSP_14), [""; 0]);
         assert_eq!(extra(&COCO_17), COCO_17[..5]);
@@ -372,7 +372,7 @@ mod tests {
         // The face at height 1.6, the shoulders at 1.4.
         let height = |keypoint: usize| if keypoint < 5 { 1.6 } else { 1.4 };
         let head = rows[13].as_ref().unwrap();
-        let top: f64 = head.iter().map(|it| it.1 * height(it.0)).sum();
+        let top: f64 = head.iter().map(|head| head.1 * height(head.0)).sum();
         assert!((top - 1.72).abs() < 1e-12, "{top}");
     }
 

@@ -67,7 +67,8 @@ mod tests {
                 !card.weights.is_empty() && !card.licence.is_empty(),
                 "{name}"
             );
-            let missing = joint_rows(&card.names()).iter().filter(|it| it.is_none()).count();
+            let missing =
+                joint_rows(&card.names()).iter().filter(|joint_row| joint_row.is_none()).count();
             assert_eq!(missing, 0, "{name}");
         }
     }
@@ -88,16 +89,17 @@ mod tests {
         let listed = |folder: &str| {
             let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
             let files = std::fs::read_dir(folder).unwrap();
-            let names = files.map(|it| it.unwrap().path());
-            let mut names: Vec<_> =
-                names.map(|it| it.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
+            let names = files.map(|file| file.unwrap().path());
+            let mut names: Vec<_> = names
+                .map(|name| name.file_stem().unwrap().to_str().unwrap().to_owned())
+                .collect();
             names.sort();
             names
         };
-        let mut networks = SHIPPED.map(|it| it.0);
+        let mut networks = SHIPPED.map(|shipped| shipped.0);
         networks.sort_unstable();
         assert_eq!(listed("../../configs/networks"), networks);
-        let detectors = SHIPPED_DETECTORS.map(|it| it.0);
+        let detectors = SHIPPED_DETECTORS.map(|shipped_detector| shipped_detector.0);
         assert_eq!(listed("../../configs/detectors"), detectors);
     }
 }

@@ -52,12 +52,13 @@ impl Window {
 
     fn of_input(card: &Card, outline: [f64; 4], input: [usize; 2]) -> Option<Self> {
         let [left, top, right, bottom] = outline;
-        let mut size = [right - left, bottom - top].map(|it| it * card.crop.margin);
-        let is_box = outline.iter().all(|it| it.is_finite()) && size.iter().all(|it| *it > 0.0);
+        let mut size = [right - left, bottom - top].map(|value| value * card.crop.margin);
+        let is_box =
+            outline.iter().all(|value| value.is_finite()) && size.iter().all(|value| *value > 0.0);
         if !is_box {
             return None;
         }
-        let [width, height] = input.map(|it| it as f64);
+        let [width, height] = input.map(|input| input as f64);
         if card.crop.fit == Fit::Widen {
             size = [
                 size[0].max(size[1] * width / height),
@@ -73,7 +74,7 @@ impl Window {
             centre: [f64::midpoint(left, right), f64::midpoint(top, bottom)],
             step: [size[0] / lengths[0], size[1] / lengths[1]],
             input,
-            middle: lengths.map(|it| it / 2.0),
+            middle: lengths.map(|length| length / 2.0),
         })
     }
 
@@ -86,8 +87,8 @@ impl Window {
     /// * Returns `None` for numbers that are not finite, and for a box whose sides are exchanged.
     pub fn grid(outline: [f64; 4], margin: f64, most_rows: usize) -> Option<Self> {
         let [left, top, right, bottom] = outline;
-        let [width, height] = [right - left, bottom - top].map(|it| it * margin);
-        let is_box = outline.iter().all(|it| it.is_finite()) && width >= 0.0 && height >= 0.0;
+        let [width, height] = [right - left, bottom - top].map(|value| value * margin);
+        let is_box = outline.iter().all(|value| value.is_finite()) && width >= 0.0 && height >= 0.0;
         if !is_box || !(width + height).is_finite() || most_rows == 0 {
             return None;
         }
@@ -103,7 +104,7 @@ impl Window {
             centre: [f64::midpoint(left, right), f64::midpoint(top, bottom)],
             step: [step; 2],
             input,
-            middle: input.map(|it| it as f64 / 2.0),
+            middle: input.map(|input| input as f64 / 2.0),
         })
     }
 
@@ -170,7 +171,7 @@ fn is_unbiased(card: &Card) -> bool {
 
 /// The box around the keypoints that were found with a score above 0: left, top, right, bottom.
 pub fn outline(keypoints: &[Option<Keypoint>]) -> Option<[f64; 4]> {
-    let found = keypoints.iter().flatten().filter(|it| it.score > 0.0);
+    let found = keypoints.iter().flatten().filter(|keypoint| keypoint.score > 0.0);
     found.fold(None, |around: Option<[f64; 4]>, it| {
         let [x, y] = it.at;
         let [left, top, right, bottom] = around.unwrap_or([x, y, x, y]);

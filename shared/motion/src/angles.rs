@@ -74,7 +74,7 @@ fn value(
     up: Option<UnitVector3<f64>>,
 ) -> Result<Value, Unknown> {
     let roles = angle.roles();
-    let of = |role: Role| joints.iter().find(|it| it.0 == role).map(|it| it.1);
+    let of = |role: Role| joints.iter().find(|joint| joint.0 == role).map(|joint| joint.1);
     let mut found: Vec<Estimate> = Vec::with_capacity(roles.len());
     for role in &roles {
         found.push(of(*role).ok_or(Unknown::Missing)?);
@@ -88,7 +88,7 @@ fn value(
     let points: Vec<Vector3<f64>> = found.iter().map(|it| it.position).collect();
     let degrees = angle.degrees(&points, &up).ok_or(Unknown::Undefined)?;
     let sd_degrees = spread::sd(degrees, &places, |points| angle.degrees(points, &up))?;
-    if sd_degrees.is_some_and(|it| it > MOST_SD_DEGREES) {
+    if sd_degrees.is_some_and(|sd_degree| sd_degree > MOST_SD_DEGREES) {
         return Err(Unknown::Uncertain);
     }
     let is_any = |state: State| found.iter().any(|it| it.state == state);
@@ -102,7 +102,7 @@ fn value(
 }
 
 fn is_finite(covariance: &Matrix3<f64>) -> bool {
-    covariance.iter().all(|it| it.is_finite())
+    covariance.iter().all(|value| value.is_finite())
 }
 
 /// The sides in the order of files.

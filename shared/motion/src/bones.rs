@@ -26,13 +26,13 @@ pub(crate) fn constant(
     recorded: &Recorded,
     tracks: &mut [Vec<Smoothed>],
 ) -> Vec<([usize; 2], f64)> {
-    let at_role = |role: Role| recorded.joints.iter().position(|it| it.role == Some(role));
+    let at_role = |role: Role| recorded.joints.iter().position(|joint| joint.role == Some(role));
     let mut bones = Vec::new();
     for [a, b] in RIGID {
         let (Some(a), Some(b)) = (at_role(a), at_role(b)) else {
             continue;
         };
-        let measured = |it: &Smoothed| it.ok().filter(|it| it.state == State::Measured);
+        let measured = |smoothed: &Smoothed| smoothed.ok().filter(|it| it.state == State::Measured);
         let lengths: Vec<f64> = tracks[a]
             .iter()
             .zip(&tracks[b])
@@ -64,14 +64,14 @@ fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)])
     let mut joints: Vec<usize> = here.iter().flat_map(|it| it.0).collect();
     joints.sort_unstable();
     joints.dedup();
-    let found: Vec<Estimate> = joints.iter().filter_map(|&it| tracks[it][at].ok()).collect();
+    let found: Vec<Estimate> = joints.iter().filter_map(|&joint| tracks[joint][at].ok()).collect();
     if found.is_empty() {
         return;
     }
     let places: Vec<([usize; 2], f64)> = here
         .iter()
         .filter_map(|(ends, length)| {
-            let [a, b] = ends.map(|it| joints.binary_search(&it).ok());
+            let [a, b] = ends.map(|end| joints.binary_search(&end).ok());
             Some(([a?, b?], *length))
         })
         .collect();

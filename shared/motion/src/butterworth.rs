@@ -46,7 +46,7 @@ fn needed_hz(cutoff_hz: f64) -> f64 {
 /// [`CutoffError`].
 pub fn filter(recorded: &Recorded, cutoff_hz: f64, fill_s: f64) -> Result<Motion, CutoffError> {
     let times = &recorded.times;
-    let step = median(times.windows(2).map(|it| it[1] - it[0]).collect());
+    let step = median(times.windows(2).map(|pair| pair[1] - pair[0]).collect());
     let rate_hz = if step > 0.0 {
         1.0 / step
     } else {
@@ -73,13 +73,13 @@ pub fn filter(recorded: &Recorded, cutoff_hz: f64, fill_s: f64) -> Result<Motion
         }
         joints.push(track);
     }
-    let counts = joints.iter().map(|it| Counts::of(it)).collect();
+    let counts = joints.iter().map(|joint| Counts::of(joint)).collect();
     let report = Report {
         noise: vec![None; joints.len()],
         counts,
         breaks,
         unsure: recorded.unsure(),
-        resampled_s: Some(off_grid(times, step)).filter(|it| *it > 0.01 * step),
+        resampled_s: Some(off_grid(times, step)).filter(|value| *value > 0.01 * step),
         ..Report::default()
     };
     Ok(Motion { joints, report })
@@ -102,7 +102,7 @@ fn pieces<'a>(
     breaks: &[usize],
     fill_s: f64,
 ) -> Vec<&'a [(usize, Vector3<f64>)]> {
-    let step = median(times.windows(2).map(|it| it[1] - it[0]).collect());
+    let step = median(times.windows(2).map(|pair| pair[1] - pair[0]).collect());
     let goes_on = |a: &(usize, Vector3<f64>), b: &(usize, Vector3<f64>)| {
         let is_near = times[b.0] - times[a.0] <= fill_s.max(1.5 * step);
         is_near && !breaks.iter().any(|it| (a.0 + 1..=b.0).contains(it))
@@ -130,17 +130,17 @@ fn fill(
         step
     };
     let grid: Vec<f64> = (0..n).map(|at| begin + step * at as f64).collect();
-    let at: Vec<f64> = piece.iter().map(|it| times[it.0]).collect();
+    let at: Vec<f64> = piece.iter().map(|piece| times[piece.0]).collect();
     let mut filtered = vec![Vector3::zeros(); last.0 - first.0 + 1];
     for axis in 0..3 {
-        let values: Vec<f64> = piece.iter().map(|it| it.1[axis]).collect();
+        let values: Vec<f64> = piece.iter().map(|piece| piece.1[axis]).collect();
         let uniform: Vec<f64> = grid.iter().map(|&time| cubic(&at, &values, time)).collect();
         let smooth = twice(&uniform, 1.0 / step, cutoff_hz);
         for (nth, it) in filtered.iter_mut().enumerate() {
             it[axis] = cubic(&grid, &smooth, times[first.0 + nth]);
         }
     }
-    let mut known = piece.iter().map(|it| it.0).peekable();
+    let mut known = piece.iter().map(|piece| piece.0).peekable();
     for (nth, position) in filtered.into_iter().enumerate() {
         let here = first.0 + nth;
         let state = if known.next_if_eq(&here).is_some() {
@@ -188,8 +188,8 @@ fn twice(values: &[f64], rate_hz: f64, cutoff_hz: f64) -> Vec<f64> {
         return values.to_vec();
     }
     let n_around = ((2.0 * rate_hz / cutoff_hz).ceil() as usize).clamp(1, n - 1);
-    let before = (1..=n_around).rev().map(|it| 2.0 * values[0] - values[it]);
-    let after = (1..=n_around).map(|it| 2.0 * values[n - 1] - values[n - 1 - it]);
+    let before = (1..=n_around).rev().map(|i| 2.0 * values[0] - values[i]);
+    let after = (1..=n_around).map(|i| 2.0 * values[n - 1] - values[n - 1 - i]);
     let mut all: Vec<f64> = before.chain(values.iter().copied()).chain(after).collect();
     for _ in 0..2 {
         once(&mut all, rate_hz, cutoff_hz / TWICE);
@@ -223,7 +223,7 @@ mod tests {
     fn passed(hz: f64) -> f64 {
         let rate = 120.0;
         let wave: Vec<f64> =
-            (0..1200).map(|it| (2.0 * PI * hz * f64::from(it) / rate).sin()).collect();
+            (0..1200).map(|i| (2.0 * PI * hz * f64::from(i) / rate).sin()).collect();
         let got = twice(&wave, rate, 6.0);
         let (mut same, mut all) = (0.0, 0.0);
         for at in 300..900 {
@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_straight_line_stays_to_its_ends() {
-        let line: Vec<f64> = (0..50).map(|it| 0.3 * f64::from(it) - 2.0).collect();
+        let line: Vec<f64> = (0..50).map(|i| 0.3 * f64::from(i) - 2.0).collect();
         for (got, want) in twice(&line, 60.0, 6.0).iter().zip(&line) {
             assert!((got - want).abs() < 1e-2, "{got} {want}");
         }
@@ -255,7 +255,7 @@ mod tests {
     #[test]
     fn a_cubic_curve_goes_through_its_points_and_along_lines() {
         let times = [0.0, 0.1, 0.25, 0.3, 0.5];
-        let values = times.map(|it| 3.0 * it + 1.0);
+        let values = times.map(|time| 3.0 * time + 1.0);
         for time in [0.0, 0.05, 0.1, 0.2, 0.31, 0.5] {
             assert!((cubic(&times, &values, time) - (3.0 * time + 1.0)).abs() < 1e-12);
         }

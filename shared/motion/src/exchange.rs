@@ -40,7 +40,7 @@ pub(crate) fn settle(
             }
         }
     }
-    let changed = (0..tracks.len()).filter(|&it| is_changed[it]).collect();
+    let changed = (0..tracks.len()).filter(|&i| is_changed[i]).collect();
     (changed, counts)
 }
 
@@ -52,14 +52,14 @@ fn away(track: &Track, at: usize, measured: &Usable) -> Option<f64> {
 
 /// Exchanges two joints of which neither fits and each fits the other.
 fn exchange_pair(tracks: &mut [Track], [a, b]: [usize; 2], at: usize) -> bool {
-    let is_out = |it: &Track| it.used[at].is_some() && it.weights[at] == 0.0;
+    let is_out = |track: &Track| track.used[at].is_some() && track.weights[at] == 0.0;
     // One of them may fit by chance, where the limbs cross.
     if !is_out(&tracks[a]) || !is_out(&tracks[b]) {
         return false;
     }
     let of_a = away(&tracks[a], at, &tracks[b].used[at]);
     let of_b = away(&tracks[b], at, &tracks[a].used[at]);
-    let fits = |it: Option<f64>| it.is_some_and(|it| it <= GATE);
+    let fits = |it: Option<f64>| it.is_some_and(|value| value <= GATE);
     if !fits(of_a) || !fits(of_b) {
         return false;
     }

@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn a_late_track_is_late_by_that_much() {
-        let times: Vec<f64> = (0..200).map(|it| f64::from(it) * 0.01).collect();
+        let times: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.01).collect();
         let at = |t: f64| Some(Vector3::new((3.0 * t).sin(), (2.0 * t).cos(), 0.0));
         let truth: Vec<_> = times.iter().map(|&t| at(t)).collect();
         let late: Vec<_> = times.iter().map(|&t| at(t - 0.02)).collect();
@@ -156,8 +156,8 @@ mod tests {
             &truth,
             &[true, false, true, true],
         );
-        let n: f64 = errors.iter().map(|it| it.position_m.n).sum();
+        let n: f64 = errors.iter().map(|error| error.position_m.n).sum();
         assert_eq!(n, 2.0);
-        assert!(errors.iter().all(|it| it.jitter_m.n == 0.0));
+        assert!(errors.iter().all(|error| error.jitter_m.n == 0.0));
     }
 }

@@ -85,8 +85,17 @@ pub fn with_people(mut line: FrameLine, people: Vec<PersonLine>) -> FrameLine {
 
 fn placed(it: &Estimate, old: Option<&JointLine>) -> PlacedJoint {
     let covariance = it.covariance;
-    let halved = |it: Matrix3<f64>| [it.m11, it.m12, it.m13, it.m22, it.m23, it.m33];
-    let views = old.and_then(JointLine::placed).map(|it| it.views.clone());
+    let halved = |matrix3: Matrix3<f64>| {
+        [
+            matrix3.m11,
+            matrix3.m12,
+            matrix3.m13,
+            matrix3.m22,
+            matrix3.m23,
+            matrix3.m33,
+        ]
+    };
+    let views = old.and_then(JointLine::placed).map(|placed| placed.views.clone());
     PlacedJoint {
         covariance_m2: covariance.map_or([f64::NAN; 6], halved),
         position_m: it.position.into(),

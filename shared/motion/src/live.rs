@@ -36,7 +36,7 @@ impl Smoother {
         let models = |name: &&str| Models::new(prior(Role::of(name)));
         Self {
             joints: names.iter().map(models).collect(),
-            is_sided: names.iter().map(|it| crate::mirrored_name(it).is_some()).collect(),
+            is_sided: names.iter().map(|name| crate::mirrored_name(name).is_some()).collect(),
             fill_s,
             delay: Delay::default(),
         }
@@ -82,12 +82,12 @@ impl Smoother {
 ///
 /// The times must be [checked](Recorded::check).
 pub fn over(recorded: &Recorded, fill_s: f64) -> Motion {
-    let names: Vec<&str> = recorded.joints.iter().map(|it| it.name.as_str()).collect();
+    let names: Vec<&str> = recorded.joints.iter().map(|joint| joint.name.as_str()).collect();
     let mut smoother = Smoother::new(&names, fill_s);
     let n = recorded.times.len();
     let mut joints: Vec<Vec<Smoothed>> = vec![Vec::with_capacity(n); names.len()];
     for (at, &time_s) in recorded.times.iter().enumerate() {
-        let measured: Vec<_> = recorded.joints.iter().map(|it| it.measured[at]).collect();
+        let measured: Vec<_> = recorded.joints.iter().map(|joint| joint.measured[at]).collect();
         let smoothed = smoother.step(time_s, &measured, recorded.sides[at]);
         for (track, it) in joints.iter_mut().zip(smoothed) {
             track.push(it);
@@ -95,11 +95,11 @@ pub fn over(recorded: &Recorded, fill_s: f64) -> Motion {
     }
     let report = Report {
         noise: vec![None; joints.len()],
-        counts: joints.iter().map(|it| Counts::of(it)).collect(),
+        counts: joints.iter().map(|joint| Counts::of(joint)).collect(),
         unsure: [
             0,
             0,
-            recorded.sides.iter().filter(|it| **it == Sides::Unsure).count(),
+            recorded.sides.iter().filter(|side| **side == Sides::Unsure).count(),
         ],
         delay_s: smoother.delay_s().unwrap_or(0.0),
         ..Report::default()

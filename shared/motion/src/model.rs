@@ -70,7 +70,7 @@ impl Belief {
         }
         let left = moved(&self.covariance, dt);
         let mut covariance = moved(&left.transpose(), dt);
-        let powers = [1, 2, 3, 4, 5].map(|it| jerk * dt.powi(it));
+        let powers = [1, 2, 3, 4, 5].map(|i| jerk * dt.powi(i));
         let [t1, t2, t3, t4, t5] = powers;
         for i in 0..3 {
             covariance[(i, i)] += t5 / 20.0;
@@ -98,7 +98,8 @@ impl Belief {
         let root = total.cholesky()?;
         let difference = position - self.position();
         let distance2 = difference.dot(&root.solve(&difference));
-        let log_determinant = 2.0 * root.l().diagonal().iter().map(|it| it.ln()).sum::<f64>();
+        let log_determinant =
+            2.0 * root.l().diagonal().iter().map(|diagonal| diagonal.ln()).sum::<f64>();
         Some(Innovation {
             distance2,
             log_determinant,

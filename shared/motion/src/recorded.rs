@@ -91,7 +91,7 @@ impl Recorded {
     /// [`TimesError`].
     pub fn check(&self) -> Result<(), TimesError> {
         let expected = self.times.len();
-        let lengths = self.joints.iter().map(|it| it.measured.len());
+        let lengths = self.joints.iter().map(|joint| joint.measured.len());
         for got in lengths.chain([self.sides.len()]) {
             if got != expected {
                 return Err(TimesError::Length { got, expected });
@@ -101,7 +101,8 @@ impl Recorded {
             if !time_s.is_finite() {
                 return Err(TimesError::NotFinite { at });
             }
-            let before_s = at.checked_sub(1).map_or(f64::NEG_INFINITY, |it| self.times[it]);
+            let before_s =
+                at.checked_sub(1).map_or(f64::NEG_INFINITY, |difference| self.times[difference]);
             if time_s <= before_s {
                 return Err(TimesError::Order {
                     at,
@@ -123,7 +124,7 @@ impl Recorded {
 
     /// What becomes of instants whose sides are not certain where nothing decides them: kept, exchanged, left out.
     pub(crate) fn unsure(&self) -> [usize; 3] {
-        let n = self.sides.iter().filter(|it| **it == Sides::Unsure).count();
+        let n = self.sides.iter().filter(|side| **side == Sides::Unsure).count();
         if self.sides.contains(&Sides::Sure) {
             [0, 0, n]
         } else {
@@ -133,8 +134,8 @@ impl Recorded {
 
     /// Of every joint the index of that on the other side.
     pub(crate) fn other_sides(&self) -> Vec<Option<usize>> {
-        let at = |name: &str| self.joints.iter().position(|it| it.name == name);
-        let other = |it: &Joint| mirrored_name(&it.name).and_then(|name| at(&name));
+        let at = |name: &str| self.joints.iter().position(|joint| joint.name == name);
+        let other = |joint: &Joint| mirrored_name(&joint.name).and_then(|name| at(&name));
         self.joints.iter().map(other).collect()
     }
 
@@ -146,7 +147,7 @@ impl Recorded {
         let centres: Vec<(usize, Vector3<f64>)> =
             (0..self.times.len()).filter_map(|at| Some((at, self.centre(at)?))).collect();
         let median_of = |range: &[(usize, Vector3<f64>)]| {
-            Vector3::from_fn(|axis, _| median(range.iter().map(|it| it.1[axis]).collect()))
+            Vector3::from_fn(|axis, _| median(range.iter().map(|range| range.1[axis]).collect()))
         };
         let mut breaks = Vec::new();
         for nth in 1..centres.len() {
@@ -172,8 +173,9 @@ impl Recorded {
             .filter(|it| it.iter().all(|x| x.is_finite()))
             .collect();
         let is_enough = points.len() * 2 >= self.joints.len().min(14) && !points.is_empty();
-        is_enough
-            .then(|| Vector3::from_fn(|axis, _| median(points.iter().map(|it| it[axis]).collect())))
+        is_enough.then(|| {
+            Vector3::from_fn(|axis, _| median(points.iter().map(|point| point[axis]).collect()))
+        })
     }
 }
 

@@ -86,9 +86,9 @@ pub(crate) fn forwards(
 /// Runs backwards over what [`forwards`] has found.
 fn backwards(times: &[f64], forwards: &[Belief], noise: Noise) -> Vec<Known> {
     let jerk = noise.jerk / noise.scale;
-    let known = |it: &Belief| Known {
-        position: it.position(),
-        covariance: it.position_covariance(),
+    let known = |belief: &Belief| Known {
+        position: belief.position(),
+        covariance: belief.position_covariance(),
     };
     let mut all: Vec<Known> = forwards.iter().map(known).collect();
     let Some(mut next) = forwards.last().copied() else {
@@ -122,7 +122,7 @@ pub(crate) fn distance2(
         return f64::INFINITY;
     };
     let own = own * weight;
-    let is_known = |it: &Matrix3<f64>| it.diagonal().iter().all(|it| *it > 0.0);
+    let is_known = |matrix3: &Matrix3<f64>| matrix3.diagonal().iter().all(|value| *value > 0.0);
     let Some(others) = (all - own).try_inverse().filter(is_known) else {
         return 0.0; // Nothing but this measurement is known here.
     };
@@ -141,7 +141,7 @@ fn solved(total: &Matrix3<f64>, difference: &Vector3<f64>) -> f64 {
 pub(crate) fn smooth(times: &[f64], measured: &[Usable], noise: Noise) -> Stretch {
     let mut weights: Vec<f64> = vec![0.0; times.len()];
     let known = forwards(times, measured, noise, |at, innovation| {
-        let distance2 = innovation.map_or(0.0, |it| it.distance2 / noise.scale);
+        let distance2 = innovation.map_or(0.0, |innovation| innovation.distance2 / noise.scale);
         weights[at] = weight(distance2);
         weights[at]
     });

@@ -50,7 +50,8 @@ pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
         .iter()
         .enumerate()
         .map(|(nth, joint)| {
-            let all: Vec<Usable> = joint.measured.iter().map(|it| usable(it.as_ref()?)).collect();
+            let all: Vec<Usable> =
+                joint.measured.iter().map(|measured| usable(measured.as_ref()?)).collect();
             let mut track = Track::new(all);
             for at in (0..track.used.len()).filter(|&at| withheld(nth, at)) {
                 track.used[at] = None;
@@ -67,7 +68,7 @@ pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
     }
     let noise = tracks.iter().map(Track::known_noise).collect();
     // Each track goes when its joint is there: a long run would need both at once.
-    let filled = |it: Track| it.filled(&recorded.times, settings.fill_s);
+    let filled = |track: Track| track.filled(&recorded.times, settings.fill_s);
     let mut motion = Motion {
         joints: tracks.into_iter().map(filled).collect(),
         report: Report {
@@ -80,7 +81,7 @@ pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
     if settings.constant_bones {
         motion.report.bones = bones::constant(recorded, &mut motion.joints);
     }
-    motion.report.counts = motion.joints.iter().map(|it| Counts::of(it)).collect();
+    motion.report.counts = motion.joints.iter().map(|joint| Counts::of(joint)).collect();
     motion
 }
 
@@ -114,7 +115,7 @@ pub fn as_measured(recorded: &Recorded) -> Motion {
     let joints: Vec<Vec<Smoothed>> = recorded.joints.iter().map(of).collect();
     let report = Report {
         noise: vec![None; joints.len()],
-        counts: joints.iter().map(|it| Counts::of(it)).collect(),
+        counts: joints.iter().map(|joint| Counts::of(joint)).collect(),
         ..Report::default()
     };
     Motion { joints, report }

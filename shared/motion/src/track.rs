@@ -99,14 +99,14 @@ pub(crate) fn usable(it: &Measured) -> Option<(Vector3<f64>, Matrix3<f64>)> {
 /// The covariance with standard deviations within [`SD_M`] along its own axes.
 fn bounded(covariance: Matrix3<f64>) -> Matrix3<f64> {
     let symmetric = (covariance + covariance.transpose()) * 0.5;
-    let [least, most] = SD_M.map(|it| it * it);
+    let [least, most] = SD_M.map(|sd_m| sd_m * sd_m);
     let trace = symmetric.trace();
     // Most are far from both limits: the determinant over the square of the trace bounds the smallest eigenvalue from below.
     if trace < most && symmetric.determinant() > least * trace * trace {
         return symmetric;
     }
     let mut axes = symmetric.symmetric_eigen();
-    axes.eigenvalues.apply(|it| *it = it.clamp(least, most));
+    axes.eigenvalues.apply(|eigenvalue| *eigenvalue = eigenvalue.clamp(least, most));
     axes.recompose()
 }
 

@@ -33,7 +33,7 @@ const SKIPPED: usize = 3;
 /// * `stretches`: of the track, each with its times, ascending.
 pub(crate) fn tune(stretches: &[(&[f64], &[Usable])], prior: Prior) -> Noise {
     let windows = windows(stretches);
-    let n: usize = windows.iter().map(|it| it.1.iter().flatten().count()).sum();
+    let n: usize = windows.iter().map(|window| window.1.iter().flatten().count()).sum();
     let expected = Noise {
         jerk: 10.0_f64.powf(prior.log10_jerk),
         scale: 1.0,
@@ -68,7 +68,7 @@ fn vertex(tried: &[(f64, f64, f64)], best: usize) -> f64 {
     if best == 0 || best + 1 >= tried.len() {
         return 0.0;
     }
-    let [before, at, after] = [best - 1, best, best + 1].map(|it| tried[it].1);
+    let [before, at, after] = [best - 1, best, best + 1].map(|i| tried[i].1);
     let bend = before - 2.0 * at + after;
     if bend < 0.0 {
         (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
@@ -79,7 +79,7 @@ fn vertex(tried: &[(f64, f64, f64)], best: usize) -> f64 {
 
 /// All of a short track, parts of a long one.
 fn windows<'a>(stretches: &[(&'a [f64], &'a [Usable])]) -> Vec<(&'a [f64], &'a [Usable])> {
-    let n: usize = stretches.iter().map(|it| it.0.len()).sum();
+    let n: usize = stretches.iter().map(|stretch| stretch.0.len()).sum();
     if n <= N_WINDOWS * WINDOW {
         return stretches.to_vec();
     }
@@ -87,7 +87,7 @@ fn windows<'a>(stretches: &[(&'a [f64], &'a [Usable])]) -> Vec<(&'a [f64], &'a [
         .iter()
         .flat_map(|(times, measured)| times.chunks(WINDOW).zip(measured.chunks(WINDOW)));
     let chunks: Vec<_> = chunks
-        .filter(|it| it.1.iter().flatten().count() * 2 > it.1.len().min(WINDOW / 2))
+        .filter(|chunk| chunk.1.iter().flatten().count() * 2 > chunk.1.len().min(WINDOW / 2))
         .collect();
     let every = chunks.len().div_ceil(N_WINDOWS).max(1);
     chunks.into_iter().step_by(every).collect()
@@ -117,7 +117,8 @@ fn score(windows: &[(&[f64], &[Usable])], jerk: f64, scale: f64) -> (f64, f64) {
         let found = scale_of(&distances).clamp(SCALES[0], SCALES[1]);
         let student = found * GAUSSIAN_SHARE;
         let n = distances.len() as f64;
-        let tails: f64 = distances.iter().map(|it| (it / (FREEDOM * student)).ln_1p()).sum();
+        let tails: f64 =
+            distances.iter().map(|distance| (distance / (FREEDOM * student)).ln_1p()).sum();
         score = -0.5 * (log_determinants + 3.0 * n * student.ln() + (FREEDOM + 3.0) * tails);
         let is_settled = (found / scale).ln().abs() < 0.02;
         scale = found;
@@ -146,8 +147,10 @@ fn student_scale(distances: &[f64]) -> f64 {
     let mut scale = (median / 2.366).max(1e-12);
     let n = distances.len() as f64;
     for _ in 0..30 {
-        let sum: f64 =
-            distances.iter().map(|it| it * (FREEDOM + 3.0) / (FREEDOM + it / scale)).sum();
+        let sum: f64 = distances
+            .iter()
+            .map(|distance| distance * (FREEDOM + 3.0) / (FREEDOM + distance / scale))
+            .sum();
         let next = (sum / (3.0 * n)).max(1e-12);
         let is_settled = (next / scale).ln().abs() < 1e-4;
         scale = next;

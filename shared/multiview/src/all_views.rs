@@ -100,7 +100,8 @@ pub fn estimate_all_views(
     let own = poses.iter().enumerate().map(|(view, pose)| own_score(view, pose));
     let mut state = State::new(own.collect(), poses, &pairs);
     let order = order(input, &state.poses);
-    let mut solvers: Vec<_> = evidence.iter().map(|it| solver.incremental(it)).collect();
+    let mut solvers: Vec<_> =
+        evidence.iter().map(|evidence| solver.incremental(evidence)).collect();
     let mut term_keys: Vec<TermKeys> = vec![TermKeys::default(); n_views];
     let (mut iterations, mut converged) = (Vec::new(), n_views < 2);
     let mut convergence = Convergence::of(n_views);
@@ -171,8 +172,8 @@ fn order(input: &AllViewsInput<'_>, poses: &[Pose]) -> Vec<usize> {
     let expected = input.views.iter();
     let expected = expected.map(|view| view.sigma_px.map(|sigma_px| sigma_px.iter().sum::<f32>()));
     let trust: Vec<f32> = match expected.collect::<Option<Vec<f32>>>() {
-        Some(errors) => errors.iter().map(|it| -it).collect(),
-        None => poses.iter().map(|it| it.score).collect(),
+        Some(errors) => errors.iter().map(|error| -error).collect(),
+        None => poses.iter().map(|pose| pose.score).collect(),
     };
     let mut order: Vec<usize> = (0..poses.len()).collect();
     order.sort_by(|&a, &b| trust[a].total_cmp(&trust[b]).then(b.cmp(&a)));

@@ -33,7 +33,7 @@ pub fn average(candidates: &[(f64, &[[f64; 2]])]) -> Option<FusedPose> {
     Some(FusedPose {
         centres_px: sum.iter().map(|it| it.map(|sum| sum / n)).collect(),
         n_pairs: candidates.len(),
-        energy: candidates.iter().map(|it| it.0).sum(),
+        energy: candidates.iter().map(|candidate| candidate.0).sum(),
     })
 }
 

@@ -375,7 +375,7 @@ mod tests {
         let second = Compatibility::of(vec![DMatrix::from_row_slice(3, 3, &to_and_fro)]);
         let first = Compatibility::of(vec![DMatrix::identity(3, 3)]);
         let (joint, _) = Compatibility::joint_from_conditionals(&second, &first).unwrap();
-        let settled = [2.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0].map(|it| it / 8.0);
+        let settled = [2.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0].map(|value| value / 8.0);
         let settled = Compatibility::of(vec![DMatrix::from_row_slice(3, 3, &settled)]);
         assert!(largest_difference(&joint, &settled) < 1e-12);
     }

@@ -120,7 +120,7 @@ fn meeting(
     choices: &[Vec<Choice>],
     means: &[Vec<Choice>],
 ) -> Option<Point3<f64>> {
-    let most = views.iter().map(|it| it.points_px.len()).max();
+    let most = views.iter().map(|view| view.points_px.len()).max();
     let price = vote_cost(settings, 1, most.unwrap_or(1));
     let chosen = best(settings, views, choices);
     let average = best(settings, views, means);
@@ -158,7 +158,7 @@ fn distinct(
         }
     }
     let choice = |kind: &Kind| {
-        let at = Point2::from(kind.sum.map(|it| it / kind.n as f64));
+        let at = Point2::from(kind.sum.map(|sum| sum / kind.n as f64));
         Choice {
             at,
             ray: view.camera.ray(&at),
@@ -205,7 +205,7 @@ fn of_mean(view: &Sightings<'_>) -> Option<Choice> {
 
 fn mean(points: &[[f64; 2]]) -> Point2<f64> {
     let sum = points.iter().fold([0.0; 2], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
-    Point2::from(sum.map(|it| it / points.len() as f64))
+    Point2::from(sum.map(|sum| sum / points.len() as f64))
 }
 
 /// The cheapest point in which two rays meet, behind its cost.
@@ -257,9 +257,9 @@ fn nearest(
 ) -> (usize, f64) {
     let c2 = settings.loss_sigmas.powi(2);
     let seen = view.camera.project(point);
-    let cost = |it: &Choice| {
-        let r = seen.map_or(UNSEEN, |seen| (seen - it.at).norm() / view.sigma_px);
-        it.cost + c2 * (r * r / c2).ln_1p()
+    let cost = |choice: &Choice| {
+        let r = seen.map_or(UNSEEN, |seen| (seen - choice.at).norm() / view.sigma_px);
+        choice.cost + c2 * (r * r / c2).ln_1p()
     };
     let costs = choices.iter().map(cost).enumerate();
     let dearest = (0, f64::INFINITY);

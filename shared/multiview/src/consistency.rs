@@ -70,7 +70,7 @@ impl<'a> PairTerms<'a> {
             .map(|part| {
                 let at = plan.ideal_centre(first, part);
                 let term = self.term([0, target], part, second);
-                let distance2 = term.map_or(0.0, |it| it.distance2(at, scale2));
+                let distance2 = term.map_or(0.0, |term| term.distance2(at, scale2));
                 let mixture = usize::from(first.parts[part].mixture);
                 let of_type = self.of_type([0, target], [part, mixture], second);
                 f64::from(of_type) - self.settings.alpha * distance2

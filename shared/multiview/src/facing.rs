@@ -131,9 +131,9 @@ impl FacingFilter {
         present: Exchanges,
     ) -> Facing {
         assert!(!hypotheses.is_empty(), "at least one hypothesis");
-        let score = |it: &FacingHypothesis| {
-            let path = self.best_path(settings, it.exchanges, present);
-            (it.exchanges, it.energy + path)
+        let score = |facing_hypothesis: &FacingHypothesis| {
+            let path = self.best_path(settings, facing_hypothesis.exchanges, present);
+            (facing_hypothesis.exchanges, facing_hypothesis.energy + path)
         };
         let scored: Vec<(Exchanges, f64)> = hypotheses.iter().map(score).collect();
         let better = |best: (usize, f64), (i, next): (usize, &(Exchanges, f64))| {
@@ -142,8 +142,8 @@ impl FacingFilter {
         let all = scored.iter().enumerate();
         let (hypothesis, top) = all.fold((0, f64::NEG_INFINITY), better);
         let others = scored.iter().enumerate().filter(|it| it.0 != hypothesis);
-        let runner_up = others.map(|it| it.1.1).fold(f64::NEG_INFINITY, f64::max);
-        self.scores = scored.iter().map(|it| (it.0, it.1 - top)).collect();
+        let runner_up = others.map(|other| other.1.1).fold(f64::NEG_INFINITY, f64::max);
+        self.scores = scored.iter().map(|scored| (scored.0, scored.1 - top)).collect();
         Facing {
             exchanges: scored[hypothesis].0,
             hypothesis,

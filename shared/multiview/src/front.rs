@@ -72,7 +72,7 @@ pub fn front_log_ratio_of(
     let Some(front) = front(joints) else {
         return 0.0;
     };
-    let known: Vec<Vector3<f64>> = joints.iter().flatten().map(|it| it.coords).collect();
+    let known: Vec<Vector3<f64>> = joints.iter().flatten().map(|joint| joint.coords).collect();
     let place = Point3::from(known.iter().sum::<Vector3<f64>>() / known.len().max(1) as f64);
     let of_view = |(camera, evidence): &(&Camera, FrontEvidence)| {
         front_log_ratio(front_in_view(camera, &place, &front), *evidence)

@@ -157,7 +157,7 @@ enum Line {
 impl Line {
     fn new(target_from_support: &Matrix3<f64>, support_px: [f64; 2], size: [usize; 2]) -> Self {
         let line = target_from_support * Vector3::new(support_px[0], support_px[1], 1.0);
-        let [right, bottom] = size.map(|it| it as f64 - 0.5);
+        let [right, bottom] = size.map(|size| size as f64 - 0.5);
         let (left, top) = (-0.5, -0.5);
         let at_x = |x: f64| [x, -(line.x * x + line.z) / line.y];
         let at_y = |y: f64| [-(line.y * y + line.z) / line.x, y];
@@ -165,7 +165,7 @@ impl Line {
         let sides = sides.into_iter().filter(|[_, y]| (top..=bottom).contains(y));
         let ends = [at_y(top), at_y(bottom)];
         let ends = ends.into_iter().filter(|[x, _]| left < *x && *x < right);
-        let mut points = sides.chain(ends).map(|point| point.map(|it| it + 1.0));
+        let mut points = sides.chain(ends).map(|point| point.map(|point| point + 1.0));
         match (points.next(), points.next()) {
             (Some(from), Some(to)) => Self::Across([from, to]),
             _ => Self::Outside,

@@ -246,7 +246,7 @@ fn set_exchanged(used: &mut [Used], combination: usize) {
 /// Shoulders that are turned by an angle to the viewing directions of two pairs of opposite cameras, and shoulders that are turned by as
 /// much the other way, look alike but for their names: where left and right follow the picture, this alone tells them apart.
 fn front_agreement(views: &[SpaceView<'_>], found: &SpacePose) -> f64 {
-    let said = views.iter().map(|it| (it.camera, it.front));
+    let said = views.iter().map(|view| (view.camera, view.front));
     let said: Vec<(&Camera, FrontEvidence)> = said.collect();
     front_log_ratio_of(&found.joints, &said).abs() / 2.0
 }

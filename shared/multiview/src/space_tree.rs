@@ -125,8 +125,8 @@ pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N -
     ];
     let [mean, sd] = STATURE;
     let said = joints.and_then(skeleton::body::stature);
-    let [own, known] = [said.map_or(0.0, |it| it.sd.powi(-2)), sd.powi(-2)];
-    let stature = (own * said.map_or(0.0, |it| it.metres) + known * mean) / (own + known);
+    let [own, known] = [said.map_or(0.0, |said| said.sd.powi(-2)), sd.powi(-2)];
+    let stature = (own * said.map_or(0.0, |said| said.metres) + known * mean) / (own + known);
     let unsure = (own + known).powf(-0.5) / stature;
     KINDS.map(|kind| {
         let proportion = kind.proportion();
@@ -199,13 +199,13 @@ pub(crate) fn best_on_tree(
             weight: springs,
             cap: settings.cap,
         };
-        let coordinates = |it: &Point3<f64>| [it.x, it.y, it.z];
+        let coordinates = |point: &Point3<f64>| [point.x, point.y, point.z];
         let ends = ScoredPoints::new(of(child).iter().map(coordinates), &scores[child]);
         let choice = ends.best(Isa::best(), of(parent).iter().map(coordinates), &spring);
         for (score, it) in scores[parent].iter_mut().zip(&choice) {
             *score += it.1;
         }
-        choices[bone] = choice.into_iter().map(|it| it.0).collect();
+        choices[bone] = choice.into_iter().map(|choice| choice.0).collect();
     }
     let mut chosen = [0; N];
     let root = scores[ROOT].iter().enumerate();

@@ -43,15 +43,15 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Opt
                 if other == nth {
                     continue;
                 }
-                let distance = |it: &usize| {
-                    let both = [(*camera, &people[person]), (*their_camera, &theirs[*it])];
+                let distance = |i: &usize| {
+                    let both = [(*camera, &people[person]), (*their_camera, &theirs[*i])];
                     let as_named = apart(both, |joint| joint);
                     let exchanged = as_seen.then(|| apart(both, |joint| MIRROR[joint])).flatten();
                     as_named.into_iter().chain(exchanged).reduce(f64::min)
                 };
                 let near = by_size(theirs).into_iter().filter_map(|it| Some((distance(&it)?, it)));
                 let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
-                if let Some((_, it)) = nearest.filter(|it| it.0 < SAME_M) {
+                if let Some((_, it)) = nearest.filter(|nearest| nearest.0 < SAME_M) {
                     chosen[other] = Some(it);
                     size += theirs[it].height;
                 }

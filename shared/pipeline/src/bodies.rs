@@ -58,7 +58,7 @@ impl Bodies {
         of_body: &[Result<Triangulated, TriangulateError>],
         (set, joints): (&JointSet, Vec<Result<Triangulated, TriangulateError>>),
     ) -> (Vec<Result<Triangulated, NoJoint>>, Option<Body>) {
-        let known = joints.into_iter().map(|it| it.map_err(NoJoint::from));
+        let known = joints.into_iter().map(|joint| joint.map_err(NoJoint::from));
         let mut joints: Vec<Result<Triangulated, NoJoint>> = known.collect();
         if !settings.check || of_body.len() != N_JOINTS {
             return (joints, None);
@@ -90,13 +90,14 @@ impl Bodies {
         };
         let changes: [Change; N_JOINTS] = core::array::from_fn(change);
         for (joint, place) in set.joints.iter().zip(&mut joints) {
-            let of_joint: Vec<&Change> = same_parts(joint).map(|it| &changes[it]).collect();
+            let of_joint: Vec<&Change> =
+                same_parts(joint).map(|same_part| &changes[same_part]).collect();
             if of_joint.iter().any(|it| it.is_dropped) {
                 *place = Err(NoJoint::Implausible);
             } else if let Ok(place) = place {
                 let moved: Vec<_> = of_joint.iter().filter_map(|it| it.moved.as_ref()).collect();
                 if !moved.is_empty() {
-                    let sum: Vector3<f64> = moved.iter().map(|it| it.0).sum();
+                    let sum: Vector3<f64> = moved.iter().map(|moved| moved.0).sum();
                     place.in_world += sum / moved.len() as f64;
                 }
                 if let [(_, covariance)] = moved[..] {
@@ -105,7 +106,7 @@ impl Bodies {
             }
         }
         let body = Body {
-            stature_m: verdict.stature.map(|it| it.metres),
+            stature_m: verdict.stature.map(|stature| stature.metres),
             deviation: verdict.deviation,
             nobody: verdict.nobody,
         };

@@ -56,9 +56,9 @@ pub(crate) fn measure(
         };
         let metres = in_metres(&found_by.plans[view], joints, &distances_px);
         for (all, metres) in disagreements_m.iter_mut().zip(&metres) {
-            all.extend(Some(*metres).filter(|it| it.is_finite()));
+            all.extend(Some(*metres).filter(|value| value.is_finite()));
         }
-        let is_same = median(&metres).is_some_and(|it| it < SAME_PERSON_M);
+        let is_same = median(&metres).is_some_and(|value| value < SAME_PERSON_M);
         found.push((view, is_same, distances_px));
     }
     // A result on which no two views agree is judged by all of them.
@@ -73,7 +73,7 @@ pub(crate) fn measure(
     for (joint, disagreements_m) in joints.iter_mut().zip(&mut disagreements_m) {
         if let Ok(joint) = joint {
             joint.covariance = widened(&joint.covariance, disagreements_m);
-            let known = joint.residuals_px.iter().filter(|it| it.is_finite());
+            let known = joint.residuals_px.iter().filter(|residuals_px| residuals_px.is_finite());
             let squares: Vec<f64> = known.map(|it| it * it).collect();
             if !squares.is_empty() {
                 let mean = squares.iter().sum::<f64>() / squares.len() as f64;
@@ -96,7 +96,7 @@ fn nearest(
     let inside = |at: &Point2<f64>| (0.0..width).contains(&at.x) && (0.0..height).contains(&at.y);
     let mut projected: Vec<Option<Point2<f64>>> = joints
         .iter()
-        .map(|it| camera.project(&it.as_ref().ok()?.in_world).filter(inside))
+        .map(|joint| camera.project(&joint.as_ref().ok()?.in_world).filter(inside))
         .collect();
     // A picture that was taken at another time shows them elsewhere.
     if let Some(by) = motion.since_instant(view, [answer.skew_s, 0.0], projected.clone()) {
@@ -136,14 +136,16 @@ fn in_metres(
 /// * `disagreements_m`: distance of what each view shows from the joint, metres.
 fn widened(covariance: &Matrix3<f64>, disagreements_m: &mut [f64]) -> Matrix3<f64> {
     disagreements_m.sort_by(f64::total_cmp);
-    let second = disagreements_m.get(1).map_or(MOST_M, |it| it.min(MOST_M));
+    let second = disagreements_m
+        .get(1)
+        .map_or(MOST_M, |disagreements_m| disagreements_m.min(MOST_M));
     let added = second.powi(2) + DEFINITION_M.powi(2);
     covariance * NOISE_SHARE + Matrix3::from_diagonal_element(added)
 }
 
 /// The median of those that are known.
 fn median(values: &[f64]) -> Option<f64> {
-    let known = values.iter().copied().filter(|it| it.is_finite());
+    let known = values.iter().copied().filter(|value| value.is_finite());
     let mut known: Vec<f64> = known.collect();
     known.sort_by(f64::total_cmp);
     known.get(known.len() / 2).copied()
@@ -165,7 +167,7 @@ fn readings<'a>(
 }
 
 fn sum(distances: &[f64]) -> f64 {
-    distances.iter().filter(|it| it.is_finite()).sum()
+    distances.iter().filter(|distance| distance.is_finite()).sum()
 }
 
 #[cfg(test)]

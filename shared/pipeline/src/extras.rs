@@ -172,7 +172,7 @@ impl Match {
     /// Moves the keypoints of a picture that was taken at another time.
     fn move_to_instant(&mut self, skew_s: f64, motion: &mut Motion) {
         let points = self.extras.iter();
-        let points = points.map(|it| it.map(|it| Point2::from(it.0))).collect();
+        let points = points.map(|point| point.map(|it| Point2::from(it.0))).collect();
         let moved = motion.since_instant(self.view, [skew_s; 2], points);
         for (extra, by) in self.extras.iter_mut().zip(moved.into_iter().flatten()) {
             if let Some((at, _)) = extra {
@@ -195,7 +195,7 @@ impl Match {
 
 /// The joints by which the side of a keypoint is told.
 fn sides_of(name: &str) -> [[usize; 2]; 2] {
-    let has = |words: &[&str]| words.iter().any(|it| name.contains(it));
+    let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
     if has(&["toe", "heel", "foot", "ankle", "knee"]) {
         LEGS
     } else if has(&["hand", "finger", "thumb", "index", "pinky", "palm", "wrist"]) {
@@ -208,7 +208,7 @@ fn sides_of(name: &str) -> [[usize; 2]; 2] {
 /// Median distance of the joints, whose sides may be exchanged.
 fn middle_distance(own: &[[f64; 2]], fused: &[[f64; 2]]) -> f64 {
     let mirror = |joint: usize| {
-        let pair = SIDES.iter().find(|it| it.contains(&joint));
+        let pair = SIDES.iter().find(|side| side.contains(&joint));
         pair.map_or(joint, |&[right, left]| right + left - joint)
     };
     let each = (0..own.len()).map(|joint| {

@@ -54,8 +54,10 @@ impl Others {
     fn of(found: &Found, followed: Option<usize>) -> Self {
         Self {
             of_views: found.others(followed),
-            without: followed.map_or(0, |it| found.without(it)),
-            own: followed.map_or_else(Vec::new, |it| found.people[it].candidates.clone()),
+            without: followed.map_or(0, |followed| found.without(followed)),
+            own: followed.map_or_else(Vec::new, |followed| {
+                found.people[followed].candidates.clone()
+            }),
         }
     }
 
@@ -97,7 +99,7 @@ impl Following {
     /// The one who is followed; `None` if that is none of those who were found.
     fn choose(&mut self, found: &Found) -> Option<usize> {
         let people = || found.people.iter().enumerate();
-        let first = people().next().map(|it| it.0);
+        let first = people().next().map(|person| person.0);
         let chosen = match self.follow {
             Follow::Clearest => first,
             Follow::Largest => {
@@ -118,7 +120,7 @@ impl Following {
     fn nearest(&mut self, people: &[Person]) -> Option<usize> {
         let near = self.last.and_then(|last| {
             let reach = REACH_M + REACH_PER_FRAME_M * f64::from(self.n_without);
-            let each = people.iter().map(|it| (it.place - last).norm()).enumerate();
+            let each = people.iter().map(|person| (person.place - last).norm()).enumerate();
             each.filter(|it| it.1 <= reach).min_by(|a, b| a.1.total_cmp(&b.1))
         });
         if let Some((chosen, _)) = near {
@@ -231,9 +233,9 @@ mod tests {
         let near_and_far: &[([f64; 2], f64)] = &[([0.0, 0.0], 1.0), ([1.2, 1.2], 0.7)];
         let cameras: Vec<_> = (0..3).map(camera).collect();
         let found = found(&cameras, near_and_far);
-        let sizes: Vec<f64> = found.people.iter().map(|it| it.size_px).collect();
+        let sizes: Vec<f64> = found.people.iter().map(|person| person.size_px).collect();
         let index = Following::new(Follow::Largest).choose(&found).unwrap();
-        assert!(sizes.iter().all(|it| *it <= sizes[index]), "{sizes:?}");
+        assert!(sizes.iter().all(|size| *size <= sizes[index]), "{sizes:?}");
         assert_ne!(sizes[0], sizes[1]);
     }
 

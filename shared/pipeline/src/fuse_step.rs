@@ -312,9 +312,9 @@ impl FuseStep {
                 of_one + self.space.judge(answers, &views).score
             };
             let mut scored: Vec<(f64, Start)> =
-                starts.into_iter().map(|it| (score(&it), it)).collect();
+                starts.into_iter().map(|start| (score(&start), start)).collect();
             scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-            starts = scored.into_iter().map(|it| it.1).collect();
+            starts = scored.into_iter().map(|scored| scored.1).collect();
         }
         starts.truncate(N_STARTS);
         starts
@@ -333,7 +333,7 @@ impl FuseStep {
             .fold(0, |mask, (view, it)| mask | Exchanges::from(*it) << view);
         let mut views = vec![None; self.plans.len()];
         for (&view, &candidate) in present.iter().zip(&start.candidates) {
-            let pose = answers[view].as_ref().map(|it| &it.candidates[candidate]);
+            let pose = answers[view].as_ref().map(|answer| &answer.candidates[candidate]);
             views[view] = pose.map(|pose| {
                 let mirror = self.space.mirror(view, exchanges);
                 let start =

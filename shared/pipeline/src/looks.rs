@@ -36,7 +36,7 @@ pub(crate) struct Looks<'a> {
 /// ago. The box then shows only some of the person, and that near its edge.
 fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
     let sure = maps.peaks().iter().flatten();
-    let sure = sure.filter(|it| it.score >= SURE).map(|it| it.at);
+    let sure = sure.filter(|sure| sure.score >= SURE).map(|sure| sure.at);
     outline_of(sure).is_some_and(|it| overlap(it, outline) < SAME)
 }
 
@@ -276,7 +276,7 @@ impl Looks<'_> {
 
     /// Whether there is room for the person in a box, and nobody is known there.
     fn is_unknown(&self, outline: [f64; 4], memory: &NetworkMemory) -> bool {
-        let is_known = |it: &Seen| overlap(it.outline, outline) > SAME;
+        let is_known = |seen: &Seen| overlap(seen.outline, outline) > SAME;
         memory.n_seen < self.n_most && !memory.people().iter().any(is_known)
     }
 

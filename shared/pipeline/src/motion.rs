@@ -36,7 +36,7 @@ impl Motion {
 
     /// The instant of the frame, if what was found is to be moved there: some picture was taken at another time.
     fn instant(&self, answers: &[Option<ViewResult>]) -> Option<f64> {
-        let is_off = answers.iter().flatten().any(|it| it.skew_s != 0.0);
+        let is_off = answers.iter().flatten().any(|answer| answer.skew_s != 0.0);
         self.instant_s.filter(|_| is_off)
     }
 
@@ -57,7 +57,7 @@ impl Motion {
                 continue;
             };
             let centres = &mut fused.pose.centres_px;
-            let points: Points = centres.iter().map(|it| Some(Point2::from(*it))).collect();
+            let points: Points = centres.iter().map(|centre| Some(Point2::from(*centre))).collect();
             let height_px = height(&points);
             let sizes = [fused.cell_px * sigma_cells, height_px];
             let skew_s = answer.skew_s;
@@ -91,8 +91,8 @@ impl Motion {
         let instant_s = self.instant_s.filter(|_| skew_s != 0.0)?;
         let height_px = height(&points);
         let velocities = self.velocities(view, instant_s + taken_s, points, height_px);
-        let by = |it: Option<Velocity>| {
-            it.and_then(|it| it.shift(skew_s)).unwrap_or_else(Vector2::zeros)
+        let by = |velocity: Option<Velocity>| {
+            velocity.and_then(|it| it.shift(skew_s)).unwrap_or_else(Vector2::zeros)
         };
         Some(velocities.into_iter().map(by).collect())
     }
@@ -120,7 +120,7 @@ impl Motion {
 
 /// How tall the person is in the picture, pixels.
 fn height(points: &Points) -> f64 {
-    longer_side(points.iter().flatten().map(|it| [it.x, it.y])).unwrap_or(0.0)
+    longer_side(points.iter().flatten().map(|point| [point.x, point.y])).unwrap_or(0.0)
 }
 
 #[cfg(test)]

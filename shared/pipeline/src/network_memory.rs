@@ -85,7 +85,7 @@ impl NetworkMemory {
 
     /// What the network tells of the people of this frame, the largest and best seen first.
     pub fn maps(&self) -> impl Iterator<Item = &JointMaps> {
-        self.people().iter().map(|it| &it.maps)
+        self.people().iter().map(|person| &person.maps)
     }
 
     /// The heat of the person of this frame who is seen best, 0 to 1; 0 without anybody.
@@ -119,13 +119,13 @@ impl NetworkMemory {
         let apart = self.last.map(|last| frame.saturating_sub(last));
         let share = apart.zip(most_apart);
         let share = share.map(|(it, most)| it as f64 / most);
-        self.is_soon = share.is_some_and(|it| it <= SOON);
+        self.is_soon = share.is_some_and(|share| share <= SOON);
         self.hold = apart.zip(most_apart).map(|(gap, most)| Hold {
             gap,
             most: (HELD * most) as u64,
         });
-        self.apart = share.filter(|it| *it > 1.0);
-        if share.is_some_and(|it| it > LOST) && !self.has_searched {
+        self.apart = share.filter(|share| *share > 1.0);
+        if share.is_some_and(|share| share > LOST) && !self.has_searched {
             // The first frame is searched anyway, and sets its own phase.
             self.until = self.until.map(|_| 0);
         }
@@ -134,7 +134,7 @@ impl NetworkMemory {
 
     /// Whether boxes are to be looked for in this frame, whoever is seen.
     pub(crate) fn is_due(&self) -> bool {
-        self.until.is_none_or(|it| it == 0)
+        self.until.is_none_or(|until| until == 0)
     }
 
     /// Whether boxes were looked for in this frame.

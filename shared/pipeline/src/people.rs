@@ -124,14 +124,14 @@ impl Found {
             let is_of = |person: &Person, it: &FoundBody| {
                 person.lines_px[view].as_ref().is_some_and(|line| it.is_on(line))
             };
-            let is_other = |it: &FoundBody| {
+            let is_other = |found_body: &FoundBody| {
                 let mut others = people().filter(|(index, _)| Some(*index) != followed);
-                !followed.is_some_and(|it_is| is_of(&self.people[it_is], it))
-                    && others.any(|(_, other)| is_of(other, it))
+                !followed.is_some_and(|it_is| is_of(&self.people[it_is], found_body))
+                    && others.any(|(_, other)| is_of(other, found_body))
             };
             let each = sightings.iter().enumerate().take(u64::BITS as usize);
             let others = each.filter(|(_, it)| is_other(it));
-            let others: Vec<usize> = others.map(|it| it.0).collect();
+            let others: Vec<usize> = others.map(|other| other.0).collect();
             if others.len() == sightings.len() {
                 return 0;
             }
@@ -145,7 +145,8 @@ impl Found {
     /// The views that see others, but not this person, as bits.
     pub(crate) fn without(&self, followed: usize) -> u64 {
         let is_seen = |view: usize| self.people[followed].candidates[view].is_some();
-        let sees_others = |view: usize| self.people.iter().any(|it| it.candidates[view].is_some());
+        let sees_others =
+            |view: usize| self.people.iter().any(|person| person.candidates[view].is_some());
         let views = 0..self.views.len().min(u64::BITS as usize);
         views
             .filter(|view| !is_seen(*view) && sees_others(*view))
@@ -168,7 +169,7 @@ pub(crate) fn find(cameras: &[&Camera], views: Vec<Vec<FoundBody>>) -> Found {
 
 /// Everything that enough views agree on; the same person many times.
 fn groups(cameras: &[&Camera], views: &[Vec<FoundBody>]) -> Vec<Person> {
-    let n_present = views.iter().filter(|it| !it.is_empty()).count();
+    let n_present = views.iter().filter(|view| !view.is_empty()).count();
     let needed = MIN_VIEWS.min(n_present).max(2);
     let mut found = Vec::new();
     let mut candidates = vec![None; views.len()];
@@ -182,7 +183,7 @@ fn groups(cameras: &[&Camera], views: &[Vec<FoundBody>]) -> Vec<Person> {
                         candidates[first] = Some(a);
                         candidates[second] = Some(b);
                         let group = person(cameras, views, &mut candidates, &mut rays);
-                        found.extend(group.filter(|it| it.n_views() >= needed));
+                        found.extend(group.filter(|group| group.n_views() >= needed));
                     }
                 }
             }
@@ -281,7 +282,7 @@ fn placed<'a>(
         let nearest = each
             .map(|(candidate, it)| (candidate, it.distance(&projected)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((candidate, distance)) = nearest.filter(|it| it.1 <= TOLERANCE) {
+        if let Some((candidate, distance)) = nearest.filter(|nearest| nearest.1 <= TOLERANCE) {
             person.candidates[view] = Some(candidate);
             let it = &sightings[candidate];
             person.strength += it.strength * (1.0 - distance / TOLERANCE);
@@ -330,7 +331,7 @@ fn meeting(rays: &[&Ray]) -> Option<Point3<f64>> {
         return None;
     }
     let point = Point3::from(normal.cholesky()?.solve(&target));
-    let is_before = rays.iter().all(|it| (point - it.origin).dot(&it.direction) > 0.0);
+    let is_before = rays.iter().all(|ray| (point - ray.origin).dot(&ray.direction) > 0.0);
     is_before.then_some(point)
 }
 

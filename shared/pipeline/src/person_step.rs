@@ -113,8 +113,9 @@ impl PersonStep {
         let of_set = of_set(settings.joints, &joints);
         let settled = self.bodies.settle(&settings.body, &joints, (settings.joints, of_set));
         let (mut settled, body): (Vec<Result<Triangulated, NoJoint>>, Option<Body>) = settled;
-        let takes_part =
-            |view: usize| solution.is_some_and(|it| it.views.iter().any(|part| part.view == view));
+        let takes_part = |view: usize| {
+            solution.is_some_and(|solution| solution.views.iter().any(|part| part.view == view))
+        };
         let takes_part: Vec<bool> = (0..plans.len()).map(takes_part).collect();
         let found_by = FoundByViews {
             plans,
@@ -131,7 +132,7 @@ impl PersonStep {
             n_people: people.n_seen,
             n_pairs: pairs_of(takes_part.iter().filter(|takes_part| **takes_part).count()),
             facing_margin: f64::INFINITY,
-            sides: solution.and_then(|it| it.sides),
+            sides: solution.and_then(|solution| solution.sides),
             kept: Kept::Solved,
         }
     }
@@ -182,11 +183,11 @@ impl PersonStep {
         plans: &'a [Arc<ViewPlan>],
         shown: &'a [Shown<'_>],
     ) -> Option<Solution<'a>> {
-        let views = shown.iter().map(|it| SpaceView {
-            camera: plans[it.view].camera(),
-            evidence: &it.evidence,
+        let views = shown.iter().map(|shown| SpaceView {
+            camera: plans[shown.view].camera(),
+            evidence: &shown.evidence,
             exchanged: [false; 2],
-            front: it.front,
+            front: shown.front,
         });
         let views: Vec<SpaceView<'a>> = views.collect();
         if views.len() < 2 {
@@ -223,7 +224,7 @@ impl PersonStep {
     ) -> Solution<'a> {
         let mut places = found.pose.joints;
         let sides = self.rig.settings.sides.as_ref().map(|settings| {
-            let said = views.iter().map(|it| (it.shown.camera, it.shown.front));
+            let said = views.iter().map(|view| (view.shown.camera, view.shown.front));
             let said: Vec<_> = said.collect();
             let evidence = settings.anatomy_weight
                 * anatomical_evidence(&places, self.rig.up_in_world)

@@ -63,7 +63,8 @@ pub(crate) fn joints_at(
             return Err(too_few(views_used.count_ones() as usize));
         }
         let covariance = curvature.cholesky().map(|factor| factor.inverse());
-        let covariance = covariance.filter(|it| it.iter().all(|entry| entry.is_finite()));
+        let covariance =
+            covariance.filter(|covariance| covariance.iter().all(|entry| entry.is_finite()));
         Ok(Triangulated {
             in_world: at,
             covariance: covariance.ok_or(TriangulateError::Diverged { iterations: 0 })?,
@@ -83,7 +84,7 @@ pub(crate) fn of_set(
     let mean = |joint: &Joint| {
         let of_part = |part: &usize| {
             let own = |it: &&Joint| it.parts.contains(part);
-            let index = PARSE14.joints.iter().position(|it| own(&it));
+            let index = PARSE14.joints.iter().position(|joint| own(&joint));
             let missing = TriangulateError::TooFewViews {
                 views: 0,
                 needed: 2,
@@ -165,7 +166,7 @@ pub(crate) fn between(part: usize) -> Between {
         };
     }
     let parent = |part: usize| PARENT[part];
-    let child = |part: usize| (0..N_PARTS).find(|it| PARENT[*it] == Some(part));
+    let child = |part: usize| (0..N_PARTS).find(|i| PARENT[*i] == Some(part));
     let (above, n_above) = next_joint(part, parent).unwrap_or((0, 1));
     let (below, n_below) = next_joint(part, child).unwrap_or((above, 1));
     Between {

@@ -183,7 +183,7 @@ impl SkeletonStep {
         let moved = self.motion.at_instant(answers, views, sigma_cells);
         moved.map_or_else(
             || (views.into(), Vec::new()),
-            |it| (it.views.into(), it.more_px),
+            |moved| (moved.views.into(), moved.more_px),
         )
     }
 
@@ -198,7 +198,7 @@ impl SkeletonStep {
         let set = settings.joints;
         if !self.space.can_exchange() {
             // The parts are not those of the 14 joints.
-            let joints = joints.into_iter().map(|it| it.map_err(NoJoint::from));
+            let joints = joints.into_iter().map(|joint| joint.map_err(NoJoint::from));
             return (joints.collect(), None);
         }
         let of_body = if set == &PARSE14 {
@@ -285,7 +285,7 @@ impl SkeletonStep {
             return (solved, Kept::Solved);
         }
         let agreement = |views: &[Option<FusedView>]| {
-            let n_parts = self.space.plans.first().map_or(0, |it| it.model().n_parts());
+            let n_parts = self.space.plans.first().map_or(0, |plan| plan.model().n_parts());
             let parts = self.space.triangulate(views, n_parts, Cow::from, &[]);
             self.space.agreement(views, &parts)
         };
@@ -364,7 +364,7 @@ impl SkeletonStep {
         workspace: &mut ConsensusWorkspace,
     ) -> Vec<Option<FusedView>> {
         let mut views = fuse(candidates, exchanged);
-        let n_parts = self.space.plans.first().map_or(0, |it| it.model().n_parts());
+        let n_parts = self.space.plans.first().map_or(0, |plan| plan.model().n_parts());
         let mut sightings: Vec<Sightings<'_>> = views
             .iter()
             .zip(&self.space.plans)
@@ -372,7 +372,7 @@ impl SkeletonStep {
             .collect();
         for part in 0..n_parts {
             for (sightings, candidates) in sightings.iter_mut().zip(candidates) {
-                let all = candidates.iter().flat_map(|it| &it.poses);
+                let all = candidates.iter().flat_map(|candidate| &candidate.poses);
                 sightings.points_px.clear();
                 sightings.points_px.extend(all.map(|it| it.centres_px[part]));
             }
@@ -388,7 +388,7 @@ impl SkeletonStep {
 
     /// The camera and uncertainty of a view, still without points.
     fn sightings<'a>(&self, view: Option<&FusedView>, plan: &'a ViewPlan) -> Sightings<'a> {
-        let cell_px = view.map_or(1.0, |it| it.cell_px);
+        let cell_px = view.map_or(1.0, |view| view.cell_px);
         Sightings {
             camera: plan.camera(),
             sigma_px: cell_px * self.space.settings.sigma_cells,
@@ -407,7 +407,7 @@ fn add(expected_px: &mut Vec<Vec<f64>>, more_px: &[Vec<f64>], joints: &JointSet)
     expected_px.resize(more_px.len().max(expected_px.len()), Vec::new());
     for (expected, more) in expected_px.iter_mut().zip(more_px) {
         // The second number is only there because `from_parts` takes points.
-        let of_parts: Vec<[f64; 2]> = more.iter().map(|it| [*it, 0.0]).collect();
+        let of_parts: Vec<[f64; 2]> = more.iter().map(|more| [*more, 0.0]).collect();
         if of_parts.is_empty() {
             continue;
         }

@@ -103,7 +103,7 @@ impl Space {
         let middle = |centres: &[[f64; 2]]| {
             let n = centres.len() as f64;
             let sum = centres.iter().fold([0.0, 0.0], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
-            sum.map(|it| it / n)
+            sum.map(|sum| sum / n)
         };
         let of_fused = middle(&fused.pose.centres_px);
         let distance = |pose: &Pose| {
@@ -112,7 +112,7 @@ impl Space {
         };
         let candidates = answer.candidates.iter().zip(&answer.front);
         let nearest = candidates.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
-        nearest.map(|it| *it.1)
+        nearest.map(|nearest| *nearest.1)
     }
 
     /// The geometric term over all views: the squared distance of every part from its reprojection.
@@ -178,7 +178,7 @@ impl Space {
                 }
             }));
             let found = geometry::triangulate(&observations, &self.settings.triangulation)?;
-            Ok(by_view(found, present.iter().map(|it| it.0)))
+            Ok(by_view(found, present.iter().map(|present| present.0)))
         };
         (0..n_points).map(triangulate).collect()
     }

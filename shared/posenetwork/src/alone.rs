@@ -20,7 +20,7 @@ impl JointMaps {
     /// Mean heat of the joints at their peaks, 0 to 1.
     pub fn heat(&self) -> f64 {
         let peaks = self.peaks().iter();
-        let sum: f64 = peaks.flatten().map(|it| it.score.clamp(0.0, 1.0)).sum();
+        let sum: f64 = peaks.flatten().map(|peak| peak.score.clamp(0.0, 1.0)).sum();
         sum / self.peaks().len().max(1) as f64
     }
 
@@ -31,10 +31,12 @@ impl JointMaps {
     pub fn turn(&self, now: Turn) -> Turn {
         let mean = |joints: core::ops::Range<usize>, least: usize| {
             let peaks = self.peaks().get(joints)?.iter().flatten();
-            let sure: Vec<[f64; 2]> = peaks.filter(|it| it.score >= SURE).map(|it| it.at).collect();
+            let sure: Vec<[f64; 2]> =
+                peaks.filter(|peak| peak.score >= SURE).map(|peak| peak.at).collect();
             let n = sure.len();
-            (n >= least)
-                .then(|| [0, 1].map(|axis| sure.iter().map(|it| it[axis]).sum::<f64>() / n as f64))
+            (n >= least).then(|| {
+                [0, 1].map(|axis| sure.iter().map(|sure| sure[axis]).sum::<f64>() / n as f64)
+            })
         };
         let (Some(head), Some(legs)) = (mean(12..14, 1), mean(0..6, LEGS)) else {
             return now;
@@ -98,7 +100,7 @@ mod tests {
     ];
 
     fn maps(joints: [[f64; 2]; 14]) -> JointMaps {
-        let names: Vec<String> = LSP_14.iter().map(|it| (*it).to_owned()).collect();
+        let names: Vec<String> = LSP_14.iter().map(|lsp_14| (*lsp_14).to_owned()).collect();
         let keypoint = |at: [f64; 2]| Keypoint {
             at: [at[0] + 200.0, at[1] + 200.0],
             score: 0.9,

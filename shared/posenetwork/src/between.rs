@@ -23,7 +23,7 @@ impl Tap {
         let lower = (cell + 1.0) as i64 - 1;
         let first = lower - 1;
         Self {
-            cells: [0, 1, 2, 3].map(|it| (first + it).clamp(0, n as i64 - 1) as usize),
+            cells: [0, 1, 2, 3].map(|i| (first + i).clamp(0, n as i64 - 1) as usize),
             weights: cubic((cell - lower as f64) as f32),
             is_inside,
         }
@@ -32,8 +32,8 @@ impl Tap {
 
 /// The value of a map between sixteen cells: along each of four rows, then across them.
 pub(crate) fn between(map: &[f32], columns: usize, row: &Tap, column: &Tap) -> f32 {
-    let [a, b, c, d] = row.cells.map(|it| {
-        let line = &map[it * columns..(it + 1) * columns];
+    let [a, b, c, d] = row.cells.map(|cell| {
+        let line = &map[cell * columns..(cell + 1) * columns];
         column.along(line)
     });
     let [w_a, w_b, w_c, w_d] = row.weights;

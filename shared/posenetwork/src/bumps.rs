@@ -45,11 +45,11 @@ impl Bump {
         let (trace, determinant) = (xx + yy, xx * yy - xy * xy);
         let spread = (trace * trace / 4.0 - determinant).max(0.0).sqrt();
         self.joint < N_JOINTS
-            && numbers.iter().all(|it| it.is_finite())
-            && self.at.iter().all(|it| it.abs() <= 65_536.0)
+            && numbers.iter().all(|number| number.is_finite())
+            && self.at.iter().all(|value| value.abs() <= 65_536.0)
             && self.heat > 0.0
             && self.heat <= 1.0
-            && [xx, xy, yy].iter().all(|it| it.is_finite())
+            && [xx, xy, yy].iter().all(|value| value.is_finite())
             && trace / 2.0 - spread >= 0.9 * low
             && trace / 2.0 + spread <= 1.1 * high
     }
@@ -192,7 +192,7 @@ fn highest(joint: usize, heats: &[f64], [columns, rows]: [usize; 2]) -> Option<B
             (row as f64 + away[1]) as f32,
         ],
         heat: heat as f32,
-        precision: precision.map(|it| it as f32),
+        precision: precision.map(|precision| precision as f32),
     })
 }
 
@@ -203,7 +203,7 @@ fn fit(around: &impl Fn(i64, i64) -> Option<f64>, top: f64) -> Option<([f64; 2],
     let mut right = Vector6::<f64>::zeros();
     for down in -REACH..=REACH {
         for across in -REACH..=REACH {
-            let Some(heat) = around(across, down).filter(|it| *it >= SHARE * top) else {
+            let Some(heat) = around(across, down).filter(|value| *value >= SHARE * top) else {
                 continue;
             };
             let [x, y] = [across as f64, down as f64];
@@ -221,7 +221,7 @@ fn fit(around: &impl Fn(i64, i64) -> Option<f64>, top: f64) -> Option<([f64; 2],
         (yy * slope[0] - xy * slope[1]) / determinant,
         (xx * slope[1] - xy * slope[0]) / determinant,
     ];
-    if !away.iter().all(|it| it.abs() <= 1.5) {
+    if !away.iter().all(|value| value.abs() <= 1.5) {
         return None;
     }
     let heat = (height + 0.5 * (slope[0] * away[0] + slope[1] * away[1])).exp();
@@ -231,12 +231,12 @@ fn fit(around: &impl Fn(i64, i64) -> Option<f64>, top: f64) -> Option<([f64; 2],
 
 /// The nearest precision whose eigenvalues are those of a Gaussian that is neither too narrow nor too wide.
 fn bounded([xx, xy, yy]: [f64; 3]) -> Option<[f64; 3]> {
-    if ![xx, xy, yy].iter().all(|it| it.is_finite()) {
+    if ![xx, xy, yy].iter().all(|value| value.is_finite()) {
         return None;
     }
     let eigen = nalgebra::Matrix2::new(xx, xy, xy, yy).symmetric_eigen();
     let [low, high] = precisions();
-    let values = eigen.eigenvalues.map(|it| it.clamp(low, high));
+    let values = eigen.eigenvalues.map(|eigenvalue| eigenvalue.clamp(low, high));
     let it = eigen.eigenvectors
         * nalgebra::Matrix2::from_diagonal(&values)
         * eigen.eigenvectors.transpose();

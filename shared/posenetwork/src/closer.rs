@@ -124,12 +124,12 @@ impl Looker<'_> {
         let mut best = self.look_upright((image, seen), memory, maps)?;
         let least = best.heat - FAINTER;
         for _ in 0..MOST_MORE {
-            let next = best.around.filter(|it| overlap(*it, best.outline) <= FITS);
+            let next = best.around.filter(|around| overlap(*around, best.outline) <= FITS);
             let Some(next) = next else {
                 break;
             };
             let more = self.look_beside((image, next), best.turn, memory)?;
-            let Some(more) = more.filter(|it| it.heat > least) else {
+            let Some(more) = more.filter(|more| more.heat > least) else {
                 break;
             };
             core::mem::swap(maps, &mut memory.other);
@@ -157,7 +157,7 @@ impl Looker<'_> {
         }
         let outline = seen.around.unwrap_or(seen.outline);
         let turned = self.look_beside((image, outline), turn, memory)?;
-        let Some(turned) = turned.filter(|it| it.heat > seen.heat) else {
+        let Some(turned) = turned.filter(|turned| turned.heat > seen.heat) else {
             return Ok(seen);
         };
         core::mem::swap(maps, &mut memory.other);
@@ -183,7 +183,7 @@ impl Looker<'_> {
         let mut best: Option<Look> = None;
         for outline in outlines {
             let look = self.look_beside((image, *outline), turn, memory)?;
-            if let Some(look) = look.filter(|it| best.is_none_or(|best| it.heat > best.heat)) {
+            if let Some(look) = look.filter(|look| best.is_none_or(|best| look.heat > best.heat)) {
                 core::mem::swap(maps, &mut memory.other);
                 best = Some(look);
             }

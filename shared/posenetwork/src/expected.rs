@@ -38,7 +38,7 @@ mod tests {
         assert_eq!(expected_error(0.25), 0.095);
         assert_eq!(expected_error(2.0), 0.015);
         assert_eq!(expected_error(0.6), f64::midpoint(0.039, 0.033));
-        let all: Vec<f64> = (0..=100).map(|it| expected_error(f64::from(it) / 100.0)).collect();
+        let all: Vec<f64> = (0..=100).map(|i| expected_error(f64::from(i) / 100.0)).collect();
         assert!(all.is_sorted_by(|a, b| a > b), "{all:?}");
     }
 }

@@ -56,11 +56,11 @@ pub(crate) fn likelihood(values: &[f32], axis: usize, sight: &Sight<'_>) -> Vec<
         _ => 1.0,
     };
     let most = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let each = values.iter().map(|it| (nats * f64::from(it - most)).exp());
+    let each = values.iter().map(|value| (nats * f64::from(value - most)).exp());
     let each: Vec<f64> = each.collect();
     let sum: f64 = each.iter().sum();
     let of_label = 1.0 / (SIMCC_SIGMA[axis] * core::f64::consts::TAU.sqrt());
-    let share = |it: f64| (it / sum / of_label).min(1.0);
+    let share = |value: f64| (value / sum / of_label).min(1.0);
     each.into_iter().map(share).collect()
 }
 

@@ -160,7 +160,7 @@ impl JointMaps {
         self.keypoints
             .extend(each.map(|(nth, it)| Some(scored(nth, *it, (&read, sight)))));
         for (joint, row) in rows.iter().enumerate() {
-            let found = |it: usize| self.keypoints[it];
+            let found = |i: usize| self.keypoints[i];
             let peak = row.as_ref().and_then(|row| weighted(row, found));
             self.peaks.push(peak);
             if let (Some(row), Some(mut peak)) = (row, peak) {
@@ -195,7 +195,7 @@ impl JointMaps {
         self.step = [1.0; 2];
         self.window =
             keypoints::outline(keypoints).and_then(|it| Window::grid(it, BOX_MARGIN, MOST_ROWS));
-        [self.columns, self.rows] = self.window.map_or([0, 0], |it| it.input());
+        [self.columns, self.rows] = self.window.map_or([0, 0], |window| window.input());
         let n_values = N_JOINTS * self.rows * self.columns;
         self.values.clear();
         // Once for the widest grid, so that no later frame allocates.
@@ -215,7 +215,7 @@ impl JointMaps {
         self.sigma_px = Some(sigma * height);
         self.told.resize(N_JOINTS, None);
         for (joint, ways) in ways.iter().enumerate().take(N_JOINTS) {
-            let found = |at: usize| keypoints[at].filter(|it| it.score > 0.0);
+            let found = |at: usize| keypoints[at].filter(|keypoint| keypoint.score > 0.0);
             let seen = |way: &Way| Some((weighted(&way.row, found)?, way.spread));
             let Some((peak, spread)) = ways.iter().find_map(seen) else {
                 continue;
@@ -285,7 +285,7 @@ impl JointMaps {
                     let of_pixel = bins.len() as f64 / size[axis] as f64;
                     let bin = |cell: usize| (cell as f64 * step[axis] * of_pixel).round() as usize;
                     let cells = 0..n;
-                    cells.map(|it| bins[bin(it).min(bins.len() - 1)]).collect()
+                    cells.map(|cell| bins[bin(cell).min(bins.len() - 1)]).collect()
                 };
                 let (across, down) = (of_cells(0, columns), of_cells(1, self.rows));
                 for ((_, line), down) in lines.zip(down) {
@@ -322,7 +322,7 @@ impl JointMaps {
         let told = self.told.get(joint).copied().flatten();
         let [_, top, _, bottom] = self.extent();
         let by_heat = || expected_error(peak.score) * (bottom - top);
-        Some(told.map_or_else(by_heat, |it| it * ALONG_AN_AXIS))
+        Some(told.map_or_else(by_heat, |value| value * ALONG_AN_AXIS))
     }
 
     /// Where the network sees each of the 14 joints, pixels of the picture; scores from 0 to 1. `None` for a joint that its
@@ -350,7 +350,7 @@ impl JointMaps {
 
     /// Moves everything in the picture, pixels.
     pub fn shift(&mut self, by: [f64; 2]) {
-        self.window = self.window.map(|it| it.shifted(by));
+        self.window = self.window.map(|window| window.shifted(by));
         let keypoints = self.keypoints.iter_mut();
         for peak in self.peaks.iter_mut().chain(keypoints).flatten() {
             peak.at = [peak.at[0] + by[0], peak.at[1] + by[1]];

@@ -115,7 +115,7 @@ impl PoseNetwork {
         };
         let mut workspace = Workspace::default();
         workspace.values.resize(network.n_values(), 0.0);
-        let [width, height] = network.size().map(|it| it as f64);
+        let [width, height] = network.size().map(|size| size as f64);
         if let Some(window) = Window::new(&network.card, [0.0, 0.0, width, height]) {
             network.try_numbers(&mut workspace)?;
             network.sight(window, &workspace)?;
@@ -296,7 +296,7 @@ impl PoseNetwork {
         workspace: &'a Workspace,
     ) -> Result<Sight<'a>, LookError> {
         let outputs = &workspace.outputs[..];
-        if let Some(at) = outputs.iter().position(|it| !it.is_f32) {
+        if let Some(at) = outputs.iter().position(|output| !output.is_f32) {
             let name = self.outputs[at].clone();
             return Err(LookError::Type { name });
         }
@@ -365,7 +365,8 @@ impl<'a> Sight<'a> {
             }
             Codec::Simcc { bins_per_pixel, .. } => {
                 let rows = &self.outputs[1];
-                let bins = [width, height].map(|it| (it as f64 * bins_per_pixel).round() as usize);
+                let bins =
+                    [width, height].map(|value| (value as f64 * bins_per_pixel).round() as usize);
                 let values = [&first.values[..], &rows.values[..]];
                 SimCc::new(values, [&first.shape, &rows.shape], bins, n).map(Read::SimCc)
             }
@@ -392,14 +393,14 @@ impl<'a> Sight<'a> {
         let [_, height] = self.network.size();
         let height = height as f64 * self.window.step()[1];
         let errors = &self.also(self.network.card.also.error.as_deref())?.values;
-        Some(errors.iter().map(move |it| f64::from(*it) * height))
+        Some(errors.iter().map(move |error| f64::from(*error) * height))
     }
 
     fn also(&self, name: Option<&str>) -> Option<&'a Tensor> {
         let name = name?;
         let names = self.network.outputs.iter().zip(self.outputs);
         // Behind those of the codec.
-        names.rev().find(|it| it.0.as_str() == name).map(|it| it.1)
+        names.rev().find(|it| it.0.as_str() == name).map(|name| name.1)
     }
 
     /// Whether what it tells beside the keypoints has the shape that the card says, and is finite.
@@ -421,7 +422,7 @@ impl<'a> Sight<'a> {
                     error,
                 });
             }
-            if let Some(at) = output.values.iter().position(|it| !it.is_finite()) {
+            if let Some(at) = output.values.iter().position(|value| !value.is_finite()) {
                 let error = OutputError::NotANumber {
                     index: at,
                     value: output.values[at],

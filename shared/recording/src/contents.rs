@@ -83,7 +83,7 @@ impl Contents {
             };
             let mut entries = self.messages.remove(channel).unwrap_or_default();
             let n = entries.len();
-            entries.retain(|it| message::check_length(kind, it.len).is_ok());
+            entries.retain(|entry| message::check_length(kind, entry.len).is_ok());
             self.extent.n_malformed += (n - entries.len()) as u64;
             if kind.status_at().is_none() {
                 for entry in &mut entries {
@@ -96,7 +96,7 @@ impl Contents {
             });
             track.entries.extend(entries);
             let [due, n_found] = self.numbers.remove(channel).unwrap_or_default();
-            let recorded = self.counts.get(name).map_or(0, |it| it.recorded);
+            let recorded = self.counts.get(name).map_or(0, |count| count.recorded);
             let missing = due.max(recorded).saturating_sub(n_found);
             if missing > 0 {
                 *self.extent.missing.entry(name.clone()).or_default() += missing;

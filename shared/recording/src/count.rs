@@ -27,7 +27,7 @@ impl FromStr for Count {
     fn from_str(text: &str) -> Result<Self, ()> {
         let rest = text.strip_prefix("recorded ").ok_or(())?;
         let (recorded, lost) = rest.split_once(", lost ").ok_or(())?;
-        let number = |it: &str| it.parse().map_err(drop);
+        let number = |text: &str| text.parse().map_err(drop);
         Ok(Self {
             recorded: number(recorded)?,
             lost: number(lost)?,

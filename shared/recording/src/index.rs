@@ -73,12 +73,12 @@ impl Recording {
     /// All messages that can be read.
     pub fn n_messages(&self) -> u64 {
         let tracks = self.tracks.values();
-        tracks.map(|it| it.entries.len() as u64).sum()
+        tracks.map(|track| track.entries.len() as u64).sum()
     }
 
     /// Messages of all topics that were sent but not recorded, as far as the file contains the counts.
     pub fn n_lost(&self) -> u64 {
-        let lost = self.counts.values().map(|it| it.lost);
+        let lost = self.counts.values().map(|value| value.lost);
         lost.fold(0, u64::saturating_add)
     }
 
@@ -91,8 +91,8 @@ impl Recording {
     pub fn span(&self) -> Option<[u64; 2]> {
         let is_stamped = |it: &&Track| !matches!(it.kind, Kind::Health | Kind::Picture);
         let stamped = self.tracks.values().filter(is_stamped);
-        let times = stamped.flat_map(|it| &it.entries).map(|it| it.publish_time);
-        let times = times.filter(|it| *it > 0);
+        let times = stamped.flat_map(|it| &it.entries).map(|entry| entry.publish_time);
+        let times = times.filter(|time| *time > 0);
         times.fold(None, |span, it| {
             let [first, last] = span.unwrap_or([it; 2]);
             Some([first.min(it), last.max(it)])
@@ -137,7 +137,7 @@ mod tests {
     fn messages_are_ordered_by_the_time_of_sending() {
         let (poses, evidence) = (track(&[20, 40], 0), track(&[10, 30], 100));
         let order = in_order(&[&poses, &evidence]);
-        let times: Vec<_> = order.iter().map(|it| (it.0, it.1.publish_time)).collect();
+        let times: Vec<_> = order.iter().map(|order| (order.0, order.1.publish_time)).collect();
         assert_eq!(times, [(1, 10), (0, 20), (1, 30), (0, 40)]);
     }
 

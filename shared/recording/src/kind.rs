@@ -195,15 +195,15 @@ mod tests {
 
     /// Size and alignment of a type in CDR, bytes; an array of variable length counts as 0.
     fn size(kind: &str) -> [usize; 2] {
-        if let Some((one, n)) = kind.strip_suffix(']').and_then(|it| it.rsplit_once('[')) {
+        if let Some((one, n)) = kind.strip_suffix(']').and_then(|rest| rest.rsplit_once('[')) {
             let [size, alignment] = size(one);
             return [size * n.parse::<usize>().unwrap_or(0), alignment];
         }
         if let Some(name) = kind.strip_prefix("parallax/") {
-            let part = PARTS.iter().find(|it| it.0 == name).unwrap();
+            let part = PARTS.iter().find(|part| part.0 == name).unwrap();
             return size_of_text(part.1);
         }
-        let digits = kind.trim_start_matches(|it: char| it.is_ascii_alphabetic());
+        let digits = kind.trim_start_matches(|letter: char| letter.is_ascii_alphabetic());
         let bytes = digits.parse::<usize>().unwrap() / 8;
         [bytes, bytes]
     }

@@ -155,9 +155,11 @@ pub fn check<R: Read + Seek>(
     recording: &Recording,
     wanted: impl Fn(&str) -> bool,
 ) -> Result<Vec<Damaged>, ReadError> {
-    let tracks = recording.tracks.iter().filter(|it| wanted(it.0));
+    let tracks = recording.tracks.iter().filter(|track| wanted(track.0));
     let mut all: Vec<_> = tracks
-        .flat_map(|(topic, track)| track.entries.iter().map(move |it| (topic, track.kind, it)))
+        .flat_map(|(topic, track)| {
+            track.entries.iter().map(move |entry| (topic, track.kind, entry))
+        })
         .collect();
     all.sort_by_key(|(_, _, entry)| entry.offset);
     let (mut damaged, mut buffer) = (Vec::new(), Buffer::default());

@@ -67,8 +67,8 @@ fn written(sent: &[Sent], flush_every: usize) -> Vec<u8> {
 fn held(recording: &Recording, file: &[u8], sent: &[Sent]) -> usize {
     let mut found = Vec::new();
     for (nth, name) in topics().iter().enumerate() {
-        let entries = recording.tracks.get(name).map(|it| &it.entries[..]);
-        found.extend(entries.unwrap_or_default().iter().map(|it| (nth, *it)));
+        let entries = recording.tracks.get(name).map(|track| &track.entries[..]);
+        found.extend(entries.unwrap_or_default().iter().map(|entry| (nth, *entry)));
     }
     found.sort_by_key(|it| it.1.offset);
     let mut buffer = Buffer::default();
@@ -102,7 +102,7 @@ fn a_recording_survives_a_round_trip_with_its_counts() {
     assert_eq!([0, 1, 2].map(count), expected);
     assert_eq!(recording.n_lost(), 10);
     assert_eq!(
-        recording.span().map(|it| it[0]),
+        recording.span().map(|span| span[0]),
         Some(10),
         "the first does not say when"
     );

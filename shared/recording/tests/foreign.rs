@@ -49,17 +49,17 @@ fn other_programs_find_their_schemas_and_messages() {
     let file = written();
     let summary = mcap::Summary::read(&file).unwrap().unwrap();
     assert_eq!(summary.stats.unwrap().message_count, 9);
-    let schemas: Vec<_> = summary.schemas.values().map(|it| it.name.clone()).collect();
+    let schemas: Vec<_> = summary.schemas.values().map(|value| value.name.clone()).collect();
     assert_eq!(schemas.len(), 3, "{schemas:?}");
     let messages = mcap::MessageStream::new(&file).unwrap();
     let messages = messages.map(Result::unwrap);
-    let strange = messages.filter(|it| it.channel.message_encoding == "json");
+    let strange = messages.filter(|message| message.channel.message_encoding == "json");
     let found: Vec<_> = strange
-        .map(|it| {
-            let schema = it.channel.schema.clone().unwrap();
+        .map(|strange| {
+            let schema = strange.channel.schema.clone().unwrap();
             assert_eq!(schema.encoding, "jsonschema");
-            let text = String::from_utf8(it.data.to_vec()).unwrap();
-            (it.channel.topic.clone(), schema.name.clone(), text)
+            let text = String::from_utf8(strange.data.to_vec()).unwrap();
+            (strange.channel.topic.clone(), schema.name.clone(), text)
         })
         .collect();
     let expected = |topic: &str, nth: u32| {
@@ -89,7 +89,7 @@ fn a_file_that_is_cut_off_among_them_holds_ours_up_to_there() {
         assert!(recording.extent.damage.is_empty(), "{n}");
         assert_eq!(recording.extent.n_malformed, 0, "{n}");
         let track = recording.tracks.get(&topic::health("a"));
-        let found = track.map_or(0, |it| it.entries.len());
+        let found = track.map_or(0, |track| track.entries.len());
         assert!(found >= most, "{n}");
         most = found;
     }

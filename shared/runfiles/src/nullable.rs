@@ -18,5 +18,5 @@ where
     [Option<f64>; N]: Deserialize<'de>,
 {
     let numbers = <[Option<f64>; N]>::deserialize(deserializer)?;
-    Ok(numbers.map(|it| it.unwrap_or(f64::NAN)))
+    Ok(numbers.map(|number| number.unwrap_or(f64::NAN)))
 }

@@ -218,7 +218,7 @@ impl RunSummary {
     ///
     /// [`ReadError`].
     pub fn parse_session(text: &str) -> Result<u64, ReadError> {
-        parse::<OfSession>(text).map(|it| it.session)
+        parse::<OfSession>(text).map(|value| value.session)
     }
 
     /// The file.

@@ -128,14 +128,17 @@ impl Trust {
     /// The numbers for people, in one line.
     pub fn text(&self) -> String {
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-        let reprojection = self.reprojection.map_or_else(String::new, |it| {
-            format!("reprojection {} of the person's height, ", percent(it))
+        let reprojection = self.reprojection.map_or_else(String::new, |reprojection| {
+            format!(
+                "reprojection {} of the person's height, ",
+                percent(reprojection)
+            )
         });
-        let bones = self.body_deviation.map_or_else(String::new, |it| {
-            format!("bones {it:.1} sd from people's, ")
+        let bones = self.body_deviation.map_or_else(String::new, |body_deviation| {
+            format!("bones {body_deviation:.1} sd from people's, ")
         });
-        let limbs = self.expected_error_m().map_or_else(String::new, |it| {
-            format!("limbs waver by {:.1} cm, ", 100.0 * it)
+        let limbs = self.expected_error_m().map_or_else(String::new, |expected_error_m| {
+            format!("limbs waver by {:.1} cm, ", 100.0 * expected_error_m)
         });
         format!(
             "{reprojection}{limbs}{bones}{} of bodies and {} of joints left out, sides unsure in {}",

@@ -268,7 +268,8 @@ impl Guest {
         let theirs = all.iter().filter_map(|it| parts_of(it));
         let other = ours.and_then(|ours| {
             // One of the same version was made since this one was not there.
-            let mut others = theirs.filter(|it| (it.0, it.2) == (ours.0, ours.2) && it.1 != ours.1);
+            let mut others = theirs
+                .filter(|theirs| (theirs.0, theirs.2) == (ours.0, ours.2) && theirs.1 != ours.1);
             Some((ours, others.next()?))
         });
         match other {
@@ -361,7 +362,7 @@ impl<E: Message, H: Header> Seen<E, H> {
 pub fn running_deployments() -> Result<Vec<String>, LockError> {
     let all = deployments(&Namespace::usual_base())?.into_iter();
     let running = all.filter(|it| it.supervisor.is_some());
-    Ok(running.map(|it| it.namespace.name().to_owned()).collect())
+    Ok(running.map(|running| running.namespace.name().to_owned()).collect())
 }
 
 fn not_running(name: &str) -> GuestError {

@@ -54,7 +54,7 @@ impl Losses {
     /// How many processes are marked.
     pub(crate) fn count(&self) -> usize {
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
-        let is_mark = |path: PathBuf| path.extension().is_some_and(|it| it == MARK);
+        let is_mark = |path: PathBuf| path.extension().is_some_and(|extension| extension == MARK);
         entries.filter(|entry| is_mark(entry.path())).count()
     }
 }

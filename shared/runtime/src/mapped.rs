@@ -33,7 +33,8 @@ pub fn mapped_at<T>(array: &[T]) -> io::Result<Option<Mapped>> {
 
 fn find(maps: &str, begin: usize, end: usize) -> Option<Mapped> {
     let mut mappings = maps.lines().filter_map(Mapping::parse);
-    let mapping = mappings.find(|it| it.address <= begin && end <= it.address + it.len)?;
+    let mapping = mappings
+        .find(|mapping| mapping.address <= begin && end <= mapping.address + mapping.len)?;
     mapping.shared.then(|| Mapped {
         file: PathBuf::from(mapping.path),
         inode: mapping.inode,

@@ -103,7 +103,7 @@ pub fn preflight(topics: &[TopicPlan]) -> Result<(), PreflightError> {
     if let Some(limit) = getrlimit(Resource::Nofile).current {
         check_descriptors(topics.len() as u64, limit)?;
     }
-    if let Some(limit) = getrlimit(Resource::Stack).current.filter(|it| *it < STACK) {
+    if let Some(limit) = getrlimit(Resource::Stack).current.filter(|current| *current < STACK) {
         return Err(PreflightError::Stack { limit });
     }
     check_room(
@@ -160,7 +160,7 @@ mod tests {
 
     fn topics() -> Vec<TopicPlan> {
         let evidence = (0..4).map(|view| evidence(view, Delivery::Realtime));
-        let processes = (0..12).flat_map(|it| process_topics(&format!("process-{it}")));
+        let processes = (0..12).flat_map(|i| process_topics(&format!("process-{i}")));
         evidence.chain(processes).collect()
     }
 

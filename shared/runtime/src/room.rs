@@ -62,7 +62,9 @@ pub(crate) fn connections()
     move |cause, _| {
         let n = n_refused();
         let is_refused = known.swap(n, Ordering::Relaxed) < n;
-        let is_full = || free_shared_memory().is_ok_and(|it| it < OVERHEAD_BYTES);
+        let is_full = || {
+            free_shared_memory().is_ok_and(|free_shared_memory| free_shared_memory < OVERHEAD_BYTES)
+        };
         match cause {
             DegradationCause::FailedToEstablishConnection if is_refused || is_full() => {
                 DegradationAction::DegradeAndFail

@@ -135,7 +135,7 @@ impl TopicPlan {
     /// Of these, those that are mapped ahead of use.
     pub(crate) fn mapped_chunks(&self) -> usize {
         let chunks = self.chunks() - self.onlooked_chunks();
-        self.usual_chunks.map_or(chunks, |it| it.min(chunks))
+        self.usual_chunks.map_or(chunks, |usual_chunk| usual_chunk.min(chunks))
     }
 
     /// Largest size of one message, bytes.

@@ -70,7 +70,7 @@ mod tests {
             ("h264x", None),
             ("a b c", None),
         ] {
-            assert_eq!(FourCc::parse(text).map(|it| it.0), expected, "{text}");
+            assert_eq!(FourCc::parse(text).map(|value| value.0), expected, "{text}");
         }
         assert_eq!(FourCc(*b"Y16 ").to_string(), "Y16");
         assert_eq!(

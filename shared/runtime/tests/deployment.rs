@@ -54,7 +54,7 @@ fn topics(delivery: Delivery) -> Vec<TopicPlan> {
         delivery,
         small(1),
     ));
-    topics.extend(processes().iter().flat_map(|it| process_topics(it)));
+    topics.extend(processes().iter().flat_map(|process| process_topics(process)));
     topics
 }
 

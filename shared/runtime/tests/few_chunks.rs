@@ -49,11 +49,11 @@ fn full(
 /// in the sender or in the receiver, whichever has more.
 fn mapped(deployment: &Deployment) -> usize {
     let files = shared_memory(deployment.namespace()).into_iter();
-    let is_pool = |it: &String| std::path::Path::new(it).extension() == Some("data".as_ref());
+    let is_pool = |text: &String| std::path::Path::new(text).extension() == Some("data".as_ref());
     let pool = files.into_iter().find(is_pool).unwrap();
     let maps = std::fs::read_to_string("/proc/self/smaps").unwrap();
     let kib = |of_pool: &str| -> usize {
-        let rss = of_pool.lines().find_map(|it| it.strip_prefix("Rss:"));
+        let rss = of_pool.lines().find_map(|line| line.strip_prefix("Rss:"));
         let rss = rss.unwrap().trim().strip_suffix(" kB").unwrap();
         rss.parse().unwrap()
     };

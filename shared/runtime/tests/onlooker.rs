@@ -31,10 +31,10 @@ fn a_sender_without_loss_does_not_wait_for_onlookers_and_its_receiver_gets_every
     let publisher = bus.publisher::<ViewQuality>("small").unwrap();
     let frames = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
     let looking = [deployment.bus("x"), deployment.bus("y")].map(runtime::Bus::as_onlooker);
-    let open = |it: &runtime::Bus| {
-        let mut waiter = it.waiter();
-        let small = it.subscriber::<ViewQuality>("small", &mut waiter).unwrap();
-        let large = it.slice_subscriber::<u8, FrameHeader>("frames", &mut waiter);
+    let open = |bus: &runtime::Bus| {
+        let mut waiter = bus.waiter();
+        let small = bus.subscriber::<ViewQuality>("small", &mut waiter).unwrap();
+        let large = bus.slice_subscriber::<u8, FrameHeader>("frames", &mut waiter);
         (small, large.unwrap())
     };
     let onlookers = looking.each_ref().map(open);
@@ -58,7 +58,7 @@ fn a_sender_without_loss_does_not_wait_for_onlookers_and_its_receiver_gets_every
         let got = receiver_of_frames.receive().unwrap().unwrap();
         assert_eq!(got.payload()[0], frame as u8);
         if frame == 0 {
-            held.extend(onlookers.each_ref().map(|it| it.1.receive().unwrap()));
+            held.extend(onlookers.each_ref().map(|onlooker| onlooker.1.receive().unwrap()));
         }
     }
     assert!(begin.elapsed() < NOT_STUCK, "the sender waited");

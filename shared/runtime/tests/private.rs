@@ -36,7 +36,7 @@ fn all_files(deployment: &Deployment) -> Vec<PathBuf> {
     let mut files = Vec::new();
     below(deployment.namespace().root(), &mut files);
     let memory = common::shared_memory(deployment.namespace()).into_iter();
-    files.extend(memory.map(|it| Path::new("/dev/shm").join(it)));
+    files.extend(memory.map(|memory| Path::new("/dev/shm").join(memory)));
     files
 }
 

@@ -102,8 +102,8 @@ fn killed_sender(deployment: &Deployment) -> PathBuf {
 
 fn folders(nodes: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(nodes).unwrap();
-    let paths = entries.map(|it| it.unwrap().path());
-    paths.filter(|it| it.is_dir()).collect()
+    let paths = entries.map(|entry| entry.unwrap().path());
+    paths.filter(|path| path.is_dir()).collect()
 }
 
 /// Starts this executable as another process, and waits until it is ready.

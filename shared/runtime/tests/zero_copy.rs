@@ -28,7 +28,7 @@ fn file(place: &Mapped) -> (u64, u64) {
 fn every_receiver_reads_pixels_in_place() {
     let deployment = deployment();
     let camera = deployment.bus("camera");
-    let readers = ["one", "two"].map(|it| deployment.bus(it));
+    let readers = ["one", "two"].map(|name| deployment.bus(name));
     let ports = readers.each_ref().map(|bus| {
         let mut waiter = bus.waiter();
         bus.slice_subscriber::<u8, FrameHeader>(PIXELS, &mut waiter).unwrap()
@@ -52,7 +52,7 @@ fn every_receiver_reads_pixels_in_place() {
             assert!(!read.is_writable, "a reader cannot change it");
         }
     }
-    let copied = readers.each_ref().map(|it| it.copies().bytes());
+    let copied = readers.each_ref().map(|reader| reader.copies().bytes());
     assert_eq!((camera.copies().bytes(), copied), (0, [0, 0]));
 }
 

@@ -37,7 +37,7 @@ impl Backdrop {
     /// * `camera`: in the frame of the stage.
     /// * `photo`: replaces the picture of the room, which still receives the shadow and occludes the person.
     pub(crate) fn new(camera: &Camera, room: &Room, photo: Option<&Photo>) -> Self {
-        let [width, height] = camera.intrinsics.size.map(|it| it as usize);
+        let [width, height] = camera.intrinsics.size.map(|size| size as usize);
         let eye: Point3<f32> = camera.centre_in_world().cast();
         let view = View { camera, room, eye };
         let normalised = view.directions(width, height);

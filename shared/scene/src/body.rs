@@ -164,7 +164,7 @@ impl Bones {
         let scale = height / 1.75;
         let soles = FOOT
             .iter()
-            .flat_map(|&foot| self.sole.map(|it| (frames[foot] * Point3::from(it)).z));
+            .flat_map(|&foot| self.sole.map(|sole| (frames[foot] * Point3::from(sole)).z));
         // Radii of the body around the joints, metres for a man of 1.75 m.
         let round = [(PELVIS, 0.105), (CHEST, 0.112), (HEAD, 0.09)].into_iter();
         let limbs = [
@@ -173,7 +173,7 @@ impl Bones {
             (HAND, 0.03),
             (SHIN, 0.055),
         ];
-        let limbs = limbs.into_iter().flat_map(|(pair, r)| pair.map(|it| (it, r)));
+        let limbs = limbs.into_iter().flat_map(|(pair, r)| pair.map(|pair| (pair, r)));
         let joints = round.chain(limbs).map(|(bone, r)| frames[bone].translation.z - r * scale);
         soles.chain(joints).fold(f64::INFINITY, f64::min)
     }

@@ -7,8 +7,8 @@ pub(crate) type Linear = Vector3<f32>;
 
 /// Linear light of an sRGB colour, `[r, g, b]` of 0 to 255.
 pub(crate) fn srgb(bytes: [u8; 3]) -> Linear {
-    Vector3::from(bytes.map(|it| {
-        let share = f32::from(it) / 255.0;
+    Vector3::from(bytes.map(|byte| {
+        let share = f32::from(byte) / 255.0;
         if share <= 0.04045 {
             share / 12.92
         } else {

@@ -104,7 +104,7 @@ impl Fabric {
     /// * `at`: around the body and along it, metres of the cloth.
     /// * `place`: of the body at rest, metres.
     pub(crate) fn colour(&self, at: Vector2<f32>, place: &Vector3<f32>) -> Linear {
-        let odd = |it: f32| it.rem_euclid(1.0) < 0.5;
+        let odd = |value: f32| value.rem_euclid(1.0) < 0.5;
         let second = match self.pattern {
             Pattern::Plain => 0.0,
             Pattern::Stripes(per_metre) => f32::from(odd(at.y * per_metre)),

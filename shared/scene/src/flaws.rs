@@ -145,7 +145,7 @@ impl Flaws {
             for value in rgb {
                 // The sum of four bytes, scaled to mean 0 and standard deviation 1.
                 let bits = random.bits().to_le_bytes();
-                let sum: i32 = bits[..4].iter().map(|it| i32::from(*it)).sum();
+                let sum: i32 = bits[..4].iter().map(|bit| i32::from(*bit)).sum();
                 let deviate = (f64::from(sum) - 510.0) / 147.8;
                 *value = (f64::from(*value) + self.noise * deviate).round().clamp(0.0, 255.0) as u8;
             }
@@ -154,8 +154,8 @@ impl Flaws {
 }
 
 fn expose(gain: f32, rgb: &mut [u8]) {
-    let curve: [u8; 256] = core::array::from_fn(|it| {
-        let light = srgb([it as u8; 3]).x * gain;
+    let curve: [u8; 256] = core::array::from_fn(|i| {
+        let light = srgb([i as u8; 3]).x * gain;
         (255.0 * crate::colour::written(light.min(1.0)) + 0.5) as u8
     });
     for value in rgb {
@@ -167,12 +167,12 @@ fn expose(gain: f32, rgb: &mut [u8]) {
 fn blur(deviation: f32, size: Size, rgb: &mut [u8]) {
     let reach = (3.0 * deviation).ceil() as usize;
     let weights: Vec<f32> = (0..=2 * reach)
-        .map(|it| (-0.5 * ((it as f32 - reach as f32) / deviation).powi(2)).exp())
+        .map(|i| (-0.5 * ((i as f32 - reach as f32) / deviation).powi(2)).exp())
         .collect();
     let sum: f32 = weights.iter().sum();
     let Size { width, height } = size;
     let mut pass = |n: usize, step: usize, start: usize| {
-        let line: Vec<f32> = (0..n).map(|it| f32::from(rgb[start + it * step])).collect();
+        let line: Vec<f32> = (0..n).map(|i| f32::from(rgb[start + i * step])).collect();
         for at in 0..n {
             let value: f32 = weights
                 .iter()
@@ -183,10 +183,10 @@ fn blur(deviation: f32, size: Size, rgb: &mut [u8]) {
         }
     };
     for row in 0..height {
-        (0..3).for_each(|it| pass(width, 3, 3 * row * width + it));
+        (0..3).for_each(|i| pass(width, 3, 3 * row * width + i));
     }
     for column in 0..width {
-        (0..3).for_each(|it| pass(height, 3 * width, 3 * column + it));
+        (0..3).for_each(|i| pass(height, 3 * width, 3 * column + i));
     }
 }
 
@@ -197,7 +197,7 @@ mod tests {
     const SIZE: Size = Size::new(40, 30);
 
     fn degraded(flaws: Flaws) -> Vec<u8> {
-        let mut rgb: Vec<u8> = (0..SIZE.rgb_bytes()).map(|it| (it / 3 % 40 * 6) as u8).collect();
+        let mut rgb: Vec<u8> = (0..SIZE.rgb_bytes()).map(|i| (i / 3 % 40 * 6) as u8).collect();
         flaws.degrade(Random::new(1), SIZE, &mut rgb);
         rgb
     }
@@ -205,7 +205,8 @@ mod tests {
     #[test]
     fn every_flaw_has_the_requested_size_and_none_changes_nothing() {
         let plain = degraded(Flaws::default());
-        let mean = |rgb: &[u8]| rgb.iter().map(|it| f64::from(*it)).sum::<f64>() / rgb.len() as f64;
+        let mean =
+            |rgb: &[u8]| rgb.iter().map(|rgb| f64::from(*rgb)).sum::<f64>() / rgb.len() as f64;
         let noisy = degraded(Flaws {
             noise: 5.0,
             ..Flaws::default()
@@ -259,7 +260,7 @@ mod tests {
             drop: 0.2,
             ..Flaws::default()
         };
-        let n = (0..2000).filter(|it| flaws.drops(Random::new(3), 1, *it)).count();
+        let n = (0..2000).filter(|i| flaws.drops(Random::new(3), 1, *i)).count();
         assert!((330..470).contains(&n), "{n}");
         assert!(!(0..50).any(|it| flaws.drops(Random::new(it), 1, 0)));
     }

@@ -47,8 +47,8 @@ impl Mesh {
                 *point -= shape.normal(point) * off;
             }
         }
-        let normals = points.iter().map(|it| shape.normal(it)).collect();
-        let weights = points.iter().map(|it| weights(shape, it)).collect();
+        let normals = points.iter().map(|point| shape.normal(point)).collect();
+        let weights = points.iter().map(|point| weights(shape, point)).collect();
         Self {
             points,
             normals,
@@ -103,7 +103,7 @@ fn weights(shape: &BodyShape, at: &Point3<f32>) -> [(u8, f32); N_WEIGHTS] {
     // A point of one leg never follows the other leg.
     let other = if at.y > 0.0 { THIGH[1] } else { THIGH[0] };
     distances[other..other + 3].fill(FAR);
-    let mut order: [usize; N_BONES] = core::array::from_fn(|it| it);
+    let mut order: [usize; N_BONES] = core::array::from_fn(|i| i);
     order.sort_by(|a, b| distances[*a].total_cmp(&distances[*b]));
     let nearest = distances[order[0]];
     let mut shares: [(u8, f32); N_WEIGHTS] = core::array::from_fn(|nth| {
@@ -117,7 +117,7 @@ fn weights(shape: &BodyShape, at: &Point3<f32>) -> [(u8, f32); N_WEIGHTS] {
         (bone as u8, if share < 0.02 { 0.0 } else { share })
     });
     shares[0].1 = 1.0;
-    let sum: f32 = shares.iter().map(|it| it.1).sum();
+    let sum: f32 = shares.iter().map(|share| share.1).sum();
     for share in &mut shares {
         share.1 /= sum;
     }
@@ -156,11 +156,11 @@ mod tests {
                 *edges.entry((*from.min(to), *from.max(to))).or_default() +=
                     if from < to { 1 } else { -1 };
             }
-            let [p, q, r] = [a, b, c].map(|it| mesh.points[*it as usize].coords);
+            let [p, q, r] = [a, b, c].map(|value| mesh.points[*value as usize].coords);
             volume += p.dot(&q.cross(&r)) / 6.0;
         }
         assert!(
-            edges.values().all(|it| *it == 0),
+            edges.values().all(|value| *value == 0),
             "every edge has two sides"
         );
         assert!((0.045..0.13).contains(&volume), "{volume} m3");
@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn points_lie_on_the_surface_and_the_bones_inside() {
         let (bones, shape, mesh) = mesh_of(4);
-        let on = mesh.points.iter().filter(|it| shape.distance(it).abs() < 1.5e-3).count();
+        let on = mesh.points.iter().filter(|point| shape.distance(point).abs() < 1.5e-3).count();
         assert!(on as f64 > 0.98 * mesh.points.len() as f64);
         let joints = bones.joints(&shape.frames);
         for (joint, at) in skeleton::PARSE14.joints.iter().zip(joints) {

@@ -147,7 +147,7 @@ impl Motion {
         };
         let frames = self.bones.frames(&pose);
         let middle = if stance.planted {
-            let feet = FOOT.map(|it| frames[it].translation.vector);
+            let feet = FOOT.map(|foot| frames[foot].translation.vector);
             (feet[0] + feet[1]) / 2.0
         } else {
             Vector3::zeros()

@@ -105,7 +105,8 @@ impl Painter {
                 })
             }));
             for triangle in &mesh.triangles {
-                let corners = triangle.map(|it| &self.corners[body.first_corner + it as usize]);
+                let corners =
+                    triangle.map(|triangle| &self.corners[body.first_corner + triangle as usize]);
                 self.samples.draw(n_triangles as u32, corners);
                 n_triangles += 1;
             }
@@ -140,7 +141,7 @@ impl Painter {
 
     /// Whether a sample sees the subject.
     pub(crate) fn sees_subject(&self, sample: usize) -> bool {
-        let end = self.bodies.get(1).map_or(usize::MAX, |it| it.first_triangle);
+        let end = self.bodies.get(1).map_or(usize::MAX, |body| body.first_triangle);
         let triangle = self.samples.triangle[sample];
         triangle != NOTHING && (triangle as usize) < end
     }
@@ -175,7 +176,7 @@ impl Painter {
 
     /// The mean of the samples of a pixel, where any of them sees a person.
     fn pixel(&self, of: &Input<'_>, x: usize, y: usize) -> Option<Linear> {
-        let n = self.of_pixel(x, y).filter(|it| self.samples.triangle[*it] != NOTHING).count();
+        let n = self.of_pixel(x, y).filter(|i| self.samples.triangle[*i] != NOTHING).count();
         if n == 0 {
             return None;
         }
@@ -196,15 +197,16 @@ impl Painter {
 
     /// The light reflected to the camera by a place of the body.
     fn shade(&self, of: &Input<'_>, triangle: usize, place: Point2<f32>) -> Linear {
-        let after = self.bodies.partition_point(|it| it.first_triangle <= triangle);
+        let after = self.bodies.partition_point(|body| body.first_triangle <= triangle);
         let body = &self.bodies[after - 1];
         let Figure { mesh, wear } = of.people[after - 1].figure;
-        let corners = mesh.triangles[triangle - body.first_triangle].map(|it| it as usize);
-        let on_picture = corners.map(|it| &self.corners[body.first_corner + it]);
+        let corners =
+            mesh.triangles[triangle - body.first_triangle].map(|triangle| triangle as usize);
+        let on_picture = corners.map(|corner| &self.corners[body.first_corner + corner]);
         let shares = shares(on_picture, place);
-        let at = point_between(corners.map(|it| &body.posed.points[it]), shares);
-        let smooth = between(corners.map(|it| &body.posed.normals[it]), shares);
-        let rest = point_between(corners.map(|it| &mesh.points[it]), shares);
+        let at = point_between(corners.map(|corner| &body.posed.points[corner]), shares);
+        let smooth = between(corners.map(|corner| &body.posed.normals[corner]), shares);
+        let rest = point_between(corners.map(|corner| &mesh.points[corner]), shares);
         let bone = mesh.bone(corners[0]);
         let finish = wear.finish(&rest, bone);
         let turned = smooth + body.turns[bone] * finish.bump;

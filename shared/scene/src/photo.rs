@@ -51,7 +51,7 @@ pub fn photos_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
-        let ending = path.extension().and_then(|it| it.to_str()).unwrap_or_default();
+        let ending = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         if ["png", "jpg", "jpeg", "bmp"].iter().any(|it| ending.eq_ignore_ascii_case(it)) {
             found.push(path);
         }

@@ -105,9 +105,9 @@ mod tests {
     fn forks_for_purposes_and_numbers_differ() {
         let random = Random::new(1);
         let mut all: Vec<u64> = ["a", "b"]
-            .map(|it| random.fork(it).bits())
+            .map(|name| random.fork(name).bits())
             .into_iter()
-            .chain((0..100).map(|it| random.nth(it).bits()))
+            .chain((0..100).map(|i| random.nth(i).bits()))
             .collect();
         all.sort_unstable();
         all.dedup();
@@ -119,7 +119,7 @@ mod tests {
         let mut random = Random::new(7);
         let numbers: Vec<f64> = (0..4000).map(|_| random.normal()).collect();
         let mean = numbers.iter().sum::<f64>() / 4000.0;
-        let variance = numbers.iter().map(|it| (it - mean).powi(2)).sum::<f64>() / 4000.0;
+        let variance = numbers.iter().map(|number| (number - mean).powi(2)).sum::<f64>() / 4000.0;
         assert!(mean.abs() < 0.06 && (variance - 1.0).abs() < 0.08);
     }
 

@@ -40,18 +40,18 @@ impl Samples {
 
     /// Where a sample lies on the picture, pixels.
     pub(crate) fn place(column: usize, row: usize) -> Point2<f32> {
-        let at = |it: usize| (it as f32 + 0.5) / SUB as f32 - 0.5;
+        let at = |value: usize| (value as f32 + 0.5) / SUB as f32 - 0.5;
         Point2::new(at(column), at(row))
     }
 
     /// Draws one triangle, seen from its front (clockwise on the picture, whose rows point down).
     pub(crate) fn draw(&mut self, index: u32, corners: [&Corner; 3]) {
-        if corners.iter().any(|it| it.z <= 0.0) {
+        if corners.iter().any(|corner| corner.z <= 0.0) {
             return;
         }
         // In samples: the centre of sample i lies at i.
-        let grown = |it: f32| (it + 0.5) * SUB as f32 - 0.5;
-        let [a, b, c] = corners.map(|it| Point2::new(grown(it.x), grown(it.y)));
+        let grown = |value: f32| (value + 0.5) * SUB as f32 - 0.5;
+        let [a, b, c] = corners.map(|corner| Point2::new(grown(corner.x), grown(corner.y)));
         let area = (b - a).perp(&(c - a));
         if area >= -1e-9 {
             return;
@@ -99,7 +99,7 @@ const EDGE: f32 = 1e-5;
 
 /// The shares of the corners at a place of the picture, corrected for depth; they sum to 1.
 pub(crate) fn shares(corners: [&Corner; 3], at: Point2<f32>) -> [f32; 3] {
-    let [a, b, c] = corners.map(|it| Point2::new(it.x, it.y));
+    let [a, b, c] = corners.map(|corner| Point2::new(corner.x, corner.y));
     let area = (b - a).perp(&(c - a));
     if area.abs() < 1e-12 {
         return [1.0, 0.0, 0.0];
@@ -112,7 +112,7 @@ pub(crate) fn shares(corners: [&Corner; 3], at: Point2<f32>) -> [f32; 3] {
     if sum.abs() < 1e-12 {
         return [u, v, w];
     }
-    weighted.map(|it| it / sum)
+    weighted.map(|weighted| weighted / sum)
 }
 
 /// A value interpolated between those of the corners.
@@ -122,5 +122,5 @@ pub(crate) fn between(values: [&Vector3<f32>; 3], shares: [f32; 3]) -> Vector3<f
 
 /// The same for points.
 pub(crate) fn point_between(values: [&Point3<f32>; 3], shares: [f32; 3]) -> Point3<f32> {
-    Point3::from(between(values.map(|it| &it.coords), shares))
+    Point3::from(between(values.map(|value| &value.coords), shares))
 }

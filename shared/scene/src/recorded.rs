@@ -47,8 +47,8 @@ impl Recording {
         };
         let pair = from.toes.zip(to.toes);
         Posture {
-            joints: core::array::from_fn(|it| mix(from.joints[it], to.joints[it])),
-            toes: pair.map(|(a, b)| core::array::from_fn(|it| mix(a[it], b[it]))),
+            joints: core::array::from_fn(|i| mix(from.joints[i], to.joints[i])),
+            toes: pair.map(|(a, b)| core::array::from_fn(|i| mix(a[i], b[i]))),
         }
     }
 }
@@ -114,7 +114,7 @@ impl Recorded {
 
     fn posed(&self, posture: &Posture) -> [Isometry3<f64>; N_BONES] {
         let turns = turns(&self.bones, posture);
-        let joint = |it: usize| Vector3::from(posture.joints[it]);
+        let joint = |i: usize| Vector3::from(posture.joints[i]);
         let hips = (joint(HIPS[LEFT]) + joint(HIPS[RIGHT])) / 2.0;
         let root = hips * self.scale + self.shift;
         let mut frames = turns.map(|turn| Isometry3::from_parts(Translation3::from(root), turn));
@@ -141,12 +141,14 @@ fn recorded_leg(recording: &Recording) -> f64 {
     };
     let all = recording.postures.iter();
     let all: Vec<f64> = all.flat_map(|it| [0, 1].map(|side| length(it, side))).collect();
-    Sorted::new(all).upper_median().map_or(1e-3, |it| it.max(1e-3))
+    Sorted::new(all)
+        .upper_median()
+        .map_or(1e-3, |upper_median| upper_median.max(1e-3))
 }
 
 /// The rotations of all bones, in the frame of the recording.
 fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
-    let joint = |it: usize| Vector3::from(posture.joints[it]);
+    let joint = |i: usize| Vector3::from(posture.joints[i]);
     let across = |pair: [usize; 2]| joint(pair[LEFT]) - joint(pair[RIGHT]);
     let offset = &bones.offset;
     let mut turns = [UnitQuaternion::identity(); N_BONES];
@@ -217,7 +219,7 @@ fn turned(from: Vector3<f64>, along: Vector3<f64>, left: Vector3<f64>) -> UnitQu
         } else {
             Vector3::x()
         };
-        let off = |it: Vector3<f64>| it - along * it.dot(&along);
+        let off = |vector: Vector3<f64>| vector - along * vector.dot(&along);
         let left = unit(off(left), unit(off(any), Vector3::y()));
         Matrix3::from_columns(&[left.cross(&along), left, along])
     };

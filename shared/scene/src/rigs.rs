@@ -79,7 +79,7 @@ impl RigChoice {
             };
         };
         let mut fields = rest.split(':');
-        let n = fields.next().and_then(|it| it.parse().ok());
+        let n = fields.next().and_then(|field| field.parse().ok());
         let n = n.filter(|it| (1..=MAX_RING_CAMERAS).contains(it)).ok_or_else(wrong)?;
         let mut metres = |default: f64, least: f64| match fields.next() {
             None => Ok(default),
@@ -258,7 +258,7 @@ mod tests {
     use super::*;
 
     fn angle_between(rig: &Rig, a: usize, b: usize) -> f64 {
-        let axis = |it: usize| rig.cameras()[it].axis_in_world().into_inner();
+        let axis = |i: usize| rig.cameras()[i].axis_in_world().into_inner();
         axis(a).xy().angle(&axis(b).xy()).to_degrees()
     }
 
@@ -266,7 +266,7 @@ mod tests {
     fn presets_have_the_cameras_of_their_names() {
         let rig = RigChoice::HumanEva.rig().unwrap();
         assert_eq!(rig.cameras().len(), 3);
-        assert!(rig.cameras().iter().all(|it| it.intrinsics.size == [640, 480]));
+        assert!(rig.cameras().iter().all(|camera| camera.intrinsics.size == [640, 480]));
         for (a, b) in [(0, 1), (0, 2)] {
             assert!((angle_between(&rig, a, b) - 90.0).abs() < 25.0);
         }

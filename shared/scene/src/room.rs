@@ -40,7 +40,7 @@ impl Block {
     /// Larger by a distance to every side.
     fn grown(&self, by: f32) -> Self {
         Self {
-            half: self.half.map(|it| it + by),
+            half: self.half.map(|half| half + by),
             reach: self.reach + 2.0 * by,
             ..*self
         }
@@ -116,7 +116,7 @@ impl Room {
     /// Whether furniture stands between a point and the key lamp.
     pub(crate) fn is_shaded(&self, at: &Vector3<f32>, towards: &Vector3<f32>) -> bool {
         let from = Point3::from(at + towards * 2e-3);
-        self.blocks.iter().any(|it| it.enter(&from, towards).is_some())
+        self.blocks.iter().any(|block| block.enter(&from, towards).is_some())
     }
 
     fn walls(&self, from: &Point3<f32>, direction: &Vector3<f32>) -> Hit {
@@ -138,9 +138,9 @@ impl Room {
         let mut normal = Vector3::zeros();
         normal[axis] = if outward { -1.0 } else { 1.0 };
         let edge = (0..3)
-            .filter(|it| *it != axis)
-            .map(|it| (at[it] - self.low[it]).min(self.high[it] - at[it]));
-        let near: f32 = edge.map(|it| (-it.max(0.0) / 0.3).exp()).sum();
+            .filter(|i| *i != axis)
+            .map(|i| (at[i] - self.low[i]).min(self.high[i] - at[i]));
+        let near: f32 = edge.map(|edge| (-edge.max(0.0) / 0.3).exp()).sum();
         let (colour, shines) = match axis {
             2 if outward => (Linear::new(0.78, 0.77, 0.74), false),
             2 => (self.floor.colour(&at), false),

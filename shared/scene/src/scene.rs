@@ -170,7 +170,7 @@ impl Scene {
         Header {
             frame_rate_hz: self.settings.rate_hz,
             up: up.into(),
-            cameras: self.rig.cameras().iter().map(|it| it.name.clone()).collect(),
+            cameras: self.rig.cameras().iter().map(|camera| camera.name.clone()).collect(),
             ..Header::new(self.settings.subject, self.action(), self.settings.seed)
         }
     }
@@ -184,7 +184,7 @@ impl Scene {
     pub fn joints(&self, seconds: f64) -> [[f64; 3]; N_JOINTS] {
         let frames = self.performance.frames(seconds);
         let joints = self.performance.bones.joints(&frames);
-        joints.map(|it| (self.world_from_stage * it).coords.into())
+        joints.map(|joint| (self.world_from_stage * joint).coords.into())
     }
 
     /// The same of every other person.
@@ -220,7 +220,7 @@ impl Scene {
             shown -= 1;
         }
         let late = flaws.late_s(self.random, camera);
-        let skew = self.settings.skews_ms.get(camera).map_or(0.0, |it| it * 1e-3);
+        let skew = self.settings.skews_ms.get(camera).map_or(0.0, |skews_ms| skews_ms * 1e-3);
         (self.seconds(shown) + skew + late, shown != frame)
     }
 }
@@ -250,11 +250,11 @@ fn others(settings: &Settings, performance: &Performance) -> Vec<Bystander> {
 /// [`SceneError::NoCamera`].
 pub fn camera_of(rig: &Rig, name: &str) -> Result<usize, SceneError> {
     let cameras = rig.cameras();
-    let by_name = cameras.iter().position(|it| it.name == name);
-    let by_number = || name.parse().ok().filter(|it| *it < cameras.len());
+    let by_name = cameras.iter().position(|camera| camera.name == name);
+    let by_number = || name.parse().ok().filter(|value| *value < cameras.len());
     by_name.or_else(by_number).ok_or_else(|| SceneError::NoCamera {
         name: name.to_owned(),
-        known: cameras.iter().map(|it| it.name.clone()).collect(),
+        known: cameras.iter().map(|camera| camera.name.clone()).collect(),
     })
 }
 
@@ -362,7 +362,7 @@ impl View {
     fn draw(&mut self, seconds: f64, rgb: Option<&mut [u8]>) -> [Isometry3<f64>; N_BONES] {
         let scene = &self.scene;
         let frames = scene.performance.frames(seconds);
-        let others = scene.others.iter().map(|it| (it, it.frames(seconds)));
+        let others = scene.others.iter().map(|other| (other, other.frames(seconds)));
         let others: Vec<(&Bystander, [Isometry3<f64>; N_BONES])> = others.collect();
         let subject = Person {
             figure: &scene.figure,

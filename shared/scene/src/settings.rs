@@ -40,8 +40,8 @@ impl Settings {
 
     /// Reads [`Self::skews_ms`]: numbers separated by commas.
     pub fn parse_skews_ms(text: &str) -> Option<Vec<f64>> {
-        let one = |it: &str| {
-            let skew: f64 = it.trim().parse().ok()?;
+        let one = |text: &str| {
+            let skew: f64 = text.trim().parse().ok()?;
             (skew.abs() <= Self::MOST_SKEW_MS).then_some(skew)
         };
         text.split(',').map(one).collect()
@@ -169,7 +169,7 @@ impl Address {
             n_frames: 300,
         };
         let mut seen: Vec<&str> = Vec::new();
-        for pair in query.split('&').filter(|it| !it.is_empty()) {
+        for pair in query.split('&').filter(|part| !part.is_empty()) {
             let wrong = || AddressError::Pair {
                 text: pair.to_owned(),
             };
@@ -237,7 +237,7 @@ impl Address {
             }
             "rate" => {
                 let rate: Option<f64> = value.parse().ok();
-                let rate = rate.filter(|it| (0.1..=1000.0).contains(it));
+                let rate = rate.filter(|rate| (0.1..=1000.0).contains(rate));
                 settings.rate_hz = rate.ok_or_else(|| wrong("0.1 to 1000 frames a second"))?;
             }
             _ => {

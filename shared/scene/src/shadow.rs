@@ -27,14 +27,15 @@ pub(crate) struct Shadow {
 impl Shadow {
     /// Draws the bodies.
     pub(crate) fn cast(&mut self, light: &Light, bodies: &[Surface<'_>]) {
-        let points = bodies.iter().flat_map(|it| it.points);
-        let beams: Vec<(Vector2<f32>, f32)> = points.map(|it| light.beam(&it.coords)).collect();
+        let points = bodies.iter().flat_map(|body| body.points);
+        let beams: Vec<(Vector2<f32>, f32)> =
+            points.map(|point| light.beam(&point.coords)).collect();
         let (mut low, mut high) = (Vector2::repeat(f32::MAX), Vector2::repeat(f32::MIN));
         for (across, _) in &beams {
             low = low.inf(across);
             high = high.sup(across);
         }
-        let extent = ((high - low) / CELL).map(|it| it.clamp(0.0, 2000.0));
+        let extent = ((high - low) / CELL).map(|value| value.clamp(0.0, 2000.0));
         self.low = low;
         (self.width, self.height) = (extent.x as usize + 2, extent.y as usize + 2);
         self.near.clear();
@@ -42,8 +43,8 @@ impl Shadow {
         let mut first = 0;
         for Surface { points, triangles } in bodies {
             for triangle in *triangles {
-                self.draw(triangle.map(|it| {
-                    let (across, near) = beams[first + it as usize];
+                self.draw(triangle.map(|triangle| {
+                    let (across, near) = beams[first + triangle as usize];
                     let at = (across - low) / CELL;
                     Vector3::new(at.x, at.y, near)
                 }));
@@ -84,11 +85,11 @@ impl Shadow {
     pub(crate) fn share(&self, across: Vector2<f32>, near: f32, reach: usize, bias: f32) -> f32 {
         let at = (across - self.low) / CELL;
         let border = reach as f32 + 1.0;
-        let outside = |it: f32, n: usize| it < -border || it > n as f32 + border;
+        let outside = |value: f32, n: usize| value < -border || value > n as f32 + border;
         if outside(at.x, self.width) || outside(at.y, self.height) {
             return 0.0;
         }
-        let cell = at.map(|it| it.floor() as i64);
+        let cell = at.map(|at| at.floor() as i64);
         let part = at - at.map(f32::floor);
         let taps = 2 * reach as i64 + 1;
         let mut sum = 0.0;

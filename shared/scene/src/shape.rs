@@ -58,7 +58,7 @@ impl BodyShape {
 
     /// Smallest and largest coordinates.
     pub(crate) fn bounds(&self) -> [Vector3<f32>; 2] {
-        let all = self.pieces.iter().map(|it| it.solid.bounds());
+        let all = self.pieces.iter().map(|piece| piece.solid.bounds());
         all.fold(
             [Vector3::repeat(f32::MAX), Vector3::repeat(f32::MIN)],
             |[low, high], [l, h]| [low.inf(&l), high.sup(&h)],
@@ -135,7 +135,7 @@ impl Grid {
     pub(crate) fn around([low, high]: [Vector3<f32>; 2], step: f32) -> Self {
         let origin = Point3::from(low.add_scalar(-2.5 * step));
         let extent = (high - low).add_scalar(5.0 * step) / step;
-        let size = [extent.x, extent.y, extent.z].map(|it| it.ceil() as usize + 1);
+        let size = [extent.x, extent.y, extent.z].map(|value| value.ceil() as usize + 1);
         Self {
             origin,
             step,

@@ -167,7 +167,7 @@ impl Frame {
     /// [`TruthError::Syntax`], and [`TruthError::Views`] if there is not one view for every camera.
     pub fn parse(line: &str, header: &Header) -> Result<Self, TruthError> {
         let frame: Self = serde_json::from_str(line)?;
-        let cameras = frame.views.iter().map(|it| &it.camera);
+        let cameras = frame.views.iter().map(|view| &view.camera);
         if !cameras.eq(&header.cameras) {
             return Err(TruthError::Views { frame: frame.frame });
         }
@@ -201,7 +201,7 @@ impl View {
 }
 
 fn names() -> impl Iterator<Item = &'static str> {
-    skeleton::PARSE14.joints.iter().map(|it| it.name)
+    skeleton::PARSE14.joints.iter().map(|joint| joint.name)
 }
 
 /// Converts joints to another set, by way of the parts that every set is made of.
@@ -234,15 +234,15 @@ mod tests {
         Frame {
             frame: 2,
             seconds: 0.1,
-            joints: core::array::from_fn(|it| [it as f64, 0.5, -1.0]),
+            joints: core::array::from_fn(|i| [i as f64, 0.5, -1.0]),
             others: vec![[[0.5; 3]; N_JOINTS]],
             views: vec![View {
                 camera: "a".to_owned(),
                 seconds: 0.1,
                 repeated: false,
                 from_behind: true,
-                pixels: core::array::from_fn(|it| (it != 3).then_some([it as f64, 2.5])),
-                visible: core::array::from_fn(|it| it % 2 == 0),
+                pixels: core::array::from_fn(|i| (i != 3).then_some([i as f64, 2.5])),
+                visible: core::array::from_fn(|i| i % 2 == 0),
                 outline: None,
             }],
         }
@@ -250,11 +250,12 @@ mod tests {
 
     #[test]
     fn every_joint_of_every_set_is_made_of_the_fourteen() {
-        let known: Vec<usize> = PARSE14.joints.iter().flat_map(|it| it.parts).copied().collect();
+        let known: Vec<usize> =
+            PARSE14.joints.iter().flat_map(|joint| joint.parts).copied().collect();
         for set in JointSet::ALL {
             for joint in set.joints {
                 assert!(
-                    joint.parts.iter().all(|it| known.contains(it)),
+                    joint.parts.iter().all(|part| known.contains(part)),
                     "{}",
                     joint.name
                 );

@@ -20,7 +20,7 @@ fn synthetic_people_are_people_whatever_they_do() {
             let scene = Scene::new(&settings).unwrap();
             for frame in 0..20 {
                 let seconds = 0.45 * f64::from(frame);
-                let joints: Joints = scene.joints(seconds).map(|it| Some(Point3::from(it)));
+                let joints: Joints = scene.joints(seconds).map(|joint| Some(Point3::from(joint)));
                 let found = check(&joints, &[None; 14], None);
                 let at = format!("subject {subject} {} {seconds} s", action.name());
                 assert_eq!((found.nobody, found.dropped), (None, [false; 14]), "{at}");

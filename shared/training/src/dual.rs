@@ -134,7 +134,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
     /// Tags and shares of all examples, in the order in which they were added. Added again in this
     /// order with these shares, they make the same machine.
     pub fn entries(&self) -> impl Iterator<Item = (&T, f64)> {
-        self.entries.iter().map(|it| (&it.tag, it.share))
+        self.entries.iter().map(|entry| (&entry.tag, entry.share))
     }
 
     /// The solution.
@@ -157,8 +157,8 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
     /// * `may_go`: whether an example with this tag may be removed.
     pub fn forget(&mut self, room: f64, bytes: usize, may_go: impl Fn(&T) -> bool) {
         let mut idle: Vec<(f64, usize)> = (0..self.entries.len())
-            .filter(|&it| self.entries[it].share == 0.0 && may_go(&self.entries[it].tag))
-            .map(|it| (self.slope(it), it))
+            .filter(|&i| self.entries[i].share == 0.0 && may_go(&self.entries[i].tag))
+            .map(|i| (self.slope(i), i))
             .collect();
         idle.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut left = self.bytes;

@@ -77,7 +77,7 @@ impl Example {
                 i32::from(parent.x) + anchor[0] - i32::from(placed.x),
                 i32::from(parent.y) + anchor[1] - i32::from(placed.y),
             ]
-            .map(|it| it as f32);
+            .map(|value| value as f32);
             let bias = at.bias(part, usize::from(parent.mixture), mixture);
             let quadratic = vec![-dx * dx, -dy * dy];
             runs.push((at.quadratic(part, mixture), Run::Own(quadratic)));
@@ -87,7 +87,7 @@ impl Example {
         }
         let (root, value) = at.root();
         runs.push((root, Run::Own(vec![value])));
-        runs.sort_unstable_by_key(|it| it.0);
+        runs.sort_unstable_by_key(|run| run.0);
         Self {
             features: Sparse::sharing(shared, runs),
             fixed,

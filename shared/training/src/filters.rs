@@ -74,9 +74,9 @@ fn one(
 ) -> Vec<f64> {
     let n = at.filter_len();
     let mut machine = Machine::new(n + 1, 0..0);
-    let windows = people.iter().filter_map(|it| it.features.run(first));
-    let windows = windows.map(|it| (it, settings.positive_weight, 1.0));
-    let background = background.iter().map(|it| (it.clone(), 1.0, -1.0));
+    let windows = people.iter().filter_map(|person| person.features.run(first));
+    let windows = windows.map(|window| (window, settings.positive_weight, 1.0));
+    let background = background.iter().map(|background| (background.clone(), 1.0, -1.0));
     for (group, (window, weight, sign)) in windows.chain(background).enumerate() {
         let cost = Cost {
             group,

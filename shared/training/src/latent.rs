@@ -22,10 +22,14 @@ impl Marked {
     /// every side by half of its width and height together (Yang & Ramanan 2013).
     pub fn surroundings(&self) -> [f64; 4] {
         let half = self.side / 2.0;
-        let low =
-            |axis: usize| self.parts.iter().map(|it| it[axis] - half).fold(f64::INFINITY, f64::min);
+        let low = |axis: usize| {
+            self.parts.iter().map(|part| part[axis] - half).fold(f64::INFINITY, f64::min)
+        };
         let high = |axis: usize| {
-            self.parts.iter().map(|it| it[axis] + half).fold(f64::NEG_INFINITY, f64::max)
+            self.parts
+                .iter()
+                .map(|part| part[axis] + half)
+                .fold(f64::NEG_INFINITY, f64::max)
         };
         let around = [low(0), low(1), high(0), high(1)];
         let grow = (around[2] - around[0] + around[3] - around[1]) / 2.0;
@@ -99,9 +103,9 @@ pub(crate) fn nearest(
             cells.iter().fold(first, closer)
         };
         let picked: Vec<Cell> = cells.iter().map(nearest).collect();
-        let sum = picked.iter().map(|it| it.overlap).sum();
+        let sum = picked.iter().map(|picked| picked.overlap).sum();
         if best.as_ref().is_none_or(|it| sum > it.0) {
-            let mixture = |part: usize| marked.types.as_ref().map_or(0, |it| it[part]);
+            let mixture = |part: usize| marked.types.as_ref().map_or(0, |kind| kind[part]);
             let placed = picked.iter().enumerate();
             let placed = placed.map(|(part, it)| placement(it, mixture(part)));
             let pose = Pose {
@@ -184,7 +188,7 @@ type Scores = Vec<Vec<f64>>;
 impl Search<'_> {
     fn best(&self) -> Pose {
         let n_parts = self.model.n_parts();
-        let mut scores: Vec<Scores> = (0..n_parts).map(|it| self.own(it)).collect();
+        let mut scores: Vec<Scores> = (0..n_parts).map(|i| self.own(i)).collect();
         // The best cell of a child's type for every cell of its parent: `[part][cell][type]`.
         let mut choices: Vec<Vec<Vec<(f64, usize)>>> = vec![Vec::new(); n_parts];
         for part in (1..n_parts).rev() {
@@ -208,8 +212,8 @@ impl Search<'_> {
         let map = self.pyramid.level(self.level);
         let n_types = self.model.n_types(part);
         let response = |cell: &Cell, mixture: usize| {
-            let wanted = self.marked.types.as_ref().map(|it| it[part]);
-            if wanted.is_some_and(|it| it != mixture) {
+            let wanted = self.marked.types.as_ref().map(|kind| kind[part]);
+            if wanted.is_some_and(|wanted| wanted != mixture) {
                 return f64::NEG_INFINITY;
             }
             let filter = self.model.filter(part, mixture);
@@ -222,7 +226,7 @@ impl Search<'_> {
             })
             .sum()
         };
-        let of_cell = |cell: &Cell| (0..n_types).map(|it| response(cell, it)).collect();
+        let of_cell = |cell: &Cell| (0..n_types).map(|i| response(cell, i)).collect();
         self.cells[part].iter().map(of_cell).collect()
     }
 
@@ -248,7 +252,7 @@ impl Search<'_> {
             }
             best
         };
-        let of_cell = |parent: &Cell| (0..springs.len()).map(|it| vote(parent, it)).collect();
+        let of_cell = |parent: &Cell| (0..springs.len()).map(|i| vote(parent, i)).collect();
         self.cells[edge.parent].iter().map(of_cell).collect()
     }
 

@@ -15,7 +15,7 @@ pub(crate) struct Placed {
 impl Placed {
     /// Takes a pose without its score.
     pub(crate) fn of(pose: &Pose) -> Self {
-        let part = |it: &Placement| (it.x, it.y, it.mixture);
+        let part = |placement: &Placement| (placement.x, placement.y, placement.mixture);
         Self {
             level: pose.level,
             parts: pose.parts.iter().map(part).collect(),

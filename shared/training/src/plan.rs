@@ -94,7 +94,7 @@ impl Plan {
     ) -> Result<Self, PlanError> {
         let expected = tree.parents.len();
         for (person, parts) in people.iter().enumerate() {
-            let finite = |it: &&[f64; 2]| it.iter().all(|it| it.is_finite());
+            let finite = |it: &&[f64; 2]| it.iter().all(|value| value.is_finite());
             let got = parts.iter().filter(finite).count();
             if got != expected || parts.len() != expected {
                 let person = person + 1;
@@ -114,7 +114,7 @@ impl Plan {
         let side = fits.min(settings.max_filter_cells);
         let filter_px = side * settings.cell_px;
         let large: Vec<usize> =
-            (0..people.len()).filter(|&it| sides[it] >= filter_px as f64).collect();
+            (0..people.len()).filter(|&i| sides[i] >= filter_px as f64).collect();
         if large.is_empty() {
             let n_people = people.len();
             return Err(PlanError::NoPeople {
@@ -122,9 +122,9 @@ impl Plan {
                 filter_px,
             });
         }
-        let in_cells = |&it: &usize| {
-            let scale = side as f64 / sides[it];
-            people[it].iter().map(|at| at.map(|px| px * scale)).collect()
+        let in_cells = |&i: &usize| {
+            let scale = side as f64 / sides[i];
+            people[i].iter().map(|at| at.map(|px| px * scale)).collect()
         };
         let in_cells: Vec<Vec<[f64; 2]>> = large.iter().map(in_cells).collect();
         let Types { of_person, anchors } = cluster(&in_cells, tree.sides(settings), settings);

@@ -27,10 +27,10 @@ pub(crate) fn box_sides(people: &[Vec<[f64; 2]>], parents: &[Option<usize>]) -> 
     let usual = |edge: (usize, usize)| {
         let of_person = |it: &Vec<[f64; 2]>| (length(it, edge) / length(it, first)).ln();
         let ratios: Vec<_> = people.iter().map(of_person).collect();
-        let ratios = ratios.into_iter().filter(|it| it.is_finite()).collect();
+        let ratios = ratios.into_iter().filter(|ratio| ratio.is_finite()).collect();
         quantile(ratios, 0.5).exp()
     };
-    let usual: Vec<_> = edges.iter().map(|it| usual(*it)).collect();
+    let usual: Vec<_> = edges.iter().map(|edge| usual(*edge)).collect();
     let side = |person: &Vec<[f64; 2]>| {
         let sides = edges.iter().zip(&usual);
         let sides = sides.map(|(edge, usual)| length(person, *edge) / usual);
@@ -61,7 +61,7 @@ mod tests {
     fn person(scale: f64) -> Vec<[f64; 2]> {
         [[0.0, 0.0], [0.0, 20.0], [15.0, 30.0], [30.0, 55.0]]
             .iter()
-            .map(|it| it.map(|it| 7.0 + scale * it))
+            .map(|it| it.map(|value| 7.0 + scale * value))
             .collect()
     }
 

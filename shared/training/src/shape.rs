@@ -63,7 +63,7 @@ impl Shape {
         let mut first_bias = vec![0];
         for (part, parent) in self.parents.iter().enumerate() {
             first_type.push(first_type[part] + self.n_types(part));
-            let pairs = parent.map_or(0, |it| self.n_types(it) * self.n_types(part));
+            let pairs = parent.map_or(0, |parent| self.n_types(parent) * self.n_types(part));
             first_bias.push(first_bias[part] + pairs);
         }
         let n_types = first_type[self.n_parts()];
@@ -95,15 +95,15 @@ impl Shape {
         let at = self.coordinates();
         assert_eq!(v.len(), at.len(), "the vector of this shape");
         let n_types = at.first_type[self.n_parts()];
-        let filters = (0..n_types).map(|it| Filter {
+        let filters = (0..n_types).map(|i| Filter {
             rows: self.side,
             cols: self.side,
-            weights: v[it * at.filter_len..(it + 1) * at.filter_len].to_vec(),
+            weights: v[i * at.filter_len..(i + 1) * at.filter_len].to_vec(),
         });
         Model::new(ModelSpec {
             name: self.name.clone(),
             filters: filters.collect(),
-            parts: (0..self.n_parts()).map(|it| self.part(&at, v, it)).collect(),
+            parts: (0..self.n_parts()).map(|i| self.part(&at, v, i)).collect(),
             root_bias: v[at.root] / ROOT_BIAS_SCALE,
             interval: self.interval,
             cell_px: self.cell_px,

@@ -60,7 +60,7 @@ impl Sparse {
         shared: Option<Arc<[f32]>>,
         runs: impl IntoIterator<Item = (usize, Run)>,
     ) -> Self {
-        let n_shared = shared.as_ref().map_or(0, |it| it.len());
+        let n_shared = shared.as_ref().map_or(0, |shared| shared.len());
         let mut own = Vec::new();
         let span = |(start, run): (usize, Run)| {
             let (at, len, shared) = match run {
@@ -96,23 +96,23 @@ impl Sparse {
     /// The runs, each with where it begins, before the sign.
     fn runs(&self) -> impl Iterator<Item = (usize, &[f32])> {
         let shared = self.shared.as_deref().unwrap_or_default();
-        self.spans.iter().map(move |it| {
-            let values = if it.shared { shared } else { &self.own };
-            let at = it.at as usize;
-            (it.start as usize, &values[at..at + it.len as usize])
+        self.spans.iter().map(move |span| {
+            let values = if span.shared { shared } else { &self.own };
+            let at = span.at as usize;
+            (span.start as usize, &values[at..at + span.len as usize])
         })
     }
 
     /// Where every run begins and how long it is.
     pub fn spans(&self) -> impl Iterator<Item = (usize, usize)> {
         let spans = self.spans.iter();
-        spans.map(|it| (it.start as usize, it.len as usize))
+        spans.map(|span| (span.start as usize, span.len as usize))
     }
 
     /// The values of the run that begins at `start`.
     pub fn run(&self, start: usize) -> Option<Vec<f32>> {
-        let found = self.runs().find(|it| it.0 == start);
-        found.map(|(_, run)| run.iter().map(|it| self.sign * it).collect())
+        let found = self.runs().find(|run| run.0 == start);
+        found.map(|(_, run)| run.iter().map(|value| self.sign * value).collect())
     }
 
     /// The square of its norm.
@@ -133,8 +133,8 @@ impl Sparse {
         let mut theirs = other.runs().peekable();
         let mut sum = 0.0;
         for (start, run) in self.runs() {
-            while theirs.next_if(|it| it.0 < start).is_some() {}
-            if let Some((_, their_run)) = theirs.next_if(|it| it.0 == start) {
+            while theirs.next_if(|theirs| theirs.0 < start).is_some() {}
+            if let Some((_, their_run)) = theirs.next_if(|theirs| theirs.0 == start) {
                 sum += sum_of_products(run, their_run);
             }
         }
@@ -161,15 +161,16 @@ impl Sparse {
     /// This vector less another.
     #[must_use]
     pub fn minus(&self, other: &Self) -> Self {
-        let signed = |run: &[f32], sign: f32| run.iter().map(|it| sign * it).collect::<Vec<_>>();
+        let signed =
+            |run: &[f32], sign: f32| run.iter().map(|value| sign * value).collect::<Vec<_>>();
         let mut runs: Vec<(usize, Vec<f32>)> = Vec::new();
         let mut theirs = other.runs().peekable();
         for (start, run) in self.runs() {
-            while let Some((start, run)) = theirs.next_if(|it| it.0 < start) {
+            while let Some((start, run)) = theirs.next_if(|theirs| theirs.0 < start) {
                 runs.push((start, signed(run, -other.sign)));
             }
             let mut run = signed(run, self.sign);
-            if let Some((_, their_run)) = theirs.next_if(|it| it.0 == start) {
+            if let Some((_, their_run)) = theirs.next_if(|theirs| theirs.0 == start) {
                 for (a, b) in run.iter_mut().zip(their_run) {
                     *a -= other.sign * b;
                 }
@@ -193,7 +194,7 @@ fn sum_of_products(a: &[f32], b: &[f32]) -> f64 {
             *sum += a * b;
         }
     }
-    sums.iter().map(|it| f64::from(*it)).sum::<f64>() + rest
+    sums.iter().map(|sum| f64::from(*sum)).sum::<f64>() + rest
 }
 
 #[cfg(test)]
@@ -210,7 +211,7 @@ mod tests {
         (prop::collection::vec(run, LEN / 4), any::<bool>()).prop_map(|(runs, negated)| {
             let runs = runs.into_iter().enumerate().filter(|it| it.1.0);
             let runs = runs.map(|(at, (_, values))| {
-                let values = values[..=at % 4].iter().map(|it| f32::from(*it));
+                let values = values[..=at % 4].iter().map(|value| f32::from(*value));
                 (4 * at, values.collect::<Vec<_>>())
             });
             let it = Sparse::new(runs);
@@ -232,7 +233,7 @@ mod tests {
         #[test]
         fn products_and_differences_are_those_of_dense_vectors(a in vector(), b in vector()) {
             let (da, db) = (dense(&a), dense(&b));
-            let single: Vec<f32> = db.iter().map(|it| *it as f32).collect();
+            let single: Vec<f32> = db.iter().map(|db| *db as f32).collect();
             prop_assert_eq!(a.dot(&single), product(&da, &db));
             prop_assert_eq!(a.dot_sparse(&b), product(&da, &db));
             prop_assert_eq!(a.squared_norm(), product(&da, &da));

@@ -36,7 +36,7 @@ impl Symmetry {
             return None;
         }
         let at = shape.coordinates();
-        let plain = (0..at.len()).map(|it| (it as u32, 1.0));
+        let plain = (0..at.len()).map(|i| (i as u32, 1.0));
         let mut mirrored: Vec<(u32, f64)> = plain.collect();
         for part in 0..shape.n_parts() {
             for k in 0..shape.n_types(part) {
@@ -138,7 +138,10 @@ mod tests {
             cols: COLS,
             cells,
         };
-        let (shape, v) = (shape(), v.iter().map(|it| *it as f32).collect::<Vec<_>>());
+        let (shape, v) = (
+            shape(),
+            v.iter().map(|value| *value as f32).collect::<Vec<_>>(),
+        );
         let example = Example::of(&shape, &shape.coordinates(), &map, pose);
         example.features.dot(&v) + example.fixed
     }
@@ -190,7 +193,7 @@ mod tests {
             let v = symmetry.balance(&numbers(shape.coordinates().len(), seed));
             let cells: Vec<f32> = numbers(ROWS * COLS * N_CHANNELS, !seed)
                 .into_iter()
-                .map(|it| it as f32)
+                .map(|number| number as f32)
                 .collect();
             let typed = |(part, (x, y, k)): (usize, (u16, u16, u8))| {
                 (x, y, k % shape.n_types(part) as u8)

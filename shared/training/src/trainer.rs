@@ -218,7 +218,7 @@ impl<'a> Trainer<'a> {
             }
         }
         self.machine.retain(|it| matches!(it, Origin::Background { .. }));
-        self.right = placed.into_iter().map(|it| it.map(|it| it.0)).collect();
+        self.right = placed.into_iter().map(|placed| placed.map(|it| it.0)).collect();
         let people = self.right.iter().zip(shares).enumerate();
         let (origins, shares): (Vec<_>, Vec<_>) = people
             .filter_map(|(person, (pose, share))| {
@@ -246,7 +246,7 @@ impl<'a> Trainer<'a> {
     /// Bytes that examples and features take.
     fn bytes(&self) -> usize {
         let cells = self.cells.lock().unwrap_or_else(PoisonError::into_inner);
-        self.machine.bytes() + cells.values().map(|it| it.bytes()).sum::<usize>()
+        self.machine.bytes() + cells.values().map(|value| value.bytes()).sum::<usize>()
     }
 
     /// Drops wrong poses without a share, and the features that no example uses.
@@ -254,13 +254,14 @@ impl<'a> Trainer<'a> {
         let features = self.bytes() - self.machine.bytes();
         let room = (self.settings.cache_mib << 20).saturating_sub(features);
         // A right pose without a share may need one later, and would not be found again.
-        let may_go = |it: &Origin| !matches!(it, Origin::Right { .. });
+        let may_go = |origin: &Origin| !matches!(origin, Origin::Right { .. });
         self.machine.forget(self.settings.room, room, may_go);
-        let image = |it: &Origin| match it {
+        let image = |origin: &Origin| match origin {
             Origin::Background { image, .. } => Some(*image as usize),
             Origin::Right { .. } | Origin::Mistake { .. } => None,
         };
-        let shown: BTreeSet<usize> = self.machine.entries().filter_map(|it| image(it.0)).collect();
+        let shown: BTreeSet<usize> =
+            self.machine.entries().filter_map(|entry| image(entry.0)).collect();
         let cells = self.cells.get_mut().unwrap_or_else(PoisonError::into_inner);
         cells.retain(|it, _| shown.contains(it));
     }
@@ -268,7 +269,7 @@ impl<'a> Trainer<'a> {
     /// Sets the threshold to the fifth percentile of the people's scores (Yang & Ramanan 2013).
     fn judge(&mut self) -> Result<(), TrainError> {
         let placed = self.best_placements(false)?;
-        let scores = placed.into_iter().flatten().map(|it| it.1);
+        let scores = placed.into_iter().flatten().map(|placed| placed.1);
         self.threshold = quantile(scores.collect(), 0.05);
         Ok(())
     }

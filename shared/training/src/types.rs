@@ -29,7 +29,7 @@ pub(crate) fn cluster(
     (parents, mirror): (&[Option<usize>], Option<&[usize]>),
     settings: &Settings,
 ) -> Types {
-    let other = |part: usize| mirror.map_or(part, |it| it[part]);
+    let other = |part: usize| mirror.map_or(part, |mirror| mirror[part]);
     let clustered = |part: usize| -> Vec<(usize, OfPart)> {
         let mut random = fastrand::Rng::with_seed(settings.seed ^ ((part as u64) << 32));
         let sight = Offsets::of(part, parents, settings.types_by);
@@ -55,14 +55,14 @@ pub(crate) fn cluster(
     };
     let mut parts: Vec<(usize, OfPart)> = (0..parents.len())
         .into_par_iter()
-        .filter(|&it| it <= other(it))
+        .filter(|&i| i <= other(i))
         .flat_map_iter(clustered)
         .collect();
-    parts.sort_unstable_by_key(|it| it.0);
-    let of_person = |person: usize| parts.iter().map(|it| it.1.labels[person]).collect();
+    parts.sort_unstable_by_key(|part| part.0);
+    let of_person = |person: usize| parts.iter().map(|part| part.1.labels[person]).collect();
     Types {
         of_person: (0..people.len()).map(of_person).collect(),
-        anchors: parts.iter().map(|it| it.1.anchors()).collect(),
+        anchors: parts.iter().map(|part| part.1.anchors()).collect(),
     }
 }
 
@@ -77,7 +77,7 @@ struct Offsets {
 impl Offsets {
     /// The parts whose offsets define the types of `part`, its parent first.
     fn of(part: usize, parents: &[Option<usize>], by: TypesBy) -> Self {
-        let children = (0..parents.len()).filter(|&it| parents[it] == Some(part));
+        let children = (0..parents.len()).filter(|&i| parents[i] == Some(part));
         let mut neighbours: Vec<_> = parents[part].into_iter().collect();
         match by {
             TypesBy::Parent if neighbours.is_empty() => neighbours.extend(children.take(1)),
@@ -95,7 +95,7 @@ impl Offsets {
     fn mirrored(&self, mirror: &[usize]) -> Self {
         Self {
             part: mirror[self.part],
-            neighbours: self.neighbours.iter().map(|&it| mirror[it]).collect(),
+            neighbours: self.neighbours.iter().map(|&neighbour| mirror[neighbour]).collect(),
             in_mirror: !self.in_mirror,
         }
     }
@@ -124,10 +124,10 @@ struct OfPart {
 impl OfPart {
     fn clustered(points: &[Vec<f64>], settings: &Settings, random: &mut fastrand::Rng) -> Self {
         let labels = k_means(points, settings, random);
-        let mut centres = vec![Vec::new(); labels.iter().max().map_or(0, |it| it + 1)];
+        let mut centres = vec![Vec::new(); labels.iter().max().map_or(0, |label| label + 1)];
         for (label, centre) in centres.iter_mut().enumerate() {
             let members = labels.iter().zip(points).filter(|it| *it.0 == label);
-            *centre = middle(&mut members.map(|it| it.1));
+            *centre = middle(&mut members.map(|member| member.1));
         }
         Self { labels, centres }
     }
@@ -139,14 +139,14 @@ impl OfPart {
         let nearest = |point: &Vec<f64>| nearest(point, &self.centres).map_or(0, |it| it.0);
         Self {
             labels: points.iter().map(nearest).collect(),
-            centres: self.centres.iter().map(|it| in_mirror(it)).collect(),
+            centres: self.centres.iter().map(|centre| in_mirror(centre)).collect(),
         }
     }
 
     /// The anchors of the types, `[x, y]` from the first neighbour, cells.
     fn anchors(&self) -> Vec<[i32; 2]> {
         let anchor = |it: &Vec<f64>| match it[..] {
-            [x, y, ..] => [x, y].map(|it| it.round() as i32),
+            [x, y, ..] => [x, y].map(|value| value.round() as i32),
             _ => [0; 2],
         };
         self.centres.iter().map(anchor).collect()
@@ -171,7 +171,7 @@ fn in_the_middle(
     let label = |(label, is_left): (&usize, bool)| 2 * label + usize::from(is_left);
     let labels = found.labels.iter().zip(is_left).map(label).collect();
     let centres = found.centres.into_iter();
-    let centres = centres.flat_map(|it| [it.clone(), in_mirror(&it)]).collect();
+    let centres = centres.flat_map(|centre| [centre.clone(), in_mirror(&centre)]).collect();
     OfPart { labels, centres }
 }
 
@@ -190,7 +190,7 @@ fn middle(points: &mut dyn Iterator<Item = &Vec<f64>>) -> Vec<f64> {
         }
         n += 1.0;
     }
-    sum.into_iter().map(|it| it / n).collect()
+    sum.into_iter().map(|sum| sum / n).collect()
 }
 
 /// The nearest of some points, and its squared distance; the first of several.
@@ -206,7 +206,7 @@ fn k_means(points: &[Vec<f64>], settings: &Settings, random: &mut fastrand::Rng)
     let mut best: Option<(f64, Vec<usize>)> = None;
     for _ in 0..settings.cluster_starts.max(1) {
         let picked = random.choose_multiple(0..points.len(), settings.n_types);
-        let centres = picked.into_iter().map(|it| points[it].clone()).collect();
+        let centres = picked.into_iter().map(|picked| points[picked].clone()).collect();
         let (spread, labels) = lloyd(points, centres);
         if best.as_ref().is_none_or(|it| spread < it.0) {
             best = Some((spread, labels));
@@ -249,7 +249,7 @@ fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
 }
 
 fn by_size(mut labels: Vec<usize>, k: usize) -> Vec<usize> {
-    let mut counts: Vec<_> = (0..k).map(|it| (0_usize, it)).collect();
+    let mut counts: Vec<_> = (0..k).map(|i| (0_usize, i)).collect();
     for &label in &labels {
         counts[label].0 += 1;
     }

@@ -25,7 +25,7 @@ fn joint(person: usize, joint: usize) -> [f64; 2] {
 }
 
 fn joints(person: usize) -> Vec<[f64; 2]> {
-    (0..N_JOINTS).map(|it| joint(person, it)).collect()
+    (0..N_JOINTS).map(|i| joint(person, i)).collect()
 }
 
 fn write_image(path: &Path) {
@@ -65,14 +65,14 @@ fn parse_set() -> TempDir {
 }
 
 fn images(people: &People) -> Vec<String> {
-    let name = |it: &Person| it.image.file_name().unwrap().to_string_lossy().into_owned();
+    let name = |person: &Person| person.image.file_name().unwrap().to_string_lossy().into_owned();
     people.people.iter().map(name).collect()
 }
 
 fn messages(problems: &People) -> Vec<String> {
-    let full = |it: &training::datasets::Problem| {
-        let file = it.file.file_name().unwrap().to_string_lossy();
-        format!("{file}, {}: {}", it.row, it.source().unwrap())
+    let full = |problem: &training::datasets::Problem| {
+        let file = problem.file.file_name().unwrap().to_string_lossy();
+        format!("{file}, {}: {}", problem.row, problem.source().unwrap())
     };
     problems.problems.iter().map(full).collect()
 }
@@ -118,7 +118,7 @@ fn the_third_number_is_hidden_in_lsp_and_visible_in_lsp_extended() {
     let original = parse_joints(&file("joints", &original, false)).unwrap();
     let extended = parse_joints(&file("joints", &extended, false)).unwrap();
     for person in 0..2 {
-        let expected: Vec<_> = (0..N).map(|it| joint(person, it)).collect();
+        let expected: Vec<_> = (0..N).map(|i| joint(person, i)).collect();
         assert_eq!(original[person].0, expected);
         assert_eq!(extended[person].0, expected);
         assert_eq!(original[person].1, [true, false, true, true]);
@@ -167,7 +167,7 @@ fn ranges_and_lists_select_and_leave_out() {
     let list = dir.path().join("test.txt");
     fs::write(&list, "im0003.png\n").unwrap();
     let options = |only: Option<&str>, without: Option<&str>| {
-        let selection = |it: &str| Selection::from_argument(it).unwrap();
+        let selection = |text: &str| Selection::from_argument(text).unwrap();
         ReadOptions {
             only: only.map(selection),
             without: without.map(selection),
@@ -219,7 +219,7 @@ fn every_fault_is_reported_with_file_and_row_and_counted() {
     let dir = faulty();
     let path = dir.path().join("people.jsonl");
     let people = read(&path, &ReadOptions::default()).unwrap();
-    let rows: Vec<_> = people.people.iter().map(|it| it.row.as_str()).collect();
+    let rows: Vec<_> = people.people.iter().map(|person| person.row.as_str()).collect();
     assert_eq!(
         rows,
         ["line 1", "line 13"],
@@ -241,7 +241,7 @@ fn every_fault_is_reported_with_file_and_row_and_counted() {
     let cause = people.problems[6].source().unwrap().source().unwrap();
     assert!(cause.to_string().ends_with("empty.png is empty (0 bytes)"));
     let counts = people.counts();
-    assert_eq!(counts.iter().map(|it| it.1).sum::<usize>(), 10);
+    assert_eq!(counts.iter().map(|count| count.1).sum::<usize>(), 10);
     assert!(counts.contains(&(FaultKind::Image, 3)));
 }
 

@@ -32,9 +32,8 @@ const BLOCKS: [(usize, i64); 13] = [
 ];
 
 fn main() {
-    let pixels: Vec<u8> = (0..3 * SIZE[0] * SIZE[1])
-        .map(|it| ((it * 2_654_435_761) >> 13) as u8)
-        .collect();
+    let pixels: Vec<u8> =
+        (0..3 * SIZE[0] * SIZE[1]).map(|i| ((i * 2_654_435_761) >> 13) as u8).collect();
     let image = Rgb8View::new(SIZE[0], SIZE[1], &pixels).unwrap();
     let tile = Tile::around([600.0, 200.0, 740.0, 600.0], TileShape::SMALL).unwrap();
     let network = Network::parse(file(), N_PARTS).unwrap();
@@ -106,7 +105,7 @@ impl Layers {
     /// A convolution with bias, and a rectifier.
     fn convolve(&mut self, channels: usize, side: usize, stride: i64, groups: usize) {
         let nth = self.net.nodes.len();
-        let [weights, bias, raw, out] = ["w", "b", "c", "r"].map(|it| format!("{it}{nth}"));
+        let [weights, bias, raw, out] = ["w", "b", "c", "r"].map(|name| format!("{name}{nth}"));
         let shape = [channels, self.channels / groups, side, side];
         let n = shape.iter().product();
         let values = (0..n).map(|_| self.random(n / channels)).collect();

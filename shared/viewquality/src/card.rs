@@ -213,7 +213,7 @@ impl Card {
             Unit::Pixels => 1.0,
             Unit::Relative | Unit::LogRelative => tile_height,
         };
-        self.tau.iter().map(move |it| (f64::from(*it) * scale) as f32)
+        self.tau.iter().map(move |tau| (f64::from(*tau) * scale) as f32)
     }
 }
 
@@ -228,7 +228,7 @@ fn shortened(text: &str) -> String {
 
 fn version(key: &'static str, value: &str, known: u32) -> Result<u32, CardError> {
     let number = value.trim().parse().ok();
-    let known = number.filter(|it| *it == known).ok_or(known);
+    let known = number.filter(|number| *number == known).ok_or(known);
     known.map_err(|known| entry(key, value, known.to_string()))
 }
 
@@ -245,9 +245,9 @@ fn tile(value: &str) -> Result<TileShape, CardError> {
 }
 
 fn numbers(value: &str, is_fit: impl Fn(f32) -> bool) -> Option<Vec<f32>> {
-    let words = value.split(|it: char| it == ',' || it.is_whitespace());
-    let words = words.filter(|it| !it.is_empty());
-    let number = |word: &str| word.parse().ok().filter(|it| is_fit(*it));
+    let words = value.split(|letter: char| letter == ',' || letter.is_whitespace());
+    let words = words.filter(|word| !word.is_empty());
+    let number = |word: &str| word.parse().ok().filter(|value| is_fit(*value));
     words.map(number).collect()
 }
 

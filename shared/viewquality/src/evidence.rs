@@ -138,9 +138,9 @@ pub fn evidence(
         });
     }
     let centres = pose.centres(model, layout);
-    let second = candidates.get(1).map(|it| it.centres(model, layout));
+    let second = candidates.get(1).map(|candidate| candidate.centres(model, layout));
     let mirror = model.spec().mirror.as_deref();
-    let [width, height] = layout.image_size.map(|it| it as f64 - 1.0);
+    let [width, height] = layout.image_size.map(|image_size| image_size as f64 - 1.0);
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let (mut responses, mut springs) = (0.0, 0.0);
     out.clear();
@@ -154,7 +154,7 @@ pub fn evidence(
         let side = box_side(model, layout, pose, part);
         let sides = |px: f64| (px / side).clamp(-f64::from(FAR), f64::from(FAR)) as f32;
         let centre = centres[part];
-        let [x, y] = tile.place(centre).map(|it| it as f32);
+        let [x, y] = tile.place(centre).map(|value| value as f32);
         let [spring, pair_bias] = edge(model, pose, part);
         let from_mirror =
             mirror.map_or(0.0, |mirror| sides(distance(centre, centres[mirror[part]])));
@@ -172,7 +172,9 @@ pub fn evidence(
     let [x1, y1, x2, y2] = pose.bounding_box(model, layout);
     out.extend([
         pose.score,
-        candidates.get(1).map_or(FAR, |it| (pose.score - it.score).min(FAR)),
+        candidates
+            .get(1)
+            .map_or(FAR, |candidate| (pose.score - candidate.score).min(FAR)),
         candidates.len().min(MOST_CANDIDATES) as f32 / MOST_CANDIDATES as f32,
         box_side(model, layout, pose, 0).ln() as f32,
         (tile.height_px() / layout.image_size[1] as f64) as f32,

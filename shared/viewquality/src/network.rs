@@ -91,8 +91,8 @@ impl Network {
             let found: Vec<&str> = inputs.iter().map(|input| input.name.as_str()).collect();
             return Err(names("inputs", &found));
         }
-        if !outputs.iter().any(|it| it.name == SIGMA) {
-            let found: Vec<&str> = outputs.iter().map(|it| it.name.as_str()).collect();
+        if !outputs.iter().any(|output| output.name == SIGMA) {
+            let found: Vec<&str> = outputs.iter().map(|output| output.name.as_str()).collect();
             return Err(names("outputs", &found));
         }
         if evidence.is_some() != card.evidence.is_some() {

@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_long_list_of_sequences_is_shortened() {
-        let rows: Vec<String> = (0..20).map(|it| format!("S,A,1,view{it},2")).collect();
+        let rows: Vec<String> = (0..20).map(|i| format!("S,A,1,view{i},2")).collect();
         let table = Table::parse(&rows.join("\n"), 1).unwrap();
         let said = Predictor::from_table(&table, selection(0, 1), "C1").unwrap_err();
         assert!(said.known.ends_with(", ..."));

@@ -105,8 +105,8 @@ impl Tau {
         let mut px = Vec::new();
         for (line, content) in text.lines().enumerate() {
             let content = content.split('#').next().unwrap_or_default();
-            let words = content.split(|it: char| it == ',' || it.is_whitespace());
-            for word in words.filter(|it| !it.is_empty()) {
+            let words = content.split(|letter: char| letter == ',' || letter.is_whitespace());
+            for word in words.filter(|word| !word.is_empty()) {
                 match word.parse() {
                     Ok(value) if (0.0..=f32::MAX).contains(&value) => px.push(value),
                     _ => {

@@ -62,7 +62,7 @@ impl Tile {
         let by_width = width * shape.height as f64 / shape.width as f64;
         let scale = MARGIN * height.max(by_width) / shape.height as f64;
         let centre = [f64::midpoint(x1, x2), f64::midpoint(y1, y2)];
-        let is_finite = scale.is_finite() && centre.iter().all(|it| it.is_finite());
+        let is_finite = scale.is_finite() && centre.iter().all(|value| value.is_finite());
         (is_finite && width > 0.0 && height > 0.0).then_some(Self {
             shape,
             centre,
@@ -93,7 +93,7 @@ impl Tile {
     /// the tile.
     pub fn place(&self, point: [f64; 2]) -> [f64; 2] {
         let [x, y] = self.centre;
-        [point[0] - x, point[1] - y].map(|it| it / self.height_px())
+        [point[0] - x, point[1] - y].map(|value| value / self.height_px())
     }
 }
 
@@ -183,9 +183,9 @@ impl Sampler {
             let at = centre + (i as f64 - (n as f64 - 1.0) / 2.0) * scale;
             let [first, last] = [(at - reach).ceil() as i64, (at + reach).floor() as i64];
             let begin = self.weights.len();
-            let weight = |it: i64| (1.0 - (it as f64 - at).abs() / reach).max(0.0);
+            let weight = |value: i64| (1.0 - (value as f64 - at).abs() / reach).max(0.0);
             let total: f64 = (first..=last).map(weight).sum();
-            self.weights.extend((first..=last).map(|it| (weight(it) / total) as f32));
+            self.weights.extend((first..=last).map(|i| (weight(i) / total) as f32));
             let count = self.weights.len() - begin;
             self.taps.push(Taps {
                 first,
@@ -197,11 +197,14 @@ impl Sampler {
 
     /// First column of the frame that the tile needs, and the one after the last.
     fn columns(&self, height: usize, image_width: usize) -> [usize; 2] {
-        let inside = |it: i64| it.clamp(0, image_width as i64 - 1) as usize;
+        let inside = |value: i64| value.clamp(0, image_width as i64 - 1) as usize;
         let columns = &self.taps[height..];
-        let first = columns.iter().map(|it| inside(it.first)).min();
-        let last = columns.iter().map(|it| inside(it.first + it.count as i64 - 1)).max();
-        [first.unwrap_or(0), last.map_or(1, |it| it + 1)]
+        let first = columns.iter().map(|column| inside(column.first)).min();
+        let last = columns
+            .iter()
+            .map(|column| inside(column.first + column.count as i64 - 1))
+            .max();
+        [first.unwrap_or(0), last.map_or(1, |value| value + 1)]
     }
 
     /// The weighted mean of the frame's rows that belong to a row of the tile, into `band`.

@@ -25,7 +25,9 @@ pub fn all_views_to_messages(
     views_present: u32,
 ) -> Result<Vec<PairPose>, WireError> {
     let message = |view: usize| {
-        let place = |it: &AllViewsResult| it.views.iter().position(|it| *it == view);
+        let place = |all_views_result: &AllViewsResult| {
+            all_views_result.views.iter().position(|it| *it == view)
+        };
         let found = answer.and_then(|it| Some((it, place(it).filter(|place| *place > 0)?)));
         let Some((answer, place)) = found else {
             return pair_to_message([view - 1, view], None, views_present);
@@ -54,7 +56,7 @@ pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireErr
         message.stamp.view as usize,
         n_views.saturating_sub(1),
     )?;
-    let [first, second] = message.views.map(|it| it as usize);
+    let [first, second] = message.views.map(|view| view as usize);
     let sender = |field, got, expected| {
         Err(WireError::Sender {
             field,
@@ -73,16 +75,16 @@ pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireErr
 
 /// The pair of the first view of a result and the one at `place`.
 fn beside_the_first(answer: &AllViewsResult, place: usize) -> PairResult {
-    let hypothesis = |it: &AllViewsHypothesis| PairEstimate {
+    let hypothesis = |all_views_hypothesis: &AllViewsHypothesis| PairEstimate {
         start: PairStart {
-            candidates: [0, place].map(|it_is| it.candidates[it_is]),
-            exchanged: it.exchanged[place] != it.exchanged[0],
+            candidates: [0, place].map(|it_is| all_views_hypothesis.candidates[it_is]),
+            exchanged: all_views_hypothesis.exchanged[place] != all_views_hypothesis.exchanged[0],
         },
-        energy: it.estimate.energy,
+        energy: all_views_hypothesis.estimate.energy,
         iterations: Vec::new(),
-        converged: it.estimate.converged,
+        converged: all_views_hypothesis.estimate.converged,
         active: Vec::new(),
-        poses: [0, place].map(|it_is| it.estimate.poses[it_is].clone()),
+        poses: [0, place].map(|it_is| all_views_hypothesis.estimate.poses[it_is].clone()),
     };
     PairResult {
         views: [answer.views[0], answer.views[place]],
@@ -187,7 +189,7 @@ mod tests {
     ) -> AllViewsHypothesis {
         exchanged[0] = false;
         AllViewsHypothesis {
-            candidates: (0..poses.len()).map(|it| it % 8).collect(),
+            candidates: (0..poses.len()).map(|i| i % 8).collect(),
             exchanged,
             estimate: AllViewsEstimate {
                 energy,
@@ -201,7 +203,7 @@ mod tests {
 
     fn read(messages: &[PairPose]) -> Vec<PairResult> {
         let plans = plans_of(N_VIEWS);
-        let read = messages.iter().map(|it| pair_from_message(it, &plans));
+        let read = messages.iter().map(|message| pair_from_message(message, &plans));
         read.filter_map(|it| it.unwrap()).collect()
     }
 
@@ -227,7 +229,7 @@ mod tests {
     fn a_missing_result_is_sent_as_such() {
         let messages = all_views_to_messages(3, None, 0b001).unwrap();
         assert_eq!(messages.len(), 2);
-        assert!(messages.iter().all(|it| it.status == Status::TOO_FEW_VIEWS));
+        assert!(messages.iter().all(|message| message.status == Status::TOO_FEW_VIEWS));
         assert_eq!(all_views_from_pairs(&read(&messages)).unwrap(), None);
     }
 

@@ -184,8 +184,8 @@ mod tests {
         let [width, height] = layout.image_size;
         let ranges = (range(layout.levels.len()), range(width), range(height));
         ranges.prop_map(move |(levels, x, y)| {
-            let [x, y] = [x, y].map(|it| it.map(|it| it as u32));
-            let levels = levels.map(|it| it as u16);
+            let [x, y] = [x, y].map(|it| it.map(|value| value as u32));
+            let levels = levels.map(|level| level as u16);
             Scope::new(&layout, levels[0]..levels[1], Region { x, y }).unwrap()
         })
     }
@@ -198,7 +198,7 @@ mod tests {
             known in prop::collection::vec((-1e6..1e6_f32, 0.0..1e6_f32, any::<bool>()), 96),
         ) {
             let layout = layout();
-            let levels: Vec<u16> = scope.levels().filter(|&it| mask[usize::from(it)]).collect();
+            let levels: Vec<u16> = scope.levels().filter(|&level| mask[usize::from(level)]).collect();
             let bound = |level: u16| match known[usize::from(level)] {
                 (best, size, true) if levels.contains(&level) => Bound { best, size },
                 _ => Bound::UNKNOWN,
@@ -230,8 +230,8 @@ mod tests {
             let whole = Scope::whole(&layout);
             let mut message = evidence_to_message(&[], &unknown(), &whole, &layout).unwrap();
             message.levels.copy_from_slice(&levels);
-            message.best = std::array::from_fn(|it| f32::from_bits(bounds[it].0));
-            message.size = std::array::from_fn(|it| f32::from_bits(bounds[it].1));
+            message.best = std::array::from_fn(|i| f32::from_bits(bounds[i].0));
+            message.size = std::array::from_fn(|i| f32::from_bits(bounds[i].1));
             for (n, any_scope) in [(n_levels, false), (small, false), (small, true)] {
                 message.n_levels = n;
                 if any_scope {

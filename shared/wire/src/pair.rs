@@ -24,7 +24,7 @@ pub fn pair_to_message(
 ) -> Result<PairPose, WireError> {
     let mut message = PairPose {
         status: Status::TOO_FEW_VIEWS,
-        views: views.map(|it| it as u32),
+        views: views.map(|view| view as u32),
         views_present,
         ..PairPose::default()
     };
@@ -75,7 +75,7 @@ pub fn pair_from_message(
     if message.status != Status::OK {
         return Ok(None);
     }
-    let [first, second] = message.views.map(|it| it as usize);
+    let [first, second] = message.views.map(|view| view as usize);
     index("views", 1, second, plans.len())?;
     index("views", 0, first, second)?;
     let most = message.hypotheses.len();
@@ -83,7 +83,7 @@ pub fn pair_from_message(
     let plans = [plans[first].as_ref(), plans[second].as_ref()];
     let hypotheses = message.hypotheses[..n]
         .iter()
-        .map(|it| estimate(it, plans))
+        .map(|hypothesis| estimate(hypothesis, plans))
         .collect::<Result<_, _>>()?;
     Ok(Some(PairResult {
         views: [first, second],
@@ -196,7 +196,7 @@ mod tests {
             };
             if let Ok(Some(answer)) = pair_from_message(&message, &plans()) {
                 prop_assert_eq!(answer.views, [0, 1]);
-                prop_assert!(answer.hypotheses.iter().all(|it| it.energy.is_finite()));
+                prop_assert!(answer.hypotheses.iter().all(|hypothesis| hypothesis.energy.is_finite()));
             }
         }
     }

@@ -155,7 +155,7 @@ mod tests {
             if let Ok(frame) = people_from_message(&message, 3) {
                 for person in &frame.people {
                     prop_assert_eq!(person.candidates.len(), 3);
-                    prop_assert!(person.candidates.iter().flatten().all(|it| *it < messages::MAX_CANDIDATES));
+                    prop_assert!(person.candidates.iter().flatten().all(|candidate| *candidate < messages::MAX_CANDIDATES));
                 }
             }
         }

@@ -121,7 +121,7 @@ pub fn candidates_from_message(
     )?;
     message.candidates[..n]
         .iter()
-        .map(|it| pose_from_message(it, model, layout))
+        .map(|candidate| pose_from_message(candidate, model, layout))
         .collect()
 }
 
@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn extra_keypoints_of_whole_candidates_survive_a_round_trip() {
         let extras: Vec<ExtraKeypoint> = (0..500_u32)
-            .map(|it| (it % 3 > 0).then_some(([f64::from(it), 2.0], 0.5)))
+            .map(|i| (i % 3 > 0).then_some(([f64::from(i), 2.0], 0.5)))
             .collect();
         let mut message = ViewPose::default();
         extras_to_message(&mut message, 100, &extras).unwrap();
@@ -334,7 +334,7 @@ mod tests {
         ) {
             let (model, layout) = (model(), layout());
             if let Ok(pose) = pose_from_message(&message, &model, &layout) {
-                prop_assert!(pose.centres(&model, &layout).iter().flatten().all(|it| it.is_finite()));
+                prop_assert!(pose.centres(&model, &layout).iter().flatten().all(|centre| centre.is_finite()));
                 let level = &layout.levels[usize::from(pose.level)];
                 for part in &pose.parts {
                     prop_assert!(usize::from(part.x) < level.cols && usize::from(part.y) < level.rows);

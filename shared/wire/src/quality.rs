@@ -167,7 +167,7 @@ mod tests {
             for n in [3, n_parts as usize] {
                 if let Ok(Some(sigma)) = sigma_from_message(&message, n) {
                     prop_assert_eq!(sigma.len(), n);
-                    prop_assert!(sigma.iter().all(|it| it.is_finite() && *it >= 0.0));
+                    prop_assert!(sigma.iter().all(|value| value.is_finite() && *value >= 0.0));
                 }
             }
         }
@@ -198,7 +198,7 @@ mod tests {
             for side in 0..2 {
                 if let Ok(Some((_, sigma))) = sigma_from_pair(&message, side, n_parts) {
                     prop_assert_eq!(sigma.len(), n_parts);
-                    prop_assert!(sigma.iter().all(|it| it.is_finite() && *it >= 0.0));
+                    prop_assert!(sigma.iter().all(|value| value.is_finite() && *value >= 0.0));
                 }
             }
         }

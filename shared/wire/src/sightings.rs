@@ -50,7 +50,8 @@ pub fn sightings_to_message(
     }
     let fronts: Vec<[f32; 2]> = people.iter().map(|person| person.front).collect();
     front_to_message(&mut message, &fronts)?;
-    let extras: Vec<ExtraKeypoint> = people.iter().flat_map(|it| it.extras.clone()).collect();
+    let extras: Vec<ExtraKeypoint> =
+        people.iter().flat_map(|person| person.extras.clone()).collect();
     extras_to_message(&mut message, n_extras, &extras)?;
     Ok(message)
 }

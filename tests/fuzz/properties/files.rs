@@ -32,7 +32,7 @@ pub fn deployment_text(input: &[u8]) {
         return;
     };
     let file = std::path::Path::new("deployment.toml");
-    let option = input.lines().next().and_then(|it| it.strip_prefix("#--set "));
+    let option = input.lines().next().and_then(|line| line.strip_prefix("#--set "));
     let set: Vec<String> = option.map(str::to_owned).into_iter().collect();
     let loaded = match Loaded::parse(input, file, &set, &AnyMachine) {
         Ok(it) => it,
@@ -102,14 +102,14 @@ pub fn quality_table(input: &[u8]) {
         assert!(table.n_rows() > 0);
     }
     if let Ok(tau) = Tau::parse(input, 2) {
-        assert!(tau.px().iter().all(|it| it.is_finite()));
+        assert!(tau.px().iter().all(|value| value.is_finite()));
     }
 }
 
 /// Networks that predict errors: what their files say of themselves, and the files themselves.
 pub fn quality_network(input: &[u8]) {
     if let Ok(text) = core::str::from_utf8(input) {
-        let entries = text.lines().filter_map(|it| it.split_once('='));
+        let entries = text.lines().filter_map(|line| line.split_once('='));
         if let Ok(card) = Card::parse(entries, 2) {
             let entries = card.entries();
             let entries = entries.iter().map(|(name, it)| (*name, it.as_str()));
@@ -164,7 +164,7 @@ pub fn network_card(input: &[u8]) {
     if let Ok(card) = keypoints::DetectorCard::parse(input) {
         let mut values = vec![f32::NAN; 3 * card.input.width * card.input.height];
         let step = card.fill(&[200; 3 * 7 * 5], [7, 5], &mut values);
-        assert!(step > 0.0 && values.iter().all(|it| !it.is_nan()));
+        assert!(step > 0.0 && values.iter().all(|value| !value.is_nan()));
         let _outcome = card.boxes(&values[..15], &[1, 3, 5]);
         if let keypoints::Boxes::Centres { stride, .. } = card.output {
             let [rows, columns] = [card.input.height, card.input.width].map(|side| side / stride);
@@ -180,12 +180,12 @@ pub fn network_card(input: &[u8]) {
     let names = card.names();
     assert!(!names.is_empty());
     for row in keypoints::joint_rows(&names).into_iter().flatten() {
-        assert!((row.iter().map(|it| it.1).sum::<f64>() - 1.0).abs() < 1e-9);
+        assert!((row.iter().map(|row| row.1).sum::<f64>() - 1.0).abs() < 1e-9);
     }
     let window = keypoints::Window::new(&card, [2.0, 1.0, 9.0, 12.0]).expect("a box");
     let mut values = vec![f32::NAN; 3 * card.input.width * card.input.height];
     window.fill(&card, &[200; 3 * 7 * 5], [7, 5], &mut values);
-    assert!(values.iter().all(|it| !it.is_nan()));
+    assert!(values.iter().all(|value| !value.is_nan()));
 }
 
 /// Keypoints of other programs, in either layout: what is read has as many keypoints as names, in their limits.
@@ -208,7 +208,7 @@ pub fn keypoint_files(input: &[u8]) {
     };
     for names in [None, Some(&given)] {
         if let Ok(frame) = openpose::parse(input, names) {
-            check(&frame.people, frame.names.map_or(0, |it| it.n()));
+            check(&frame.people, frame.names.map_or(0, |name| name.n()));
         }
         if let Ok(film) = coco::parse(input, names) {
             assert!(film.n_frames <= keypoints::files::MAX_FRAMES);
@@ -392,7 +392,7 @@ fn smoothed(input: &str) {
         recorded.times.push(time_s);
         recorded.sides.push(motion::lines::sides(person));
         for (name, it) in &person.joints {
-            let known = recorded.joints.iter().position(|it| it.name == *name);
+            let known = recorded.joints.iter().position(|joint| joint.name == *name);
             let nth = known.unwrap_or(recorded.joints.len());
             if known.is_none() {
                 let (name, role) = (name.clone(), Role::of(name));
@@ -424,7 +424,7 @@ fn smoothed(input: &str) {
     ] {
         let motion = motion::smooth(&recorded, &settings);
         for it in motion.joints.iter().flatten().flatten() {
-            assert!(it.position.iter().all(|it| it.is_finite()), "{it:?}");
+            assert!(it.position.iter().all(|value| value.is_finite()), "{it:?}");
         }
     }
 }

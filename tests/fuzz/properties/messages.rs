@@ -98,7 +98,7 @@ fn camera(x: f64) -> Camera {
             fy: 80.0,
             cx: 39.5,
             cy: 29.5,
-            size: SIZE.map(|it| it as u32),
+            size: SIZE.map(|size| size as u32),
             lens: Lens::default(),
         },
         camera_from_world: Isometry3::translation(x, 0.0, 3.0),
@@ -109,7 +109,7 @@ fn model() -> Model {
     let filter = |seed: usize| Filter {
         rows: 3,
         cols: 3,
-        weights: (0..9 * N_CHANNELS).map(|it| ((seed + it) % 7) as f64 * 0.1).collect(),
+        weights: (0..9 * N_CHANNELS).map(|i| ((seed + i) % 7) as f64 * 0.1).collect(),
     };
     let spring = Spring {
         w: [0.01, 0.0, 0.02, 0.0],
@@ -251,11 +251,11 @@ fn candidates(input: &[u8]) {
     let World { model, plans, .. } = world();
     let message = view_pose(input);
     if let Ok(poses) = wire::candidates_from_message(&message, model, plans[0].layout()) {
-        let centres = poses.iter().flat_map(|it| it.centres(model, plans[0].layout()));
+        let centres = poses.iter().flat_map(|pose| pose.centres(model, plans[0].layout()));
         assert!(centres.flatten().all(f64::is_finite));
     }
     if let Ok(front) = wire::front_from_message(&message, message.n_candidates as usize) {
-        assert!(front.as_flattened().iter().all(|it| it.is_finite()));
+        assert!(front.as_flattened().iter().all(|value| value.is_finite()));
     }
     if let Ok(Some(seen)) = wire::sightings_from_message(&message, 2) {
         let joints = seen.people.iter().flat_map(|person| person.joints).flatten();
@@ -267,7 +267,7 @@ fn candidates(input: &[u8]) {
         assert!(found.flat_map(|it| [it.0[0], it.0[1], it.1]).all(f64::is_finite));
     }
     if let Ok(scores) = wire::local_from_message(&message, model.n_parts()) {
-        assert!(scores.iter().all(|it| it.margin.is_finite()));
+        assert!(scores.iter().all(|score| score.margin.is_finite()));
     }
 }
 
@@ -292,7 +292,9 @@ fn expected_errors(input: &[u8]) {
         let sigma = wire::sigma_from_message(&message, n_parts).ok().flatten();
         let tau = wire::tau_from_message(&message, n_parts).ok().flatten();
         for px in sigma.into_iter().chain(tau) {
-            assert!(px.len() == n_parts && px.iter().all(|it| it.is_finite() && *it >= 0.0));
+            assert!(
+                px.len() == n_parts && px.iter().all(|value| value.is_finite() && *value >= 0.0)
+            );
         }
     }
 }
@@ -343,11 +345,11 @@ fn pair(input: &[u8]) {
     }
     if let Ok(Some(answer)) = wire::pair_from_message(&message, plans) {
         assert!(answer.views[0] < answer.views[1] && answer.views[1] < plans.len());
-        assert!(answer.hypotheses.iter().all(|it| it.energy.is_finite()));
+        assert!(answer.hypotheses.iter().all(|hypothesis| hypothesis.energy.is_finite()));
     }
     for side in 0..2 {
         if let Ok(Some((_, sigma))) = wire::sigma_from_pair(&message, side, 3) {
-            assert!(sigma.iter().all(|it| it.is_finite() && *it >= 0.0));
+            assert!(sigma.iter().all(|value| value.is_finite() && *value >= 0.0));
         }
     }
 }
@@ -385,7 +387,7 @@ fn result(input: &[u8]) {
             let keypoints = &person.keypoints[..person.n_keypoints as usize];
             let points = person.joints[..14].iter().chain(keypoints);
             let mut found = points.filter(|point| point.status == Status::OK);
-            assert!(found.all(|point| point.in_world.iter().all(|it| it.is_finite())));
+            assert!(found.all(|point| point.in_world.iter().all(|value| value.is_finite())));
         }
     }
 }
@@ -425,7 +427,7 @@ pub fn wire_fusion(input: &[u8]) {
     let (header, values) = evidence(input);
     let (whole_header, whole_values) = evidence(&[]);
     if let Ok(maps) = wire::maps_from_message(&header, &values) {
-        assert!(maps.iter().all(|it| it.at(3, [9.0, 9.0]).is_finite()));
+        assert!(maps.iter().all(|map| map.at(3, [9.0, 9.0]).is_finite()));
     }
     let read = wire::evidence_from_message(&header, &values, plans[0].layout());
     let other = wire::evidence_from_message(&whole_header, &whole_values, plans[1].layout());
@@ -436,7 +438,7 @@ pub fn wire_fusion(input: &[u8]) {
         let answer = fuse.pair([0, 1], &answers, evidence, &start);
         let sent = wire::pair_to_message([0, 1], answer.as_ref(), 3);
         // Responses that are no numbers may make an energy that is none, which is not sent.
-        if let Some(read) = sent.ok().map(|it| wire::pair_from_message(&it, plans)) {
+        if let Some(read) = sent.ok().map(|sent| wire::pair_from_message(&sent, plans)) {
             found.extend(read.expect("it was written"));
         }
     }
@@ -497,7 +499,7 @@ fn evidence(input: &[u8]) -> (EvidenceHeader, Vec<f32>) {
         (header.best[level], header.size[level]) = (f32::INFINITY, 1e3);
     }
     let n = layout.n_responses();
-    let mut values: Vec<f32> = (0..n).map(|it| (it * 37 % 101) as f32 * 0.01).collect();
+    let mut values: Vec<f32> = (0..n).map(|i| (i * 37 % 101) as f32 * 0.01).collect();
     for it in Change::all(input) {
         let level = it.of(MAX_LEVELS);
         match it.field % 14 {

@@ -141,7 +141,7 @@ impl Clock {
         self.n_odd = 0;
         self.n_exchanges += 1;
         let part = sample.at / PART_NANOS;
-        match self.parts.back_mut().filter(|it| it.0 >= part) {
+        match self.parts.back_mut().filter(|back_mut| back_mut.0 >= part) {
             Some((_, best)) if best.trip < sample.trip => {}
             Some((_, best)) => *best = sample,
             None => self.parts.push_back((part, sample)),
@@ -167,7 +167,7 @@ impl Clock {
 
     /// What is known at a time of ours; none before the first exchange.
     pub fn estimate(&self, now: u64) -> Option<Estimate> {
-        let all = || self.parts.iter().map(|it| it.1);
+        let all = || self.parts.iter().map(|part| part.1);
         let best = all().min_by_key(|it| it.trip)?;
         let line = Line::through(&all(), best);
         let at = |time: u64| line.at(time);

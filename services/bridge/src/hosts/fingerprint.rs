@@ -44,7 +44,7 @@ impl Fingerprint {
             here: find(self, what),
             there: find(other, what),
         });
-        compared.filter(|it| it.here != it.there).collect()
+        compared.filter(|compared| compared.here != compared.there).collect()
     }
 
     /// How many things it has.

@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn the_same_files_are_welcome_and_others_refused_with_both_hashes() {
         let ours = hello(b"a").fingerprint;
-        let read = |it: &Answer| Answer::parse(&it.to_bytes()).unwrap();
+        let read = |answer: &Answer| Answer::parse(&answer.to_bytes()).unwrap();
         let same = Hello::parse(&hello(b"a").to_bytes()).unwrap();
         let answer = same.answer(true, &ours, WELCOME);
         assert_eq!(read(&answer), Answer::Welcome(WELCOME));

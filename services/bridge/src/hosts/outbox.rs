@@ -107,17 +107,17 @@ impl<T> Outbox<T> {
 
     /// What became of the parcels of a lane.
     pub fn sent(&self, lane: usize) -> Sent {
-        self.lanes.get(lane).map_or_else(Sent::default, |it| it.sent)
+        self.lanes.get(lane).map_or_else(Sent::default, |lane| lane.sent)
     }
 
     /// Lanes with something that waits.
     pub fn n_waiting(&self) -> usize {
-        self.lanes.iter().filter(|it| it.waiting.is_some()).count()
+        self.lanes.iter().filter(|lane| lane.waiting.is_some()).count()
     }
 
     /// Whether nothing waits, and nothing is on its way.
     pub fn is_empty(&self) -> bool {
-        self.lanes.iter().all(|it| it.waiting.is_none() && it.on_way.is_empty())
+        self.lanes.iter().all(|lane| lane.waiting.is_none() && lane.on_way.is_empty())
     }
 }
 

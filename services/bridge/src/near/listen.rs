@@ -108,7 +108,7 @@ pub(super) fn listen(
     hear_hellos(link, &topics, remotes, (&job.fingerprint, welcome))?;
     let answering = link.answer(&topics.status(), move || {
         let text = status.lock();
-        text.map_or_else(|_| Vec::new(), |it| it.clone().into_bytes())
+        text.map_or_else(|_| Vec::new(), |text| text.clone().into_bytes())
     });
     answering.or_fail(ExitKind::Run)?;
     Ok(arrived)
@@ -127,7 +127,7 @@ impl Gate {
     fn take(&self, key: &str, bytes: &[u8]) {
         let came_at = now_nanos();
         let name = host_of(key);
-        let Some(remote) = self.remotes.iter().find(|it| it.name == name) else {
+        let Some(remote) = self.remotes.iter().find(|remote| remote.name == name) else {
             tracing::debug!(key, "from a host that is not in the deployment");
             return;
         };
@@ -165,14 +165,14 @@ impl Gate {
         };
         let inlet = self.inlets.get(packet.head.view as usize);
         let inlet = inlet.and_then(Option::as_ref);
-        if inlet.is_none_or(|it| it.try_send(waiting).is_err()) {
+        if inlet.is_none_or(|inlet| inlet.try_send(waiting).is_err()) {
             remote.state().n_no_room += 1;
         }
     }
 
     fn most_body(&self) -> usize {
         const TABLES: usize = 1 << 16;
-        let pixels = self.sizes.iter().map(|it| (it[0] * it[1] * 3) as usize);
+        let pixels = self.sizes.iter().map(|size| (size[0] * size[1] * 3) as usize);
         pixels.max().unwrap_or(0) + TABLES
     }
 }
@@ -228,7 +228,7 @@ impl Decoder {
                     return None;
                 };
                 let maps = self.check(maps);
-                checked = maps.inspect_err(|it| remote.malformed(it)).ok()?;
+                checked = maps.inspect_err(|error| remote.malformed(error)).ok()?;
                 self.message(Kind::ViewPose, poses)?
             }
             Content::ViewQuality => self.message(Kind::ViewQuality, it.body)?,
@@ -254,7 +254,7 @@ impl Decoder {
     fn check(&self, bytes: &[u8]) -> Result<Option<maps::Checked>, String> {
         match &self.maps {
             _ if bytes.is_empty() => Ok(None),
-            Some(maps) => maps.unpack(bytes).map(Some).map_err(|it| it.to_string()),
+            Some(maps) => maps.unpack(bytes).map(Some).map_err(|error| error.to_string()),
             None => Err(format!(
                 "{} bytes after poses, where no maps cross",
                 bytes.len()
@@ -283,7 +283,7 @@ fn hear_signals(
     let heard = link.subscribe(&topics.up("*"), move |key, bytes| {
         let heard_at = now_nanos();
         let name = host_of(key);
-        let Some(remote) = remotes.iter().find(|it| it.name == name) else {
+        let Some(remote) = remotes.iter().find(|remote| remote.name == name) else {
             return;
         };
         match Signal::parse(bytes) {
@@ -336,7 +336,7 @@ fn hear_hellos(
             return;
         };
         let name = host_of(key);
-        let remote = remotes.iter().find(|it| it.name == name && it.name == hello.host);
+        let remote = remotes.iter().find(|remote| remote.name == name && remote.name == hello.host);
         let answer = hello.answer(remote.is_some(), &fingerprint, welcome);
         match (remote, &answer) {
             (Some(remote), Answer::Welcome(_)) => remote.welcomed(hello.origin, now_nanos()),

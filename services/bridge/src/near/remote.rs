@@ -133,8 +133,8 @@ impl Remote {
             }
         }
         let estimate = state.clock.estimate(now).filter(|_| is_there);
-        let settled = estimate.filter(|it| it.n_exchanges >= 20);
-        let warning = settled.and_then(|it| it.warning(period_nanos as u64, max_share));
+        let settled = estimate.filter(|estimate| estimate.n_exchanges >= 20);
+        let warning = settled.and_then(|settled| settled.warning(period_nanos as u64, max_share));
         if let Some(warning) = warning.filter(|_| !state.has_warned) {
             state.has_warned = true;
             tracing::warn!(host = self.name, "{warning}");

@@ -86,7 +86,7 @@ impl Report {
             .iter()
             .enumerate()
             .map(|(index, remote)| {
-                let own = views.iter().filter(|it| it.1 == index);
+                let own = views.iter().filter(|view| view.1 == index);
                 self.host(remote, own.map(|it| (it.0, it.2)))
             })
             .collect();
@@ -134,7 +134,7 @@ impl Report {
 
     fn view(&self, view: usize, tally: &Tally) -> Value {
         let times = self.views.get(&view);
-        let of = |pick: fn(&Times) -> &Timing| times.and_then(|it| pick(it).percentiles());
+        let of = |pick: fn(&Times) -> &Timing| times.and_then(|time| pick(time).percentiles());
         json!({
             "view": view,
             "used": tally.n_used,
@@ -143,8 +143,8 @@ impl Report {
             "left_out": tally.n_left_out,
             "came_late": tally.n_came_late,
             "surplus": tally.n_surplus,
-            "overtaken": times.map_or(0, |it| it.n_overtaken),
-            "bytes": times.map_or(0, |it| it.n_bytes),
+            "overtaken": times.map_or(0, |time| time.n_overtaken),
+            "bytes": times.map_or(0, |time| time.n_bytes),
             "encode": of(|it| &it.encode),
             "network": of(|it| &it.network),
             "decode": of(|it| &it.decode),

@@ -91,7 +91,7 @@ impl LiveError {
 }
 
 fn known() -> String {
-    let all = PixelFormat::ALL.map(|it| FourCc(it.letters()).to_string());
+    let all = PixelFormat::ALL.map(|pixel_format| FourCc(pixel_format.letters()).to_string());
     all.join(", ")
 }
 
@@ -139,12 +139,12 @@ impl LiveCamera {
         device: &VideoDevice,
         size: Option<[u32; 2]>,
     ) -> Result<(VideoMode, PixelFormat), LiveError> {
-        let known = PixelFormat::ALL.map(|it| FourCc(it.letters()));
+        let known = PixelFormat::ALL.map(|pixel_format| FourCc(pixel_format.letters()));
         let formats = match &self.format {
             None => known.to_vec(),
             Some(text) => {
                 let format =
-                    FourCc::parse(text).filter(|it| PixelFormat::of_letters(it.0).is_some());
+                    FourCc::parse(text).filter(|value| PixelFormat::of_letters(value.0).is_some());
                 let unknown = || LiveError::Format {
                     format: text.clone(),
                 };
@@ -172,7 +172,7 @@ impl LiveCamera {
             return false;
         };
         let scheme = address.split(':').next().unwrap_or_default();
-        ["http", "https"].iter().any(|it| scheme.eq_ignore_ascii_case(it))
+        ["http", "https"].iter().any(|name| scheme.eq_ignore_ascii_case(name))
     }
 
     pub(super) fn stream(&self, address: &str) -> StreamSpec {

@@ -167,7 +167,7 @@ mod tests {
             let unix = |nanos: u64| 1_700_000_000 * 1_000_000_000 + nanos.cast_signed();
             let shown = unix(taken) + ahead_ms * MS as i64;
             last = clock.taken_at([shown, unix(arrived)], arrived);
-            assert!(last.is_none_or(|it| it <= arrived));
+            assert!(last.is_none_or(|value| value <= arrived));
         }
         (clock.verdict, clock.delay_nanos / MS as i64, last)
     }
@@ -218,7 +218,7 @@ mod tests {
             let mut clock = OwnClock::default();
             for (taken, arrived, at) in times {
                 let got = clock.taken_at([taken, arrived], at);
-                prop_assert!(got.is_none_or(|it| it <= at));
+                prop_assert!(got.is_none_or(|value| value <= at));
             }
         }
 

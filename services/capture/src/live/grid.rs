@@ -70,7 +70,7 @@ impl Grid {
             return Some(Status::CLOCK_JUMPED);
         }
         let last = self.last.replace(at_nanos);
-        let last = last.filter(|it| it.abs_diff(at_nanos) <= MAX_OFF_NANOS)?;
+        let last = last.filter(|value| value.abs_diff(at_nanos) <= MAX_OFF_NANOS)?;
         if at_nanos > last {
             self.intervals.push_back(at_nanos - last);
             if self.intervals.len() > N_INTERVALS {
@@ -137,7 +137,7 @@ mod tests {
             let at = (START as f64 + time * 1e9 / 30.0) as u64;
             assert_eq!(grid.wrong_clock(at, at), None);
             let nth = grid.place(at, next);
-            next = nth.map_or(next, |it| it + 1);
+            next = nth.map_or(next, |nth| nth + 1);
             all.push(nth);
         }
         all
@@ -155,7 +155,7 @@ mod tests {
             let instants: Vec<u64> = all.iter().flatten().copied().collect();
             assert_eq!(n_surplus(&all), 0, "{phase}");
             assert!(
-                instants.windows(2).all(|it| it[1] == it[0] + 1),
+                instants.windows(2).all(|pair| pair[1] == pair[0] + 1),
                 "{phase}: {instants:?}"
             );
         }

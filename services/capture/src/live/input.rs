@@ -72,11 +72,11 @@ impl Input {
                     ..camera.stream(address)
                 }
                 .open(size)?,
-                kept: originals.map(|it| KeptStream::new(Arc::clone(it), size)),
+                kept: originals.map(|original| KeptStream::new(Arc::clone(original), size)),
                 clock: ClockMap::default(),
                 own_clock: camera.has_own_clock.then(OwnClock::default),
                 address: camera.address.to_string(),
-                period_nanos: camera.rate_hz.map(|it| 1e9 / it),
+                period_nanos: camera.rate_hz.map(|rate_hz| 1e9 / rate_hz),
                 last: None,
             }))),
         }
@@ -164,8 +164,8 @@ impl Device {
         let is_whole =
             !picture.is_damaged && self.format.to_rgb(picture.bytes, stride, self.size, rgb);
         let (at_nanos, timed_by) =
-            picture.at_nanos.map_or((arrived_at_nanos, TimedBy::ARRIVAL), |it| {
-                (it, TimedBy::DRIVER)
+            picture.at_nanos.map_or((arrived_at_nanos, TimedBy::ARRIVAL), |at_nano| {
+                (at_nano, TimedBy::DRIVER)
             });
         if let Some(originals) = &self.originals {
             originals.put(Original {
@@ -209,7 +209,7 @@ fn again(path: &Path, about: &VideoAbout) -> Result<VideoDevice, LiveError> {
         return Ok(there?);
     }
     let others: Vec<PathBuf> = video_devices().unwrap_or_default();
-    for other in others.into_iter().filter(|it| it != path) {
+    for other in others.into_iter().filter(|other| other != path) {
         let Ok(device) = VideoDevice::open(&other) else {
             continue;
         };
@@ -219,7 +219,7 @@ fn again(path: &Path, about: &VideoAbout) -> Result<VideoDevice, LiveError> {
         }
     }
     let found = there?.about()?;
-    let shown = |it: &VideoAbout| format!("{} at {}", it.card, it.bus);
+    let shown = |video_about: &VideoAbout| format!("{} at {}", video_about.card, video_about.bus);
     Err(LiveError::Another {
         address: path.display().to_string(),
         found: shown(&found),
@@ -257,7 +257,8 @@ impl Stream {
         if let Some(presented) = frame.presented_nanos {
             let last = self.last.replace(presented);
             let gap = last.map_or(0, |last| presented.saturating_sub(last));
-            taken.n_lost = self.period_nanos.map_or(0, |it| missing_by_time(gap, it));
+            taken.n_lost =
+                self.period_nanos.map_or(0, |period_nano| missing_by_time(gap, period_nano));
             taken.at_nanos = self.clock.taken_at(presented, arrived_at_nanos);
         }
         if let (Some(unix), Some(clock)) = (frame.unix_nanos, &mut self.own_clock) {

@@ -211,7 +211,8 @@ mod tests {
         }
         originals.take().unwrap();
         originals.put(original(9));
-        let numbers: Vec<u64> = core::iter::from_fn(|| originals.take().map(|it| it.0)).collect();
+        let numbers: Vec<u64> =
+            core::iter::from_fn(|| originals.take().map(|original| original.0)).collect();
         assert_eq!(numbers, [1, 3], "the third had no room");
         assert_eq!(originals.n_all(), 4);
         originals.put(original(MAX_BYTES));
@@ -239,9 +240,10 @@ mod tests {
         // The second was not decoded.
         kept.decoded(100_100_000, 5067 * MS);
         kept.put_decoded(9000 * MS);
-        let all: Vec<([u8; 4], u64)> =
-            core::iter::from_fn(|| originals.take().map(|it| (it.1.format, it.1.at_nanos)))
-                .collect();
+        let all: Vec<([u8; 4], u64)> = core::iter::from_fn(|| {
+            originals.take().map(|original| (original.1.format, original.1.at_nanos))
+        })
+        .collect();
         assert_eq!(all[1], (*b"MKV1", 5000 * MS));
         assert_eq!(all[2], (*b"MKV2", 5033 * MS + 900_000));
         assert_eq!(all[3], (*b"MKV2", 5067 * MS));

@@ -68,7 +68,7 @@ impl Phase {
         self.measured.push_back((at_nanos, skew.saturating_add(self.added)));
         let begin = at_nanos.saturating_sub(WINDOW_NANOS);
         while self.measured.len() > MOST_MEASUREMENTS
-            || self.measured.front().is_some_and(|it| it.0 < begin)
+            || self.measured.front().is_some_and(|measured| measured.0 < begin)
         {
             self.measured.pop_front();
         }
@@ -77,7 +77,7 @@ impl Phase {
 
     /// The median skew of the last pictures, nanoseconds; `None` before there are enough.
     pub(crate) fn skew_nanos(&self) -> Option<i64> {
-        self.measured.back().map(|it| it.1.saturating_sub(self.added))
+        self.measured.back().map(|measured| measured.1.saturating_sub(self.added))
     }
 
     /// By how much the camera falls behind the instants, parts per billion: negative for one that is faster. `None` while it was

@@ -115,10 +115,10 @@ impl Source {
     /// The oldest picture that waits; none if none comes within `patience`.
     pub(crate) fn next(&self, patience: Duration) -> Option<Picture> {
         let state = self.shared.state();
-        let is_empty = |it: &mut State| it.waiting.is_empty();
+        let is_empty = |state: &mut State| state.waiting.is_empty();
         let waited = self.shared.news.wait_timeout_while(state, patience, is_empty);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        let is_silent = |it: Instant| it.elapsed() > LONGEST_SILENCE;
+        let is_silent = |instant: Instant| instant.elapsed() > LONGEST_SILENCE;
         if state.waits_since.is_some_and(is_silent)
             && let Some(end) = state.end.take()
         {
@@ -285,7 +285,7 @@ impl Keeper {
         let overtaken = if state.waiting.len() > N_WAITING {
             state.n_overtaken += 1;
             state.tally.n_overtaken += 1;
-            state.waiting.pop_front().map(|it| it.rgb)
+            state.waiting.pop_front().map(|waiting| waiting.rgb)
         } else {
             None
         };
@@ -299,7 +299,7 @@ impl Keeper {
         let mut state = self.shared.state();
         state.trouble = Some(status);
         state.end = None;
-        let goes_on = |it: &mut State| !it.is_over;
+        let goes_on = |state: &mut State| !state.is_over;
         let waited = self.shared.news.wait_timeout_while(state, pause, goes_on);
         drop(waited);
     }
@@ -323,7 +323,8 @@ impl Pace {
         if self.n < LEAST_FOR_RATE {
             return None;
         }
-        let seconds = at_nanos.checked_sub(first).filter(|it| *it > 0)? as f64 * 1e-9;
+        let seconds =
+            at_nanos.checked_sub(first).filter(|difference| *difference > 0)? as f64 * 1e-9;
         Some(self.n as f64 / seconds)
     }
 }

@@ -18,10 +18,10 @@ pub(super) fn from(
 ) -> io::Result<impl Iterator<Item = Vec<u8>> + Send + 'static> {
     let mut input = files::open(file)?;
     let parts = &table.parts;
-    let is_of = |it: &Part| it.connection == first.connection;
+    let is_of = |part: &Part| part.connection == first.connection;
     let own: Vec<Part> = parts.iter().copied().filter(is_of).collect();
     let here = own.iter().position(|it| it.entry == first.entry);
-    let head = |it: &Part| it.format == *b"MKV0";
+    let head = |part: &Part| part.format == *b"MKV0";
     let begin = own[..here.unwrap_or(0)].iter().rposition(head);
     let mut state = State::Begin;
     let mut last = None;
@@ -38,7 +38,7 @@ pub(super) fn from(
             State::Pictures => part.format != *b"MKV0",
             State::Begin | State::Gap => false,
         };
-        message.filter(|_| is_sent).map(|it| it.elements.to_vec())
+        message.filter(|_| is_sent).map(|message| message.elements.to_vec())
     }))
 }
 

@@ -77,11 +77,11 @@ impl Table {
         let recording = recording::scan(file)?;
         let mut input = BufReader::new(file);
         let tracks = recording.tracks.values();
-        let tracks = tracks.filter(|it| it.kind == Kind::Picture);
+        let tracks = tracks.filter(|track| track.kind == Kind::Picture);
         let mut known = Vec::new();
         for track in tracks {
             let heads = heads(&mut input, track)?;
-            let Some(first) = heads.first().map(|it| it.1) else {
+            let Some(first) = heads.first().map(|head| head.1) else {
                 continue;
             };
             let name = name_of(&first);
@@ -123,7 +123,7 @@ impl Table {
             labels: BTreeMap::new(),
         };
         table.parts.extend(heads.iter().filter_map(part));
-        table.parts.sort_by_key(|it| (it.connection[0], it.number));
+        table.parts.sort_by_key(|part| (part.connection[0], part.number));
         table.place(heads);
         if table.pictures.is_empty() {
             return Err(malformed("none is whole and at an instant of the run"));
@@ -137,12 +137,12 @@ impl Table {
             let header = &it.1;
             header.status == Status::OK
                 && header.format != *b"MKV0"
-                && [header.width, header.height].map(|it| it as usize)
+                && [header.width, header.height].map(|value| value as usize)
                     == [self.size.width, self.size.height]
         };
         let mut by_time: Vec<_> = heads.iter().filter(is_picture).collect();
         by_time.sort_by_key(|it| it.1.stamp.captured_at_nanos);
-        let times = by_time.iter().map(|it| it.1.stamp.captured_at_nanos);
+        let times = by_time.iter().map(|by_time| by_time.1.stamp.captured_at_nanos);
         self.grid.learn(times);
         let mut next = 0;
         for (entry, header) in by_time {
@@ -173,12 +173,12 @@ impl Table {
 
     /// Frames up to the last picture.
     pub(super) fn n_frames(&self) -> u64 {
-        self.pictures.last().map_or(0, |it| it.instant + 1)
+        self.pictures.last().map_or(0, |picture| picture.instant + 1)
     }
 
     /// The first picture that is not before an instant.
     pub(super) fn first_at(&self, instant: u64) -> usize {
-        self.pictures.partition_point(|it| it.instant < instant)
+        self.pictures.partition_point(|picture| picture.instant < instant)
     }
 
     /// The first picture after those of the connection of another.
@@ -194,7 +194,7 @@ impl Table {
         let to = (connection, label_nanos.saturating_add(SAME_NANOS));
         let near = self.labels.range(from..=to);
         let nearest = near.min_by_key(|it| it.0.1.abs_diff(label_nanos));
-        nearest.map(|it| *it.1)
+        nearest.map(|nearest| *nearest.1)
     }
 
     /// Seconds from the first instant.
@@ -233,7 +233,7 @@ fn heads(
         let head = recording::read_head(input, track.kind, entry, &mut buffer)?;
         let header: PictureHeader = pod_read_unaligned(head);
         // The number and the time of sending are told by the checked index of the file, too.
-        let is_same = entry.frame.is_none_or(|it| it == header.stamp.frame)
+        let is_same = entry.frame.is_none_or(|frame| frame == header.stamp.frame)
             && entry.publish_time == header.timing.sent_at_nanos;
         let age = header.timing.sent_at_nanos.abs_diff(header.stamp.captured_at_nanos);
         if is_same && age <= MAX_AGE_NANOS && header.status != Status::END {

@@ -125,7 +125,7 @@ fn every_instant_has_the_nearest_picture_and_the_others_are_left_out() {
 fn a_damaged_picture_is_left_out() {
     let (_folder, file) = recording(&[(0, 0, 10), (1, 100, 77), (2, 200, 12)]);
     let mut bytes = std::fs::read(&file).unwrap();
-    let at = bytes.windows(8).position(|it| it == [77; 8]).unwrap();
+    let at = bytes.windows(8).position(|window| window == [77; 8]).unwrap();
     bytes[at] = 78;
     std::fs::write(&file, bytes).unwrap();
     assert_eq!(read(&spec(&file)), [(0, 10), (2, 12)]);

@@ -168,15 +168,15 @@ pub(crate) struct Arguments {
 
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT")?;
-    let side = |it: &str| it.parse::<u32>().map_err(|error| format!("{it:?}: {error}"));
+    let side = |text: &str| text.parse::<u32>().map_err(|error| format!("{text:?}: {error}"));
     Ok([side(width)?, side(height)?])
 }
 
 fn share(text: &str) -> Result<[f64; 2], String> {
     let (from, to) = text.split_once('-').ok_or("expected FROM-TO, as 0.8-1")?;
-    let end = |it: &str| match it.parse::<f64>() {
+    let end = |text: &str| match text.parse::<f64>() {
         Ok(end) if (0.0..=1.0).contains(&end) => Ok(end),
-        _ => Err(format!("{it:?} is no share from 0 to 1")),
+        _ => Err(format!("{text:?} is no share from 0 to 1")),
     };
     let [from, to] = [end(from)?, end(to)?];
     if from < to {
@@ -248,7 +248,7 @@ fn run_versions(arguments: &Arguments, globals: Globals, stop: Stop) -> Result<E
         },
         model: Arc::clone(&model),
         sigma,
-        forecaster: network.map(|it| Mutex::new(Forecaster::new(it))),
+        forecaster: network.map(|network| Mutex::new(Forecaster::new(network))),
         poses,
         stop,
     };
@@ -291,7 +291,7 @@ fn fusion(
         config.tau = deployment::paper::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
     }
     let settings = fuse::settings(&config, scale, learned);
-    let cameras: Vec<&str> = sequence.views.iter().map(|it| it.camera.as_str()).collect();
+    let cameras: Vec<&str> = sequence.views.iter().map(|view| view.camera.as_str()).collect();
     let tables = inputs::pair_tables(&config, learned, model, &cameras)?;
     Ok((settings, tables))
 }
@@ -300,7 +300,7 @@ fn fusion(
 fn outcome(done: &Done) -> Result<ExitCode, Failure> {
     match done.n_missing {
         0 => {
-            let is_judged = done.sequences.iter().any(|it| !it.1.is_empty());
+            let is_judged = done.sequences.iter().any(|sequence| !sequence.1.is_empty());
             failure::require_results(
                 is_judged,
                 "no frame was judged: there is none, or --only and --every leave none",
@@ -315,7 +315,10 @@ fn outcome(done: &Done) -> Result<ExitCode, Failure> {
 
 /// Whether single pictures are evaluated; refuses pictures together with sequences.
 fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
-    let n = arguments.sequences.iter().filter(|it| lab::eval::pictures::is_one(it));
+    let n = arguments
+        .sequences
+        .iter()
+        .filter(|sequence| lab::eval::pictures::is_one(sequence));
     let n = n.count();
     let selects = arguments.only.is_some() || arguments.without.is_some();
     let refuse = |message: &str| Err(Failure::new(ExitKind::Usage, message));
@@ -394,7 +397,7 @@ fn paper_section(file: Option<&Path>) -> Result<Config, Failure> {
         Failure::new(ExitKind::Config, message)
     })?;
     energy_numbers(&config)
-        .map_err(|it| it.at(file.display().to_string()))
+        .map_err(|error| error.at(file.display().to_string()))
         .or_fail(ExitKind::Config)?;
     let folder = file.parent().map_or_else(PathBuf::new, PathBuf::from);
     config.resolve(&folder);
@@ -405,7 +408,7 @@ fn paper_section(file: Option<&Path>) -> Result<Config, Failure> {
 fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Failure> {
     let expects = arguments.sigma.is_some() || arguments.network.is_some() || arguments.oracle;
     if let [_, ..] = arguments.versions[..] {
-        let adaptive = |it: &Version| it.terms == lab::evaluation::Terms::Adaptive;
+        let adaptive = |version: &Version| version.terms == lab::evaluation::Terms::Adaptive;
         if !expects && arguments.versions.iter().any(adaptive) {
             let message = "adaptive selection needs expected errors: --network FILE, --sigma FILE or --oracle";
             return Err(Failure::new(ExitKind::Usage, message));
@@ -444,8 +447,12 @@ fn settings_text(
     };
     let model = formats::checksum::fnv1a(&inputs::model_bytes(arguments.model.as_deref())?);
     let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
-    let network = arguments.network.as_ref().map(|it| of(Shipped::Network, it)).transpose()?;
-    let network = network.map_or_else(String::new, |it| format!("network {it:016x}, "));
+    let network = arguments
+        .network
+        .as_ref()
+        .map(|network| of(Shipped::Network, network))
+        .transpose()?;
+    let network = network.map_or_else(String::new, |network| format!("network {network:016x}, "));
     let orientation = if deployment::is_none(&arguments.orientation) {
         String::new()
     } else {

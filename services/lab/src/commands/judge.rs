@@ -102,14 +102,14 @@ impl Arguments {
         let mut people = read.map_err(lab::dataset_failure)?;
         let table = SkeletonTable::published();
         let sided = people.people.into_iter();
-        let sided = sided.map(|it| self.sides.of(it, table.joint_mirror()));
+        let sided = sided.map(|sided| self.sides.of(sided, table.joint_mirror()));
         people.people = sided.collect();
         Ok(people)
     }
 }
 
 pub(super) fn selection(text: &str) -> Result<Selection, String> {
-    Selection::from_argument(text).map_err(|it| it.to_string())
+    Selection::from_argument(text).map_err(|error| error.to_string())
 }
 
 /// Runs the command.
@@ -117,7 +117,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let terminal = Terminal::with_bar(globals.quiet, false, BAR);
     let is_network = arguments.model.extension();
-    if is_network.is_some_and(|it| it.eq_ignore_ascii_case("onnx")) {
+    if is_network.is_some_and(|is_network| is_network.eq_ignore_ascii_case("onnx")) {
         if finding::is_file::<finding::Picture>(&arguments.dataset) {
             return detector::run(arguments, &stop, &terminal);
         }
@@ -139,7 +139,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         joint_map: joints.map(None, &PARSE14),
     };
     let pictures = judged::judged(&reader, "", &people, &stop, &terminal)?;
-    let [best, on_person] = Judged::ALL.map(|it| pictures.report(it));
+    let [best, on_person] = Judged::ALL.map(|judged| pictures.report(judged));
     if arguments.json {
         let mut report = json!({
             "schema_version": 1,

@@ -85,7 +85,7 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
 /// Whether a file is called as networks are.
 fn is_network(file: &Path) -> bool {
     let ending = file.extension();
-    ending.is_some_and(|it| it.eq_ignore_ascii_case("onnx"))
+    ending.is_some_and(|ending| ending.eq_ignore_ascii_case("onnx"))
 }
 
 fn import(file: &Path, out: &Path) -> Result<ExitCode, Failure> {
@@ -172,6 +172,6 @@ fn description(file: &Path, model: &Model) -> Value {
         "interval": spec.interval,
         "root_bias": spec.root_bias,
         "threshold": spec.threshold,
-        "mirror": spec.mirror.as_ref().map(|it| it.iter().map(|part| part + 1).collect::<Vec<_>>()),
+        "mirror": spec.mirror.as_ref().map(|mirror| mirror.iter().map(|part| part + 1).collect::<Vec<_>>()),
     })
 }

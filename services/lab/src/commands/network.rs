@@ -123,7 +123,7 @@ fn look(network: &PoseNetwork, image: &Path, arguments: &Arguments) -> Result<Ve
     let picture = first_picture(image)?;
     let whole = [picture.size.width as f64, picture.size.height as f64];
     let whole = [0.0, 0.0, whole[0] - 1.0, whole[1] - 1.0];
-    let outline = arguments.outline.map_or(whole, |it| it.0);
+    let outline = arguments.outline.map_or(whole, |outline| outline.0);
     let mut workspace = Workspace::default();
     let sight = network::look(network, &picture, (outline, Turn::Up), &mut workspace)?;
     if let Some(out) = &arguments.out {
@@ -155,7 +155,8 @@ fn ports(ports: &[Port]) -> Vec<Value> {
 fn card_json(card: &Card, place: &CardPlace) -> Value {
     let rows = joint_rows(&card.names());
     let joints = PARSE14.joints.iter().zip(rows);
-    let missing: Vec<&str> = joints.filter(|it| it.1.is_none()).map(|it| it.0.name).collect();
+    let missing: Vec<&str> =
+        joints.filter(|joint| joint.1.is_none()).map(|joint| joint.0.name).collect();
     json!({
         "from": place.to_string(),
         "name": card.name,
@@ -216,7 +217,7 @@ fn ports_in_words(description: &Description) -> Result<(), Failure> {
 
 fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
     let mut entries = description.metadata.iter();
-    if entries.any(|it| it.0 == viewquality::key::VERSION) {
+    if entries.any(|entry| entry.0 == viewquality::key::VERSION) {
         return output::line(
             "  it predicts the errors of single views (`errors` in [paper] of a deployment), and finds no keypoints",
         );
@@ -231,8 +232,10 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
         ("networks", "networks that find keypoints", networks),
         ("detectors", "detectors of people", detectors),
     ] {
-        let files: Vec<String> =
-            nearest.iter().map(|it| format!("configs/{folder}/{it}.toml")).collect();
+        let files: Vec<String> = nearest
+            .iter()
+            .map(|nearest| format!("configs/{folder}/{nearest}.toml"))
+            .collect();
         let come = match &files[..] {
             [] => continue,
             [_] => "comes nearest",
@@ -300,8 +303,8 @@ fn given(card: &Card) -> String {
             score,
             ..
         } => {
-            let fields = fields.iter().map(|it| json!(it));
-            let fields: Vec<String> = fields.map(|it| word(&it).to_owned()).collect();
+            let fields = fields.iter().map(|field| json!(field));
+            let fields: Vec<String> = fields.map(|field| word(&field).to_owned()).collect();
             format!(
                 "a list of {}; unit: {}; scores: {}",
                 fields.join(", "),
@@ -320,8 +323,8 @@ fn word(value: &Value) -> &str {
 fn joints_in_words(names: &[String]) -> Result<(), Failure> {
     let rows = joint_rows(names);
     let joints = PARSE14.joints.iter().zip(&rows);
-    let missing = joints.clone().filter(|it| it.1.is_none());
-    let missing: Vec<&str> = missing.map(|it| it.0.name).collect();
+    let missing = joints.clone().filter(|joint| joint.1.is_none());
+    let missing: Vec<&str> = missing.map(|missing| missing.0.name).collect();
     let derived = joints.filter_map(|(joint, row)| match row.as_deref() {
         Some(several @ [_, _, ..]) => {
             let from: Vec<String> = several

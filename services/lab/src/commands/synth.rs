@@ -266,7 +266,7 @@ fn create_folder(out: &Path) -> Result<(), Failure> {
 
 fn report(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Failure> {
     let Done { sequences, seconds } = done;
-    let pictures: u64 = sequences.iter().map(|it| it.n_pictures).sum();
+    let pictures: u64 = sequences.iter().map(|sequence| sequence.n_pictures).sum();
     let rate = pictures as f64 / seconds.max(1e-9);
     if arguments.json {
         return output::json(&json!({

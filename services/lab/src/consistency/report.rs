@@ -57,19 +57,22 @@ fn text(out: &Path, done: &Done) -> String {
         "bins of half the circle, and what tables of so many know of people held out:".to_owned(),
     );
     for (n, lift) in &done.bins {
-        let lift = lift.map_or_else(|| "-".to_owned(), |it| format!("{it:.4}"));
+        let lift = lift.map_or_else(|| "-".to_owned(), |lift| format!("{lift:.4}"));
         lines.push(format!("    {n:3}  {lift}"));
     }
     lines.push("joints: error in sizes of the person".to_owned());
     for (ridge, error) in &done.joints {
-        let ridge = ridge.map_or_else(|| "parts alone".to_owned(), |it| format!("ridge {it:e}"));
+        let ridge = ridge.map_or_else(
+            || "parts alone".to_owned(),
+            |ridge| format!("ridge {ridge:e}"),
+        );
         lines.push(format!("    {ridge:12} {error:.4}"));
     }
     lines.push(format!(
         "{:>8} {:>6} {:>6} {:>6} {:>7} {:>7} {:>6}",
         "alpha", "cap", "form", "beta", "area", "PCP3D", "iter."
     ));
-    lines.extend(done.single.iter().map(|it| row(it, "")));
+    lines.extend(done.single.iter().map(|single| row(single, "")));
     for it in &done.surface {
         let is_chosen = it.weights == done.learned.weights;
         lines.push(row(it, if is_chosen { "  <- chosen" } else { "" }));

@@ -9,7 +9,7 @@ pub(super) fn split(
     hold_out: &[String],
 ) -> Result<(Vec<Sequence>, Vec<Sequence>), Failure> {
     let mut subjects: Vec<&str> = all.iter().map(|it| it.subject.as_str()).collect();
-    subjects.sort_by_key(|it| (it.len(), *it));
+    subjects.sort_by_key(|subject| (subject.len(), *subject));
     subjects.dedup();
     if let Some(unknown) = hold_out.iter().find(|it| !subjects.contains(&it.as_str())) {
         let known = subjects.join(", ");
@@ -35,9 +35,9 @@ pub(super) fn split(
 
 /// Sees that all sequences have the same cameras.
 pub(super) fn one_rig(all: &[&Sequence], rig: &str) -> Result<(), Failure> {
-    let cameras = |it: &Sequence| -> Vec<String> {
-        let views = it.views.iter();
-        views.map(|it| it.camera.clone()).collect()
+    let cameras = |sequence: &Sequence| -> Vec<String> {
+        let views = sequence.views.iter();
+        views.map(|view| view.camera.clone()).collect()
     };
     for pair in all.windows(2) {
         if cameras(pair[0]) != cameras(pair[1]) {
@@ -90,10 +90,11 @@ mod tests {
     }
 
     fn held(subjects: &[&str], hold_out: &[&str]) -> Result<Vec<String>, String> {
-        let all = subjects.iter().map(|it| sequence(it)).collect();
-        let hold_out: Vec<String> = hold_out.iter().map(|it| (*it).to_owned()).collect();
-        let (_, held) = split(all, &hold_out).map_err(|it| it.to_string())?;
-        Ok(held.into_iter().map(|it| it.subject).collect())
+        let all = subjects.iter().map(|subject| sequence(subject)).collect();
+        let hold_out: Vec<String> =
+            hold_out.iter().map(|hold_out| (*hold_out).to_owned()).collect();
+        let (_, held) = split(all, &hold_out).map_err(|error| error.to_string())?;
+        Ok(held.into_iter().map(|held| held.subject).collect())
     }
 
     #[test]

@@ -97,7 +97,7 @@ impl<'a> Learning<'a> {
             .zip(known)
             .map(|(n, (learner, other))| (*n, learner.lift_on(other)))
             .collect();
-        let chosen = largest(bins.iter().map(|it| it.1));
+        let chosen = largest(bins.iter().map(|bin| bin.1));
         let (learner, other) = (&learners[chosen], &others[chosen]);
         let joints = joint_errors(learner, other);
         let ridge = smallest(&joints).filter(|_| self.job.with_joints);
@@ -107,7 +107,7 @@ impl<'a> Learning<'a> {
         let (single, surface) = self.choose(&tried, &first)?;
         let weights = best(&surface).map_or(first.weights, |it| it.weights);
         let mut learned = self.learned(learner, weights, ridge)?;
-        learned.learned.held_out = tried.iter().map(|it| it.frames.len() as u64).sum();
+        learned.learned.held_out = tried.iter().map(|tried| tried.frames.len() as u64).sum();
         keep(&learned)?;
         Ok(Done {
             learned,
@@ -121,7 +121,7 @@ impl<'a> Learning<'a> {
 
     /// Some instants of people held out, evenly over all of them.
     fn thinned(&self, held: &[Sequence]) -> Vec<Sequence> {
-        let n: usize = held.iter().map(|it| it.frames.len()).sum();
+        let n: usize = held.iter().map(|held| held.frames.len()).sum();
         let most = self.job.tries.min(n);
         let mut seen = 0;
         let thin = |sequence: &Sequence| {
@@ -230,7 +230,7 @@ impl<'a> Learning<'a> {
         trials: &[Trial],
         mut visit: impl FnMut(&mut Bench, &Sequence, &Frame, &[Option<Rgb8View<'_>>]),
     ) -> Result<(), Failure> {
-        let n: usize = sequences.iter().map(|it| it.frames.len()).sum();
+        let n: usize = sequences.iter().map(|sequence| sequence.frames.len()).sum();
         let (mut done, mut said) = (0, Instant::now());
         for sequence in sequences {
             let mut film = Film::open(sequence, &self.job.film).map_err(film_failure)?;
@@ -311,7 +311,7 @@ fn smallest(errors: &[(Option<f64>, f64)]) -> Option<f64> {
 fn largest(values: impl Iterator<Item = Option<f64>>) -> usize {
     let mut best = (0, f64::NEG_INFINITY);
     for (nth, value) in values.enumerate() {
-        if value.is_some_and(|it| it > best.1) {
+        if value.is_some_and(|value| value > best.1) {
             best = (nth, value.unwrap_or(best.1));
         }
     }

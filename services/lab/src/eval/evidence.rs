@@ -103,7 +103,7 @@ impl EvidenceJob<'_> {
         console: &dyn Console,
     ) -> Result<Vec<EvidenceRow>, Failure> {
         let mut tallies = vec![vec![Tally::default(); Method::ALL.len()]; self.stress.len()];
-        let n_frames: usize = sequences.iter().map(|it| it.frames.len()).sum();
+        let n_frames: usize = sequences.iter().map(|sequence| sequence.frames.len()).sum();
         console.begin("frames", "");
         let mut done = 0;
         for sequence in sequences {
@@ -138,7 +138,7 @@ impl EvidenceJob<'_> {
 
     /// Solves all frames as `run` does.
     fn as_run(&self, sequences: &[Sequence], console: &dyn Console) -> Result<Tally, Failure> {
-        let n_frames: usize = sequences.iter().map(|it| it.frames.len()).sum();
+        let n_frames: usize = sequences.iter().map(|sequence| sequence.frames.len()).sum();
         console.begin("frames as run", "");
         let (mut tally, mut done) = (Tally::default(), 0);
         for sequence in sequences {
@@ -184,7 +184,7 @@ impl EvidenceJob<'_> {
             }
             let views: Vec<(&Camera, &NetworkView)> =
                 chosen.iter().map(|it| (&it.0, &it.1)).collect();
-            let height = instant.cameras.iter().map(|it| it.intrinsics.size[1]).max();
+            let height = instant.cameras.iter().map(|camera| camera.intrinsics.size[1]).max();
             let limit_px = LIMIT * f64::from(height.unwrap_or(0));
             for (method, tally) in Method::ALL.into_iter().zip(tallies) {
                 tally.add(&joints_by(method, &views, limit_px), &instant.truth);
@@ -223,7 +223,7 @@ impl EvidenceJob<'_> {
         let boxes = self.detector.people(image, values);
         let boxes = boxes.or_fail(ExitKind::Input)?;
         let mut people = Vec::new();
-        for outline in boxes.into_iter().take(MOST_PEOPLE).map(|it| it.outline) {
+        for outline in boxes.into_iter().take(MOST_PEOPLE).map(|bounds| bounds.outline) {
             let mut maps = JointMaps::default();
             let seen = looker.look((image, outline), memory, &mut maps);
             let Some(seen) = seen.or_fail(ExitKind::Input)? else {
@@ -333,7 +333,7 @@ fn outline(instant: &Instant<'_>, view: usize) -> Option<[f64; 4]> {
     let joints = projected(&instant.cameras[view], [0.0; 2], &instant.truth)?;
     let far = [f64::INFINITY, f64::NEG_INFINITY];
     let ends = [0, 1].map(|axis| {
-        let each = joints.iter().map(|it| it[axis]);
+        let each = joints.iter().map(|joint| joint[axis]);
         each.fold(far, |[from, to], it| [from.min(it), to.max(it)])
     });
     Some([ends[0][0], ends[1][0], ends[0][1], ends[1][1]])
@@ -345,11 +345,11 @@ impl Tally {
         let errors = segment_errors(&segments, found, truth);
         let hits = errors.iter().flatten();
         self.found.push(Share::of(
-            hits.map(|it| if *it <= GAMMA { 100.0 } else { 0.0 }),
+            hits.map(|hit| if *hit <= GAMMA { 100.0 } else { 0.0 }),
         ));
         let errors = joint_errors(found, truth);
         let limbs = errors.iter().take(N_LIMB_JOINTS).flatten();
-        self.errors.push(Share::of(limbs.map(|it| it.min(MOST_M) * 1000.0)));
+        self.errors.push(Share::of(limbs.map(|limb| limb.min(MOST_M) * 1000.0)));
     }
 }
 

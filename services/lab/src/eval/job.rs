@@ -78,7 +78,7 @@ impl Job<'_> {
     ///
     /// Footage or cameras that cannot be used; a file of what is found that cannot be written, or is of another run.
     pub fn run(&self, sequences: &[Sequence], console: &dyn Console) -> Result<Done, Failure> {
-        let n_frames = sequences.iter().map(|it| it.frames.len()).sum();
+        let n_frames = sequences.iter().map(|sequence| sequence.frames.len()).sum();
         let mut progress = Progress::new(console, n_frames);
         let mut done = Done::default();
         for sequence in sequences {
@@ -99,8 +99,9 @@ impl Job<'_> {
         progress: &mut Progress<'_>,
     ) -> Result<(Vec<Record>, usize), Failure> {
         let (mut kept, mut records) = self.keep(sequence)?;
-        let is_done = |frame: &Frame| records.iter().any(|it: &Record| it.frame == frame.number);
-        let open: Vec<&Frame> = sequence.frames.iter().filter(|it| !is_done(it)).collect();
+        let is_done =
+            |frame: &Frame| records.iter().any(|record: &Record| record.frame == frame.number);
+        let open: Vec<&Frame> = sequence.frames.iter().filter(|frame| !is_done(frame)).collect();
         progress.passed_over(sequence.frames.len() - open.len());
         if open.is_empty() {
             return Ok((records, 0));
@@ -123,7 +124,7 @@ impl Job<'_> {
             let predicted = Mutex::new(vec![None; sequence.views.len()]);
             let found = bench.solve(&images, &|look| {
                 let view = look.view;
-                let joints = truth.as_ref().and_then(|it| it[view].as_ref());
+                let joints = truth.as_ref().and_then(|truth| truth[view].as_ref());
                 if self.oracle {
                     let sigma = part_errors(look.centres, joints?, self.facing)?;
                     return Some(Expectation { sigma, tau: None });
@@ -167,7 +168,7 @@ impl Job<'_> {
         let number = i64::try_from(frame.number).ok()?;
         let sigma = table.get(&sequence.subject, &sequence.action, number, camera)?;
         Some(Expectation {
-            sigma: sigma.iter().map(|it| it * frame_scale).collect(),
+            sigma: sigma.iter().map(|sigma| sigma * frame_scale).collect(),
             tau: None,
         })
     }
@@ -195,11 +196,13 @@ impl Job<'_> {
             |error| tracing::warn!(view = look.view, %error, "the network says nothing"),
         );
         let forecast = forecast.ok()?;
-        let tenth = joints.map(|it| tenth_of(it));
+        let tenth = joints.map(|joint| tenth_of(joint));
         let tau_px: Vec<f32> = if !self.tau_px.is_empty() {
-            self.tau_px.iter().map(|it| it * frame_scale as f32).collect()
+            self.tau_px.iter().map(|tau_px| tau_px * frame_scale as f32).collect()
         } else if forecast.tau_px.is_empty() {
-            tenth.map_or_else(Vec::new, |it| vec![it as f32; forecast.sigma_px.len()])
+            tenth.map_or_else(Vec::new, |tenth| {
+                vec![tenth as f32; forecast.sigma_px.len()]
+            })
         } else {
             forecast.tau_px
         };
@@ -208,7 +211,7 @@ impl Job<'_> {
             Some(Predicted {
                 sigma_px: forecast.sigma_px.clone(),
                 tau_px: tau_px.clone(),
-                error_px: errors.iter().map(|it| it * tenth as f32).collect(),
+                error_px: errors.iter().map(|error| error * tenth as f32).collect(),
             })
         });
         let expectation = Expectation {
@@ -221,7 +224,13 @@ impl Job<'_> {
     /// The file that what is found goes to, and what is in it already.
     fn keep(&self, sequence: &Sequence) -> Result<(File, Vec<Record>), Failure> {
         let name = format!("{} {}", sequence.dataset, sequence.name);
-        let safe = |it: char| if it.is_alphanumeric() { it } else { '-' };
+        let safe = |letter: char| {
+            if letter.is_alphanumeric() {
+                letter
+            } else {
+                '-'
+            }
+        };
         let file = self.poses.join(name.chars().map(safe).collect::<String>() + ".jsonl");
         let versions = self.versions.iter().map(ToString::to_string).collect();
         let header = Header::new(&sequence.name, &self.settings, versions);

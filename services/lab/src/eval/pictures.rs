@@ -24,7 +24,9 @@ pub fn is_one(path: &Path) -> bool {
 
 /// The last word of a path, with that before where it is a file of a known name.
 pub fn name(path: &Path) -> String {
-    let is_known = path.file_name().is_some_and(|it| it == "labels.mat" || it == "joints.mat");
+    let is_known = path
+        .file_name()
+        .is_some_and(|name| name == "labels.mat" || name == "joints.mat");
     let place = if is_known { path.parent() } else { Some(path) };
     let stem = place.and_then(Path::file_stem).unwrap_or_default();
     let stem = stem.to_string_lossy().into_owned();
@@ -77,7 +79,7 @@ pub fn write_report(
     let numbers = json!({
         "schema_version": 1,
         "confidence": bootstrap.confidence,
-        "pictures": sets.iter().map(|it| numbers(it, bootstrap)).collect::<Vec<_>>(),
+        "pictures": sets.iter().map(|set| numbers(set, bootstrap)).collect::<Vec<_>>(),
     });
     let json = serde_json::to_string_pretty(&numbers).or_fail(ExitKind::Run)?;
     let page = pictures_html(sets, &about(model, sets), bootstrap);
@@ -113,9 +115,9 @@ fn numbers(set: &Pictures, bootstrap: &Bootstrap) -> Value {
 }
 
 fn about(model: &str, sets: &[Pictures]) -> Vec<(String, String)> {
-    let pictures = sets.iter().map(|it| {
-        let (n, n_left_out) = (it.truths.len(), it.n_left_out);
-        format!("{}: {n}, left out {n_left_out}", it.name)
+    let pictures = sets.iter().map(|set| {
+        let (n, n_left_out) = (set.truths.len(), set.n_left_out);
+        format!("{}: {n}, left out {n_left_out}", set.name)
     });
     let pictures: Vec<String> = pictures.collect();
     vec![

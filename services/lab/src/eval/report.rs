@@ -17,8 +17,9 @@ impl Done {
     /// * `versions`: those that were compared.
     pub fn summary(&self, versions: &[Version], bootstrap: &Bootstrap) -> Summary {
         let versions: Vec<String> = versions.iter().map(ToString::to_string).collect();
-        let records = self.sequences.iter().flat_map(|it| &it.1);
-        let predicted: Vec<_> = records.flat_map(|it| it.predicted.iter().flatten()).collect();
+        let records = self.sequences.iter().flat_map(|sequence| &sequence.1);
+        let predicted: Vec<_> =
+            records.flat_map(|record| record.predicted.iter().flatten()).collect();
         Summary {
             predictions: judge(&predicted),
             ..summarise(&measured(self), &versions, bootstrap)
@@ -62,7 +63,7 @@ fn measured(done: &Done) -> Vec<Measured> {
     for (sequence, records) in &done.sequences {
         let mut scores: Vec<Vec<FrameScore>> = Vec::new();
         for frame in &sequence.frames {
-            if let Some(record) = records.iter().find(|it| it.frame == frame.number) {
+            if let Some(record) = records.iter().find(|record| record.frame == frame.number) {
                 let found = record.found.iter();
                 scores.push(found.map(|it| score(sequence, frame, it)).collect());
             }
@@ -80,11 +81,12 @@ fn measured(done: &Done) -> Vec<Measured> {
 /// The short form for people: PCP3D of every group, and the gain over the first version.
 pub fn text(summary: &Summary, versions: &[Version]) -> String {
     let mut head = vec![format!("{:<28} {:>6}", "PCP3D at 0.5, %", "frames")];
-    head.extend(versions.iter().map(|it| format!("{:>22}", it.to_string())));
+    head.extend(versions.iter().map(|version| format!("{:>22}", version.to_string())));
     let mut lines = vec![head.join(" ")];
     lines.extend(summary.groups.iter().map(row));
     if let Some(it) = summary.predictions.first() {
-        let number = |it: Option<f64>| it.map_or_else(|| "-".to_owned(), |it| format!("{it:.3}"));
+        let number =
+            |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |it| format!("{it:.3}"));
         let [auc, correlation] = [it.auc, it.rank_correlation].map(number);
         lines.push(format!(
             "expected errors, mean over parts: area under the ROC {auc}, rank correlation {correlation}"
@@ -95,11 +97,11 @@ pub fn text(summary: &Summary, versions: &[Version]) -> String {
 
 fn row(group: &Group) -> String {
     let name = [&group.dataset, &group.subject, &group.action].map(String::as_str);
-    let name: Vec<&str> = name.into_iter().filter(|it| !it.is_empty()).collect();
+    let name: Vec<&str> = name.into_iter().filter(|name| !name.is_empty()).collect();
     let mut row = vec![format!("{:<28} {:>6}", name.join(" "), group.frames)];
     for it in &group.versions {
-        let gain = it.gain.map_or_else(String::new, |it| format!(" ({it:+.2})"));
-        let value = it.pcp3d.map(|it| format!("{it:.2}{gain}"));
+        let gain = it.gain.map_or_else(String::new, |gain| format!(" ({gain:+.2})"));
+        let value = it.pcp3d.map(|pcp3d| format!("{pcp3d:.2}{gain}"));
         row.push(format!("{:>22}", value.unwrap_or_else(|| "-".to_owned())));
     }
     row.join(" ")

@@ -121,15 +121,20 @@ impl Bench {
         let plans: Vec<Arc<ViewPlan>> = plans.collect::<Result<_, _>>()?;
         let views: Vec<ViewStep> = plans
             .iter()
-            .map(|it| {
-                let layout = Arc::new(it.layout().clone());
+            .map(|plan| {
+                let layout = Arc::new(plan.layout().clone());
                 ViewStep::new(Arc::clone(&setup.model), layout, setup.view.clone())
             })
             .collect();
-        let responses = views.iter().map(|it| vec![0.0; it.layout().n_responses()]);
-        let fuse = setup.trials.iter().map(|it| {
+        let responses = views.iter().map(|view| vec![0.0; view.layout().n_responses()]);
+        let fuse = setup.trials.iter().map(|trial| {
             let model = Arc::clone(&setup.model);
-            FuseStep::new(model, it.fuse.clone(), plans.clone(), it.tables.clone())
+            FuseStep::new(
+                model,
+                trial.fuse.clone(),
+                plans.clone(),
+                trial.tables.clone(),
+            )
         });
         Ok(Self {
             responses: responses.collect(),
@@ -144,7 +149,7 @@ impl Bench {
 
     /// The cameras of the frames.
     pub fn cameras(&self) -> impl Iterator<Item = &Camera> {
-        self.plans.iter().map(|it| it.camera())
+        self.plans.iter().map(|plan| plan.camera())
     }
 
     /// Solves a frame, on rayon's current pool. Frames are independent, so the result depends only on the
@@ -208,8 +213,8 @@ impl Bench {
             Some(ViewResult {
                 candidates: it.candidates.clone(),
                 front: it.front.clone(),
-                tau_px: expected.as_ref().and_then(|it| it.tau.clone()),
-                sigma_px: expected.map(|it| it.sigma),
+                tau_px: expected.as_ref().and_then(|expected| expected.tau.clone()),
+                sigma_px: expected.map(|expected| expected.sigma),
                 skew_s: 0.0,
             })
         };
@@ -284,7 +289,7 @@ impl Bench {
     ) -> Vec<PairResult> {
         let start = step.start(answers, others);
         let solve = |pair: [usize; 2]| {
-            let [first, second] = pair.map(|it| evidence.evidence[it].as_ref());
+            let [first, second] = pair.map(|pair| evidence.evidence[pair].as_ref());
             step.pair(pair, answers, [first?, second?], &start)
         };
         let pairs = all_pairs(self.views.len()).into_par_iter();
@@ -293,7 +298,7 @@ impl Bench {
 
     fn found(&self, skeleton: &Skeleton, effort: Effort) -> FrameResult {
         let joints = skeleton.joints.iter();
-        let joints = joints.map(|it| it.as_ref().ok().map(|it| it.in_world.into()));
+        let joints = joints.map(|joint| joint.as_ref().ok().map(|it| it.in_world.into()));
         let view = |(view, it): (usize, &Option<pipeline::FusedView>)| {
             let rows = self.footage_from_frame[view];
             let in_footage = |[x, y]: [f64; 2]| rows.map(|row| row[0] * x + row[1] * y + row[2]);
@@ -327,8 +332,8 @@ struct Effort {
 impl Effort {
     /// Counts the iterations of the hypothesis with the highest energy, and the solutions of all hypotheses.
     fn of_all_views(&mut self, all: &AllViewsResult) {
-        let estimates = all.hypotheses.iter().map(|it| &it.estimate);
-        self.solutions = estimates.clone().map(|it| it.iterations.len() as u32).sum();
+        let estimates = all.hypotheses.iter().map(|hypothesis| &hypothesis.estimate);
+        self.solutions = estimates.clone().map(|estimate| estimate.iterations.len() as u32).sum();
         if let Some(it) = estimates.max_by(|a, b| a.energy.total_cmp(&b.energy)) {
             self.count(it.iterations.len(), it.converged);
             self.on = Some(it.active);
@@ -346,16 +351,16 @@ impl Effort {
         for pair in pairs {
             let [first, second] = pair.views.map(|view| {
                 let view = skeleton.views[view].as_ref();
-                view.is_some_and(|it| it.exchanged)
+                view.is_some_and(|view| view.exchanged)
             });
             let is_taken = |it: &&PairEstimate| it.start.exchanged == (first != second);
             let taken = pair.hypotheses.iter().find(is_taken);
             if let Some(it) = taken.or(pair.hypotheses.first()) {
                 self.count(it.iterations.len(), it.converged);
-                on += it.active.iter().filter(|it| **it).count();
+                on += it.active.iter().filter(|active| **active).count();
                 n_terms += it.active.len();
             }
-            let all = pair.hypotheses.iter().map(|it| it.iterations.len() as u32);
+            let all = pair.hypotheses.iter().map(|hypothesis| hypothesis.iterations.len() as u32);
             self.solutions += all.sum::<u32>();
         }
         self.on = (n_terms > 0).then(|| on as f64 / n_terms as f64);

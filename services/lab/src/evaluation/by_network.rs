@@ -96,7 +96,7 @@ impl NetworkView {
     ///
     /// * `height`: of the box, as a share of that of the picture.
     pub fn person(&self, height: f64) -> SeenPerson {
-        let joint = |it: &Option<keypoints::Keypoint>| it.map(|it| (it.at, it.score));
+        let joint = |keypoint: &Option<keypoints::Keypoint>| keypoint.map(|it| (it.at, it.score));
         SeenPerson {
             joints: self.maps.peaks().iter().map(joint).collect(),
             height,
@@ -162,10 +162,10 @@ pub fn joints_by(
     views: &[(&Camera, &NetworkView)],
     limit_px: f64,
 ) -> Vec<Option<Point>> {
-    let as_point = |it: Point3<f64>| [it.x, it.y, it.z];
+    let as_point = |point: Point3<f64>| [point.x, point.y, point.z];
     let seen = |joint: usize| sightings(views, joint);
     match method {
-        Method::Linear => (0..N).map(|it| linear(&seen(it)).map(as_point)).collect(),
+        Method::Linear => (0..N).map(|i| linear(&seen(i)).map(as_point)).collect(),
         Method::Dropping => {
             let of_joint = |it: usize| dropping(&seen(it), limit_px).map(as_point);
             (0..N).map(of_joint).collect()
@@ -183,7 +183,7 @@ pub fn joints_by(
                 settings.springs = 0.0;
             }
             match solve_person(&each, &settings) {
-                Some(found) => found.pose.joints.map(|it| it.map(as_point)).to_vec(),
+                Some(found) => found.pose.joints.map(|joint| joint.map(as_point)).to_vec(),
                 None => vec![None; N],
             }
         }

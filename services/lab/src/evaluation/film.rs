@@ -96,7 +96,7 @@ impl Film {
                 camera: name(),
                 source,
             })?;
-            let [width, height] = framing.out_size().map(|it| it as usize);
+            let [width, height] = framing.out_size().map(|out_size| out_size as usize);
             let out = Size::new(width, height);
             let warp = Warp::new(size, out, &framing.source_from_output(), Fill::Black).map_err(
                 |source| FilmError::Warp {
@@ -122,12 +122,12 @@ impl Film {
 
     /// The cameras of the frames.
     pub fn cameras(&self) -> Vec<Camera> {
-        self.reels.iter().map(|it| it.framing.camera().clone()).collect()
+        self.reels.iter().map(|reel| reel.framing.camera().clone()).collect()
     }
 
     /// From pixels of the frames to those of the footage, for every view.
     pub fn footage_from_frame(&self) -> Vec<[[f64; 3]; 2]> {
-        self.reels.iter().map(|it| it.framing.source_from_output()).collect()
+        self.reels.iter().map(|reel| reel.framing.source_from_output()).collect()
     }
 
     /// The images of all views at a frame of the sequence; `None` for a view whose footage has ended.
@@ -144,10 +144,10 @@ impl Film {
                 source,
             })?;
         }
-        let image = |it: &'_ Reel| it.is_there.then_some(it.framing.out_size());
-        let images = self.reels.iter().map(|it| {
-            let [width, height] = image(it)?.map(|it| it as usize);
-            Rgb8View::new(width, height, &it.frame).ok()
+        let image = |reel: &'_ Reel| reel.is_there.then_some(reel.framing.out_size());
+        let images = self.reels.iter().map(|reel| {
+            let [width, height] = image(reel)?.map(|value| value as usize);
+            Rgb8View::new(width, height, &reel.frame).ok()
         });
         Ok(images.collect())
     }

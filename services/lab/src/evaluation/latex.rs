@@ -10,8 +10,8 @@ use crate::evaluation::{Group, Pictures, Summary, Version, published};
 /// * `versions`: those of the summary.
 pub fn latex(summary: &Summary, versions: &[Version]) -> String {
     let mut out = String::new();
-    let titles: Vec<String> = versions.iter().map(|it| it.title()).collect();
-    let words = |it: &[String]| it.to_vec();
+    let titles: Vec<String> = versions.iter().map(|version| version.title()).collect();
+    let words = |strings: &[String]| strings.to_vec();
     let caption = "PCP3D (\\%) at 0.5; in parentheses as published";
     begin(&mut out, caption, 3 + versions.len());
     let names = ["Data set", "Subject", "Sequence"].map(str::to_owned);
@@ -32,7 +32,7 @@ pub fn latex(summary: &Summary, versions: &[Version]) -> String {
     out.push_str("\\hline\n");
     for group in overall(summary) {
         for (title, it) in titles.iter().zip(&group.versions) {
-            let parts: Vec<String> = it.parts.iter().map(|it| number(*it, 1)).collect();
+            let parts: Vec<String> = it.parts.iter().map(|part| number(*part, 1)).collect();
             let names = [escape(&group.dataset), title.clone()];
             line(&mut out, &[words(&names), parts].concat());
         }
@@ -44,13 +44,13 @@ pub fn latex(summary: &Summary, versions: &[Version]) -> String {
 /// The tables of single pictures.
 pub fn pictures_latex(sets: &[Pictures], bootstrap: &Bootstrap) -> String {
     let mut out = String::new();
-    for table in sets.iter().flat_map(|it| it.tables(bootstrap)) {
+    for table in sets.iter().flat_map(|set| set.tables(bootstrap)) {
         begin(&mut out, &escape(&table.title), 1 + table.columns.len());
         let names = [vec![String::new()], table.columns.clone()].concat();
         line(&mut out, &names);
         out.push_str("\\hline\n");
         for (name, values, _) in table.rows {
-            let values = values.iter().map(|it| number(Some(*it), 1));
+            let values = values.iter().map(|value| number(Some(*value), 1));
             line(&mut out, &[vec![name], values.collect()].concat());
         }
         end(&mut out);
@@ -104,9 +104,9 @@ fn line(out: &mut String, cells: &[String]) {
 }
 
 fn escape(text: &str) -> String {
-    let escape = |it: char| match it {
-        '_' | '&' | '%' | '#' | '$' | '{' | '}' => format!("\\{it}"),
-        it => it.to_string(),
+    let escape = |letter: char| match letter {
+        '_' | '&' | '%' | '#' | '$' | '{' | '}' => format!("\\{letter}"),
+        letter => letter.to_string(),
     };
     text.chars().map(escape).collect()
 }

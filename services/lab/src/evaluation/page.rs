@@ -25,7 +25,7 @@ pub struct Page<'a> {
 
 /// One self-contained page.
 pub fn html(page: &Page<'_>) -> String {
-    let titles: Vec<String> = page.versions.iter().map(|it| it.title()).collect();
+    let titles: Vec<String> = page.versions.iter().map(|version| version.title()).collect();
     let mut out = begin("Parallax: evaluation");
     about_table(&mut out, page.about);
     put!(out, "<p class=\"key\">");
@@ -122,10 +122,10 @@ fn measures(out: &mut Html, group: &Group, titles: &[String]) {
         ("joints not found, %", |it| (it.lost, None, 2)),
         ("images: PCP, %", |it| (it.pcp2d, None, 1)),
         ("images: PCK at 0.1, %", |it| {
-            (it.pck2d.map(|it| it[0]), None, 1)
+            (it.pck2d.map(|pck2d| pck2d[0]), None, 1)
         }),
         ("images: PCK at 0.2, %", |it| {
-            (it.pck2d.map(|it| it[1]), None, 1)
+            (it.pck2d.map(|pck2d| pck2d[1]), None, 1)
         }),
         ("iterations until settled", |it| (it.iterations, None, 2)),
         ("not settled, %", |it| (it.unsettled, None, 2)),

@@ -58,10 +58,10 @@ impl Pictures {
 
     /// Their confidence intervals, by resampling pictures.
     pub fn intervals(&self, which: Judged, bootstrap: &Bootstrap) -> Intervals {
-        let each: Vec<Report> = self.pairs(which).map(|it| evaluate([it])).collect();
+        let each: Vec<Report> = self.pairs(which).map(|pair| evaluate([pair])).collect();
         let over = |count: &dyn Fn(&Report) -> Pcp| {
-            let share = |it: &Report| {
-                let count = count(it);
+            let share = |report: &Report| {
+                let count = count(report);
                 Share {
                     sum: 100.0 * count.correct as f64,
                     n: count.total as f64,
@@ -122,9 +122,10 @@ fn tables(set: &Pictures, bootstrap: &Bootstrap) -> Vec<Table> {
                 set.name
             )
         };
-        let limbs = report.limbs(PcpRule::MeanOfEnds).map(|it| it.0);
+        let limbs = report.limbs(PcpRule::MeanOfEnds).map(|limb| limb.0);
         let by_rule = RULES.iter().zip(intervals.pcp).map(|((rule, name), interval)| {
-            let mut row: Vec<f64> = report.limbs(*rule).iter().map(|it| it.1.percent()).collect();
+            let mut row: Vec<f64> =
+                report.limbs(*rule).iter().map(|limb| limb.1.percent()).collect();
             row.push(report.pcp(*rule).percent());
             ((*name).to_owned(), row, interval)
         });
@@ -144,7 +145,7 @@ fn tables(set: &Pictures, bootstrap: &Bootstrap) -> Vec<Table> {
         });
         tables.push(Table {
             title: title("PCK, %"),
-            columns: columns(PCK_GROUPS.iter().map(|it| it.0), "mean"),
+            columns: columns(PCK_GROUPS.iter().map(|pck_group| pck_group.0), "mean"),
             rows: by_share.collect(),
         });
     }
@@ -161,7 +162,7 @@ mod tests {
     use crate::evaluation::pictures_latex;
 
     fn person(x: f64) -> Joints {
-        core::array::from_fn(|it| [x + 10.0 * (it % 4) as f64, 25.0 * (it / 4) as f64])
+        core::array::from_fn(|i| [x + 10.0 * (i % 4) as f64, 25.0 * (i / 4) as f64])
     }
 
     /// The person is detected on two of three pictures; on one of them the best detection is elsewhere.

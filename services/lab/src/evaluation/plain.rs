@@ -28,7 +28,7 @@ pub fn linear(views: &[Sighting<'_>]) -> Option<Point3<f64>> {
     let solved = normal.symmetric_eigen();
     let point = solved.eigenvectors.column(solved.eigenvalues.imin()).into_owned();
     let point = Point3::new(point[0], point[1], point[2]) / point[3];
-    point.iter().all(|it| it.is_finite()).then_some(point)
+    point.iter().all(|value| value.is_finite()).then_some(point)
 }
 
 /// The same, leaving out as few views as are needed for a mean reprojection error below `limit_px` (as Pose2Sim does); of
@@ -37,9 +37,9 @@ pub fn dropping(views: &[Sighting<'_>], limit_px: f64) -> Option<Point3<f64>> {
     let n = views.len().min(16);
     let mut best: Option<(f64, Point3<f64>)> = None;
     for kept in (2..=n).rev() {
-        for mask in (0_u32..1 << n).filter(|it| it.count_ones() as usize == kept) {
+        for mask in (0_u32..1 << n).filter(|i| i.count_ones() as usize == kept) {
             let chosen: Vec<Sighting<'_>> =
-                (0..n).filter(|it| mask >> it & 1 == 1).map(|it| views[it]).collect();
+                (0..n).filter(|i| mask >> i & 1 == 1).map(|i| views[i]).collect();
             let Some(point) = linear(&chosen) else {
                 continue;
             };
@@ -94,9 +94,9 @@ mod tests {
         let truth = Point3::new(0.2, 0.3, -0.1);
         let mut views: Vec<Sighting<'_>> = cameras
             .iter()
-            .map(|it| {
-                let at = it.project(&truth).unwrap();
-                (it, [at.x, at.y], 1.0)
+            .map(|camera| {
+                let at = camera.project(&truth).unwrap();
+                (camera, [at.x, at.y], 1.0)
             })
             .collect();
         assert!((linear(&views).unwrap() - truth).norm() < 1e-9);

@@ -45,11 +45,11 @@ pub fn judge(views: &[&Predicted]) -> Vec<Judgement> {
         .map(|part| {
             of_part(
                 PART_NAMES[part],
-                views.iter().filter_map(|it| sample(it, part)),
+                views.iter().filter_map(|view| sample(view, part)),
             )
         })
         .collect();
-    if parts.iter().all(|it| it.n == 0) {
+    if parts.iter().all(|part| part.n == 0) {
         return Vec::new();
     }
     let mean = |of: fn(&Judgement) -> Option<f64>| {
@@ -58,7 +58,7 @@ pub fn judge(views: &[&Predicted]) -> Vec<Judgement> {
     };
     let all = Judgement {
         part: "mean".to_owned(),
-        n: parts.iter().map(|it| it.n).sum::<usize>() / N_PARTS,
+        n: parts.iter().map(|part| part.n).sum::<usize>() / N_PARTS,
         above: mean(|it| it.above),
         caught: mean(|it| it.caught),
         wasted: mean(|it| it.wasted),
@@ -70,18 +70,19 @@ pub fn judge(views: &[&Predicted]) -> Vec<Judgement> {
 
 /// Expected and true error of a part, per threshold.
 fn sample(view: &Predicted, part: usize) -> Option<(f64, f64)> {
-    let at = |values: &[f32]| values.get(part).map(|it| f64::from(*it));
-    let tau = at(&view.tau_px).filter(|it| *it > 0.0)?;
+    let at = |values: &[f32]| values.get(part).map(|value| f64::from(*value));
+    let tau = at(&view.tau_px).filter(|value| *value > 0.0)?;
     let (sigma, error) = (at(&view.sigma_px)? / tau, at(&view.error_px)? / tau);
     (sigma.is_finite() && error.is_finite()).then_some((sigma, error))
 }
 
 fn of_part(name: &str, samples: impl Iterator<Item = (f64, f64)>) -> Judgement {
     let samples: Vec<(f64, f64)> = samples.collect();
-    let classes: Vec<(f64, bool)> = samples.iter().map(|it| (it.0, it.1 > 1.0)).collect();
+    let classes: Vec<(f64, bool)> =
+        samples.iter().map(|sample| (sample.0, sample.1 > 1.0)).collect();
     let share = |of: &dyn Fn(&(f64, bool)) -> bool, among: &dyn Fn(&(f64, bool)) -> bool| {
-        let n = classes.iter().filter(|it| among(it)).count();
-        let hits = classes.iter().filter(|it| among(it) && of(it)).count();
+        let n = classes.iter().filter(|class| among(class)).count();
+        let hits = classes.iter().filter(|class| among(class) && of(class)).count();
         (n > 0).then(|| 100.0 * hits as f64 / n as f64)
     };
     Judgement {
@@ -101,7 +102,7 @@ mod tests {
 
     /// A view with the same values for all parts.
     fn view(sigma: f32, tau: f32, error: f32) -> Predicted {
-        let all = |it: f32| vec![it; N_PARTS];
+        let all = |value: f32| vec![value; N_PARTS];
         Predicted {
             sigma_px: all(sigma),
             tau_px: all(tau),
@@ -134,7 +135,7 @@ mod tests {
 
     #[test]
     fn the_truth_predicts_itself() {
-        let views: Vec<Predicted> = (1..9).map(|it| view(it as f32, 4.0, it as f32)).collect();
+        let views: Vec<Predicted> = (1..9).map(|i| view(i as f32, 4.0, i as f32)).collect();
         let all = &judge(&views.iter().collect::<Vec<_>>())[0];
         assert_eq!((all.auc, all.rank_correlation), (Some(1.0), Some(1.0)));
         assert_eq!((all.caught, all.wasted), (Some(100.0), Some(0.0)));
@@ -142,7 +143,7 @@ mod tests {
 
     #[test]
     fn a_constant_is_chance_level() {
-        let views: Vec<Predicted> = (1..9).map(|it| view(3.0, 4.0, it as f32)).collect();
+        let views: Vec<Predicted> = (1..9).map(|i| view(3.0, 4.0, i as f32)).collect();
         let all = &judge(&views.iter().collect::<Vec<_>>())[0];
         assert_eq!((all.auc, all.rank_correlation), (Some(0.5), None));
     }

@@ -40,7 +40,7 @@ pub fn published(dataset: &str, subject: &str, action: &str, version: Version) -
     };
     let subject = if dataset == "UMPM" { "All" } else { subject };
     let is_it = |it: &&Row| (it.0, it.1, it.2) == (dataset, subject, action);
-    PCP3D.iter().find(is_it).map(|it| it.3[column])
+    PCP3D.iter().find(is_it).map(|pcp3d| pcp3d.3[column])
 }
 
 #[cfg(test)]
@@ -56,10 +56,10 @@ mod tests {
             let mut n = 0.0;
             for row in PCP3D
                 .iter()
-                .filter(|it| it.0 == "HumanEva" && it.1 == "All" && it.2 != "Overall")
+                .filter(|pcp3d| pcp3d.0 == "HumanEva" && pcp3d.1 == "All" && pcp3d.2 != "Overall")
             {
-                let frames = PAPER_TEST.iter().filter(|it| it.action == row.2);
-                let frames = frames.map(|it| it.n_frames).sum::<usize>() as f64;
+                let frames = PAPER_TEST.iter().filter(|paper_test| paper_test.action == row.2);
+                let frames = frames.map(|frame| frame.n_frames).sum::<usize>() as f64;
                 sum += frames * row.3[column];
                 n += frames;
             }

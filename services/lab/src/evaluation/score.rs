@@ -42,7 +42,7 @@ pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameSc
     let truth = &frame.joints;
     let segments = segments(sequence.joints).map_or_else(Vec::new, Vec::from);
     let aligned_m = aligned(&found.joints, truth);
-    let aligned_m = aligned_m.map(|it| joint_errors(&it, truth));
+    let aligned_m = aligned_m.map(|aligned_m| joint_errors(&aligned_m, truth));
     let in_space = parse14(sequence.joints, truth);
     let views = sequence.rig.cameras().iter().zip(&sequence.views);
     let views = views.enumerate().map(|(nth, (camera, view))| {
@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn a_body_with_its_sides_exchanged_is_told() {
-        let truth: Vec<Option<Point>> = (0..14).map(|it| Some([f64::from(it), 0.0, 1.0])).collect();
+        let truth: Vec<Option<Point>> = (0..14).map(|i| Some([f64::from(i), 0.0, 1.0])).collect();
         let mut found = truth.clone();
         assert_eq!(is_exchanged(&found, &truth), Some(false));
         for [right, left] in [[0, 5], [1, 4], [2, 3], [6, 11], [7, 10], [8, 9]] {

@@ -39,7 +39,7 @@ impl Stress {
     /// * `nth`: number of the frame, from 0.
     pub fn views(self, nth: usize, n_views: usize) -> Vec<usize> {
         match self {
-            Self::Views(n) => (0..n.min(n_views)).map(|it| (it + nth) % n_views).collect(),
+            Self::Views(n) => (0..n.min(n_views)).map(|i| (i + nth) % n_views).collect(),
             _ => (0..n_views).collect(),
         }
     }
@@ -84,7 +84,7 @@ pub fn cover_half(rgb: &mut [u8], size: [usize; 2], outline: [f64; 4], nth: usiz
         _ => top = f64::midpoint(top, bottom),
     }
     let pixels = |from: f64, to: f64, side: usize| {
-        let at = |it: f64| (it.max(0.0) as usize).min(side);
+        let at = |value: f64| (value.max(0.0) as usize).min(side);
         at(from)..at(to).max(at(from))
     };
     let columns = pixels(left, right, size[0]);
@@ -173,7 +173,7 @@ mod tests {
                 .collect();
             let n = if stress == Stress::Bystander { 1 } else { 2 };
             assert!(hit.iter().all(|it| it.len() == n), "{hit:?}");
-            assert!((0..4).all(|view| hit.iter().filter(|it| it.contains(&view)).count() == n));
+            assert!((0..4).all(|view| hit.iter().filter(|hit| hit.contains(&view)).count() == n));
         }
         assert_eq!(Stress::Views(2).views(3, 4), [3, 0]);
         assert_eq!(Stress::Clean.views(3, 4), [0, 1, 2, 3]);
@@ -184,7 +184,7 @@ mod tests {
         for nth in 0..4 {
             let mut rgb = vec![9; 3 * 100 * 80];
             cover_half(&mut rgb, [100, 80], [20.0, 10.0, 60.0, 50.0], nth);
-            let grey = rgb.chunks_exact(3).filter(|it| *it == [127; 3]).count();
+            let grey = rgb.chunks_exact(3).filter(|chunk| *chunk == [127; 3]).count();
             assert_eq!(grey, 52 * 26, "{nth}");
             let inside = |x: usize, y: usize| rgb[3 * (y * 100 + x)] == 127;
             let corners = [inside(16, 6), inside(63, 6), inside(16, 53), inside(63, 53)];

@@ -131,7 +131,7 @@ pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootst
     let add = |groups: &mut Vec<Group>, names: [&str; 3], of: Vec<&Measured>| {
         let scores: Vec<&Vec<FrameScore>> = of.iter().flat_map(|it| &it.scores).collect();
         let [dataset, subject, action] = names.map(str::to_owned);
-        let numbers = (0..versions.len()).map(|it| numbers(&scores, it, bootstrap));
+        let numbers = (0..versions.len()).map(|i| numbers(&scores, i, bootstrap));
         groups.push(Group {
             dataset,
             subject,
@@ -144,8 +144,9 @@ pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootst
         let names = [&it.dataset, &it.subject, &it.action].map(String::as_str);
         add(&mut groups, names, vec![it]);
     }
-    for dataset in distinct(sequences.iter().map(|it| &it.dataset)) {
-        let own: Vec<&Measured> = sequences.iter().filter(|it| it.dataset == dataset).collect();
+    for dataset in distinct(sequences.iter().map(|sequence| &sequence.dataset)) {
+        let own: Vec<&Measured> =
+            sequences.iter().filter(|sequence| sequence.dataset == dataset).collect();
         let several = |of: &[&Measured]| of.len() > 1;
         for action in distinct(own.iter().map(|it| &it.action)) {
             let of: Vec<&Measured> = own.iter().copied().filter(|it| it.action == action).collect();
@@ -189,7 +190,7 @@ fn distinct<'a>(names: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
 /// Eq. 13 in one frame, percent.
 fn correct(frame: &FrameScore) -> Share {
     let judged = frame.segments.iter().flatten();
-    Share::of(judged.map(|it| percent(*it <= GAMMA)))
+    Share::of(judged.map(|judged| percent(*judged <= GAMMA)))
 }
 
 /// The gain of a frame over another, percent.
@@ -203,13 +204,13 @@ fn gain(own: &FrameScore, first: &FrameScore) -> Share {
 
 /// Errors of the joints that were found, mm.
 fn errors_mm(errors: &[Option<f64>]) -> Share {
-    let found = errors.iter().flatten().filter(|it| it.is_finite());
-    Share::of(found.map(|it| 1000.0 * it))
+    let found = errors.iter().flatten().filter(|error| error.is_finite());
+    Share::of(found.map(|value| 1000.0 * value))
 }
 
 fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -> Numbers {
-    let own: Vec<&FrameScore> = frames.iter().filter_map(|it| it.get(version)).collect();
-    let first: Vec<&FrameScore> = frames.iter().filter_map(|it| it.first()).collect();
+    let own: Vec<&FrameScore> = frames.iter().filter_map(|frame| frame.get(version)).collect();
+    let first: Vec<&FrameScore> = frames.iter().filter_map(|frame| frame.first()).collect();
     let each = |share: fn(&FrameScore) -> Share| -> Vec<Share> {
         own.iter().map(|it| share(it)).collect()
     };
@@ -219,7 +220,7 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
     };
     let segment = |nth: usize| {
         let errors = own.iter().filter_map(|it| *it.segments.get(nth)?);
-        Share::mean(&[Share::of(errors.map(|it| percent(it <= GAMMA)))])
+        Share::mean(&[Share::of(errors.map(|error| percent(error <= GAMMA)))])
     };
     let pcp = each(correct);
     let gains = own.iter().zip(&first).map(|(own, first)| gain(own, first));
@@ -228,9 +229,9 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
     let exchanged = each(|it| Share::of(it.is_exchanged.map(percent)));
     let images = images(&own);
     let effort = own.iter().flat_map(|it| &it.iterations);
-    let effort = Share::of(effort.map(|it| f64::from(*it)));
+    let effort = Share::of(effort.map(|effort| f64::from(*effort)));
     let n_unsettled: u32 = own.iter().map(|it| it.unsettled).sum();
-    let off = |it: &FrameScore| Share::of(it.on.map(|it| 100.0 * (1.0 - it)));
+    let off = |frame_score: &FrameScore| Share::of(frame_score.on.map(|on| 100.0 * (1.0 - on)));
     let is_compared = version > 0;
     Numbers {
         pcp3d: Share::mean(&pcp),
@@ -244,10 +245,10 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
         aligned_mpjpe_mm: Share::mean(&each(|it| errors_mm(&it.aligned_m))),
         exchanged: Share::mean(&exchanged),
         exchanged_interval: bootstrap.interval(&exchanged),
-        pck3d: of_joints(|it| it <= PCK_M),
-        lost: of_joints(|it| !it.is_finite()),
-        pcp2d: images.as_ref().map(|it| it.pcp(PcpRule::MeanOfEnds).percent()),
-        pck2d: images.map(|it| [0, 1].map(|share| it.pck(share).percent())),
+        pck3d: of_joints(|value| value <= PCK_M),
+        lost: of_joints(|value| !value.is_finite()),
+        pcp2d: images.as_ref().map(|image| image.pcp(PcpRule::MeanOfEnds).percent()),
+        pck2d: images.map(|image| [0, 1].map(|share| image.pck(share).percent())),
         iterations: Share::mean(&[effort]),
         unsettled: (effort.n > 0.0).then(|| 100.0 * f64::from(n_unsettled) / effort.n),
         solutions: Share::mean(&each(|it| Share::of([f64::from(it.solutions)]))),
@@ -261,13 +262,15 @@ fn percent(is_right: bool) -> f64 {
 }
 
 fn curve(frames: &[&FrameScore]) -> Vec<[f64; 2]> {
-    let errors: Vec<f64> =
-        frames.iter().flat_map(|it| it.segments.iter().flatten().copied()).collect();
+    let errors: Vec<f64> = frames
+        .iter()
+        .flat_map(|frame| frame.segments.iter().flatten().copied())
+        .collect();
     let point = |nth: usize| {
         let gamma = 0.05 * nth as f64;
         // The steps are not exact in binary, and 0.5 has to agree with the tables.
         let gamma = (gamma * 100.0).round() / 100.0;
-        let n = errors.iter().filter(|it| **it <= gamma).count();
+        let n = errors.iter().filter(|error| **error <= gamma).count();
         [gamma, 100.0 * n as f64 / errors.len().max(1) as f64]
     };
     (0..N_GAMMAS).map(point).collect()
@@ -275,7 +278,7 @@ fn curve(frames: &[&FrameScore]) -> Vec<[f64; 2]> {
 
 fn images(frames: &[&FrameScore]) -> Option<Report> {
     let mut report = Report::default();
-    for (found, truth) in frames.iter().flat_map(|it| it.views.iter().flatten()) {
+    for (found, truth) in frames.iter().flat_map(|frame| frame.views.iter().flatten()) {
         report.add(found.as_ref(), truth);
     }
     (report.n_images() > 0).then_some(report)
@@ -352,8 +355,11 @@ mod tests {
             measured("S1", "Jog", &[[6, 12]; 4]),
         ];
         let got = summary(&sequences);
-        let names: Vec<_> =
-            got.groups.iter().map(|it| (it.subject.as_str(), it.action.as_str())).collect();
+        let names: Vec<_> = got
+            .groups
+            .iter()
+            .map(|group| (group.subject.as_str(), group.action.as_str()))
+            .collect();
         let expected = [
             ("S1", "Box"),
             ("S2", "Box"),

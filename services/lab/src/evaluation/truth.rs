@@ -8,7 +8,7 @@ use statistics::score::Point;
 /// * Returns `None` for a joint that is not known, or that the set does not have.
 pub fn parse14(set: &JointSet, joints: &[Option<Point>]) -> Vec<Option<Point>> {
     let joint = |parts: &[usize]| {
-        let at = set.joints.iter().position(|it| it.parts == parts)?;
+        let at = set.joints.iter().position(|joint| joint.parts == parts)?;
         joints[at]
     };
     PARSE14.joints.iter().map(|it| joint(it.parts)).collect()
@@ -35,9 +35,9 @@ fn parts(joints: &[[f64; 2]]) -> [[f64; 2]; N_PARTS] {
         parts[joint.parts[0]] = *at;
     }
     for (part, from, to, share) in BETWEEN {
-        for side in [|it: usize| it, |it: usize| MIRROR[it]] {
+        for side in [|it: usize| it, |i: usize| MIRROR[i]] {
             let ends = [parts[side(from)], parts[side(to)]];
-            parts[side(part)] = [0, 1].map(|it| ends[0][it] + share * (ends[1][it] - ends[0][it]));
+            parts[side(part)] = [0, 1].map(|i| ends[0][i] + share * (ends[1][i] - ends[0][i]));
         }
     }
     parts
@@ -46,7 +46,7 @@ fn parts(joints: &[[f64; 2]]) -> [[f64; 2]; N_PARTS] {
 /// A tenth of the longer side of the rectangle around joints, in their unit.
 pub fn tenth_of(joints: &[[f64; 2]]) -> f64 {
     let side = |axis: usize| {
-        let values = joints.iter().map(|it| it[axis]);
+        let values = joints.iter().map(|joint| joint[axis]);
         let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
             [low.min(it), high.max(it)]
         });
@@ -80,7 +80,7 @@ pub fn part_errors_and_facing(
     joints: &[[f64; 2]],
     may_be_exchanged: bool,
 ) -> Option<(Vec<f32>, bool)> {
-    if centres.len() != N_PARTS || joints.iter().flatten().any(|it| !it.is_finite()) {
+    if centres.len() != N_PARTS || joints.iter().flatten().any(|joint| !joint.is_finite()) {
         return None;
     }
     let truth = parts(joints);
@@ -98,7 +98,7 @@ pub fn part_errors_and_facing(
         return Some((plain, false));
     }
     let other = errors(true);
-    let sum = |it: &[f32]| it.iter().sum::<f32>();
+    let sum = |values: &[f32]| values.iter().sum::<f32>();
     Some(if sum(&other) < sum(&plain) {
         (other, true)
     } else {
@@ -109,7 +109,7 @@ pub fn part_errors_and_facing(
 /// The size of a person: the longer side of the rectangle around the joints, pixels.
 pub fn size(joints: &[[f64; 2]]) -> f64 {
     let side = |axis: usize| {
-        let values = joints.iter().map(|it| it[axis]);
+        let values = joints.iter().map(|joint| joint[axis]);
         let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
             [low.min(it), high.max(it)]
         });
@@ -124,7 +124,12 @@ mod tests {
 
     /// Joints of a person who faces the camera, 200 px tall.
     fn standing() -> Vec<[f64; 2]> {
-        let joint = |it: usize| [40.0 + 3.0 * it as f64, 200.0 - 200.0 * it as f64 / 13.0];
+        let joint = |value: usize| {
+            [
+                40.0 + 3.0 * value as f64,
+                200.0 - 200.0 * value as f64 / 13.0,
+            ]
+        };
         (0..14).map(joint).collect()
     }
 
@@ -132,7 +137,7 @@ mod tests {
     fn every_set_has_the_fourteen_joints() {
         for set in JointSet::ALL {
             let joints: Vec<Option<Point>> =
-                (0..set.joints.len()).map(|it| Some([it as f64, 0.0, 0.0])).collect();
+                (0..set.joints.len()).map(|i| Some([i as f64, 0.0, 0.0])).collect();
             assert!(
                 parse14(set, &joints).iter().all(Option::is_some),
                 "{}",
@@ -145,7 +150,7 @@ mod tests {
     fn every_part_has_a_position_and_joints_coincide_with_their_parts() {
         let joints = standing();
         let parts = parts(&joints);
-        assert!(parts.iter().flatten().all(|it| it.is_finite()));
+        assert!(parts.iter().flatten().all(|part| part.is_finite()));
         assert_eq!(PARSE14.from_parts(&parts), joints);
         let [shoulder, hip] = [parts[14], parts[21]];
         let third = shoulder[1] + (hip[1] - shoulder[1]) / 3.0;
@@ -159,17 +164,17 @@ mod tests {
         found[6][0] += 20.1;
         let got = part_errors(&found, &joints, false).unwrap();
         assert!((got[6] - 1.0).abs() < 1e-5, "{}", got[6]);
-        assert_eq!(got.iter().filter(|it| **it > 0.0).count(), 1);
+        assert_eq!(got.iter().filter(|value| **value > 0.0).count(), 1);
     }
 
     #[test]
     fn sides_are_exchanged_where_that_may_be_and_fits_better() {
         let joints = standing();
         let truth = parts(&joints);
-        let found: Vec<[f64; 2]> = (0..N_PARTS).map(|it| truth[MIRROR[it]]).collect();
+        let found: Vec<[f64; 2]> = (0..N_PARTS).map(|i| truth[MIRROR[i]]).collect();
         let off = |may: bool| part_errors(&found, &joints, may).unwrap();
         assert!(off(true).iter().all(|it| *it == 0.0));
-        assert!(off(false).iter().any(|it| *it > 1.0));
+        assert!(off(false).iter().any(|value| *value > 1.0));
     }
 
     #[test]

@@ -76,9 +76,12 @@ impl Version {
 
     /// Its title in the paper's tables.
     pub fn title(self) -> String {
-        let terms = TERMS.iter().find(|it| it.0 == self.terms);
+        let terms = TERMS.iter().find(|term| term.0 == self.terms);
         let combining = COMBINING.iter().find(|it| it.0 == self.combining);
-        let words = [terms.map_or("", |it| it.2), combining.map_or("", |it| it.2)];
+        let words = [
+            terms.map_or("", |term| term.2),
+            combining.map_or("", |combining| combining.2),
+        ];
         words.concat()
     }
 }
@@ -86,10 +89,10 @@ impl Version {
 impl fmt::Display for Version {
     /// Its name in settings: `geometry+all-views`.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let terms = TERMS.iter().find(|it| it.0 == self.terms);
+        let terms = TERMS.iter().find(|term| term.0 == self.terms);
         let combining = COMBINING.iter().find(|it| it.0 == self.combining);
-        out.write_str(terms.map_or("", |it| it.1))?;
-        out.write_str(combining.map_or("", |it| it.1))
+        out.write_str(terms.map_or("", |term| term.1))?;
+        out.write_str(combining.map_or("", |combining| combining.1))
     }
 }
 

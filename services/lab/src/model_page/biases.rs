@@ -8,7 +8,7 @@ use exports::report::{html, put};
 
 /// Rows are the parent's types, columns those of the part; the colours span the table's own largest bias.
 pub(super) fn table(edge: &Edge) -> Html {
-    let all = || edge.bias.iter().flatten().filter(|it| it.is_finite());
+    let all = || edge.bias.iter().flatten().filter(|bias| bias.is_finite());
     let largest = all().fold(0.0_f64, |largest, it| largest.max(it.abs()));
     let n_own = edge.bias.first().map_or(0, Vec::len);
     let mut out = html!("<figure><table class=\"biases\"><tr><th></th>");

@@ -29,8 +29,8 @@ impl Figure {
         let (mut corner, mut spring) = (Vec::new(), Vec::new());
         for (part, spec) in model.spec().parts.iter().enumerate() {
             let edge = spec.edge.as_ref();
-            let its = edge.and_then(|it| of_pair(it, types[it.parent], types[part]));
-            let from = edge.map_or([0.0; 2], |it| corner[it.parent]);
+            let its = edge.and_then(|edge| of_pair(edge, types[edge.parent], types[part]));
+            let from = edge.map_or([0.0; 2], |edge| corner[edge.parent]);
             let offset = its.map_or([0.0; 2], |it| it.centre);
             corner.push([from[0] + offset[0], from[1] + offset[1]]);
             spring.push(its);
@@ -96,7 +96,7 @@ impl Figure {
                     [x, y, rx, ry, colour]
                 );
                 for (_, other) in ellipses(edge) {
-                    let [dx, dy] = [0, 1].map(|it| other.centre[it] - spring.centre[it]);
+                    let [dx, dy] = [0, 1].map(|i| other.centre[i] - spring.centre[i]);
                     put!(
                         springs,
                         "<circle cx=\"{:.2}\" cy=\"{:.2}\" r=\".1\" fill=\"{colour}\" fill-opacity=\".5\"/>",

@@ -30,7 +30,7 @@ pub(super) fn symbols(model: &Model) -> Html {
 pub(super) fn of_type(model: &Model, part: usize, mixture: usize) -> Html {
     let index = model.spec().parts[part].filter_of_type[mixture];
     let filter = model.filter(part, mixture);
-    let [width, height] = [filter.cols, filter.rows].map(|it| it as f64 * CELL);
+    let [width, height] = [filter.cols, filter.rows].map(|value| value as f64 * CELL);
     let largest = orientations(filter).into_iter().fold(0.0, f64::max);
     html!(
         "<figure><svg class=\"dark\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {width} {height}\">\
@@ -51,8 +51,8 @@ fn orientations(filter: &Filter) -> Vec<f64> {
         .0
         .iter()
         .flat_map(|cell| {
-            (0..N_ORIENTATIONS).map(|it| {
-                [it, it + N_ORIENTATIONS, it + 2 * N_ORIENTATIONS]
+            (0..N_ORIENTATIONS).map(|i| {
+                [i, i + N_ORIENTATIONS, i + 2 * N_ORIENTATIONS]
                     .iter()
                     .map(|&channel| cell[channel].max(0.0))
                     .sum()

@@ -19,12 +19,12 @@ pub(super) struct Ellipse {
 impl Ellipse {
     /// The spring costs `w0 d^2 + w1 d` an axis with `d = anchor - offset`: least at `d = -w1 / (2 w0)`.
     pub(super) fn of(spring: &Spring) -> Self {
-        let axis = |it: usize| [spring.w[2 * it], spring.w[2 * it + 1]];
+        let axis = |value: usize| [spring.w[2 * value], spring.w[2 * value + 1]];
         let [x, y] = spring.anchor.map(f64::from);
         let rest = |[square, linear]: [f64; 2]| linear / (2.0 * square);
         Self {
             centre: [x + rest(axis(0)), y + rest(axis(1))],
-            radius: [0, 1].map(|it| (SPRING_COST / axis(it)[0]).sqrt()),
+            radius: [0, 1].map(|i| (SPRING_COST / axis(i)[0]).sqrt()),
         }
     }
 }

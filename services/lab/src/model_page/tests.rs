@@ -26,7 +26,7 @@ pub(crate) fn planted(name: &str) -> ModelSpec {
     let filter = |seed: usize| Filter {
         rows: 2,
         cols: 3,
-        weights: (0..6 * N_CHANNELS).map(|it| ((it + 1000 * seed) as f64).sin()).collect(),
+        weights: (0..6 * N_CHANNELS).map(|i| ((i + 1000 * seed) as f64).sin()).collect(),
     };
     ModelSpec {
         name: name.to_owned(),
@@ -51,7 +51,10 @@ fn count(page: &str, name: &str) -> usize {
         ..ParsingOptions::default()
     };
     let document = Document::parse_with_options(page, options).unwrap();
-    document.descendants().filter(|it| it.has_tag_name(name)).count()
+    document
+        .descendants()
+        .filter(|descendant| descendant.has_tag_name(name))
+        .count()
 }
 
 #[test]
@@ -94,7 +97,7 @@ fn the_ellipse_is_where_the_spring_costs_what_it_says() {
     let ellipse = Ellipse::of(&SPRING);
     assert_eq!(ellipse.centre, [3.0, 1.0]);
     let cost = |at: [f64; 2]| {
-        let [dx, dy] = [0, 1].map(|it| f64::from(SPRING.anchor[it]) - at[it]);
+        let [dx, dy] = [0, 1].map(|i| f64::from(SPRING.anchor[i]) - at[i]);
         let [a, b, c, d] = SPRING.w;
         a * dx * dx + b * dx + c * dy * dy + d * dy
     };

@@ -86,7 +86,7 @@ pub(super) fn samples(job: &Job, work: &Work) -> Result<(Vec<Sample>, Vec<Named>
 }
 
 fn selection(values: &[&str]) -> Result<Option<Selection>, Failure> {
-    let one = values.first().map(|it| Selection::from_argument(it));
+    let one = values.first().map(|value| Selection::from_argument(value));
     one.transpose().or_fail(ExitKind::Usage)
 }
 

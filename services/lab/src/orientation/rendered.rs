@@ -67,7 +67,7 @@ fn mean_error(centres: &[[f64; 2]], truth: &[[f64; 2]]) -> Option<f64> {
             let there = truth[of(part)];
             (x - there[0]).hypot(y - there[1])
         });
-        let known: Vec<f64> = distances.filter(|it| it.is_finite()).collect();
+        let known: Vec<f64> = distances.filter(|distance| distance.is_finite()).collect();
         (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
     };
     let sides = [mean(&|part| part)?, mean(&|part| skeleton::MIRROR[part])?];
@@ -79,12 +79,14 @@ pub(crate) fn front_in_view(shown: &Shown<'_>) -> Option<[f32; 2]> {
     let joints: Vec<Option<Point3<f64>>> = shown
         .in_world
         .iter()
-        .map(|it| it.iter().all(|it| it.is_finite()).then(|| Point3::from(*it)))
+        .map(|in_world| {
+            in_world.iter().all(|value| value.is_finite()).then(|| Point3::from(*in_world))
+        })
         .collect();
     let known: Vec<&Point3<f64>> = joints.iter().flatten().collect();
     let sum: Vector3<f64> = known.iter().map(|it| it.coords).sum();
     let place = Point3::from(sum / known.len().max(1) as f64);
     let front = multiview::front(&joints)?;
     let in_view = multiview::front_in_view(shown.camera, &place, &front);
-    Some(in_view.map(|it| it as f32))
+    Some(in_view.map(|in_view| in_view as f32))
 }

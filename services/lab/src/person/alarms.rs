@@ -48,9 +48,9 @@ pub(super) fn count(
     progress.begin_alarms(images.len());
     let scores: Vec<_> = images
         .par_iter()
-        .map(|it| {
+        .map(|image| {
             progress.go_on_or_stop()?;
-            let scores = scores(&search, &settings, it);
+            let scores = scores(&search, &settings, image);
             progress.looked_at_one();
             Ok::<_, Failure>(scores)
         })
@@ -59,7 +59,7 @@ pub(super) fn count(
         folder,
         n_images: 0,
         n_unreadable: 0,
-        counts: thresholds.map(|it| (it, 0)),
+        counts: thresholds.map(|threshold| (threshold, 0)),
     };
     for (image, scores) in images.iter().zip(scores) {
         match scores {

@@ -65,11 +65,11 @@ impl Gallery {
         let people: Vec<_> = data.people.iter().enumerate().collect();
         let copies: Result<Vec<_>, AlbumError> = people.into_par_iter().map(of_person).collect();
         let (copies, parts) = copies.or_fail(ExitKind::Input)?.into_iter().flatten().unzip();
-        let images = data.people.iter().map(|it| it.0.image.as_path());
+        let images = data.people.iter().map(|person| person.0.image.as_path());
         let files: Vec<&Path> = images.chain(data.negatives.iter().map(PathBuf::as_path)).collect();
         Ok(Self {
             stamp: stamp(&files),
-            people: data.people.iter().map(|it| it.0.clone()).collect(),
+            people: data.people.iter().map(|person| person.0.clone()).collect(),
             joint_mirror,
             copies,
             parts,
@@ -125,7 +125,7 @@ fn turned(plain: &Sample, degrees: f64) -> Result<Sample, AlbumError> {
 /// FNV-1a of the names and lengths of files.
 fn stamp(files: &[&Path]) -> u64 {
     let named = files.iter().flat_map(|file| {
-        let length = std::fs::metadata(file).map_or(0, |it| it.len());
+        let length = std::fs::metadata(file).map_or(0, |metadata| metadata.len());
         let name = file.file_name().unwrap_or_default().as_encoded_bytes();
         name.iter().copied().chain(length.to_le_bytes())
     });

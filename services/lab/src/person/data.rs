@@ -101,12 +101,12 @@ impl Data {
             let People { people, problems } =
                 training::datasets::read(path, options).map_err(dataset_failure)?;
             let people = people.into_iter();
-            let people = people.map(|it| sides.of(it, table.joint_mirror()));
+            let people = people.map(|person| sides.of(person, table.joint_mirror()));
             for problem in problems {
                 *data.left_out.entry(problem.fault.kind().name()).or_default() += 1;
                 progress.left_out(&problem)?;
             }
-            data.people.extend(people.map(|it| (it, angles.clone())));
+            data.people.extend(people.map(|person| (person, angles.clone())));
         }
         if data.people.is_empty() {
             let n: usize = data.left_out.values().sum();
@@ -120,7 +120,7 @@ impl Data {
     /// Decodes every image once, to know that it can be.
     fn negatives(&mut self, folders: &[PathBuf], progress: &Progress) -> Result<(), Failure> {
         let images = in_folders(folders)?;
-        let read: Vec<_> = images.par_iter().map(|it| Picture::read(it).err()).collect();
+        let read: Vec<_> = images.par_iter().map(|image| Picture::read(image).err()).collect();
         for (image, error) in images.into_iter().zip(read) {
             match error {
                 None => self.negatives.push(image),
@@ -141,7 +141,7 @@ impl Data {
 
 /// All images of folders, by name.
 pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    if let Some(folder) = folders.iter().find(|it| !it.is_dir()) {
+    if let Some(folder) = folders.iter().find(|folder| !folder.is_dir()) {
         let message = format!("{}: no folder of images without people", folder.display());
         return Err(Failure::new(ExitKind::Input, message));
     }
@@ -191,9 +191,9 @@ fn selection(option: &str, values: &[&str]) -> Result<Option<Selection>, Failure
 /// Angles of copies, 0 first, each once.
 fn degrees(values: &[&str]) -> Result<Vec<f64>, Failure> {
     let mut angles = vec![0.0];
-    for text in values.iter().flat_map(|it| it.split(',')) {
+    for text in values.iter().flat_map(|value| value.split(',')) {
         let angle = text.trim().parse::<f64>().ok();
-        let angle = angle.filter(|it| it.abs() <= 180.0).ok_or_else(|| {
+        let angle = angle.filter(|angle| angle.abs() <= 180.0).ok_or_else(|| {
             let message = format!("--rotate {text}: expected degrees between -180 and 180");
             Failure::new(ExitKind::Usage, message)
         })?;

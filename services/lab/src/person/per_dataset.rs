@@ -53,7 +53,7 @@ pub(crate) fn deal<'a>(
                 }
             }
             Whose::All(_) => {
-                let first = datasets.first().map(|it| it.display().to_string());
+                let first = datasets.first().map(|dataset| dataset.display().to_string());
                 let first = first.unwrap_or_default();
                 let message =
                     format!("{option} {argument}: of several data sets, which one is meant?");

@@ -150,7 +150,7 @@ impl Progress {
 
     /// Images of people that could not be placed in the end.
     pub(super) fn n_lost(&self) -> Option<usize> {
-        self.lock().placed.map(|it| it.1)
+        self.lock().placed.map(|placed| placed.1)
     }
 
     /// Ends the bar.
@@ -204,8 +204,8 @@ impl State {
         let placed = self
             .placed
             .map(|(n, n_lost, mean)| format!(", {n} placed, {n_lost} lost, mean score {mean:.3}"));
-        let gap = self.gap.map(|it| {
-            let (objective, n, share) = (it.primal, it.n_support, 100.0 * it.relative());
+        let gap = self.gap.map(|gap| {
+            let (objective, n, share) = (gap.primal, gap.n_support, 100.0 * gap.relative());
             format!(", objective {objective:.4}, gap {share:.1} %, {n} support vectors")
         });
         let learns = matches!(self.step, Step::Learn { .. });
@@ -217,13 +217,13 @@ impl State {
     /// Seconds until all steps are done: each takes as long as those of its kind took, or all did.
     fn seconds_left(&self) -> Option<f64> {
         let mean = |of: &dyn Fn(Step) -> bool| {
-            let taken = self.seconds.iter().filter(|it| of(it.0)).map(|it| it.1);
+            let taken = self.seconds.iter().filter(|second| of(second.0)).map(|second| second.1);
             let n = taken.clone().count();
             (n > 0).then(|| taken.sum::<f64>() / n as f64)
         };
         let any = mean(&|_| true)?;
         let left = self.all.get(self.at..).filter(|it| !it.is_empty())?.iter();
-        let of_step = |it: &Step| mean(&|other| kind(other) == kind(*it)).unwrap_or(any);
+        let of_step = |step: &Step| mean(&|other| kind(other) == kind(*step)).unwrap_or(any);
         Some(left.map(of_step).sum())
     }
 
@@ -283,7 +283,7 @@ fn what(step: Step) -> String {
         Step::Filters => "first filters".to_owned(),
         Step::Place { round } => format!("round {}, people placed", round + 1),
         Step::Learn { round, pass, batch } => {
-            let [round, pass, batch] = [round, pass, batch].map(|it| it + 1);
+            let [round, pass, batch] = [round, pass, batch].map(|value| value + 1);
             format!("round {round}, pass {pass}, batch {batch}")
         }
         Step::Judge => "threshold".to_owned(),

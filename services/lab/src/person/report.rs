@@ -44,7 +44,7 @@ pub struct Report {
 impl Report {
     /// What is known before the training.
     pub(super) fn new(data: &Data, gallery: &Gallery, plan: &Plan) -> Self {
-        let copies = (0..plan.n_people()).map(|it| gallery.person_of(plan.person(it)));
+        let copies = (0..plan.n_people()).map(|i| gallery.person_of(plan.person(i)));
         let mut people: Vec<usize> = copies.collect();
         people.dedup();
         let shape = plan.shape();
@@ -58,7 +58,7 @@ impl Report {
             n_unreadable: data.n_unreadable,
             filter_cells: shape.side,
             n_parts,
-            n_filters: (0..n_parts).map(|it| shape.n_types(it)).sum(),
+            n_filters: (0..n_parts).map(|i| shape.n_types(i)).sum(),
             threshold: f64::NAN,
             training_seconds: 0.0,
             n_resumed: 0,

@@ -20,7 +20,7 @@ impl Crop {
     /// * `angle`: the picture is turned by it first, radians, clockwise.
     pub(super) fn around(joints: &[[f64; 2]], angle: f64) -> Option<Self> {
         let turn = [angle.cos(), angle.sin()];
-        let known = joints.iter().filter(|it| it.iter().all(|it| it.is_finite()));
+        let known = joints.iter().filter(|joint| joint.iter().all(|value| value.is_finite()));
         let turned = known.map(|[x, y]| [turn[0] * x - turn[1] * y, turn[1] * x + turn[0] * y]);
         let [left, top, right, bottom] = posenetwork::outline_of(turned)?;
         let shape = Shape::default();
@@ -47,7 +47,7 @@ impl Crop {
 
     /// The point of the picture at a point of the square.
     pub(super) fn outside(&self, at: [f64; 2]) -> [f64; 2] {
-        let [x, y] = at.map(|it| (it - 0.5 * (SIDE - 1) as f64) * self.step);
+        let [x, y] = at.map(|at| (at - 0.5 * (SIDE - 1) as f64) * self.step);
         let [cosine, sine] = self.turn;
         [
             cosine * x + sine * y + self.centre[0],
@@ -68,7 +68,7 @@ impl Crop {
             for column in 0..SIDE {
                 let mut sum = [0.0; 3];
                 for part in 0..n * n {
-                    let within = |it: usize| (it as f64 + 0.5) / n as f64 - 0.5;
+                    let within = |value: usize| (value as f64 + 0.5) / n as f64 - 0.5;
                     let at = [
                         column as f64 + within(part % n),
                         row as f64 + within(part / n),
@@ -78,7 +78,7 @@ impl Crop {
                         *sum += colour / (n * n) as f64;
                     }
                 }
-                rgb.extend(sum.map(|it| it.round().clamp(0.0, 255.0) as u8));
+                rgb.extend(sum.map(|sum| sum.round().clamp(0.0, 255.0) as u8));
             }
         }
         rgb
@@ -126,8 +126,8 @@ mod tests {
         let picture = Rgb8View::new(100, 120, &data).unwrap();
         let rgb = crop.rgb(picture);
         let brightest = (0..SIDE * SIDE)
-            .max_by_key(|it| rgb[3 * it])
-            .map(|it| [(it % SIDE) as f64, (it / SIDE) as f64])
+            .max_by_key(|i| rgb[3 * i])
+            .map(|i| [(i % SIDE) as f64, (i / SIDE) as f64])
             .unwrap();
         assert!((brightest[0] - at[0]).abs() < 1.0 && (brightest[1] - at[1]).abs() < 1.0);
     }

@@ -96,7 +96,7 @@ fn of_all(
     let of_thread = &of_thread;
     let found: Result<Vec<_>, Failure> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..n_threads)
-            .map(|it| teachers.get(it).map_or(&[][..], Vec::as_slice))
+            .map(|i| teachers.get(i).map_or(&[][..], Vec::as_slice))
             .map(|teachers| scope.spawn(move || of_thread(teachers)))
             .collect();
         let died = || {
@@ -105,7 +105,9 @@ fn of_all(
                 "a thread that prepared people died",
             ))
         };
-        let join = |it: std::thread::ScopedJoinHandle<'_, _>| it.join().unwrap_or_else(|_| died());
+        let join = |scoped_join_handle: std::thread::ScopedJoinHandle<'_, _>| {
+            scoped_join_handle.join().unwrap_or_else(|_| died())
+        };
         threads.into_iter().map(join).collect()
     });
     let mut found: Vec<(usize, Person)> = found?.into_iter().flatten().collect();
@@ -129,7 +131,7 @@ fn of_person(
         return Ok(None);
     };
     let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
-    let marked = joints.map(|at| upright.inside(at).map(|it| it as f32));
+    let marked = joints.map(|at| upright.inside(at).map(|value| value as f32));
     let trunk = length(trunk(&marked));
     if !trunk.is_finite() || trunk < MIN_TRUNK || upright.enlarges() > MOST_ENLARGED {
         return Ok(None);
@@ -160,12 +162,12 @@ fn of_person(
     }
     let back = |at: Point| {
         let at = crop.inside(upright.outside(at.map(f64::from)));
-        at.map(|it| it as f32)
+        at.map(|at| at as f32)
     };
-    let targets = marks.targets().map(|it| Target {
-        at: back(it.at),
-        or: it.or.map(back),
-        ..it
+    let targets = marks.targets().map(|target| Target {
+        at: back(target.at),
+        or: target.or.map(back),
+        ..target
     });
     Ok(Some(Person {
         source: Source::Photograph,
@@ -179,7 +181,7 @@ fn of_person(
 /// The joints that are marked as visible; the others are not finite.
 fn visible(person: &Annotated) -> [[f64; 2]; N_JOINTS] {
     core::array::from_fn(|joint| {
-        let is_visible = person.visible.get(joint).is_some_and(|it| *it);
+        let is_visible = person.visible.get(joint).is_some_and(|visible| *visible);
         let at = person.joints.get(joint).filter(|_| is_visible);
         at.copied().unwrap_or([f64::NAN; 2])
     })
@@ -207,8 +209,8 @@ fn in_picture([aside, towards]: [f32; 2], lean: f32) -> [f32; 3] {
 
 /// The angle between the trunk and upright, clockwise, radians.
 fn lean(joints: &[[f64; 2]; N_JOINTS]) -> f64 {
-    let [right, left] = PAIRS[0].map(|it| joints[it]);
-    let shoulders = PAIRS[1].map(|it| joints[it]);
+    let [right, left] = PAIRS[0].map(|pair| joints[pair]);
+    let shoulders = PAIRS[1].map(|pair| joints[pair]);
     let neck = if joints[NECK][0].is_finite() {
         joints[NECK]
     } else {
@@ -219,8 +221,8 @@ fn lean(joints: &[[f64; 2]; N_JOINTS]) -> f64 {
 }
 
 fn trunk(joints: &[Point; N_JOINTS]) -> Point {
-    let [right, left] = PAIRS[0].map(|it| joints[it]);
-    let shoulders = PAIRS[1].map(|it| joints[it]);
+    let [right, left] = PAIRS[0].map(|pair| joints[pair]);
+    let shoulders = PAIRS[1].map(|pair| joints[pair]);
     let neck = if joints[NECK][0].is_finite() {
         joints[NECK]
     } else {
@@ -259,7 +261,7 @@ fn taught(
     marked: &[Point; N_JOINTS],
 ) -> Result<[(Point, f32); N_KEYPOINTS], Failure> {
     let last = (SIDE - 1) as f64;
-    let known = marked.iter().filter(|it| it[0].is_finite()).map(|at| at.map(f64::from));
+    let known = marked.iter().filter(|marked| marked[0].is_finite()).map(|at| at.map(f64::from));
     let Some([left, top, right, bottom]) = posenetwork::outline_of(known) else {
         return Ok([UNKNOWN; N_KEYPOINTS]);
     };
@@ -307,7 +309,9 @@ fn find(
                 found.map(|(keypoint, _)| keypoint)
             }
         };
-        peak.map_or(UNKNOWN, |it| (it.at.map(|it| it as f32), it.score as f32))
+        peak.map_or(UNKNOWN, |peak| {
+            (peak.at.map(|at| at as f32), peak.score as f32)
+        })
     }))
 }
 

@@ -37,7 +37,7 @@ pub(super) fn people(scenes: &Scenes, work: &Work<'_>) -> Result<Vec<(u64, Perso
 fn person(shown: &Shown<'_>) -> Option<(u64, Person)> {
     let subject = shown.group.rsplit(' ').next()?.parse().ok()?;
     let joints: [[f64; 2]; N_JOINTS] = shown.joints.as_slice().try_into().ok()?;
-    let n_seen = joints.iter().filter(|it| it[0].is_finite()).count();
+    let n_seen = joints.iter().filter(|joint| joint[0].is_finite()).count();
     if n_seen < FEWEST {
         return None;
     }
@@ -52,7 +52,7 @@ fn person(shown: &Shown<'_>) -> Option<(u64, Person)> {
             return Target::UNKNOWN;
         }
         Target {
-            at: crop.inside(at).map(|it| it as f32),
+            at: crop.inside(at).map(|value| value as f32),
             or: None,
             weight: 1.0,
             is_marked: true,

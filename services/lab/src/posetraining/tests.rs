@@ -72,7 +72,7 @@ fn a_network_that_was_not_trained_fits_its_card_and_tells_front_and_errors() {
     let errors: Vec<f64> = sight.errors().unwrap().collect();
     assert_eq!(errors.len(), N_KEYPOINTS);
     assert!(
-        errors.iter().all(|it| (it - 10.0).abs() < 0.1),
+        errors.iter().all(|error| (error - 10.0).abs() < 0.1),
         "{errors:?}"
     );
     let mut maps = posenetwork::JointMaps::default();

@@ -33,12 +33,12 @@ fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
 fn drawn(passes: &[Pass]) -> String {
     let cost = |name, value: &dyn Fn(&Pass) -> f32| Line {
         name,
-        values: passes.iter().map(|it| f64::from(value(it))).collect(),
+        values: passes.iter().map(|pass| f64::from(value(pass))).collect(),
     };
-    let judged: Vec<Score> = passes.iter().filter_map(|it| it.score).collect();
+    let judged: Vec<Score> = passes.iter().filter_map(|pass| pass.score).collect();
     let score = |name, value: &dyn Fn(&Score) -> f32| Line {
         name,
-        values: judged.iter().map(|it| f64::from(value(it))).collect(),
+        values: judged.iter().map(|judged| f64::from(value(judged))).collect(),
     };
     let panel = |what, lines| Panel { what, lines };
     let panels = [

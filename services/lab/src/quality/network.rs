@@ -242,7 +242,7 @@ impl Say<'_> {
         let areas = judgement
             .area
             .iter()
-            .map(|it| it.map_or("-".to_owned(), |it| format!("{:.0}", 100.0 * it)));
+            .map(|area| area.map_or("-".to_owned(), |value| format!("{:.0}", 100.0 * value)));
         let areas: Vec<String> = areas.collect();
         self.console.result(&format!(
             "{name}: {} samples, area under the ROC {:.3}, rank correlation {:.3}\n  area by part, %: {}",

@@ -66,7 +66,7 @@ impl Observer {
         (group, source): (String, String),
     ) -> Result<Sample, NoSample> {
         if joints.len() != self.table.n_joints()
-            || joints.iter().flatten().any(|it| !it.is_finite())
+            || joints.iter().flatten().any(|joint| !joint.is_finite())
         {
             return Err(NoSample::Unknown);
         }
@@ -93,7 +93,7 @@ impl Observer {
             picture: picture_of(picture, &tile),
             evidence: numbers,
             height_px: tile.height_px() as f32,
-            errors_px: errors.into_iter().map(|it| it as f32).collect(),
+            errors_px: errors.into_iter().map(|error| error as f32).collect(),
         })
     }
 }
@@ -114,6 +114,6 @@ fn picture_of(picture: Rgb8View<'_>, tile: &Tile) -> Vec<u8> {
     let area = height * width;
     (0..area)
         .flat_map(|at| [0, 1, 2].map(|channel| planes[channel * area + at]))
-        .map(|it| (it * 255.0).round() as u8)
+        .map(|value| (value * 255.0).round() as u8)
         .collect()
 }

@@ -123,6 +123,6 @@ fn people(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
 }
 
 fn selection(values: &[&str]) -> Result<Option<Selection>, Failure> {
-    let one = values.first().map(|it| Selection::from_argument(it));
+    let one = values.first().map(|value| Selection::from_argument(value));
     one.transpose().or_fail(ExitKind::Usage)
 }

@@ -104,9 +104,9 @@ pub(super) fn deployment(
     scene: &Scene,
 ) -> Result<(), Failure> {
     let settings = scene.settings();
-    let quoted = |it: &str| toml::Value::from(it).to_string();
-    let model = job.model.as_deref().map_or(String::new(), |it| {
-        let file = absolute_path(it).display().to_string();
+    let quoted = |text: &str| toml::Value::from(text).to_string();
+    let model = job.model.as_deref().map_or(String::new(), |model| {
+        let file = absolute_path(model).display().to_string();
         format!("method = \"paper\"\npaper.model = {}\n", quoted(&file))
     });
     let (rate, seed) = (settings.rate_hz, settings.seed);
@@ -131,7 +131,7 @@ pub(super) fn deployment(
         let (name, source) = (quoted(&camera.name), quoted(&source));
         write!(text, "\n[[camera]]\nname = {name}\nsource = {source}\n").or_fail(ExitKind::Run)?;
         // The address of a scene has it.
-        let skew_ms = settings.skews_ms.get(nth).filter(|it| **it != 0.0 && !job.live);
+        let skew_ms = settings.skews_ms.get(nth).filter(|skews_ms| **skews_ms != 0.0 && !job.live);
         if let Some(skew_ms) = skew_ms {
             writeln!(text, "skew_ms = {skew_ms:?}").or_fail(ExitKind::Run)?;
         }

@@ -14,7 +14,7 @@ use training::datasets::sequences::{
 ///
 /// The file cannot be read, or is no such table.
 pub fn marker_table(name: &Path) -> Result<MarkerTable, Failure> {
-    let preset = name.to_str().filter(|it| PRESETS.contains(it));
+    let preset = name.to_str().filter(|text| PRESETS.contains(text));
     match preset.and_then(MarkerTable::preset) {
         Some(table) => Ok(table),
         None => MarkerTable::read(name).map_err(failed),
@@ -57,7 +57,7 @@ fn performed(file: &Path, motion: &Motion) -> Recording {
     let postures = motion.joints.iter().enumerate();
     let postures = postures.map(|(frame, joints)| Posture {
         joints: *joints,
-        toes: toes.map(|it| it[frame]),
+        toes: toes.map(|toe| toe[frame]),
     });
     Recording {
         name: name(file),
@@ -69,7 +69,13 @@ fn performed(file: &Path, motion: &Motion) -> Recording {
 /// A name for folders and deployments: lower case, digits and hyphens, not long.
 fn name(file: &Path) -> String {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-    let plain = |it: char| if it.is_ascii_alphanumeric() { it } else { '-' };
+    let plain = |letter: char| {
+        if letter.is_ascii_alphanumeric() {
+            letter
+        } else {
+            '-'
+        }
+    };
     let name: String = stem.to_ascii_lowercase().chars().map(plain).take(16).collect();
     match name.trim_matches('-') {
         "" => "motion".to_owned(),

@@ -43,8 +43,8 @@ impl People {
             anatomical += &(line.clone() + "\n");
             let line = if *behind {
                 let mirrored = Person {
-                    joints: MIRROR.map(|it| person.joints[it]).to_vec(),
-                    visible: MIRROR.map(|it| person.visible[it]).to_vec(),
+                    joints: MIRROR.map(|mirror| person.joints[mirror]).to_vec(),
+                    visible: MIRROR.map(|mirror| person.visible[mirror]).to_vec(),
                     ..person.clone()
                 };
                 training::datasets::to_line(&mirrored, Some(name)).or_fail(ExitKind::Run)?

@@ -75,7 +75,7 @@ impl<'a> Sequence<'a> {
     pub(super) fn write(&self, stop: &Stop, console: &dyn Console) -> Result<People, Failure> {
         let views: Result<Vec<View>, SceneError> = (0..self.n_cameras())
             .into_par_iter()
-            .map(|it| View::new(&self.scene, it))
+            .map(|i| View::new(&self.scene, i))
             .collect();
         let views = views.map_err(failed)?;
         let n_chunks = self.job.n_frames.div_ceil(CHUNK);
@@ -152,14 +152,14 @@ impl<'a> Sequence<'a> {
             return people;
         }
         for frame in frames {
-            for seen in frame.views.iter().filter(|it| !it.repeated && it.outline.is_some()) {
+            for seen in frame.views.iter().filter(|view| !view.repeated && view.outline.is_some()) {
                 let file = files::name(&format!("{:06}", frame.frame), self.job.format);
                 let image = Path::new("cameras").join(&seen.camera).join(file);
                 let unknown = [f64::NAN; 2];
                 let person = Person {
                     image,
                     row: String::new(),
-                    joints: seen.pixels.iter().map(|it| it.unwrap_or(unknown)).collect(),
+                    joints: seen.pixels.iter().map(|pixel| pixel.unwrap_or(unknown)).collect(),
                     visible: seen.visible.to_vec(),
                 };
                 let name = format!("{}-{}-{:06}", self.name, seen.camera, frame.frame);

@@ -52,9 +52,9 @@ impl Drawn {
         assert_ended(&ended, 0, &[]);
         let report: Value = serde_json::from_str(&ended.stdout).unwrap();
         let rows = report["offsets"].as_array().unwrap();
-        let row = rows.iter().find(|it| it["joint"] == joint).unwrap();
+        let row = rows.iter().find(|row| row["joint"] == joint).unwrap();
         let along = row["along"].as_f64().unwrap();
-        let ends = [0, 1].map(|it| row["along_interval"][it].as_f64().unwrap());
+        let ends = [0, 1].map(|i| row["along_interval"][i].as_f64().unwrap());
         assert!(ends[0] <= along && along <= ends[1], "{row}");
         (along, report["joints"].clone())
     }
@@ -78,7 +78,7 @@ fn knees_that_are_marked_lower_are_found_lower_with_the_file_that_was_learned() 
     let summary: Value = serde_json::from_str(learned.stdout.lines().last().unwrap()).unwrap();
     let set = &summary["learned"]["sets"][0];
     assert_eq!(set["people"], 30, "{summary}");
-    let error = |it: &str| set[it].as_f64().unwrap();
+    let error = |text: &str| set[text].as_f64().unwrap();
     assert!(error("error_after") < error("error_before"), "{summary}");
 
     let (before, plain) = drawn.offset("knee", "none");
@@ -97,7 +97,7 @@ fn knees_that_are_marked_lower_are_found_lower_with_the_file_that_was_learned() 
     assert!(drawn.model("one.joints") == drawn.model("two.joints"));
 
     assert_eq!(drawn.knee("shipped"), drawn.knee("none"));
-    let [low, high] = ["one.joints", "none"].map(|it| drawn.knee(it)[1].as_f64().unwrap());
+    let [low, high] = ["one.joints", "none"].map(|name| drawn.knee(name)[1].as_f64().unwrap());
     assert!(low > high + 1.0, "{low} {high}");
 }
 

@@ -29,7 +29,7 @@ pub fn live_camera(camera: &Camera) -> Option<LiveCamera> {
         size: camera.size,
         rate_hz: camera.frame_rate_hz,
         controls: camera.controls.clone(),
-        transport: camera.transport.map(|it| match it {
+        transport: camera.transport.map(|transport| match transport {
             Transport::Tcp => footage::Transport::Tcp,
             Transport::Udp => footage::Transport::Udp,
         }),
@@ -64,7 +64,7 @@ pub(crate) fn footage(
                 }
                 None => elsewhere(deployment, camera),
                 Some(Ok(found)) => {
-                    found.map(|it| of_live(it, capture)).map_err(|it| refused(it, camera))
+                    found.map(|it| of_live(it, capture)).map_err(|error| refused(error, camera))
                 }
                 Some(Err(_panic)) => {
                     Err(Failure::new(ExitKind::Run, "a camera could not be asked"))
@@ -73,7 +73,7 @@ pub(crate) fn footage(
         });
         read.collect()
     });
-    let names = deployment.cameras.iter().map(|it| it.name.as_str());
+    let names = deployment.cameras.iter().map(|camera| camera.name.as_str());
     let all = inputs::advice::of_all(names.zip(all).collect())?;
     if deployment.has_clocks() {
         retimed(deployment, all)
@@ -121,7 +121,7 @@ pub(crate) fn lead_nanos(deployment: &Deployment) -> u64 {
     const DEVICES: u64 = 3_000_000_000;
     const STREAMS: u64 = 6_000_000_000;
     let cameras = deployment.cameras.iter().filter_map(live_camera);
-    let leads = cameras.map(|it| match it.address {
+    let leads = cameras.map(|camera| match camera.address {
         LiveAddress::Device(_) => DEVICES,
         LiveAddress::Stream(_) => STREAMS,
     });
@@ -179,7 +179,7 @@ fn elsewhere(deployment: &Deployment, camera: &Camera) -> Result<Footage, Failur
     Ok(Footage {
         size,
         n_frames: capture.n_frames.unwrap_or(ENDLESS),
-        frame_rate_hz: rate_hz.map(|it| it / capture.frame_step as f64),
+        frame_rate_hz: rate_hz.map(|rate_hz| rate_hz / capture.frame_step as f64),
         timeline: None,
     })
 }

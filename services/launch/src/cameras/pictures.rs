@@ -21,13 +21,14 @@ use super::is_live;
 /// The calibration cannot be read.
 pub fn settled(deployment: &Deployment) -> Result<Deployment, Failure> {
     let mut settled = deployment.clone();
-    let is_of_files = |it: &Camera| {
-        let is_made = Address::is_address(&it.source) || capture::Blank::is_blank(&it.source);
-        let is_recorded = capture::Recorded::is_recorded(&it.source);
-        !it.source.is_empty() && !is_made && !is_recorded && !is_live(&it.source)
+    let is_of_files = |camera: &Camera| {
+        let is_made =
+            Address::is_address(&camera.source) || capture::Blank::is_blank(&camera.source);
+        let is_recorded = capture::Recorded::is_recorded(&camera.source);
+        !camera.source.is_empty() && !is_made && !is_recorded && !is_live(&camera.source)
     };
     let files: Vec<usize> = (0..settled.cameras.len())
-        .filter(|&it| is_of_files(&settled.cameras[it]))
+        .filter(|&i| is_of_files(&settled.cameras[i]))
         .collect();
     turn(&mut settled, &files)?;
     count(&mut settled, &files);
@@ -112,7 +113,7 @@ fn with_up(rig: Rig) -> Rig {
     }
     let down = rig.cameras().iter();
     let down: Vector3<f64> =
-        down.map(|it| it.camera_from_world.rotation.inverse() * Vector3::y()).sum();
+        down.map(|down| down.camera_from_world.rotation.inverse() * Vector3::y()).sum();
     let up = UnitVector3::try_new(-down, 0.3 * rig.cameras().len() as f64);
     let level = Rig::new(rig.cameras().to_vec(), up, rig.source());
     level.unwrap_or(rig)
@@ -126,7 +127,7 @@ fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, Stri
     };
     let [width, height] = camera.intrinsics.size;
     let turned = tag.size(stored);
-    let is_wide = |it: Size| it.width > it.height;
+    let is_wide = |size: Size| size.width > size.height;
     if tag.swaps_sides() && is_wide(turned) != is_wide(stored) && width != height {
         let does_turn = is_wide(turned) == (width > height);
         let pixels = if does_turn { turned } else { stored };
@@ -175,7 +176,7 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
     }
     let of_cameras = match Counting::of(&numbers) {
         Counting::InOrder => {
-            if numbers.iter().any(|it| *it != numbers[0]) {
+            if numbers.iter().any(|number| *number != numbers[0]) {
                 tracing::warn!(
                     "the numbers of the pictures ({}) lie too far apart to be those of frames: pictures are paired in their order; \
                      `numbers = [first, step]` of a [[camera]] says which numbers are frames",
@@ -185,7 +186,7 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
             return;
         }
         Counting::Common(common) => {
-            if numbers.iter().any(|it| it[0] != numbers[0][0]) {
+            if numbers.iter().any(|number| number[0] != numbers[0][0]) {
                 tracing::warn!(
                     "cameras do not begin with the same picture ({}): frames are paired by these numbers; where each camera counts for \
                      itself, `numbers = [first, step]` of its [[camera]] says which is the number of frame 0",
@@ -220,10 +221,10 @@ fn gaps(numbers: &[u64], counted: PictureNumbers) -> Option<String> {
     let frame = |number: u64| (number - first) / step;
     let missing: Vec<[u64; 2]> = numbers
         .windows(2)
-        .map(|it| [frame(it[0]) + 1, frame(it[1])])
+        .map(|pair| [frame(pair[0]) + 1, frame(pair[1])])
         .filter(|it| it[1] > it[0])
         .collect();
-    let n: u64 = missing.iter().map(|it| it[1] - it[0]).sum();
+    let n: u64 = missing.iter().map(|missing| missing[1] - missing[0]).sum();
     let named = missing.iter().take(MOST_NAMED).map(|[from, end]| {
         let last = end - 1;
         if *from == last {

@@ -159,7 +159,7 @@ fn check_rate(trial: &Trial, given: &Given) -> Result<(), Failure> {
     if let Some(rate_hz) = given.rate_hz
         && trial
             .rate_hz
-            .is_some_and(|it| (it * trial.frame_step as f64 / rate_hz - 1.0).abs() > 1e-6)
+            .is_some_and(|hz| (hz * trial.frame_step as f64 / rate_hz - 1.0).abs() > 1e-6)
     {
         let own = trial.rate_hz.unwrap_or_default();
         let message = format!(
@@ -199,7 +199,7 @@ pub(super) fn camera(resolved: &Resolved, rig: &Rig, nth: usize) -> Result<ViewC
         .camera(&entry.name)
         .ok_or_else(|| refused(format!("{} does not have it", rig.source())))?;
     let footage = resolved.footage.get(nth);
-    let size = footage.map_or(camera.intrinsics.size, |it| it.size);
+    let size = footage.map_or(camera.intrinsics.size, |footage| footage.size);
     let whole = OutSize::Scale(1.0);
     let framing = Framing::new(camera, size, entry.source_offset_px, whole, 0.0)
         .map_err(|error| refused(error.to_string()))?;
@@ -207,8 +207,8 @@ pub(super) fn camera(resolved: &Resolved, rig: &Rig, nth: usize) -> Result<ViewC
 }
 
 fn views(resolved: Option<&Resolved>) -> Vec<String> {
-    let cameras = resolved.map_or(&[][..], |it| &it.deployment.cameras);
-    cameras.iter().map(|it| it.name.clone()).collect()
+    let cameras = resolved.map_or(&[][..], |resolved| &resolved.deployment.cameras);
+    cameras.iter().map(|camera| camera.name.clone()).collect()
 }
 
 fn of_folder(folder: &Path) -> Result<Resolved, String> {
@@ -287,7 +287,7 @@ fn messages(
     let mut gathering = Gathering::new(views(Some(resolved)));
     let track = recording.tracks.get(&topic::skeletons());
     let (mut buffer, mut n_damaged) = (recording::Buffer::default(), 0);
-    for entry in track.map_or(&[][..], |it| &it.entries) {
+    for entry in track.map_or(&[][..], |track| &track.entries) {
         let message = match recording::read(&mut input, Kind::Skeletons, entry, &mut buffer) {
             Ok(message) => message,
             Err(error @ recording::ReadError::Read(_)) => return Err(in_file(file, &error)),
@@ -357,6 +357,6 @@ fn of_message(it: &Joint3d, resolved: &Resolved) -> JointLine {
         covariance_m2: it.covariance,
         position_m: it.in_world,
         reprojection_px: Some(it.reprojection_px),
-        views: used.map(|it| it.1.name.clone()).collect(),
+        views: used.map(|used| used.1.name.clone()).collect(),
     })
 }

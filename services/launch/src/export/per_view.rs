@@ -39,7 +39,7 @@ pub(super) fn openpose(
          standard deviation in the picture"
             .to_owned(),
     ];
-    if trials[0].joints.joints.iter().any(|it| it.name == "head") {
+    if trials[0].joints.joints.iter().any(|joint| joint.name == "head") {
         notes.push("the head is left out: BODY_25 has none".to_owned());
     }
     Ok(Written {
@@ -137,7 +137,7 @@ fn draw_all(
     stop: &Stop,
     console: &dyn Console,
 ) -> Result<usize, Failure> {
-    let [width, height] = pictures.view.size.map(|it| it as usize);
+    let [width, height] = pictures.view.size.map(|size| size as usize);
     let size = Size::new(width, height);
     let trial = &trials[0];
     let rate_hz = trial.rate_hz.unwrap_or_default();

@@ -77,10 +77,10 @@ impl Pictures {
     ///
     /// The footage or the recording cannot be read.
     pub(super) fn at(&mut self, frame: u64) -> Result<Option<&[u8]>, Failure> {
-        let n_bytes = 3 * self.view.size.iter().map(|it| *it as usize).product::<usize>();
+        let n_bytes = 3 * self.view.size.iter().map(|size| *size as usize).product::<usize>();
         match &mut self.from {
             From::Footage { feed, at, is_over } => {
-                while !*is_over && at.is_none_or(|it| it < frame) {
+                while !*is_over && at.is_none_or(|at| at < frame) {
                     let next = feed.next_frame().or_fail(ExitKind::Input)?;
                     *is_over = next.is_none();
                     *at = next.map(|it| it.index).or(*at);
@@ -132,10 +132,10 @@ fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, Str
         ..crate::cameras::source(camera, &resolved.deployment.capture)
     };
     let footage = resolved.footage.get(nth);
-    let feed = Retimed::open(&spec, footage.and_then(|it| it.timeline.as_ref()));
+    let feed = Retimed::open(&spec, footage.and_then(|footage| footage.timeline.as_ref()));
     let feed = feed.map_err(|error| failure::wording::in_one_line(&error))?;
     let size = feed.info().size;
-    let due = footage.map_or([0; 2], |it| it.size.map(|it| it as usize));
+    let due = footage.map_or([0; 2], |footage| footage.size.map(|size| size as usize));
     if [size.width, size.height] != due {
         return Err(format!(
             "{} is {size}, and was {}x{} in the run",
@@ -151,7 +151,7 @@ fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, Str
 
 fn recorded(origin: &Origin, recording: &Recording, nth: usize) -> Option<From> {
     let track = recording.tracks.get(&topic::frame(nth))?;
-    let has_pixels = !recording.about.as_ref().is_ok_and(|it| it.without.pixels);
+    let has_pixels = !recording.about.as_ref().is_ok_and(|about| about.without.pixels);
     let frames = track.entries.iter().filter_map(|it| Some((it.frame?, *it)));
     has_pixels.then_some(From::Recording {
         path: origin.source.clone(),

@@ -97,7 +97,7 @@ impl Watch {
         // Tells the boxes of the next picture.
         self.step.sightings(&mut self.memory);
         let found = |maps: &JointMaps| {
-            let each = (0..self.n_keypoints).map(|it| maps.keypoint(it).map(|it| it.0));
+            let each = (0..self.n_keypoints).map(|i| maps.keypoint(i).map(|it| it.0));
             each.collect()
         };
         Ok(self.memory.maps().map(found).collect())

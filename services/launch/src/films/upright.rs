@@ -25,14 +25,14 @@ impl Upright {
             return Ok(None);
         }
         let (sin, cos) = roll.sin_cos();
-        let [width, height] = [size.width, size.height].map(|it| it as f64);
+        let [width, height] = [size.width, size.height].map(|value| value as f64);
         let sides = [
             width * cos.abs() + height * sin.abs(),
             width * sin.abs() + height * cos.abs(),
         ];
         let [wide, high] = sides.map(f64::ceil);
-        let [right, down] = [wide, high].map(|it| (it - 1.0) / 2.0);
-        let centre = [width, height].map(|it| (it - 1.0) / 2.0);
+        let [right, down] = [wide, high].map(|value| (value - 1.0) / 2.0);
+        let centre = [width, height].map(|value| (value - 1.0) / 2.0);
         let map = [
             [cos, sin, centre[0] - cos * right - sin * down],
             [-sin, cos, centre[1] + sin * right - cos * down],
@@ -94,7 +94,7 @@ mod tests {
         let mut sums = [0.0; 3];
         for (nth, pixel) in rgb.chunks_exact(3).enumerate() {
             let weight = f64::from(pixel[0]);
-            let at = [nth % size.width, nth / size.width].map(|it| it as f64);
+            let at = [nth % size.width, nth / size.width].map(|value| value as f64);
             sums[0] += weight * at[0];
             sums[1] += weight * at[1];
             sums[2] += weight;

@@ -33,7 +33,7 @@ fn deployment(folder: &Path, more: &str, set: &[&str]) -> Deployment {
         "name = 'one'\nrig = 'rig.toml'\noutput = 'out'\n[[camera]]\nname = 'a'\nsource = 'a.mp4'\n\
          [[camera]]\nname = 'b'\nkeypoints = 'b_json'\n{more}\n[network]\nfile = 'n.onnx'\n"
     );
-    let set: Vec<String> = set.iter().map(|it| (*it).to_owned()).collect();
+    let set: Vec<String> = set.iter().map(|set| (*set).to_owned()).collect();
     let file = folder.join("deployment.toml");
     Loaded::parse(&text, &file, &set, &AnyMachine).unwrap().deployment
 }

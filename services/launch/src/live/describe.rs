@@ -22,7 +22,7 @@ fn process(process: &ProcessSnapshot) -> Value {
         "pid": process.pid,
         "state": process.state.name(),
         "age_ms": process.reading.as_ref().map(|_| process.age_nanos / 1_000_000),
-        "problem": process.problem.map(|it| it.to_string()),
+        "problem": process.problem.map(|problem| problem.to_string()),
         "measured": process.reading.as_ref().map(measured),
     });
     if process.problem.is_none()
@@ -43,14 +43,14 @@ pub fn measured(reading: &Reading) -> Value {
     json!({
         "restarts": reading.restarts,
         "seconds": (reading.at_nanos - reading.began_at_nanos) as f64 / 1e9,
-        "view": reading.view.as_ref().map(|it| json!({ "index": it.index, "name": it.name })),
+        "view": reading.view.as_ref().map(|view| json!({ "index": view.index, "name": view.name })),
         "finished": reading.is_finished,
         "received": reading.n_received,
         "sent": reading.n_sent,
         "sent_per_second": reading.sent_millihertz as f64 / 1e3,
         "dropped": dropped,
-        "queue": reading.queue.map(|it| it[0]),
-        "longest_queue": reading.queue.map(|it| it[1]),
+        "queue": reading.queue.map(|queue| queue[0]),
+        "longest_queue": reading.queue.map(|queue| queue[1]),
         "memory_bytes": reading.memory_bytes,
         "peak_memory_bytes": reading.peak_memory_bytes,
         "evidence_bytes": reading.evidence_bytes,
@@ -114,7 +114,8 @@ mod tests {
         let value = describe(&snapshot());
         assert_eq!(value["name"], "walk");
         let processes = value["processes"].as_array().unwrap();
-        let states: Vec<&str> = processes.iter().map(|it| it["state"].as_str().unwrap()).collect();
+        let states: Vec<&str> =
+            processes.iter().map(|process| process["state"].as_str().unwrap()).collect();
         assert_eq!(states, ["begins", "dead", "runs", "runs"]);
         assert_eq!(processes[0]["measured"], Value::Null);
         let pose = &processes[2]["measured"];

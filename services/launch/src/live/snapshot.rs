@@ -74,8 +74,8 @@ impl Snapshot {
         now: u64,
     ) -> Self {
         let mut processes: Vec<ProcessSnapshot> =
-            observed.iter().map(|it| ProcessSnapshot::new(it, now)).collect();
-        processes.sort_by_key(|it| sort_key(&it.name));
+            observed.iter().map(|observed| ProcessSnapshot::new(observed, now)).collect();
+        processes.sort_by_key(|process| sort_key(&process.name));
         Self {
             name: name.to_owned(),
             supervisor,
@@ -85,9 +85,9 @@ impl Snapshot {
 
     /// The names of the views, as far as the metrics contain them.
     pub fn views(&self) -> BTreeMap<usize, &str> {
-        let readings = self.processes.iter().filter_map(|it| it.reading.as_ref());
+        let readings = self.processes.iter().filter_map(|process| process.reading.as_ref());
         readings
-            .filter_map(|it| it.view.as_ref())
+            .filter_map(|reading| reading.view.as_ref())
             .filter(|it| !it.name.is_empty())
             .map(|it| (it.index, it.name.as_str()))
             .collect()
@@ -95,7 +95,8 @@ impl Snapshot {
 
     /// Whether every live process has sent metrics.
     pub(super) fn is_complete(&self) -> bool {
-        let is_starting = |it: &ProcessSnapshot| it.state == State::Starting;
+        let is_starting =
+            |process_snapshot: &ProcessSnapshot| process_snapshot.state == State::Starting;
         !self.processes.iter().any(is_starting)
     }
 }
@@ -103,7 +104,7 @@ impl Snapshot {
 impl ProcessSnapshot {
     fn new(observed: &ObservedProcess<'_>, now: u64) -> Self {
         let read = observed.metrics.map(Reading::from_message);
-        let age_nanos = observed.metrics.map_or(0, |it| now.saturating_sub(it.at_nanos));
+        let age_nanos = observed.metrics.map_or(0, |metric| now.saturating_sub(metric.at_nanos));
         let (reading, problem) = match read {
             None => (None, None),
             Some(Ok(reading)) => (Some(reading), None),
@@ -214,7 +215,8 @@ pub(crate) mod tests {
 
     #[test]
     fn processes_are_in_pipeline_order_and_by_index() {
-        let names: Vec<String> = snapshot().processes.into_iter().map(|it| it.name).collect();
+        let names: Vec<String> =
+            snapshot().processes.into_iter().map(|process| process.name).collect();
         assert_eq!(names, ["capture-9", "capture-10", "pose-0", "results"]);
     }
 

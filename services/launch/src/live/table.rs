@@ -11,7 +11,7 @@ const NONE: &str = "-";
 
 /// A deployment as two tables. The titles contain the units.
 pub fn table(snapshot: &Snapshot) -> String {
-    let alive = snapshot.processes.iter().filter(|it| it.pid.is_some()).count();
+    let alive = snapshot.processes.iter().filter(|process| process.pid.is_some()).count();
     let mut text = format!(
         "{}: run by process {}, {alive} of {} processes live\n\n",
         snapshot.name,
@@ -61,8 +61,9 @@ fn cameras(snapshot: &Snapshot) -> String {
         .filter_map(|process| {
             let reading = process.reading.as_ref()?;
             let it = reading.camera?;
-            let index = reading.view.as_ref().map(|it| it.index);
-            let mut row = vec![index.map_or_else(|| process.name.clone(), |it| view(snapshot, it))];
+            let index = reading.view.as_ref().map(|view| view.index);
+            let mut row =
+                vec![index.map_or_else(|| process.name.clone(), |index| view(snapshot, index))];
             row.extend(
                 [
                     it.n_connections,
@@ -123,21 +124,38 @@ fn process_row(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<String> {
     let or_none = |value: Option<String>| value.unwrap_or_else(|| NONE.to_owned());
     let is_active = matches!(process.state, State::Running | State::Done);
     let megabytes = |bytes: u64| format!("{:.1}", bytes as f64 / 1e6);
-    let uptime = |it: &Reading| format!("{:.0}", (it.at_nanos - it.began_at_nanos) as f64 / 1e9);
+    let uptime = |reading: &Reading| {
+        format!(
+            "{:.0}",
+            (reading.at_nanos - reading.began_at_nanos) as f64 / 1e9
+        )
+    };
     vec![
         process.name.clone(),
-        or_none(reading.and_then(|it| it.view.as_ref()).map(|it| view(snapshot, it.index))),
-        process.state.name().to_owned(),
-        or_none(reading.filter(|_| is_active).map(uptime)),
-        or_none(reading.map(|it| it.n_sent.to_string())),
-        or_none(reading.filter(|_| is_active).map(|it| rate(it.sent_millihertz))),
-        or_none(reading.map(|it| it.restarts.to_string())),
-        or_none(reading.and_then(|it| it.queue).map(|it| format!("{} of {}", it[0], it[1]))),
-        or_none(reading.filter(|it| it.memory_bytes > 0).map(|it| megabytes(it.memory_bytes))),
         or_none(
             reading
-                .filter(|it| it.evidence_bytes > 0)
-                .map(|it| megabytes(it.evidence_bytes)),
+                .and_then(|reading| reading.view.as_ref())
+                .map(|it| view(snapshot, it.index)),
+        ),
+        process.state.name().to_owned(),
+        or_none(reading.filter(|_| is_active).map(uptime)),
+        or_none(reading.map(|reading| reading.n_sent.to_string())),
+        or_none(reading.filter(|_| is_active).map(|reading| rate(reading.sent_millihertz))),
+        or_none(reading.map(|reading| reading.restarts.to_string())),
+        or_none(
+            reading
+                .and_then(|reading| reading.queue)
+                .map(|queue| format!("{} of {}", queue[0], queue[1])),
+        ),
+        or_none(
+            reading
+                .filter(|reading| reading.memory_bytes > 0)
+                .map(|reading| megabytes(reading.memory_bytes)),
+        ),
+        or_none(
+            reading
+                .filter(|reading| reading.evidence_bytes > 0)
+                .map(|reading| megabytes(reading.evidence_bytes)),
         ),
         or_none(reading.map(dropped)),
     ]
@@ -168,7 +186,7 @@ fn time_rows(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<Vec<String>>
     };
     let mut sorted: Vec<&Timed> = reading.times.iter().collect();
     sorted.sort_by_key(|it| (it.span, it.view));
-    let own_view = reading.view.as_ref().map(|it| it.index);
+    let own_view = reading.view.as_ref().map(|view| view.index);
     let rows = sorted.into_iter().enumerate().map(|(nth, timed)| {
         let ms = [
             timed.p50_nanos,
@@ -193,7 +211,7 @@ fn time_rows(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<Vec<String>>
 
 /// The name of a view, or its number if the name is unknown.
 fn view(snapshot: &Snapshot, index: usize) -> String {
-    let name = snapshot.views().get(&index).map(|it| (*it).to_owned());
+    let name = snapshot.views().get(&index).map(|view| (*view).to_owned());
     name.unwrap_or_else(|| format!("view {index}"))
 }
 
@@ -278,7 +296,7 @@ results  waiting     all       100   20.0  ";
         };
         snapshot.processes[2].reading.as_mut().unwrap().camera = Some(camera);
         let text = table(&snapshot);
-        let line = text.lines().find(|it| it.starts_with("left")).unwrap();
+        let line = text.lines().find(|line| line.starts_with("left")).unwrap();
         assert!(
             line.ends_with("-3.2          -     +41.0  camera"),
             "{text}"

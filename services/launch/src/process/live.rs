@@ -13,13 +13,16 @@ pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> 
     if matches!(camera.address, LiveAddress::Stream(_)) {
         // What it told before: a stream is not asked again.
         let step = resolved.deployment.capture.frame_step as f64;
-        camera.rate_hz = footage.frame_rate_hz.map(|it| it * step);
+        camera.rate_hz = footage.frame_rate_hz.map(|frame_rate_hz| frame_rate_hz * step);
     }
     Some(capture::LiveJob {
         camera,
         size: Size::new(footage.size[0] as usize, footage.size[1] as usize),
         rate_hz: resolved.instants_hz(),
-        is_kept: resolved.recording.as_ref().is_some_and(|it| it.pictures.contains(&view)),
+        is_kept: resolved
+            .recording
+            .as_ref()
+            .is_some_and(|recording| recording.pictures.contains(&view)),
         name: entry.name.clone(),
         max_skew_nanos: max_skew_nanos(resolved),
         lead_nanos: crate::cameras::lead_nanos(&resolved.deployment),

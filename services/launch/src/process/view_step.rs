@@ -79,6 +79,6 @@ pub(crate) fn of_view(
 
 /// Of every extra keypoint of the deployment its number among the names of a camera.
 fn extras(resolved: &Resolved, names: &[String]) -> Vec<Option<usize>> {
-    let number = |wanted: &String| names.iter().position(|it| it == wanted);
+    let number = |wanted: &String| names.iter().position(|name| name == wanted);
     resolved.extra_keypoints.iter().map(number).collect()
 }

@@ -51,9 +51,9 @@ pub(super) fn live(outcome: &Outcome) -> String {
     let readings = outcome
         .processes
         .iter()
-        .filter_map(|it| Reading::from_message(it.measured.as_ref()?).ok());
+        .filter_map(|process| Reading::from_message(process.measured.as_ref()?).ok());
     let cameras = readings.filter_map(|reading| {
-        let name = reading.view.map_or_else(String::new, |it| it.name);
+        let name = reading.view.map_or_else(String::new, |view| view.name);
         Some((name, reading.camera?))
     });
     let cameras: Vec<_> = cameras.collect();
@@ -73,7 +73,7 @@ fn line((name, it): &(String, CameraCounts)) -> String {
         (it.n_overtaken, "overtaken by newer ones"),
         (it.n_refused, "refused"),
     ];
-    let more = more.into_iter().filter(|it| it.0 > 0);
+    let more = more.into_iter().filter(|more| more.0 > 0);
     parts.extend(more.map(|(n, what)| format!("{n} {what}")));
     if it.rate_microhertz > 0 {
         parts.push(format!("{:.3} a second", it.rate_microhertz as f64 / 1e6));
@@ -186,7 +186,7 @@ mod tests {
             [TimedBy::ARRIVAL, TimedBy::DISBELIEVED],
             [TimedBy::ARRIVAL, TimedBy::NOTHING],
         ] {
-            let pair = alike.map(|it| camera("any", it));
+            let pair = alike.map(|alike| camera("any", alike));
             assert_eq!(unlike_times(&pair), None, "{alike:?}");
         }
     }

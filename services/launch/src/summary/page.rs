@@ -172,7 +172,7 @@ fn strips(folder: &Path, cameras: &[String]) -> Vec<Strip> {
 /// What the pictures of a file name such as `000010.png` show.
 fn caption(name: &str) -> String {
     let number = name.trim_end_matches(".png");
-    let number = number.parse().map_or(number.to_owned(), |it: u64| it.to_string());
+    let number = number.parse().map_or(number.to_owned(), |value: u64| value.to_string());
     format!("frame {number}")
 }
 

@@ -26,10 +26,10 @@ impl Outside {
             Some((it.name.clone(), 1.0 / (a * d - b * c).abs().sqrt(), px))
         });
         let views: Vec<(String, f64, f64)> = views.collect();
-        let seen: Vec<[f64; 2]> = views.iter().map(|it| [it.1, it.2]).collect();
+        let seen: Vec<[f64; 2]> = views.iter().map(|view| [view.1, view.2]).collect();
         let is_outside = |px: f64| !(USABLE_PX[0]..=USABLE_PX[1]).contains(&px);
-        let outside = views.into_iter().filter(|it| is_outside(it.2));
-        let views: Vec<(String, f64)> = outside.map(|it| (it.0, it.2)).collect();
+        let outside = views.into_iter().filter(|view| is_outside(view.2));
+        let views: Vec<(String, f64)> = outside.map(|outside| (outside.0, outside.2)).collect();
         let scale = better_scale(&seen).filter(|_| !views.is_empty())?;
         Some(Self {
             views,
@@ -77,7 +77,7 @@ mod tests {
             schema_version: VERSION,
             session: 1,
             summary: Summary {
-                person_px: views.iter().map(|it| it.name.clone()).zip(px).collect(),
+                person_px: views.iter().map(|view| view.name.clone()).zip(px).collect(),
                 ..Summary::default()
             },
             trc_axes: "y up".to_owned(),

@@ -36,7 +36,7 @@ impl Recorded {
 
     /// The counts of the run, if there is a summary.
     pub fn summary(&self) -> Option<&Summary> {
-        self.written().map(|it| &it.summary)
+        self.written().map(|written| &written.summary)
     }
 
     /// Where people were too small or too large for the search.
@@ -48,7 +48,7 @@ impl Recorded {
 
     /// The latency report of the run, if there is a summary.
     pub fn latency(&self) -> Option<&LatencyReport> {
-        self.written().map(|it| &it.latency)
+        self.written().map(|written| &written.latency)
     }
 
     /// Why there is no summary; none if there is one.

@@ -105,7 +105,7 @@ impl Watcher {
         }
         self.printed_at = Instant::now();
         let rate = self.n_done as f64 / self.begin.elapsed().as_secs_f64();
-        let of = self.n_frames.map_or_else(String::new, |it| format!(" of {it}"));
+        let of = self.n_frames.map_or_else(String::new, |frame| format!(" of {frame}"));
         output::message(format_args!(
             "{}{of} frames, {rate:.2} a second",
             self.n_done

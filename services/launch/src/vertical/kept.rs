@@ -32,7 +32,7 @@ pub(super) fn read(rig: &Path, cameras: &[Camera]) -> Option<Vertical> {
         return None;
     }
     let kept: Kept = serde_json::from_str(&fs::read_to_string(&file).ok()?).ok()?;
-    let length = kept.up.iter().map(|it| it * it).sum::<f64>();
+    let length = kept.up.iter().map(|up| up * up).sum::<f64>();
     if kept.cameras != digest(cameras) || (length - 1.0).abs() > 1e-6 {
         return None;
     }
@@ -64,7 +64,7 @@ pub(super) fn write(rig: &Path, cameras: &[Camera], found: &Vertical) {
 fn digest(cameras: &[Camera]) -> String {
     let text: Vec<String> = cameras
         .iter()
-        .map(|it| format!("{} {:?}", it.name, it.camera_from_world))
+        .map(|camera| format!("{} {:?}", camera.name, camera.camera_from_world))
         .collect();
     format!("{:016x}", fnv1a(text.join("\n").as_bytes()))
 }

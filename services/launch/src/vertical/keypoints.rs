@@ -40,7 +40,7 @@ pub(super) fn find(
 ) -> Result<Option<Vertical>, Failure> {
     let mut all = Vec::new();
     for entry in &deployment.cameras {
-        let camera = cameras.iter().find(|it| it.name == entry.name);
+        let camera = cameras.iter().find(|camera| camera.name == entry.name);
         let (Some(camera), Some(source)) = (camera, keypoint_files::of_camera(entry)?) else {
             continue;
         };
@@ -87,7 +87,8 @@ fn vertical(all: &[Standing]) -> Option<Vertical> {
     let up = common_normal(&normals, all.iter().map(|it| it.upward).sum())?;
     let n_agreeing = all.iter().filter(|it| it.upward.dot(&up) > 0.0).count();
     let share = n_agreeing as f64 / all.len() as f64;
-    let mut leans: Vec<f64> = normals.iter().map(|it| it.dot(&up).abs().min(1.0).asin()).collect();
+    let mut leans: Vec<f64> =
+        normals.iter().map(|normal| normal.dot(&up).abs().min(1.0).asin()).collect();
     leans.sort_by(f64::total_cmp);
     let lean = leans[leans.len() / 2].to_degrees();
     if share < LEAST_AGREEING || lean > MOST_LEAN {
@@ -121,7 +122,7 @@ fn weighted(row: &[(usize, f64)], found: impl Fn(usize) -> Option<Keypoint>) -> 
 
 fn middle(points: &[[f64; 2]]) -> Option<[f64; 2]> {
     let n = points.len();
-    let mean = |axis: usize| points.iter().map(|it| it[axis]).sum::<f64>() / n as f64;
+    let mean = |axis: usize| points.iter().map(|point| point[axis]).sum::<f64>() / n as f64;
     (n > 0).then(|| [mean(0), mean(1)])
 }
 

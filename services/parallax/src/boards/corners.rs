@@ -64,7 +64,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
                 .map_err(|_not_whole| wrong(which))
         };
         let number = |which: usize| {
-            let number = cell(which).parse::<f64>().ok().filter(|it| it.is_finite());
+            let number = cell(which).parse::<f64>().ok().filter(|value| value.is_finite());
             number.ok_or_else(|| wrong(which))
         };
         let Some(camera) = camera_named(names, cell(1)) else {
@@ -96,24 +96,24 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
 /// A whole number without the fraction that tables of floating-point numbers give it: `3` of `3.0`.
 pub(super) fn without_fraction(number: &str) -> &str {
     match number.split_once('.') {
-        Some((whole, zeros)) if is_digits(whole) && zeros.bytes().all(|it| it == b'0') => whole,
+        Some((whole, zeros)) if is_digits(whole) && zeros.bytes().all(|byte| byte == b'0') => whole,
         _ => number,
     }
 }
 
 fn is_digits(text: &str) -> bool {
-    !text.is_empty() && text.bytes().all(|it| it.is_ascii_digit())
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 fn camera_named(names: &[String], id: &str) -> Option<usize> {
-    let exactly = names.iter().position(|it| it == id);
+    let exactly = names.iter().position(|name| name == id);
     let id = without_fraction(id);
     exactly.or_else(|| {
         let number = |name: &String| {
-            let before = name.trim_end_matches(|it: char| it.is_ascii_digit()).len();
+            let before = name.trim_end_matches(|letter: char| letter.is_ascii_digit()).len();
             name[before..].to_owned()
         };
-        names.iter().position(|it| number(it) == id)
+        names.iter().position(|name| number(name) == id)
     })
 }
 
@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn a_table_is_read_as_it_was_written_and_refused_where_it_is_cut() {
         let names = ["left".to_owned(), "cam_7".to_owned()];
-        let board: Vec<_> = (0..4).map(|it| Point2::new(f64::from(it) * 0.05, 0.05)).collect();
+        let board: Vec<_> = (0..4).map(|i| Point2::new(f64::from(i) * 0.05, 0.05)).collect();
         let corners = (0..4).map(|id| (id, Point2::new(10.5 + id as f64, 20.25)));
         let sights = vec![Sight::new(1, 35, corners, &board)];
         let folder = tempfile::tempdir().unwrap();

@@ -18,7 +18,8 @@ pub struct FrameTable {
 impl FrameTable {
     /// The frames of a camera: of its name, or of a number that its name ends with.
     pub fn of(&self, camera: &str) -> Option<&[usize]> {
-        let digits = camera.len() - camera.trim_end_matches(|it: char| it.is_ascii_digit()).len();
+        let digits =
+            camera.len() - camera.trim_end_matches(|letter: char| letter.is_ascii_digit()).len();
         let number = &camera[camera.len() - digits..];
         let found = self.frames.get(camera).or_else(|| self.frames.get(number));
         found.map(Vec::as_slice)

@@ -68,9 +68,10 @@ pub fn look(
             each.collect()
         })
         .collect::<Result<_, Failure>>()?;
-    let rates: Vec<Option<f64>> = infos.iter().map(|it| it[0].frame_rate_hz).collect();
+    let rates: Vec<Option<f64>> = infos.iter().map(|info| info[0].frame_rate_hz).collect();
     let slowest_hz = slowest(&rates);
-    let n_pictures = |infos: &Vec<SourceInfo>| infos.iter().map(|it| it.n_frames as usize).sum();
+    let n_pictures =
+        |infos: &Vec<SourceInfo>| infos.iter().map(|info| info.n_frames as usize).sum();
     let longest: usize = infos.iter().map(n_pictures).max().unwrap_or(0);
     let every = settings.every.unwrap_or_else(|| longest.div_ceil(settings.most.max(1)).max(1));
     console.begin("", "looking for the board");
@@ -183,7 +184,7 @@ impl CameraTask<'_> {
                 if (self.is_over)() {
                     return Ok(raw);
                 }
-                if self.first.is_some_and(|it| picture.index >= it) {
+                if self.first.is_some_and(|value| picture.index >= value) {
                     break;
                 }
                 count += 1;
@@ -194,7 +195,7 @@ impl CameraTask<'_> {
                     None if self.camera.paths.len() > 1 => Some(nth),
                     None => Some(by_clock(picture.index, picture.time_s, self.slowest_hz)),
                 };
-                let Some(frame) = frame.filter(|it| it.is_multiple_of(self.every)) else {
+                let Some(frame) = frame.filter(|frame| frame.is_multiple_of(self.every)) else {
                     continue;
                 };
                 let grey = Picture::of_rgb(size[0] as usize, size[1] as usize, picture.rgb);
@@ -240,7 +241,7 @@ fn agreed(finder: &Finder, raw: Vec<Raw>) -> Looked {
         votes[it.found.variant] += it.found.corners.len();
     }
     // The first of the best: the board as it was said to be.
-    let best = (0..votes.len()).rev().max_by_key(|it| votes[*it]).unwrap_or(0);
+    let best = (0..votes.len()).rev().max_by_key(|i| votes[*i]).unwrap_or(0);
     let variant = &finder.variants()[best];
     let cameras = raw.into_iter().enumerate().map(|(camera, raw)| {
         let own: Vec<&Sighting> = raw.found.iter().filter(|it| it.found.variant == best).collect();
@@ -255,7 +256,7 @@ fn agreed(finder: &Finder, raw: Vec<Raw>) -> Looked {
             sights: own
                 .iter()
                 .map(|it| {
-                    let corners = it.found.corners.iter().map(|it| (it.id, it.at));
+                    let corners = it.found.corners.iter().map(|corner| (corner.id, corner.at));
                     Sight::new(camera, it.frame, corners, &variant.layout.points)
                 })
                 .collect(),

@@ -39,10 +39,11 @@ pub fn worst(
     let mut list: Vec<(usize, usize, f64)> = Vec::new();
     for (nth, camera) in outcome.cameras.iter().enumerate() {
         let mut own: Vec<(usize, f64)> = Vec::new();
-        let mut frames: Vec<usize> = camera.residuals.iter().map(|it| it.frame).collect();
+        let mut frames: Vec<usize> =
+            camera.residuals.iter().map(|residual| residual.frame).collect();
         frames.dedup();
         for frame in frames {
-            let each = camera.residuals.iter().filter(|it| it.frame == frame);
+            let each = camera.residuals.iter().filter(|residual| residual.frame == frame);
             let squares: Vec<f64> = each.map(|it| it.off.norm_squared()).collect();
             own.push((
                 frame,
@@ -60,7 +61,7 @@ pub fn worst(
         let Some(picture) = seen[nth].pictures.get(&frame) else {
             continue;
         };
-        let own = outcome.cameras[nth].residuals.iter().filter(|it| it.frame == frame);
+        let own = outcome.cameras[nth].residuals.iter().filter(|residual| residual.frame == frame);
         let residuals: Vec<Residual> = own.copied().collect();
         if let Some(jpeg) = drawn(&cameras[nth], *picture, &residuals)? {
             overlays.push(Overlay {
@@ -95,10 +96,10 @@ fn drawn(
 
 fn around(size: Size, rgb: &[u8], residuals: &[Residual]) -> Option<Vec<u8>> {
     let extent = |axis: usize, side: usize| {
-        let values = residuals.iter().map(|it| it.at[axis]);
+        let values = residuals.iter().map(|residual| residual.at[axis]);
         let low = values.clone().fold(f64::MAX, f64::min) - MARGIN;
         let high = values.fold(f64::MIN, f64::max) + MARGIN;
-        [low, high].map(|it| it.clamp(0.0, side as f64) as usize)
+        [low, high].map(|value| value.clamp(0.0, side as f64) as usize)
     };
     let ([left, right], [top, bottom]) = (extent(0, size.width), extent(1, size.height));
     let mut canvas = Canvas::part(size, rgb, [left..right, top..bottom])?;

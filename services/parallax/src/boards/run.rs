@@ -88,7 +88,7 @@ pub fn calibrate(
     stop: &Stop,
     console: &dyn Console,
 ) -> Result<Calibrated, Failure> {
-    let names: Vec<String> = settings.cameras.iter().map(|it| it.name.clone()).collect();
+    let names: Vec<String> = settings.cameras.iter().map(|camera| camera.name.clone()).collect();
     refuse_twins(&names)?;
     let (looked, sights, points, sizes) = sighted(settings, &names, stop, console)?;
     let mut notes = Vec::new();
@@ -119,7 +119,7 @@ pub fn calibrate(
     let outcome = adjust(&task);
     console.finish();
     if let Mirrored::Asked(cameras) = &asked {
-        let agrees = |it: &Outcome| sides_agree(it, cameras);
+        let agrees = |outcome: &Outcome| sides_agree(outcome, cameras);
         if !outcome.as_ref().is_ok_and(agrees) {
             return Err(left_is_right(&task.names, cameras));
         }
@@ -137,7 +137,9 @@ pub fn calibrate(
         ));
     }
     Ok(Calibrated {
-        board: looked.as_ref().map_or_else(|| settings.board.clone(), |it| it.board.clone()),
+        board: looked
+            .as_ref()
+            .map_or_else(|| settings.board.clone(), |looked| looked.board.clone()),
         task,
         looked,
         outcome,
@@ -180,7 +182,7 @@ fn sighted(
     if sights.is_empty() {
         return Err(nowhere(settings, &looked, stop));
     }
-    let sizes = looked.cameras.iter().map(|it| it.size).collect();
+    let sizes = looked.cameras.iter().map(|camera| camera.size).collect();
     let points = looked.layout.points.clone();
     Ok((Some(looked), sights, points, sizes))
 }
@@ -219,9 +221,10 @@ fn mirrored(
     if !settings.is_mirrored || !is_all {
         return Err(left_is_right(&task.names, &cameras));
     }
-    let turned = |points: &mut Vec<Point2<f64>>| points.iter_mut().for_each(|it| it.x = -it.x);
+    let turned =
+        |points: &mut Vec<Point2<f64>>| points.iter_mut().for_each(|point| point.x = -point.x);
     turned(&mut task.board);
-    task.sights.iter_mut().for_each(|it| turned(&mut it.on_board));
+    task.sights.iter_mut().for_each(|sight| turned(&mut sight.on_board));
     notes.push(
         "all footage is mirrored: left and right of what is found with this rig are exchanged"
             .to_owned(),
@@ -232,7 +235,8 @@ fn mirrored(
 /// Whether cameras that see the back of a board stand behind it, as those that see the front agree with. Where the pictures are mirrored and the
 /// board has one side, every picture puts the camera elsewhere.
 fn sides_agree(outcome: &Outcome, behind: &[usize]) -> bool {
-    let crosses = |it: &&Together| it.cameras.iter().filter(|it| behind.contains(it)).count() == 1;
+    let crosses =
+        |it: &&Together| it.cameras.iter().filter(|camera| behind.contains(camera)).count() == 1;
     let (mut n, mut n_agree) = (0, 0);
     for it in outcome.pairs.iter().filter(crosses) {
         n += it.n;
@@ -242,7 +246,7 @@ fn sides_agree(outcome: &Outcome, behind: &[usize]) -> bool {
 }
 
 fn two_sided(names: &[String], behind: &[usize]) -> String {
-    let names: Vec<&str> = behind.iter().map(|it| names[*it].as_str()).collect();
+    let names: Vec<&str> = behind.iter().map(|behind| names[*behind].as_str()).collect();
     format!(
         "{} saw the back of the board: it has the mirror image of the front, and the cameras agree about that",
         names.join(", ")
@@ -252,7 +256,7 @@ fn two_sided(names: &[String], behind: &[usize]) -> String {
 /// Mirrored codes that no board with two sides explains.
 fn left_is_right(names: &[String], cameras: &[usize]) -> Failure {
     let is_all = cameras.len() == names.len();
-    let named: Vec<&str> = cameras.iter().map(|it| names[*it].as_str()).collect();
+    let named: Vec<&str> = cameras.iter().map(|camera| names[*camera].as_str()).collect();
     let which = if is_all {
         "all cameras".to_owned()
     } else {
@@ -278,7 +282,7 @@ fn known(
     sizes: &[[u32; 2]],
 ) -> Result<Vec<Option<geometry::Intrinsics>>, Failure> {
     let each = names.iter().zip(sizes).map(|(name, size)| {
-        let camera = rig.and_then(|rig| rig.cameras().iter().find(|it| it.name == *name));
+        let camera = rig.and_then(|rig| rig.cameras().iter().find(|camera| camera.name == *name));
         match camera {
             Some(camera) if camera.intrinsics.size != *size => {
                 let known = camera.intrinsics.size;
@@ -290,13 +294,14 @@ fn known(
                     ),
                 ))
             }
-            camera => Ok(camera.map(|it| it.intrinsics)),
+            camera => Ok(camera.map(|camera| camera.intrinsics)),
         }
     });
     let known: Vec<_> = each.collect::<Result<_, _>>()?;
     match rig {
         Some(rig) if known.iter().all(Option::is_none) => {
-            let there: Vec<&str> = rig.cameras().iter().map(|it| it.name.as_str()).collect();
+            let there: Vec<&str> =
+                rig.cameras().iter().map(|camera| camera.name.as_str()).collect();
             Err(Failure::new(
                 ExitKind::Usage,
                 format!(
@@ -313,7 +318,7 @@ fn known(
 
 /// Nothing at all was found: what may be there instead.
 fn nowhere(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Failure {
-    let pictures: usize = looked.cameras.iter().map(|it| it.n_pictures).sum();
+    let pictures: usize = looked.cameras.iter().map(|camera| camera.n_pictures).sum();
     let failure = Failure::new(
         ExitKind::Input,
         format!("no board {} in {pictures} pictures", settings.board),
@@ -328,14 +333,15 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
         return None;
     }
     let quiet = failure::Silent;
-    let most = looked.cameras.iter().map(|it| it.n_pictures).max()?;
+    let most = looked.cameras.iter().map(|camera| camera.n_pictures).max()?;
     let settings_of = LookSettings {
         every: Some(most.div_ceil(GUESSED_PICTURES).max(1)),
         ..settings.look.clone()
     };
     // The largest of each family has the codes of the smaller ones.
-    let largest = dictionary_names()
-        .filter(|it| !["_50", "_100", "_250"].iter().any(|small| it.ends_with(small)));
+    let largest = dictionary_names().filter(|dictionary_name| {
+        !["_50", "_100", "_250"].iter().any(|small| dictionary_name.ends_with(small))
+    });
     for name in largest {
         let text = settings.board.to_string();
         let mut parts: Vec<&str> = text.split(':').collect();
@@ -358,12 +364,12 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
 fn reasons(looked: &Looked) -> String {
     use calibration::boards::Nothing;
 
-    let most = looked.cameras.iter().flat_map(|it| &it.nothing).max_by_key(|it| {
+    let most = looked.cameras.iter().flat_map(|camera| &camera.nothing).max_by_key(|it| {
         // What says more goes first.
         let says = !matches!(it.0, Nothing::NoGrid | Nothing::NoMarkers);
         (says, it.1)
     });
-    match most.map(|it| it.0) {
+    match most.map(|most| most.0) {
         Some(Nothing::OtherGrid { columns, rows }) => format!(
             "a chessboard of {columns}x{rows} inner corners is there: inner corners are counted, not squares"
         ),
@@ -380,8 +386,8 @@ fn reasons(looked: &Looked) -> String {
 fn refused(error: &BoardError, looked: Option<&Looked>, task: &Task) -> Failure {
     let hint = match error {
         BoardError::TooFewBoards { camera, .. } => {
-            let nth = task.names.iter().position(|it| it == camera);
-            let seen = nth.and_then(|it| looked?.cameras.get(it));
+            let nth = task.names.iter().position(|name| name == camera);
+            let seen = nth.and_then(|nth| looked?.cameras.get(nth));
             seen.map_or_else(String::new, |seen| {
                 let n = seen.sights.len();
                 format!("{n} of its {} pictures show some of the board; {}", seen.n_pictures, looked.map_or_else(String::new, reasons))
@@ -415,7 +421,7 @@ impl Calibrated {
     /// Numbers that no camera has.
     pub fn rig(&self) -> Result<Rig, Failure> {
         let cameras: Vec<Camera> =
-            self.outcome.cameras.iter().map(|it| it.camera.clone()).collect();
+            self.outcome.cameras.iter().map(|camera| camera.camera.clone()).collect();
         let mut source = format!("calibrate board {}", self.board);
         if !self.task.wants_rig {
             source += "; intrinsics alone: the poses are not known";
@@ -443,12 +449,12 @@ impl Calibrated {
         };
         let worst: Vec<(String, Vec<u8>)> = overlays
             .into_iter()
-            .map(|it| {
+            .map(|overlay| {
                 let caption = format!(
                     "{}, frame {}: {:.2} px",
-                    self.task.names[it.camera], it.frame, it.rms_px
+                    self.task.names[overlay.camera], overlay.frame, overlay.rms_px
                 );
-                (caption, it.jpeg)
+                (caption, overlay.jpeg)
             })
             .collect();
         let [width, height] = self.board.size_metres();

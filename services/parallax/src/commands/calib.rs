@@ -145,8 +145,9 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
 
 fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
     if as_json {
-        let cameras: Vec<Value> = rig.cameras().iter().map(|it| describe(it, rig)).collect();
-        let up = rig.up_in_world().map(|it| <[f64; 3]>::from(it.into_inner()));
+        let cameras: Vec<Value> =
+            rig.cameras().iter().map(|camera| describe(camera, rig)).collect();
+        let up = rig.up_in_world().map(|up_in_world| <[f64; 3]>::from(up_in_world.into_inner()));
         output::json(&json!({
             "schema_version": 1, "source": rig.source(), "up": up, "cameras": cameras,
         }))?;
@@ -169,8 +170,8 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
     for camera in rig.cameras() {
         let intrinsics = &camera.intrinsics;
         let centre = camera.centre_in_world();
-        let roll = upright_roll(camera, rig).map_or("unknown".to_owned(), |it| {
-            format!("{:.1} degrees", it.to_degrees())
+        let roll = upright_roll(camera, rig).map_or("unknown".to_owned(), |value| {
+            format!("{:.1} degrees", value.to_degrees())
         });
         let place = if has_place(rig, camera) {
             format!(
@@ -221,15 +222,17 @@ fn describe(camera: &Camera, rig: &Rig) -> Value {
 
 fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode, Failure> {
     let findings = geometry::files::check(rig);
-    let has_problems = findings.iter().any(|it| it.severity() != geometry::files::Severity::Note);
+    let has_problems = findings
+        .iter()
+        .any(|finding| finding.severity() != geometry::files::Severity::Note);
     let report = detections.map(|file| own_views::agreement(rig, file));
     let report = report.transpose()?;
-    let disagreements = report.as_ref().map_or(&[][..], |it| &it.disagreements);
+    let disagreements = report.as_ref().map_or(&[][..], |report| &report.disagreements);
     let name = |index: usize| rig.cameras()[index].name.as_str();
     if as_json {
         let findings: Vec<Value> = findings
             .iter()
-            .map(|it| json!({ "severity": format!("{:?}", it.severity()).to_lowercase(), "text": it.to_string() }))
+            .map(|finding| json!({ "severity": format!("{:?}", finding.severity()).to_lowercase(), "text": finding.to_string() }))
             .collect();
         let cameras = report.as_ref().map(|report| {
             let each = report.errors.cameras.iter();
@@ -271,8 +274,9 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
 fn survey_text(survey: &Survey) -> String {
     let mut lines = vec![format!("{} cameras", survey.cameras.len())];
     for place in &survey.cameras {
-        let height = place.height_m.map(|it| format!("{it:.2} m above the origin"));
-        let distance = place.distance_m.map(|it| format!("{it:.2} m from the middle"));
+        let height = place.height_m.map(|height_m| format!("{height_m:.2} m above the origin"));
+        let distance =
+            place.distance_m.map(|distance_m| format!("{distance_m:.2} m from the middle"));
         let known: Vec<String> = height.into_iter().chain(distance).collect();
         lines.push(format!("  {:<12} {}", place.name, known.join(", ")));
     }
@@ -302,9 +306,9 @@ fn survey_json(survey: &Survey) -> Value {
     json!({
         "cameras": cameras.collect::<Vec<_>>(),
         "camera_distance_m": survey.apart_m,
-        "middle_m": survey.focus.map(|it| <[f64; 3]>::from(it.coords)),
-        "shared_box_m": survey.shared.map(|it| it.sides_m),
-        "shared_volume_m3": survey.shared.map(|it| it.volume_m3),
+        "middle_m": survey.focus.map(|focus| <[f64; 3]>::from(focus.coords)),
+        "shared_box_m": survey.shared.map(|shared| shared.sides_m),
+        "shared_volume_m3": survey.shared.map(|shared| shared.volume_m3),
         "error_mm_per_px": survey.error_mm,
     })
 }

@@ -82,10 +82,13 @@ fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
         return Ok(LiveCamera::new(address));
     };
     let deployment = load::read(file, &[])?.deployment;
-    let entry = deployment.cameras.iter().find(|it| it.name == *name);
+    let entry = deployment.cameras.iter().find(|camera| camera.name == *name);
     let live = entry.and_then(launch::cameras::live_camera);
     live.ok_or_else(|| {
-        let live = deployment.cameras.iter().filter(|it| launch::cameras::is_live(&it.source));
+        let live = deployment
+            .cameras
+            .iter()
+            .filter(|camera| launch::cameras::is_live(&camera.source));
         let names: Vec<&str> = live.map(|it| it.name.as_str()).collect();
         let message = format!("{} has no live camera {name:?}", file.display());
         let hint = if names.is_empty() {
@@ -153,10 +156,10 @@ fn look(path: &Path) -> Result<Found, VideoError> {
 /// The names of a device that stay when it is plugged in again.
 fn stable_names(path: &Path) -> Vec<PathBuf> {
     let folders = ["/dev/v4l/by-id", "/dev/v4l/by-path"];
-    let entries = folders.iter().filter_map(|it| std::fs::read_dir(it).ok()).flatten();
+    let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
     let links = entries.filter_map(|it| Some(it.ok()?.path()));
     let mut names: Vec<PathBuf> =
-        links.filter(|it| it.canonicalize().is_ok_and(|it| it == path)).collect();
+        links.filter(|link| link.canonicalize().is_ok_and(|it| it == path)).collect();
     names.sort();
     names
 }
@@ -194,7 +197,10 @@ fn described(it: &Found) -> Value {
 
 fn text(it: &Found) -> String {
     let [width, height] = it.mode.size;
-    let rate = it.mode.rate_hz.map_or_else(String::new, |it| format!(", {it:.2} a second"));
+    let rate = it
+        .mode
+        .rate_hz
+        .map_or_else(String::new, |rate_hz| format!(", {rate_hz:.2} a second"));
     let about = &it.about;
     let mut lines = vec![
         format!(
@@ -206,7 +212,7 @@ fn text(it: &Found) -> String {
         ),
         format!("  now           {} {width}x{height}{rate}", it.mode.format),
     ];
-    lines.extend(it.stable.iter().map(|it| format!("  stable name   {}", it.display())));
+    lines.extend(it.stable.iter().map(|stable| format!("  stable name   {}", stable.display())));
     for format in &it.formats {
         let is_read = footage::PixelFormat::of_letters(format.format.0).is_some();
         let note = if is_read { "" } else { " (not read)" };
@@ -215,7 +221,8 @@ fn text(it: &Found) -> String {
             format.format, format.description
         ));
         for size in format.sizes.iter().filter(|_| is_read) {
-            let rates: Vec<String> = size.rates_hz.iter().map(|it| format!("{it:.2}")).collect();
+            let rates: Vec<String> =
+                size.rates_hz.iter().map(|rates_hz| format!("{rates_hz:.2}")).collect();
             lines.push(format!(
                 "    {} at {} a second",
                 size.text(),

@@ -165,7 +165,7 @@ impl Arguments {
             (self.heat.is_some(), "--heat"),
         ];
         let given = |options: &[(bool, &'static str)]| {
-            let mut given = options.iter().filter(|it| it.0);
+            let mut given = options.iter().filter(|option| option.0);
             given.next().map(|it| it.1)
         };
         let network = match self.network.as_deref() {
@@ -221,12 +221,12 @@ impl Arguments {
 
 /// Parses the longest side of a searched image, pixels.
 fn side(text: &str) -> Result<usize, String> {
-    let side = text.parse().ok().filter(|it| (40..=65535).contains(it));
+    let side = text.parse().ok().filter(|value| (40..=65535).contains(value));
     side.ok_or_else(|| format!("expected 40 to 65535 pixels, got {text:?}"))
 }
 
 fn heat(text: &str) -> Result<f64, String> {
-    let heat = text.parse().ok().filter(|it| (0.0..=1.0).contains(it));
+    let heat = text.parse().ok().filter(|value| (0.0..=1.0).contains(value));
     heat.ok_or_else(|| format!("expected 0 to 1, got {text:?}"))
 }
 
@@ -237,9 +237,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         inputs::make_folder(folder)?;
     }
     let files = inputs::images::listed(&arguments.images)?;
-    let mut sheet = arguments.sheet.as_ref().map(|it| {
-        let n_pictures = files.iter().map(|it| pictures::count(it, arguments.wanted()));
-        Sheet::new(it.clone(), n_pictures.sum())
+    let mut sheet = arguments.sheet.as_ref().map(|sheet| {
+        let n_pictures = files.iter().map(|file| pictures::count(file, arguments.wanted()));
+        Sheet::new(sheet.clone(), n_pictures.sum())
     });
     let (mut n_searched, mut n_failed) = (0_u64, 0_usize);
     for file in &files {
@@ -371,7 +371,8 @@ impl Detector<'_> {
         if self.arguments.json {
             let placed = |it| Placed::new(it, model, layout).scaled(searched.per_pixel());
             let detections = found.iter().map(placed);
-            let detections: Vec<_> = detections.map(|it| it.json(Some(&self.joints))).collect();
+            let detections: Vec<_> =
+                detections.map(|detection| detection.json(Some(&self.joints))).collect();
             let mut line = json!({
                 "image": picture.path,
                 "width": picture.size.width,
@@ -397,7 +398,7 @@ impl Detector<'_> {
         let notes = notes.collect::<Vec<_>>().join("; ");
         let n = found.len();
         let detections = if n == 1 { "detection" } else { "detections" };
-        let frame = picture.frame.map_or(String::new(), |it| format!(" frame {it}"));
+        let frame = picture.frame.map_or(String::new(), |frame| format!(" frame {frame}"));
         output::line(format_args!(
             "{}{frame}: {n} {detections}{notes}",
             picture.path.display()
@@ -423,7 +424,7 @@ impl Detector<'_> {
     fn skeleton(&self, searched: &Searched, pose: &Pose) -> Skeleton {
         let centres = pose.centres(&self.search.model, searched.layout());
         Skeleton {
-            points: centres.into_iter().map(|it| searched.in_picture(it)).collect(),
+            points: centres.into_iter().map(|centre| searched.in_picture(centre)).collect(),
             limbs: limbs(&self.search.model),
             score: pose.score,
         }

@@ -94,8 +94,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     findings.extend(adapters());
     findings.push(remains());
     if arguments.json {
-        let all = findings.iter().map(|it| {
-            json!({ "what": it.what, "state": it.state.name(), "found": it.found, "advice": it.advice })
+        let all = findings.iter().map(|finding| {
+            json!({ "what": finding.what, "state": finding.state.name(), "found": finding.found, "advice": finding.advice })
         });
         output::json(&json!({ "schema_version": 1, "findings": all.collect::<Vec<_>>() }))?;
     } else {
@@ -107,7 +107,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             }
         }
     }
-    let is_missing = findings.iter().any(|it| it.state == State::Missing);
+    let is_missing = findings.iter().any(|finding| finding.state == State::Missing);
     Ok(ExitCode::from(if is_missing {
         ExitKind::Config.status()
     } else {

@@ -108,7 +108,7 @@ fn formats(text: &str) -> Result<Formats, String> {
     let names: Vec<&str> = all.iter().map(|it| it.name()).collect();
     let mut found: Formats = Vec::new();
     for wanted in text.split(',').map(str::trim) {
-        let of_name = |it: &Format| wanted == "all" || it.name() == wanted;
+        let of_name = |format: &Format| wanted == "all" || format.name() == wanted;
         let chosen: Formats = all.iter().copied().filter(of_name).collect();
         if chosen.is_empty() && wanted == "parquet" {
             return Err(NO_PARQUET.to_owned());
@@ -131,21 +131,21 @@ fn formats(text: &str) -> Result<Formats, String> {
 fn name(text: &str) -> Result<String, String> {
     let is_plain = !text.is_empty()
         && !text.starts_with('.')
-        && !text.contains(|it: char| it == '/' || it.is_control());
+        && !text.contains(|letter: char| letter == '/' || letter.is_control());
     let expected = "expected the name of a file, without a folder";
     is_plain.then(|| text.to_owned()).ok_or_else(|| expected.to_owned())
 }
 
 fn rate(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|it| (0.001..=1e5).contains(it));
+    let number = text.parse().ok().filter(|value| (0.001..=1e5).contains(value));
     number.ok_or_else(|| format!("expected 0.001 to 100000 frames a second, got {text:?}"))
 }
 
 pub(crate) fn up(text: &str) -> Result<UnitVector3<f64>, String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|it| it.trim().parse().ok()).collect();
-    let [x, y, z] = numbers.and_then(|it| it.try_into().ok()).unwrap_or_default();
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let [x, y, z] = numbers.and_then(|number| number.try_into().ok()).unwrap_or_default();
     let up = UnitVector3::try_new(Vector3::new(x, y, z), 1e-9);
-    up.filter(|it| it.iter().all(|it| it.is_finite()))
+    up.filter(|up| up.iter().all(|value| value.is_finite()))
         .ok_or_else(|| format!("expected a direction such as 0,0,1, got {text:?}"))
 }
 

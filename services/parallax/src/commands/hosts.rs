@@ -150,7 +150,7 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
             output::line(line(it, deployment).trim_end())?;
         }
     }
-    let is_whole = all.iter().all(|it| it["there"] == true);
+    let is_whole = all.iter().all(|value| value["there"] == true);
     let status = if is_whole {
         0
     } else {
@@ -161,7 +161,7 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
 
 /// A host in words, with a line for every view.
 fn line(host: &Value, deployment: &Deployment) -> String {
-    let number = |it: &Value| it.as_f64().unwrap_or(f64::NAN);
+    let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
     let name = host["name"].as_str().unwrap_or_default();
     let there = if host["there"] == true {
         "answers"
@@ -184,7 +184,7 @@ fn line(host: &Value, deployment: &Deployment) -> String {
     let mut text = format!("{name}: {there}; {clock}\n");
     for view in host["views"].as_array().into_iter().flatten() {
         let index = view["view"].as_u64().unwrap_or(0) as usize;
-        let camera = deployment.cameras.get(index).map_or("?", |it| it.name.as_str());
+        let camera = deployment.cameras.get(index).map_or("?", |camera| camera.name.as_str());
         // Writing to a string cannot fail.
         let _infallible = writeln!(
             text,
@@ -209,13 +209,13 @@ fn keys(arguments: &KeysArguments) -> Result<ExitCode, Failure> {
         .as_deref()
         .ok_or("the deployment has no `link.keys`")
         .or_fail(ExitKind::Config)?;
-    let names = deployment.hosts.iter().map(|it| {
-        let address = it.address.iter();
-        let name = address.filter_map(|it| it.rsplit_once(':')).map(|it| {
+    let names = deployment.hosts.iter().map(|host| {
+        let address = host.address.iter();
+        let name = address.filter_map(|address| address.rsplit_once(':')).map(|it| {
             let name = it.0.trim_start_matches('[').trim_end_matches(']');
             name.to_owned()
         });
-        (it.name.clone(), name.collect())
+        (host.name.clone(), name.collect())
     });
     let names: Vec<(String, Vec<String>)> = names.collect();
     let made = bridge::make_keys(folder, &names).or_fail(ExitKind::Input)?;

@@ -125,7 +125,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 
 impl Step {
     fn new(words: &[&str], done: Option<PathBuf>) -> Self {
-        let words = words.iter().map(|it| (*it).to_owned()).collect();
+        let words = words.iter().map(|word| (*word).to_owned()).collect();
         Self { words, done }
     }
 
@@ -238,9 +238,9 @@ fn later_steps(arguments: &Arguments, deployment: &Path) -> Vec<Step> {
 /// The deployment file: the cameras, the rig, and where results go.
 fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
     let stem = arguments.room.file_name().unwrap_or_default().to_string_lossy();
-    let plain = |it: char| {
-        if it.is_ascii_alphanumeric() || it == '-' {
-            it
+    let plain = |letter: char| {
+        if letter.is_ascii_alphanumeric() || letter == '-' {
+            letter
         } else {
             '-'
         }
@@ -259,7 +259,7 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
         text.extend([format!("up = [{:?}, {:?}, {:?}]\n", up.x, up.y, up.z)]);
     }
     let is_camera = |name: &str| {
-        let names = arguments.camera.iter().map(|it| CameraFootage::of(it).name);
+        let names = arguments.camera.iter().map(|camera| CameraFootage::of(camera).name);
         names.into_iter().any(|it| it == name)
     };
     if let Some(stray) = arguments.offset.iter().find(|it| !is_camera(&it.camera)) {

@@ -90,7 +90,7 @@ fn usage(error: &client::publish::TargetError) -> Failure {
 pub(crate) fn finish(companion: Option<Companion>, quiet: bool) {
     let said = companion.map(Companion::finish).unwrap_or_default();
     let first = "publishing the skeletons";
-    for line in said.iter().filter(|it| !quiet && !it.contains(first)) {
+    for line in said.iter().filter(|said| !quiet && !said.contains(first)) {
         output::message(format_args!("publish: {line}"));
     }
 }

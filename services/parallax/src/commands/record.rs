@@ -132,13 +132,13 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let mut growth = Growth::new(&file, &forecast);
     let report = planned.run(globals.quiet, &stop, &mut |_| growth.message())?;
     let recording = recorded::open(&file)?;
-    let later = (1..MAX_EPOCHS).map(|it| record::file_of_life(&file, it));
+    let later = (1..MAX_EPOCHS).map(|i| record::file_of_life(&file, i));
     let later: Vec<PathBuf> = later.take_while(|it| it.exists()).collect();
     if arguments.json {
         let mut value = report.json();
         value["recording"] = recorded::json(&file, &recording);
         value["recording"]["goes_on_in"] =
-            later.iter().map(|it| it.display().to_string()).collect();
+            later.iter().map(|later| later.display().to_string()).collect();
         output::json(&value)?;
     } else if !globals.quiet {
         output::line(report.text())?;
@@ -156,7 +156,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<Forecast, Failure> {
     let resolved = planned.resolved();
     let replaced = if arguments.force {
-        std::fs::metadata(file).map_or(0, |it| it.len())
+        std::fs::metadata(file).map_or(0, |metadata| metadata.len())
     } else {
         0
     };
@@ -178,8 +178,8 @@ fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<For
 ///
 /// A file exists and `force` is not set, is a folder, or is being recorded to.
 fn remove_existing(file: &Path, force: bool) -> Result<(), Failure> {
-    let files = (0..MAX_EPOCHS).map(|it| record::file_of_life(file, it));
-    for file in files.filter(|it| it.exists()) {
+    let files = (0..MAX_EPOCHS).map(|i| record::file_of_life(file, i));
+    for file in files.filter(|file| file.exists()) {
         if file.is_dir() {
             let message = format!("{} is a folder", file.display());
             let failure = Failure::new(ExitKind::Usage, message);

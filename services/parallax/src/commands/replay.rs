@@ -217,7 +217,7 @@ fn check(
     resolved: &Resolved,
     from: Stage,
 ) -> Result<(), Failure> {
-    let without = recording.about.as_ref().map(|it| it.without);
+    let without = recording.about.as_ref().map(|about| about.without);
     let without = without.unwrap_or_default();
     let n_pairs = resolved.deployment.cameras.len().saturating_sub(1);
     let needs_pixels =
@@ -234,8 +234,8 @@ fn check(
         Some((Kind::Evidence, "evidence"))
     } else {
         needed(resolved, from).find(|(kind, _)| {
-            let tracks = recording.tracks.values().filter(|it| it.kind == *kind);
-            tracks.map(|it| it.entries.len()).sum::<usize>() == 0
+            let tracks = recording.tracks.values().filter(|value| value.kind == *kind);
+            tracks.map(|track| track.entries.len()).sum::<usize>() == 0
         })
     };
     let Some((kind, what)) = missing else {
@@ -253,7 +253,7 @@ fn check(
         from.name()
     );
     let failure = Failure::new(ExitKind::Input, message);
-    Err(match recording.counts.keys().find(|it| kind.is_of_another_version(it)) {
+    Err(match recording.counts.keys().find(|key| kind.is_of_another_version(key)) {
         Some(topic) => failure.with_hint(format!(
             "its messages of {topic} have another layout than those of this Parallax: replay it with the one that recorded it"
         )),
@@ -275,7 +275,7 @@ fn check_views(
     let lacks = |topic: fn(usize) -> String| {
         let is_empty = move |view: usize| {
             let track = recording.tracks.get(&topic(view));
-            track.is_none_or(|it| it.entries.is_empty())
+            track.is_none_or(|track| track.entries.is_empty())
         };
         let names = cameras.clone().filter(|(view, _)| is_empty(*view));
         names.map(|(_, it)| it.name.as_str()).collect::<Vec<_>>()

@@ -78,7 +78,7 @@ pub(crate) struct Arguments {
 /// Runs the deployment until its footage ends or a stop is requested.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let budget = arguments.latency_budget_ms;
-    let budget = budget.map(|it| format!("supervise.latency_budget_ms={it:?}"));
+    let budget = budget.map(|budget| format!("supervise.latency_budget_ms={budget:?}"));
     let set: Vec<String> = arguments.set.iter().cloned().chain(budget).collect();
     let mut loaded = load::read(&arguments.config, &set)?;
     if let Some(out) = &arguments.out {
@@ -152,7 +152,7 @@ fn show(plan: &Plan) -> Result<ExitCode, Failure> {
         mb(free)
     ))?;
     let mut topics: Vec<_> = plan.topics.iter().collect();
-    topics.sort_by_key(|it| core::cmp::Reverse(it.pool_bytes()));
+    topics.sort_by_key(|topic| core::cmp::Reverse(topic.pool_bytes()));
     for topic in topics.iter().take(8) {
         output::line(format_args!(
             "  {:<20} {:>8.1} MB",

@@ -44,7 +44,7 @@ struct ServiceArguments {
 
 /// A parser of the names of processes, with their description in `--help`.
 fn names() -> impl TypedValueParser<Value = Name> {
-    let values = Name::ALL.map(|it| PossibleValue::new(it.name()).help(it.help()));
+    let values = Name::ALL.map(|name| PossibleValue::new(name.name()).help(name.help()));
     PossibleValuesParser::new(values)
         .try_map(|name| Name::of_name(&name).ok_or("there is no such process"))
 }

@@ -65,7 +65,7 @@ pub(crate) struct Arguments {
 }
 
 fn method(text: &str) -> Result<Method, String> {
-    let known = Method::ALL.into_iter().find(|it| it.name() == text);
+    let known = Method::ALL.into_iter().find(|method| method.name() == text);
     known.ok_or_else(|| {
         format!(
             "expected one of {}",
@@ -87,14 +87,14 @@ fn rate(text: &str) -> Result<f64, String> {
 }
 
 fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|it| (least..=most).contains(it));
+    let number = text.parse().ok().filter(|value| (least..=most).contains(value));
     number.ok_or_else(|| format!("expected {least} to {most}"))
 }
 
 fn up(text: &str) -> Result<UnitVector3<f64>, String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|it| it.trim().parse().ok()).collect();
-    let direction = numbers.filter(|it| it.len() == 3).map(Vector3::from_vec);
-    let direction = direction.and_then(|it| UnitVector3::try_new(it, 1e-9));
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let direction = numbers.filter(|number| number.len() == 3).map(Vector3::from_vec);
+    let direction = direction.and_then(|direction| UnitVector3::try_new(direction, 1e-9));
     direction.ok_or_else(|| "expected three numbers, not all 0, as 0,0,1".to_owned())
 }
 

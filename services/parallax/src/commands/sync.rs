@@ -105,7 +105,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|it| (least..=most).contains(it));
+    let number = text.parse().ok().filter(|value| (least..=most).contains(value));
     number.ok_or_else(|| format!("expected {least} to {most} seconds, got {text:?}"))
 }
 
@@ -140,7 +140,7 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
         }
     };
     terminal.finish();
-    let names: Vec<&str> = deployment.cameras.iter().map(|it| it.name.as_str()).collect();
+    let names: Vec<&str> = deployment.cameras.iter().map(|camera| camera.name.as_str()).collect();
     if arguments.json {
         output::json(&as_json(&outcome, &names, &finders, reference))?;
     } else {
@@ -170,9 +170,10 @@ fn reference(arguments: &Arguments, deployment: &Deployment) -> Result<usize, Fa
     let Some(name) = &arguments.reference else {
         return Ok(0);
     };
-    let found = deployment.cameras.iter().position(|it| it.name == *name);
+    let found = deployment.cameras.iter().position(|camera| camera.name == *name);
     found.ok_or_else(|| {
-        let known: Vec<&str> = deployment.cameras.iter().map(|it| it.name.as_str()).collect();
+        let known: Vec<&str> =
+            deployment.cameras.iter().map(|camera| camera.name.as_str()).collect();
         let message = format!(
             "--reference: no camera {name:?}; there are {}",
             known.join(", ")
@@ -246,9 +247,9 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
         ]);
     }
     output::line(table)?;
-    if outcome.cameras.iter().all(|it| it.drift_error.is_none()) {
+    if outcome.cameras.iter().all(|camera| camera.drift_error.is_none()) {
         output::line("drift: the footage does not determine it, 0 is taken")?;
-    } else if outcome.cameras.iter().any(|it| it.drift == 0.0) {
+    } else if outcome.cameras.iter().any(|camera| camera.drift == 0.0) {
         output::line("drift: one that is not significant is 0")?;
     }
     output::line(format_args!(
@@ -256,7 +257,7 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
         "pair alone", "best, ms", "second best, ms", "as good, %", "samples"
     ))?;
     for it in &outcome.pairs {
-        let [a, b] = it.cameras.map(|it| names[it]);
+        let [a, b] = it.cameras.map(|camera| names[camera]);
         output::line(format_args!(
             "{:<25} {:>9.0} {:>15.0} {:>12.0} {:>8}",
             format!("{a} - {b}"),
@@ -279,7 +280,7 @@ fn pixels(it: f64) -> String {
 }
 
 fn as_json(outcome: &Outcome, names: &[&str], finders: &[String], reference: usize) -> Value {
-    let finite = |it: f64| it.is_finite().then_some(it);
+    let finite = |value: f64| value.is_finite().then_some(value);
     let cameras = names.iter().zip(&outcome.cameras).zip(finders);
     let cameras: Vec<Value> = cameras
         .map(|((name, it), finder)| {
@@ -288,7 +289,7 @@ fn as_json(outcome: &Outcome, names: &[&str], finders: &[String], reference: usi
                 "offset_ms": 1e3 * it.offset_s,
                 "error_ms": finite(1e3 * it.error_s),
                 "drift_ppm": it.drift_error.map(|_| 1e6 * it.drift),
-                "drift_error_ppm": it.drift_error.map(|it| 1e6 * it).filter(|it| it.is_finite()),
+                "drift_error_ppm": it.drift_error.map(|drift_error| 1e6 * drift_error).filter(|value| value.is_finite()),
                 "joints": it.n,
                 "before_px": finite(it.before_px),
                 "after_px": finite(it.after_px),
@@ -299,18 +300,18 @@ fn as_json(outcome: &Outcome, names: &[&str], finders: &[String], reference: usi
     let pairs: Vec<Value> = outcome
         .pairs
         .iter()
-        .map(|it| {
+        .map(|pair| {
             json!({
-                "cameras": it.cameras.map(|it| names[it]),
-                "offset_ms": 1e3 * it.offset_s,
-                "best_ms": 1e3 * it.best_s,
-                "second_best_ms": 1e3 * it.second_s,
-                "ratio": finite(it.ratio),
-                "samples": it.n,
+                "cameras": pair.cameras.map(|camera| names[camera]),
+                "offset_ms": 1e3 * pair.offset_s,
+                "best_ms": 1e3 * pair.best_s,
+                "second_best_ms": 1e3 * pair.second_s,
+                "ratio": finite(pair.ratio),
+                "samples": pair.n,
             })
         })
         .collect();
-    let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
+    let doubts: Vec<String> = outcome.doubts.iter().map(|doubt| doubt.text(names)).collect();
     json!({
         "schema_version": 1,
         "is_determined": doubts.is_empty(),
@@ -356,7 +357,7 @@ fn refuse(outcome: &Outcome, names: &[&str], by: By) -> Result<(), Failure> {
     if outcome.doubts.is_empty() {
         return Ok(());
     }
-    let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
+    let doubts: Vec<String> = outcome.doubts.iter().map(|doubt| doubt.text(names)).collect();
     let message = format!("the clocks are not determined:\n  {}", doubts.join("\n  "));
     let failure = Failure::new(ExitKind::Degraded, message);
     Err(failure.with_hint(match by {
@@ -380,9 +381,11 @@ fn write(file: &Path, outcome: &Outcome, names: &[&str]) -> Result<(), Failure> 
     let keys: Vec<ClockKeys> = names.iter().zip(&outcome.cameras).map(keys).collect();
     let text = failure::read_text(file)?;
     let changed = with_clocks(&text, &keys).map_err(|error| {
-        let lines = keys.iter().map(|it| {
-            let drift = it.drift_ppm.map_or(String::new(), |it| format!(", drift_ppm = {it:.3}"));
-            format!("{}: offset_ms = {:.3}{drift}", it.name, it.offset_ms)
+        let lines = keys.iter().map(|key| {
+            let drift = key.drift_ppm.map_or(String::new(), |drift_ppm| {
+                format!(", drift_ppm = {drift_ppm:.3}")
+            });
+            format!("{}: offset_ms = {:.3}{drift}", key.name, key.offset_ms)
         });
         let hint = format!(
             "write them by hand: {}",

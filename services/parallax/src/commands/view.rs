@@ -128,7 +128,7 @@ fn subject(named: Option<&str>) -> Result<Subject, Failure> {
         return Ok(Subject::Deployment(None));
     };
     let path = Path::new(named);
-    let ends_with = |ending: &str| path.extension().is_some_and(|it| it == ending);
+    let ends_with = |ending: &str| path.extension().is_some_and(|extension| extension == ending);
     if ends_with("toml") {
         let name = load::read(path, &[])?.deployment.name;
         return Ok(Subject::Deployment(Some(name)));
@@ -184,8 +184,8 @@ fn random_token() -> Result<String, Failure> {
     let source = Path::new("/dev/urandom");
     let read = File::open(source).and_then(|mut it| it.read_exact(&mut bytes));
     read.map_err(|error| failure::in_file(source, &error))?;
-    let digits = bytes.iter().flat_map(|it| [it >> 4, it & 15]);
-    let digits = digits.filter_map(|it| char::from_digit(it.into(), 16));
+    let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
+    let digits = digits.filter_map(|digit| char::from_digit(digit.into(), 16));
     Ok(digits.collect())
 }
 

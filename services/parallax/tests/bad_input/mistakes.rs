@@ -142,7 +142,7 @@ const NO_FILES: &[Mistake] = &[
     ),
     Mistake {
         what: "number of a webcam without quotes",
-        made: |it| it.edit("deployment.toml", "source = \"b\"", "source = 0"),
+        made: |fixture| fixture.edit("deployment.toml", "source = \"b\"", "source = 0"),
         command: CHECK,
         code: 3,
         says: &["deployment.toml:12", "`camera.source`", "found 0"],

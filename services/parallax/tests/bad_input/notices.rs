@@ -116,7 +116,7 @@ fn the_announced_size_of_a_recording_is_right() {
     let ended = case.start(&["record", "deployment.toml", "--out", "run.mcap"]).wait();
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let line = ended.stderr.lines().find(|it| it.starts_with("recording ")).unwrap();
+    let line = ended.stderr.lines().find(|line| line.starts_with("recording ")).unwrap();
     assert!(
         ended.stderr.contains("--without evidence: "),
         "{}",

@@ -144,7 +144,7 @@ const LINES: &[Mistake] = &[
     },
     Mistake {
         what: "results in the place of a file",
-        made: |it| it.write("out", ""),
+        made: |fixture| fixture.write("out", ""),
         command: "run deployment.toml",
         code: 4,
         says: &["cannot make the folder", "out is a file"],
@@ -160,7 +160,7 @@ const LINES: &[Mistake] = &[
     },
     Mistake {
         what: "images in an empty folder",
-        made: |it| fs::create_dir(it.path("none")).unwrap(),
+        made: |fixture| fs::create_dir(fixture.path("none")).unwrap(),
         command: "detect none",
         code: 4,
         says: &["none: no image"],
@@ -220,7 +220,7 @@ fn joints(case: &Case, file: &str) {
 const INPUTS: &[Mistake] = &[
     input(
         "absent model",
-        |it| it.edit("deployment.toml", "model.plx", "person.mat"),
+        |fixture| fixture.edit("deployment.toml", "model.plx", "person.mat"),
         &["there is no model file", "person.mat"],
         &[
             "the one that ships with Parallax",
@@ -229,13 +229,13 @@ const INPUTS: &[Mistake] = &[
     ),
     input(
         "empty model",
-        |it| it.write("model.plx", ""),
+        |fixture| fixture.write("model.plx", ""),
         &["model.plx is empty"],
         &["0 bytes"],
     ),
     input(
         "folder for a model",
-        |it| it.edit("deployment.toml", "model.plx", "a"),
+        |fixture| fixture.edit("deployment.toml", "model.plx", "a"),
         &["cannot read the model file", "/a"],
         &["is a folder, not a regular file"],
     ),
@@ -253,8 +253,8 @@ const INPUTS: &[Mistake] = &[
     ),
     input(
         "absent consistency",
-        |it| {
-            it.edit(
+        |fixture| {
+            fixture.edit(
                 "deployment.toml",
                 "workers = 2",
                 "workers = 2\nconsistency = \"person.consistency\"",
@@ -265,8 +265,8 @@ const INPUTS: &[Mistake] = &[
     ),
     input(
         "rig for consistency",
-        |it| {
-            it.edit(
+        |fixture| {
+            fixture.edit(
                 "deployment.toml",
                 "workers = 2",
                 "workers = 2\nconsistency = \"rig.toml\"",
@@ -299,20 +299,20 @@ const INPUTS: &[Mistake] = &[
     ),
     input(
         "folder for a rig",
-        |it| it.edit("deployment.toml", "rig = \"rig.toml\"", "rig = \"a\""),
+        |fixture| fixture.edit("deployment.toml", "rig = \"rig.toml\"", "rig = \"a\""),
         &["cannot read", "/a"],
         &["a rig is one file"],
     ),
     rig(
         "empty rig",
-        |it| it.write("rig.toml", ""),
+        |fixture| fixture.write("rig.toml", ""),
         &["rig.toml", "no camera found"],
         &["rig.toml is empty"],
     ),
     rig(
         "deployment for a rig",
-        |it| {
-            it.edit(
+        |fixture| {
+            fixture.edit(
                 "deployment.toml",
                 "rig = \"rig.toml\"",
                 "rig = \"deployment.toml\"",
@@ -323,8 +323,8 @@ const INPUTS: &[Mistake] = &[
     ),
     rig(
         "unknown lens",
-        |it| {
-            it.edit(
+        |fixture| {
+            fixture.edit(
                 "rig.toml",
                 "name = \"a\"",
                 "name = \"a\"\nlens = \"fisheyee\"",

@@ -14,7 +14,8 @@ pub(crate) struct Block {
 impl Block {
     /// Whether it is of a language and carries a mark.
     pub(crate) fn is(&self, language: &str, mark: &str) -> bool {
-        self.info.first().is_some_and(|it| it == language) && self.info.iter().any(|it| it == mark)
+        self.info.first().is_some_and(|info| info == language)
+            && self.info.iter().any(|it| it == mark)
     }
 }
 

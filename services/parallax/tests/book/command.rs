@@ -85,8 +85,9 @@ impl Line {
             Some("parallax-lab") => vec!["services/lab".to_owned()],
             Some(name) => vec![format!("shared/{name}"), format!("services/{name}")],
         };
-        let manifests = folders.iter().map(|it| super::root().join(it).join("Cargo.toml"));
-        let Some(manifest) = manifests.into_iter().find_map(|it| fs::read_to_string(it).ok())
+        let manifests = folders.iter().map(|folder| super::root().join(folder).join("Cargo.toml"));
+        let Some(manifest) =
+            manifests.into_iter().find_map(|manifest| fs::read_to_string(manifest).ok())
         else {
             return Some("there is no such package".to_owned());
         };
@@ -158,7 +159,7 @@ pub(crate) fn check((program, arguments): (Program, &[String])) -> Result<(), St
     while help.lines().any(|line| line == "Commands:") {
         let Some((name, others)) = rest.split_first() else {
             // One that may be left out stands on a line of its own.
-            let asks = |it: &str| it.starts_with("Usage: ") && it.ends_with("<COMMAND>");
+            let asks = |text: &str| text.starts_with("Usage: ") && text.ends_with("<COMMAND>");
             let is_optional = !path.is_empty() && !help.lines().any(asks);
             return if is_optional {
                 Ok(())

@@ -25,7 +25,7 @@ fn targets(text: &str) -> Vec<String> {
     let without_code: String = prose.split('`').step_by(2).collect();
     let mut found = Vec::new();
     for rest in without_code.split("](").skip(1) {
-        let target: String = rest.chars().take_while(|it| *it != ')').collect();
+        let target: String = rest.chars().take_while(|c| *c != ')').collect();
         if !target.contains("://") {
             found.push(target);
         }
@@ -62,8 +62,6 @@ fn follow(root: &Path, file: &Path, target: &str) -> Result<(), String> {
 fn anchor_of(heading: &str) -> String {
     let heading = heading.trim_start_matches('#').trim();
     let letters = heading.to_lowercase();
-    let kept = letters
-        .chars()
-        .filter(|it| it.is_alphanumeric() || [' ', '-', '_'].contains(it));
+    let kept = letters.chars().filter(|c| c.is_alphanumeric() || [' ', '-', '_'].contains(c));
     kept.map(|it| if it == ' ' { '-' } else { it }).collect()
 }

@@ -14,8 +14,9 @@ pub(crate) fn paths(text: &str) -> Vec<String> {
     let is_path = |span: &&str| {
         let mut letters = span.chars();
         span.contains("::")
-            && letters.next().is_some_and(|it| it.is_ascii_lowercase())
-            && letters.all(|it| it.is_ascii_alphanumeric() || it == '_' || it == ':')
+            && letters.next().is_some_and(|letter| letter.is_ascii_lowercase())
+            && letters
+                .all(|letter| letter.is_ascii_alphanumeric() || letter == '_' || letter == ':')
     };
     let prose = prose(text);
     let spans = prose.split('`').skip(1).step_by(2);
@@ -27,7 +28,7 @@ pub(crate) fn exists(root: &Path, path: &str) -> bool {
     let mut segments = path.split("::");
     let name = segments.next().unwrap_or_default();
     let sources = ["shared", "services"].map(|group| root.join(group).join(name).join("src"));
-    let Some(source) = sources.iter().find(|it| it.exists()) else {
+    let Some(source) = sources.iter().find(|source| source.exists()) else {
         return false;
     };
     let files = files_below(source, ".rs");
@@ -37,7 +38,8 @@ pub(crate) fn exists(root: &Path, path: &str) -> bool {
 
 /// Whether a file declares a name, or has it as a variant of an enum.
 fn declares(text: &str, name: &str) -> bool {
-    let is_end = |rest: &str| !rest.starts_with(|it: char| it.is_alphanumeric() || it == '_');
+    let is_end =
+        |rest: &str| !rest.starts_with(|letter: char| letter.is_alphanumeric() || letter == '_');
     text.lines().map(str::trim_start).any(|line| {
         let is_variant = line
             .strip_prefix(name)

@@ -31,8 +31,8 @@ pub(crate) const PACED: &str = "[capture]\nupright = false\nmode = \"paced\"\n\
 /// The last line of a frame that every view took: on a loaded machine a view takes every second frame, or fourth, and drops the
 /// others.
 pub(crate) fn last_taken(lines: &[Value]) -> &Value {
-    let is_taken = |it: &&Value| {
-        let mut missing = it["views_missing"].as_object().unwrap().values();
+    let is_taken = |value: &&Value| {
+        let mut missing = value["views_missing"].as_object().unwrap().values();
         missing.all(|why| why != "dropped")
     };
     lines.iter().rev().find(is_taken).unwrap()

@@ -66,7 +66,7 @@ pub(crate) fn name(view: usize) -> String {
 
 /// The picture of a camera in a frame.
 pub(crate) fn picture(camera: &Camera, frame: usize) -> Canvas {
-    let [width, height] = SIZE.map(|it| it as usize);
+    let [width, height] = SIZE.map(|size| size as usize);
     let mut canvas = Canvas::new(Size::new(width, height), [90, 96, 102]);
     let parts = figure(frame).map(|at| camera.project(&at).unwrap());
     for (part, at) in parts.iter().enumerate() {
@@ -99,7 +99,7 @@ pub(crate) fn joints(frame: usize) -> Vec<[f64; 3]> {
 
 /// Position of a part of the standing figure: lower with its depth in the tree, and displaced to its side.
 fn standing(part: usize) -> Point3<f64> {
-    let depth = core::iter::successors(PARENT[part], |it| PARENT[*it]).count() as f64;
+    let depth = core::iter::successors(PARENT[part], |i| PARENT[*i]).count() as f64;
     let side = (MIRROR[part] as f64 - part as f64).signum();
     let side = if MIRROR[part] == part { 0.0 } else { side };
     let swing = 0.04 * ((part * 7) % 5) as f64;

@@ -30,9 +30,12 @@ impl OneProcess {
     /// Compares the results of a run with those of this computation.
     pub(crate) fn assert_same(&self, case: &Case, n_views: usize, n_frames: usize) {
         let rig = geometry::files::read(&case.path("rig.toml"), &ReadOptions::default()).unwrap();
-        let mut views: Vec<View> =
-            rig.cameras().iter().map(|it| View::new(it, &rig, self.upright_size)).collect();
-        let cameras: Vec<Camera> = views.iter().map(|it| it.framing.camera().clone()).collect();
+        let mut views: Vec<View> = rig
+            .cameras()
+            .iter()
+            .map(|camera| View::new(camera, &rig, self.upright_size))
+            .collect();
+        let cameras: Vec<Camera> = views.iter().map(|view| view.framing.camera().clone()).collect();
         let (model, up) = (planted::model(), rig.up_in_world());
         let mut settings = self.settings.clone();
         let shipped = Path::new(deployment::SHIPPED);
@@ -43,13 +46,14 @@ impl OneProcess {
         assert_eq!((pose3d.len(), pose2d.len()), (n_frames, n_frames * n_views));
         let mut n_placed = 0;
         for frame in 0..n_frames {
-            let pictures = rig.cameras().iter().map(|it| planted::picture(it, frame));
+            let pictures = rig.cameras().iter().map(|camera| planted::picture(camera, frame));
             let frames: Vec<Vec<u8>> =
                 pictures.zip(&mut views).map(|(it, view)| view.frame(&it)).collect();
-            let is_missing = |view: usize| self.is_missing.is_some_and(|it| it(frame, view));
+            let is_missing =
+                |view: usize| self.is_missing.is_some_and(|is_missing| is_missing(frame, view));
             let images = frames.iter().zip(&views).enumerate();
             let images = images.map(|(nth, (it, view))| {
-                let [width, height] = view.framing.out_size().map(|it| it as usize);
+                let [width, height] = view.framing.out_size().map(|out_size| out_size as usize);
                 (!is_missing(nth)).then(|| Rgb8View::new(width, height, it).unwrap())
             });
             let images: Vec<_> = images.collect();
@@ -62,7 +66,7 @@ impl OneProcess {
                 let line = &pose2d[frame * n_views + view];
                 let layout = estimator.plans()[view].layout();
                 it.assert_same(line, [frame, view], &estimate, layout);
-                let sigma = self.sigma_px.map(|it| it(frame, view));
+                let sigma = self.sigma_px.map(|sigma_px| sigma_px(frame, view));
                 assert_eq!(line["sigma_px"], json!(sigma), "frame {frame}, view {view}");
             }
         }
@@ -167,7 +171,7 @@ pub(crate) fn assert_same_skeleton(line: &Value, frame: usize, skeleton: &Skelet
             continue;
         };
         let c = &expected.covariance;
-        let covariance = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|it| c[it]);
+        let covariance = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|i| c[i]);
         let position: [f64; 3] = expected.in_world.coords.into();
         assert_eq!(
             got["position_m"],

@@ -141,7 +141,7 @@ impl Started {
             found = processes(folder)
                 .into_iter()
                 .find(|(_, line)| words.iter().all(|word| line.contains(&(*word).to_owned())))
-                .map(|it| it.0);
+                .map(|process| process.0);
             found.is_some()
         });
         found.unwrap()

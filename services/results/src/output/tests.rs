@@ -27,7 +27,7 @@ fn all_files_are_there_at_the_end_and_no_part() {
     let (dir, _) = written(vec![record(0), record(2)]);
     let mut names: Vec<String> = fs::read_dir(dir.path())
         .unwrap()
-        .map(|it| it.unwrap().file_name().into_string().unwrap())
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     names.sort();
     let expected = [
@@ -100,8 +100,8 @@ fn searches_and_the_bytes_of_their_evidence_are_counted_by_view() {
     assert_eq!(summary.searches["left"], [("full".to_owned(), 4)].into());
     assert_eq!(summary.evidence_bytes_per_frame["right"], 500);
     let text = text(&dir, "pose2d.jsonl");
-    let lines = text.lines().map(|it| serde_json::from_str::<Value>(it).unwrap());
-    let said: Vec<Value> = lines.map(|it| it["search"].clone()).collect();
+    let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let said: Vec<Value> = lines.map(|line| line["search"].clone()).collect();
     assert_eq!(said[3], "tracked");
     assert_eq!(said[7], Value::Null, "there was no frame");
 }
@@ -145,12 +145,12 @@ fn every_frame_has_a_line_a_row_of_every_joint_and_one_for_opensim() {
     let summary = output.finish(1);
     assert_eq!((summary.frames, summary.frames_missed), (2, 4));
     let lines = text(&dir, "pose3d.jsonl");
-    let lines = lines.lines().map(|it| serde_json::from_str(it).unwrap());
+    let lines = lines.lines().map(|line| serde_json::from_str(line).unwrap());
     let lines: Vec<Value> = lines.collect();
-    let told = |it: &Value| {
+    let told = |value: &Value| {
         (
-            it["frame"].as_u64(),
-            it["reason"].as_str().map(str::to_owned),
+            value["frame"].as_u64(),
+            value["reason"].as_str().map(str::to_owned),
         )
     };
     let dropped = Some("dropped".to_owned());

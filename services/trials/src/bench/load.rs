@@ -124,14 +124,25 @@ impl Options {
     /// The requested limits, checked on the run with all cameras.
     fn limits(&self, all: &[Measured]) -> Vec<Limit> {
         let whole = all.iter().rfind(|it| !it.case.has_dead);
-        let end_to_end = whole.and_then(|it| it.end_to_end);
-        let rate = whole.and_then(|it| it.rate_hz);
+        let end_to_end = whole.and_then(|whole| whole.end_to_end);
+        let rate = whole.and_then(|whole| whole.rate_hz);
         let limits = [
-            self.max_p50_ms
-                .map(|it| limit::at_most("p50, ms", it, end_to_end.map(|it| it.p50))),
-            self.max_p99_ms
-                .map(|it| limit::at_most("p99, ms", it, end_to_end.map(|it| it.p99))),
-            self.min_rate_hz.map(|it| limit::at_least("results a second", it, rate)),
+            self.max_p50_ms.map(|max_p50_ms| {
+                limit::at_most(
+                    "p50, ms",
+                    max_p50_ms,
+                    end_to_end.map(|end_to_end| end_to_end.p50),
+                )
+            }),
+            self.max_p99_ms.map(|max_p99_ms| {
+                limit::at_most(
+                    "p99, ms",
+                    max_p99_ms,
+                    end_to_end.map(|end_to_end| end_to_end.p99),
+                )
+            }),
+            self.min_rate_hz
+                .map(|min_rate_hz| limit::at_least("results a second", min_rate_hz, rate)),
         ];
         limits.into_iter().flatten().collect()
     }

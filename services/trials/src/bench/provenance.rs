@@ -27,13 +27,13 @@ impl Provenance {
     /// The provenance of a measurement that starts now.
     pub(super) fn now() -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
-        let cores = runtime::own_cores().map_or(0, |it| it.len());
+        let cores = runtime::own_cores().map_or(0, |own_core| own_core.len());
         let cpu = first("/proc/cpuinfo", "model name\t: ");
         let kernel = first("/proc/sys/kernel/osrelease", "");
         let load = first("/proc/loadavg", "");
         let load: Vec<&str> = load.split(' ').take(3).collect();
         Self {
-            date: date(since.map_or(0, |it| it.as_secs())),
+            date: date(since.map_or(0, |since| since.as_secs())),
             machine: format!("{cpu}, {cores} cores, Linux {kernel}"),
             load: load.join(" "),
             version: env!("CARGO_PKG_VERSION"),
@@ -54,7 +54,7 @@ impl Provenance {
 fn first(file: &str, prefix: &str) -> String {
     let text = fs::read_to_string(file).unwrap_or_default();
     let mut lines = text.lines();
-    let found = lines.find_map(|it| it.strip_prefix(prefix));
+    let found = lines.find_map(|line| line.strip_prefix(prefix));
     found.unwrap_or("unknown").trim().to_owned()
 }
 

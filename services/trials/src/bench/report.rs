@@ -35,7 +35,7 @@ pub struct Report {
 impl Report {
     /// Whether all limits held.
     pub fn is_held(&self) -> bool {
-        self.limits.iter().all(|it| it.held)
+        self.limits.iter().all(|limit| limit.held)
     }
 
     /// Appends the report to a Markdown file. Creates the file and its folder if they do not exist.
@@ -66,7 +66,7 @@ impl Report {
     /// The report as JSON.
     pub fn json(&self) -> Value {
         let limits = self.limits.iter().map(
-            |it| json!({ "what": it.what, "asked": it.asked, "got": it.got, "held": it.held }),
+            |limit| json!({ "what": limit.what, "asked": limit.asked, "got": limit.got, "held": limit.held }),
         );
         json!({
             "schema_version": 1,

@@ -136,7 +136,7 @@ impl Transport {
                 "interval_us": self.interval_us,
                 "sender_core": sender,
                 "receiver_core": receiver,
-                "real_time_priority": self.priority.map_or_else(|| "none".to_owned(), |it| it.to_string()),
+                "real_time_priority": self.priority.map_or_else(|| "none".to_owned(), |priority| priority.to_string()),
             }),
             table,
             notes: Vec::new(),
@@ -150,13 +150,13 @@ impl Transport {
         let mut limits = Vec::new();
         for (spins, most) in [(false, self.max_event_us), (true, self.max_polled_us)] {
             let Some(most) = most else { continue };
-            for row in rows.iter().filter(|it| it.spins == spins) {
+            for row in rows.iter().filter(|row| row.spins == spins) {
                 let what = format!("p50 of {} bytes {}, us", row.bytes, mode(spins));
-                let got = row.measured.receiver.hop_us.map(|it| it.p50);
+                let got = row.measured.receiver.hop_us.map(|hop_u| hop_u.p50);
                 limits.push(limit::at_most(&what, most, got));
             }
         }
-        let sum = |of: fn(&Measured) -> u64| rows.iter().map(|it| of(&it.measured)).sum::<u64>();
+        let sum = |of: fn(&Measured) -> u64| rows.iter().map(|row| of(&row.measured)).sum::<u64>();
         let compared = sum(|it| it.n_compared as u64);
         limits.extend([
             limit::at_least("messages asked where they lie", 1.0, Some(compared as f64)),

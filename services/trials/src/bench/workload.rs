@@ -250,20 +250,23 @@ impl Workload {
         let report = planned.run(self.verbosity.quiet, stop, &mut |event| {
             injector
                 .as_mut()
-                .and_then(|it| it.handle(event, now_nanos(), ProcessFault::inject))
+                .and_then(|injector| injector.handle(event, now_nanos(), ProcessFault::inject))
         })?;
         let cpu_seconds = cpu_seconds_of_children()? - before;
         if stop.is_requested() {
             return Ok(None);
         }
-        let names: Vec<String> = deployment.cameras.iter().map(|it| it.name.clone()).collect();
+        let names: Vec<String> =
+            deployment.cameras.iter().map(|camera| camera.name.clone()).collect();
         let mut results = results::read(&deployment.output, &names)?;
         if let Some(injector) = &injector {
             let killed = injector.times().injected;
             let since = killed.map_or(f64::INFINITY, |killed| {
                 killed.saturating_sub(planned.session()) as f64 / 1e6
             });
-            results.retain(|it| it.captured_ms().is_some_and(|it| it > since));
+            results.retain(|result| {
+                result.captured_ms().is_some_and(|captured_ms| captured_ms > since)
+            });
         }
         Ok(Some(measured(case, &results, cpu_seconds, &report)))
     }
@@ -272,7 +275,7 @@ impl Workload {
 fn measured(case: Case, results: &[FrameResult], cpu_seconds: f64, report: &Report) -> Measured {
     let took = |it: &FrameResult| Some(it.sent_ms - it.captured_ms()?);
     let run = report.json();
-    let stages = report.recorded().latency().map(|it| &it.stages);
+    let stages = report.recorded().latency().map(|latency| &latency.stages);
     Measured {
         case,
         n_results: results.len(),
@@ -290,7 +293,7 @@ fn measured(case: Case, results: &[FrameResult], cpu_seconds: f64, report: &Repo
 
 /// Results per second, from the first to the last.
 fn rate_hz(results: &[FrameResult]) -> Option<f64> {
-    let sent = || results.iter().map(|it| it.sent_ms);
+    let sent = || results.iter().map(|result| result.sent_ms);
     let (first, last) = (sent().reduce(f64::min)?, sent().reduce(f64::max)?);
     (last > first).then(|| 1e3 * (results.len() - 1) as f64 / (last - first))
 }
@@ -309,7 +312,7 @@ fn spread(percentiles: &Percentiles) -> Spread {
 /// Keeps the first cameras, and removes settings that name others.
 fn keep_views(deployment: &mut Deployment, n_views: usize) {
     deployment.cameras.truncate(n_views);
-    let names: Vec<String> = deployment.cameras.iter().map(|it| it.name.clone()).collect();
+    let names: Vec<String> = deployment.cameras.iter().map(|camera| camera.name.clone()).collect();
     let is_kept = |name: &String| names.contains(name);
     deployment.paper.pairs.retain(|pair| pair.iter().all(is_kept));
     deployment.paper.compatibility.retain(|it| it.views.iter().all(is_kept));
@@ -361,7 +364,7 @@ mod tests {
 
     #[test]
     fn the_rate_is_that_from_the_first_to_the_last_result() {
-        let results = [0.0, 100.0, 250.0, 400.0].map(|it| moment(it, it + 30.0));
+        let results = [0.0, 100.0, 250.0, 400.0].map(|value| moment(value, value + 30.0));
         assert_eq!(rate_hz(&results), Some(7.5));
         assert_eq!(rate_hz(&results[..1]), None);
         assert_eq!(rate_hz(&[]), None);
@@ -372,7 +375,9 @@ mod tests {
         let stat = "7 (a) b) S 1 2 3 4 5 6 7 8 9 10 1100 1200 250 50 20 0";
         assert_eq!(parse_stat(stat), Some(3.0));
         assert_eq!(parse_stat("7 (a) S 1 2"), None);
-        assert!(cpu_seconds_of_children().is_ok_and(|it| it >= 0.0));
+        assert!(
+            cpu_seconds_of_children().is_ok_and(|cpu_seconds_of_child| cpu_seconds_of_child >= 0.0)
+        );
     }
 
     #[test]

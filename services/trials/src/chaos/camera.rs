@@ -49,19 +49,23 @@ impl CameraFailure {
         span: [u64; 2],
         results: &[FrameResult],
     ) -> Self {
-        let reason = |it: &FrameResult| it.views.get(view).and_then(|it| it.missing.clone());
-        let during: Vec<&FrameResult> =
-            results.iter().filter(|it| (span[0]..span[1]).contains(&it.frame)).collect();
+        let reason = |frame_result: &FrameResult| {
+            frame_result.views.get(view).and_then(|view| view.missing.clone())
+        };
+        let during: Vec<&FrameResult> = results
+            .iter()
+            .filter(|result| (span[0]..span[1]).contains(&result.frame))
+            .collect();
         let flagged = fault.parts().iter().map(|(_, status)| {
             let cause = status.reason();
-            let n = during.iter().filter(|it| reason(it).as_deref() == Some(cause)).count();
+            let n = during.iter().filter(|during| reason(during).as_deref() == Some(cause)).count();
             (cause.to_owned(), n)
         });
-        let has_others = |it: &&&FrameResult| it.views.iter().any(|it| it.missing.is_none());
-        let pauses = during.windows(2).map(|it| it[1].sent_ms - it[0].sent_ms);
-        let last = during.last().map(|it| it.sent_ms);
-        let mut after = results.iter().filter(|it| it.frame >= span[1]);
-        let back = after.find(|it| reason(it).is_none()).map(|it| it.sent_ms);
+        let has_others = |it: &&&FrameResult| it.views.iter().any(|view| view.missing.is_none());
+        let pauses = during.windows(2).map(|pair| pair[1].sent_ms - pair[0].sent_ms);
+        let last = during.last().map(|during| during.sent_ms);
+        let mut after = results.iter().filter(|result| result.frame >= span[1]);
+        let back = after.find(|it| reason(it).is_none()).map(|after| after.sent_ms);
         Self {
             camera: camera.to_owned(),
             span,
@@ -177,7 +181,7 @@ mod tests {
             ..RunOutcome::default()
         };
         let checked = failure.judge(&limits, &outcome).into_iter();
-        checked.filter(|it| !it.held).map(|it| it.what).collect()
+        checked.filter(|checked| !checked.held).map(|checked| checked.what).collect()
     }
 
     #[test]
@@ -206,12 +210,11 @@ mod tests {
     #[test]
     fn an_undetected_fault_and_a_camera_that_never_returns_miss_limits() {
         let unnoticed: Vec<FrameResult> =
-            (0..8).map(|it| moment(it, 100.0 * it as f64, None)).collect();
+            (0..8).map(|i| moment(i, 100.0 * i as f64, None)).collect();
         assert_eq!(missed(&failed(&unnoticed)), ["frames called camera gone"]);
         let gone = Some("camera gone");
-        let never_back: Vec<FrameResult> = (0..8)
-            .map(|it| moment(it, 100.0 * it as f64, gone.filter(|_| it > 1)))
-            .collect();
+        let never_back: Vec<FrameResult> =
+            (0..8).map(|i| moment(i, 100.0 * i as f64, gone.filter(|_| i > 1))).collect();
         assert_eq!(missed(&failed(&never_back)), ["back after, ms"]);
     }
 }

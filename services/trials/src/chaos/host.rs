@@ -65,16 +65,16 @@ pub(super) fn attempt(
         }
         let begin = Instant::now();
         let ms = |since: Instant| since.elapsed().as_secs_f64() * 1e3;
-        let is_gone = |it: &Value| it["hosts"][0]["there"] == false;
+        let is_gone = |value: &Value| value["hosts"][0]["there"] == false;
         measured.gone_ms = watch.until(FAULT * 2, is_gone).map(|_| ms(begin));
         std::thread::sleep(FAULT.saturating_sub(begin.elapsed()));
-        let before = watch.read().map_or(0, |it| n_used(&it));
+        let before = watch.read().map_or(0, |watch| n_used(&watch));
         match fault {
             HostFault::Cut => relay.cut(false),
             HostFault::Kill => far = Running(start(testbed, &far_file, FAR, &output)?),
         }
         let restored = Instant::now();
-        let is_back = |it: &Value| n_used(it) > before + 1;
+        let is_back = |value: &Value| n_used(value) > before + 1;
         measured.back_ms = watch.until(PATIENCE, is_back).map(|_| ms(restored));
     }
     desk.0.wait().or_fail(ExitKind::Run)?;
@@ -158,12 +158,12 @@ impl Watch<'_> {
 
 fn views(state: &Value) -> impl Iterator<Item = &Value> {
     let hosts = state["hosts"].as_array().into_iter().flatten();
-    hosts.flat_map(|it| it["views"].as_array().into_iter().flatten())
+    hosts.flat_map(|host| host["views"].as_array().into_iter().flatten())
 }
 
 /// Frames of the other host that were used, of the view that has the fewest.
 fn n_used(state: &Value) -> u64 {
-    let used = views(state).filter_map(|it| it["used"].as_u64());
+    let used = views(state).filter_map(|view| view["used"].as_u64());
     used.min().unwrap_or(0)
 }
 
@@ -171,7 +171,7 @@ fn n_used(state: &Value) -> u64 {
 fn unaccounted(state: &Value, n_frames: u64) -> Vec<String> {
     let sum = |view: &Value| {
         let counts = ["used", "late", "gone", "left_out"];
-        counts.iter().filter_map(|it| view[it].as_u64()).sum::<u64>()
+        counts.iter().filter_map(|count| view[count].as_u64()).sum::<u64>()
     };
     let mut odd: Vec<String> = views(state)
         .filter(|view| sum(view) != n_frames)

@@ -120,12 +120,12 @@ pub(super) fn random(
         at_least(
             "came back",
             kills.n_kills as f64,
-            Some(kills.downtime_ms.map_or(0, |it| it.n) as f64),
+            Some(kills.downtime_ms.map_or(0, |downtime_ms| downtime_ms.n) as f64),
         ),
         at_most(
             "back after (p99), ms",
             requested.max_return_ms,
-            kills.downtime_ms.map(|it| it.p99),
+            kills.downtime_ms.map(|downtime_ms| downtime_ms.p99),
         ),
     ];
     limits.extend(outcome.judge(kills.n_kills as u64));
@@ -211,8 +211,8 @@ mod tests {
     }
 
     fn missed(limits: Vec<Limit>) -> Vec<String> {
-        let missed = limits.into_iter().filter(|it| !it.held);
-        missed.map(|it| it.what).collect()
+        let missed = limits.into_iter().filter(|limit| !limit.held);
+        missed.map(|missed| missed.what).collect()
     }
 
     /// The limits that a good run misses after a change.
@@ -363,7 +363,9 @@ mod tests {
             unanswered: 0,
             ..good().1
         };
-        let judge = |it: &SupervisorKillOutcome| missed(supervisor(&ASKED, it, &outcome));
+        let judge = |supervisor_kill_outcome: &SupervisorKillOutcome| {
+            missed(supervisor(&ASKED, supervisor_kill_outcome, &outcome))
+        };
         assert_eq!(judge(&good_one), [""; 0]);
         let orphans = SupervisorKillOutcome {
             ended_ms: None,

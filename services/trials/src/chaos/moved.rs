@@ -53,11 +53,11 @@ pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, F
     let mut outcome = run.outcome(|_| 0);
     let is_named = outcome.suspected.contains(&camera);
     outcome.suspected.retain(|it| *it != camera);
-    let summary = run.report.as_ref().ok().and_then(|it| it.recorded().summary());
-    let fits = summary.map(|it| &it.calibration);
-    let fit = fits.and_then(|it| it.get(&camera)).copied();
+    let summary = run.report.as_ref().ok().and_then(|report| report.recorded().summary());
+    let fits = summary.map(|summary| &summary.calibration);
+    let fit = fits.and_then(|fit| fit.get(&camera)).copied();
     let fit = fit.unwrap_or_default();
-    let px = |px: Option<f64>| px.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.0} px"));
+    let px = |px: Option<f64>| px.map_or_else(|| "unknown".to_owned(), |px| format!("{px:.0} px"));
     let measured = format!(
         "{camera} turned by {DEGREES} degrees: {}; cameras are {} apart with it, {} without; {} results",
         if is_named { "named" } else { "not named" },

@@ -53,10 +53,10 @@ pub(super) fn kill(
     let killed = Instant::now();
     supervisor.wait().or_fail(ExitKind::Run)?;
     outcome?;
-    while orphans.iter().any(|it| is_alive(*it)) && killed.elapsed() < ORPHAN_PATIENCE {
+    while orphans.iter().any(|orphan| is_alive(*orphan)) && killed.elapsed() < ORPHAN_PATIENCE {
         std::thread::sleep(POLL_INTERVAL);
     }
-    let ended = !orphans.iter().any(|it| is_alive(*it));
+    let ended = !orphans.iter().any(|orphan| is_alive(*orphan));
     Ok(SupervisorKillOutcome {
         ended_ms: (ended && !orphans.is_empty()).then(|| killed.elapsed().as_secs_f64() * 1000.0),
         files: resources::n_files(&planned.plan().namespace),
@@ -86,8 +86,8 @@ fn wait_for_results(testbed: &Testbed, supervisor: &mut Child, file: &Path) -> R
 /// The child processes of a process.
 fn children(parent: u32) -> BTreeSet<u32> {
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
-    let pids = entries.filter_map(|it| it.file_name().to_str()?.parse().ok());
-    pids.filter(|it| state(*it).is_some_and(|it| it.1 == parent)).collect()
+    let pids = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+    pids.filter(|pid| state(*pid).is_some_and(|it| it.1 == parent)).collect()
 }
 
 /// Whether a process runs; a zombie does not.

@@ -33,14 +33,14 @@ pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, F
         random_kills.handle(event, now, runtime::kill)
     });
     let kills = random_kills.kills();
-    let n_faults = |name: &str| kills.iter().filter(|it| it.process == name).count() as u32;
+    let n_faults = |name: &str| kills.iter().filter(|kill| kill.process == name).count() as u32;
     let outcome = run.outcome(n_faults);
     let session = planned.session();
     let downtime_ms =
-        |it: &Kill| it.downtime_ms(epoch_source_of(&it.process), session, &run.results);
+        |kill: &Kill| kill.downtime_ms(epoch_source_of(&kill.process), session, &run.results);
     let each = kills
         .iter()
-        .map(|it| json!({ "process": it.process, "back_ms": downtime_ms(it) }));
+        .map(|kill| json!({ "process": kill.process, "back_ms": downtime_ms(kill) }));
     let each: Vec<_> = each.collect();
     let measured = RandomKillsOutcome {
         n_kills: kills.len(),

@@ -51,7 +51,7 @@ impl Kill {
         let killed = self.times.injected?;
         let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 / 1e6;
         let sent = source.began_ms(self.epoch, results);
-        let sent = sent.map(|it| it - ms(session, killed));
+        let sent = sent.map(|sent| sent - ms(session, killed));
         sent.or_else(|| Some(ms(killed, self.times.recovered?)))
     }
 }
@@ -123,7 +123,7 @@ impl RandomKills {
     /// The kill of a process that is not back yet.
     fn pending(&mut self, process: &str) -> Option<&mut Kill> {
         let mut kills = self.kills.iter_mut();
-        kills.find(|it| it.process == process && it.times.recovered.is_none())
+        kills.find(|kill| kill.process == process && kill.times.recovered.is_none())
     }
 
     fn kill_if_due(
@@ -134,9 +134,9 @@ impl RandomKills {
         self.next_at.filter(|at| *at <= now && !self.is_over)?;
         let is_away = |name: &str| {
             let mut kills = self.kills.iter();
-            kills.any(|it| it.process == name && it.times.recovered.is_none())
+            kills.any(|kill| kill.process == name && kill.times.recovered.is_none())
         };
-        let available: Vec<_> = self.running.iter().filter(|it| !is_away(it.0)).collect();
+        let available: Vec<_> = self.running.iter().filter(|running| !is_away(running.0)).collect();
         let (process, &(pid, epoch)) = self.random.choice(available)?;
         let process = process.clone();
         self.next_at = Some(now + self.period);

@@ -112,12 +112,15 @@ impl ResourceMonitor {
             _ => {}
         }
         let is_due = now.saturating_sub(self.taken_at) >= PERIOD;
-        if is_due && !self.processes.is_empty() && self.processes.values().all(|it| it.has_worked) {
+        if is_due
+            && !self.processes.is_empty()
+            && self.processes.values().all(|value| value.has_worked)
+        {
             self.taken_at = now;
-            let pids: Vec<u32> = self.processes.values().map(|it| it.pid).collect();
+            let pids: Vec<u32> = self.processes.values().map(|value| value.pid).collect();
             let Measured { used, memory_bytes } = measure(&pids);
             let ages = self.processes.values();
-            let ages = ages.map(|it| age_class(now.saturating_sub(it.started_at)));
+            let ages = ages.map(|age| age_class(now.saturating_sub(age.started_at)));
             self.samples.push(Sample {
                 at: now,
                 used,
@@ -137,7 +140,7 @@ impl ResourceMonitor {
         let ends = [&self.samples[..third], &self.samples[last..]];
         let memory = at_equal_ages(ends);
         let of = |nth: usize| {
-            let used = median(ends[nth].iter().map(|it| it.used))?;
+            let used = median(ends[nth].iter().map(|end| end.used))?;
             Some(ResourceUse {
                 memory_bytes: memory[nth],
                 ..used
@@ -150,32 +153,38 @@ impl ResourceMonitor {
     ///
     /// * `span`: `failure::now_nanos`.
     pub(super) fn within(&self, span: &Range<u64>) -> Option<ResourceUse> {
-        let within = self.samples.iter().filter(|it| span.contains(&it.at));
-        median(within.map(|it| it.used))
+        let within = self.samples.iter().filter(|sample| span.contains(&sample.at));
+        median(within.map(|within| within.used))
     }
 }
 
 /// Ages of one class differ by less than a factor of two: the logarithm of the age in seconds.
 fn age_class(nanos: u64) -> u32 {
-    (nanos / 1_000_000_000).checked_ilog2().map_or(0, |it| it + 1)
+    (nanos / 1_000_000_000)
+        .checked_ilog2()
+        .map_or(0, |checked_ilog2| checked_ilog2 + 1)
 }
 
 /// The memory of all processes in two parts of a run, bytes: of every process the mean over the classes of age that it had in
 /// both, and of each class the median. A process that had no age in both counts in neither.
 fn at_equal_ages(parts: [&[Sample]; 2]) -> [u64; 2] {
-    let n_processes = parts.iter().flat_map(|it| it.iter());
-    let n_processes = n_processes.map(|it| it.processes.len()).max().unwrap_or(0);
+    let n_processes = parts.iter().flat_map(|part| part.iter());
+    let n_processes = n_processes.map(|process| process.processes.len()).max().unwrap_or(0);
     let mut sums = [0; 2];
     for process in 0..n_processes {
         let by_class = parts.map(|samples| {
             let mut classes: BTreeMap<u32, Vec<u64>> = BTreeMap::new();
-            for (class, memory) in samples.iter().filter_map(|it| it.processes.get(process)) {
+            for (class, memory) in samples.iter().filter_map(|sample| sample.processes.get(process))
+            {
                 classes.entry(*class).or_default().push(*memory);
             }
             classes
         });
-        let both: Vec<u32> =
-            by_class[0].keys().filter(|it| by_class[1].contains_key(it)).copied().collect();
+        let both: Vec<u32> = by_class[0]
+            .keys()
+            .filter(|key| by_class[1].contains_key(key))
+            .copied()
+            .collect();
         for (sum, classes) in sums.iter_mut().zip(by_class) {
             let medians = both.iter().filter_map(|it| {
                 let mut all = classes.get(it)?.clone();
@@ -218,7 +227,10 @@ pub(super) fn measure(namespace: &Namespace, pids: &[u32]) -> Measured {
             supervisor_memory_bytes: memory(own),
             descriptors: descriptors.sum(),
             files: n_files(namespace),
-            shared_bytes: shared_files(namespace).iter().map(|it| shared(it)).sum(),
+            shared_bytes: shared_files(namespace)
+                .iter()
+                .map(|shared_file| shared(shared_file))
+                .sum(),
         },
         memory_bytes,
     }
@@ -238,26 +250,26 @@ pub(super) fn n_files(namespace: &Namespace) -> u64 {
 /// The names of a deployment's files in shared memory.
 pub(super) fn shared_files(namespace: &Namespace) -> Vec<String> {
     let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
-    let names = entries.filter_map(|it| it.file_name().into_string().ok());
-    names.filter(|it| it.starts_with(namespace.prefix())).collect()
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    names.filter(|name| name.starts_with(namespace.prefix())).collect()
 }
 
 /// Anonymous resident memory of a process, bytes; 0 if it has ended.
 fn memory(pid: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
-    let line = status.lines().find_map(|it| it.strip_prefix("RssAnon:"));
-    let kib = line.and_then(|it| it.split_whitespace().next()?.parse::<u64>().ok());
+    let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:"));
+    let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok());
     kib.unwrap_or(0) * 1024
 }
 
 fn descriptors(pid: u32) -> u64 {
-    fs::read_dir(format!("/proc/{pid}/fd")).map_or(0, |it| it.count() as u64)
+    fs::read_dir(format!("/proc/{pid}/fd")).map_or(0, |entry| entry.count() as u64)
 }
 
 fn files(folder: &Path) -> u64 {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let counts = entries.map(|it| match it.file_type() {
-        Ok(kind) if kind.is_dir() => files(&it.path()),
+    let counts = entries.map(|entry| match entry.file_type() {
+        Ok(kind) if kind.is_dir() => files(&entry.path()),
         _ => 1,
     });
     counts.sum()
@@ -317,8 +329,11 @@ mod tests {
         start(&mut monitor, "a", 1);
         health_at(&mut monitor, "a", 0, 4);
         health_at(&mut monitor, "a", 1, 5);
-        let taken: Vec<_> =
-            monitor.samples.iter().map(|it| (it.used.files, it.used.descriptors)).collect();
+        let taken: Vec<_> = monitor
+            .samples
+            .iter()
+            .map(|sample| (sample.used.files, sample.used.descriptors))
+            .collect();
         assert_eq!(taken, [(2, 2), (5, 2)]);
         let within = |span: Range<u64>| monitor.within(&(span.start * PERIOD..span.end * PERIOD));
         assert_eq!(within(3..6).map(|it| it.files), Some(5));
@@ -356,7 +371,7 @@ mod tests {
         }
         assert_eq!(monitor.ends(), None, "too few");
         health_at(&mut monitor, "a", 0, 900);
-        let files = monitor.ends().unwrap().map(|it| it.files);
+        let files = monitor.ends().unwrap().map(|end| end.files);
         assert_eq!(files, [2, 8]);
     }
 

@@ -33,13 +33,13 @@ pub enum Scenario {
 impl Scenario {
     /// All scenarios.
     pub fn all() -> Vec<Self> {
-        let once = |fault| SERVICES.map(|it| Self::Once(fault, it));
+        let once = |fault| SERVICES.map(|service| Self::Once(fault, service));
         let mut all = Vec::from(once(ProcessFault::Kill));
         all.push(Self::Random);
         all.extend(once(ProcessFault::Stop));
         // Not `results`: no stage waits for it, and its work depends on the disk.
-        let spinning = SERVICES.into_iter().filter(|it| *it != "results");
-        all.extend(spinning.map(|it| Self::Once(ProcessFault::Spin, it)));
+        let spinning = SERVICES.into_iter().filter(|service| *service != "results");
+        all.extend(spinning.map(|spinning| Self::Once(ProcessFault::Spin, spinning)));
         all.push(Self::Supervisor);
         all.extend(CameraFault::ALL.map(Self::Camera));
         all.extend([Self::Moved, Self::Stall]);
@@ -104,15 +104,20 @@ impl Scenario {
     /// * `processes`: their names.
     pub fn is_possible(self, processes: &[String]) -> bool {
         match self {
-            Self::Once(_, service) => processes.iter().any(|it| service_of(it) == service),
+            Self::Once(_, service) => {
+                processes.iter().any(|process| service_of(process) == service)
+            }
             Self::Random | Self::Supervisor | Self::Camera(_) | Self::Stall => true,
             // Two of its cameras at either host; what carries messages is in some builds only.
             Self::Host(_) => {
                 bridge::HAS_LINK
-                    && processes.iter().filter(|it| service_of(it) == "capture").count() > 3
+                    && processes.iter().filter(|process| service_of(process) == "capture").count()
+                        > 3
             }
             // With fewer than four cameras the moved one cannot be identified.
-            Self::Moved => processes.iter().filter(|it| service_of(it) == "capture").count() > 3,
+            Self::Moved => {
+                processes.iter().filter(|process| service_of(process) == "capture").count() > 3
+            }
         }
     }
 }

@@ -37,17 +37,17 @@ pub(super) fn parts(
     monitor: &ResourceMonitor,
     results: &[FrameResult],
 ) -> Vec<Part> {
-    let sent = |it: &FrameResult| session + (it.sent_ms * 1e6) as u64;
+    let sent = |frame_result: &FrameResult| session + (frame_result.sent_ms * 1e6) as u64;
     let end = results.iter().map(sent).max().unwrap_or(session);
     let begins = (session..=end).step_by(length.max(1) as usize);
     let part = |from: u64| {
         let span: Range<u64> = from..from + length.max(1);
-        let killed = kills.iter().filter_map(|it| it.times.injected);
-        let of_part = results.iter().filter(|it| span.contains(&sent(it)));
+        let killed = kills.iter().filter_map(|kill| kill.times.injected);
+        let of_part = results.iter().filter(|result| span.contains(&sent(result)));
         let latency = |it: &FrameResult| Some(it.sent_ms - it.captured_ms()?);
         Part {
             from_s: (from - session) as f64 / 1e9,
-            kills: killed.filter(|it| span.contains(it)).count(),
+            kills: killed.filter(|killed| span.contains(killed)).count(),
             results: of_part.clone().count(),
             end_to_end_ms: Spread::of(of_part.filter_map(latency).collect()),
             resources: monitor.within(&span),
@@ -112,7 +112,7 @@ mod tests {
     const SESSION: u64 = 50 * SECOND;
 
     fn moment(captured_s: f64, sent_s: f64) -> FrameResult {
-        let [captured_ms, sent_ms] = [captured_s, sent_s].map(|it| it * 1000.0);
+        let [captured_ms, sent_ms] = [captured_s, sent_s].map(|value| value * 1000.0);
         let camera = CameraTimes {
             epoch: 0,
             captured_ms,
@@ -180,12 +180,12 @@ mod tests {
         let parts = parts(10 * SECOND, SESSION, &kills, &monitor(&[2, 13]), &results);
         let got: Vec<_> = parts
             .iter()
-            .map(|it| {
+            .map(|part| {
                 (
-                    it.from_s,
-                    it.kills,
-                    it.results,
-                    it.resources.map(|it| it.files),
+                    part.from_s,
+                    part.kills,
+                    part.results,
+                    part.resources.map(|resource| resource.files),
                 )
             })
             .collect();
@@ -215,7 +215,7 @@ mod tests {
             ]
         );
         assert!(
-            lines.iter().all(|it| it.len() == lines[0].len()),
+            lines.iter().all(|line| line.len() == lines[0].len()),
             "{lines:#?}"
         );
     }

@@ -138,13 +138,14 @@ fn judge(
     let mut limits = vec![at_most(
         "it stood still, ms",
         most_ms,
-        measurement.map(|it| it.stall_ms),
+        measurement.map(|measurement| measurement.stall_ms),
     )];
     limits.push(if let Some(n) = every_frame {
         at_least("results written", n as f64, Some(outcome.n_results as f64))
     } else {
-        let [before, meanwhile] = measurement.map_or([f64::NAN; 2], |it| it.rates_hz);
-        let meanwhile = Some(meanwhile).filter(|it| it.is_finite());
+        let [before, meanwhile] =
+            measurement.map_or([f64::NAN; 2], |measurement| measurement.rates_hz);
+        let meanwhile = Some(meanwhile).filter(|value| value.is_finite());
         at_least("results a second meanwhile", SHARE * before, meanwhile)
     });
     limits.extend(outcome.judge(0));
@@ -168,12 +169,12 @@ pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, F
     let measurement = stall.measurement();
     let is_lossless = planned.resolved().delivery() == runtime::Delivery::Lossless;
     let every_frame = is_lossless.then(|| planned.resolved().n_frames());
-    let [before, meanwhile] = measurement.map_or([0.0; 2], |it| it.rates_hz);
+    let [before, meanwhile] = measurement.map_or([0.0; 2], |measurement| measurement.rates_hz);
     Ok(Verdict {
         scenario: STALL.to_owned(),
         measured: format!(
             "results stood still for {}; results a second {before:.1} before, {meanwhile:.1} meanwhile; {} results written",
-            ms(measurement.map(|it| it.stall_ms)),
+            ms(measurement.map(|measurement| measurement.stall_ms)),
             outcome.n_results
         ),
         details: Vec::new(),
@@ -242,7 +243,7 @@ mod tests {
         };
         let missed = |it: Option<StallMeasurement>, every_frame| {
             let limits = judge(&asked, it.as_ref(), every_frame, &outcome).into_iter();
-            limits.filter(|it| !it.held).map(|it| it.what).collect::<Vec<_>>()
+            limits.filter(|limit| !limit.held).map(|limit| limit.what).collect::<Vec<_>>()
         };
         let with = |rate| {
             Some(StallMeasurement {

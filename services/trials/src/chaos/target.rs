@@ -16,7 +16,7 @@ pub(super) fn frame_at(planned: &Planned, share: f64) -> f64 {
 
 /// Where results record the epoch of a process.
 pub(super) fn epoch_source_of(process: &str) -> EpochSource {
-    let view = |it: &str| process.strip_prefix(it)?.parse().ok();
+    let view = |text: &str| process.strip_prefix(text)?.parse().ok();
     match (view("capture-"), view("pose-"), process) {
         (Some(view), _, _) => EpochSource::Camera(view),
         (_, Some(view), _) => EpochSource::Pose(view),

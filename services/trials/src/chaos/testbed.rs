@@ -151,7 +151,7 @@ impl Testbed {
     ) -> CompletedRun {
         let report = planned.run(self.verbosity.quiet, &self.stop, on_event);
         let deployment = &planned.resolved().deployment;
-        let names = deployment.cameras.iter().map(|it| it.name.clone());
+        let names = deployment.cameras.iter().map(|camera| camera.name.clone());
         let names: Vec<String> = names.collect();
         let read = |report| {
             let results = results::read(&deployment.output, &names)?;
@@ -181,8 +181,10 @@ impl CompletedRun {
         RunOutcome {
             failure: self.report.as_ref().err().map(ToString::to_string),
             n_results: self.results.len(),
-            unanswered: report.map_or(0, |it| it.views().iter().map(|it| it.unanswered).sum()),
-            failed: report.map_or_else(Vec::new, |it| it.unexpected_failures(n_faults)),
+            unanswered: report.map_or(0, |report| {
+                report.views().iter().map(|view| view.unanswered).sum()
+            }),
+            failed: report.map_or_else(Vec::new, |report| report.unexpected_failures(n_faults)),
             leftovers: self.leftovers.clone(),
             suspected: report.map_or_else(Vec::new, Report::misplaced),
         }

@@ -28,12 +28,12 @@ pub(super) struct Verdict {
 impl Verdict {
     /// Whether all limits held.
     pub(super) fn is_held(&self) -> bool {
-        self.limits.iter().all(|it| it.held)
+        self.limits.iter().all(|limit| limit.held)
     }
 
     /// The verdict as JSON.
     pub(super) fn json(&self) -> Value {
-        let limit = |it: &Limit| json!({ "what": it.what, "asked": it.asked, "measured": it.got, "held": it.held });
+        let limit = |limit: &Limit| json!({ "what": limit.what, "asked": limit.asked, "measured": limit.got, "held": limit.held });
         json!({
             "scenario": self.scenario,
             "held": self.is_held(),
@@ -61,7 +61,7 @@ fn write(text: &mut String, verdicts: &[Verdict]) -> core::fmt::Result {
             "{word:<8}{:<17} {}",
             verdict.scenario, verdict.measured
         )?;
-        for limit in verdict.limits.iter().filter(|it| !it.held) {
+        for limit in verdict.limits.iter().filter(|limit| !limit.held) {
             let Limit {
                 what, asked, got, ..
             } = limit;
@@ -71,7 +71,7 @@ fn write(text: &mut String, verdicts: &[Verdict]) -> core::fmt::Result {
             writeln!(text, "{:<8}{line}", "")?;
         }
     }
-    let n_held = verdicts.iter().filter(|it| it.is_held()).count();
+    let n_held = verdicts.iter().filter(|verdict| verdict.is_held()).count();
     writeln!(text, "{n_held} of {} scenarios held", verdicts.len())
 }
 
@@ -92,8 +92,8 @@ pub(super) fn of_random_kills(measured: &RandomKillsOutcome, n_results: usize) -
     let mut text = format!(
         "{} kills; back p50 {}, p99 {}; {n_results} results",
         measured.n_kills,
-        ms(measured.downtime_ms.map(|it| it.p50)),
-        ms(measured.downtime_ms.map(|it| it.p99)),
+        ms(measured.downtime_ms.map(|downtime_ms| downtime_ms.p50)),
+        ms(measured.downtime_ms.map(|downtime_ms| downtime_ms.p99)),
     );
     if let Some([first, last]) = &measured.resources {
         let mb = |bytes: u64| bytes as f64 / 1e6;

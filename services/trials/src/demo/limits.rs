@@ -77,7 +77,7 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
             ),
         ]);
     }
-    let unanswered: u64 = measured.views.iter().map(|it| it.unanswered).sum();
+    let unanswered: u64 = measured.views.iter().map(|view| view.unanswered).sum();
     let may_be_lost = if measured.cost.is_some() {
         MAX_UNACCOUNTED
     } else {
@@ -210,7 +210,7 @@ mod tests {
     /// The limits that a good run misses after a change.
     fn missed(change: impl FnOnce(&mut Run)) -> Vec<String> {
         let limits = Run::changed(change).limits().into_iter();
-        limits.filter(|it| !it.held).map(|it| it.what).collect()
+        limits.filter(|limit| !limit.held).map(|limit| limit.what).collect()
     }
 
     #[test]
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn on_a_slower_machine_only_limits_on_times_are_larger() {
-        let slow = |it: &mut Run| (it.slowness, it.spread) = (3.0, 2.0);
+        let slow = |run: &mut Run| (run.slowness, run.spread) = (3.0, 2.0);
         for (back_ms, pause_ms, expected) in [
             (16_000.0, 6000.0, &[][..]),
             (16_001.0, 6000.0, &["killed camera back after, ms"]),
@@ -295,8 +295,8 @@ mod tests {
     #[test]
     fn no_results_are_needed_meanwhile_if_the_camera_is_back_at_once() {
         let back = |ms: f64| {
-            move |it: &mut Run| {
-                if let Some(cost) = &mut it.cost {
+            move |run: &mut Run| {
+                if let Some(cost) = &mut run.cost {
                     (cost.results_without_it, cost.back_ms) = (0, Some(ms));
                 }
             }

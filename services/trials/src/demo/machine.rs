@@ -99,7 +99,7 @@ impl Gauge {
 
     fn frame(&mut self, number: u64) -> Result<(), Failure> {
         let views = self.views.par_iter_mut();
-        views.map(|it| it.frame(number)).collect()
+        views.map(|view| view.frame(number)).collect()
     }
 }
 

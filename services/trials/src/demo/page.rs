@@ -26,7 +26,7 @@ pub(super) fn page(
     folder: &Path,
 ) -> Page {
     let clock = Clock::new(run);
-    let posed = || run.results.iter().filter(|it| it.is_posed());
+    let posed = || run.results.iter().filter(|result| result.is_posed());
     let mut tables = Vec::new();
     if let Some(cost) = &report.cost {
         tables.push(of_cost(cost, &run.cameras[VICTIM]));
@@ -44,7 +44,7 @@ pub(super) fn page(
             plural(run.results.len(), "result"),
             posed().count(),
             posed()
-                .filter(|it| it.views.iter().all(|it| it.missing.is_none()))
+                .filter(|posed| posed.views.iter().all(|view| view.missing.is_none()))
                 .count(),
             run.cameras.len(),
         ),
@@ -85,15 +85,15 @@ impl Clock {
 }
 
 fn marks(cost: Option<&Cost>, clock: &Clock) -> Vec<Mark> {
-    let Some(killed) = cost.and_then(|it| it.killed_at_ms) else {
+    let Some(killed) = cost.and_then(|cost| cost.killed_at_ms) else {
         return Vec::new();
     };
     let mark = |ms: f64, what: &str| Mark {
         seconds: clock.seconds(ms),
         what: what.to_owned(),
     };
-    let back = cost.and_then(|it| it.back_ms);
-    let back = back.map(|it| mark(killed + it, "back"));
+    let back = cost.and_then(|cost| cost.back_ms);
+    let back = back.map(|back| mark(killed + back, "back"));
     [mark(killed, "killed")].into_iter().chain(back).collect()
 }
 
@@ -103,23 +103,23 @@ fn space(run: &Run<'_>, synthetic: &SyntheticDeployment) -> Space {
         seconds: result.frame as f64 / run.rate_hz,
         found: result.joints.clone(),
         truth: truth.clone(),
-        views: result.views.iter().map(|it| it.missing.clone()).collect(),
+        views: result.views.iter().map(|view| view.missing.clone()).collect(),
     };
     let up = synthetic.rig.up_in_world();
     Space {
-        joints: PARSE14.joints.iter().map(|it| it.name.to_owned()).collect(),
+        joints: PARSE14.joints.iter().map(|joint| joint.name.to_owned()).collect(),
         limbs: PARSE14.limbs.to_vec(),
         eyes: synthetic
             .rig
             .cameras()
             .iter()
-            .map(|it| Eye {
-                name: it.name.clone(),
-                at: it.centre_in_world().coords.into(),
-                axis: it.axis_in_world().into_inner().into(),
+            .map(|camera| Eye {
+                name: camera.name.clone(),
+                at: camera.centre_in_world().coords.into(),
+                axis: camera.axis_in_world().into_inner().into(),
             })
             .collect(),
-        up: up.map_or([0.0, 0.0, 1.0], |it| it.into_inner().into()),
+        up: up.map_or([0.0, 0.0, 1.0], |up| up.into_inner().into()),
         moments: run.results.iter().zip(run.truth).map(moment).collect(),
     }
 }
@@ -143,7 +143,8 @@ fn of_cost(cost: &Cost, camera: &str) -> Table {
          a result has count as back."
     );
     let mut table = table("What the killed camera cost", &note, ["", ""]);
-    let ms = |it: Option<f64>| it.map_or_else(|| "never".to_owned(), |it| format!("{it:.0} ms"));
+    let ms =
+        |value: Option<f64>| value.map_or_else(|| "never".to_owned(), |it| format!("{it:.0} ms"));
     let count = |it: Option<u64>| it.map_or_else(|| "–".to_owned(), |it| it.to_string());
     table.rows = [
         ("its death was noticed after", ms(cost.noticed_ms)),
@@ -180,29 +181,29 @@ fn accuracy(report: &Report) -> Table {
     let note = "PCP3D at gamma 0.5: segments whose ends are off by at most half their length in the mean; MPJPE: mean \
                 distance of the joints.";
     let mut columns = vec![String::new()];
-    columns.extend(report.scores.iter().map(|it| it.0.to_owned()));
-    let scores = || report.scores.iter().map(|it| &it.1);
+    columns.extend(report.scores.iter().map(|score| score.0.to_owned()));
+    let scores = || report.scores.iter().map(|score| &score.1);
     let row = |what: &str, cells: Vec<String>| [vec![what.to_owned()], cells].concat();
     let mut rows = vec![
         row(
             "results",
-            scores().map(|it| it.frames.to_string()).collect(),
+            scores().map(|score| score.frames.to_string()).collect(),
         ),
         row(
             "PCP3D, %",
-            scores().map(|it| number(it.pcp3d_percent, 1)).collect(),
+            scores().map(|score| number(score.pcp3d_percent, 1)).collect(),
         ),
         row(
             "MPJPE, mm",
-            scores().map(|it| number(it.mpjpe_mm, 0)).collect(),
+            scores().map(|score| number(score.mpjpe_mm, 0)).collect(),
         ),
         row(
             "joints not found, %",
-            scores().map(|it| number(it.lost_percent, 1)).collect(),
+            scores().map(|score| number(score.lost_percent, 1)).collect(),
         ),
     ];
     for (nth, (name, _)) in report.scores[0].1.segments.iter().enumerate() {
-        let cells = scores().map(|it| number(it.segments[nth].1, 0));
+        let cells = scores().map(|score| number(score.segments[nth].1, 0));
         rows.push(row(&format!("{name}, %"), cells.collect()));
     }
     Table {
@@ -257,7 +258,7 @@ fn accounts(run: &Run<'_>) -> Table {
             ];
             [
                 vec![view.name.clone()],
-                counts.map(|it| it.to_string()).into(),
+                counts.map(|count| count.to_string()).into(),
             ]
             .concat()
         })
@@ -274,7 +275,7 @@ fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
         run.cameras.iter().any(|camera| file(camera, result.frame).exists())
     };
     let drawn: Vec<&FrameResult> = run.results.iter().filter(is_drawn).collect();
-    let shown = chosen(&drawn, cost.and_then(|it| it.last_frame));
+    let shown = chosen(&drawn, cost.and_then(|cost| cost.last_frame));
     let picture = |result: &FrameResult, view: usize| Picture {
         caption: run.cameras[view].clone(),
         jpeg: jpeg(&file(&run.cameras[view], result.frame)).map_err(|_none| {
@@ -299,9 +300,9 @@ fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
 /// * `drawn`: the frames with overlays.
 /// * `killed_at`: the last frame of the killed camera before the kill.
 fn chosen<'a>(drawn: &[&'a FrameResult], killed_at: Option<u64>) -> Vec<&'a FrameResult> {
-    let middle = drawn.get(drawn.len() / 2).map_or(0, |it| it.frame);
+    let middle = drawn.get(drawn.len() / 2).map_or(0, |drawn| drawn.frame);
     let killed_at = killed_at.unwrap_or(middle);
-    let is_complete = |it: &&&FrameResult| it.views.iter().all(|it| it.missing.is_none());
+    let is_complete = |it: &&&FrameResult| it.views.iter().all(|view| view.missing.is_none());
     let (before, after): (Vec<&FrameResult>, Vec<&FrameResult>) =
         drawn.iter().partition(|it| it.frame <= killed_at);
     let without = after.iter().find(|it| it.views[VICTIM].missing.is_some());

@@ -29,26 +29,31 @@ impl Report {
     pub(super) fn new(run: &Run<'_>, requested: &Limits) -> Self {
         let of = |wanted: &dyn Fn(&FrameResult) -> bool| {
             let pairs = run.results.iter().zip(run.truth);
-            let selected = pairs.filter(|it| wanted(it.0));
-            score(selected.map(|it| (&it.0.joints[..], &it.1[..])))
+            let selected = pairs.filter(|pair| wanted(pair.0));
+            score(selected.map(|selected| (&selected.0.joints[..], &selected.1[..])))
         };
         let scores = [
             ("all results", of(&|_| true)),
             (
                 "with every camera",
-                of(&|it| it.views.iter().all(|it| it.missing.is_none())),
+                of(&|it| it.views.iter().all(|view| view.missing.is_none())),
             ),
             (
                 "without the killed one",
                 of(&|it| it.views[VICTIM].missing.is_some()),
             ),
         ];
-        let cost = run
-            .killed
-            .map(|it| Cost::new(EpochSource::Camera(VICTIM), it, run.session, run.results));
-        let posed = run.results.iter().filter(|it| it.is_posed()).count();
+        let cost = run.killed.map(|killed| {
+            Cost::new(
+                EpochSource::Camera(VICTIM),
+                killed,
+                run.session,
+                run.results,
+            )
+        });
+        let posed = run.results.iter().filter(|result| result.is_posed()).count();
         let summary = run.report.recorded().summary();
-        let was_killed = cost.as_ref().is_some_and(|it| it.killed_at_ms.is_some());
+        let was_killed = cost.as_ref().is_some_and(|cost| cost.killed_at_ms.is_some());
         let killed = format!("capture-{VICTIM}");
         let measured = Measured {
             n_frames: run.n_frames,
@@ -56,11 +61,11 @@ impl Report {
             score: &scores[0].1,
             cost: cost.as_ref(),
             deadline_ms: run.deadline_ms,
-            slowness: run.machine.map_or(1.0, |it| it.slowness()),
-            spread: run.machine.map_or(1.0, |it| it.spread()),
+            slowness: run.machine.map_or(1.0, |machine| machine.slowness()),
+            spread: run.machine.map_or(1.0, |machine| machine.spread()),
             views: run.report.views(),
             failed: &run.report.unexpected_failures(|it| u32::from(was_killed && it == killed)),
-            n_unwritten: summary.map(|it| it.writes_failed + it.frames_not_recorded),
+            n_unwritten: summary.map(|summary| summary.writes_failed + summary.frames_not_recorded),
         };
         let limits = limits::judge(requested, &measured);
         Self {
@@ -72,12 +77,12 @@ impl Report {
 
     /// Whether all limits held.
     pub(super) fn is_held(&self) -> bool {
-        self.limits.iter().all(|it| it.held)
+        self.limits.iter().all(|limit| limit.held)
     }
 
     /// The report as JSON; the content of `report.json`.
     pub(super) fn json(&self, run: &Run<'_>) -> Value {
-        let limit = |it: &Limit| json!({ "what": it.what, "asked": it.asked, "measured": it.got, "held": it.held });
+        let limit = |limit: &Limit| json!({ "what": limit.what, "asked": limit.asked, "measured": limit.got, "held": limit.held });
         let [all, complete, without] = &self.scores;
         json!({
             "schema_version": 1,
@@ -85,9 +90,9 @@ impl Report {
             "limits": self.limits.iter().map(limit).collect::<Vec<_>>(),
             "frames": run.n_frames,
             "frames_with_result": run.results.len(),
-            "frames_with_skeleton": run.results.iter().filter(|it| it.is_posed()).count(),
+            "frames_with_skeleton": run.results.iter().filter(|result| result.is_posed()).count(),
             "frame_rate_hz": run.rate_hz,
-            "machine": run.machine.map(|it| it.json()),
+            "machine": run.machine.map(|machine| machine.json()),
             "processes": run.processes,
             "gamma": GAMMA,
             "accuracy": { "all": all.1, "every_camera": complete.1, "without_killed": without.1 },

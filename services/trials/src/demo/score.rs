@@ -42,7 +42,7 @@ pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [P
         }
         let errors = joint_errors(found, &truth);
         n_joints += errors.len();
-        distances.extend(errors.into_iter().flatten().filter(|it| it.is_finite()));
+        distances.extend(errors.into_iter().flatten().filter(|error| error.is_finite()));
         frames += 1;
     }
     let share = |n: usize, of: usize| (of > 0).then(|| 100.0 * n as f64 / of as f64);
@@ -67,14 +67,15 @@ mod tests {
 
     /// Fourteen joints in a row, 0.1 m apart.
     fn truth() -> Vec<Point> {
-        (0..14).map(|it| [0.1 * f64::from(it), 0.0, 0.0]).collect()
+        (0..14).map(|i| [0.1 * f64::from(i), 0.0, 0.0]).collect()
     }
 
     #[test]
     fn the_truth_is_right_and_distant_joints_are_wrong() {
         let truth = truth();
         let found: Vec<Option<Point>> = truth.iter().copied().map(Some).collect();
-        let far: Vec<Option<Point>> = truth.iter().map(|it| Some([it[0], 9.0, 0.0])).collect();
+        let far: Vec<Option<Point>> =
+            truth.iter().map(|truth| Some([truth[0], 9.0, 0.0])).collect();
         let pair = |it| (it, &truth[..]);
         let good = score([pair(&found[..])].into_iter());
         assert_eq!(

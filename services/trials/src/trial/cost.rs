@@ -48,8 +48,10 @@ impl EpochSource {
     /// the run.
     fn epoch(self, result: &FrameResult) -> Option<(u32, f64)> {
         match self {
-            Self::Camera(view) => result.views[view].camera.map(|it| (it.epoch, it.sent_ms)),
-            Self::Pose(view) => result.views[view].pose.map(|it| (it.epoch, it.sent_ms)),
+            Self::Camera(view) => {
+                result.views[view].camera.map(|camera| (camera.epoch, camera.sent_ms))
+            }
+            Self::Pose(view) => result.views[view].pose.map(|pose| (pose.epoch, pose.sent_ms)),
             Self::Result => Some((result.epoch, result.sent_ms)),
             Self::Unrecorded => None,
         }
@@ -58,8 +60,8 @@ impl EpochSource {
     /// When the process sent its first message of an epoch that contributed to a result, milliseconds since the
     /// planning of the run; none if there is no such result.
     pub(crate) fn began_ms(self, epoch: u32, results: &[FrameResult]) -> Option<f64> {
-        let mut sent = results.iter().filter_map(|it| self.epoch(it));
-        sent.find(|it| it.0 == epoch).map(|it| it.1)
+        let mut sent = results.iter().filter_map(|result| self.epoch(result));
+        sent.find(|it| it.0 == epoch).map(|sent| sent.1)
     }
 }
 
@@ -82,7 +84,7 @@ impl Cost {
         let injected_at = ms(injected.saturating_sub(session));
         let after = |it: u64| ms(it.saturating_sub(injected));
         let epochs = results.iter().filter_map(|it| Some((it, source.epoch(it)?)));
-        let (old, new): (Vec<_>, Vec<_>) = epochs.partition(|it| it.1.0 == 0);
+        let (old, new): (Vec<_>, Vec<_>) = epochs.partition(|epoch| epoch.1.0 == 0);
         let (last, first) = (old.last(), new.first());
         let recovered = times.recovered.filter(|_| source == EpochSource::Unrecorded).map(after);
         // The pause ends with the first result of the new epoch, or else with the first result after the recovery.
@@ -112,7 +114,7 @@ impl Cost {
             frames_lost: last
                 .zip(first)
                 .map(|(last, first)| first.0.frame.saturating_sub(last.0.frame + 1)),
-            results_without_it: away.filter(|it| it.is_posed()).count(),
+            results_without_it: away.filter(|away| away.is_posed()).count(),
             longest_pause_ms: longest_pause(results, injected_at, end),
             usual_pause_ms: longest_pause(results, f64::NEG_INFINITY, injected_at),
         }
@@ -122,9 +124,9 @@ impl Cost {
 /// The longest time between two consecutive results of which the later was sent in the given span, milliseconds, both
 /// ends included.
 fn longest_pause(results: &[FrameResult], from: f64, to: f64) -> Option<f64> {
-    let pairs = results.windows(2).map(|it| [it[0].sent_ms, it[1].sent_ms]);
-    let inside = pairs.filter(|it| it[1] >= from && it[1] <= to);
-    inside.map(|it| it[1] - it[0]).reduce(f64::max)
+    let pairs = results.windows(2).map(|pair| [pair[0].sent_ms, pair[1].sent_ms]);
+    let inside = pairs.filter(|pair| pair[1] >= from && pair[1] <= to);
+    inside.map(|inside| inside[1] - inside[0]).reduce(f64::max)
 }
 
 #[cfg(test)]

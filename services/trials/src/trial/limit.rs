@@ -8,7 +8,7 @@ pub(crate) fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {
         what,
         format!("at least {asked}"),
         got,
-        got.is_some_and(|it| it >= asked),
+        got.is_some_and(|value| value >= asked),
     )
 }
 
@@ -18,7 +18,7 @@ pub(crate) fn at_most(what: &str, asked: f64, got: Option<f64>) -> Limit {
         what,
         format!("at most {asked}"),
         got,
-        got.is_some_and(|it| it <= asked),
+        got.is_some_and(|value| value <= asked),
     )
 }
 
@@ -38,7 +38,7 @@ pub(crate) fn none_of(what: &str, got: &[String]) -> Limit {
 
 /// * `got`: the measured number; a limit on an unmeasured number is missed.
 fn limit(what: &str, asked: String, got: Option<f64>, held: bool) -> Limit {
-    let digits = |it: f64| usize::from(it.fract() != 0.0);
+    let digits = |value: f64| usize::from(value.fract() != 0.0);
     Limit {
         what: what.to_owned(),
         asked,

@@ -42,8 +42,8 @@ impl FrameResult {
 
     /// When the first of its pictures was captured, milliseconds since the planning of the run.
     pub(crate) fn captured_ms(&self) -> Option<f64> {
-        let shots = self.views.iter().filter_map(|it| it.camera);
-        shots.map(|it| it.captured_ms).reduce(f64::min)
+        let shots = self.views.iter().filter_map(|view| view.camera);
+        shots.map(|shot| shot.captured_ms).reduce(f64::min)
     }
 }
 
@@ -71,7 +71,7 @@ fn lines<L: Line>(folder: &Path) -> Result<Vec<L>, Failure> {
 
 /// Joins the lines of both files by frame; a frame that is in one of them only has no result.
 fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<FrameResult> {
-    let times = times.into_iter().map(|it| (it.frame, it));
+    let times = times.into_iter().map(|time| (time.frame, time));
     let times: BTreeMap<u64, TimesLine> = times.collect();
     let both = frames.iter().filter_map(|it| Some((it, times.get(&it.frame)?)));
     both.map(|(line, time)| {
@@ -79,8 +79,8 @@ fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<
         let joint = |name: &str| Some(person?.joints.get(name)?.placed()?.position_m);
         let view = |name: &String| ViewResult {
             missing: line.views_missing.get(name).map(ToString::to_string),
-            camera: time.views.get(name).and_then(|it| it.camera),
-            pose: time.views.get(name).and_then(|it| it.pose),
+            camera: time.views.get(name).and_then(|view| view.camera),
+            pose: time.views.get(name).and_then(|view| view.pose),
         };
         FrameResult {
             frame: line.frame,

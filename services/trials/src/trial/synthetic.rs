@@ -123,7 +123,7 @@ impl SyntheticDeployment {
     }
 
     fn deployment(&self, setup: &SyntheticSetup<'_>) -> String {
-        let quoted = |it: &str| toml::Value::from(it).to_string();
+        let quoted = |text: &str| toml::Value::from(text).to_string();
         let settings = Settings {
             rig: RigChoice::File(PathBuf::from("rig.toml")),
             ..self.settings.clone()
@@ -165,7 +165,7 @@ impl SyntheticDeployment {
         frames: impl Iterator<Item = u64>,
     ) -> Result<Vec<Vec<Point>>, Failure> {
         let scene = Scene::new(&self.settings).or_fail(ExitKind::Run)?;
-        let joints = frames.map(|it| scene.joints(scene.seconds(it)).to_vec());
+        let joints = frames.map(|frame| scene.joints(scene.seconds(frame)).to_vec());
         Ok(joints.collect())
     }
 }

@@ -73,7 +73,7 @@ impl Folder {
             let text = format!("{} in {} has no frame", FrameLine::FILE, path.display());
             return Err(Failure::new(ExitKind::Input, text));
         }
-        frames.sort_by_key(|it| it.number);
+        frames.sort_by_key(|frame| frame.number);
         let view_lines = open_lines(path, ViewLine::FILE, &mut notes)?;
         let mut views: BTreeMap<u64, (u64, usize)> = BTreeMap::new();
         if let Some(file) = &view_lines {
@@ -82,7 +82,7 @@ impl Folder {
             })?;
         }
         let scene = scene(path, &mut notes);
-        let folders = scene.views.iter().map(|it| pictures(path, &it.name));
+        let folders = scene.views.iter().map(|view| pictures(path, &view.name));
         Ok(Self {
             name: path.display().to_string(),
             pictures: folders.collect(),
@@ -275,7 +275,7 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
     };
     let places = |placed: &[Option<PlacedJoint>]| {
         let places = placed.iter();
-        places.map(|it| it.as_ref().map(|it| in_world(it.position_m))).collect()
+        places.map(|place| place.as_ref().map(|it| in_world(it.position_m))).collect()
     };
     let others = line.people.iter().skip(1).map(|other| Other {
         id: other.id,
@@ -284,8 +284,8 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
         views: Vec::new(),
     });
     let followed = placed(person);
-    let views = scene.views.iter().map(|it| Seen {
-        why: line.views_missing.get(&it.name).map(|why: &Missing| why.text().to_owned()),
+    let views = scene.views.iter().map(|view| Seen {
+        why: line.views_missing.get(&view.name).map(|why: &Missing| why.text().to_owned()),
         ..Seen::default()
     });
     let why = line.reason.clone().unwrap_or_else(|| line.status.clone());
@@ -300,7 +300,7 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
         joints: places(&followed),
         spread: followed
             .iter()
-            .map(|it| it.as_ref().and_then(|it| spread(it.covariance_m2)))
+            .map(|followed| followed.as_ref().and_then(|it| spread(it.covariance_m2)))
             .collect(),
         views: views.collect(),
         people: line.seen,
@@ -311,14 +311,14 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
 
 /// Adds the pose of a view.
 fn see(scene: &Scene, moment: &mut Moment, line: &ViewLine) {
-    let Some(view) = scene.views.iter().position(|it| it.name == line.view) else {
+    let Some(view) = scene.views.iter().position(|view| view.name == line.view) else {
         return;
     };
     let parts = line.fused.iter().flat_map(|it| &it.parts);
-    let centres: Option<Vec<[f64; 2]>> = parts.map(|it| Some([it.x?, it.y?])).collect();
-    let joints = centres.and_then(|it| scene.joints_of(&it));
+    let centres: Option<Vec<[f64; 2]>> = parts.map(|part| Some([part.x?, part.y?])).collect();
+    let joints = centres.and_then(|centre| scene.joints_of(&centre));
     if let Some(seen) = moment.views.get_mut(view) {
-        seen.joints = joints.map(|it| it.into_iter().map(in_view).collect());
+        seen.joints = joints.map(|joint| joint.into_iter().map(in_view).collect());
         seen.behind = line.facing == Some(runfiles::Facing::Behind);
     }
 }

@@ -45,13 +45,13 @@ impl Tape {
         let mut notes: Vec<String> = scene.problem.clone().into_iter().collect();
         note(&recording, &mut notes);
         let track = recording.tracks.get(&topic::skeletons());
-        let mut poses = track.map_or_else(Vec::new, |it| it.entries.clone());
+        let mut poses = track.map_or_else(Vec::new, |track| track.entries.clone());
         let mut input = files::open(path).map_err(|why| failure::in_file(path, &why))?;
-        poses.retain(|it| read_pose(&mut input, it).is_ok_and(|it| it.status != Status::END));
+        poses.retain(|pose| read_pose(&mut input, pose).is_ok_and(|it| it.status != Status::END));
         if poses.is_empty() {
             return Err(refused("it has no result".to_owned()));
         }
-        poses.sort_by_key(|it| it.frame);
+        poses.sort_by_key(|pose| pose.frame);
         let frame = |(place, entry): (usize, &Entry)| Frame {
             number: entry.frame.unwrap_or(place as u64),
             has_pose: read_pose(&mut input, entry).ok().map(|it| it.status == Status::OK),
@@ -61,7 +61,8 @@ impl Tape {
         let of_view = |view: usize| {
             let track = recording.tracks.get(&topic::frame(view));
             let entries = track.into_iter().flat_map(|it| &it.entries);
-            let with_pixels = entries.filter(|it| it.len as usize > size_of::<FrameHeader>() + 64);
+            let with_pixels =
+                entries.filter(|entry| entry.len as usize > size_of::<FrameHeader>() + 64);
             with_pixels.filter_map(|it| Some((it.frame?, *it))).collect()
         };
         Ok(Self {

@@ -80,11 +80,11 @@ impl Events {
 
     /// A frame of a view: says when its camera fails, and when it is back.
     pub(crate) fn frame(&mut self, board: &Board, scene: &Scene, view: usize, status: Status) {
-        let Some(last) = self.frames.get_mut(view).filter(|it| **it != status) else {
+        let Some(last) = self.frames.get_mut(view).filter(|frame| **frame != status) else {
             return;
         };
         *last = status;
-        let name = scene.views.get(view).map_or("", |it| &it.name);
+        let name = scene.views.get(view).map_or("", |view| &view.name);
         match status {
             Status::OK => board.event(Weight::Note, &format!("{name}: pictures again")),
             Status::END => board.event(Weight::Note, &format!("{name}: end of footage")),
@@ -100,7 +100,7 @@ impl Events {
             let known = self.processes.get(name).copied();
             let mut seen = Seen {
                 state: process.state,
-                restarts: reading.map_or(0, |it| it.restarts),
+                restarts: reading.map_or(0, |reading| reading.restarts),
                 told: known.and_then(|it| it.told),
                 dropped: known.map_or([0; Cause::ALL.len()], |it| it.dropped),
             };
@@ -109,7 +109,7 @@ impl Events {
                     board,
                     name,
                     &mut seen,
-                    &Cause::ALL.map(|it| reading.n_dropped_by(it)),
+                    &Cause::ALL.map(|cause| reading.n_dropped_by(cause)),
                 );
             }
             if let Some(known) = known {
@@ -156,7 +156,7 @@ fn lost(board: &Board, name: &str, seen: &mut Seen, now: &[u64; Cause::ALL.len()
         return;
     }
     let counts = now.iter().zip(&seen.dropped).zip(Cause::ALL);
-    let new = counts.filter(|it| it.0.0 > it.0.1);
+    let new = counts.filter(|count| count.0.0 > count.0.1);
     let new: Vec<String> = new
         .map(|((now, then), cause)| format!("{} {}", now - then, cause.name()))
         .collect();

@@ -128,7 +128,7 @@ impl Session {
     /// Messages cannot be received.
     pub(crate) fn look(&mut self, board: &Board) -> Result<Look, Failure> {
         let has_come = self.look_at_poses(board)?;
-        if has_come || self.looked.is_none_or(|it| it.elapsed() >= PATIENCE) {
+        if has_come || self.looked.is_none_or(|looked| looked.elapsed() >= PATIENCE) {
             self.looked = Some(Instant::now());
             for view in 0..self.cameras.len() {
                 self.look_at(view, board)?;
@@ -201,7 +201,8 @@ impl Session {
         let snapshot = self.live.snapshot()?;
         self.events.processes(board, &snapshot);
         let sessions = snapshot.processes.iter();
-        let mut sessions = sessions.filter_map(|it| it.reading.as_ref().map(|it| it.session));
+        let mut sessions =
+            sessions.filter_map(|session| session.reading.as_ref().map(|reading| reading.session));
         self.run = self.run.or_else(|| sessions.next());
         let described = live::describe(&snapshot);
         self.record(board);

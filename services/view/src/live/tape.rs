@@ -48,7 +48,7 @@ impl Tape {
             ..RecordingPlan::default()
         };
         let topology = resolved.topology();
-        let processes = topology.processes().iter().map(|it| it.name.clone());
+        let processes = topology.processes().iter().map(|process| process.name.clone());
         let job = Job {
             file: file.clone(),
             about: recorded::about(resolved, &plan)?,
@@ -109,7 +109,7 @@ impl Tape {
 
     /// For the page.
     pub(crate) fn json(&self) -> Value {
-        let bytes = std::fs::metadata(&self.file).map_or(0, |it| it.len());
+        let bytes = std::fs::metadata(&self.file).map_or(0, |metadata| metadata.len());
         json!({
             "file": self.file.display().to_string(), "bytes": bytes,
             "seconds": self.began.elapsed().as_secs(),

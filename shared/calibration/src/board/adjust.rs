@@ -29,7 +29,7 @@ pub(crate) fn adjusted(
     boards: &[Shown],
 ) -> Result<Outcome, BoardError> {
     let all: Vec<Vec<(usize, Observation)>> =
-        boards.iter().map(|it| observations(task, it)).collect();
+        boards.iter().map(|board| observations(task, board)).collect();
     let seen: Vec<Vec<Observation>> =
         all.iter().map(|it| it.iter().map(|it| it.1).collect()).collect();
     let settings = Settings {
@@ -38,7 +38,7 @@ pub(crate) fn adjusted(
     };
     let start = BoardProblem {
         cameras: Cameras::new(cameras, free),
-        boards: boards.iter().map(|it| it.world_from_board).collect(),
+        boards: boards.iter().map(|board| board.world_from_board).collect(),
         seen: &seen,
         sigma_px: 1.0,
         loss: Loss::Cauchy(3.0),
@@ -150,7 +150,7 @@ fn right(solved: &BoardProblem<'_>, limits: &[f64]) -> Vec<Vec<bool>> {
 fn used(seen: &[Vec<Observation>], kept: &[Vec<bool>]) -> Vec<Vec<Observation>> {
     let of_frame = |(seen, kept): (&Vec<Observation>, &Vec<bool>)| {
         let used = seen.iter().zip(kept).filter(|it| *it.1);
-        used.map(|it| *it.0).collect()
+        used.map(|used| *used.0).collect()
     };
     seen.iter().zip(kept).map(of_frame).collect()
 }

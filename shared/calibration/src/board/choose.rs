@@ -18,7 +18,7 @@ const TILTS: usize = 6;
 /// One after the other the frame is taken that adds most of what has been seen least: cells of each camera's picture, sizes and
 /// tilts of the board, and pairs of cameras that see it together.
 pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<usize> {
-    let mut all: Vec<usize> = sights.iter().map(|it| it.frame).collect();
+    let mut all: Vec<usize> = sights.iter().map(|sight| sight.frame).collect();
     all.sort_unstable();
     all.dedup();
     if all.len() <= most {
@@ -30,7 +30,7 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
     let features: Vec<Vec<usize>> = all
         .iter()
         .map(|frame| {
-            let own: Vec<&Sight> = sights.iter().filter(|it| it.frame == *frame).collect();
+            let own: Vec<&Sight> = sights.iter().filter(|sight| sight.frame == *frame).collect();
             let mut list: Vec<usize> = own
                 .iter()
                 .flat_map(|it| {
@@ -54,7 +54,7 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
     let mut is_taken = vec![false; all.len()];
     for _ in 0..most {
         let gain = |nth: usize| -> f64 {
-            let each = features[nth].iter().map(|it| 1.0 / f64::from(1 + times[*it]));
+            let each = features[nth].iter().map(|feature| 1.0 / f64::from(1 + times[*feature]));
             each.sum()
         };
         let open = (0..all.len()).filter(|nth| !is_taken[*nth]);
@@ -75,10 +75,10 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
 pub(crate) fn speeds(sights: &[Sight], n_cameras: usize) -> BTreeMap<(usize, usize), f64> {
     let mut speeds = BTreeMap::new();
     for camera in 0..n_cameras {
-        let mut own: Vec<&Sight> = sights.iter().filter(|it| it.camera == camera).collect();
+        let mut own: Vec<&Sight> = sights.iter().filter(|sight| sight.camera == camera).collect();
         own.sort_by_key(|it| it.frame);
         for (nth, sight) in own.iter().enumerate() {
-            let before = nth.checked_sub(1).and_then(|it| own.get(it));
+            let before = nth.checked_sub(1).and_then(|difference| own.get(difference));
             let near = [before, own.get(nth + 1)].into_iter().flatten();
             let each = near.filter_map(|other| speed(sight, other));
             let fastest = each.fold(f64::NAN, f64::max);
@@ -116,7 +116,7 @@ pub(crate) fn slow(
 /// The median movement of corners between two pictures, pixels a frame.
 fn speed(a: &Sight, b: &Sight) -> Option<f64> {
     let moved = a.points.iter().filter_map(|(id, at)| {
-        let other = b.points.iter().find(|it| it.0 == *id)?;
+        let other = b.points.iter().find(|point| point.0 == *id)?;
         Some((other.1 - at).norm())
     });
     let moved = Sorted::new(moved.collect::<Vec<f64>>()).median()?;
@@ -133,8 +133,9 @@ fn features_of(sight: &Sight, size: [f64; 2]) -> impl Iterator<Item = usize> {
     let step = (-side.max(1e-3).ln() / 1.5_f64.ln()).clamp(0.0, (SIZES - 1) as f64) as usize;
     cells.push(n_cells + step);
     if let Some([u, v]) = tilt(sight) {
-        let bin =
-            |it: f64| ((it + 0.75) / 1.5 * TILTS as f64).clamp(0.0, (TILTS - 1) as f64) as usize;
+        let bin = |value: f64| {
+            ((value + 0.75) / 1.5 * TILTS as f64).clamp(0.0, (TILTS - 1) as f64) as usize
+        };
         cells.push(n_cells + SIZES + bin(v) * TILTS + bin(u));
     }
     cells.into_iter()
@@ -155,15 +156,15 @@ pub(crate) fn coverage(points: impl Iterator<Item = Point2<f64>>, size: [u32; 2]
     for at in points {
         is_seen[cell(at, size.map(f64::from))] = true;
     }
-    is_seen.iter().filter(|it| **it).count() as f64 / is_seen.len() as f64
+    is_seen.iter().filter(|is_seen| **is_seen).count() as f64 / is_seen.len() as f64
 }
 
 /// The root mean square distance of points from their middle, pixels.
 fn spread(sight: &Sight) -> f64 {
     let n = sight.points.len().max(1) as f64;
-    let middle = sight.points.iter().map(|it| it.1.coords);
+    let middle = sight.points.iter().map(|point| point.1.coords);
     let middle = middle.sum::<nalgebra::Vector2<f64>>() / n;
-    let square = sight.points.iter().map(|it| (it.1.coords - middle).norm_squared());
+    let square = sight.points.iter().map(|point| (point.1.coords - middle).norm_squared());
     (square.sum::<f64>() / n).sqrt()
 }
 
@@ -172,10 +173,19 @@ fn tilt(sight: &Sight) -> Option<[f64; 2]> {
     let map =
         Homography::fit(sight.on_board.iter().zip(&sight.points).map(|(on, at)| (*on, at.1, 1.0)))?;
     let n = sight.on_board.len() as f64;
-    let middle = sight.on_board.iter().map(|it| it.coords).sum::<nalgebra::Vector2<f64>>() / n;
-    let reach = sight.on_board.iter().map(|it| (it.coords - middle).norm()).fold(0.0, f64::max);
+    let middle = sight
+        .on_board
+        .iter()
+        .map(|on_board| on_board.coords)
+        .sum::<nalgebra::Vector2<f64>>()
+        / n;
+    let reach = sight
+        .on_board
+        .iter()
+        .map(|on_board| (on_board.coords - middle).norm())
+        .fold(0.0, f64::max);
     let row = map.matrix().row(2).into_owned();
     let depth = row[0] * middle.x + row[1] * middle.y + row[2];
     let share = [row[0] * reach / depth, row[1] * reach / depth];
-    share.iter().all(|it| it.is_finite()).then_some(share)
+    share.iter().all(|value| value.is_finite()).then_some(share)
 }

@@ -26,10 +26,10 @@ const SAME_SHIFT: f64 = 0.15;
 /// The pose that most meetings agree with, then the mean of these.
 pub(crate) fn pair(meetings: &[Meeting]) -> Option<Pair> {
     let step = meetings.len().div_ceil(60).max(1);
-    let candidates = meetings.iter().step_by(step).flat_map(|it| it.a_from_b.iter());
+    let candidates = meetings.iter().step_by(step).flat_map(|meeting| meeting.a_from_b.iter());
     let cost = |pose: &Isometry3<f64>| -> f64 {
         let each = meetings.iter().map(|meeting| {
-            let nearest = meeting.a_from_b.iter().map(|it| apart(pose, it));
+            let nearest = meeting.a_from_b.iter().map(|a_from_b| apart(pose, a_from_b));
             meeting.weight * nearest.fold(f64::MAX, f64::min).min(1.0)
         });
         each.sum()
@@ -38,7 +38,7 @@ pub(crate) fn pair(meetings: &[Meeting]) -> Option<Pair> {
     let agreeing: Vec<(Isometry3<f64>, f64)> = meetings
         .iter()
         .filter_map(|meeting| {
-            let near = meeting.a_from_b.iter().filter(|it| apart(best, it) < 1.0);
+            let near = meeting.a_from_b.iter().filter(|a_from_b| apart(best, a_from_b) < 1.0);
             let nearest = near.min_by(|x, y| apart(best, x).total_cmp(&apart(best, y)))?;
             Some((*nearest, meeting.weight))
         })
@@ -59,7 +59,7 @@ pub(crate) fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
 }
 
 fn mean(near: &Isometry3<f64>, poses: &[(Isometry3<f64>, f64)]) -> Isometry3<f64> {
-    let total: f64 = poses.iter().map(|it| it.1).sum();
+    let total: f64 = poses.iter().map(|pose| pose.1).sum();
     let (mut turn, mut shift) = (nalgebra::Vector3::zeros(), nalgebra::Vector3::zeros());
     for (pose, weight) in poses {
         turn += *weight * (pose.rotation * near.rotation.inverse()).scaled_axis();

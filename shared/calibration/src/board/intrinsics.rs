@@ -23,11 +23,11 @@ pub(crate) fn start(size: [u32; 2], lens: LensKind, boards: &[Vec<Sighted>]) -> 
     let cost = |intrinsics: &Intrinsics| -> f64 {
         let each = boards.iter().step_by(step).map(|points| {
             let rms = linear(intrinsics, points).and_then(|pose| square(intrinsics, &pose, points));
-            rms.map_or(1e4, |it| it.min(1e4))
+            rms.map_or(1e4, |rm| rm.min(1e4))
         });
         each.sum()
     };
-    let costs: Vec<(f64, Intrinsics)> = tried.map(|it| (cost(&it), it)).collect();
+    let costs: Vec<(f64, Intrinsics)> = tried.map(|tried| (cost(&tried), tried)).collect();
     let best = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     best.0.is_finite().then_some(best.1)
 }
@@ -60,7 +60,7 @@ fn square(intrinsics: &Intrinsics, pose: &Isometry3<f64>, points: &[Sighted]) ->
         let image = camera.project(&Point3::new(on_board.x, on_board.y, 0.0))?;
         Some(sum + (image - seen).norm_squared())
     });
-    sum.map(|it| it / points.len().max(1) as f64)
+    sum.map(|sum| sum / points.len().max(1) as f64)
 }
 
 /// What of a camera's intrinsics is free.

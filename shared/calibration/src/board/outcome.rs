@@ -23,7 +23,7 @@ pub(crate) struct Shown {
 /// The frame of the board with its origin in the middle of the board.
 pub(crate) fn middle(task: &Task) -> Isometry3<f64> {
     let n = task.board.len().max(1) as f64;
-    let sum = task.board.iter().map(|it| it.coords);
+    let sum = task.board.iter().map(|board| board.coords);
     let sum = sum.sum::<nalgebra::Vector2<f64>>();
     Translation3::new(sum.x / n, sum.y / n, 0.0).into()
 }
@@ -68,13 +68,13 @@ pub(crate) fn outcome(task: &Task, adjusted: &Adjusted<'_>) -> Outcome {
     let cameras = residuals.into_iter().enumerate().map(|(nth, residuals)| {
         frames[nth].dedup();
         let used = |it: &&Residual| !it.is_wrong;
-        let place = |it: &Residual| -> Point2<f64> { it.at };
+        let place = |residual: &Residual| -> Point2<f64> { residual.at };
         CameraOutcome {
             camera: solved.cameras.cameras()[nth].clone(),
             is_known: task.known[nth].is_some(),
             n_boards: [0, frames[nth].len()],
-            rms_px: rms(residuals.iter().filter(used).map(|it| it.off)),
-            rms_of_all_px: rms(residuals.iter().map(|it| it.off)),
+            rms_px: rms(residuals.iter().filter(used).map(|residual| residual.off)),
+            rms_of_all_px: rms(residuals.iter().map(|residual| residual.off)),
             coverage: choose::coverage(residuals.iter().filter(used).map(place), task.sizes[nth]),
             numbers: known[solved.cameras.parameters(nth)].to_vec(),
             residuals,
@@ -93,7 +93,7 @@ pub(crate) fn outcome(task: &Task, adjusted: &Adjusted<'_>) -> Outcome {
 }
 
 fn rms(off: impl Iterator<Item = nalgebra::Vector2<f64>>) -> f64 {
-    let squares: Vec<f64> = off.map(|it| it.norm_squared()).collect();
+    let squares: Vec<f64> = off.map(|off| off.norm_squared()).collect();
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
@@ -123,8 +123,8 @@ fn numbers(solved: &BoardProblem<'_>) -> Vec<Known> {
             } else {
                 1.0
             };
-            let sd = spread.as_ref().map_or(f64::INFINITY, |it| it.sd(parameter));
-            let sd = by_parts.as_ref().map_or(sd, |it| sd.max(it.sd(parameter)));
+            let sd = spread.as_ref().map_or(f64::INFINITY, |spread| spread.sd(parameter));
+            let sd = by_parts.as_ref().map_or(sd, |part| sd.max(part.sd(parameter)));
             Known {
                 name,
                 value: value * unit,
@@ -151,8 +151,8 @@ fn value_of(camera: &Camera, name: &str) -> f64 {
         _ => {
             let names = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
             let short = name.trim_start_matches("lens ");
-            let nth = names.iter().position(|it| *it == short);
-            let value = nth.and_then(|it| intrinsics.lens.model().coefficients().nth(it));
+            let nth = names.iter().position(|name| *name == short);
+            let value = nth.and_then(|nth| intrinsics.lens.model().coefficients().nth(nth));
             value.unwrap_or(f64::NAN)
         }
     }

@@ -41,8 +41,8 @@ pub(crate) fn linear(intrinsics: &Intrinsics, points: &[Sighted]) -> Option<Isom
         Some((*on_board, ideal, 1.0))
     });
     let map = Homography::fit(pairs)?;
-    let [a, b, t] = [0, 1, 2].map(|it| map.matrix().column(it).into_owned());
-    let middle = points.iter().map(|it| it.0.coords);
+    let [a, b, t] = [0, 1, 2].map(|i| map.matrix().column(i).into_owned());
+    let middle = points.iter().map(|point| point.0.coords);
     let middle = middle.sum::<nalgebra::Vector2<f64>>() / points.len() as f64;
     let depth = map.matrix().row(2) * Vector3::new(middle.x, middle.y, 1.0);
     let scale = depth[0].signum() * 2.0 / (a.norm() + b.norm());
@@ -56,7 +56,7 @@ pub(crate) fn linear(intrinsics: &Intrinsics, points: &[Sighted]) -> Option<Isom
 }
 
 fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
-    if !matrix.iter().all(|it| it.is_finite()) {
+    if !matrix.iter().all(|value| value.is_finite()) {
         return None;
     }
     let svd = matrix.svd(true, true);
@@ -69,7 +69,7 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
 
 /// The other pose: the normal of the board mirrored at the line of sight to its middle.
 fn mirrored(pose: &Isometry3<f64>, points: &[Sighted]) -> Isometry3<f64> {
-    let middle = points.iter().map(|it| it.0.coords);
+    let middle = points.iter().map(|point| point.0.coords);
     let middle = middle.sum::<nalgebra::Vector2<f64>>() / points.len() as f64;
     let on_board = Point3::new(middle.x, middle.y, 0.0);
     let in_camera = pose * on_board;
@@ -106,7 +106,7 @@ pub(crate) fn refined(
             Translation3::from(camera.camera_from_world.translation.vector + shift),
             turn * camera.camera_from_world.rotation,
         );
-        match square(&moved, points).filter(|it| *it < cost) {
+        match square(&moved, points).filter(|value| *value < cost) {
             Some(less) => {
                 let gain = cost - less;
                 (camera, cost) = (moved, less);

@@ -41,10 +41,10 @@ pub(crate) struct BoardProblem<'a> {
 impl BoardProblem<'_> {
     /// The residuals (image less seen, pixels) of a frame; `None` for a point without an image.
     pub(crate) fn residuals(&self, frame: usize) -> Vec<Option<nalgebra::Vector2<f64>>> {
-        let residual = |it: &Observation| {
-            let camera: &Camera = &self.cameras.cameras()[it.camera];
-            let image = camera.project(&(self.boards[frame] * it.on_board))?;
-            Some(image - it.seen)
+        let residual = |observation: &Observation| {
+            let camera: &Camera = &self.cameras.cameras()[observation.camera];
+            let image = camera.project(&(self.boards[frame] * observation.on_board))?;
+            Some(image - observation.seen)
         };
         self.seen[frame].iter().map(residual).collect()
     }
@@ -133,7 +133,7 @@ fn prior(camera: &Camera, name: &str) -> Option<(f64, f64)> {
             let nth = number.strip_prefix("lens ")?;
             let index = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"]
                 .iter()
-                .position(|it| *it == nth)?;
+                .position(|name| *name == nth)?;
             let value = intrinsics.lens.model().coefficients().nth(index)?;
             let is_fisheye = matches!(intrinsics.lens.model(), LensModel::KannalaBrandt { .. });
             let sd = match index {
@@ -148,7 +148,7 @@ fn prior(camera: &Camera, name: &str) -> Option<(f64, f64)> {
                     .coefficients()
                     .skip(3)
                     .take(3)
-                    .any(|it| it != 0.0) =>
+                    .any(|coefficient| coefficient != 0.0) =>
                 {
                     DIVIDING
                 }

@@ -37,13 +37,15 @@ pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
         return each_alone(task, &sights, &started);
     }
     let alone = each_alone(task, &sights, &started)?;
-    let lenses: Vec<Intrinsics> = alone.cameras.iter().map(|it| it.camera.intrinsics).collect();
+    let lenses: Vec<Intrinsics> =
+        alone.cameras.iter().map(|camera| camera.camera.intrinsics).collect();
     let placed = placed(task, &sights, &lenses);
     let (pairs, together) = pairs(task, &placed);
     let standing = standing(task.names.len(), &pairs);
     let poses: Option<Vec<Isometry3<f64>>> = standing.poses.iter().copied().collect();
     let Some(poses) = poses else {
-        let named = |group: &Vec<usize>| group.iter().map(|it| task.names[*it].clone()).collect();
+        let named =
+            |group: &Vec<usize>| group.iter().map(|group| task.names[*group].clone()).collect();
         return Err(BoardError::Apart {
             groups: standing.groups.iter().map(named).collect(),
         });
@@ -61,7 +63,7 @@ pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
     }
     outcome.pairs = together;
     for (nth, camera) in outcome.cameras.iter_mut().enumerate() {
-        camera.n_boards[0] = sights.iter().filter(|it| it.camera == nth).count();
+        camera.n_boards[0] = sights.iter().filter(|sight| sight.camera == nth).count();
     }
     verdict::doubt(task, &mut outcome);
     Ok(outcome)
@@ -132,7 +134,7 @@ fn own(nth: usize, sights: &[Sight], placed: &[Placed]) -> (Vec<Sight>, Vec<Plac
 
 /// The root mean square of all residuals that were used, pixels.
 fn pooled(outcome: &Outcome) -> f64 {
-    let all = outcome.cameras.iter().flat_map(|it| &it.residuals);
+    let all = outcome.cameras.iter().flat_map(|camera| &camera.residuals);
     let squares: Vec<f64> = all.filter(|it| !it.is_wrong).map(|it| it.off.norm_squared()).collect();
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
@@ -166,11 +168,11 @@ fn each_alone(
 ) -> Result<Outcome, BoardError> {
     let mut all: Option<Outcome> = None;
     for (nth, start) in started.iter().enumerate() {
-        let own: Vec<Sight> = sights.iter().filter(|it| it.camera == nth).cloned().collect();
+        let own: Vec<Sight> = sights.iter().filter(|sight| sight.camera == nth).cloned().collect();
         let frames = choose::frames(&own, &task.sizes, task.most_frames);
         let placed = placed(task, &own, started);
         let cameras: Vec<Camera> = (0..task.names.len())
-            .map(|it| camera_of(task, it, started[it], Isometry3::identity()))
+            .map(|i| camera_of(task, i, started[i], Isometry3::identity()))
             .collect();
         let mut free = vec![Free::default(); cameras.len()];
         free[nth] = free_of(task, nth, false);
@@ -199,7 +201,7 @@ fn first_intrinsics(
     camera: usize,
     sights: &[Sight],
 ) -> Result<Intrinsics, BoardError> {
-    let own: Vec<Sight> = sights.iter().filter(|it| it.camera == camera).cloned().collect();
+    let own: Vec<Sight> = sights.iter().filter(|sight| sight.camera == camera).cloned().collect();
     let name = || task.names[camera].clone();
     let least = if task.known[camera].is_some() {
         1
@@ -264,15 +266,15 @@ fn pairs(task: &Task, placed: &[Placed]) -> (Vec<([usize; 2], Pair)>, Vec<Togeth
     for a in 0..task.names.len() {
         for b in a + 1..task.names.len() {
             let mut meetings = Vec::new();
-            for one in placed.iter().filter(|it| it.sight.camera == a) {
-                let same = placed
-                    .iter()
-                    .filter(|it| it.sight.camera == b && it.sight.frame == one.sight.frame);
+            for one in placed.iter().filter(|placed| placed.sight.camera == a) {
+                let same = placed.iter().filter(|placed| {
+                    placed.sight.camera == b && placed.sight.frame == one.sight.frame
+                });
                 for other in same {
                     let first = one.ways[0].1;
                     let n = one.sight.points.len().min(other.sight.points.len());
                     meetings.push(Meeting {
-                        a_from_b: other.ways.iter().map(|it| first * it.1.inverse()).collect(),
+                        a_from_b: other.ways.iter().map(|way| first * way.1.inverse()).collect(),
                         weight: n as f64,
                     });
                 }
@@ -294,7 +296,8 @@ fn pairs(task: &Task, placed: &[Placed]) -> (Vec<([usize; 2], Pair)>, Vec<Togeth
 fn boards(task: &Task, cameras: &[Camera], placed: &[Placed], frames: &[usize]) -> Vec<Shown> {
     let mut list = Vec::new();
     for &frame in frames {
-        let own: Vec<&Placed> = placed.iter().filter(|it| it.sight.frame == frame).collect();
+        let own: Vec<&Placed> =
+            placed.iter().filter(|placed| placed.sight.frame == frame).collect();
         let candidates = own.iter().map(|it| {
             let camera = &cameras[it.sight.camera];
             camera.camera_from_world.inverse() * it.ways[0].1
@@ -310,7 +313,7 @@ fn boards(task: &Task, cameras: &[Camera], placed: &[Placed], frames: &[usize]) 
                     costs.min_by(|a, b| a.0.total_cmp(&b.0))
                 })
                 .collect();
-            (ways.iter().map(|it| it.0).sum::<f64>(), pose, ways)
+            (ways.iter().map(|way| way.0).sum::<f64>(), pose, ways)
         });
         let Some((_, pose, ways)) = judged.min_by(|a, b| a.0.total_cmp(&b.0)) else {
             continue;
@@ -319,7 +322,7 @@ fn boards(task: &Task, cameras: &[Camera], placed: &[Placed], frames: &[usize]) 
             frame,
             world_from_board: pose * middle(task),
             spreads: vec![1.0; ways.len()],
-            sights: ways.into_iter().map(|it| it.1).collect(),
+            sights: ways.into_iter().map(|way| way.1).collect(),
         });
     }
     list
@@ -330,7 +333,7 @@ fn cost(camera: &Camera, world_from_board: &Isometry3<f64>, sight: &Sight) -> f6
     let each = sight.sighted().into_iter().map(|(on_board, at)| {
         let in_world = world_from_board * Point3::new(on_board.x, on_board.y, 0.0);
         let image = camera.project(&in_world);
-        image.map_or(100.0, |it| (it - at).norm().min(100.0))
+        image.map_or(100.0, |image| (image - at).norm().min(100.0))
     });
     each.sum::<f64>() / sight.points.len().max(1) as f64
 }

@@ -16,7 +16,8 @@ pub fn standing_board(
     board: &[Point2<f64>],
     sights: &[Sight],
 ) -> Option<(Isometry3<f64>, f64)> {
-    let enough: Vec<&Sight> = sights.iter().filter(|it| it.points.len() >= LEAST_CORNERS).collect();
+    let enough: Vec<&Sight> =
+        sights.iter().filter(|sight| sight.points.len() >= LEAST_CORNERS).collect();
     let seen: Vec<Observation> = enough
         .iter()
         .flat_map(|sight| {
@@ -42,7 +43,7 @@ pub fn standing_board(
         };
         let (solved, _) = solve(problem, &Settings::default());
         let residuals = solved.residuals(0);
-        let squares = residuals.iter().map(|it| it.map_or(1e6, |it| it.norm_squared()));
+        let squares = residuals.iter().map(|residual| residual.map_or(1e6, |it| it.norm_squared()));
         let rms_px = (squares.sum::<f64>() / residuals.len().max(1) as f64).sqrt();
         Some((solved.boards[0], rms_px))
     });

@@ -72,7 +72,7 @@ fn seen(
     }
     let points = board.iter().enumerate().filter_map(|(id, point)| {
         let image = camera.project(&(pose * Point3::new(point.x, point.y, 0.0)))?;
-        let inside = (0..2).all(|it| image[it] > 0.0 && image[it] < f64::from(SIZE[it]));
+        let inside = (0..2).all(|i| image[i] > 0.0 && image[i] < f64::from(SIZE[i]));
         inside.then(|| (id, image + Vector2::new(noise(), noise())))
     });
     let sight = Sight::new(nth, frame, points, board);
@@ -111,7 +111,7 @@ impl Show<'_> {
 
 fn task(cameras: &[Camera], board: &[Point2<f64>], sights: Vec<Sight>) -> Task {
     Task {
-        names: cameras.iter().map(|it| it.name.clone()).collect(),
+        names: cameras.iter().map(|camera| camera.name.clone()).collect(),
         sizes: vec![SIZE; cameras.len()],
         known: vec![None; cameras.len()],
         lens: LensKind::Five,
@@ -170,7 +170,7 @@ fn a_rig_is_found_from_a_board_that_no_two_opposite_cameras_see_together() {
         "{focal} {turn} {place}"
     );
     assert_eq!(outcome.doubts, []);
-    let all = outcome.cameras.iter().flat_map(|it| &it.residuals);
+    let all = outcome.cameras.iter().flat_map(|camera| &camera.residuals);
     let left_out = all.clone().filter(|it| it.is_wrong).count();
     assert!(
         left_out > 0 && left_out <= n_wrong,
@@ -183,9 +183,12 @@ fn a_rig_is_found_from_a_board_that_no_two_opposite_cameras_see_together() {
     );
     // What is said of the focal lengths is true.
     for (found, truth) in outcome.cameras.iter().zip(&truth) {
-        let focal = found.numbers.iter().find(|it| it.name == "focal length");
+        let focal = found.numbers.iter().find(|number| number.name == "focal length");
         let off = (found.camera.intrinsics.fx - truth.intrinsics.fx).abs();
-        assert!(focal.is_some_and(|it| off < 4.0 * it.sd), "{off} {focal:?}");
+        assert!(
+            focal.is_some_and(|focal| off < 4.0 * focal.sd),
+            "{off} {focal:?}"
+        );
     }
 }
 
@@ -244,7 +247,7 @@ fn a_board_that_looks_the_same_turned_is_told_by_the_cameras_together() {
         focal < 4e-3 && turn < 0.6 && place < 1e-2,
         "{focal} {turn} {place}"
     );
-    assert!(outcome.cameras.iter().all(|it| it.wrong_share() < 0.02));
+    assert!(outcome.cameras.iter().all(|camera| camera.wrong_share() < 0.02));
 }
 
 #[test]
@@ -259,19 +262,19 @@ fn what_cannot_be_known_is_refused_with_the_reason() {
     };
     let sights = show.sights(&mut fastrand::Rng::with_seed(3));
     // Cameras 0, 1 and cameras 2, 3 never at the same time.
-    let apart = sights.iter().filter(|it| (it.camera < 2) == (it.frame % 2 == 0));
+    let apart = sights.iter().filter(|sight| (sight.camera < 2) == (sight.frame % 2 == 0));
     let error = calibrate(&task(&truth, &board, apart.cloned().collect())).unwrap_err();
     assert!(
         error.to_string().contains("cam0, cam1 | cam2, cam3"),
         "{error}"
     );
-    let none = sights.iter().filter(|it| it.camera != 2).cloned().collect();
+    let none = sights.iter().filter(|sight| sight.camera != 2).cloned().collect();
     let error = calibrate(&task(&truth, &board, none)).unwrap_err();
     assert!(
         error.to_string().contains("\"cam2\" saw the board in 0 pictures"),
         "{error}"
     );
-    let few = sights.iter().filter(|it| it.frame < 9).cloned().collect();
+    let few = sights.iter().filter(|sight| sight.frame < 9).cloned().collect();
     match calibrate(&task(&truth, &board, few)) {
         Ok(outcome) => assert!(!outcome.doubts.is_empty()),
         Err(error) => assert!(!error.to_string().is_empty()),
@@ -295,7 +298,7 @@ fn cameras_out_of_step_are_doubted() {
     }
     match calibrate(&task(&truth, &board, sights)) {
         Ok(outcome) => assert!(
-            outcome.doubts.iter().any(|it| matches!(it, Doubt::Disagreement { .. })),
+            outcome.doubts.iter().any(|doubt| matches!(doubt, Doubt::Disagreement { .. })),
             "{:?}",
             outcome.doubts
         ),
@@ -367,7 +370,7 @@ fn errors_in_deviations(outcome: &Outcome, truth: &[Camera]) -> Vec<f64> {
     let mut list = Vec::new();
     let first = truth[0].camera_from_world;
     for (nth, (found, truth)) in outcome.cameras.iter().zip(truth).enumerate() {
-        let sd = |name: &str| found.numbers.iter().find(|it| it.name == name).unwrap().sd;
+        let sd = |name: &str| found.numbers.iter().find(|number| number.name == name).unwrap().sd;
         let [own, focal] = [&found.camera, truth].map(|camera| camera.intrinsics.fx);
         list.push((own - focal) / sd("focal length"));
         if nth == 0 {
@@ -408,7 +411,9 @@ fn cameras_out_of_step_have_lenses_by_their_own_pictures_and_what_is_stated_hold
         assert!(is_doubted || is_near, "{degrees} {share}");
         errors_stated.extend(errors_in_deviations(&outcome, &truth));
     }
-    let within = |n: f64| errors_stated.iter().filter(|it| it.abs() < n).count() as f64;
+    let within = |n: f64| {
+        errors_stated.iter().filter(|errors_stated| errors_stated.abs() < n).count() as f64
+    };
     let shares = [within(2.0), within(4.0)].map(|n| n / errors_stated.len() as f64);
     assert!(shares[0] > 0.85 && shares[1] > 0.98, "{shares:?}");
 }

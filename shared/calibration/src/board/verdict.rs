@@ -133,7 +133,11 @@ impl Doubt {
 /// Whether the points of a sight span a plane.
 pub(super) fn is_spread(sight: &Sight) -> bool {
     let n = sight.on_board.len() as f64;
-    let sum = sight.on_board.iter().map(|it| it.coords).sum::<nalgebra::Vector2<f64>>();
+    let sum = sight
+        .on_board
+        .iter()
+        .map(|on_board| on_board.coords)
+        .sum::<nalgebra::Vector2<f64>>();
     let middle = sum / n;
     let mut scatter = nalgebra::Matrix2::zeros();
     for point in &sight.on_board {
@@ -141,14 +145,14 @@ pub(super) fn is_spread(sight: &Sight) -> bool {
         scatter += offset * offset.transpose();
     }
     let eigenvalues = scatter.symmetric_eigenvalues();
-    let finite = sight.points.iter().all(|it| it.1.coords.iter().all(|c| c.is_finite()));
+    let finite = sight.points.iter().all(|point| point.1.coords.iter().all(|c| c.is_finite()));
     finite && eigenvalues.min() > 0.01 * eigenvalues.max()
 }
 
 /// Standard deviation of a focal length, share of it; infinite where it is not told.
 fn focal_share(camera: &CameraOutcome) -> f64 {
-    let focal = camera.numbers.iter().find(|it| it.name == "focal length");
-    focal.map_or(f64::INFINITY, |it| it.sd / it.value)
+    let focal = camera.numbers.iter().find(|number| number.name == "focal length");
+    focal.map_or(f64::INFINITY, |focal| focal.sd / focal.value)
 }
 
 /// Whether the focal length of a camera is given, or known at all.
@@ -169,7 +173,7 @@ pub(super) fn are_lenses_the_same(joint: &Outcome, alone: &Outcome) -> bool {
 /// How well a turn, degrees, and a place, metres, are known: the largest deviations.
 fn place_of(camera: &CameraOutcome) -> [f64; 2] {
     ["rotation", "place"].map(|name| {
-        let own = camera.numbers.iter().filter(|it| it.name.starts_with(name));
+        let own = camera.numbers.iter().filter(|number| number.name.starts_with(name));
         own.map(|it| it.sd).fold(0.0, f64::max)
     })
 }
@@ -177,12 +181,12 @@ fn place_of(camera: &CameraOutcome) -> [f64; 2] {
 /// Adds the doubts of an outcome to it.
 pub(super) fn doubt(task: &Task, outcome: &mut Outcome) {
     let mut doubts = Vec::new();
-    let centre = |it: &CameraOutcome| it.camera.centre_in_world();
+    let centre = |camera_outcome: &CameraOutcome| camera_outcome.camera.centre_in_world();
     for (camera, it) in outcome.cameras.iter().enumerate() {
         let side = f64::from(task.sizes[camera][0].max(task.sizes[camera][1]));
         let limit_px = LARGE_PX * (side / USUAL_SIDE).max(0.5);
         // Out of step, residuals of all together tell of the times, and the deviations of what comes of it.
-        let rms_px = outcome.out_of_step.map_or(it.rms_px, |it| it.alone_px);
+        let rms_px = outcome.out_of_step.map_or(it.rms_px, |out_of_step| out_of_step.alone_px);
         if outcome.out_of_step.is_some() {
             let [degrees, metres] = place_of(it);
             let apart = (centre(it) - centre(&outcome.cameras[0])).norm();
@@ -216,8 +220,8 @@ pub(super) fn doubt(task: &Task, outcome: &mut Outcome) {
             let share = it.coverage;
             doubts.push(Doubt::LittleCovered { camera, share });
         }
-        let focal = it.numbers.iter().find(|it| it.name == "focal length");
-        let share = focal.map_or(0.0, |it| it.sd / it.value);
+        let focal = it.numbers.iter().find(|number| number.name == "focal length");
+        let share = focal.map_or(0.0, |focal| focal.sd / focal.value);
         if share.is_nan() || share > FOCAL_SHARE {
             doubts.push(Doubt::Focal { camera, share });
         }

@@ -271,7 +271,7 @@ impl FromStr for Board {
             Some("aprilgrid" | "apriltag" | "grid") => (Kind::Grid, 0.3, Some(USUAL_TAGS)),
             _ => return Err(shape()),
         };
-        let counts = parts.next().and_then(|it| it.split_once(['x', 'X']));
+        let counts = parts.next().and_then(|part| part.split_once(['x', 'X']));
         let (columns, rows) = counts.ok_or_else(shape)?;
         let count = |text: &str| text.trim().parse::<usize>().map_err(|_not_a_count| shape());
         let mut board = Self {

@@ -51,8 +51,8 @@ pub(crate) fn find(
 
 fn scales(picture: &Picture) -> impl Iterator<Item = (Picture, f64)> {
     let same = Some((picture.clone(), 1.0));
-    let half = picture.halved().filter(|it| it.width().min(it.height()) >= 200);
-    let half = half.map(|it| (it, 0.5));
+    let half = picture.halved().filter(|halved| halved.width().min(halved.height()) >= 200);
+    let half = half.map(|half| (half, 0.5));
     let twice = (picture.width().max(picture.height()) <= 1400).then(|| (picture.doubled(), 2.0));
     [same, half, twice].into_iter().flatten()
 }
@@ -68,14 +68,18 @@ fn grids(picture: &Picture, scale: f64) -> Vec<Grid> {
         return Vec::new();
     };
     let grid = |found: calib_targets_chessboard::ChessboardDetection| {
-        let places = found.corners.iter().map(|it| {
-            let at = Point2::new(f64::from(it.position.x), f64::from(it.position.y));
+        let places = found.corners.iter().map(|corner| {
+            let at = Point2::new(f64::from(corner.position.x), f64::from(corner.position.y));
             // Where the middle of a pixel is after scaling.
-            let at = at.map(|it| (it + 0.5) / scale - 0.5);
-            ([it.grid.u.max(0) as usize, it.grid.v.max(0) as usize], at)
+            let at = at.map(|at| (at + 0.5) / scale - 0.5);
+            (
+                [corner.grid.u.max(0) as usize, corner.grid.v.max(0) as usize],
+                at,
+            )
         });
         let corners: Vec<([usize; 2], Point2<f64>)> = places.collect();
-        let extent = |axis: usize| corners.iter().map(|it| it.0[axis] + 1).max().unwrap_or(0);
+        let extent =
+            |axis: usize| corners.iter().map(|corner| corner.0[axis] + 1).max().unwrap_or(0);
         Grid {
             columns: extent(0),
             rows: extent(1),

@@ -60,7 +60,7 @@ mod tests {
     #[test]
     fn a_blurred_crossing_is_found_to_hundredths_of_a_pixel() {
         let truth = Point2::new(20.37, 19.81);
-        let soft = |it: f64| (it / 1.2).tanh();
+        let soft = |value: f64| (value / 1.2).tanh();
         let pixels = (0..40 * 40).map(|i| {
             let offset = Point2::new(f64::from(i % 40), f64::from(i / 40)) - truth;
             let (u, v) = (offset.x + 0.2 * offset.y, offset.y - 0.3 * offset.x);

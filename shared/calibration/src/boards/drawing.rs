@@ -129,7 +129,7 @@ impl Drawing {
     ///
     /// [`PaperError::TooSmall`].
     pub fn new(board: &Board, paper: Paper) -> Result<Self, PaperError> {
-        let size = board.size_metres().map(|it| 1e3 * it);
+        let size = board.size_metres().map(|value| 1e3 * value);
         let needed = [size[0] + 2.0 * MARGIN, size[1] + 2.0 * MARGIN + FOOT];
         let page = page_for(needed, paper)?;
         let board_at = [0.5 * (page[0] - size[0]), 0.5 * (page[1] - size[1] - FOOT)];
@@ -176,8 +176,12 @@ impl Drawing {
         for marker in Layout::of(board).markers {
             let [first, _, last, _] = marker.corners;
             let side = 1e3 * (last.x - first.x);
-            let place =
-                |it: Point2<f64>| [self.board_at[0] + 1e3 * it.x, self.board_at[1] + 1e3 * it.y];
+            let place = |point: Point2<f64>| {
+                [
+                    self.board_at[0] + 1e3 * point.x,
+                    self.board_at[1] + 1e3 * point.y,
+                ]
+            };
             let at = place(first);
             self.rectangle(at, [side; 2], true);
             let cell = side / (cells + 2) as f64;
@@ -187,7 +191,7 @@ impl Drawing {
                 let mut column = 0;
                 // White cells side by side are one rectangle: no hairlines between them.
                 while column < cells {
-                    let run = (column..cells).take_while(|it| is_white(*it)).count();
+                    let run = (column..cells).take_while(|i| is_white(*i)).count();
                     if run > 0 {
                         let corner = [
                             at[0] + (column + 1) as f64 * cell,

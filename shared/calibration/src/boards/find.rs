@@ -107,7 +107,7 @@ impl Finder {
         let mut best: Option<(bool, usize, Vec<Sighting>)> = None;
         let mut nothing = Nothing::NoMarkers;
         for is_inverted in [false, true] {
-            if hints.is_inverted.is_some_and(|it| it != is_inverted) {
+            if hints.is_inverted.is_some_and(|inverted| inverted != is_inverted) {
                 continue;
             }
             let seen = if is_inverted {
@@ -176,7 +176,7 @@ impl Finder {
     fn agreed(&self, sightings: &[Sighting], hints: Hints) -> Option<(usize, Vec<Sighting>)> {
         let mut best: Option<(usize, Vec<Sighting>)> = None;
         for (index, variant) in self.variants.iter().enumerate() {
-            if hints.variant.is_some_and(|it| it != index) {
+            if hints.variant.is_some_and(|variant| variant != index) {
                 continue;
             }
             let agreed = agreeing(&variant.layout, sightings);
@@ -213,7 +213,7 @@ fn read(codes: &Codes, picture: &Picture, scale: f64, frames: &[usize]) -> Vec<S
     let mut sightings = codes.read(&scaled, &quads(&scaled), frames);
     for sighting in &mut sightings {
         for corner in &mut sighting.corners {
-            *corner = corner.map(|it| (it + 0.5) / scale - 0.5);
+            *corner = corner.map(|corner| (corner + 0.5) / scale - 0.5);
         }
     }
     sightings
@@ -230,7 +230,7 @@ fn variants(board: &Board) -> Vec<Variant> {
             });
         }
     };
-    let counts = |it: &Board| format!("{}x{}", it.columns, it.rows);
+    let counts = |board: &Board| format!("{}x{}", board.columns, board.rows);
     for told in [board.clone(), board.turned()] {
         let turned = (told != *board)
             .then(|| format!("the board has {}, not {}", counts(&told), counts(board)));
@@ -282,7 +282,7 @@ fn regrouped(layout: Layout, columns: usize, is_from_below: bool, turn: usize) -
         marker.corners = [0, 1, 2, 3].map(|nth| place[(nth + turn) % 4]);
     }
     Layout {
-        points: markers.iter().flat_map(|it| it.corners).collect(),
+        points: markers.iter().flat_map(|marker| marker.corners).collect(),
         markers,
         ..layout
     }

@@ -48,9 +48,9 @@ fn is_better(a: &(f64, Vec<Sighting>), b: &(f64, Vec<Sighting>)) -> bool {
 }
 
 fn map_of(layout: &Layout, sightings: &[Sighting]) -> Option<Homography> {
-    let pairs = sightings.iter().filter_map(|it| {
-        let marker = layout.marker(it.id)?;
-        Some((0..4).map(move |i| (marker.corners[i], it.corners[i], 1.0)))
+    let pairs = sightings.iter().filter_map(|sighting| {
+        let marker = layout.marker(sighting.id)?;
+        Some((0..4).map(move |i| (marker.corners[i], sighting.corners[i], 1.0)))
     });
     Homography::fit(pairs.flatten())
 }
@@ -59,7 +59,8 @@ fn map_of(layout: &Layout, sightings: &[Sighting]) -> Option<Homography> {
 fn supporters(layout: &Layout, map: &Homography, sightings: &[Sighting]) -> (f64, Vec<Sighting>) {
     let mut kept: Vec<(f64, Sighting)> = Vec::new();
     for sighting in sightings {
-        let Some(off) = off_sides(layout, map, sighting).filter(|it| *it < OFF_SIDES) else {
+        let Some(off) = off_sides(layout, map, sighting).filter(|off_side| *off_side < OFF_SIDES)
+        else {
             continue;
         };
         match kept.iter_mut().find(|it| it.1.id == sighting.id) {

@@ -137,7 +137,10 @@ fn worst_off(layout: &Layout, side: f64, corners: &[Corner]) -> Option<usize> {
     if corners.len() < 6 {
         return None;
     }
-    let known: Vec<Known> = corners.iter().map(|it| (layout.points[it.id], it.at, 1.0)).collect();
+    let known: Vec<Known> = corners
+        .iter()
+        .map(|corner| (layout.points[corner.id], corner.at, 1.0))
+        .collect();
     let mut worst = (1.0, None);
     for (nth, corner) in corners.iter().enumerate() {
         let point = layout.points[corner.id];
@@ -151,7 +154,7 @@ fn worst_off(layout: &Layout, side: f64, corners: &[Corner]) -> Option<usize> {
             continue;
         };
         // At the border of the board the others say less.
-        let around = others.iter().filter(|it| (it.0 - point).norm() < 1.6 * side);
+        let around = others.iter().filter(|other| (other.0 - point).norm() < 1.6 * side);
         let slack = if around.count() >= 5 { 1.0 } else { 2.0 };
         let off = (expected - corner.at).norm() / (slack * (OFF_SQUARES * square_px).max(OFF_PX));
         if off > worst.0 {

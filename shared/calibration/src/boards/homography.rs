@@ -49,7 +49,7 @@ impl Homography {
         let matrix = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
         let matrix = after.try_inverse()? * matrix * before;
         let largest = matrix.abs().max();
-        (largest > 0.0 && matrix.iter().all(|it| it.is_finite())).then(|| Self {
+        (largest > 0.0 && matrix.iter().all(|value| value.is_finite())).then(|| Self {
             matrix: matrix / largest,
         })
     }
@@ -64,7 +64,8 @@ impl Homography {
     pub fn apply(&self, point: Point2<f64>) -> Option<Point2<f64>> {
         let mapped = self.matrix * Vector3::new(point.x, point.y, 1.0);
         let result = Point2::new(mapped.x / mapped.z, mapped.y / mapped.z);
-        (mapped.z.abs() > 1e-12 && result.coords.iter().all(|it| it.is_finite())).then_some(result)
+        (mapped.z.abs() > 1e-12 && result.coords.iter().all(|coord| coord.is_finite()))
+            .then_some(result)
     }
 
     /// The matrix, up to scale.

@@ -103,7 +103,7 @@ fn grid(board: &Board) -> Layout {
     };
     for row in 0..board.rows {
         for column in 0..board.columns {
-            let at = [column, row].map(|it| gap + it as f64 * (side + gap));
+            let at = [column, row].map(|value| gap + value as f64 * (side + gap));
             let marker = marker(layout.markers.len(), at, side);
             layout.points.extend(marker.corners);
             layout.markers.push(marker);

@@ -34,7 +34,7 @@ pub(crate) struct Sighting {
 
 impl Sighting {
     pub(crate) fn centre(&self) -> Point2<f64> {
-        let sum = self.corners.iter().map(|it| it.coords);
+        let sum = self.corners.iter().map(|corner| corner.coords);
         Point2::from(sum.sum::<nalgebra::Vector2<f64>>() / 4.0)
     }
 
@@ -172,7 +172,7 @@ fn cells(picture: &Picture, quad: [Point2<f64>; 4], side: usize, frame: usize) -
     let threshold = between_two_groups(&values)?;
     let is_frame = |index: usize| {
         let at = [index % total, index / total];
-        at.iter().any(|it| *it < frame || *it >= total - frame)
+        at.iter().any(|value| *value < frame || *value >= total - frame)
     };
     let in_frame = (0..values.len()).filter(|index| is_frame(*index));
     let n_white = in_frame.clone().filter(|index| values[*index] > threshold);

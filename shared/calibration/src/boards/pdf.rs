@@ -9,7 +9,7 @@ const POINTS: f64 = 72.0 / 25.4;
 
 /// A PDF file (version 1.4).
 pub fn pdf(drawing: &Drawing) -> Vec<u8> {
-    let [width, height] = drawing.page.map(|it| it * POINTS);
+    let [width, height] = drawing.page.map(|page| page * POINTS);
     let content = content(drawing);
     let objects = [
         // Readers are asked not to fit the page to the paper.

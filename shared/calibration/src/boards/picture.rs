@@ -82,7 +82,7 @@ impl Picture {
     #[must_use]
     pub(crate) fn inverted(&self) -> Self {
         Self {
-            pixels: self.pixels.iter().map(|it| 255 - it).collect(),
+            pixels: self.pixels.iter().map(|pixel| 255 - pixel).collect(),
             ..*self
         }
     }

@@ -58,7 +58,7 @@ fn outlines(mask: &[bool], width: usize, height: usize) -> Vec<Vec<Pixel>> {
             }
         }
         let is_inside = low[0] > 0 && low[1] > 0 && high[0] + 1 < width && high[1] + 1 < height;
-        let sides = [high[0] - low[0], high[1] - low[1]].map(|it| it as f64);
+        let sides = [high[0] - low[0], high[1] - low[1]].map(|value| value as f64);
         if is_inside && sides[0].max(sides[1]) >= SHORTEST_SIDE && sides[0].min(sides[1]) >= 4.0 {
             let start = [(first % width) as i32, (first / width) as i32];
             result.push(trace(mask, width, start));
@@ -117,8 +117,8 @@ fn four_corners(outline: &[Pixel]) -> Option<[Point2<f64>; 4]> {
     }
     let length: f64 =
         (0..n).map(|i| (point(outline[(i + 1) % n]) - point(outline[i])).norm()).sum();
-    let first = furthest(outline, |it| (it - point(outline[0])).norm())?.0;
-    let second = furthest(outline, |it| (it - point(outline[first])).norm())?.0;
+    let first = furthest(outline, |value| (value - point(outline[0])).norm())?.0;
+    let second = furthest(outline, |value| (value - point(outline[first])).norm())?.0;
     let (a, b) = (first.min(second), first.max(second));
     let mut corners = vec![a];
     split(outline, [a, b], STRAY * length, &mut corners);
@@ -138,7 +138,7 @@ fn point(pixel: Pixel) -> Point2<f64> {
 }
 
 fn furthest(outline: &[Pixel], distance: impl Fn(Point2<f64>) -> f64) -> Option<(usize, f64)> {
-    let distances = outline.iter().map(|it| distance(point(*it))).enumerate();
+    let distances = outline.iter().map(|outline| distance(point(*outline))).enumerate();
     distances.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -235,7 +235,7 @@ mod tests {
         let found = quads(&picture);
         assert!(!found.is_empty());
         for corner in truth {
-            let nearest = found[0].iter().map(|it| (it - corner).norm());
+            let nearest = found[0].iter().map(|value| (value - corner).norm());
             assert!(nearest.fold(f64::MAX, f64::min) < 0.7, "{found:?}");
         }
     }

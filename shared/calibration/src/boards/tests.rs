@@ -31,11 +31,11 @@ fn photographed(drawing: &Drawing, map: &Matrix3<f64>, [width, height]: [usize; 
             // Sixteen samples of a pixel and a little of its neighbours: a lens is not sharper than that.
             for v in 0..4 {
                 for u in 0..4 {
-                    let offset = [u, v].map(|it| (f64::from(it) - 1.5) * 0.375);
+                    let offset = [u, v].map(|value| (f64::from(value) - 1.5) * 0.375);
                     let ray = map
                         * nalgebra::Vector3::new(x as f64 + offset[0], y as f64 + offset[1], 1.0);
                     let at = [ray.x / ray.z, ray.y / ray.z];
-                    let is_on_page = (0..2).all(|it| at[it] >= 0.0 && at[it] < drawing.page[it]);
+                    let is_on_page = (0..2).all(|i| at[i] >= 0.0 && at[i] < drawing.page[i]);
                     sum += if is_on_page { grey(drawing, at) } else { 120.0 };
                 }
             }
@@ -99,8 +99,8 @@ fn shot(text: &str, size: [usize; 2], angle: f64) -> Shot {
     let pixel_from_page = view(&drawing, size, scale, angle);
     let page_from_pixel = pixel_from_page.try_inverse().unwrap();
     let layout = Layout::of(&board);
-    let truth = layout.points.iter().map(|it| {
-        let at = [0, 1].map(|axis| drawing.board_at[axis] + 1e3 * it[axis]);
+    let truth = layout.points.iter().map(|point| {
+        let at = [0, 1].map(|axis| drawing.board_at[axis] + 1e3 * point[axis]);
         let seen = pixel_from_page * nalgebra::Vector3::new(at[0], at[1], 1.0);
         Point2::new(seen.x / seen.z, seen.y / seen.z)
     });
@@ -112,7 +112,7 @@ fn shot(text: &str, size: [usize; 2], angle: f64) -> Shot {
 
 /// The share of corners that are found, and the largest error in pixels.
 fn compared(found: &Found, truth: &[Point2<f64>]) -> (f64, f64) {
-    let errors = found.corners.iter().map(|it| (it.at - truth[it.id]).norm());
+    let errors = found.corners.iter().map(|corner| (corner.at - truth[corner.id]).norm());
     let share = found.corners.len() as f64 / truth.len() as f64;
     (share, errors.fold(0.0, f64::max))
 }
@@ -158,7 +158,7 @@ fn inverted_and_mirrored_pictures_are_found_and_named() {
     let mirrored = mirrored.unwrap();
     assert!(mirrored.is_mirrored && !mirrored.is_inverted);
     let truth: Vec<Point2<f64>> =
-        shot.truth.iter().map(|it| Point2::new(399.0 - it.x, it.y)).collect();
+        shot.truth.iter().map(|truth| Point2::new(399.0 - truth.x, truth.y)).collect();
     assert!(compared(&mirrored, &truth).1 < 0.3);
 }
 
@@ -172,7 +172,7 @@ fn confused_counts_and_patterns_are_named() {
         let found = finder.find(&shot(printed, [400, 400], 0.2).picture, Hints::default());
         let note = finder.variants()[found.unwrap().variant].note.clone();
         assert!(
-            note.as_ref().is_some_and(|it| it.contains(said)),
+            note.as_ref().is_some_and(|note| note.contains(said)),
             "{note:?}"
         );
     }

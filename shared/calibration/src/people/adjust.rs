@@ -86,9 +86,9 @@ impl Adjustment {
     ) -> Self {
         let n = cameras.cameras().len();
         let instants = (0..sightings.times_s.len())
-            .map(|it| Instant {
-                nth: it,
-                ..instant(cameras.cameras(), &sightings.seen[it], sigmas_px)
+            .map(|i| Instant {
+                nth: i,
+                ..instant(cameras.cameras(), &sightings.seen[i], sigmas_px)
             })
             .filter(|it| !it.points.is_empty())
             .collect();
@@ -101,7 +101,7 @@ impl Adjustment {
                 next += 1;
             }
         }
-        let given_focal = cameras.cameras().iter().map(|it| it.intrinsics.fx).collect();
+        let given_focal = cameras.cameras().iter().map(|camera| camera.intrinsics.fx).collect();
         let mut it = Self {
             cameras,
             given_focal,
@@ -127,8 +127,8 @@ impl Adjustment {
     fn find_shares(&mut self) {
         let sizes: Vec<f64> = self.instants.iter().map(Instant::size).collect();
         let near = PLACE * Sorted::new(sizes).upper_median().unwrap_or(0.0);
-        let n_joints = self.instants.iter().flat_map(|it| &it.joints).max();
-        for joint in 0..n_joints.map_or(0, |it| it + 1) {
+        let n_joints = self.instants.iter().flat_map(|instant| &instant.joints).max();
+        for joint in 0..n_joints.map_or(0, |value| value + 1) {
             let each = self.instants.iter().enumerate();
             let places: Vec<(usize, usize, Point3<f64>)> = each
                 .filter_map(|(nth, it)| {
@@ -137,7 +137,7 @@ impl Adjustment {
                 })
                 .collect();
             for (nth, point, at) in &places {
-                let alike = places.iter().filter(|it| (it.2 - at).norm() < near);
+                let alike = places.iter().filter(|place| (place.2 - at).norm() < near);
                 self.instants[*nth].shares[*point] = 1.0 / alike.count().max(1) as f64;
             }
         }
@@ -150,16 +150,16 @@ impl Adjustment {
             if !is_stiff(bone.kind) {
                 continue;
             }
-            if let Some((_, parameter)) = kinds.iter().find(|it| it.0 == bone.kind) {
+            if let Some((_, parameter)) = kinds.iter().find(|kind| kind.0 == bone.kind) {
                 self.bones[nth] = Some(*parameter);
                 continue;
             }
             let alike = BONES.iter().filter(|it| it.kind == bone.kind);
-            let ends: Vec<[usize; 2]> = alike.map(|it| [it.from[0], it.to]).collect();
+            let ends: Vec<[usize; 2]> = alike.map(|alike| [alike.from[0], alike.to]).collect();
             let mut all: Vec<f64> = Vec::new();
             for instant in &self.instants {
                 let each = ends.iter().filter_map(|[a, b]| instant.distance(*a, *b));
-                all.extend(each.filter(|it| *it > 0.0));
+                all.extend(each.filter(|value| *value > 0.0));
             }
             all.sort_by(f64::total_cmp);
             if let Some(length) = all.get(all.len() / 2).filter(|_| all.len() >= 6) {
@@ -175,7 +175,7 @@ impl Adjustment {
     pub(crate) fn believing(&self, times: f64) -> Self {
         let mut it = self.clone();
         for prior in it.beliefs.poses.iter_mut().flatten() {
-            prior.sd = prior.sd.map(|it| it / times);
+            prior.sd = prior.sd.map(|sd| sd / times);
         }
         it
     }
@@ -186,7 +186,7 @@ impl Adjustment {
 
     /// By how much the offset of each camera has changed, seconds.
     pub(crate) fn offset_steps_s(&self) -> Vec<f64> {
-        self.offsets.iter().map(|it| it.1).collect()
+        self.offsets.iter().map(|offset| offset.1).collect()
     }
 
     /// The parameter of a camera's offset.
@@ -196,12 +196,12 @@ impl Adjustment {
 
     /// Which of all instants each local block is.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = usize> {
-        self.instants.iter().map(|it| it.nth)
+        self.instants.iter().map(|instant| instant.nth)
     }
 
     /// Points of all instants.
     pub(crate) fn n_points(&self) -> usize {
-        self.instants.iter().map(|it| it.points.len()).sum()
+        self.instants.iter().map(|instant| instant.points.len()).sum()
     }
 
     /// Calls back for every joint seen.
@@ -250,7 +250,7 @@ impl Adjustment {
             return false;
         };
         let ends = [BONES[nth].from[0], BONES[nth].to];
-        let [Some(a), Some(b)] = ends.map(|it| instant.place(it)) else {
+        let [Some(a), Some(b)] = ends.map(|end| instant.place(end)) else {
             return false;
         };
         let length = self.lengths[parameter - self.first_bone];
@@ -306,19 +306,19 @@ impl Problem for Adjustment {
         if parameter < self.cameras.n_parameters() {
             return self.cameras.name(parameter);
         }
-        let camera = self.offsets.iter().position(|it| it.0 == Some(parameter));
+        let camera = self.offsets.iter().position(|offset| offset.0 == Some(parameter));
         if let Some(camera) = camera {
             return format!("{}: time offset", self.cameras.cameras()[camera].name);
         }
-        let bone = self.bones.iter().position(|it| *it == Some(parameter));
+        let bone = self.bones.iter().position(|bone| *bone == Some(parameter));
         bone.map_or_else(
             || "what a joint errs by all the time".to_owned(),
-            |it| format!("length of the {}", BONES[it].name),
+            |bone| format!("length of the {}", BONES[bone].name),
         )
     }
 
     fn locals(&self) -> Vec<usize> {
-        self.instants.iter().map(|it| 3 * it.points.len()).collect()
+        self.instants.iter().map(|instant| 3 * instant.points.len()).collect()
     }
 
     fn terms_of(&self, local: usize, take: &mut dyn FnMut(&Term)) {
@@ -338,7 +338,7 @@ impl Problem for Adjustment {
     fn priors(&self, take: &mut dyn FnMut(&Term)) {
         let mut term = Term::default();
         if let Some((a, b, wanted)) = self.beliefs.baseline {
-            let [from, to] = [a, b].map(|it| self.cameras.cameras()[it].centre_in_world());
+            let [from, to] = [a, b].map(|i| self.cameras.cameras()[i].centre_in_world());
             let way = to - from;
             let sigma = 1e-4 * wanted;
             term.begin(&[(way.norm() - wanted) / sigma], Loss::Square);
@@ -381,7 +381,7 @@ impl Problem for Adjustment {
         let mut moved = self.clone();
         moved.cameras = self.cameras.moved(&step.shared);
         for (parameter, offset) in &mut moved.offsets {
-            *offset += parameter.map_or(0.0, |it| step.shared[it]);
+            *offset += parameter.map_or(0.0, |parameter| step.shared[parameter]);
         }
         moved.biases.step(&step.shared);
         for (nth, length) in moved.lengths.iter_mut().enumerate() {

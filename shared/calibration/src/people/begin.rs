@@ -74,7 +74,7 @@ pub(crate) fn choices(n_chains: usize, offset_s: f64, window_s: f64, as_seen: bo
         }
     }
     all.sort_by(|a, b| {
-        let far = |it: &Choice| (it.chain, (it.offset_s - offset_s).abs());
+        let far = |choice: &Choice| (choice.chain, (choice.offset_s - offset_s).abs());
         far(a).partial_cmp(&far(b)).unwrap_or(core::cmp::Ordering::Equal)
     });
     all
@@ -109,7 +109,7 @@ impl Study<'_> {
         let seen = self.sightings(&all);
         let mut matches = Vec::new();
         for instant in &seen.seen {
-            let [of_a, of_b] = pair.map(|it| &instant[it]);
+            let [of_a, of_b] = pair.map(|pair| &instant[pair]);
             for both in of_a.iter().zip(of_b) {
                 let both = [*both.0, *both.1];
                 let [a, b] = [0, 1].map(|nth| {
@@ -136,7 +136,7 @@ impl Study<'_> {
                 }
             }
         }
-        pairs.sort_by_key(|it| core::cmp::Reverse(it.1));
+        pairs.sort_by_key(|pair| core::cmp::Reverse(pair.1));
         pairs.truncate(MOST_PAIRS);
         let mut best = None;
         let mut most = 0.0;
@@ -247,7 +247,7 @@ impl Study<'_> {
     ) -> Option<(usize, Choice, Camera, f64)> {
         let points = self.points(cameras, choices);
         let mut best: Option<(usize, Choice, Camera, f64)> = None;
-        for camera in (0..cameras.len()).filter(|it| choices[*it].is_none()) {
+        for camera in (0..cameras.len()).filter(|i| choices[*i].is_none()) {
             for choice in &self.choices[camera] {
                 let mut alone = vec![None; cameras.len()];
                 alone[camera] = Some(*choice);
@@ -292,7 +292,7 @@ impl Study<'_> {
                 .collect();
             place(&observations)
         };
-        let of = |instant| (0..self.n_joints).map(|it| at(instant, it)).collect();
+        let of = |instant| (0..self.n_joints).map(|i| at(instant, i)).collect();
         seen.seen.iter().map(of).collect()
     }
 }

@@ -34,8 +34,8 @@ pub(super) struct Biases {
 impl Biases {
     /// * `first`: the first parameter; `sd_px`: what is believed, by camera.
     pub(super) fn new(first: usize, sd_px: &[f64], instants: &[Instant]) -> Self {
-        let n_joints = instants.iter().flat_map(|it| &it.joints).max();
-        let mut counts = vec![vec![0_usize; n_joints.map_or(0, |it| it + 1)]; sd_px.len()];
+        let n_joints = instants.iter().flat_map(|instant| &instant.joints).max();
+        let mut counts = vec![vec![0_usize; n_joints.map_or(0, |joint| joint + 1)]; sd_px.len()];
         for instant in instants {
             for seen in &instant.seen {
                 counts[seen.camera][instant.joints[seen.point]] += 1;
@@ -70,7 +70,7 @@ impl Biases {
 
     /// Pixels; 0 where there is none.
     pub(super) fn of(&self, camera: usize, joint: usize) -> Vector2<f64> {
-        self.place(camera, joint).map_or_else(Vector2::zeros, |it| self.values[it])
+        self.place(camera, joint).map_or_else(Vector2::zeros, |i| self.values[i])
     }
 
     /// The derivatives of what a camera sees of a joint.
@@ -108,11 +108,11 @@ impl Biases {
 /// * `residuals`: of each joint in each camera, as shares of the size.
 pub(super) fn share_of(residuals: &[Vec<Vector2<f64>>]) -> Option<f64> {
     let mut squares = Vec::new();
-    for of_joint in residuals.iter().filter(|it| it.len() >= LEAST) {
+    for of_joint in residuals.iter().filter(|residual| residual.len() >= LEAST) {
         for axis in 0..2 {
             let each: Vec<f64> = of_joint.iter().map(|it| it[axis]).collect();
             let middle = Sorted::new(each.clone()).upper_median()?;
-            let away = each.iter().map(|it| (it - middle).abs());
+            let away = each.iter().map(|value| (value - middle).abs());
             let noise = 1.4826 * Sorted::new(away.collect::<Vec<_>>()).upper_median()?;
             // The median of n numbers has pi / 2 times the variance of their mean.
             let chance = core::f64::consts::FRAC_PI_2 * noise.powi(2) / of_joint.len() as f64;
@@ -146,7 +146,7 @@ mod tests {
         let found = share_of(&residuals(0.006, 0.008)).unwrap();
         assert!((0.006..0.010).contains(&found), "{found}");
         let noise = share_of(&residuals(0.006, 0.0));
-        assert!(noise.is_none_or(|it| it < 0.001), "{noise:?}");
+        assert!(noise.is_none_or(|noise| noise < 0.001), "{noise:?}");
         assert_eq!(share_of(&residuals(0.0, 0.0)), None);
         assert_eq!(share_of(&residuals(0.0, 1.0)), Some(MOST));
         assert_eq!(share_of(&[]), None);

@@ -54,7 +54,7 @@ pub(super) fn spread(all: &Solved, known: &Covariance) -> Vec<[f64; 2]> {
             sum[1] += it.way.powi(2);
         }
     }
-    sums.iter().map(|it| it.map(f64::sqrt)).collect()
+    sums.iter().map(|sum| sum.map(f64::sqrt)).collect()
 }
 
 /// The distance of a camera to the people, metres.
@@ -103,10 +103,10 @@ pub(super) fn certainty(outcome: &mut Outcome, study: &Study<'_>, all: &Solved) 
 
 /// Lets the deviations be as large as halves that differ more than these tell: each camera's by the share of all cameras together.
 fn widen(outcome: &mut Outcome, apart: &[Difference]) {
-    let of = |it: &Difference| [0.5 * it.turn.to_degrees(), 0.5 * it.way];
+    let of = |difference: &Difference| [0.5 * difference.turn.to_degrees(), 0.5 * difference.way];
     for axis in 0..2 {
-        let told: f64 = outcome.reports.iter().map(|it| it.sd[axis].powi(2)).sum();
-        let seen: f64 = apart.iter().map(|it| of(it)[axis].powi(2)).sum();
+        let told: f64 = outcome.reports.iter().map(|report| report.sd[axis].powi(2)).sum();
+        let seen: f64 = apart.iter().map(|apart| of(apart)[axis].powi(2)).sum();
         let share = (seen / told).sqrt();
         for report in outcome.reports.iter_mut().filter(|_| share > 1.0) {
             report.sd[axis] *= share;
@@ -136,13 +136,13 @@ pub(super) fn halves(
     let span = outcome.span_s;
     let mut rigs = Vec::new();
     for half in 0..2 {
-        let near = |it: &Choice| vec![*it];
+        let near = |choice: &Choice| vec![*choice];
         let part = Study {
             times_s: study
                 .times_s
                 .iter()
                 .copied()
-                .filter(|it| half_of(*it, span) == half)
+                .filter(|times_s| half_of(*times_s, span) == half)
                 .collect(),
             choices: all.choices.iter().map(near).collect(),
             ..study.clone()

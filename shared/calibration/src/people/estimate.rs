@@ -146,7 +146,7 @@ fn check(cameras: &[Camera], films: &[Film], settings: &Settings) -> Result<(), 
 
 /// Sees that the joints are those of a body, and every side is one of them.
 pub(crate) fn check_joints(joints: usize, sides: &[usize]) -> Result<(), PeopleError> {
-    if joints < N_JOINTS || sides.len() != joints || sides.iter().any(|it| *it >= joints) {
+    if joints < N_JOINTS || sides.len() != joints || sides.iter().any(|side| *side >= joints) {
         let sides = sides.len();
         return Err(PeopleError::Joints { joints, sides });
     }
@@ -189,11 +189,11 @@ pub(crate) fn instants(
         .enumerate()
         .filter_map(|(camera, it)| {
             let offset_s = offsets_s.get(camera).copied().unwrap_or(0.0);
-            Some(longest(it)?.span().map(|it| it + offset_s))
+            Some(longest(it)?.span().map(|span| span + offset_s))
         })
         .collect();
-    let mut froms: Vec<f64> = spans.iter().map(|it| it[0]).collect();
-    let mut tos: Vec<f64> = spans.iter().map(|it| it[1]).collect();
+    let mut froms: Vec<f64> = spans.iter().map(|span| span[0]).collect();
+    let mut tos: Vec<f64> = spans.iter().map(|span| span[1]).collect();
     froms.sort_by(f64::total_cmp);
     tos.sort_by(|a, b| b.total_cmp(a));
     let (Some(from), Some(to)) = (froms.get(1), tos.get(1)) else {
@@ -205,7 +205,7 @@ pub(crate) fn instants(
     }
     let n = ((length_s / interval_s).round() as usize + 1).clamp(1, most.max(2));
     let step_s = length_s / (n.max(2) - 1) as f64;
-    (0..n).map(|it| from + step_s * it as f64).collect()
+    (0..n).map(|i| from + step_s * i as f64).collect()
 }
 
 /// What is to be said of an answer.
@@ -237,21 +237,23 @@ fn judge(
         camera
     });
     outcome.cameras = placed.collect();
-    let to_metres_point = |it: &Option<Point3<f64>>| it.map(|it| to_metres.point(&it));
+    let to_metres_point = |point: &Option<Point3<f64>>| point.map(|it| to_metres.point(&it));
     outcome.times_s = times_s.to_vec();
-    outcome.skeletons =
-        skeletons.iter().map(|it| it.iter().map(to_metres_point).collect()).collect();
+    outcome.skeletons = skeletons
+        .iter()
+        .map(|skeleton| skeleton.iter().map(to_metres_point).collect())
+        .collect();
     outcome.stature_m = stature_of(&outcome.skeletons).map(|it| it.0);
     let fits = fits(&all.problem, &all.sigmas_px);
     let blocks = blocks(&all.problem, &study.times_s);
     let known = clustered(&all.problem, &blocks);
     let deviations = known.as_ref().ok().and_then(Option::as_ref);
-    let sds = deviations.map(|it| spread(all, it));
+    let sds = deviations.map(|deviation| spread(all, deviation));
     outcome.reports = fits
         .into_iter()
         .enumerate()
         .map(|(camera, fit)| {
-            let sd = sds.as_ref().map_or([f64::INFINITY; 2], |it| it[camera]);
+            let sd = sds.as_ref().map_or([f64::INFINITY; 2], |sd| sd[camera]);
             let sd = [sd[0], to_metres.scale * sd[1]];
             report((camera, sd), fit, all, deviations)
         })
@@ -264,7 +266,7 @@ fn judge(
         let what = error.to_string();
         outcome.doubts.push(Doubt::Undetermined { what });
     }
-    if let Some(spread) = bone_spread(&skeletons).filter(|it| *it > MOST_BONES) {
+    if let Some(spread) = bone_spread(&skeletons).filter(|value| *value > MOST_BONES) {
         let limit = MOST_BONES;
         outcome.doubts.push(Doubt::Bones { spread, limit });
     }

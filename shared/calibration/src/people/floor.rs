@@ -63,12 +63,12 @@ mod tests {
         let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.7, -0.4, 1.1));
         let moved = Isometry3::from_parts(Translation3::new(2.0, -1.0, 0.5), rotation);
         let mut random = fastrand::Rng::with_seed(3);
-        let times_s: Vec<f64> = (0..600).map(|it| f64::from(it) / 30.0).collect();
+        let times_s: Vec<f64> = (0..600).map(|i| f64::from(i) / 30.0).collect();
         let mut error = || noise * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
         let skeletons = times_s.iter().map(|time_s| {
             let joints = walker(*time_s, size).into_iter();
-            let joints = joints.map(|it| {
-                let at = Point3::from(it) + Vector3::new(error(), error(), error());
+            let joints = joints.map(|joint| {
+                let at = Point3::from(joint) + Vector3::new(error(), error(), error());
                 Some(moved * at)
             });
             joints.collect()

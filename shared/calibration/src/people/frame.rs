@@ -77,28 +77,29 @@ pub(crate) fn world(
             });
         }
         Scale::Distance(a, b, metres) => {
-            let [a, b] = [a, b].map(|it| cameras[it].centre_in_world());
+            let [a, b] = [a, b].map(|i| cameras[i].centre_in_world());
             (metres / (a - b).norm(), 0.0)
         }
         Scale::Height(metres) => of_height(skeletons, metres)?,
     };
     let scaled: Skeletons = skeletons
         .iter()
-        .map(|it| it.iter().map(|it| it.map(|it| it * factor)).collect())
+        .map(|skeleton| skeleton.iter().map(|it| it.map(|value| value * factor)).collect())
         .collect();
     let (up, vertical) = vertical(times_s, &scaled)?;
     let to_z = turn_to_z(up);
-    let turned = |it: &Point3<f64>| to_z * it;
+    let turned = |point: &Point3<f64>| to_z * point;
     let feet: Vec<Point3<f64>> = standing(times_s, &scaled, &up).iter().map(turned).collect();
     let all = scaled.iter().flatten().flatten();
     let turned: Vec<Point3<f64>> = all.map(turned).collect();
     let middle = |axis: usize| {
-        Sorted::new(turned.iter().map(|it| it[axis]).collect::<Vec<_>>()).upper_median()
+        Sorted::new(turned.iter().map(|turned| turned[axis]).collect::<Vec<_>>()).upper_median()
     };
     let ankle = ANKLE * stature_of(&scaled).map_or(1.7, |it| it.0);
-    let floor = match Sorted::new(feet.iter().map(|it| it.z).collect::<Vec<_>>()).upper_median() {
+    let floor = match Sorted::new(feet.iter().map(|foot| foot.z).collect::<Vec<_>>()).upper_median()
+    {
         Some(height) if feet.len() >= LEAST => height - ankle,
-        _ => turned.iter().map(|it| it.z).fold(f64::INFINITY, f64::min) - ankle,
+        _ => turned.iter().map(|turned| turned.z).fold(f64::INFINITY, f64::min) - ankle,
     };
     let to_metres = Similarity {
         rotation: to_z,
@@ -136,7 +137,7 @@ fn joints(skeleton: &[Option<Point3<f64>>]) -> Joints {
 pub(crate) fn stature_of(skeletons: &Skeletons) -> Option<(f64, f64)> {
     let mut each: Vec<[f64; 2]> = skeletons
         .iter()
-        .filter_map(|it| stature(&joints(it)))
+        .filter_map(|skeleton| stature(&joints(skeleton)))
         .map(|it| [it.metres, it.sd])
         .collect();
     if each.len() < LEAST {
@@ -153,12 +154,12 @@ fn of_height(skeletons: &Skeletons, metres: f64) -> Option<(f64, f64)> {
     let tall = |factor: f64| {
         let scaled = skeletons.iter();
         let scaled: Skeletons = scaled
-            .map(|it| it.iter().map(|it| it.map(|it| it * factor)).collect())
+            .map(|scaled| scaled.iter().map(|it| it.map(|value| value * factor)).collect())
             .collect();
         stature_of(&scaled)
     };
     let (first, _) = tall(1.0)?;
-    let [mut low, mut high] = [0.3, 3.0].map(|it| it * metres / first);
+    let [mut low, mut high] = [0.3, 3.0].map(|value| value * metres / first);
     for _ in 0..40 {
         let middle = f64::midpoint(low, high);
         if tall(middle)?.0 < metres {
@@ -186,7 +187,7 @@ pub(crate) fn standing(
         if passed > 0.5 || passed <= 0.0 {
             continue;
         }
-        let [right, left] = LEGS.map(|it| skeletons[nth][it[0]]);
+        let [right, left] = LEGS.map(|leg| skeletons[nth][leg[0]]);
         let (Some(right), Some(left)) = (right, left) else {
             continue;
         };
@@ -197,7 +198,7 @@ pub(crate) fn standing(
             (left, LEGS[1][0])
         };
         let before = skeletons[nth - 1][ankle];
-        if before.is_some_and(|it| (at - it).norm() < STANDING_M_S * passed) {
+        if before.is_some_and(|before| (at - before).norm() < STANDING_M_S * passed) {
             feet.push(at);
         }
     }
@@ -209,9 +210,12 @@ pub(crate) fn vertical(
     times_s: &[f64],
     skeletons: &Skeletons,
 ) -> Option<(UnitVector3<f64>, Vertical)> {
-    let upright: Vec<Vector3<f64>> = skeletons.iter().filter_map(|it| body(it, STRAIGHT)).collect();
-    let all: Vec<Vector3<f64>> =
-        skeletons.iter().filter_map(|it| body(it, core::f64::consts::PI)).collect();
+    let upright: Vec<Vector3<f64>> =
+        skeletons.iter().filter_map(|skeleton| body(skeleton, STRAIGHT)).collect();
+    let all: Vec<Vector3<f64>> = skeletons
+        .iter()
+        .filter_map(|skeleton| body(skeleton, core::f64::consts::PI))
+        .collect();
     let (bodies, source) = if upright.len() >= LEAST {
         (middle(&upright)?, Vertical::Bodies)
     } else {
@@ -246,7 +250,8 @@ fn floor(feet: &[Point3<f64>]) -> Option<UnitVector3<f64>> {
             .map(|it| (it.coords - middle) * (it.coords - middle).transpose() / n)
             .sum();
         let eigen = SymmetricEigen::new(spread);
-        let mut sizes: Vec<f64> = eigen.eigenvalues.iter().map(|it| it.max(0.0).sqrt()).collect();
+        let mut sizes: Vec<f64> =
+            eigen.eigenvalues.iter().map(|eigenvalue| eigenvalue.max(0.0).sqrt()).collect();
         sizes.sort_by(f64::total_cmp);
         let axis = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
         let is_floor = sizes[1] > FLOOR_M[0] && sizes[0] < FLOOR_M[1];
@@ -286,15 +291,16 @@ fn middle(all: &[Vector3<f64>]) -> Option<UnitVector3<f64>> {
 /// How much the bones change their lengths over time: the median over bones of the median deviation, as a share.
 pub(crate) fn bone_spread(skeletons: &Skeletons) -> Option<f64> {
     let mut each = Vec::new();
-    for bone in BONES.iter().filter(|it| it.from[0] == it.from[1]) {
+    for bone in BONES.iter().filter(|bone| bone.from[0] == bone.from[1]) {
         let lengths: Vec<f64> =
-            skeletons.iter().filter_map(|it| bone.length(&joints(it))).collect();
+            skeletons.iter().filter_map(|skeleton| bone.length(&joints(skeleton))).collect();
         if lengths.len() < 2 * LEAST {
             continue;
         }
         let lengths = Sorted::new(lengths);
         let length = lengths.upper_median()?;
-        let away: Vec<f64> = lengths.values().iter().map(|it| (it / length - 1.0).abs()).collect();
+        let away: Vec<f64> =
+            lengths.values().iter().map(|value| (value / length - 1.0).abs()).collect();
         each.push(1.4826 * Sorted::new(away).upper_median()?);
     }
     Sorted::new(each).upper_median()

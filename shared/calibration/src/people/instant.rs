@@ -42,7 +42,7 @@ impl Instant {
     /// From one end of the person to the other.
     pub(super) fn size(&self) -> f64 {
         let extent = |axis: usize| {
-            let each = self.points.iter().map(|it| it[axis]);
+            let each = self.points.iter().map(|point| point[axis]);
             let [from, to] = each.fold([f64::INFINITY, f64::NEG_INFINITY], |[from, to], it| {
                 [from.min(it), to.max(it)]
             });

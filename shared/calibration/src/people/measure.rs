@@ -30,7 +30,7 @@ pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) ->
         FITTED * own.unwrap_or(whole) / MEDIAN
     };
     let shares: Vec<f64> = all.iter().map(share).collect();
-    let of_camera = |size: &f64| shares.iter().map(|it| (it * size).max(LEAST_PX)).collect();
+    let of_camera = |size: &f64| shares.iter().map(|share| (share * size).max(LEAST_PX)).collect();
     sizes_px.iter().map(of_camera).collect()
 }
 
@@ -41,7 +41,7 @@ pub(crate) fn biases(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) ->
         all[it.camera * n_joints + it.joint].push(it.whole / sizes_px[it.camera]);
     });
     let share = share_of(&all)?;
-    Some(sizes_px.iter().map(|it| share * it).collect())
+    Some(sizes_px.iter().map(|sizes_px| share * sizes_px).collect())
 }
 
 /// How the joints of a camera fit.
@@ -69,8 +69,8 @@ pub(crate) fn fits(problem: &Adjustment, sigmas_px: &[Vec<f64>]) -> Vec<Fit> {
         good[camera] += usize::from(it.own.norm() < 3.0 * sigmas_px[camera][it.joint]);
         let [width, height] = cameras[camera].intrinsics.size.map(f64::from);
         let share = [(at.x + 0.5) / width, (at.y + 0.5) / height];
-        let cell =
-            share.map(|it| (it * CELLS as f64).floor().clamp(0.0, CELLS as f64 - 1.0) as usize);
+        let cell = share
+            .map(|share| (share * CELLS as f64).floor().clamp(0.0, CELLS as f64 - 1.0) as usize);
         cells[camera][cell[1] * CELLS + cell[0]] += 1;
     });
     let each = lengths.into_iter().zip(good).zip(cells);

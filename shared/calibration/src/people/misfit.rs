@@ -64,7 +64,7 @@ impl Fitted<'_> {
 
     fn of_camera(&self, camera: usize) -> Vec<Misfit> {
         let (film, offset_s) = (&self.films[camera], self.offsets_s[camera]);
-        let intervals = film.shots.windows(2).map(|it| it[1].time_s - it[0].time_s);
+        let intervals = film.shots.windows(2).map(|pair| pair[1].time_s - pair[0].time_s);
         let intervals: Vec<f64> = intervals.collect();
         let interval_s = Sorted::new(intervals).upper_median().unwrap_or(0.0);
         let (times_s, skeletons) = self.skeletons;
@@ -73,12 +73,12 @@ impl Fitted<'_> {
             let own_s = time_s - offset_s;
             let away = |it: &&Shot| (it.time_s - own_s).abs();
             let shot = film.shots.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
-            let Some(shot) = shot.filter(|it| away(it) <= 0.51 * interval_s) else {
+            let Some(shot) = shot.filter(|shot| away(shot) <= 0.51 * interval_s) else {
                 continue;
             };
             let people = shot.people.iter();
             let best = people
-                .filter_map(|it| self.fit(camera, it, skeleton))
+                .filter_map(|person| self.fit(camera, person, skeleton))
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             found.extend(best.map(|(residual_px, joints)| Misfit {
                 camera,
@@ -101,7 +101,7 @@ impl Fitted<'_> {
             let each = person.joints.iter().enumerate();
             let joints: Vec<[[f64; 2]; 2]> = each
                 .filter_map(|(joint, seen)| {
-                    let seen = seen.filter(|it| it.at.iter().all(|it| it.is_finite()))?;
+                    let seen = seen.filter(|it| it.at.iter().all(|value| value.is_finite()))?;
                     let at = skeleton.get(other(joint))?.as_ref()?;
                     let expected = self.cameras[camera].project(at)?;
                     Some([seen.at, [expected.x, expected.y]])
@@ -132,10 +132,10 @@ mod tests {
     #[test]
     fn the_picture_whose_person_is_elsewhere_comes_first() {
         let cameras = ring(3);
-        let times_s: Vec<f64> = (0..40).map(|it| f64::from(it) * 0.1).collect();
+        let times_s: Vec<f64> = (0..40).map(|i| f64::from(i) * 0.1).collect();
         let skeletons: Skeletons = times_s
             .iter()
-            .map(|it| walker(*it, 1.0).map(|it| Some(Point3::from(it))).to_vec())
+            .map(|times_s| walker(*times_s, 1.0).map(|it| Some(Point3::from(it))).to_vec())
             .collect();
         let offsets_s = [0.0, 0.5, -0.2];
         let mut films: Vec<Film> = Vec::new();
@@ -150,7 +150,7 @@ mod tests {
                 });
                 // The sides of one camera are exchanged.
                 let other = |it: usize| if nth == 2 { sides()[it] } else { it };
-                let joints = (0..14).map(|it| joints[other(it)]).collect();
+                let joints = (0..14).map(|i| joints[other(i)]).collect();
                 Shot {
                     time_s: time_s - offsets_s[nth],
                     people: vec![Person { joints }],

@@ -70,7 +70,7 @@ fn thinned(known: &[Known], most: usize) -> Vec<Known> {
 
 fn mean_cost(camera: &Camera, known: &[Known]) -> f64 {
     let cost = |(point, seen, sigma): &Known| {
-        let away = camera.project(point).map(|it| (it - seen).norm() / sigma);
+        let away = camera.project(point).map(|value| (value - seen).norm() / sigma);
         away.unwrap_or(1e3).powi(2).ln_1p()
     };
     known.iter().map(cost).sum::<f64>() / known.len() as f64
@@ -78,7 +78,7 @@ fn mean_cost(camera: &Camera, known: &[Known]) -> f64 {
 
 /// The linear solution of six joints, with the nearest rotation.
 fn linear(camera: &Camera, sample: &[Known; 6]) -> Option<Isometry3<f64>> {
-    let centre = sample.iter().map(|it| it.0.coords).sum::<nalgebra::Vector3<f64>>() / 6.0;
+    let centre = sample.iter().map(|sample| sample.0.coords).sum::<nalgebra::Vector3<f64>>() / 6.0;
     let mut normal = SMatrix::<f64, 12, 12>::zeros();
     for (point, seen, _) in sample {
         let seen = normalised(camera, seen);
@@ -108,7 +108,7 @@ fn linear(camera: &Camera, sample: &[Known; 6]) -> Option<Isometry3<f64>> {
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
     let translation = right / scale - rotation * centre;
     let pose = Isometry3::from_parts(Translation3::from(translation), rotation);
-    translation.iter().all(|it| it.is_finite()).then_some(pose)
+    translation.iter().all(|value| value.is_finite()).then_some(pose)
 }
 
 /// One camera, and joints that stay where they are.

@@ -44,7 +44,7 @@ pub(crate) fn exchange(
                 let costs = costs(cameras, seen, camera, sigmas_px, sides);
                 costs.is_exchanged().then_some((camera, costs.here - costs.exchanged))
             };
-            let worst = (1..=cameras.len()).filter_map(|it| gain(cameras.len() - it));
+            let worst = (1..=cameras.len()).filter_map(|i| gain(cameras.len() - i));
             let Some((camera, _)) = worst.max_by(|a, b| a.1.total_cmp(&b.1)) else {
                 break;
             };
@@ -65,7 +65,7 @@ fn costs(
     let others = |it: &usize| *it != camera && seen[*it].iter().flatten().count() >= LEAST_JOINTS;
     let others: Vec<usize> = (0..cameras.len()).filter(others).collect();
     let mut costs = Costs::default();
-    let sided = |joint: &usize| sides.get(*joint).is_some_and(|it| it != joint);
+    let sided = |joint: &usize| sides.get(*joint).is_some_and(|side| side != joint);
     for joint in (0..sides.len()).filter(sided) {
         let sigma = sigmas_px[camera][joint];
         let pair = [seen[camera][joint], seen[camera][sides[joint]]];
@@ -77,7 +77,7 @@ fn costs(
             [only] => of_pair(cameras, [*only, camera], seen[*only][joint], [here, other]),
             many => {
                 let point = point(cameras, seen, many, joint, sigmas_px);
-                point.and_then(|it| of_point(&cameras[camera], &it, [here, other]))
+                point.and_then(|point| of_point(&cameras[camera], &point, [here, other]))
             }
         };
         if let Some([a, b]) = each {
@@ -99,11 +99,11 @@ pub(crate) fn point(
 ) -> Option<Point3<f64>> {
     let observations: Vec<Observation<'_>> = others
         .iter()
-        .filter_map(|it| {
+        .filter_map(|other| {
             Some(Observation {
-                camera: &cameras[*it],
-                point_px: seen[*it][joint]?.at,
-                sigma_px: sigmas_px[*it][joint],
+                camera: &cameras[*other],
+                point_px: seen[*other][joint]?.at,
+                sigma_px: sigmas_px[*other][joint],
             })
         })
         .collect();

@@ -47,7 +47,7 @@ impl Chain {
     /// How much it may be of use: how long it is seen, as large and as surely as it is. What a network takes for a person, a chair say, is
     /// seen for as long as anybody, but neither large nor surely.
     fn worth(&self) -> f64 {
-        let of = |it: &Track| (it.span()[1] - it.span()[0]) * it.size() * it.score();
+        let of = |track: &Track| (track.span()[1] - track.span()[0]) * track.size() * track.score();
         self.tracks.iter().map(of).sum()
     }
 
@@ -109,7 +109,7 @@ impl Chain {
             let n = (LONGEST_OVERLAP_S / self.interval_s).ceil() as i32;
             let mut times = (0..=n).map(|nth| from_s + sign * self.interval_s * f64::from(nth));
             let place = times.find_map(|time_s| it.place(joint, time_s));
-            place.map(|it| Vector2::from(it.at))
+            place.map(|place| Vector2::from(place.at))
         };
         let apart = (0..n_joints).filter_map(|joint| {
             let before = near(last, joint, last.span()[1], -1.0)?;
@@ -117,7 +117,7 @@ impl Chain {
             Some((before - after).norm())
         });
         let apart = Sorted::new(apart.collect::<Vec<_>>()).upper_median();
-        apart.is_some_and(|it| it < ONE_PLACE * last.size().max(track.size()))
+        apart.is_some_and(|apart| apart < ONE_PLACE * last.size().max(track.size()))
     }
 }
 
@@ -141,7 +141,7 @@ pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: 
     }
     chains.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
     let least = LEAST_SHARE * longest(&chains).map_or(0.0, Chain::seen_s);
-    chains.retain(|it| it.seen_s() >= least);
+    chains.retain(|chain| chain.seen_s() >= least);
     chains.truncate(MOST_CHAINS);
     chains
 }
@@ -163,7 +163,7 @@ pub(crate) fn ideal(camera: &Camera) -> Camera {
 pub(crate) fn interval_s(film: &Film) -> Option<f64> {
     let each = film.shots.array_windows();
     let steps: Vec<f64> = each.map(|[a, b]| b.time_s - a.time_s).collect();
-    Sorted::new(steps).upper_median().filter(|it| *it > 0.0)
+    Sorted::new(steps).upper_median().filter(|upper_median| *upper_median > 0.0)
 }
 
 /// The joints of one person at instants: by instant, camera and joint.
@@ -189,7 +189,7 @@ impl Sightings {
             let look = |joint| chains[camera]?.sight(joint, own_s);
             (0..n_joints).map(look).collect()
         };
-        let at = |time_s: &f64| (0..chains.len()).map(|it| of(it, *time_s)).collect();
+        let at = |time_s: &f64| (0..chains.len()).map(|i| of(i, *time_s)).collect();
         Self {
             times_s: times_s.to_vec(),
             seen: times_s.iter().map(at).collect(),
@@ -199,7 +199,7 @@ impl Sightings {
     /// Exchanges left and right of a camera at an instant.
     pub(crate) fn exchange(&mut self, instant: usize, camera: usize, sides: &[usize]) {
         let own = &self.seen[instant][camera];
-        let other = sides.iter().map(|it| own.get(*it).copied().flatten());
+        let other = sides.iter().map(|side| own.get(*side).copied().flatten());
         self.seen[instant][camera] = other.collect();
     }
 
@@ -225,7 +225,7 @@ mod tests {
         let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
         let mut joint = |nth: usize| {
             let at = [400.0 + 10.0 * nth as f64, 300.0 + 25.0 * nth as f64];
-            let at = at.map(|it| it + 3.0 * normal());
+            let at = at.map(|at| at + 3.0 * normal());
             Some(Joint { at, score: 0.9 })
         };
         let mut shot = |nth: i32| Shot {
@@ -242,13 +242,13 @@ mod tests {
     #[test]
     fn who_is_seen_large_and_surely_comes_before_what_is_seen_longer() {
         let mut film = standing();
-        let chair = |it: Joint| Joint {
-            at: it.at.map(|at| 100.0 + 0.3 * (at - 300.0)),
+        let chair = |joint: Joint| Joint {
+            at: joint.at.map(|at| 100.0 + 0.3 * (at - 300.0)),
             score: 0.4,
         };
         for (nth, shot) in film.shots.iter_mut().enumerate() {
             let joints = shot.people[0].joints.iter();
-            let joints = joints.map(|it| it.map(chair)).collect();
+            let joints = joints.map(|joint| joint.map(chair)).collect();
             shot.people.insert(0, Person { joints });
             if nth >= 240 {
                 shot.people.truncate(1);
@@ -300,8 +300,8 @@ mod tests {
                 chain.span()[1] - chain.span()[0] > 0.9 * seen_s,
                 "{chain:?}"
             );
-            let times = (3..57).map(|it| chain.span()[0] + seen_s * f64::from(it) / 60.0);
-            let n = times.filter(|it| chain.sight(12, *it).is_some()).count();
+            let times = (3..57).map(|i| chain.span()[0] + seen_s * f64::from(i) / 60.0);
+            let n = times.filter(|time| chain.sight(12, *time).is_some()).count();
             assert!(n > 50, "{n} of 54");
         }
     }
@@ -314,8 +314,8 @@ mod tests {
         for phase in [0.0, 0.025, 0.05, 0.075] {
             let (mut both, mut squares) = (0.0, [0.0; 2]);
             for joint in 0..N_JOINTS {
-                let times = (5..295).map(|it| 0.1 * f64::from(it) + phase);
-                let each: Vec<Sight> = times.filter_map(|it| chain.sight(joint, it)).collect();
+                let times = (5..295).map(|i| 0.1 * f64::from(i) + phase);
+                let each: Vec<Sight> = times.filter_map(|time| chain.sight(joint, time)).collect();
                 let n = each.len() as f64;
                 let middle = each.iter().map(|it| it.at.coords).sum::<Vector2<f64>>() / n;
                 for it in &each {

@@ -197,7 +197,7 @@ impl Flaws {
                 let at = camera.project(&Point3::from(joints[from]))?;
                 let mut at = [0, 1].map(|axis| at[axis] + self.noise_px * noise[joint][axis]);
                 if random.f64() < self.wrong {
-                    at = at.map(|it| it + 250.0 * (random.f64() - 0.5));
+                    at = at.map(|at| at + 250.0 * (random.f64() - 0.5));
                 }
                 let is_seen =
                     random.f64() >= self.missing && at.iter().all(|it| (0.0..1000.0).contains(it));

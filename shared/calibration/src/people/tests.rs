@@ -109,8 +109,8 @@ fn clocks_that_joints_do_not_contradict_are_as_given() {
     let outcome = found(&truth, &flaws, &told);
     assert_eq!(outcome.doubts, []);
     assert!(!outcome.clocks_are_found);
-    let offsets = outcome.reports.iter().map(|it| it.offset_s);
-    let given = flaws.offsets_s.iter().map(|it| [*it, 0.0]);
+    let offsets = outcome.reports.iter().map(|report| report.offset_s);
+    let given = flaws.offsets_s.iter().map(|offsets_s| [*offsets_s, 0.0]);
     assert!(offsets.eq(given), "{:?}", outcome.reports);
 }
 
@@ -122,7 +122,7 @@ fn drifting(films: &mut [Film], px: f64, seed: u64) {
         let by: Vec<[f64; 2]> = (0..24).map(|_| [0; 2].map(|_| px * normal())).collect();
         for shot in &mut film.shots {
             let by = by[(2.0 * shot.time_s) as usize];
-            let joints = shot.people.iter_mut().flat_map(|it| &mut it.joints);
+            let joints = shot.people.iter_mut().flat_map(|person| &mut person.joints);
             for it in joints.flatten() {
                 it.at = [0, 1].map(|axis| it.at[axis] + by[axis]);
             }
@@ -150,9 +150,9 @@ fn deviations_are_those_of_the_answers_where_errors_last() {
             n += 1.0;
         }
     }
-    let ratios = squares.map(|it: f64| (it / n).sqrt());
+    let ratios = squares.map(|square: f64| (square / n).sqrt());
     assert!(
-        ratios.iter().all(|it| (0.5..1.6).contains(it)),
+        ratios.iter().all(|ratio| (0.5..1.6).contains(ratio)),
         "{ratios:?}"
     );
 }
@@ -242,7 +242,7 @@ fn beside(films: &mut [Film], px: f64) {
     for film in films {
         let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
         let by: Vec<[f64; 2]> = (0..N_JOINTS).map(|_| [0; 2].map(|_| px * normal())).collect();
-        for person in film.shots.iter_mut().flat_map(|it| &mut it.people) {
+        for person in film.shots.iter_mut().flat_map(|shot| &mut shot.people) {
             for (joint, by) in person.joints.iter_mut().zip(&by) {
                 if let Some(it) = joint {
                     it.at = [0, 1].map(|axis| it.at[axis] + by[axis]);

@@ -54,14 +54,14 @@ pub(crate) fn relative(matches: &[Match], sigma: f64, random: &mut Rng) -> Optio
             continue;
         };
         let cost = mean_cost(&judges, &essential, sigma);
-        let is_good = starts.len() < STARTS || starts.last().is_some_and(|it| cost < it.0);
+        let is_good = starts.len() < STARTS || starts.last().is_some_and(|start| cost < start.0);
         if is_good && let Some(pose) = decompose(&essential, &judges, sigma) {
             starts.push((cost, pose));
             starts.sort_by(|a, b| a.0.total_cmp(&b.0));
             starts.truncate(STARTS);
         }
     }
-    let poses = starts.iter().map(|it| fit(it.1, &fitted, sigma));
+    let poses = starts.iter().map(|start| fit(start.1, &fitted, sigma));
     let best = poses
         .map(|pose| (mean_cost(&fitted, &essential_of(&pose), sigma), pose))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -76,7 +76,7 @@ fn judged(pose: Isometry3<f64>, cost: f64, matches: &[Match], sigma: f64) -> Rel
     let (mut n, mut angles) = (0, Vec::new());
     for it in matches.iter().filter(good) {
         if let Some((depths, angle)) = depths(&pose, it)
-            && depths.iter().all(|it| *it > 0.0)
+            && depths.iter().all(|depth| *depth > 0.0)
         {
             n += 1;
             angles.push(angle);
@@ -112,14 +112,14 @@ pub(crate) fn essential_of(b_from_a: &Isometry3<f64>) -> Matrix3<f64> {
 }
 
 fn mean_cost(matches: &[Match], essential: &Matrix3<f64>, sigma: f64) -> f64 {
-    let each = matches.iter().map(|it| (sampson(it, essential) / sigma).powi(2).ln_1p());
+    let each = matches.iter().map(|hit| (sampson(hit, essential) / sigma).powi(2).ln_1p());
     each.sum::<f64>() / matches.len() as f64
 }
 
 /// The linear solution of eight matches (Hartley 1997), with singular values 1, 1, 0.
 fn eight_points(sample: &[Match; 8]) -> Option<Matrix3<f64>> {
-    let of_a = normaliser(&sample.map(|it| it.a))?;
-    let of_b = normaliser(&sample.map(|it| it.b))?;
+    let of_a = normaliser(&sample.map(|sample| sample.a))?;
+    let of_b = normaliser(&sample.map(|sample| sample.b))?;
     let mut normal = SMatrix::<f64, 9, 9>::zeros();
     for it in sample {
         let (a, b) = (of_a * it.a.push(1.0), of_b * it.b.push(1.0));
@@ -131,13 +131,13 @@ fn eight_points(sample: &[Match; 8]) -> Option<Matrix3<f64>> {
     let matrix = Matrix3::from_fn(|i, j| vector[3 * i + j]);
     let svd = (of_b.transpose() * matrix * of_a).svd(true, true);
     let essential = svd.u? * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0)) * svd.v_t?;
-    essential.iter().all(|it| it.is_finite()).then_some(essential)
+    essential.iter().all(|value| value.is_finite()).then_some(essential)
 }
 
 /// Moves points to the origin, at a mean distance of √2.
 fn normaliser(points: &[Vector2<f64>; 8]) -> Option<Matrix3<f64>> {
     let centre = points.iter().sum::<Vector2<f64>>() / 8.0;
-    let away = points.iter().map(|it| (it - centre).norm()).sum::<f64>() / 8.0;
+    let away = points.iter().map(|point| (point - centre).norm()).sum::<f64>() / 8.0;
     let scale = core::f64::consts::SQRT_2 / away;
     let [x, y] = [-scale * centre.x, -scale * centre.y];
     let matrix = Matrix3::new(scale, 0.0, x, 0.0, scale, y, 0.0, 0.0, 1.0);
@@ -171,7 +171,7 @@ fn decompose(essential: &Matrix3<f64>, matches: &[Match], sigma: f64) -> Option<
     });
     let good: Vec<&Match> = matches
         .iter()
-        .filter(|it| sampson(it, essential).abs() < 3.0 * sigma)
+        .filter(|hit| sampson(hit, essential).abs() < 3.0 * sigma)
         .take(60)
         .collect();
     let in_front = |pose: &Isometry3<f64>| {
@@ -179,7 +179,7 @@ fn decompose(essential: &Matrix3<f64>, matches: &[Match], sigma: f64) -> Option<
             |it: &&&Match| depths(pose, it).is_some_and(|it| it.0.iter().all(|depth| *depth > 0.0));
         good.iter().filter(front).count()
     };
-    let best = poses.iter().max_by_key(|it| in_front(it))?;
+    let best = poses.iter().max_by_key(|pose| in_front(pose))?;
     (2 * in_front(best) > good.len()).then_some(*best)
 }
 
@@ -227,7 +227,7 @@ fn fit(start: Isometry3<f64>, matches: &[Match], sigma: f64) -> Isometry3<f64> {
             for nth in 0..5 {
                 damped[(nth, nth)] *= 1.0 + damping;
             }
-            let Some(step) = damped.cholesky().map(|it| it.solve(&-gradient)) else {
+            let Some(step) = damped.cholesky().map(|cholesky| cholesky.solve(&-gradient)) else {
                 break;
             };
             let next = turned(&at, &step);

@@ -27,17 +27,17 @@ pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
     let n = study.cameras.len();
     let n_chains = |camera: usize| study.chains[camera].len();
     // Everybody in view of the camera with fewest people may be the one whom all cameras see.
-    let anchor = (0..n).min_by_key(|it| n_chains(*it)).unwrap_or(0);
+    let anchor = (0..n).min_by_key(|i| n_chains(*i)).unwrap_or(0);
     let followed = (0..n_chains(anchor)).map(|chain| {
         let with = |camera: usize| {
-            let each = (0..n_chains(camera)).map(|it| {
-                let pair = [(anchor, chain), (camera, it)];
-                (distance(study, pair, pair.map(choice)), it)
+            let each = (0..n_chains(camera)).map(|i| {
+                let pair = [(anchor, chain), (camera, i)];
+                (distance(study, pair, pair.map(choice)), i)
             });
             each.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
         };
         let all: Vec<(f64, usize)> =
-            (0..n).map(|it| if it == anchor { (0.0, chain) } else { with(it) }).collect();
+            (0..n).map(|i| if i == anchor { (0.0, chain) } else { with(i) }).collect();
         let sum: f64 = all.iter().map(|it| it.0).sum();
         (sum, all)
     });
@@ -61,7 +61,7 @@ fn distance(study: &Study<'_>, pair: [(usize, usize); 2], choices: [Choice; 2]) 
         for (own, other) in instant[camera].iter().zip(&instant[anchor]) {
             if let Some(it) = *own {
                 let away = of_pair(&study.cameras, [anchor, camera], *other, [it; 2]);
-                each.extend(away.map(|it| it[0]));
+                each.extend(away.map(|away| away[0]));
             }
         }
     }
@@ -69,7 +69,9 @@ fn distance(study: &Study<'_>, pair: [(usize, usize); 2], choices: [Choice; 2]) 
         return f64::INFINITY;
     }
     let median = Sorted::new(each).upper_median();
-    median.map_or(f64::INFINITY, |it| it / study.chains[camera][chain].size())
+    median.map_or(f64::INFINITY, |median| {
+        median / study.chains[camera][chain].size()
+    })
 }
 
 /// Distances of joints from where the other cameras see them, by block of time, before and after.
@@ -101,7 +103,7 @@ impl Blocks {
             for (time_s, instant) in seen.times_s.iter().zip(&seen.seen) {
                 let block = (time_s / BLOCK_S * 2.0).floor() as i64;
                 for camera in 0..n {
-                    let others: Vec<usize> = (0..n).filter(|it| *it != camera).collect();
+                    let others: Vec<usize> = (0..n).filter(|i| *i != camera).collect();
                     for joint in 0..rest.n_joints {
                         let Some(it) = instant[camera][joint] else {
                             continue;
@@ -134,13 +136,15 @@ impl Blocks {
     /// Median distances of a camera, pixels: before and after.
     pub(super) fn of_camera(&self, camera: usize) -> [f64; 2] {
         let of = |it: &Vec<f64>| Sorted::new(it.clone()).upper_median().unwrap_or(f64::NAN);
-        self.distances.get(camera).map_or([f64::NAN; 2], |it| [of(&it[0]), of(&it[1])])
+        self.distances.get(camera).map_or([f64::NAN; 2], |distance| {
+            [of(&distance[0]), of(&distance[1])]
+        })
     }
 
     /// Whether the new rig is better.
     pub(super) fn judge(&self, outcome: &mut Outcome) {
         let all = |nth: usize| {
-            let each = self.distances.iter().flat_map(|it| it[nth].iter().copied());
+            let each = self.distances.iter().flat_map(|distance| distance[nth].iter().copied());
             Sorted::new(each.collect::<Vec<_>>()).upper_median().unwrap_or(f64::NAN)
         };
         let [before, after] = [all(0), all(1)];
@@ -148,9 +152,12 @@ impl Blocks {
         let gains: Vec<f64> = self.costs.values().map(|[a, b]| a - b).collect();
         let n = gains.len() as f64;
         let mean = gains.iter().sum::<f64>() / n;
-        let squares: f64 = gains.iter().map(|it| (it - mean).powi(2)).sum();
+        let squares: f64 = gains.iter().map(|gain| (gain - mean).powi(2)).sum();
         let error = (squares / (n - 1.0).max(1.0) / n).sqrt();
-        outcome.blocks = [gains.len(), gains.iter().filter(|it| **it > 0.0).count()];
+        outcome.blocks = [
+            gains.len(),
+            gains.iter().filter(|gain| **gain > 0.0).count(),
+        ];
         outcome.certainty = if gains.len() < 2 {
             0.0
         } else {

@@ -39,10 +39,10 @@ impl Grid {
                 let time_s = index as f64 * STEP_S;
                 let joint = |it: usize| {
                     let place = track.place(it, time_s);
-                    place.map_or(([0.0; 2], 0.0), |it| (it.at, it.weight))
+                    place.map_or(([0.0; 2], 0.0), |place| (place.at, place.weight))
                 };
                 let joints: Vec<_> = (0..n_joints).map(joint).collect();
-                if joints.iter().filter(|it| it.1 > 0.0).count() >= LEAST_JOINTS {
+                if joints.iter().filter(|joint| joint.1 > 0.0).count() >= LEAST_JOINTS {
                     columns[(index - first) as usize].push(Standing {
                         size: track.size,
                         joints,
@@ -55,7 +55,7 @@ impl Grid {
 
     fn at(&self, index: i64) -> &[Standing] {
         let nth = usize::try_from(index - self.first).ok();
-        nth.and_then(|it| self.columns.get(it)).map_or(&[], |it| it)
+        nth.and_then(|nth| self.columns.get(nth)).map_or(&[], |it| it)
     }
 }
 
@@ -123,14 +123,14 @@ impl Curve {
             for standing in column {
                 let of_offset = |m: i64| {
                     let others = of_b.at(index + m).iter();
-                    let each = others.filter_map(|it| epipolar.costs(standing, it, mirror));
-                    each.min_by(f64::total_cmp).map_or(f32::NAN, |it| it as f32)
+                    let each = others.filter_map(|other| epipolar.costs(standing, other, mirror));
+                    each.min_by(f64::total_cmp).map_or(f32::NAN, |value| value as f32)
                 };
                 let each: Vec<f32> = (-half..=half).map(of_offset).collect();
-                let known = each.iter().filter(|it| it.is_finite());
+                let known = each.iter().filter(|value| value.is_finite());
                 let n = known.clone().count();
                 if n > 0 {
-                    let mean = known.map(|it| f64::from(*it)).sum::<f64>() / n as f64;
+                    let mean = known.map(|value| f64::from(*value)).sum::<f64>() / n as f64;
                     let time_s = index as f64 * STEP_S;
                     samples.push(Costs { time_s, each, mean });
                 }
@@ -185,8 +185,8 @@ impl Epipolar {
         let Some(mirror) = mirror else {
             return Some(plain);
         };
-        let exchanged = self.costs_of(a, b, |it| mirror[it]);
-        Some(exchanged.map_or(plain, |it| it.min(plain)))
+        let exchanged = self.costs_of(a, b, |i| mirror[i]);
+        Some(exchanged.map_or(plain, |exchanged| exchanged.min(plain)))
     }
 
     fn costs_of(&self, a: &Standing, b: &Standing, other: impl Fn(usize) -> usize) -> Option<f64> {

@@ -175,7 +175,7 @@ struct Worded<'a> {
 
 impl fmt::Display for Worded<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |it: &usize| self.names.get(*it).map_or("?", |it| it);
+        let name = |it: &usize| self.names.get(*it).map_or("?", |name| name);
         match self.doubt {
             Doubt::NoPeople {
                 camera,
@@ -227,7 +227,7 @@ impl fmt::Display for Worded<'_> {
 impl Worded<'_> {
     /// Too little that tells, or nothing that fits.
     fn fit(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |it: &usize| self.names.get(*it).map_or("?", |it| it);
+        let name = |it: &usize| self.names.get(*it).map_or("?", |name| name);
         match self.doubt {
             Doubt::Flat {
                 camera,
@@ -268,7 +268,7 @@ impl Worded<'_> {
 
     /// What contradicts itself.
     fn contradiction(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |it: &usize| self.names.get(*it).map_or("?", |it| it);
+        let name = |it: &usize| self.names.get(*it).map_or("?", |name| name);
         match self.doubt {
             Doubt::Pair {
                 cameras: [a, b],
@@ -312,7 +312,7 @@ impl Worded<'_> {
 
     /// What was heard.
     fn sound(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |it: &usize| self.names.get(*it).map_or("?", |it| it);
+        let name = |it: &usize| self.names.get(*it).map_or("?", |name| name);
         match self.doubt {
             Doubt::Quiet { camera, n, least } => write!(
                 f,

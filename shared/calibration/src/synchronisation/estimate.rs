@@ -109,7 +109,7 @@ pub fn estimate(
     let sigma_s = (SMOOTHING[0] * interval_s).max(SMOOTHING[1]);
     let of_camera = |(film, camera)| tracks(film, camera, settings.n_joints, sigma_s);
     let tracks: Vec<Vec<Track>> = films.iter().zip(cameras).map(of_camera).collect();
-    let seen: Vec<f64> = tracks.iter().map(|it| seen_s(it)).collect();
+    let seen: Vec<f64> = tracks.iter().map(|track| seen_s(track)).collect();
     let mut doubts = Vec::new();
     for (camera, &seen_s) in seen.iter().enumerate() {
         if seen_s < LEAST_SEEN_S {
@@ -121,8 +121,7 @@ pub fn estimate(
             });
         }
     }
-    let mut active: Vec<usize> =
-        (0..cameras.len()).filter(|it| seen[*it] >= LEAST_SEEN_S).collect();
+    let mut active: Vec<usize> = (0..cameras.len()).filter(|i| seen[*i] >= LEAST_SEEN_S).collect();
     active.sort_by_key(|it| *it != settings.reference);
     let study = Study {
         cameras,
@@ -166,7 +165,7 @@ pub(crate) fn check_settings(n: usize, reference: usize, window_s: f64) -> Resul
 
 /// For how long someone is followed, seconds.
 fn seen_s(tracks: &[Track]) -> f64 {
-    let mut spans: Vec<[f64; 2]> = tracks.iter().map(|it| it.span).collect();
+    let mut spans: Vec<[f64; 2]> = tracks.iter().map(|track| track.span).collect();
     spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let (mut sum, mut upto) = (0.0, f64::NEG_INFINITY);
     for [from, to] in spans {
@@ -201,22 +200,22 @@ impl Study<'_> {
         let (fit, drift_errors) = self.fit(&problem, &start, span);
         let before = vec![Clock::default(); self.cameras.len()];
         let before = problem.residuals(&before, span);
-        let camera = |it: usize| CameraClock {
-            offset_s: fit.clocks[it].at_zero_s(),
-            error_s: fit.errors[it][0],
-            drift: fit.clocks[it].drift,
-            drift_error: drift_errors.as_ref().map(|all| all[it]),
-            n: fit.residuals[it].n,
-            before_px: before[it].median_px,
-            after_px: fit.residuals[it].median_px,
+        let camera = |i: usize| CameraClock {
+            offset_s: fit.clocks[i].at_zero_s(),
+            error_s: fit.errors[i][0],
+            drift: fit.clocks[i].drift,
+            drift_error: drift_errors.as_ref().map(|all| all[i]),
+            n: fit.residuals[i].n,
+            before_px: before[i].median_px,
+            after_px: fit.residuals[i].median_px,
         };
         self.doubt_search(&found, &curves, &mut doubts);
         self.doubt_fit(&problem, &fit, span, &mut doubts);
-        let pairs = curves.iter().map(|it| pair_report(it, &fit.clocks)).collect();
+        let pairs = curves.iter().map(|curve| pair_report(curve, &fit.clocks)).collect();
         Outcome {
             cameras: (0..self.cameras.len()).map(camera).collect(),
             pairs,
-            second_best: found.rivals.first().map_or(0.0, |it| it.ratio),
+            second_best: found.rivals.first().map_or(0.0, |rival| rival.ratio),
             curves,
             doubts,
             length_s: span[1] - span[0],
@@ -248,18 +247,19 @@ impl Study<'_> {
 
     /// The part of the footage with most movement, by the clocks of the cameras; all of it if it is short.
     fn searched(&self) -> [f64; 2] {
-        let spans = self.active.iter().flat_map(|it| &self.tracks[*it]);
-        let ends = spans.map(|it| it.span).fold([f64::INFINITY, f64::NEG_INFINITY], |all, it| {
-            [all[0].min(it[0]), all[1].max(it[1])]
-        });
+        let spans = self.active.iter().flat_map(|i| &self.tracks[*i]);
+        let ends =
+            spans.map(|span| span.span).fold([f64::INFINITY, f64::NEG_INFINITY], |all, it| {
+                [all[0].min(it[0]), all[1].max(it[1])]
+            });
         if ends[1] - ends[0] <= SEARCHED_S || ends[1] < ends[0] {
             return if ends[1] < ends[0] { [0.0, 0.0] } else { ends };
         }
         let n = ((ends[1] - ends[0] - SEARCHED_S) / 10.0).floor() as usize;
-        let starts = (0..=n).map(|it| ends[0] + 10.0 * it as f64);
+        let starts = (0..=n).map(|i| ends[0] + 10.0 * i as f64);
         let movement = |from: f64| -> f64 {
-            let times = (0..120).map(|it| from + 0.5 * f64::from(it));
-            times.map(|it| self.movement(it)).sum()
+            let times = (0..120).map(|i| from + 0.5 * f64::from(i));
+            times.map(|time| self.movement(time)).sum()
         };
         let best = starts.max_by(|a, b| movement(*a).total_cmp(&movement(*b)));
         let from = best.unwrap_or(ends[0]);
@@ -268,12 +268,12 @@ impl Study<'_> {
 
     /// How fast people move at a time, sizes of them per second, over all cameras.
     fn movement(&self, time_s: f64) -> f64 {
-        let all = self.active.iter().flat_map(|it| &self.tracks[*it]);
+        let all = self.active.iter().flat_map(|i| &self.tracks[*i]);
         let alive = all.filter(|it| it.span[0] <= time_s && time_s <= it.span[1]);
-        let of_track = |it: &Track| -> f64 {
-            let joints = (0..self.settings.n_joints).filter_map(|joint| it.place(joint, time_s));
-            let speeds = joints.map(|place| place.speed[0].hypot(place.speed[1]) / it.size);
-            speeds.map(|it| it.min(2.0)).sum()
+        let of_track = |track: &Track| -> f64 {
+            let joints = (0..self.settings.n_joints).filter_map(|joint| track.place(joint, time_s));
+            let speeds = joints.map(|place| place.speed[0].hypot(place.speed[1]) / track.size);
+            speeds.map(|speed| speed.min(2.0)).sum()
         };
         alive.map(of_track).sum()
     }
@@ -281,9 +281,9 @@ impl Study<'_> {
     fn problem(&self) -> Problem<'_> {
         let mut pairs = Vec::new();
         for &a in self.active {
-            for &b in self.active.iter().filter(|it| **it != a) {
+            for &b in self.active.iter().filter(|active| **active != a) {
                 let epipolar = Epipolar::new(&self.cameras[a], &self.cameras[b]);
-                pairs.extend(epipolar.map(|it| ([a, b], it)));
+                pairs.extend(epipolar.map(|epipolar| ([a, b], epipolar)));
             }
         }
         Problem {
@@ -300,7 +300,7 @@ impl Study<'_> {
         let (mut starts, mut ends) = (Vec::new(), Vec::new());
         for &camera in self.active {
             let tracks = self.tracks[camera].iter();
-            let spans = tracks.map(|it| it.span.map(|end| clocks[camera].common(end)));
+            let spans = tracks.map(|track| track.span.map(|end| clocks[camera].common(end)));
             let [from, to] = spans.fold([f64::INFINITY, f64::NEG_INFINITY], |all, it| {
                 [all[0].min(it[0]), all[1].max(it[1])]
             });
@@ -343,9 +343,9 @@ impl Study<'_> {
             ];
             fit = problem.refine(&fit.clocks, part, &all);
         }
-        let errors: Vec<f64> = fit.errors.iter().map(|it| it[1]).collect();
-        let others = self.active.iter().filter(|it| **it != problem.reference);
-        let is_known = |it: &usize| errors[*it] * length_s < MOST_DRIFT_ERROR_S;
+        let errors: Vec<f64> = fit.errors.iter().map(|error| error[1]).collect();
+        let others = self.active.iter().filter(|active| **active != problem.reference);
+        let is_known = |i: &usize| errors[*i] * length_s < MOST_DRIFT_ERROR_S;
         let all_known = others.clone().all(is_known);
         for &it in others {
             let drift = fit.clocks[it].drift.abs();

@@ -39,7 +39,7 @@ impl Epipolar {
         let in_a = self.b_from_a.tr_mul(&b);
         let by_b = Vector2::new(in_b.x, in_b.y);
         let by_a = Vector2::new(in_a.x, in_a.y);
-        let [of_a, of_b] = sizes.map(|it| NOISE * it);
+        let [of_a, of_b] = sizes.map(|size| NOISE * size);
         let sigma =
             (of_b.powi(2) * by_b.norm_squared() + of_a.powi(2) * by_a.norm_squared()).sqrt();
         let gradient = by_a.norm().hypot(by_b.norm());

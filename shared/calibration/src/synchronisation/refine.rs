@@ -115,10 +115,10 @@ impl Problem<'_> {
         let mut from = start.to_vec();
         let mut best: Option<(f64, Fit)> = None;
         let most_s = (MOST_REACH * (span[1] - span[0])).max(REACHES_S[2]);
-        for reach_s in REACHES_S.into_iter().filter(|it| *it <= most_s) {
+        for reach_s in REACHES_S.into_iter().filter(|reaches_s| *reaches_s <= most_s) {
             let fit = self.refine_at(&from, span, drifts, reach_s);
-            let known = fit.errors.iter().map(|it| it[0]);
-            let error = known.filter(|it| it.is_finite()).fold(0.0, f64::max);
+            let known = fit.errors.iter().map(|error| error[0]);
+            let error = known.filter(|value| value.is_finite()).fold(0.0, f64::max);
             from.clone_from(&fit.clocks);
             if error > 0.0 && best.as_ref().is_none_or(|it| error < it.0) {
                 best = Some((error, fit));
@@ -149,16 +149,14 @@ impl Problem<'_> {
             let step = sums.solve(&|_| true);
             let mut moved_s: f64 = 0.0;
             for (camera, clock) in clocks.iter_mut().enumerate() {
-                let [by_offset, by_drift] = [0, 1].map(|it| step[2 * camera + it]);
+                let [by_offset, by_drift] = [0, 1].map(|i| step[2 * camera + i]);
                 clock.offset_s += by_offset;
                 clock.drift += by_drift / scale_s;
                 moved_s = moved_s.max(by_offset.abs() + by_drift.abs());
             }
             if moved_s < MOVED_S || pass == MOST_PASSES {
                 return Fit {
-                    residuals: (0..clocks.len())
-                        .map(|it| residuals(&table.residuals, it))
-                        .collect(),
+                    residuals: (0..clocks.len()).map(|i| residuals(&table.residuals, i)).collect(),
                     errors: sums.errors(&step),
                     clocks,
                 };
@@ -226,12 +224,12 @@ impl Problem<'_> {
         reach_s: f64,
     ) -> Vec<(usize, Row)> {
         let places = |of: &Track, at: f64| -> Vec<Option<Place>> {
-            (0..self.n_joints).map(|it| of.place(it, at)).collect()
+            (0..self.n_joints).map(|i| of.place(i, at)).collect()
         };
         let in_a = places(track, times[0]);
         let mut best: Option<(f64, &Track, bool)> = None;
         for other in alive(others, times[1]) {
-            let in_b = [-reach_s, 0.0, reach_s].map(|it| places(other, times[1] + it));
+            let in_b = [-reach_s, 0.0, reach_s].map(|value| places(other, times[1] + value));
             for is_exchanged in [false, true] {
                 let Some(other_of) = self.sides(is_exchanged) else {
                     continue;
@@ -240,8 +238,8 @@ impl Problem<'_> {
                     mean_cost(epipolar, [&in_a, in_b], [track.size, other.size], other_of)
                 };
                 let costs: Option<Vec<f64>> = in_b.iter().map(cost).collect();
-                let cost = costs.map(|it| it.iter().sum::<f64>());
-                if let Some(cost) = cost.filter(|it| best.is_none_or(|best| *it < best.0)) {
+                let cost = costs.map(|cost| cost.iter().sum::<f64>());
+                if let Some(cost) = cost.filter(|cost| best.is_none_or(|best| *cost < best.0)) {
                     best = Some((cost, other, is_exchanged));
                 }
             }
@@ -277,7 +275,7 @@ impl Problem<'_> {
     fn sides(&self, is_exchanged: bool) -> Option<impl Fn(usize) -> usize + Copy> {
         let mirror = self.mirror.filter(|_| is_exchanged);
         (mirror.is_some() || !is_exchanged)
-            .then_some(move |joint: usize| mirror.map_or(joint, |it| it[joint]))
+            .then_some(move |joint: usize| mirror.map_or(joint, |mirror| mirror[joint]))
     }
 }
 
@@ -327,9 +325,9 @@ fn spreads(n_pairs: usize, biased: &BTreeMap<(usize, usize, i64), Vec<Timed>>) -
 /// The variance of the median of residuals that are alike for some time.
 fn variance_of_median(rows: &[Timed]) -> f64 {
     let middle = median_at(rows, HALF as usize);
-    let off = rows.iter().map(|it| (it.row.residual - middle).abs());
+    let off = rows.iter().map(|row| (row.row.residual - middle).abs());
     let sigma = NORMAL * median(off.collect());
-    let mut blocks: Vec<i64> = rows.iter().map(|it| it.block).collect();
+    let mut blocks: Vec<i64> = rows.iter().map(|row| row.block).collect();
     blocks.dedup();
     let n = blocks.len() as f64 * BLOCK_S / INDEPENDENT_S;
     sigma * sigma / n.max(1.0)
@@ -343,12 +341,12 @@ fn variance_of_median(rows: &[Timed]) -> f64 {
 fn biases(rows: &[Timed], spread: f64) -> Vec<f64> {
     let of_errors = variance_of_median(rows).max(1e-9);
     let share = 1.0 - (of_errors / (of_errors + spread)).sqrt();
-    let n_delays = rows.first().map_or(0, |it| it.row.over_delay.len());
+    let n_delays = rows.first().map_or(0, |row| row.row.over_delay.len());
     (0..n_delays).map(|delay| share * median_at(rows, delay)).collect()
 }
 
 fn median_at(rows: &[Timed], delay: usize) -> f64 {
-    median(rows.iter().filter_map(|it| it.row.over_delay.get(delay).copied()).collect())
+    median(rows.iter().filter_map(|row| row.row.over_delay.get(delay).copied()).collect())
 }
 
 fn median(mut all: Vec<f64>) -> f64 {

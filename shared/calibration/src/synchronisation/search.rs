@@ -65,11 +65,12 @@ pub(crate) fn search(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Fo
         }
     }
     let mut offsets_s = best.map_or_else(|| vec![0.0; n_cameras], |it| it.1);
-    let zero = active.first().map_or(0.0, |it| offsets_s[*it]);
+    let zero = active.first().map_or(0.0, |active| offsets_s[*active]);
     for it in &mut offsets_s {
         *it -= zero;
     }
-    let mut rivals: Vec<Rival> = groups.iter().map(|it| rival(curves, it, &offsets_s)).collect();
+    let mut rivals: Vec<Rival> =
+        groups.iter().map(|group| rival(curves, group, &offsets_s)).collect();
     rivals.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
     Found { offsets_s, rivals }
 }
@@ -78,7 +79,7 @@ pub(crate) fn search(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Fo
 fn groups(active: &[usize]) -> Vec<Vec<usize>> {
     let others = active.get(1..).unwrap_or(&[]);
     if active.len() > MOST_DIVIDED {
-        let mut singles: Vec<Vec<usize>> = others.iter().map(|it| vec![*it]).collect();
+        let mut singles: Vec<Vec<usize>> = others.iter().map(|other| vec![*other]).collect();
         singles.push(others.to_vec());
         return singles;
     }
@@ -93,15 +94,15 @@ fn groups(active: &[usize]) -> Vec<Vec<usize>> {
 fn starts(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Vec<Vec<f64>> {
     let mut peaks: Vec<(f64, [usize; 2], f64)> = curves
         .iter()
-        .map(|it| {
-            let (nth, value) = peak(it);
-            (value, it.cameras, it.offset_s(nth))
+        .map(|curve| {
+            let (nth, value) = peak(curve);
+            (value, curve.cameras, curve.offset_s(nth))
         })
         .collect();
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut starts = vec![spread(n_cameras, &peaks)];
     for &hub in active {
-        let of_hub: Vec<_> = peaks.iter().filter(|it| it.1.contains(&hub)).copied().collect();
+        let of_hub: Vec<_> = peaks.iter().filter(|peak| peak.1.contains(&hub)).copied().collect();
         starts.push(spread(n_cameras, &of_hub));
     }
     starts
@@ -148,7 +149,7 @@ pub(crate) fn second(curve: &Curve) -> Option<(usize, f64)> {
 /// up to them.
 fn other_peak(values: &[f64], best: usize) -> Option<usize> {
     let last = values.len().checked_sub(1)?;
-    let is_below = |it: &usize| values[*it] < BASIN * values[best];
+    let is_below = |i: &usize| values[*i] < BASIN * values[best];
     let after = (best..=last).find(is_below).unwrap_or(last);
     let before = (0..=best).rev().find(is_below).unwrap_or(0);
     let is_peak = |it: &usize| {
@@ -157,7 +158,7 @@ fn other_peak(values: &[f64], best: usize) -> Option<usize> {
         near.clone().all(|other| values[other] <= values[*it])
     };
     let others = (0..=before).chain(after..=last);
-    let others = others.filter(|it| *it != best && is_peak(it));
+    let others = others.filter(|other| *other != best && is_peak(other));
     others.max_by(|a, b| values[*a].total_cmp(&values[*b]))
 }
 
@@ -190,14 +191,14 @@ impl<'a> Joint<'a> {
             |it: &&Curve| group.contains(&it.cameras[0]) != group.contains(&it.cameras[1]);
         let crossing = curves.iter().filter(crosses);
         let crossing: Vec<_> = crossing
-            .map(|it| {
-                let [a, b] = it.cameras;
-                let now = (offsets_s[a] - offsets_s[b] - it.first_s) / it.step_s;
+            .map(|crossing| {
+                let [a, b] = crossing.cameras;
+                let now = (offsets_s[a] - offsets_s[b] - crossing.first_s) / crossing.step_s;
                 let sign = if group.contains(&a) { 1 } else { -1 };
-                (it, now.round() as i64, sign)
+                (crossing, now.round() as i64, sign)
             })
             .collect();
-        let half = crossing.iter().map(|it| it.0.gain.len() as i64).max();
+        let half = crossing.iter().map(|crossing| crossing.0.gain.len() as i64).max();
         Self {
             crossing,
             half: half.unwrap_or(0),
@@ -235,7 +236,7 @@ impl<'a> Joint<'a> {
                 let block = (sample.time_s / BLOCK_S).floor() as i64;
                 let sums = blocks.entry((number, block)).or_default();
                 for (sum, nth) in sums.iter_mut().zip(entries) {
-                    *sum += nth.and_then(|it| sample.gain(it)).unwrap_or(0.0);
+                    *sum += nth.and_then(|nth| sample.gain(nth)).unwrap_or(0.0);
                 }
             }
         }
@@ -250,9 +251,9 @@ fn rival(curves: &[Curve], group: &[usize], offsets_s: &[f64]) -> Rival {
     let now = joint.half as usize;
     let best = values.get(now).copied().unwrap_or(0.0);
     let other = other_peak(&values, now);
-    let by = other.map_or(0, |it| it as i64 - joint.half);
-    let value = other.map_or(0.0, |it| values[it]);
-    let differences: Vec<f64> = joint.blocks(by).iter().map(|it| it[0] - it[1]).collect();
+    let by = other.map_or(0, |other| other as i64 - joint.half);
+    let value = other.map_or(0.0, |other| values[other]);
+    let differences: Vec<f64> = joint.blocks(by).iter().map(|block| block[0] - block[1]).collect();
     Rival {
         group: group.to_vec(),
         away_s: by as f64 * STEP_S,
@@ -273,7 +274,7 @@ fn rival(curves: &[Curve], group: &[usize], offsets_s: &[f64]) -> Rival {
 fn sum_in_errors(each: &[f64]) -> f64 {
     let n = each.len() as f64;
     let sum: f64 = each.iter().sum();
-    let squares: f64 = each.iter().map(|it| (it - sum / n).powi(2)).sum();
+    let squares: f64 = each.iter().map(|value| (value - sum / n).powi(2)).sum();
     let error = (squares * n / (n - 1.0).max(1.0)).sqrt();
     if error > 0.0 { sum / error } else { 0.0 }
 }

@@ -111,7 +111,8 @@ impl Study<'_> {
         let mut doubts = self.quiet();
         let offsets_s = self.offsets(&pairs);
         self.doubt(&pairs, &offsets_s, &mut doubts);
-        let offsets_s: Vec<f64> = offsets_s.iter().map(|it| it.unwrap_or(0.0)).collect();
+        let offsets_s: Vec<f64> =
+            offsets_s.iter().map(|offsets_s| offsets_s.unwrap_or(0.0)).collect();
         let reference = self.settings.reference;
         let drifts: Vec<parts::Drift> = (0..n)
             .map(|camera| {
@@ -133,18 +134,18 @@ impl Study<'_> {
             before_px: f64::NAN,
             after_px: f64::NAN,
         };
-        let report = |it: &Pair| PairReport {
-            cameras: it.cameras,
-            offset_s: offsets_s[it.cameras[0]] - offsets_s[it.cameras[1]],
-            best_s: it.found.offset_s,
-            second_s: it.found.second_s,
-            ratio: it.found.ratio(),
-            n: it.found.n,
+        let report = |pair: &Pair| PairReport {
+            cameras: pair.cameras,
+            offset_s: offsets_s[pair.cameras[0]] - offsets_s[pair.cameras[1]],
+            best_s: pair.found.offset_s,
+            second_s: pair.found.second_s,
+            ratio: pair.found.ratio(),
+            n: pair.found.n,
         };
-        let ratios = pairs.iter().filter(|it| it.is_sure());
+        let ratios = pairs.iter().filter(|pair| pair.is_sure());
         Outcome {
             cameras: (0..n).map(camera).collect(),
-            second_best: ratios.map(|it| it.found.ratio()).fold(0.0, f64::max),
+            second_best: ratios.map(|ratio| ratio.found.ratio()).fold(0.0, f64::max),
             curves: pairs.iter().map(curve).collect(),
             doubts,
             length_s: length_s.fold(f64::INFINITY, f64::min),
@@ -186,7 +187,7 @@ impl Study<'_> {
     /// reference.
     fn offsets(&self, pairs: &[Pair]) -> Vec<Option<f64>> {
         let n = self.heard.len();
-        let sure: Vec<&Pair> = pairs.iter().filter(|it| it.is_sure()).collect();
+        let sure: Vec<&Pair> = pairs.iter().filter(|pair| pair.is_sure()).collect();
         let mut is_connected = vec![false; n];
         is_connected[self.settings.reference] = true;
         for _ in 0..n {
@@ -215,7 +216,7 @@ impl Study<'_> {
                 normal[(camera, camera)] += 1e12;
             }
         }
-        let solved = normal.cholesky().map(|it| it.solve(&right));
+        let solved = normal.cholesky().map(|cholesky| cholesky.solve(&right));
         let offset = |camera: usize| {
             let solved = solved.as_ref().filter(|_| is_connected[camera])?;
             Some(solved[camera] - solved[self.settings.reference])
@@ -249,7 +250,7 @@ impl Study<'_> {
                 Some(_) => {}
             }
         }
-        for it in pairs.iter().filter(|it| it.is_sure()) {
+        for it in pairs.iter().filter(|pair| pair.is_sure()) {
             let [a, b] = it.cameras;
             let Some((of_a, of_b)) = offsets_s[a].zip(offsets_s[b]) else {
                 continue;
@@ -271,27 +272,27 @@ impl Study<'_> {
 
 /// Beginnings that a camera shares with the one with which it shares most.
 fn shared(pairs: &[Pair], camera: usize) -> usize {
-    let own = pairs.iter().filter(|it| it.cameras.contains(&camera));
+    let own = pairs.iter().filter(|pair| pair.cameras.contains(&camera));
     own.map(|it| it.found.n).max().unwrap_or(0)
 }
 
 /// The pair of a camera that fits best.
 fn best(pairs: &[Pair], camera: usize) -> Option<&Pair> {
-    let own = pairs.iter().filter(|it| it.cameras.contains(&camera));
+    let own = pairs.iter().filter(|pair| pair.cameras.contains(&camera));
     own.max_by(|a, b| a.found.cosine.total_cmp(&b.found.cosine))
 }
 
 /// The curve of a pair, for a plot.
 fn curve(pair: &Pair) -> Curve {
     let cosines = &pair.found.cosines;
-    let known = cosines.iter().filter(|it| it.is_finite());
+    let known = cosines.iter().filter(|cosine| cosine.is_finite());
     let mean = known.clone().sum::<f64>() / known.count().max(1) as f64;
     Curve {
         cameras: pair.cameras,
         step_s: HOP_S,
         first_s: pair.found.first_s,
-        gain: cosines.iter().map(|it| it - mean).collect(),
-        cost: cosines.iter().map(|it| 1.0 - it).collect(),
+        gain: cosines.iter().map(|cosine| cosine - mean).collect(),
+        cost: cosines.iter().map(|cosine| 1.0 - cosine).collect(),
         n: vec![pair.found.n as f64; cosines.len()],
         samples: Vec::new(),
     }

@@ -84,7 +84,7 @@ fn sides_that_follow_the_picture_do_not_matter_where_that_is_known() {
         ..recording(5.0)
     };
     let mut films = films.films(&cameras, &walking);
-    for it in films[1].shots.iter_mut().flat_map(|it| &mut it.people) {
+    for it in films[1].shots.iter_mut().flat_map(|shot| &mut shot.people) {
         let joints = it.joints.clone();
         it.joints = crate::synchronisation::testing::mirror().map(|joint| joints[joint]).to_vec();
     }
@@ -176,7 +176,7 @@ fn what_tells_no_offset_is_refused() {
         &run(&cameras, &plain.films(&cameras, treadmill)),
     );
     let films = plain.films(&cameras, &walking);
-    let exchanged = [0, 2, 1].map(|it| cameras[it].clone());
+    let exchanged = [0, 2, 1].map(|i| cameras[i].clone());
     refused("cameras exchanged", &run(&exchanged, &films));
     let far = Recording {
         offsets_s: vec![0.0, 1.6, -0.2],
@@ -213,13 +213,13 @@ fn a_camera_that_sees_nobody_is_named_and_the_others_are_told() {
     let cameras = ring(3);
     let mut films = recording(5.0).films(&cameras, &walking);
     let offsets_s = OFFSETS_S;
-    for it in films[1].shots.iter_mut().flat_map(|it| &mut it.people) {
+    for it in films[1].shots.iter_mut().flat_map(|shot| &mut shot.people) {
         for joint in it.joints.iter_mut().flatten() {
             joint.at[1] = f64::NAN;
         }
     }
     let outcome = run(&cameras, &films);
-    let is_it = |it: &Doubt| matches!(it, Doubt::NoPeople { camera: 1, .. });
+    let is_it = |doubt: &Doubt| matches!(doubt, Doubt::NoPeople { camera: 1, .. });
     assert!(outcome.doubts.iter().all(is_it), "{:?}", outcome.doubts);
     assert_eq!(outcome.doubts.len(), 1);
     let off_s = outcome.cameras[2].offset_s - offsets_s[2];

@@ -67,7 +67,7 @@ impl Track {
 
     /// The mean score of its joints; 0 without any.
     pub fn score(&self) -> f64 {
-        let scores = self.joints.iter().flatten().map(|it| it.score);
+        let scores = self.joints.iter().flatten().map(|joint| joint.score);
         let n = self.joints.iter().map(Vec::len).sum::<usize>();
         scores.sum::<f64>() / n.max(1) as f64
     }
@@ -76,8 +76,8 @@ impl Track {
     pub fn place(&self, joint: usize, time_s: f64) -> Option<Place> {
         let samples = &self.joints[joint];
         let reach = KERNEL_END * self.sigma_s;
-        let from = samples.partition_point(|it| it.time_s < time_s - reach);
-        let near = samples[from..].iter().take_while(|it| it.time_s <= time_s + reach);
+        let from = samples.partition_point(|sample| sample.time_s < time_s - reach);
+        let near = samples[from..].iter().take_while(|sample| sample.time_s <= time_s + reach);
         let (mut n, mut before, mut after) = (0, false, false);
         let mut sums = [0.0; 3];
         let mut moments = [[0.0; 2]; 2];
@@ -106,8 +106,8 @@ impl Track {
         let line =
             moments.map(|[m0, m1]| [(s2 * m0 - s1 * m1) / spread, (s0 * m1 - s1 * m0) / spread]);
         Some(Place {
-            at: line.map(|it| it[0]),
-            speed: line.map(|it| it[1]),
+            at: line.map(|line| line[0]),
+            speed: line.map(|line| line[1]),
             weight: s0 / scores,
         })
     }
@@ -134,20 +134,20 @@ pub fn tracks(film: &Film, camera: &Camera, n_joints: usize, sigma_s: f64) -> Ve
     for shot in &film.shots {
         let people = shot.people.iter();
         let mut people: Vec<Option<Seen>> =
-            people.map(|it| seen(it, camera, n_joints, least_size)).collect();
-        let is_old = |it: &Open| shot.time_s - it.last().0 > LONGEST_GAP_S;
+            people.map(|person| seen(person, camera, n_joints, least_size)).collect();
+        let is_old = |open: &Open| shot.time_s - open.last().0 > LONGEST_GAP_S;
         let (old, mut fresh): (Vec<Open>, Vec<Open>) = open.into_iter().partition(is_old);
         done.extend(old);
         link(shot.time_s, &mut people, &mut fresh);
-        let begun = people.into_iter().flatten().map(|it| Open {
-            samples: vec![(shot.time_s, it)],
+        let begun = people.into_iter().flatten().map(|person| Open {
+            samples: vec![(shot.time_s, person)],
         });
         fresh.extend(begun);
         open = fresh;
     }
     done.extend(open);
     let tracks = done.into_iter();
-    tracks.filter_map(|it| it.finish(n_joints, sigma_s)).collect()
+    tracks.filter_map(|track| track.finish(n_joints, sigma_s)).collect()
 }
 
 /// Gives people to the tracks whose last pictures they are nearest to, the nearest first.
@@ -158,7 +158,7 @@ fn link(time_s: f64, people: &mut [Option<Seen>], open: &mut [Open]) {
         let farthest = FARTHEST[0] + FARTHEST[1] * (time_s - last_s);
         for (person, seen) in people.iter().enumerate() {
             let Some(seen) = seen else { continue };
-            if let Some(apart) = apart(last, seen).filter(|it| *it < farthest) {
+            if let Some(apart) = apart(last, seen).filter(|value| *value < farthest) {
                 ties.push((apart, track, person));
             }
         }
@@ -194,7 +194,7 @@ fn apart(a: &Seen, b: &Seen) -> Option<f64> {
 fn seen(person: &Person, camera: &Camera, n_joints: usize, least_size: f64) -> Option<Seen> {
     let ideal = |joint: usize| {
         let it = (*person.joints.get(joint)?)?;
-        let is_good = it.at.iter().all(|it| it.is_finite()) && it.score > LEAST_SCORE;
+        let is_good = it.at.iter().all(|value| value.is_finite()) && it.score > LEAST_SCORE;
         let at = camera.undistorted_px(&Point2::from(it.at)).filter(|_| is_good)?;
         Some(([at.x, at.y], it.score.min(1.0)))
     };
@@ -224,7 +224,7 @@ impl Open {
         if self.samples.len() < 3 {
             return None;
         }
-        let mut sizes: Vec<f64> = self.samples.iter().map(|it| it.1.size).collect();
+        let mut sizes: Vec<f64> = self.samples.iter().map(|sample| sample.1.size).collect();
         sizes.sort_by(f64::total_cmp);
         // Bent people and people cut off look smaller than they are.
         let size = sizes[sizes.len() * 3 / 4];
@@ -265,8 +265,8 @@ fn without_outliers(samples: &[Sample], limit: f64) -> Vec<Sample> {
             away.abs() < limit + TURNING * way.abs()
         })
     };
-    let kept = (0..samples.len()).filter(|it| is_good(*it));
-    kept.map(|it| samples[it]).collect()
+    let kept = (0..samples.len()).filter(|i| is_good(*i));
+    kept.map(|i| samples[i]).collect()
 }
 
 /// The median of samples, each number for itself.

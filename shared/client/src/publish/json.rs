@@ -13,12 +13,12 @@ use crate::publish::frame::{Frame, Place};
 /// `[x, y, z, deviation]` in metres, or in its place the reason why it is nowhere, as text: never zeros.
 pub fn json_datagram(frame: &Frame<'_>) -> Option<String> {
     let forms = [true, false].map(|with_names| line(frame, with_names));
-    forms.into_iter().find(|it| it.len() <= MOST_BYTES)
+    forms.into_iter().find(|form| form.len() <= MOST_BYTES)
 }
 
 /// One line of JSON with the names of the joints in their order; none if it does not fit.
 pub fn json_names(frame: &Frame<'_>) -> Option<String> {
-    let names: Vec<&str> = frame.joints.iter().map(|it| it.0).collect();
+    let names: Vec<&str> = frame.joints.iter().map(|joint| joint.0).collect();
     let names = Value::from(names);
     let deployment = Value::from(frame.deployment);
     let text = format!("{{\"parallax\":2,\"deployment\":{deployment},\"names\":{names}}}\n");
@@ -122,14 +122,14 @@ pub(crate) mod tests {
     #[test]
     fn names_are_left_out_where_they_do_not_fit_and_too_much_is_not_sent() {
         let long: Vec<String> =
-            (0..32).map(|it| format!("a joint with a very long name {it}")).collect();
+            (0..32).map(|i| format!("a joint with a very long name {i}")).collect();
         let names: Vec<&str> = long.iter().map(String::as_str).collect();
         let text = json_datagram(&frame(&names)).unwrap();
         assert!(text.len() <= MOST_BYTES);
         let value: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(value["joints"].as_array().map(Vec::len), Some(32));
         assert_eq!(value["joints"][2], "too few views");
-        assert!(json_names(&frame(&names)).is_some_and(|it| it.len() <= MOST_BYTES));
+        assert!(json_names(&frame(&names)).is_some_and(|json_name| json_name.len() <= MOST_BYTES));
         let many: Vec<&str> = vec!["x"; 100];
         assert_eq!(json_datagram(&frame(&many)), None);
     }

@@ -64,7 +64,7 @@ impl Message {
 
     /// A text ends with zeros, up to a multiple of four bytes.
     fn text(&mut self, text: &str) {
-        self.0.extend(text.bytes().filter(|it| *it != 0));
+        self.0.extend(text.bytes().filter(|byte| *byte != 0));
         self.0.push(0);
         self.0.resize(self.0.len().next_multiple_of(4), 0);
     }
@@ -98,8 +98,8 @@ fn push(bundle: &mut Vec<u8>, message: &Message) {
 
 /// A name as part of an address: what has a meaning there, and what is not ASCII, is an underscore.
 fn plain(name: &str) -> String {
-    let is_plain = |it: char| it.is_ascii_alphanumeric() || it == '-' || it == '_';
-    name.chars().map(|it| if is_plain(it) { it } else { '_' }).collect()
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '_';
+    name.chars().map(|c| if is_plain(c) { c } else { '_' }).collect()
 }
 
 #[cfg(test)]
@@ -119,7 +119,7 @@ mod tests {
             let end = message.iter().position(|it| *it == 0).unwrap();
             let address = String::from_utf8(message[..end].to_vec()).unwrap();
             let types = &message[(end + 1).next_multiple_of(4)..];
-            let end = types.iter().position(|it| *it == 0).unwrap();
+            let end = types.iter().position(|kind| *kind == 0).unwrap();
             assert_eq!(types[0], b',');
             found.push((address, types[(end + 1).next_multiple_of(4)..].to_vec()));
             rest = &rest[4 + size..];
@@ -132,7 +132,7 @@ mod tests {
         let datagrams = osc_datagrams(&frame(&["head", "right wrist", "neck"]));
         assert_eq!(datagrams.len(), 1);
         let messages = messages(&datagrams[0]);
-        let addresses: Vec<&str> = messages.iter().map(|it| it.0.as_str()).collect();
+        let addresses: Vec<&str> = messages.iter().map(|message| message.0.as_str()).collect();
         let expected = [
             "/parallax/frame",
             "/parallax/joint/head",
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_goes_into_another_bundle_with_the_same_head() {
-        let many: Vec<String> = (0..128).map(|it| format!("joint/{it}")).collect();
+        let many: Vec<String> = (0..128).map(|i| format!("joint/{i}")).collect();
         let names: Vec<&str> = many.iter().map(String::as_str).collect();
         let datagrams = osc_datagrams(&frame(&names));
         assert!(datagrams.len() > 1);

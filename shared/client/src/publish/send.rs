@@ -138,7 +138,7 @@ impl Outlet {
             return;
         };
         let has_names = line.contains("\"joints\":{");
-        let is_due = self.named.is_none_or(|it| it.elapsed() >= NAMES);
+        let is_due = self.named.is_none_or(|named| named.elapsed() >= NAMES);
         if !has_names
             && is_due
             && let Some(names) = json_names(frame)

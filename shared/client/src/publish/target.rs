@@ -109,7 +109,8 @@ mod tests {
 
     #[test]
     fn targets_are_read() {
-        let of = |text: &str| Target::parse(text).map(|it| (it.address.to_string(), it.form));
+        let of =
+            |text: &str| Target::parse(text).map(|value| (value.address.to_string(), value.form));
         let loopback = |form| Ok(("127.0.0.1:9000".to_owned(), form));
         assert_eq!(of("udp://127.0.0.1:9000"), loopback(Form::Json));
         assert_eq!(

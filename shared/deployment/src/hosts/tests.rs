@@ -13,7 +13,7 @@ const GOOD: &str = "name = 'a'\nrig = 'r'\noutput = 'o'\n\
 
 fn parse(text: &str) -> Result<Deployment, String> {
     let loaded = Loaded::parse(text, Path::new("/d/d.toml"), &[], &AnyMachine);
-    loaded.map(|it| it.deployment).map_err(|error| error.to_string())
+    loaded.map(|loaded| loaded.deployment).map_err(|error| error.to_string())
 }
 
 #[test]

@@ -231,10 +231,10 @@ fn every_key_with_a_number_says_what_it_may_be() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     let keys = keys();
-    for key in keys.iter().map(|it| it.name.as_str()) {
+    for key in keys.iter().map(|key| key.name.as_str()) {
         // Those are asked in `hosts/tests.rs`.
         let of_hosts = key == "host" || key.starts_with("link.");
-        let is_asked = of_hosts || ROWS.iter().any(|it| it.0 == key) || OTHERS.contains(&key);
+        let is_asked = of_hosts || ROWS.iter().any(|row| row.0 == key) || OTHERS.contains(&key);
         assert!(is_asked, "{key} stands in no table: what may it be?");
     }
 }
@@ -268,7 +268,7 @@ fn a_camera_has_footage_or_keypoints_and_names_of_these_that_are_known() {
     let of_camera = |lines: &str| {
         let text = format!("{SHORT}[[camera]]\nname = 'c'\n{lines}\n");
         let read = Loaded::parse(&text, Path::new("/room/deployment.toml"), &[], &AnyMachine);
-        read.map_err(|it| it.to_string())
+        read.map_err(|error| error.to_string())
     };
     for (lines, words) in [
         ("", "`camera.source` is left out of camera \"c\""),

@@ -25,7 +25,7 @@ workers = 2
 "#;
 
 fn read(text: &str, set: &[&str]) -> Result<Loaded, ConfigError> {
-    let set: Vec<String> = set.iter().map(|it| (*it).to_owned()).collect();
+    let set: Vec<String> = set.iter().map(|set| (*set).to_owned()).collect();
     Loaded::parse(text, Path::new("/room/deployment.toml"), &set, &AnyMachine)
 }
 
@@ -204,7 +204,7 @@ proptest! {
 
     #[test]
     fn any_value_of_a_known_key_is_taken_or_refused(
-        key in prop::sample::select(keys().into_iter().map(|it| it.name).collect::<Vec<_>>()),
+        key in prop::sample::select(keys().into_iter().map(|key| key.name).collect::<Vec<_>>()),
         value in prop::sample::select(vec![
             "-1", "0", "1", "99999999999", "1e308", "nan", "-inf", "''", "'x'", "[]", "[1]",
             "[nan]", "{}", "[[1]]", "{ file = 3 }", "{ a = 'b' }", "true", "1979-05-27", "=",

@@ -19,9 +19,9 @@ impl Topology {
         if host.fuses {
             let remote = (0..self.n_views).filter(|view| !own.contains(view));
             let outputs: Vec<String> = remote.flat_map(|view| crosses(&view)).collect();
-            let is_here = |it: &Process| {
-                let view = it.index.filter(|view| !own.contains(view));
-                view.is_none() || !is_at_camera(it.service, carry)
+            let is_here = |process: &Process| {
+                let view = process.index.filter(|view| !own.contains(view));
+                view.is_none() || !is_at_camera(process.service, carry)
             };
             self.processes.retain(is_here);
             // Views that are here go on without it; two can be triangulated.
@@ -33,14 +33,14 @@ impl Topology {
             let bridge = process(BRIDGE, None, role, Vec::new(), outputs);
             self.processes.push(bridge);
         } else {
-            let is_here = |it: &Process| {
-                let is_own = it.index.is_some_and(|it| own.contains(&it));
-                it.service == RECORD || is_at_camera(it.service, carry) && is_own
+            let is_here = |process: &Process| {
+                let is_own = process.index.is_some_and(|index| own.contains(&index));
+                process.service == RECORD || is_at_camera(process.service, carry) && is_own
             };
             self.processes.retain(is_here);
             self.n_workers = 0;
             let outputs: Vec<String> =
-                self.processes.iter().flat_map(|it| it.outputs.clone()).collect();
+                self.processes.iter().flat_map(|process| process.outputs.clone()).collect();
             for it in &mut self.processes {
                 it.inputs.retain(|input| outputs.contains(input));
             }
@@ -65,9 +65,9 @@ impl Topology {
             small.into_iter().chain(large)
         });
         let fused = self.fused().into_iter();
-        let is_published = |it: &String| {
+        let is_published = |text: &String| {
             let mut processes = self.processes.iter();
-            processes.any(|process| process.outputs.contains(it))
+            processes.any(|process| process.outputs.contains(text))
         };
         let mut all: Vec<String> = of_views.chain(fused).chain([topic::skeletons()]).collect();
         all.retain(|it| !is_published(it));
@@ -125,7 +125,7 @@ mod tests {
     }
 
     fn names(it: &Topology) -> Vec<&str> {
-        it.processes().iter().map(|it| it.name.as_str()).collect()
+        it.processes().iter().map(|process| process.name.as_str()).collect()
     }
 
     #[test]
@@ -201,7 +201,7 @@ mod tests {
         let recording = crate::RecordingPlan::default();
         let whole = Topology::new(&it, Some(&recording), None);
         let [desk, far] = [0, 1].map(|host| whole.clone().on_host(&it, &it.hosts[host]));
-        let inputs = |it: &Topology| it.process(RECORD).unwrap().inputs.clone();
+        let inputs = |topology: &Topology| topology.process(RECORD).unwrap().inputs.clone();
         assert_eq!(inputs(&far), [0, 2].map(topic::frame));
         assert_eq!(
             far.receivers_of(&topic::frame(0)),

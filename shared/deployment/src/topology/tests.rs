@@ -44,7 +44,7 @@ fn replay(from: Stage) -> Replay {
 
 fn of_service<'a>(topology: &'a Topology, service: &str) -> Vec<&'a Process> {
     let processes = topology.processes().iter();
-    processes.filter(|it| it.service == service).collect()
+    processes.filter(|process| process.service == service).collect()
 }
 
 #[test]
@@ -58,8 +58,8 @@ fn all_views_at_once_have_one_worker_for_every_process_however_many_are_allowed(
         for topology in [&recorded, &replayed] {
             assert_eq!(topology.n_workers(), 1);
             assert_eq!(of_service(topology, "fuse").len(), 1);
-            let answers = |it: &Process| {
-                let inputs = it.inputs.iter();
+            let answers = |process: &Process| {
+                let inputs = process.inputs.iter();
                 inputs.filter(|input| input.starts_with("pair-pose/")).count()
             };
             for it in topology.processes() {
@@ -99,12 +99,13 @@ fn the_receivers_of_a_recorded_deployment_with_a_network_are_these() {
     let senders = |name: &str| {
         let receiver = topology.process(name).unwrap();
         let senders = topology.senders_to(receiver);
-        senders.map(|it| it.name.as_str()).collect::<Vec<_>>()
+        senders.map(|sender| sender.name.as_str()).collect::<Vec<_>>()
     };
     assert_eq!(senders("capture-1"), [""; 0]);
     assert_eq!(senders("pose-1"), ["capture-1"]);
     assert_eq!(senders("quality-1"), ["pose-1", "capture-1"]);
-    let names: Vec<&str> = topology.processes().iter().map(|it| it.name.as_str()).collect();
+    let names: Vec<&str> =
+        topology.processes().iter().map(|process| process.name.as_str()).collect();
     let expected = "record results triangulate fuse-0 fuse-1 quality-0 quality-1 quality-2 pose-0 pose-1 pose-2 \
                     capture-0 capture-1 capture-2";
     assert_eq!(names.join(" "), expected);
@@ -172,8 +173,8 @@ fn topics_have_this_room() {
 fn the_answers_about_one_frame_of_many_views_find_room() {
     let all = deployment(7, "[paper]\nviews = 'all'\n");
     let rooms = Topology::new(&all, None, None).rooms(Mode::Realtime, &[SIZE; 7], 1);
-    let answers = rooms.iter().find(|it| it.content == Content::PairPose);
-    assert_eq!(answers.map(|it| it.queued), Some(7));
+    let answers = rooms.iter().find(|room| room.content == Content::PairPose);
+    assert_eq!(answers.map(|answer| answer.queued), Some(7));
 }
 
 #[test]
@@ -267,7 +268,7 @@ proptest! {
         // Every topic has room for all of its receivers, and a name of its own.
         let rooms = topology.rooms(Mode::Realtime, &vec![SIZE; n_views], 1);
         for topic in &outputs {
-            let mut its = rooms.iter().filter(|it| it.topic == **topic);
+            let mut its = rooms.iter().filter(|room| room.topic == **topic);
             let room = its.next().map_or(0, |it| it.receivers);
             prop_assert!(room >= topology.receivers_of(topic), "{topic}: {room}");
             prop_assert!(its.next().is_none(), "{topic}: twice");
@@ -296,7 +297,7 @@ proptest! {
             let pairs = topology.pairs_of(worker.index.unwrap());
             prop_assert!(!pairs.is_empty());
             for view in 0..n_views {
-                let is_its = pairs.iter().any(|it| it.1.contains(&view));
+                let is_its = pairs.iter().any(|pair| pair.1.contains(&view));
                 prop_assert_eq!(worker.inputs.contains(&topic::evidence(view)), is_its);
             }
         }
@@ -336,7 +337,7 @@ fn pictures_of_live_cameras_travel_where_they_are_recorded_only() {
     });
     let rooms = recorded.rooms(Mode::Realtime, &sizes, 1);
     let of_pictures: Vec<&Room> =
-        rooms.iter().filter(|it| it.content == Content::Picture).collect();
+        rooms.iter().filter(|room| room.content == Content::Picture).collect();
     assert_eq!(of_pictures.len(), 1);
     assert_eq!(
         (of_pictures[0].topic.as_str(), of_pictures[0].longest),

@@ -19,8 +19,9 @@ struct Joint {
 fn read(text: &str) -> (Vec<Joint>, Vec<Vec<f64>>) {
     let (mut joints, mut open): (Vec<Joint>, Vec<usize>) = (Vec::new(), Vec::new());
     let mut lines = text.lines().map(str::trim);
-    let numbers =
-        |it: &str| -> Vec<f64> { it.split_whitespace().filter_map(|it| it.parse().ok()).collect() };
+    let numbers = |text: &str| -> Vec<f64> {
+        text.split_whitespace().filter_map(|word| word.parse().ok()).collect()
+    };
     for line in lines.by_ref() {
         match line.split_whitespace().next() {
             Some("ROOT" | "JOINT" | "End") => {
@@ -54,7 +55,9 @@ fn places(joints: &[Joint], frame: &[f64]) -> Vec<Point3<f64>> {
     let mut all: Vec<(Rotation3<f64>, Point3<f64>)> = Vec::new();
     for joint in joints {
         let (turn, place) =
-            joint.parent.map_or((Rotation3::identity(), Point3::origin()), |it| all[it]);
+            joint.parent.map_or((Rotation3::identity(), Point3::origin()), |parent| {
+                all[parent]
+            });
         let mut place = place + turn * joint.offset;
         if joint.n_channels == 6 {
             place += Vector3::new(next(), next(), next());

@@ -22,7 +22,7 @@ impl Store {
     ///
     /// * `each`: numbers of an element.
     pub(super) fn reals(&mut self, values: &[f32], each: usize, kind: &str) -> usize {
-        let bytes: Vec<u8> = values.iter().flat_map(|it| it.to_le_bytes()).collect();
+        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         self.add(&bytes, None, REAL, (values.len() / each, kind))
     }
 
@@ -42,7 +42,7 @@ impl Store {
         let index = self.add(&bytes, Some(VERTICES), REAL, (values.len(), kind));
         let of = |choose: fn(f32, f32) -> f32| -> Vec<f32> {
             (0..N)
-                .map(|it| values.iter().map(|all| all[it]).reduce(choose).unwrap_or(0.0))
+                .map(|i| values.iter().map(|all| all[i]).reduce(choose).unwrap_or(0.0))
                 .collect()
         };
         self.accessors[index]["min"] = json!(of(f32::min));
@@ -59,7 +59,7 @@ impl Store {
 
     /// Adds numbers of vertices.
     pub(super) fn indices(&mut self, values: &[u16]) -> usize {
-        let bytes: Vec<u8> = values.iter().flat_map(|it| it.to_le_bytes()).collect();
+        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         self.add(&bytes, Some(INDICES), WORD, (values.len(), "SCALAR"))
     }
 

@@ -37,9 +37,10 @@ impl Read {
     fn reals(&self, accessor: &Value) -> Vec<f64> {
         let accessor = &self.json["accessors"][accessor.as_u64().unwrap() as usize];
         let view = &self.json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
-        let [at, n] = ["byteOffset", "byteLength"].map(|it| view[it].as_u64().unwrap() as usize);
+        let [at, n] =
+            ["byteOffset", "byteLength"].map(|name| view[name].as_u64().unwrap() as usize);
         let bytes = self.binary[at..at + n].as_chunks().0;
-        bytes.iter().map(|it| f64::from(f32::from_le_bytes(*it))).collect()
+        bytes.iter().map(|byte| f64::from(f32::from_le_bytes(*byte))).collect()
     }
 
     /// What a node has in a frame: its animated value, else its own.
@@ -48,7 +49,7 @@ impl Read {
         let channels = animation["channels"].as_array().unwrap();
         let own = channels
             .iter()
-            .find(|it| it["target"]["node"] == node && it["target"]["path"] == path);
+            .find(|channel| channel["target"]["node"] == node && channel["target"]["path"] == path);
         if let Some(channel) = own {
             let sampler = &animation["samplers"][channel["sampler"].as_u64().unwrap() as usize];
             let all = self.reals(&sampler["output"]);
@@ -88,7 +89,7 @@ impl Read {
 
     fn node(&self, name: &str) -> usize {
         let nodes = self.json["nodes"].as_array().unwrap();
-        nodes.iter().position(|it| it["name"] == name).unwrap()
+        nodes.iter().position(|node| node["name"] == name).unwrap()
     }
 }
 
@@ -103,7 +104,7 @@ fn the_nodes_stand_where_the_joints_were_seen() {
     let landmarks = Landmarks::of(&trial);
     for frame in [0, 7, 29] {
         let globals = read.globals(frame);
-        for node in NODES.iter().filter(|it| it.landmark.is_some()) {
+        for node in NODES.iter().filter(|node| node.landmark.is_some()) {
             let due = landmarks.at(&trial, frame, node.landmark.unwrap()).unwrap();
             let off =
                 (place(&globals[read.node(node.name)]) - trial.y_up_from_world() * due).norm();
@@ -125,7 +126,7 @@ fn the_skin_reaches_from_joint_to_joint_and_is_not_there_in_a_gap() {
     let bind = read.reals(&skin["inverseBindMatrices"]);
     let primitive = &read.json["meshes"][0]["primitives"][0]["attributes"];
     let places = read.reals(&primitive["POSITION"]);
-    let joint = joints.iter().position(|it| *it == read.node("right_ankle_bone")).unwrap();
+    let joint = joints.iter().position(|joint| *joint == read.node("right_ankle_bone")).unwrap();
     // Eight faces of three vertices for each piece; the first vertex is the tip.
     let first = (joint - N_NODES) * 24;
     let tip = |frame: usize, vertex: usize| {
@@ -177,13 +178,13 @@ fn bones_whose_ends_coincide_are_left_out_and_all_numbers_are_finite() {
     }
     let read = Read::of(&trial);
     let nodes = read.json["nodes"].as_array().unwrap();
-    let has = |name: &str| nodes.iter().any(|it| it["name"] == name);
+    let has = |name: &str| nodes.iter().any(|node| node["name"] == name);
     assert!(!has("right_ankle_bone") && has("left_ankle_bone"));
     let bind = read.reals(&read.json["skins"][0]["inverseBindMatrices"]);
-    assert!(bind.iter().all(|it| it.is_finite()));
+    assert!(bind.iter().all(|value| value.is_finite()));
     let samplers = read.json["animations"][0]["samplers"].as_array().unwrap();
     for sampler in samplers {
         let values = read.reals(&sampler["output"]);
-        assert!(values.iter().all(|it| it.is_finite()));
+        assert!(values.iter().all(|value| value.is_finite()));
     }
 }

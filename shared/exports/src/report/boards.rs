@@ -31,7 +31,7 @@ pub struct Page<'a> {
 /// One self-contained page.
 pub fn html(page: &Page<'_>) -> String {
     let mut out = begin("Parallax: cameras by a board");
-    let own = page.outcome.doubts.iter().map(|it| it.text(page.names));
+    let own = page.outcome.doubts.iter().map(|doubt| doubt.text(page.names));
     let doubts: Vec<String> = page.more_doubts.iter().cloned().chain(own).collect();
     let said = ("calibrated", "not to be trusted as it is");
     verdict(&mut out, said, &doubts);
@@ -65,7 +65,7 @@ pub fn html(page: &Page<'_>) -> String {
 }
 
 fn focal(camera: &CameraOutcome) -> (String, String) {
-    let known = camera.numbers.iter().find(|it| it.name == "focal length");
+    let known = camera.numbers.iter().find(|number| number.name == "focal length");
     let intrinsics = &camera.camera.intrinsics;
     let sd = known.map_or("given".to_owned(), |it| number(it.sd, 2));
     (format!("{:.1}, {:.1}", intrinsics.fx, intrinsics.fy), sd)
@@ -79,7 +79,7 @@ fn cameras(out: &mut Html, page: &Page<'_>) {
     );
     for (name, it) in page.names.iter().zip(&page.outcome.cameras) {
         let (focal, sd) = focal(it);
-        let wrong = it.residuals.iter().filter(|it| it.is_wrong).count();
+        let wrong = it.residuals.iter().filter(|residual| residual.is_wrong).count();
         put!(
             out,
             "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{} %<td>{}<td>{}</tr>\n",

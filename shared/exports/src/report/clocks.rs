@@ -29,7 +29,7 @@ pub struct Page<'a> {
 /// One self-contained page.
 pub fn html(page: &Page<'_>) -> String {
     let mut out = begin("Parallax: clocks of cameras");
-    let doubts = page.outcome.doubts.iter().map(|it| it.text(page.names));
+    let doubts = page.outcome.doubts.iter().map(|doubt| doubt.text(page.names));
     let doubts: Vec<String> = doubts.collect();
     verdict(&mut out, ("determined", "not to be used"), &doubts);
     about_table(&mut out, page.about);
@@ -68,7 +68,10 @@ fn cameras(out: &mut Html, page: &Page<'_>) {
             number(1e3 * it.offset_s, 2),
             number(1e3 * it.error_s, 2),
             drift_error.map_or("-".to_owned(), |_| number(1e6 * it.drift, 1)),
-            drift_error.map_or("footage too short".to_owned(), |it| number(1e6 * it, 1)),
+            drift_error.map_or("footage too short".to_owned(), |drift_error| number(
+                1e6 * drift_error,
+                1
+            )),
             it.n,
             number(it.before_px, 2),
             number(it.after_px, 2)
@@ -78,7 +81,7 @@ fn cameras(out: &mut Html, page: &Page<'_>) {
 }
 
 fn pair_plot(out: &mut Html, names: &[&str], curve: &Curve, pair: &PairReport) {
-    let [a, b] = curve.cameras.map(|it| names.get(it).copied().unwrap_or("?"));
+    let [a, b] = curve.cameras.map(|camera| names.get(camera).copied().unwrap_or("?"));
     put!(
         out,
         "<h3>{} and {}</h3>\n<p><small>best {} ms, second best {} ms ({} % as good), all cameras together {} ms; {} samples\
@@ -100,7 +103,7 @@ fn pair_plot(out: &mut Html, names: &[&str], curve: &Curve, pair: &PairReport) {
         total[0],
         total[1]
     );
-    let known = curve.cost.iter().filter(|it| it.is_finite());
+    let known = curve.cost.iter().filter(|cost| cost.is_finite());
     let [low, high] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
         [low.min(*it), high.max(*it)]
     });

@@ -47,12 +47,12 @@ pub fn svg(panels: &[Panel<'_>], best: Option<usize>) -> String {
 
 /// One diagram.
 fn panel(Panel { what, lines }: &Panel<'_>, best: Option<usize>, top: f64) -> String {
-    let all = lines.iter().flat_map(|it| &it.values);
-    let all = all.filter(|it| it.is_finite());
+    let all = lines.iter().flat_map(|line| &line.values);
+    let all = all.filter(|value| value.is_finite());
     let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
         [low.min(*value), high.max(*value)]
     });
-    let n = lines.first().map_or(0, |it| it.values.len());
+    let n = lines.first().map_or(0, |line| line.values.len());
     let x = |at: usize| MARGIN + WIDTH * at as f64 / (n.max(2) - 1) as f64;
     let y = |value: f64| {
         let share = (value - low) / (high - low).max(1e-9);

@@ -202,7 +202,8 @@ mod tests {
                 let path = entry.unwrap().path();
                 if path.is_dir() {
                     folders.push(path);
-                } else if path != own && path.extension().is_some_and(|it| it == "rs") {
+                } else if path != own && path.extension().is_some_and(|extension| extension == "rs")
+                {
                     let text = std::fs::read_to_string(&path).unwrap();
                     for hatch in ["put_wrapped", "format_args!"] {
                         assert!(!text.contains(hatch), "{}: {hatch}", path.display());

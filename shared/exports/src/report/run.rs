@@ -127,7 +127,7 @@ pub fn html(page: &Page) -> String {
 
 fn verdict(out: &mut Html, page: &Page) {
     let n_limits = page.limits.len();
-    let n_missed = page.limits.iter().filter(|it| !it.held).count();
+    let n_missed = page.limits.iter().filter(|limit| !limit.held).count();
     let of_limits = || Verdict {
         text: match n_missed {
             0 => format!("All {n_limits} limits held"),
@@ -168,7 +168,7 @@ fn limits(out: &mut Html, limits: &[Limit]) {
 }
 
 fn space(out: &mut Html, page: &Page) {
-    let has_truth = page.space.moments.iter().any(|it| !it.truth.is_empty());
+    let has_truth = page.space.moments.iter().any(|moment| !moment.truth.is_empty());
     let hidden = Html::constant(if has_truth { "" } else { " hidden" });
     let grey = if has_truth { "; grey: where it is" } else { "" };
     put!(
@@ -197,7 +197,7 @@ fn tabulate(out: &mut Html, table: &Table) {
         put!(out, "<p class=\"note\">{}</p>\n", table.note);
     }
     put!(out, "<div class=\"scroll\"><table>\n");
-    if table.columns.iter().any(|it| !it.is_empty()) {
+    if table.columns.iter().any(|column| !column.is_empty()) {
         put!(out, "<tr>");
         for column in &table.columns {
             put!(out, "<th>{}", column);

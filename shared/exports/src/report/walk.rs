@@ -66,8 +66,8 @@ pub fn of_people(
             number(it.sd[0], 3),
             number(1e3 * it.sd[1], 1),
             focal,
-            it.halves.map_or("-".to_owned(), |it| number(it[0], 2)),
-            it.halves.map_or("-".to_owned(), |it| number(1e3 * it[1], 0)),
+            it.halves.map_or("-".to_owned(), |half| number(half[0], 2)),
+            it.halves.map_or("-".to_owned(), |half| number(1e3 * half[1], 0)),
             format!(
                 "{} \u{b1} {}",
                 number(1e3 * it.offset_s[0], 1),
@@ -99,7 +99,7 @@ fn judged(out: &mut Html, outcome: &people::Outcome, names: &[&str]) {
     } else {
         (UNUSABLE, &outcome.doubts)
     };
-    let reasons: Vec<String> = reasons.iter().map(|it| it.text(names)).collect();
+    let reasons: Vec<String> = reasons.iter().map(|reason| reason.text(names)).collect();
     verdict(out, ("determined", bad), &reasons);
 }
 
@@ -113,7 +113,7 @@ pub fn of_refinement(
     pictures: &[(String, Vec<u8>)],
 ) -> String {
     let mut out = begin("Parallax: a rig refined");
-    let mut doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
+    let mut doubts: Vec<String> = outcome.doubts.iter().map(|doubt| doubt.text(names)).collect();
     if doubts.is_empty() && !outcome.is_better {
         doubts.push(
             "the new rig is no better on what it was not fitted to: keep the one that is there"
@@ -185,7 +185,7 @@ fn coverage(out: &mut Html, outcome: &people::Outcome, names: &[&str]) {
         );
         let most = it.cells.iter().copied().max().unwrap_or(0).max(1) as f64;
         for (nth, n) in it.cells.iter().enumerate() {
-            let [column, row] = [nth % CELLS, nth / CELLS].map(|it| it as f64);
+            let [column, row] = [nth % CELLS, nth / CELLS].map(|value| value as f64);
             put!(
                 out,
                 "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"#3a86c8\" fill-opacity=\"{:.2}\" stroke=\"#808894\" \
@@ -228,14 +228,14 @@ fn in_space(
     });
     let up = up.unwrap_or(Vector3::z_axis());
     let space = Space {
-        joints: joints.iter().map(|it| it.name.to_owned()).collect(),
+        joints: joints.iter().map(|joint| joint.name.to_owned()).collect(),
         limbs: skeleton::PARSE14.limbs.to_vec(),
         eyes: cameras
             .iter()
-            .map(|it| {
-                let (at, axis) = (it.centre_in_world(), it.axis_in_world());
+            .map(|camera| {
+                let (at, axis) = (camera.centre_in_world(), camera.axis_in_world());
                 Eye {
-                    name: it.name.clone(),
+                    name: camera.name.clone(),
                     at: [at.x, at.y, at.z],
                     axis: [axis.x, axis.y, axis.z],
                 }

@@ -82,7 +82,7 @@ fn one_after_the_other_is_one_trial_with_both_identities() {
 
 #[test]
 fn frames_take_their_places_and_those_that_are_missing_are_gaps() {
-    let frames = [9, 3, 5, 13].map(|it| line(it, Some(60.0)));
+    let frames = [9, 3, 5, 13].map(|i| line(i, Some(60.0)));
     let trial = gathered(&frames, None).unwrap();
     assert_eq!((trial.first_frame, trial.frame_step), (3, 2));
     assert_eq!((trial.rate_hz, trial.slots.len()), (Some(30.0), 6));
@@ -109,7 +109,7 @@ fn refused_joints_and_numbers_that_are_none_are_gaps() {
     let trial = gathered(&[one, line(1, None)], None).unwrap();
     assert_eq!(trial.points(0).flatten().count(), 10);
     assert_eq!(trial.points(1).flatten().count(), 14);
-    let head = trial.names().position(|it| it == "head").unwrap();
+    let head = trial.names().position(|name| name == "head").unwrap();
     assert_eq!(trial.slots[0].points[head], Err(Gap("implausible".into())));
     assert_eq!(trial.rate_hz, None);
 }
@@ -118,7 +118,7 @@ fn refused_joints_and_numbers_that_are_none_are_gaps() {
 fn times_off_the_grid_and_frames_twice_are_counted() {
     let mut late = line(2, Some(30.0));
     late.time_s = Some(0.08);
-    let lines = [0, 1, 3, 3, 4].map(|it| line(it, Some(30.0)));
+    let lines = [0, 1, 3, 3, 4].map(|i| line(i, Some(30.0)));
     let trial = gathered(&[&lines[..], &[late]].concat(), None).unwrap();
     assert_eq!((trial.n_irregular, trial.n_repeated), (1, 1));
     assert_eq!(trial.rate_hz, Some(30.0));

@@ -60,9 +60,9 @@ fn pixels(it: &LevelLayout) -> f64 {
 
 /// Multiplications and additions of resizing and halving, in halves of a double value.
 fn shrinking(workload: &Workload) -> f64 {
-    let [width, height] = workload.layout.image_size.map(|it| it as f64);
+    let [width, height] = workload.layout.image_size.map(|image_size| image_size as f64);
     let level = |(at, it): (usize, &LevelLayout)| {
-        let [w, h] = it.image_size.map(|it| it as f64);
+        let [w, h] = it.image_size.map(|image_size| image_size as f64);
         let taps = if at < workload.model.spec().interval {
             let overlapped = |from: f64, to: f64| if from > to { from / to + 1.0 } else { 1.0 };
             h * width * overlapped(height, h) + h * w * overlapped(width, w)
@@ -81,7 +81,7 @@ fn describing(workload: &Workload) -> f64 {
     let cell = (workload.model.spec().cell_px as f64).powi(2);
     let per_cell = 27.0 * 4.0 * 3.0;
     let levels = workload.layout.levels.iter();
-    levels.map(|it| pixels(it) * (per_pixel + per_cell / cell)).sum()
+    levels.map(|level| pixels(level) * (per_pixel + per_cell / cell)).sum()
 }
 
 /// Multiply-adds of the filters in the cheapest known form: the definition, or tiles of some
@@ -95,9 +95,9 @@ fn products(workload: &Workload, tiles: &[usize]) -> f64 {
         tiled.fold((side * side) as f64, f64::min) * N_CHANNELS as f64
     };
     let filters = workload.model.spec().filters.iter();
-    let filters: f64 = filters.map(|it| per_cell(it.rows.max(it.cols))).sum();
+    let filters: f64 = filters.map(|filter| per_cell(filter.rows.max(filter.cols))).sum();
     let levels = workload.layout.levels.iter();
-    levels.map(|it| (it.rows * it.cols) as f64 * filters).sum()
+    levels.map(|level| (level.rows * level.cols) as f64 * filters).sum()
 }
 
 /// Candidates of both passes of every transform in the window outside of which none can win, and of

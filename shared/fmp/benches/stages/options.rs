@@ -36,7 +36,7 @@ impl Options {
                 "--isa" => options.isas.push(value()?),
                 "--threads" => {
                     let n = value()?.parse();
-                    options.threads.push(n.map_err(|it| format!("--threads: {it}"))?);
+                    options.threads.push(n.map_err(|error| format!("--threads: {error}"))?);
                 }
                 "--commit" => options.commit = value()?,
                 // What cargo adds of its own.
@@ -58,11 +58,11 @@ impl Options {
 
     pub(crate) fn wants_stage(&self, stage: Stage) -> bool {
         let name = stage.name();
-        self.stages.is_empty() || self.stages.iter().any(|it| name.starts_with(it.as_str()))
+        self.stages.is_empty() || self.stages.iter().any(|stage| name.starts_with(stage.as_str()))
     }
 
     pub(crate) fn wants_image(&self, name: &str) -> bool {
-        self.images.is_empty() || self.images.iter().any(|it| it == name)
+        self.images.is_empty() || self.images.iter().any(|image| image == name)
     }
 
     /// The portable one is slow where it lacks the multiply-add, so it must be asked for.

@@ -28,7 +28,7 @@ impl Readable {
         let shrink = clock.measure(|| images = reference::pyramid(model, layout, workload.image()));
         let mut features = Vec::new();
         let hog = clock.measure(|| {
-            let maps = images.iter().map(|it| reference::features(model, layout, it));
+            let maps = images.iter().map(|image| reference::features(model, layout, image));
             features = maps.collect();
         });
         let at = model.spec().interval.min(layout.levels.len() - 1);
@@ -38,7 +38,8 @@ impl Readable {
         let filters =
             clock.measure(|| responses = reference::responses(model, level, &features[at]));
         let messages = clock.measure(|| drop(black_box(reference::solve(model, &responses, size))));
-        let cells = |it: &fmp::LevelLayout| (it.rows * it.cols) as f64;
+        let cells =
+            |level_layout: &fmp::LevelLayout| (level_layout.rows * level_layout.cols) as f64;
         let share = layout.levels.iter().map(cells).sum::<f64>() / cells(level);
         Self {
             ms: StageTimes {
@@ -56,7 +57,7 @@ fn ranges(model: &Model, responses: &[Vec<f64>], size: [usize; 2]) -> Ranges {
     let parts = &model.spec().parts;
     let own = |part: &fmp::PartSpec| {
         let filters = part.filter_of_type.iter();
-        filters.map(|&it| responses[it].clone()).collect::<Vec<_>>()
+        filters.map(|&filter| responses[filter].clone()).collect::<Vec<_>>()
     };
     let mut scores: Vec<_> = parts.iter().map(own).collect();
     for part in (1..parts.len()).rev() {

@@ -128,7 +128,7 @@ impl<'a> Bench<'a> {
     }
 
     fn run_here(&self, clock: &Clock, options: &Options) -> Vec<(Stage, Times)> {
-        let wants = |stages: &[Stage]| stages.iter().any(|it| options.wants_stage(*it));
+        let wants = |stages: &[Stage]| stages.iter().any(|stage| options.wants_stage(*stage));
         let mut all = Vec::new();
         let layout = &self.workload.layout;
         let mut values = vec![0.0; layout.n_responses()];
@@ -206,12 +206,12 @@ impl<'a> Bench<'a> {
         let interval = model.spec().interval;
         let shape = HogShape {
             cell_px: model.spec().cell_px,
-            pad: layout.pad.map(|it| it + 1),
+            pad: layout.pad.map(|pad| pad + 1),
         };
         let n_threads = self.pool.as_ref().map_or(1, rayon::ThreadPool::current_num_threads);
         let arenas: Vec<_> = (0..n_threads).map(|_| Mutex::new(Arena::default())).collect();
-        let maps = layout.levels.iter().map(|it| it.padded[0] * it.padded[1]);
-        let maps = maps.map(|it| Mutex::new(vec![0.0; it * fmp::N_CHANNELS]));
+        let maps = layout.levels.iter().map(|level| level.padded[0] * level.padded[1]);
+        let maps = maps.map(|map| Mutex::new(vec![0.0; map * fmp::N_CHANNELS]));
         let maps: Vec<_> = maps.collect();
         let chain = |first: usize| {
             let mut arena = arenas[rayon::current_thread_index().unwrap_or(0)].lock().unwrap();

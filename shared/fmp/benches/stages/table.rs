@@ -49,8 +49,8 @@ impl Row {
         let image = workload.image_name();
         let peer = |name: &str| {
             let comparable = kind == Stage::Frame && workload.filter == 6;
-            let peer = PEERS.iter().find(|it| it.0 == image && it.1 == name);
-            peer.filter(|_| comparable).map(|it| it.2 / times.min)
+            let peer = PEERS.iter().find(|peer| peer.0 == image && peer.1 == name);
+            peer.filter(|_| comparable).map(|peer| peer.2 / times.min)
         };
         Self {
             filter: workload.filter,
@@ -71,14 +71,14 @@ impl Row {
     }
 
     pub(crate) fn compared(self, floors: &Floors, readable: &Readable) -> Self {
-        let floor_ms = floors.ms.of(self.kind).map(|it| it / self.threads as f64);
+        let floor_ms = floors.ms.of(self.kind).map(|value| value / self.threads as f64);
         // The reference has no terms of other views.
         let readable = readable.ms.of(self.kind);
         let readable = readable.filter(|_| self.min_ms > 0.0 && self.kind != Stage::Iteration);
         Self {
             floor_ms,
-            percent_of_floor: floor_ms.map(|it| 100.0 * it / self.min_ms),
-            times_readable: readable.map(|it| it / self.min_ms),
+            percent_of_floor: floor_ms.map(|floor_ms| 100.0 * floor_ms / self.min_ms),
+            times_readable: readable.map(|readable| readable / self.min_ms),
             ..self
         }
     }
@@ -122,7 +122,7 @@ impl Table {
     pub(crate) fn new(options: &Options) -> Self {
         let first = |path: &str, begin: &str| {
             let text = fs::read_to_string(path).unwrap_or_default();
-            let line = text.lines().find_map(|it| it.strip_prefix(begin));
+            let line = text.lines().find_map(|line| line.strip_prefix(begin));
             line.map_or_else(|| "unknown".to_owned(), str::to_owned)
         };
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -148,12 +148,12 @@ impl Table {
 
     /// The peak rates from which the floors were computed.
     pub(crate) fn foot(&self) -> String {
-        let peak = |it: &Peaks| {
+        let peak = |peaks: &Peaks| {
             let Peaks {
                 isa,
                 multiply_add,
                 max_plus,
-            } = it;
+            } = peaks;
             format!("{isa} {multiply_add:.0} and {max_plus:.0}")
         };
         let peaks: Vec<_> = self.peaks.iter().map(peak).collect();
@@ -180,7 +180,7 @@ impl Table {
             "# Stages of a frame\n\n`scripts/bench --record`; `scripts/bench --help` explains the columns.\n"
                 .to_owned()
         });
-        let rows = self.rows.iter().map(|it| format!("{it}\n"));
+        let rows = self.rows.iter().map(|row| format!("{row}\n"));
         let rows: String = rows.collect();
         text.extend(["\n## ", &self.head(), "\n", &rows, &self.foot(), "\n"]);
         fs::write(path, text).unwrap();

@@ -40,7 +40,8 @@ impl Workload {
         let model = model.unwrap_or_else(|| made_up_model(filter));
         let pixels = real(image).and_then(|path| image::open(path).ok());
         let pixels = pixels.map(image::DynamicImage::into_rgb8);
-        let pixels = pixels.filter(|it| [it.width(), it.height()] == size.map(|it| it as u32));
+        let pixels =
+            pixels.filter(|pixel| [pixel.width(), pixel.height()] == size.map(|size| size as u32));
         let pixels = pixels.map_or_else(|| made_up_pixels(size), image::RgbImage::into_raw);
         Self {
             filter,
@@ -84,7 +85,11 @@ fn made_up_model(side: usize) -> Model {
     let mut filter = || Filter {
         rows: side,
         cols: side,
-        weights: noise.by_ref().take(side * side * N_CHANNELS).map(|it| it * 0.03).collect(),
+        weights: noise
+            .by_ref()
+            .take(side * side * N_CHANNELS)
+            .map(|noise| noise * 0.03)
+            .collect(),
     };
     let spring = |part: usize| Spring {
         w: [0.012, 0.001, 0.014, -0.002],
@@ -131,9 +136,11 @@ pub(crate) struct OtherView {
 
 impl OtherView {
     pub(crate) fn new(layout: &Layout) -> Self {
-        let map = |it: &fmp::LevelLayout| {
-            let cells = 0..it.rows * it.cols;
-            cells.map(|at| 0.07 * ((at % it.cols) as f32 / it.cols as f32)).collect()
+        let map = |level_layout: &fmp::LevelLayout| {
+            let cells = 0..level_layout.rows * level_layout.cols;
+            cells
+                .map(|at| 0.07 * ((at % level_layout.cols) as f32 / level_layout.cols as f32))
+                .collect()
         };
         Self {
             maps: layout.levels.iter().map(map).collect(),

@@ -149,7 +149,7 @@ impl<'v, 'a> At<'v, 'a> {
 
     fn ids(&self) -> Result<Vec<usize>, MatError> {
         let values = self.numbers_up_to(MAX_IDS)?.values();
-        values.into_iter().map(|it| self.as_id(it)).collect()
+        values.into_iter().map(|value| self.as_id(value)).collect()
     }
 
     /// A table of indices, by rows.
@@ -228,20 +228,20 @@ fn released(value: &Value<'_>) -> Result<Released, MatError> {
 }
 
 fn biases(all: &Elements<'_, '_>) -> Result<Vec<f64>, MatError> {
-    (0..all.len()).map(|it| all.get(it, "w")?.scalar()).collect()
+    (0..all.len()).map(|i| all.get(i, "w")?.scalar()).collect()
 }
 
 fn filters(all: &Elements<'_, '_>) -> Result<Vec<Filter>, MatError> {
     (0..all.len())
-        .map(|it| {
-            let weights = all.get(it, "w")?;
+        .map(|k| {
+            let weights = all.get(k, "w")?;
             let numbers = weights.numbers()?;
             match *numbers.sizes() {
                 [rows, cols, N_CHANNELS] if rows.max(cols) <= Model::MAX_FILTER => {
                     Ok(filter_from_planes(rows, cols, &numbers.values()))
                 }
                 _ => {
-                    let side = |it: usize| numbers.sizes()[it].min(Model::MAX_FILTER);
+                    let side = |i: usize| numbers.sizes()[i].min(Model::MAX_FILTER);
                     Err(weights.size(vec![side(0), side(1), N_CHANNELS]))
                 }
             }
@@ -251,9 +251,9 @@ fn filters(all: &Elements<'_, '_>) -> Result<Vec<Filter>, MatError> {
 
 fn springs(all: &Elements<'_, '_>) -> Result<Vec<Spring>, MatError> {
     (0..all.len())
-        .map(|it| {
-            let w = all.get(it, "w")?.row()?;
-            let at = all.get(it, "anchor")?;
+        .map(|i| {
+            let w = all.get(i, "w")?.row()?;
+            let at = all.get(i, "anchor")?;
             let [x, y, octave] = at.row()?;
             for value in [x, y] {
                 if value.fract() != 0.0 || value.abs() > 1e6 {
@@ -265,7 +265,7 @@ fn springs(all: &Elements<'_, '_>) -> Result<Vec<Spring>, MatError> {
             }
             Ok(Spring {
                 w,
-                anchor: [x, y].map(|it| it as i32 - 1),
+                anchor: [x, y].map(|value| value as i32 - 1),
             })
         })
         .collect()
@@ -298,7 +298,7 @@ fn parts(model: &Elements<'_, '_>) -> Result<Vec<ReleasedPart>, MatError> {
             expected: vec![1, Model::MAX_PARTS],
         });
     }
-    (0..all.len()).map(|it| part(&all, it)).collect()
+    (0..all.len()).map(|i| part(&all, i)).collect()
 }
 
 fn part(all: &Elements<'_, '_>, it: usize) -> Result<ReleasedPart, MatError> {

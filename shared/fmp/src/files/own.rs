@@ -47,7 +47,8 @@ pub enum OwnError {
 ///
 /// [`OwnError::Encode`], for a model beyond the format's limit of 192 MiB.
 pub fn encode(model: &Model) -> Result<Vec<u8>, OwnError> {
-    let payload = payload::write(model.spec()).map_err(|it| OwnError::Encode(Box::new(it)))?;
+    let payload =
+        payload::write(model.spec()).map_err(|error| OwnError::Encode(Box::new(error)))?;
     Ok(ENVELOPE.seal(&payload))
 }
 
@@ -58,7 +59,8 @@ pub fn encode(model: &Model) -> Result<Vec<u8>, OwnError> {
 /// [`OwnError`]; truncated bytes and bytes with a changed one are always refused.
 pub fn decode(bytes: &[u8]) -> Result<ModelSpec, OwnError> {
     let payload = ENVELOPE.open(bytes)?;
-    let (spec, n_read) = payload::read(payload).map_err(|it| OwnError::Payload(Box::new(it)))?;
+    let (spec, n_read) =
+        payload::read(payload).map_err(|error| OwnError::Payload(Box::new(error)))?;
     match payload.len() - n_read {
         0 => Ok(spec),
         left => Err(OwnError::Left { left }),
@@ -94,8 +96,8 @@ mod tests {
             let model = Model::new(spec.clone()).unwrap();
             let read = decode(&encode(&model).unwrap()).unwrap();
             assert_eq!(read, spec);
-            let bits = |it: &ModelSpec| -> Vec<u64> {
-                it.filters[0].weights.iter().map(|it| it.to_bits()).collect()
+            let bits = |model_spec: &ModelSpec| -> Vec<u64> {
+                model_spec.filters[0].weights.iter().map(|weight| weight.to_bits()).collect()
             };
             assert_eq!(bits(&read), bits(&spec));
         }

@@ -132,7 +132,7 @@ impl From<&Edge> for EdgeRecord {
                 Springs::PerTypePair(rows) => SpringsRecord::PerTypePair(
                     rows.iter()
                         .map(|row| {
-                            row.iter().map(|it| it.as_ref().map(SpringRecord::from)).collect()
+                            row.iter().map(|row| row.as_ref().map(SpringRecord::from)).collect()
                         })
                         .collect(),
                 ),
@@ -152,7 +152,7 @@ impl From<EdgeRecord> for Edge {
                 }
                 SpringsRecord::PerTypePair(rows) => Springs::PerTypePair(
                     rows.into_iter()
-                        .map(|row| row.into_iter().map(|it| it.map(Spring::from)).collect())
+                        .map(|row| row.into_iter().map(|row| row.map(Spring::from)).collect())
                         .collect(),
                 ),
             },
@@ -194,9 +194,9 @@ impl From<FilterRecord> for Filter {
 
 /// Indices and sizes of a checked model are far below 2^32.
 fn narrow(indices: &[usize]) -> Vec<u32> {
-    indices.iter().map(|&it| it as u32).collect()
+    indices.iter().map(|&index| index as u32).collect()
 }
 
 fn widen(indices: Vec<u32>) -> Vec<usize> {
-    indices.into_iter().map(|it| it as usize).collect()
+    indices.into_iter().map(|index| index as usize).collect()
 }

@@ -85,7 +85,7 @@ fn spring(seed: usize) -> Spring {
 }
 
 fn filter(seed: usize) -> Filter {
-    let weight = |it: usize| ((seed * 1000 + it) as f64).sin();
+    let weight = |value: usize| ((seed * 1000 + value) as f64).sin();
     Filter {
         rows: 2,
         cols: 2,

@@ -56,7 +56,7 @@ impl Released {
                 .parts
                 .iter()
                 .zip(PARENT)
-                .all(|(part, parent)| part.parent == parent.map_or(0, |it| it + 1));
+                .all(|(part, parent)| part.parent == parent.map_or(0, |parent| parent + 1));
         let mut parts = Vec::with_capacity(self.parts.len());
         for (part_idx, part) in self.parts.iter().enumerate() {
             let filter_of_type = part

@@ -60,7 +60,7 @@ pub struct SpringRanges {
 /// Sums a model up.
 pub fn describe(model: &Model) -> ModelSummary {
     let spec = model.spec();
-    let edges: Vec<_> = spec.parts.iter().filter_map(|it| it.edge.as_ref()).collect();
+    let edges: Vec<_> = spec.parts.iter().filter_map(|part| part.edge.as_ref()).collect();
     let springs: Vec<&Spring> = edges
         .iter()
         .flat_map(|edge| match &edge.springs {
@@ -71,9 +71,10 @@ pub fn describe(model: &Model) -> ModelSummary {
     let biases: Vec<f64> = edges
         .iter()
         .flat_map(|edge| edge.bias.iter().flatten().copied())
-        .filter(|it| it.is_finite())
+        .filter(|value| value.is_finite())
         .collect();
-    let mut filter_sizes: Vec<_> = spec.filters.iter().map(|it| [it.rows, it.cols]).collect();
+    let mut filter_sizes: Vec<_> =
+        spec.filters.iter().map(|filter| [filter.rows, filter.cols]).collect();
     filter_sizes.sort_unstable();
     filter_sizes.dedup();
     ModelSummary {
@@ -83,7 +84,7 @@ pub fn describe(model: &Model) -> ModelSummary {
             .iter()
             .map(|part| PartSummary {
                 name: part.name.clone(),
-                parent: part.edge.as_ref().map(|it| it.parent),
+                parent: part.edge.as_ref().map(|edge| edge.parent),
                 n_types: part.filter_of_type.len(),
             })
             .collect(),
@@ -92,7 +93,7 @@ pub fn describe(model: &Model) -> ModelSummary {
         n_biases: biases.len(),
         bias_range: range(biases.iter().copied()),
         n_springs: springs.len(),
-        springs_per_pair: edges.iter().any(|it| matches!(it.springs, Springs::PerTypePair(_))),
+        springs_per_pair: edges.iter().any(|edge| matches!(edge.springs, Springs::PerTypePair(_))),
         springs: spring_ranges(&springs),
         root_bias: spec.root_bias,
         threshold: spec.threshold,

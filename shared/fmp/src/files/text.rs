@@ -39,7 +39,7 @@ pub fn parse(text: &str) -> Result<ModelSpec, TextError> {
     let interval = count(&mut it, "interval", 1, MAX_SETTING)?;
     let cell_px = count(&mut it, "sbin", 1, MAX_SETTING)?;
     let n_weights = n_biases
-        + filters.iter().map(|it| it.weights.len()).sum::<usize>()
+        + filters.iter().map(|filter| filter.weights.len()).sum::<usize>()
         + springs.len() * SPRING_WEIGHTS;
     let place = it.place();
     if it.skip("len") {
@@ -264,8 +264,8 @@ fn components(
 fn largest_filter(it: &mut Tokens<'_>, filters: &[Filter]) -> Result<(), TextError> {
     let place = it.place();
     let maxsize = ids(it, "maxsize", [1, 2, 1])?;
-    let rows = filters.iter().map(|it| it.rows).max().unwrap_or(0);
-    let cols = filters.iter().map(|it| it.cols).max().unwrap_or(0);
+    let rows = filters.iter().map(|filter| filter.rows).max().unwrap_or(0);
+    let cols = filters.iter().map(|filter| filter.cols).max().unwrap_or(0);
     agree(
         "maxsize",
         place,

@@ -92,7 +92,7 @@ fn check_edge(part_idx: usize, edge: &Edge, n_types: [usize; 2]) -> Result<(), M
     match &edge.springs {
         Springs::PerChildType(springs) => {
             size("springs", whose, springs.len(), n_own)?;
-            springs.iter().try_for_each(|it| check_spring(whose, it))
+            springs.iter().try_for_each(|spring| check_spring(whose, spring))
         }
         Springs::PerTypePair(springs) => {
             size("springs", whose, springs.len(), n_parent)?;
@@ -155,7 +155,7 @@ fn check_filter(whose: impl Fn() -> String + Copy, filter: &Filter) -> Result<()
     limit("width", whose, filter.cols, 1, Model::MAX_FILTER)?;
     let n_weights = filter.rows * filter.cols * N_CHANNELS;
     size("weights", whose, filter.weights.len(), n_weights)?;
-    filter.weights.iter().try_for_each(|&it| number("weight", whose, it))
+    filter.weights.iter().try_for_each(|&weight| number("weight", whose, weight))
 }
 
 /// Checks that `mirror` exchanges parts in pairs and leaves the tree as it is.
@@ -169,9 +169,9 @@ fn check_mirror(parts: &[PartSpec], mirror: &[usize]) -> Result<(), ModelError> 
     for (part_idx, &other) in mirror.iter().enumerate() {
         present(part_idx, "as its mirror part", other, parts.len())?;
     }
-    let parent_of = |it: usize| parts[it].edge.as_ref().map(|edge| edge.parent);
+    let parent_of = |i: usize| parts[i].edge.as_ref().map(|edge| edge.parent);
     for (part_idx, &other) in mirror.iter().enumerate() {
-        let mirrored_parent = parent_of(part_idx).map(|it| mirror[it]);
+        let mirrored_parent = parent_of(part_idx).map(|i| mirror[i]);
         if mirror[other] != part_idx || parent_of(other) != mirrored_parent {
             return Err(ModelError::Mirror {
                 part: part_idx + 1,

@@ -57,7 +57,7 @@ impl Solver {
     /// The maximum that springs and biases can add to a score.
     pub(super) fn most_of_edges(&self) -> f64 {
         let parts = self.model.spec().parts.iter();
-        let of_edge = parts.filter_map(|it| it.edge.as_ref()).map(|edge| {
+        let of_edge = parts.filter_map(|part| part.edge.as_ref()).map(|edge| {
             let most = |most: f64, spring: &Spring| {
                 let [xx, x, yy, y] = spring.w;
                 most.max(x * x / (4.0 * xx) + y * y / (4.0 * yy))

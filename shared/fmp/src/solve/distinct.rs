@@ -67,7 +67,7 @@ impl Solver {
                 let level = peaks[at].level;
                 let batch = &mut batches[usize::from(level)];
                 let next: Vec<_> =
-                    (at..peaks.len()).filter(|&it| peaks[it].level == level).take(*batch).collect();
+                    (at..peaks.len()).filter(|&i| peaks[i].level == level).take(*batch).collect();
                 *batch *= 2;
                 let found = self.sweep_levels(evidence, &[level], None, |sweep| {
                     let trees = next.iter().map(|&it| (it, sweep.backtrack(peaks[it])));

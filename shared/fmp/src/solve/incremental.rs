@@ -133,7 +133,7 @@ impl IncrementalSolver<'_> {
         guesses: impl IntoIterator<Item = &'b Pose>,
     ) {
         let (solver, evidence) = (self.solver, self.evidence);
-        let guesses = guesses.into_iter().filter(|it| evidence.covers(it));
+        let guesses = guesses.into_iter().filter(|guess| evidence.covers(guess));
         let (lowest, first) = guesses.fold((f32::NEG_INFINITY, None), |best, pose| {
             let score = solver.score(evidence, pose, Some(extra));
             if score > best.0 {
@@ -147,8 +147,8 @@ impl IncrementalSolver<'_> {
         self.order.clear();
         if let Some(bounds) = evidence.bounds().or(self.own_bounds.as_ref()) {
             let uppers = evidence.levels().iter();
-            let uppers = uppers.map(|&it| (bounds.upper(it, gain, lowest, n_parts), it));
-            self.order.extend(uppers.filter(|it| !it.0.is_below(lowest)));
+            let uppers = uppers.map(|&upper| (bounds.upper(upper, gain, lowest, n_parts), upper));
+            self.order.extend(uppers.filter(|upper| !upper.0.is_below(lowest)));
         }
         self.lowest = lowest;
         self.order.sort_unstable_by(|a, b| {

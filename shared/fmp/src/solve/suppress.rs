@@ -32,13 +32,13 @@ impl Solver {
         let roots = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
             let roots = sweep.roots();
             roots
-                .filter(|it| it.score >= threshold && it.score > f32::NEG_INFINITY)
+                .filter(|root| root.score >= threshold && root.score > f32::NEG_INFINITY)
                 .collect::<Vec<_>>()
         });
         let mut roots = roots.concat();
         roots.sort_by(Root::best_first);
         roots.truncate(max);
-        let mut levels: Vec<_> = roots.iter().map(|it| it.level).collect();
+        let mut levels: Vec<_> = roots.iter().map(|root| root.level).collect();
         levels.sort_unstable();
         levels.dedup();
         let poses = self.sweep_levels(evidence, &levels, None, |sweep| {

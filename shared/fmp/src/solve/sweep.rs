@@ -139,7 +139,7 @@ impl<'a> Problem<'a> {
     fn worst_term(&self, part: usize, slack: f64) -> Option<f32> {
         let extra = self.extra?;
         let types = 0..self.solver.model.n_types(part);
-        let types = types.map(|it| f64::from(extra.of_type(part, it)));
+        let types = types.map(|kind| f64::from(extra.of_type(part, kind)));
         let best_type = types.fold(f64::NEG_INFINITY, f64::max);
         let worst = f64::from(extra.max_gain(part)) - best_type - slack;
         let worst = (worst as f32).next_down();
@@ -216,7 +216,7 @@ impl<'a> Sweep<'a> {
     /// The score of the best root of the level.
     pub(super) fn highest(&self) -> f32 {
         let ranges = &self.workspace.ranges[self.solver.planes(0)];
-        let most = ranges.iter().map(|it| it.max + self.solver.root_bias());
+        let most = ranges.iter().map(|range| range.max + self.solver.root_bias());
         most.fold(f32::NEG_INFINITY, f32::max)
     }
 
@@ -238,7 +238,7 @@ impl<'a> Sweep<'a> {
         let n_types = self.solver.model.n_types(0);
         let cells = (0..self.grid.rows).flat_map(|y| (0..self.grid.cols).map(move |x| (y, x)));
         cells.map(move |(y, x)| {
-            let scores = (0..n_types).map(|it| planes[self.grid.at(it, y, x)] + bias);
+            let scores = (0..n_types).map(|i| planes[self.grid.at(i, y, x)] + bias);
             let first = (0, f32::NEG_INFINITY);
             let (mixture, score) =
                 scores.enumerate().fold(first, |best, it| if it.1 > best.1 { it } else { best });
@@ -319,7 +319,7 @@ impl Workspace {
             self.slack = problem.slack;
         }
         for (part, before) in self.keys.iter_mut().enumerate() {
-            let key = problem.extra.and_then(|it| it.key(part));
+            let key = problem.extra.and_then(|extra| extra.key(part));
             let same = std::mem::replace(before, key) == key && key.is_some();
             self.stays.push(same_level && same);
         }
@@ -349,7 +349,7 @@ impl Workspace {
             let own = OwnScores {
                 map: problem.responses(part, mixture),
                 term: has_term.then_some(&self.term),
-                constant: problem.extra.map(|it| it.of_type(part, mixture)),
+                constant: problem.extra.map(|extra| extra.of_type(part, mixture)),
             };
             let scores = &mut self.planes.scores_mut()[grid.len(plane)..grid.len(plane + 1)];
             self.ranges[plane] = own.write(solver.isa, grid, scores);
@@ -373,15 +373,15 @@ pub(super) fn score(problem: &Problem<'_>, pose: &Pose, scores: &mut Vec<f32>) -
         let term = problem.term_at(part, at);
         let score = term.map_or(response, |term| response + term);
         let extra = problem.extra;
-        extra.map_or(score, |it| score + it.of_type(part, mixture))
+        extra.map_or(score, |extra| score + extra.of_type(part, mixture))
     };
     scores.clear();
     scores.extend((0..model.n_parts()).map(own));
     for part in (1..model.n_parts()).rev() {
         let edge = model.spec().parts[part].edge.as_ref();
         if let (Some(edge), Some(rule)) = (edge, &solver.rules[part]) {
-            let [of_parent, of_child] = [edge.parent, part].map(|it| pose.parts[it]);
-            let cell = |it: Placement| [usize::from(it.y), usize::from(it.x)];
+            let [of_parent, of_child] = [edge.parent, part].map(|i| pose.parts[i]);
+            let cell = |placement: Placement| [usize::from(placement.y), usize::from(placement.x)];
             let types = [of_parent, of_child].map(|it| usize::from(it.mixture));
             let value = rule.value(scores[part], types, cell(of_parent), cell(of_child));
             scores[edge.parent] += value;

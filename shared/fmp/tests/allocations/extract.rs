@@ -41,7 +41,7 @@ fn of_frames(n_frames: usize) -> usize {
     let layout = Layout::new(&model, SIZE[0], SIZE[1]).unwrap();
     let extractor = Extractor::new(model);
     let frames: Vec<Vec<u8>> = (0..=n_frames)
-        .map(|seed| (0..3 * SIZE[0] * SIZE[1]).map(|it| (it * it % (211 + seed)) as u8).collect())
+        .map(|seed| (0..3 * SIZE[0] * SIZE[1]).map(|i| (i * i % (211 + seed)) as u8).collect())
         .collect();
     let mut values = vec![0.0; layout.n_responses()];
     let part = Rectangle {
@@ -55,7 +55,7 @@ fn of_frames(n_frames: usize) -> usize {
         extractor.responses_in(image, &layout, &part, &mut values);
     };
     respond(&frames[0]);
-    allocations(|| frames[1..].iter().for_each(|it| respond(it)))
+    allocations(|| frames[1..].iter().for_each(|frame| respond(frame)))
 }
 
 /// On one thread, and in a pool.

@@ -59,12 +59,12 @@ proptest! {
         let mut noise = Noise(seed);
         let model = tree(&mut noise, 6);
         let mut evidence = Evidence::new(&mut noise, &model, &SIZES);
-        evidence.values.iter_mut().for_each(|it| *it += offset);
+        evidence.values.iter_mut().for_each(|value| *value += offset);
         evidence.levels.truncate(n_levels);
         // Every level is a little worse than the one before it: some can be left out.
         for level in 0..SIZES.len() {
             let maps = evidence.layout.map_range(level, 0).start..evidence.layout.n_responses();
-            evidence.values[maps].iter_mut().for_each(|it| *it -= 0.25);
+            evidence.values[maps].iter_mut().for_each(|value| *value -= 0.25);
         }
         let mut other = Evidence::new(&mut noise, &model, &SIZES);
         other.levels.truncate(n_levels);
@@ -81,7 +81,7 @@ proptest! {
         let mut noise = Noise(seed);
         let model = tree(&mut noise, 6);
         let mut evidence = Evidence::new(&mut noise, &model, &SIZES);
-        evidence.values.iter_mut().for_each(|it| *it += offset);
+        evidence.values.iter_mut().for_each(|value| *value += offset);
         let solver = Solver::new(Arc::clone(&model));
         let (view, terms) = (evidence.view(), Everywhere(gain));
         let want = solver.best(&view, Some(&terms));
@@ -102,7 +102,7 @@ proptest! {
         let mut noise = Noise(seed);
         let model = tree(&mut noise, 6);
         let mut evidence = Evidence::new(&mut noise, &model, &SIZES);
-        evidence.values.iter_mut().for_each(|it| *it += offset);
+        evidence.values.iter_mut().for_each(|value| *value += offset);
         let solver = Solver::new(Arc::clone(&model));
         let (view, terms) = (evidence.view(), OnOnePart { part, term });
         let want = solver.best(&view, Some(&terms));
@@ -210,5 +210,5 @@ fn check(solver: &Solver, evidence: &Evidence, given: bool, times: &[(OtherViews
 
 /// A pose and the bits of its score.
 fn bits(pose: Option<&Pose>) -> Option<(u32, Pose)> {
-    pose.map(|it| (it.score.to_bits(), it.clone()))
+    pose.map(|pose| (pose.score.to_bits(), pose.clone()))
 }

@@ -39,7 +39,7 @@ fn model(noise: &mut Noise, cell_px: usize, interval: usize) -> Arc<Model> {
 
 /// A range of at least one of `n`, from two shares.
 fn cut(n: usize, shares: [f64; 2]) -> Range<usize> {
-    let at = shares.map(|it| (it * n as f64) as usize);
+    let at = shares.map(|share| (share * n as f64) as usize);
     at[0].min(at[1])..at[0].max(at[1]) + 1
 }
 
@@ -98,10 +98,10 @@ fn bounds(model: &Model, layout: &Layout, scope: &Scope) -> Vec<f64> {
     let filters = &model.spec().filters;
     let templates: Vec<_> = filters
         .iter()
-        .map(|it| Template {
-            rows: it.rows,
-            cols: it.cols,
-            weights: &it.weights,
+        .map(|filter| Template {
+            rows: filter.rows,
+            cols: filter.cols,
+            weights: &filter.weights,
         })
         .collect();
     let bank = FilterBank::new(Isa::best(), &templates);
@@ -242,14 +242,14 @@ proptest! {
         let mut incremental = solver.incremental(&part);
         let mut guess = solver.best(&evidence.view(), None);
         for round in 0..3 {
-            let seeds = (0..n_parts as u64).map(|it| seed ^ (it * round / 2)).collect();
+            let seeds = (0..n_parts as u64).map(|i| seed ^ (i * round / 2)).collect();
             let others = OtherViews { seeds, gain: 0.5, scale: 0.3, known: true };
             let want = solver.best(&evidence.view(), Some(&others));
             // A guess may lie where nothing has a value now.
             prop_assert_eq!(&incremental.best(&others, guess.as_ref()), &want);
-            guess = guess.map(|mut it| {
-                it.parts[0].x = 0;
-                it
+            guess = guess.map(|mut guess| {
+                guess.parts[0].x = 0;
+                guess
             });
         }
     }

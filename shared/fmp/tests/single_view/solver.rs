@@ -12,14 +12,16 @@ use crate::other_view::OtherView;
 fn all_poses(model: &Model, level: u16, [rows, cols]: [usize; 2]) -> Vec<Pose> {
     let mut all = vec![Vec::new()];
     for part in 0..model.n_parts() {
-        let placements = (0..rows * cols * model.n_types(part)).map(|it| Placement {
-            x: (it % cols) as u16,
-            y: (it / cols % rows) as u16,
-            mixture: (it / cols / rows) as u8,
+        let placements = (0..rows * cols * model.n_types(part)).map(|i| Placement {
+            x: (i % cols) as u16,
+            y: (i / cols % rows) as u16,
+            mixture: (i / cols / rows) as u8,
         });
         let extend = |parts: &Vec<Placement>| {
             let parts = parts.clone();
-            placements.clone().map(move |it| [parts.clone(), vec![it]].concat())
+            placements
+                .clone()
+                .map(move |placement| [parts.clone(), vec![placement]].concat())
         };
         all = all.iter().flat_map(extend).collect();
     }
@@ -192,15 +194,15 @@ proptest! {
         let solver = Solver::new(model);
         let roots = solver.root_scores(&evidence, 0, None);
         let neighbours = |y: usize, x: usize| {
-            let around = (0..rows * cols).map(|it| (it / cols, it % cols));
-            around.filter(move |it| it.0.abs_diff(y) <= 1 && it.1.abs_diff(x) <= 1 && *it != (y, x))
+            let around = (0..rows * cols).map(|i| (i / cols, i % cols));
+            around.filter(move |around| around.0.abs_diff(y) <= 1 && around.1.abs_diff(x) <= 1 && *around != (y, x))
         };
         let score = |(y, x): (usize, usize)| roots[y * cols + x];
         let mut found = solver.distinct(&evidence, usize::MAX, 0.0);
         found.sort_by_key(|it| (it.parts[0].y, it.parts[0].x));
         let found = found.iter().map(|it| (usize::from(it.parts[0].y), usize::from(it.parts[0].x)));
-        let peaks = (0..rows * cols).map(|it| (it / cols, it % cols)).filter(|&at| {
-            neighbours(at.0, at.1).all(|it| score(it) < score(at) || (score(it) == score(at) && it > at))
+        let peaks = (0..rows * cols).map(|i| (i / cols, i % cols)).filter(|&at| {
+            neighbours(at.0, at.1).all(|neighbour| score(neighbour) < score(at) || (score(neighbour) == score(at) && neighbour > at))
         });
         prop_assert_eq!(found.collect::<Vec<_>>(), peaks.collect::<Vec<_>>());
     }

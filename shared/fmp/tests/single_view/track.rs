@@ -57,7 +57,7 @@ impl Scene {
             frame,
             seconds: Some(frame as f64 / rate_hz),
         };
-        (0..10).filter(|it| scene.is_full(at(*it), Some(1.0))).collect()
+        (0..10).filter(|i| scene.is_full(at(*i), Some(1.0))).collect()
     }
 }
 
@@ -80,7 +80,7 @@ fn without_settings_every_frame_is_searched_in_full() {
 #[test]
 fn the_first_frame_and_then_every_so_many_are_searched_in_full() {
     let mut scene = Scene::new(Some(TRACK));
-    let full: Vec<u64> = (7..30).filter(|&it| scene.is_full(it, Some(1.0))).collect();
+    let full: Vec<u64> = (7..30).filter(|&i| scene.is_full(i, Some(1.0))).collect();
     assert_eq!(full, [7, 12, 17, 22, 27]);
 }
 
@@ -138,7 +138,7 @@ fn the_search_margin_grows_with_the_time_since_the_last_pose() {
 fn a_frame_after_a_gap_or_out_of_order_is_searched_in_full() {
     let mut scene = Scene::new(Some(TRACK));
     let frames = [0, 2, 5, 6, 6, 4, 5];
-    let full = frames.map(|it| scene.is_full(it, Some(1.0)));
+    let full = frames.map(|frame| scene.is_full(frame, Some(1.0)));
     assert_eq!(full, [true, false, true, false, true, true, false]);
 }
 

@@ -27,7 +27,7 @@ pub struct Tile<'a> {
 pub fn compose(tiles: &[Tile<'_>], n_columns: usize) -> Canvas {
     assert!(!tiles.is_empty() && n_columns > 0, "tiles in columns");
     let largest = |side: fn(Size) -> usize| {
-        let sides = tiles.iter().map(|it| side(it.picture.size()));
+        let sides = tiles.iter().map(|tile| side(tile.picture.size()));
         sides.max().unwrap_or(0)
     };
     let cell = Size::new(largest(|it| it.width), largest(|it| it.height) + CAPTION);

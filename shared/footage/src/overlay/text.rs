@@ -53,7 +53,7 @@ impl Canvas {
                 // The glyph has no pixel at a column or row below 0, which wraps to a large one.
                 let of_glyph = |at: f64| (at / times).floor() as i64 as usize;
                 let (column, row) = (of_glyph(x - left), of_glyph(y - top));
-                let pixel = glyph.and_then(|it| it.pixel(column, row));
+                let pixel = glyph.and_then(|glyph| glyph.pixel(column, row));
                 f64::from(pixel.unwrap_or(0)) / 255.0
             });
             left += advance;

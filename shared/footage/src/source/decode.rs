@@ -34,7 +34,7 @@ pub struct Depth {
 impl Depth {
     /// The depth of images whose largest value is this; none where all 16 bits are used, or nothing is in the images.
     pub(super) fn of(brightest: u16) -> Option<Self> {
-        let bits = [8, 10, 12, 14].into_iter().find(|it| brightest < 1 << it)?;
+        let bits = [8, 10, 12, 14].into_iter().find(|i| brightest < 1 << i)?;
         (brightest > 0).then_some(Self { brightest, bits })
     }
 
@@ -191,7 +191,7 @@ pub(crate) fn jpeg_is_whole(bytes: &[u8]) -> bool {
     let mut at = 2;
     while let Some(&[0xff, marker, high, low]) = bytes.get(at..at + 4) {
         if marker == START_OF_SCAN {
-            return bytes[at..].windows(2).any(|it| it == [0xff, 0xd9]);
+            return bytes[at..].windows(2).any(|pair| pair == [0xff, 0xd9]);
         }
         // Markers may be padded with any number of fill bytes.
         at += if marker == 0xff {
@@ -213,7 +213,7 @@ pub(super) fn is_jpeg_stream(bytes: &[u8]) -> bool {
     };
     // Within the data no byte of this value is followed by another than 0 or a mark of restart.
     let data = bytes.get(first.data..).unwrap_or_default();
-    let next = data.windows(3).position(|it| it == [0xff, 0xd8, 0xff]);
+    let next = data.windows(3).position(|window| window == [0xff, 0xd8, 0xff]);
     let second = next.and_then(|at| JpegHead::read(&data[at..]));
     !first.has_others && second.is_some_and(|it| it.sides == first.sides)
 }
@@ -304,7 +304,7 @@ mod tests {
         assert_eq!([0, 16_384, 65_535].map(bits), [None; 3]);
         let depth = Depth::of(4000).unwrap();
         assert_eq!(
-            [0, 2048, 4095, 9000].map(|it| depth.in_8_bits(it)),
+            [0, 2048, 4095, 9000].map(|i| depth.in_8_bits(i)),
             [0, 128, 255, 255]
         );
     }

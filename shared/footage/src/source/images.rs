@@ -32,7 +32,7 @@ pub(super) struct Images {
 impl Images {
     /// * `files`: all images, with the numbers of their frames.
     pub(super) fn open(files: Vec<Numbered>, spec: &SourceSpec) -> Result<Self, FootageError> {
-        let n_all = files.last().map_or(0, |it| it.frame + 1);
+        let n_all = files.last().map_or(0, |file| file.frame + 1);
         let n_frames = spec.n_delivered(n_all)?;
         let end = spec.start.saturating_add(n_frames.saturating_mul(spec.step));
         let depth = depth(&files)?;
@@ -40,9 +40,9 @@ impl Images {
             let is_within = (spec.start..end).contains(&frame);
             is_within && (frame - spec.start).is_multiple_of(spec.step)
         };
-        let any = files.first().map(|it| it.path.clone()).unwrap_or_default();
-        let files: Vec<Numbered> = files.into_iter().filter(|it| is_used(it.frame)).collect();
-        let first = files.first().map_or(any, |it| it.path.clone());
+        let any = files.first().map(|file| file.path.clone()).unwrap_or_default();
+        let files: Vec<Numbered> = files.into_iter().filter(|file| is_used(file.frame)).collect();
+        let first = files.first().map_or(any, |file| file.path.clone());
         let encoded = Encoded::read(&first)?;
         let rotation = spec.rotation;
         Ok(Self {
@@ -85,7 +85,7 @@ impl Images {
 
     /// Skips a frame without opening its image; whether there was such a frame.
     pub(super) fn skip_one(&mut self, frame: u64) -> bool {
-        if self.files.as_slice().first().is_some_and(|it| it.frame <= frame) {
+        if self.files.as_slice().first().is_some_and(|file| file.frame <= frame) {
             self.files.next();
         }
         frame < self.end

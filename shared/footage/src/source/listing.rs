@@ -209,14 +209,16 @@ pub(super) fn runs(mut text: &str) -> Vec<&str> {
 
 /// The leading run of digits, or the leading run of anything else, and the rest.
 fn split_run(text: &str) -> (&str, &str) {
-    let is_number = text.starts_with(|it: char| it.is_ascii_digit());
-    let end = text.find(|it: char| it.is_ascii_digit() != is_number).unwrap_or(text.len());
+    let is_number = text.starts_with(|letter: char| letter.is_ascii_digit());
+    let end = text
+        .find(|letter: char| letter.is_ascii_digit() != is_number)
+        .unwrap_or(text.len());
     text.split_at(end)
 }
 
 /// The digits without leading zeros, of any length; they compare by length and then by character.
 fn value_of(run: &str) -> Option<&str> {
-    run.starts_with(|it: char| it.is_ascii_digit())
+    run.starts_with(|letter: char| letter.is_ascii_digit())
         .then(|| run.trim_start_matches('0'))
 }
 
@@ -227,7 +229,7 @@ mod tests {
     fn sorted(names: &[&str]) -> Vec<String> {
         let mut paths: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
         sort_naturally(&mut paths);
-        let text = |it: &PathBuf| it.to_string_lossy().into_owned();
+        let text = |path: &PathBuf| path.to_string_lossy().into_owned();
         paths.iter().map(text).collect()
     }
 
@@ -257,7 +259,7 @@ mod tests {
 
     #[test]
     fn only_a_percent_sign_digits_and_d_are_a_numbered_pattern() {
-        let parse = |it| Numbered::parse(Path::new(it)).map(|it| (it.prefix, it.suffix));
+        let parse = |it| Numbered::parse(Path::new(it)).map(|value| (value.prefix, value.suffix));
         assert_eq!(parse("x/im%05d.png"), Some(("im", ".png")));
         assert_eq!(parse("im%d.png"), Some(("im", ".png")));
         assert_eq!(parse("100%.png"), None);

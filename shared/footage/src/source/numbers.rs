@@ -43,11 +43,11 @@ pub(super) fn frames(paths: Vec<PathBuf>, numbers: Option<PictureNumbers>) -> Ve
 fn numbers_of(paths: &[PathBuf]) -> Option<Vec<u64>> {
     let texts: Vec<String> = paths
         .iter()
-        .map(|it| it.with_extension("").to_string_lossy().into_owned())
+        .map(|path| path.with_extension("").to_string_lossy().into_owned())
         .collect();
-    let all: Vec<Vec<&str>> = texts.iter().map(|it| runs(it)).collect();
+    let all: Vec<Vec<&str>> = texts.iter().map(|text| runs(text)).collect();
     let first = all.first()?;
-    let is_number = |it: &str| it.starts_with(|it: char| it.is_ascii_digit());
+    let is_number = |text: &str| text.starts_with(|letter: char| letter.is_ascii_digit());
     let is_alike = |it: &Vec<&str>| {
         let mut pairs = it.iter().zip(first);
         it.len() == first.len() && pairs.all(|(a, b)| a == b || (is_number(a) && is_number(b)))
@@ -91,8 +91,9 @@ pub enum Counting {
 impl Counting {
     /// * `cameras`: the numbers of every camera, rising; none empty.
     pub fn of(cameras: &[Vec<u64>]) -> Self {
-        let firsts: Vec<u64> = cameras.iter().filter_map(|it| it.first().copied()).collect();
-        let lasts = cameras.iter().filter_map(|it| it.last().copied());
+        let firsts: Vec<u64> =
+            cameras.iter().filter_map(|camera| camera.first().copied()).collect();
+        let lasts = cameras.iter().filter_map(|camera| camera.last().copied());
         let lengths = cameras.iter().filter_map(|it| Some(it.last()? - it.first()?));
         let from = firsts.iter().copied().max().unwrap_or(0);
         let both = (lasts.min().unwrap_or(0) + 1).saturating_sub(from);
@@ -118,7 +119,7 @@ impl Counting {
 fn step_of(firsts: &[u64], cameras: &[Vec<u64>]) -> Option<u64> {
     const MOST_FRAMES: u64 = 3;
     let all = firsts.iter().zip(cameras);
-    let all = all.flat_map(|(first, it)| it.iter().map(move |it| it - first));
+    let all = all.flat_map(|(first, it)| it.iter().map(move |value| value - first));
     let all: BTreeSet<u64> = all.collect();
     let step = all.iter().fold(0, |gcd, it| common(gcd, *it)).max(1);
     let n_frames = all.last()? / step + 1;
@@ -135,7 +136,7 @@ mod tests {
     use super::*;
 
     fn numbers(names: &[&str]) -> Option<Vec<u64>> {
-        let paths: Vec<PathBuf> = names.iter().map(|it| PathBuf::from("c1").join(it)).collect();
+        let paths: Vec<PathBuf> = names.iter().map(|name| PathBuf::from("c1").join(name)).collect();
         numbers_of(&paths)
     }
 
@@ -164,12 +165,12 @@ mod tests {
         let paths = ["2.png", "3.png", "6.png"].map(PathBuf::from).to_vec();
         let at = |first, step| -> Vec<u64> {
             let numbers = Some(PictureNumbers { first, step });
-            frames(paths.clone(), numbers).iter().map(|it| it.frame).collect()
+            frames(paths.clone(), numbers).iter().map(|frame| frame.frame).collect()
         };
         assert_eq!(at(0, 1), [2, 3, 6]);
         assert_eq!(at(3, 1), [0, 3]);
         assert_eq!(at(2, 2), [0, 2]);
-        let in_order: Vec<u64> = frames(paths, None).iter().map(|it| it.frame).collect();
+        let in_order: Vec<u64> = frames(paths, None).iter().map(|frame| frame.frame).collect();
         assert_eq!(in_order, [0, 1, 2]);
     }
 
@@ -177,10 +178,11 @@ mod tests {
     fn cameras_count_by_common_numbers_or_by_their_own() {
         let range = |range: core::ops::Range<u64>| range.collect::<Vec<u64>>();
         let common = |first, step| Counting::Common(PictureNumbers { first, step });
-        let gap: Vec<u64> = (0..14).filter(|it| !(3..6).contains(it)).collect();
+        let gap: Vec<u64> = (0..14).filter(|i| !(3..6).contains(i)).collect();
         assert_eq!(Counting::of(&[range(0..14), gap]), common(0, 1));
         assert_eq!(Counting::of(&[range(0..14), range(3..14)]), common(0, 1));
-        let fifth = |range: core::ops::Range<u64>| range.map(|it| 5 * it).collect::<Vec<u64>>();
+        let fifth =
+            |range: core::ops::Range<u64>| range.map(|range| 5 * range).collect::<Vec<u64>>();
         assert_eq!(Counting::of(&[fifth(2..20), fifth(2..19)]), common(10, 5));
         assert_eq!(Counting::of(&[range(7..8), range(7..8)]), common(7, 1));
         let own = |first| PictureNumbers { first, step: 1 };

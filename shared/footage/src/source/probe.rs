@@ -52,7 +52,7 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
     let wanted = ["-show_program_version", "-show_entries", ENTRIES];
     let output = run_ffprobe(path, spec, "v", &wanted)?;
     let stream = film(&output);
-    let has_clock = |it: &Value| number(&it["start_time"]).is_some();
+    let has_clock = |value: &Value| number(&value["start_time"]).is_some();
     let is_bare = number(&output["format"]["duration"]).is_none() && !has_clock(stream);
     let mut is_made_up = false;
     if is_bare {
@@ -78,12 +78,12 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
         tag: tag(stream),
         rate_hz: clock_hz.filter(|_| !is_made_up),
         clock_hz,
-        n_frames: number(&stream["nb_frames"]).map_or(0, |it| it as u64),
+        n_frames: number(&stream["nb_frames"]).map_or(0, |value| value as u64),
         n_promised: 0,
         times_s: None,
         origin_s: origin(stream, &output["format"], codec),
         is_inter: !INTRA.contains(&codec),
-        is_interlaced: ["tt", "bb", "tb", "bt"].iter().any(|it| stream["field_order"] == *it),
+        is_interlaced: ["tt", "bb", "tb", "bt"].iter().any(|name| stream["field_order"] == *name),
         has_fps_mode: is_5_1(output["program_version"]["version"].as_str().unwrap_or("")),
     };
     let is_regular = probe.n_frames > 0 && clock_hz == fraction(&stream["r_frame_rate"]);
@@ -116,25 +116,25 @@ fn film(output: &Value) -> &Value {
     let streams = output["streams"].as_array().map_or(&[][..], Vec::as_slice);
     let rank = |stream: &Value| {
         let marks = ["attached_pic", "timed_thumbnails", "still_image"];
-        let is_marked = marks.iter().any(|it| stream["disposition"][it] == 1);
+        let is_marked = marks.iter().any(|mark| stream["disposition"][mark] == 1);
         let is_single = stream["nb_frames"] == "1";
         let codec = stream["codec_name"].as_str().unwrap_or_default();
         let is_of_covers = INTRA[..4].contains(&codec);
-        let sides = ["width", "height"].map(|it| stream[it].as_u64().unwrap_or(0));
+        let sides = ["width", "height"].map(|name| stream[name].as_u64().unwrap_or(0));
         (!is_marked, !is_single, !is_of_covers, sides[0] * sides[1])
     };
     // The first of equal ones.
-    let best = streams.iter().rev().max_by_key(|it| rank(it));
+    let best = streams.iter().rev().max_by_key(|stream| rank(stream));
     best.unwrap_or(&Value::Null)
 }
 
 /// What the display matrix of a stream asks.
 fn tag(stream: &Value) -> Turn {
     let data = stream["side_data_list"].as_array().map_or(&[][..], Vec::as_slice);
-    let text = data.iter().find_map(|it| it["displaymatrix"].as_str());
+    let text = data.iter().find_map(|value| value["displaymatrix"].as_str());
     // "00000000:  0  65536  0", a row a line.
-    let rows = text.unwrap_or_default().lines().filter_map(|it| {
-        let mut numbers = it.split_once(':')?.1.split_whitespace().map(str::parse::<f64>);
+    let rows = text.unwrap_or_default().lines().filter_map(|line| {
+        let mut numbers = line.split_once(':')?.1.split_whitespace().map(str::parse::<f64>);
         Some([numbers.next()?.ok()?, numbers.next()?.ok()?])
     });
     match rows.collect::<Vec<_>>()[..] {
@@ -148,7 +148,7 @@ fn tag(stream: &Value) -> Turn {
 /// Where frames are not decoded in their order, some containers have the times of decoding alone, which the decoder shifts.
 fn origin(stream: &Value, format: &Value, codec: &str) -> Option<f64> {
     let has_order = INTRA.contains(&codec) || stream["has_b_frames"] == 0;
-    let starts = [stream, format].map(|it| number(&it["start_time"]));
+    let starts = [stream, format].map(|value| number(&value["start_time"]));
     match starts {
         [Some(own), Some(all)] if has_order => Some(own - all),
         [None, None] if codec == "mjpeg" => Some(0.0),
@@ -160,10 +160,10 @@ impl Probe {
     /// Whether fewer frames are shown than are stored, by the duration of what is shown: MP4 and its relatives have edit lists.
     fn is_trimmed(&self, stream: &Value, format: &Value) -> bool {
         let names = format["format_name"].as_str().unwrap_or_default();
-        let has_edits = names.split(',').any(|it| it == "mov" || it == "mp4");
+        let has_edits = names.split(',').any(|part| part == "mov" || part == "mp4");
         let seconds = number(&stream["duration"]).filter(|_| has_edits);
         let shown = self.clock_hz.zip(seconds).map(|(rate_hz, seconds)| rate_hz * seconds);
-        shown.is_some_and(|it| it < self.n_frames as f64 - 0.6)
+        shown.is_some_and(|shown| shown < self.n_frames as f64 - 0.6)
     }
 
     /// Determines the number and the times of the frames from the packets of the stream.
@@ -171,7 +171,7 @@ impl Probe {
         // Packets in front of the first frame that is shown, and behind the last one, are marked `D`, to be discarded.
         let is_discarded =
             |packet: &Value| packet["flags"].as_str().is_some_and(|flags| flags.contains('D'));
-        let shown: Vec<&Value> = packets.iter().filter(|it| !is_discarded(it)).collect();
+        let shown: Vec<&Value> = packets.iter().filter(|packet| !is_discarded(packet)).collect();
         let mut times_s: Vec<f64> =
             shown.iter().filter_map(|packet| number(&packet["pts_time"])).collect();
         times_s.sort_by(f64::total_cmp);
@@ -210,11 +210,11 @@ impl Probe {
             return Some((time_s * rate_hz).round() as u64);
         }
         let times = self.listed_s()?;
-        let above = times.partition_point(|it| *it < time_s);
+        let above = times.partition_point(|time| *time < time_s);
         let nearest = [above.saturating_sub(1), above.min(times.len() - 1)];
-        let distance = |it: &usize| (times[*it] - time_s).abs();
+        let distance = |i: &usize| (times[*i] - time_s).abs();
         let nearest = nearest.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.map(|it| it as u64)
+        nearest.map(|nearest| nearest as u64)
     }
 
     /// Whether all frames are equally spaced, to a quarter of a frame, because some containers round times to
@@ -222,7 +222,7 @@ impl Probe {
     fn is_regular(&self, times_s: &[f64]) -> bool {
         self.clock_hz.is_some_and(|rate_hz| {
             let late = |(k, time_s): (usize, &f64)| (time_s * rate_hz - k as f64).abs();
-            times_s.iter().enumerate().map(late).all(|it| it < 0.25)
+            times_s.iter().enumerate().map(late).all(|value| value < 0.25)
         })
     }
 }
@@ -240,15 +240,18 @@ pub(super) fn key_frames(
     let wanted = ["-show_entries", "packet=pts_time,flags"];
     let packets = run_ffprobe(path, spec, &probe.stream.to_string(), &wanted)?;
     let packets = packets["packets"].as_array().map_or(&[][..], Vec::as_slice);
-    let flags = |it: &Value| it["flags"].as_str().unwrap_or_default().to_owned();
+    let flags = |value: &Value| value["flags"].as_str().unwrap_or_default().to_owned();
     let mut shown: Vec<(f64, String)> = packets
         .iter()
-        .map(|it| (number(&it["pts_time"]).unwrap_or(0.0), flags(it)))
+        .map(|packet| (number(&packet["pts_time"]).unwrap_or(0.0), flags(packet)))
         .filter(|it| !it.1.contains('D'))
         .collect();
     shown.sort_by(|a, b| a.0.total_cmp(&b.0));
     let numbered = (0..).zip(shown);
-    Ok(numbered.filter(|it| it.1.1.contains('K')).map(|it| it.0).collect())
+    Ok(numbered
+        .filter(|numbered| numbered.1.1.contains('K'))
+        .map(|numbered| numbered.0)
+        .collect())
 }
 
 pub(super) fn number(value: &Value) -> Option<f64> {
@@ -268,7 +271,7 @@ pub(crate) fn fraction(value: &Value) -> Option<f64> {
 pub(crate) fn is_5_1(version: &str) -> bool {
     let mut numbers = version
         .trim_start_matches('n')
-        .split(|it: char| !it.is_ascii_digit())
+        .split(|letter: char| !letter.is_ascii_digit())
         .map(str::parse::<u32>);
     match (numbers.next(), numbers.next()) {
         (Some(Ok(major)), Some(Ok(minor))) => (major, minor) >= (5, 1),

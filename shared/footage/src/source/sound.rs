@@ -40,7 +40,7 @@ pub fn read_sound(spec: &SourceSpec, rate_hz: u32) -> Result<Option<RecordedSoun
     }
     let film = probe(&path, spec)?.stream.to_string();
     let of_pictures = run_ffprobe(&path, spec, &film, &wanted)?;
-    let start_s = |it: &Value| number(&it["start_time"]).unwrap_or(0.0);
+    let start_s = |value: &Value| number(&value["start_time"]).unwrap_or(0.0);
     let first_frame_s = start_s(&of_pictures["streams"][0]);
     Ok(Some(RecordedSound {
         // Silence is put before a sound that begins later than the file.
@@ -73,7 +73,7 @@ fn samples(path: &Path, spec: &SourceSpec, rate_hz: u32) -> Result<Vec<i16>, Foo
         });
     }
     let (samples, _) = output.stdout.as_chunks::<2>();
-    Ok(samples.iter().map(|it| i16::from_le_bytes(*it)).collect())
+    Ok(samples.iter().map(|sample| i16::from_le_bytes(*sample)).collect())
 }
 
 #[cfg(test)]
@@ -114,7 +114,7 @@ mod tests {
             }
             let spec = SourceSpec::new(path.to_str().unwrap());
             let sound = read_sound(&spec, 8000).unwrap().unwrap();
-            let loud = sound.samples.iter().position(|it| it.unsigned_abs() > 500);
+            let loud = sound.samples.iter().position(|sample| sample.unsigned_abs() > 500);
             let from_s = sound.begins_s + loud.unwrap() as f64 / 8000.0;
             assert!((from_s - 0.5).abs() < 0.03, "{name}: {from_s} s");
         }

@@ -112,13 +112,13 @@ impl Video {
         }
         loop {
             // Times are told of all frames, pixels of those that are chosen.
-            let time_s = self.log.next_time().map(|it| it.time_s);
-            let Some(told) = time_s.and_then(|it| self.probe.frame_at(it)) else {
+            let time_s = self.log.next_time().map(|next_time| next_time.time_s);
+            let Some(told) = time_s.and_then(|time_s| self.probe.frame_at(time_s)) else {
                 self.last_index = due;
                 return Ok(true);
             };
             let first = if self.is_listed() { 0 } else { self.spec.start };
-            let next = self.last_told.map_or(first, |it| it + 1);
+            let next = self.last_told.map_or(first, |last_told| last_told + 1);
             let is_whole = self.is_whole(told.max(next), next)?;
             self.last_told = Some(told.max(next));
             if self.is_listed() || self.is_chosen(told) {
@@ -385,8 +385,8 @@ mod tests {
         );
         assert!(frame_choice(&probe(Some(vec![])), &SourceSpec::new("x")).is_empty());
         let arguments = outputs(&probe(None), &spec);
-        let counts = arguments.windows(2).filter(|it| it[0] == "-frames:v");
-        let counts: Vec<&str> = counts.map(|it| it[1].as_str()).collect();
+        let counts = arguments.windows(2).filter(|pair| pair[0] == "-frames:v");
+        let counts: Vec<&str> = counts.map(|count| count[1].as_str()).collect();
         assert_eq!(
             counts,
             ["4", "31"],

@@ -66,7 +66,7 @@ impl Sampled {
         let phases = (0..n_phases).flat_map(|y| (0..n_phases).map(move |x| [x, y]));
         let kernels = phases
             .flat_map(|phase| {
-                let fraction = phase.map(|it: i32| f64::from(it) / f64::from(n_phases));
+                let fraction = phase.map(|phase: i32| f64::from(phase) / f64::from(n_phases));
                 footprint.kernel(&offsets, fraction)
             })
             .collect();
@@ -74,7 +74,7 @@ impl Sampled {
             source: sizes[0],
             output: sizes[1],
             fill,
-            map: source_from_output.map(|row| row.map(|it| (it * one).round() as i64)),
+            map: source_from_output.map(|row| row.map(|row| (row * one).round() as i64)),
             footprint,
             phase_bits,
             kernels,
@@ -208,14 +208,14 @@ impl Axis {
 /// Adds up the pixels of a block, halving it as long as whole pixels stay together.
 #[inline(always)]
 fn by_channel(sums: &Sums) -> [i32; 3] {
-    let halves: [i32; BLOCK / 2] = std::array::from_fn(|it| sums[it] + sums[it + BLOCK / 2]);
-    let quarters: [i32; BLOCK / 4] = std::array::from_fn(|it| halves[it] + halves[it + BLOCK / 4]);
-    std::array::from_fn(|it| quarters[it] + quarters[it + 3])
+    let halves: [i32; BLOCK / 2] = std::array::from_fn(|i| sums[i] + sums[i + BLOCK / 2]);
+    let quarters: [i32; BLOCK / 4] = std::array::from_fn(|i| halves[i] + halves[i + BLOCK / 4]);
+    std::array::from_fn(|i| quarters[i] + quarters[i + 3])
 }
 
 #[inline(always)]
 fn rounded(total: [i32; 3]) -> [u8; 3] {
-    total.map(|it| ((it + (1 << (WEIGHT_BITS - 1))) >> WEIGHT_BITS) as u8)
+    total.map(|total| ((total + (1 << (WEIGHT_BITS - 1))) >> WEIGHT_BITS) as u8)
 }
 
 /// 1/32 source pixel, but not finer than 1/128 output pixel: large kernels need fewer phases.
@@ -245,9 +245,9 @@ impl Footprint {
     /// All pixels that samples at `offsets` touch, from phases up to `last_fraction` of a pixel.
     fn of(offsets: &[[f64; 2]], last_fraction: f64) -> Self {
         let range = |axis: usize| {
-            let values = || offsets.iter().map(move |it| it[axis]);
-            let first = values().map(|it| it.floor() as i64).min().unwrap_or(0);
-            let last = values().map(|it| (last_fraction + it).floor() as i64 + 1);
+            let values = || offsets.iter().map(move |offset| offset[axis]);
+            let first = values().map(|value| value.floor() as i64).min().unwrap_or(0);
+            let last = values().map(|value| (last_fraction + value).floor() as i64 + 1);
             (first, (last.max().unwrap_or(1) - first + 1) as usize)
         };
         let ((left, n_columns), (top, n_rows)) = (range(0), range(1));
@@ -288,7 +288,7 @@ impl Footprint {
 
 /// Rounds weights so that their sum stays `1 << WEIGHT_BITS`: the largest one takes the rounding error.
 fn integers(weights: &[f64]) -> Vec<i16> {
-    let mut rounded: Vec<i16> = weights.iter().map(|it| it.round() as i16).collect();
+    let mut rounded: Vec<i16> = weights.iter().map(|weight| weight.round() as i16).collect();
     let sum: i32 = rounded.iter().copied().map(i32::from).sum();
     if let Some(largest) = rounded.iter_mut().max() {
         *largest += ((1 << WEIGHT_BITS) - sum) as i16;

@@ -43,14 +43,14 @@ impl Header {
             let told = [
                 parameters.number("POINT", "LONG_FRAMES"),
                 parameters.number("POINT", "FRAMES"),
-                end.map(|it| it - start.unwrap_or(1.0) + 1.0),
+                end.map(|end| end - start.unwrap_or(1.0) + 1.0),
             ];
-            let is_more = |it: &f64| *it > n_frames as f64 && *it < 1e9;
+            let is_more = |value: &f64| *value > n_frames as f64 && *value < 1e9;
             let more = told.into_iter().flatten().find(is_more);
-            n_frames = more.map_or(n_frames, |it| it as usize);
+            n_frames = more.map_or(n_frames, |more| more as usize);
         }
         let rate = f64::from(bytes.f32(20, WHAT)?);
-        let is_rate = |it: &f64| it.is_finite() && *it > 0.0;
+        let is_rate = |value: &f64| value.is_finite() && *value > 0.0;
         let rates = [Some(rate), parameters.number("POINT", "RATE")];
         Ok(Self {
             n_points: usize::from(word(2)?),
@@ -94,7 +94,7 @@ impl Header {
             let place = [x, y, z].map(|word| f64::from(whole(word)) * f64::from(self.scale));
             (place, f32::from(whole(w)))
         };
-        let is_seen = residual >= 0.0 && place.iter().all(|it| it.is_finite());
+        let is_seen = residual >= 0.0 && place.iter().all(|value| value.is_finite());
         is_seen.then_some(place)
     }
 }

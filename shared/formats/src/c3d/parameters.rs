@@ -157,6 +157,7 @@ impl<'a> Parameters<'a> {
 
 /// Latin-1 text, without surrounding blanks.
 fn text(bytes: &[u8]) -> String {
-    let all: String = bytes.iter().map(|&it| char::from(it)).collect();
-    all.trim_matches(|it: char| it == '\0' || it.is_whitespace()).to_owned()
+    let all: String = bytes.iter().map(|&byte| char::from(byte)).collect();
+    all.trim_matches(|letter: char| letter == '\0' || letter.is_whitespace())
+        .to_owned()
 }

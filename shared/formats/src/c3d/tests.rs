@@ -56,7 +56,7 @@ fn a_point_is_found_with_and_without_the_name_of_its_subject() {
 fn more_than_255_names_are_read_from_several_parameters() {
     let n = 600;
     let trial = Trial {
-        labels: (0..n).map(|it| format!("P{it}")).collect(),
+        labels: (0..n).map(|i| format!("P{i}")).collect(),
         frames: vec![vec![Some([1.0; 3]); n]],
         ..trial()
     };
@@ -147,8 +147,8 @@ proptest! {
         points in prop::collection::vec(prop::option::of(prop::array::uniform3(-3000..3000_i32)), 12),
         n_analog in 0..5_u16,
     ) {
-        let point = |it: &Option<[i32; 3]>| it.map(|it| it.map(|it| f64::from(it) * 0.25));
-        let frames = points.chunks(3).map(|it| it.iter().map(point).collect()).collect();
+        let point = |it: &Option<[i32; 3]>| it.map(|it| it.map(|value| f64::from(value) * 0.25));
+        let frames = points.chunks(3).map(|chunk| chunk.iter().map(point).collect()).collect();
         let trial = Trial { frames, n_analog, ..trial() };
         for processor in PROCESSORS {
             for scale in [Some(0.25), None] {

@@ -112,12 +112,12 @@ fn refused(why: &str) -> io::Error {
 
 /// The four reals of a point; the fourth holds cameras and residual.
 fn numbers(point: Option<&Marker>, step: f64) -> [u8; 16] {
-    let values = point.map_or([0.0, 0.0, 0.0, -1.0], |it| {
-        let [x, y, z] = it.position.map(|value| value as f32);
-        let steps = (it.residual / step).round().clamp(0.0, MAX_RESIDUAL);
+    let values = point.map_or([0.0, 0.0, 0.0, -1.0], |point| {
+        let [x, y, z] = point.position.map(|value| value as f32);
+        let steps = (point.residual / step).round().clamp(0.0, MAX_RESIDUAL);
         // Of a residual that is not a number, nothing is known.
         let steps = if steps.is_nan() { 0.0 } else { steps };
-        let cameras = f32::from(it.cameras & 0x7f);
+        let cameras = f32::from(point.cameras & 0x7f);
         [x, y, z, cameras * 256.0 + steps as f32]
     });
     let mut bytes = [0; 16];
@@ -211,11 +211,11 @@ impl Section {
     /// `NAME`, then `NAME2` and so on: one parameter holds 255 texts at most.
     fn texts(&mut self, name: &str, values: &[String]) {
         for (nth, values) in values.chunks(MAX_TEXTS).enumerate() {
-            let texts: Vec<Vec<u8>> = values.iter().map(|it| latin(it)).collect();
+            let texts: Vec<Vec<u8>> = values.iter().map(|value| latin(value)).collect();
             let width = texts.iter().map(Vec::len).max().unwrap_or(0);
-            let padded = texts.iter().flat_map(|it| {
-                let blanks = core::iter::repeat_n(b' ', width - it.len());
-                it.iter().copied().chain(blanks)
+            let padded = texts.iter().flat_map(|text| {
+                let blanks = core::iter::repeat_n(b' ', width - text.len());
+                text.iter().copied().chain(blanks)
             });
             let name = match nth {
                 0 => name.to_owned(),
@@ -229,7 +229,7 @@ impl Section {
 
 /// Latin-1, which is what readers expect at most.
 fn latin(text: &str) -> Vec<u8> {
-    let bytes = text.chars().map(|it| u8::try_from(it).unwrap_or(b'?'));
+    let bytes = text.chars().map(|c| u8::try_from(c).unwrap_or(b'?'));
     bytes.take(MAX_TEXT).collect()
 }
 

@@ -136,7 +136,7 @@ mod tests {
             ..KIND
         };
         let older = Envelope { version: 2, ..KIND };
-        let refused = |it: Envelope| KIND.open(&it.seal(b"x")).unwrap_err().to_string();
+        let refused = |envelope: Envelope| KIND.open(&envelope.seal(b"x")).unwrap_err().to_string();
         assert_eq!(refused(other), "the file does not begin with `PLXTRIAL`");
         assert_eq!(
             refused(older),

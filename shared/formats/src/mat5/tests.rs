@@ -32,7 +32,7 @@ fn numbers_of_every_storage_are_read() {
 
 #[test]
 fn an_array_of_three_dimensions_keeps_its_sizes_and_order() {
-    let values: Vec<f64> = (0..24).map(|it| f64::from(it) - 0.5).collect();
+    let values: Vec<f64> = (0..24).map(|i| f64::from(i) - 0.5).collect();
     let array = testkit::mat::Mat::Numbers(vec![4, 2, 3], values.clone());
     for compressed in [false, true] {
         let file = testkit::mat::file("ptsAll", &array, compressed);

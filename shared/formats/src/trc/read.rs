@@ -64,8 +64,8 @@ impl Trc {
         let keys = cells(2, "the names of the header fields")?;
         let values = cells(3, "the values of the header fields")?;
         let field = |name: &str, expected: &'static str| {
-            let at = keys.iter().position(|it| *it == name);
-            let value = at.and_then(|it| values.get(it)).copied();
+            let at = keys.iter().position(|key| *key == name);
+            let value = at.and_then(|at| values.get(at)).copied();
             value.ok_or(TrcError::Header { line: 3, expected })
         };
         let rate = field("DataRate", "a DataRate")?;
@@ -76,7 +76,7 @@ impl Trc {
         let markers: Vec<String> = cells(4, "the names of the markers")?
             .into_iter()
             .skip(2)
-            .filter(|it| !it.is_empty())
+            .filter(|cell| !cell.is_empty())
             .map(str::to_owned)
             .collect();
         let frames = lines
@@ -96,13 +96,13 @@ impl Trc {
 
     /// Index of a marker.
     pub fn marker(&self, name: &str) -> Option<usize> {
-        self.markers.iter().position(|it| it == name)
+        self.markers.iter().position(|marker| marker == name)
     }
 }
 
 fn row(text: &str, line: usize, markers: usize) -> Result<Vec<Option<[f64; 3]>>, TrcError> {
     let mut cells: Vec<&str> = text.split('\t').map(str::trim).collect();
-    while cells.len() > 2 + 3 * markers && cells.last().is_some_and(|it| it.is_empty()) {
+    while cells.len() > 2 + 3 * markers && cells.last().is_some_and(|cell| cell.is_empty()) {
         cells.pop();
     }
     if cells.len() != 2 + 3 * markers {
@@ -125,7 +125,7 @@ fn row(text: &str, line: usize, markers: usize) -> Result<Vec<Option<[f64; 3]>>,
         .map(|marker| {
             let at = 2 + 3 * marker;
             let point = [number(at)?, number(at + 1)?, number(at + 2)?];
-            Ok(point.iter().all(|it| it.is_finite()).then_some(point))
+            Ok(point.iter().all(|value| value.is_finite()).then_some(point))
         })
         .collect()
 }

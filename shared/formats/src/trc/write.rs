@@ -36,7 +36,7 @@ impl fmt::Display for Heading<'_> {
         let (rate, n_rows, n) = (self.rate_hz, self.n_rows, self.markers.len());
         let (name, units) = (self.file_name, self.units);
         let markers = self.markers.join("\t\t\t");
-        let axes: Vec<String> = (1..=n).map(|it| format!("X{it}\tY{it}\tZ{it}")).collect();
+        let axes: Vec<String> = (1..=n).map(|i| format!("X{i}\tY{i}\tZ{i}")).collect();
         let axes = axes.join("\t");
         write!(
             out,
@@ -87,7 +87,7 @@ mod tests {
             let text = row(7, 0.1, points);
             let cells: Vec<&str> = text.trim_end_matches('\n').split('\t').collect();
             assert_eq!(cells.len(), 2 + 3 * 3);
-            assert!(cells.iter().all(|it| !it.is_empty()), "{text:?}");
+            assert!(cells.iter().all(|cell| !cell.is_empty()), "{text:?}");
             assert_eq!(cells[8..], ["NaN"; 3]);
         }
     }

@@ -81,7 +81,7 @@ impl Cameras {
         assert_eq!(cameras.len(), free.len(), "one a camera");
         let (mut numbers, mut first) = (Vec::new(), vec![0]);
         for (nth, (camera, free)) in cameras.iter().zip(free).enumerate() {
-            numbers.extend(free_numbers(camera, *free).map(|it| (nth, it)));
+            numbers.extend(free_numbers(camera, *free).map(|free_number| (nth, free_number)));
             first.push(numbers.len());
         }
         Self {
@@ -133,7 +133,7 @@ impl Cameras {
     /// The parameter of a camera's focal length; none where it is held.
     pub fn focal_parameter(&self, camera: usize) -> Option<usize> {
         let own = self.first[camera]..self.first[camera + 1];
-        own.into_iter().find(|it| self.numbers[*it].1 == Number::Focal)
+        own.into_iter().find(|i| self.numbers[*i].1 == Number::Focal)
     }
 
     /// The parameters of a camera.
@@ -182,7 +182,7 @@ impl Cameras {
         let mut cameras = self.cameras.clone();
         for (nth, camera) in cameras.iter_mut().enumerate() {
             let own = self.parameters(nth);
-            let each = own.map(|it| (self.numbers[it].1, step[it]));
+            let each = own.map(|i| (self.numbers[i].1, step[i]));
             move_camera(camera, each);
         }
         Self {
@@ -209,7 +209,7 @@ fn free_numbers(camera: &Camera, free: Free) -> impl Iterator<Item = Number> {
         numbers.extend((0..2).map(Number::Principal));
     }
     let n_coefficients = camera.intrinsics.lens.model().coefficients().count();
-    let coefficients = (0..n_coefficients.min(8)).filter(|it| free.lens[*it]);
+    let coefficients = (0..n_coefficients.min(8)).filter(|i| free.lens[*i]);
     numbers.extend(coefficients.map(Number::Lens));
     numbers.into_iter()
 }

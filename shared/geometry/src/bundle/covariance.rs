@@ -40,7 +40,7 @@ pub enum Undetermined {
 }
 
 fn listed(directions: &[Vec<String>]) -> String {
-    let each = directions.iter().map(|it| it.join(" with "));
+    let each = directions.iter().map(|direction| direction.join(" with "));
     each.collect::<Vec<_>>().join("; nor ")
 }
 
@@ -75,18 +75,18 @@ pub fn clustered<P: Problem>(
     problem: &P,
     cluster_of: &[usize],
 ) -> Result<Option<Covariance>, Undetermined> {
-    let n_clusters = cluster_of.iter().max().map_or(0, |it| it + 1);
+    let n_clusters = cluster_of.iter().max().map_or(0, |value| value + 1);
     let mut clusters = Vec::new();
     let mut weights = [0.0; 2];
     for cluster in 0..n_clusters {
         let equations = Equations::of(problem, |it| cluster_of.get(it) == Some(&cluster));
-        weights = [0, 1].map(|it| weights[it] + equations.weights[it]);
+        weights = [0, 1].map(|i| weights[i] + equations.weights[i]);
         clusters.push(equations.reduced(0.0).ok_or(Undetermined::NotFinite)?);
     }
     let steepness = weights[1] / weights[0];
     let known = Equations::known(problem);
     let known = known.reduced(0.0).ok_or(Undetermined::NotFinite)?.matrix;
-    let of_clusters = clusters.iter().map(|it| &it.matrix * steepness);
+    let of_clusters = clusters.iter().map(|cluster| &cluster.matrix * steepness);
     let information = of_clusters.fold(known.clone(), |sum, it| sum + it);
     let inverse = inverse(problem, &information)?;
     let mut matrix = &inverse * known * &inverse;
@@ -102,7 +102,7 @@ pub fn clustered<P: Problem>(
         let step = factor.solve(&it.gradient);
         matrix += (m - 1.0) / m * &step * step.transpose();
     }
-    let is_finite = matrix.iter().all(|it| it.is_finite());
+    let is_finite = matrix.iter().all(|value| value.is_finite());
     Ok(is_finite.then_some(Covariance { matrix }))
 }
 
@@ -111,7 +111,7 @@ fn inverse<P: Problem>(
     problem: &P,
     information: &DMatrix<f64>,
 ) -> Result<DMatrix<f64>, Undetermined> {
-    if information.iter().any(|it| !it.is_finite()) {
+    if information.iter().any(|value| !value.is_finite()) {
         return Err(Undetermined::NotFinite);
     }
     let n = information.nrows();
@@ -123,14 +123,14 @@ fn inverse<P: Problem>(
     let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] / (sizes[i] * sizes[j]));
     let eigen = SymmetricEigen::new(scaled);
     let limit = LEAST_EIGENVALUE * eigen.eigenvalues.amax();
-    let lost = (0..n).filter(|it| eigen.eigenvalues[*it] <= limit);
+    let lost = (0..n).filter(|i| eigen.eigenvalues[*i] <= limit);
     let directions: Vec<Vec<String>> = lost
-        .map(|it| names(problem, &eigen.eigenvectors.column(it).into_owned()))
+        .map(|lost| names(problem, &eigen.eigenvectors.column(lost).into_owned()))
         .collect();
     if !directions.is_empty() {
         return Err(Undetermined::Directions { directions });
     }
-    let inverse = eigen.eigenvalues.map(|it| 1.0 / it);
+    let inverse = eigen.eigenvalues.map(|eigenvalue| 1.0 / eigenvalue);
     let vectors = &eigen.eigenvectors;
     let scaled = vectors * DMatrix::from_diagonal(&inverse) * vectors.transpose();
     Ok(DMatrix::from_fn(n, n, |i, j| {
@@ -141,12 +141,12 @@ fn inverse<P: Problem>(
 /// What the terms tell of the shared parameters, all local blocks being unknown: the inverse of the covariance.
 fn information<P: Problem>(problem: &P) -> Option<DMatrix<f64>> {
     let reduced = Equations::new(problem).reduced(0.0)?;
-    let is_finite = reduced.matrix.iter().all(|it| it.is_finite());
+    let is_finite = reduced.matrix.iter().all(|value| value.is_finite());
     is_finite.then_some(reduced.matrix)
 }
 
 fn names<P: Problem>(problem: &P, direction: &DVector<f64>) -> Vec<String> {
     let least = NAMED * direction.amax();
-    let moving = (0..direction.len()).filter(|it| direction[*it].abs() >= least);
-    moving.map(|it| problem.name(it)).collect()
+    let moving = (0..direction.len()).filter(|i| direction[*i].abs() >= least);
+    moving.map(|moving| problem.name(moving)).collect()
 }

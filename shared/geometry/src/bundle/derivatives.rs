@@ -43,7 +43,7 @@ pub fn derivative_error<P: Problem>(problem: &P, step: f64) -> f64 {
 /// The sum of the columns of one unknown.
 fn sum(columns: &mut dyn Iterator<Item = (usize, &[f64])>, wanted: usize, rows: usize) -> Vec<f64> {
     let mut sum = vec![0.0; rows];
-    for (_, column) in columns.filter(|it| it.0 == wanted) {
+    for (_, column) in columns.filter(|column| column.0 == wanted) {
         for (sum, it) in sum.iter_mut().zip(column) {
             *sum += it;
         }
@@ -59,8 +59,8 @@ fn compared<P: Problem>(
     of: &dyn Fn(&Term) -> Vec<f64>,
 ) -> f64 {
     let back = Step {
-        shared: by.shared.iter().map(|it| -it).collect(),
-        locals: by.locals.iter().map(|it| it.iter().map(|it| -it).collect()).collect(),
+        shared: by.shared.iter().map(|shared| -shared).collect(),
+        locals: by.locals.iter().map(|local| local.iter().map(|it| -it).collect()).collect(),
     };
     let analytic = terms(problem, local, of);
     let forwards = terms(&problem.moved(by), local, &|it| it.residuals().to_vec());

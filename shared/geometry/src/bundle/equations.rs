@@ -201,7 +201,7 @@ impl Equations {
         let locals: Vec<Vec<f64>> = each.map(of_block).collect();
         let shared: Vec<f64> = shared.iter().copied().collect();
         let mut all = shared.iter().chain(locals.iter().flatten());
-        all.all(|it| it.is_finite()).then_some(Step { shared, locals })
+        all.all(|value| value.is_finite()).then_some(Step { shared, locals })
     }
 
     /// By how much the quadratic says that a step lowers the cost.
@@ -210,7 +210,7 @@ impl Equations {
         let mut gain = -2.0 * self.gradient.dot(&shared) - shared.dot(&(&self.shared * &shared));
         for (block, local) in self.blocks.iter().zip(&step.locals) {
             let local = DVector::from_column_slice(local);
-            let known = block.shared.iter().map(|it| step.shared[*it]);
+            let known = block.shared.iter().map(|shared| step.shared[*shared]);
             let known = DVector::from_iterator(block.shared.len(), known);
             gain -= 2.0 * block.gradient.dot(&local)
                 + local.dot(&(&block.own * &local))

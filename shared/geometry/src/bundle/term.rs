@@ -104,7 +104,7 @@ impl Term {
 
     /// The squared length of the residuals.
     pub fn square(&self) -> f64 {
-        self.residuals.iter().map(|it| it * it).sum()
+        self.residuals.iter().map(|residual| residual * residual).sum()
     }
 
     /// The cost, and the weight, by the loss and by what the term counts as.

@@ -58,11 +58,11 @@ struct Cloud {
 
 impl Cloud {
     fn new(n_cameras: usize, n_points: usize, lens: LensModel, free: Free) -> Self {
-        let cameras: Vec<Camera> = (0..n_cameras).map(|it| camera(it, n_cameras, lens)).collect();
+        let cameras: Vec<Camera> = (0..n_cameras).map(|i| camera(i, n_cameras, lens)).collect();
         let mut random = fastrand_like(7);
         let mut point = || Point3::new(2.0 * random() - 1.0, 2.0 * random() - 1.0, 2.0 * random());
         let points: Vec<Point3<f64>> = (0..n_points).map(|_| point()).collect();
-        let of = |it: &Point3<f64>| cameras.iter().map(|camera| camera.project(it)).collect();
+        let of = |point: &Point3<f64>| cameras.iter().map(|camera| camera.project(point)).collect();
         let seen = points.iter().map(of).collect();
         let mut each = vec![free; n_cameras];
         each[0].pose = false;
@@ -80,8 +80,8 @@ impl Cloud {
         let mut random = fastrand_like(3);
         let mut by = |size: f64| size * (random() - 0.5);
         let shared = (0..self.n_shared())
-            .map(|it| {
-                let name = self.name(it);
+            .map(|i| {
+                let name = self.name(i);
                 let size = if name.contains("focal") || name.contains("principal") {
                     20.0
                 } else if name.contains("lens") {
@@ -137,7 +137,7 @@ impl Problem for Cloud {
 
     fn priors(&self, take: &mut dyn FnMut(&Term)) {
         let Some(wanted) = self.baseline else { return };
-        let [a, b] = [0, 1].map(|it| self.cameras.cameras()[it].centre_in_world());
+        let [a, b] = [0, 1].map(|i| self.cameras.cameras()[i].centre_in_world());
         let way = b - a;
         let mut term = Term::default();
         let truth = (camera(1, self.cameras.cameras().len(), BROWN).centre_in_world()
@@ -208,8 +208,8 @@ fn what_is_far_off_hardly_moves_a_robust_answer() {
             *it += Vector2::new(60.0, -40.0);
         }
     }
-    let worst = |it: &Cloud| {
-        let each = it.cameras.cameras().iter().zip(truth.cameras.cameras());
+    let worst = |cloud: &Cloud| {
+        let each = cloud.cameras.cameras().iter().zip(truth.cameras.cameras());
         each.map(|(a, b)| (a.centre_in_world() - b.centre_in_world()).norm())
             .fold(0.0, f64::max)
     };
@@ -248,7 +248,7 @@ fn clusters_tell_how_answers_spread_where_errors_have_much_in_common() {
     const N_CLUSTERS: usize = 10;
     let mut truth = Cloud::new(3, 60, LensModel::Pinhole, Free::POSE);
     truth.loss = Loss::Square;
-    let cluster_of: Vec<usize> = (0..60).map(|it| it * N_CLUSTERS / 60).collect();
+    let cluster_of: Vec<usize> = (0..60).map(|i| i * N_CLUSTERS / 60).collect();
     let place = truth.cameras.pose_parameters(2).unwrap()[4];
     let mut random = fastrand_like(11);
     let mut normal = || (0..12).map(|_| random()).sum::<f64>() - 6.0;
@@ -261,7 +261,7 @@ fn clusters_tell_how_answers_spread_where_errors_have_much_in_common() {
             for (camera, it) in seen.iter_mut().enumerate() {
                 let own = 0.8 * Vector2::new(normal(), normal());
                 let common = common[3 * cluster_of[nth] + camera];
-                *it = it.map(|it| it + own + common);
+                *it = it.map(|value| value + own + common);
             }
         }
         let (found, _) = solve(noisy, &Settings::default());

@@ -27,9 +27,9 @@ pub fn check(rig: &Rig) -> Vec<Finding> {
         }
     }
     findings.extend(one_place(cameras).or_else(|| nothing_shared(cameras)));
-    findings.extend(rig.left_out().iter().map(|it| Finding::LeftOut {
-        camera: it.camera.clone(),
-        why: it.why,
+    findings.extend(rig.left_out().iter().map(|left_out| Finding::LeftOut {
+        camera: left_out.camera.clone(),
+        why: left_out.why,
     }));
     if rig.up_in_world().is_none() {
         findings.push(Finding::UpUnknown);

@@ -115,8 +115,8 @@ pub(super) fn heights(rig: &Rig) -> Heights {
 
 /// The most cameras that share enough of the space that two cameras share; 0 if there is none.
 fn n_sharing(places: &[Place], n_cameras: usize, bound: Bound) -> usize {
-    let n_of: Vec<usize> = places.iter().map(|it| it.n_seen(bound)).collect();
-    let shared_by = |n: usize| n_of.iter().filter(|it| **it >= n).count();
+    let n_of: Vec<usize> = places.iter().map(|place| place.n_seen(bound)).collect();
+    let shared_by = |n: usize| n_of.iter().filter(|value| **value >= n).count();
     let enough = (MIN_SPACE_SHARE * shared_by(2) as f64).max(1.0);
     let mut sharing = (2..=n_cameras).rev();
     let found = sharing.find(|n| shared_by(*n) as f64 >= enough);
@@ -126,7 +126,7 @@ fn n_sharing(places: &[Place], n_cameras: usize, bound: Bound) -> usize {
 /// The median height in a camera, over the places that it shares with as many others as it can.
 fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) -> Option<f64> {
     let of = |n: usize, bound: Bound| {
-        let shared = places.iter().filter(|it| it.n_seen(bound) >= n);
+        let shared = places.iter().filter(|place| place.n_seen(bound) >= n);
         let seen = shared.filter_map(|it| it.seen_by(camera, bound));
         let px: Vec<f64> = seen.map(|it| it.px).collect();
         Sorted::new(px).upper_median()
@@ -134,7 +134,7 @@ fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) ->
     let fewer = (2..=n_sharing).rev();
     let found = fewer.clone().find_map(|n| of(n, bound));
     // For a camera that is aimed elsewhere than the others.
-    found.or_else(|| BOUNDS.iter().find_map(|it| fewer.clone().find_map(|n| of(n, *it))))
+    found.or_else(|| BOUNDS.iter().find_map(|bound| fewer.clone().find_map(|n| of(n, *bound))))
 }
 
 /// Places on the rays of all cameras that at least two of them see.
@@ -144,9 +144,9 @@ fn places(rig: &Rig, is_whole: bool) -> Vec<Place> {
     let viewpoints: Vec<Viewpoint<'_>> = rig.cameras().iter().map(viewpoint).collect();
     let points = viewpoints.iter().flat_map(Viewpoint::points);
     let place = |point: Point3<f64>| Place {
-        seen: viewpoints.iter().map(|it| it.person(&point)).collect(),
+        seen: viewpoints.iter().map(|viewpoint| viewpoint.person(&point)).collect(),
     };
-    let is_shared = |it: &Place| it.seen.iter().flatten().count() >= 2;
+    let is_shared = |place: &Place| place.seen.iter().flatten().count() >= 2;
     points.map(place).filter(is_shared).collect()
 }
 
@@ -181,8 +181,8 @@ impl<'a> Viewpoint<'a> {
     ) -> Self {
         let intrinsics = &camera.intrinsics;
         let [width, height] = intrinsics.size.map(f64::from);
-        let up_in_camera = up.map(|it| camera.camera_from_world.rotation * it.into_inner());
-        let across = up_in_camera.map_or(0.0, |it| it.xy().norm());
+        let up_in_camera = up.map(|up| camera.camera_from_world.rotation * up.into_inner());
+        let across = up_in_camera.map_or(0.0, |up_in_camera| up_in_camera.xy().norm());
         // Projection from above, or with nobody to say what is up, a person may lie any way in the picture.
         let side = match up_in_camera.filter(|_| across > 0.3) {
             Some(up) => (width * across / up.x.abs()).min(height * across / up.y.abs()),
@@ -198,7 +198,7 @@ impl<'a> Viewpoint<'a> {
             },
             is_whole,
             focus_depth: focus
-                .map(|it| (camera.camera_from_world * it).z)
+                .map(|focus| (camera.camera_from_world * focus).z)
                 .filter(|depth| *depth > 0.0),
             focal: (intrinsics.fx * intrinsics.fy).sqrt(),
             side,
@@ -242,7 +242,7 @@ impl<'a> Viewpoint<'a> {
         };
         let px = px.max(MIN_FORESHORTENING * from_side);
         let share = px / self.side;
-        let ratio = self.focus_depth.map_or(f64::INFINITY, |it| depth / it);
+        let ratio = self.focus_depth.map_or(f64::INFINITY, |focus_depth| depth / focus_depth);
         (px.is_finite() && share <= self.max_share).then_some(Projection {
             px,
             share,
@@ -265,7 +265,7 @@ impl<'a> Viewpoint<'a> {
             let [head, feet] = [self.inside(&ends[0])?, self.inside(&ends[1])?];
             return Some((head - feet).norm());
         }
-        let [head, feet] = ends.map(|it| self.camera.project(&it));
+        let [head, feet] = ends.map(|end| self.camera.project(&end));
         let px = head.zip(feet).map(|(head, feet)| (head - feet).norm());
         Some(px.unwrap_or(otherwise))
     }

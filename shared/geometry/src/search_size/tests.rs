@@ -97,10 +97,10 @@ fn a_ring_has_one_scale_with_an_up_direction_or_without() {
 #[test]
 fn cameras_that_are_held_on_their_sides_give_the_same() {
     let upright = ring(4, [1920, 1080], 1400.0, 4.0, 1.0);
-    let rolled = upright.iter().map(|it| Camera {
+    let rolled = upright.iter().map(|upright| Camera {
         camera_from_world: Isometry3::rotation(Vector3::z() * core::f64::consts::FRAC_PI_2)
-            * it.camera_from_world,
-        ..it.clone()
+            * upright.camera_from_world,
+        ..upright.clone()
     });
     let rolled = rig(rolled.collect());
     assert_eq!(
@@ -161,7 +161,7 @@ fn cameras_of_different_sizes_have_scales_of_their_own() {
     let rig = rig(cameras);
     let got = search_sizes(&rig);
     assert_eq!(
-        got.cameras.iter().map(|it| it.scale).collect::<Vec<_>>(),
+        got.cameras.iter().map(|camera| camera.scale).collect::<Vec<_>>(),
         [1.0 / 3.0, 0.75, 1.0 / 3.0, 1.0 / 3.0]
     );
     for px in in_the_middle(&rig) {
@@ -215,7 +215,7 @@ fn people_far_from_large_cameras_are_smaller_than_is_good_and_that_is_known() {
     }
     // A small picture costs little, and is not enlarged.
     let got = search_sizes(&rig(ring(4, [640, 480], 350.0, 5.0, 2.0)));
-    assert!(got.cameras.iter().all(|it| it.scale == 1.0 && !it.is_limited()));
+    assert!(got.cameras.iter().all(|camera| camera.scale == 1.0 && !camera.is_limited()));
 }
 
 #[test]

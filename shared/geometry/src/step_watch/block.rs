@@ -105,7 +105,8 @@ impl Block {
     pub(super) fn add(&mut self, views: &[Option<Seen>]) {
         let mut is_used = false;
         for pair in &mut self.pairs {
-            let [Some(a), Some(b)] = pair.views.map(|it| views.get(it).and_then(Option::as_ref))
+            let [Some(a), Some(b)] =
+                pair.views.map(|view| views.get(view).and_then(Option::as_ref))
             else {
                 continue;
             };
@@ -126,9 +127,9 @@ impl Block {
     pub(super) fn estimates(&self) -> Option<Vec<Option<Estimate>>> {
         let slopes = self.pairs.iter().filter_map(|it| Some((it.views, it.slope()?)));
         let slopes: Vec<([usize; 2], Slope)> = slopes.collect();
-        let linked = linked(self.n_views, slopes.iter().map(|it| it.0))?;
+        let linked = linked(self.n_views, slopes.iter().map(|slope| slope.0))?;
         // Every pair says the difference of its two offsets. What no pair says is kept at 0.
-        let all: f64 = slopes.iter().map(|it| it.1.weight).sum();
+        let all: f64 = slopes.iter().map(|slope| slope.1.weight).sum();
         let mut normal = DMatrix::identity(self.n_views, self.n_views) * (1e-9 * all);
         let mut right = DVector::zeros(self.n_views);
         for ([a, b], slope) in &slopes {
@@ -195,7 +196,7 @@ impl Pair {
         let both = both.enumerate();
         let samples = both.filter_map(|(nth, (a, b))| sample(nth, &essential, (*a)?, (*b)?));
         let mut samples: Vec<Sample> = samples.collect();
-        samples.retain(|it| it.miss.abs() <= MOST_MISS * side);
+        samples.retain(|sample| sample.miss.abs() <= MOST_MISS * side);
         if samples.len() < MIN_POINTS {
             return false;
         }
@@ -224,7 +225,7 @@ impl Pair {
     fn slope(&self) -> Option<Slope> {
         let mut rest = self.all;
         let mut n_points = 0.0;
-        for it in self.points.iter().filter(|it| it.n > 0.0) {
+        for it in self.points.iter().filter(|point| point.n > 0.0) {
             let [a, b] = it.along;
             rest.squares -= it.miss * it.miss / it.n;
             rest.both -= it.miss * 0.5 * (a + b) / it.n;

@@ -56,23 +56,25 @@ pub fn sheet(picture: &Picture, sight: &Sight<'_>) -> Result<Canvas, LookError> 
         window.in_picture(at)
     };
     let places: Vec<[f64; 2]> = (0..size.width * size.height).map(place).collect();
-    let plain: Vec<[u8; 3]> = places.iter().map(|it| colour(picture, *it)).collect();
+    let plain: Vec<[u8; 3]> = places.iter().map(|place| colour(picture, *place)).collect();
     let in_tile = |point: [f64; 2]| {
         let at = window.in_input(point);
         [0, 1].map(|axis| (at[axis] + 0.5) / per_tile[axis] - 0.5)
     };
     let mut joints = Canvas::from_rgb(size, plain.as_flattened());
     let peaks = maps.peaks();
-    let points: Vec<[f64; 2]> =
-        peaks.iter().map(|it| it.map_or([f64::NAN; 2], |it| in_tile(it.at))).collect();
+    let points: Vec<[f64; 2]> = peaks
+        .iter()
+        .map(|peak| peak.map_or([f64::NAN; 2], |it| in_tile(it.at)))
+        .collect();
     draw_limbs(&mut joints, &points, &limbs());
     let mut tiles = vec![(joints, network.card().name.clone())];
     for (joint, (named, peak)) in PARSE14.joints.iter().zip(peaks).enumerate() {
         let Some(peak) = peak else {
             continue;
         };
-        let heat = places.iter().map(|it| {
-            let value = f64::from(maps.at(joint, *it)) / settings.lambda;
+        let heat = places.iter().map(|place| {
+            let value = f64::from(maps.at(joint, *place)) / settings.lambda;
             (value.exp() - settings.eps).max(0.0)
         });
         let heat: Vec<f64> = heat.collect();
@@ -94,7 +96,7 @@ fn heated(plain: &[[u8; 3]], heat: &[f64]) -> Vec<[u8; 3]> {
     let most = heat.iter().copied().fold(1e-3, f64::max);
     let mixed = |(colour, heat): (&[u8; 3], &f64)| {
         let share = 0.8 * (heat / most).clamp(0.0, 1.0);
-        let grey = colour.iter().map(|it| f64::from(*it)).sum::<f64>() / 3.0;
+        let grey = colour.iter().map(|colour| f64::from(*colour)).sum::<f64>() / 3.0;
         HOT.map(|hot| (0.7 * grey * (1.0 - share) + hot * share).round() as u8)
     };
     plain.iter().zip(heat).map(mixed).collect()

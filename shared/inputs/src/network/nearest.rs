@@ -25,7 +25,7 @@ pub fn nearest_detectors(description: &Description) -> Vec<&'static str> {
 }
 
 fn best(rated: &[(&'static str, usize)]) -> Vec<&'static str> {
-    let best = rated.iter().map(|it| it.1).max();
+    let best = rated.iter().map(|rated| rated.1).max();
     let best = rated.iter().filter(|it| Some(it.1) == best);
     best.map(|it| it.0).collect()
 }
@@ -39,24 +39,26 @@ fn points_of_detector(card: &DetectorCard, description: &Description) -> Option<
         Boxes::Yolox {
             person, strides, ..
         } => {
-            let cells = description.inputs.iter().find_map(|it| cells(it, strides));
-            let many = |it: &Port| match &it.sides[..] {
+            let cells = description.inputs.iter().find_map(|input| cells(input, strides));
+            let many = |port: &Port| match &port.sides[..] {
                 [one, n_cells, Side::Fixed(n)] => {
-                    one.may_be(1) && cells.is_some_and(|it| n_cells.may_be(it)) && *n > 5 + person
+                    one.may_be(1)
+                        && cells.is_some_and(|cell| n_cells.may_be(cell))
+                        && *n > 5 + person
                 }
                 _ => false,
             };
-            outputs.filter(|it| many(it)).map(|_| 2).max()
+            outputs.filter(|output| many(output)).map(|_| 2).max()
         }
         // Its files carry their card.
         Boxes::Centres { .. } => None,
         Boxes::List { boxes } => {
-            let five = |it: &Port| match &it.sides[..] {
+            let five = |port: &Port| match &port.sides[..] {
                 [one, _, five] => one.may_be(1) && five.may_be(5),
                 _ => false,
             };
-            let rated = outputs.filter(|it| five(it));
-            rated.map(|it| 2 + usize::from(it.name == *boxes)).max()
+            let rated = outputs.filter(|output| five(output));
+            rated.map(|rated| 2 + usize::from(rated.name == *boxes)).max()
         }
     };
     Some(input.unwrap_or(0) + 2 * output?)
@@ -67,7 +69,7 @@ fn cells(input: &Port, strides: &[usize]) -> Option<usize> {
     let &[_, _, Side::Fixed(height), Side::Fixed(width)] = &input.sides[..] else {
         return None;
     };
-    Some(strides.iter().map(|it| (width / it) * (height / it)).sum())
+    Some(strides.iter().map(|stride| (width / stride) * (height / stride)).sum())
 }
 
 /// How many sides of the input are those of a card.
@@ -78,7 +80,7 @@ fn of_input(card: &Input, description: &Description) -> Option<usize> {
         Layout::Pixels => [1, height, width, 3],
     };
     let inputs = description.inputs.iter();
-    inputs.filter_map(|it| agreeing(it, &sides)).max()
+    inputs.filter_map(|input| agreeing(input, &sides)).max()
 }
 
 /// How well a card agrees; `None` if no output is of its kind. The kind of output counts most, then the number of keypoints, then the order
@@ -87,8 +89,8 @@ fn points(card: &Card, description: &Description) -> Option<usize> {
     let [width, height] = [card.input.width, card.input.height];
     let outputs = || description.outputs.iter();
     let n = card.names().len();
-    let named = |name: &str| usize::from(outputs().any(|it| it.name == name));
-    let given = |sides: &[usize]| outputs().filter_map(|it| agreeing(it, sides)).max();
+    let named = |name: &str| usize::from(outputs().any(|output| output.name == name));
+    let given = |sides: &[usize]| outputs().filter_map(|output| agreeing(output, sides)).max();
     let (output, names) = match &card.output {
         Codec::HeatMap {
             maps,
@@ -96,7 +98,7 @@ fn points(card: &Card, description: &Description) -> Option<usize> {
             layout,
             ..
         } => {
-            let rated = outputs().filter_map(|it| of_maps(it, n, *further, *layout));
+            let rated = outputs().filter_map(|output| of_maps(output, n, *further, *layout));
             (rated.max(), maps.as_deref().map_or(0, named))
         }
         Codec::Simcc {
@@ -108,19 +110,22 @@ fn points(card: &Card, description: &Description) -> Option<usize> {
             let bins = |side: usize| (side as f64 * bins_per_pixel).round() as usize;
             let across = given(&[1, n, bins(width)]);
             let output = across.and_then(|it| Some(it.min(given(&[1, n, bins(height)])?)));
-            (output.map(|it| 8 + it), named(x) + named(y))
+            (output.map(|output| 8 + output), named(x) + named(y))
         }
         Codec::Keypoints { list, fields, .. } => {
             let flat = given(&[1, n * fields.len()]);
             let rows = given(&[1, n, fields.len()]);
             let nested = given(&[1, 1, n, fields.len()]);
             let output = flat.max(rows).max(nested);
-            (output.map(|it| 8 + it), list.as_deref().map_or(0, named))
+            (
+                output.map(|output| 8 + output),
+                list.as_deref().map_or(0, named),
+            )
         }
     };
     let named_input = card.input.name.as_ref().is_some_and(|name| {
         let mut inputs = description.inputs.iter();
-        inputs.any(|it| it.name == *name)
+        inputs.any(|input| input.name == *name)
     });
     let input = of_input(&card.input, description).unwrap_or(0);
     Some(2 * output? + input + names + usize::from(named_input))

@@ -67,19 +67,19 @@ impl Points {
 
     /// The finite points in the order of the transformed values.
     fn finite(&self) -> Vec<f64> {
-        let pairs = self.positive[..self.n_pairs].iter().map(|&it| f64::from(it));
-        std::iter::once(0.0).chain(pairs.flat_map(|it| [it, -it])).collect()
+        let pairs = self.positive[..self.n_pairs].iter().map(|&positive| f64::from(positive));
+        std::iter::once(0.0).chain(pairs.flat_map(|pair| [pair, -pair])).collect()
     }
 
     /// `G`, `tile x taps`: what a line of a filter is multiplied with.
     pub(super) fn of_filter(&self, taps: usize) -> Vec<Vec<f64>> {
         let points = self.finite();
         let row = |p: &f64| {
-            let others = points.iter().filter(|it| *it != p);
-            let divisor: f64 = others.map(|it| p - it).product();
-            (0..taps).map(|it| power(*p, it) / divisor).collect()
+            let others = points.iter().filter(|point| *point != p);
+            let divisor: f64 = others.map(|other| p - other).product();
+            (0..taps).map(|i| power(*p, i) / divisor).collect()
         };
-        let last = (0..taps).map(|it| f64::from(it + 1 == taps)).collect();
+        let last = (0..taps).map(|i| f64::from(i + 1 == taps)).collect();
         points.iter().map(row).chain([last]).collect()
     }
 
@@ -88,7 +88,7 @@ impl Points {
         let n = self.tile();
         let mut rows = vec![vec![0.0; n]; n];
         let highest = |coefficients: &[f32], degree: usize| {
-            let low = coefficients[..degree].iter().map(|&it| f64::from(it));
+            let low = coefficients[..degree].iter().map(|&coefficient| f64::from(coefficient));
             low.chain([1.0]).collect::<Vec<_>>()
         };
         for (j, value) in highest(&self.whole, self.n_pairs).into_iter().enumerate() {
@@ -121,7 +121,7 @@ impl Points {
     pub(super) fn amplification(&self, taps: usize) -> f64 {
         let (a, b) = (self.of_products(self.tile() + 1 - taps), self.of_cells());
         let g = self.of_filter(taps);
-        let sums: Vec<f64> = b.iter().map(|row| row.iter().map(|it| it.abs()).sum()).collect();
+        let sums: Vec<f64> = b.iter().map(|row| row.iter().map(|row| row.abs()).sum()).collect();
         let of = |row: &Vec<f64>, c: usize| -> f64 {
             let terms = row.iter().zip(&g).zip(&sums);
             terms.map(|((a, g), sum)| (a * g[c]).abs() * sum).sum()
@@ -179,7 +179,7 @@ mod tests {
     }
 
     fn indices(a: usize, b: usize, c: usize) -> impl Iterator<Item = (usize, usize, usize)> {
-        (0..a * b * c).map(move |it| (it / (b * c), it / c % b, it % c))
+        (0..a * b * c).map(move |i| (i / (b * c), i / c % b, i % c))
     }
 
     /// Else the bound would have to count their roundings.
@@ -199,7 +199,7 @@ mod tests {
                 };
                 let whole = at(p * p, &points.whole[..n_pairs]) + power(*p, 2 * n_pairs);
                 assert_eq!(whole, 0.0);
-                for other in exact.iter().filter(|it| *it != p) {
+                for other in exact.iter().filter(|exact| *exact != p) {
                     let rest = at(other * other, &points.without[k][..n_pairs - 1]);
                     assert_eq!(rest + power(*other, 2 * n_pairs - 2), 0.0);
                 }

@@ -77,20 +77,21 @@ fn tiled(form: &Form, filter: Template<'_>, Level { map, size }: Level<'_>) -> V
                     if inside { map.cells[at] } else { 0.0 }
                 };
                 let columns = (0..n).map(|c| (0..n).map(|r| cell(r, c)).collect());
-                let columns: Vec<_> = columns.map(|it: Vec<f32>| of_cells(form, &it)).collect();
+                let columns: Vec<_> =
+                    columns.map(|column: Vec<f32>| of_cells(form, &column)).collect();
                 for a in 0..n {
-                    let row: Vec<_> = columns.iter().map(|it| it[a]).collect();
+                    let row: Vec<_> = columns.iter().map(|column| column[a]).collect();
                     for (b, value) in of_cells(form, &row).into_iter().enumerate() {
                         let weight = weights[(a * n + b) * N_CHANNELS + k] as f32;
                         products[a][b] = value.mul_add(weight, products[a][b]);
                     }
                 }
             }
-            let columns = (0..n).map(|b| products.iter().map(|it| it[b]).collect());
+            let columns = (0..n).map(|b| products.iter().map(|product| product[b]).collect());
             let columns: Vec<_> =
-                columns.map(|it: Vec<f32>| of_products(form, &it, rows)).collect();
+                columns.map(|column: Vec<f32>| of_products(form, &column, rows)).collect();
             for i in 0..rows.min(size[0] - y) {
-                let row: Vec<_> = columns.iter().map(|it| it[i]).collect();
+                let row: Vec<_> = columns.iter().map(|column| column[i]).collect();
                 let row = of_products(form, &row, cols);
                 let width = cols.min(size[1] - x);
                 out[(y + i) * size[1] + x..][..width].copy_from_slice(&row[..width]);

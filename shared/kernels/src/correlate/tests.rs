@@ -26,7 +26,8 @@ struct Problem {
 
 impl Problem {
     fn new(filters: &[([usize; 2], usize)], sizes: &[[usize; 2]], seed: u64) -> Self {
-        let largest = [0, 1].map(|axis| filters.iter().map(|it| it.0[axis]).max().unwrap_or(1));
+        let largest =
+            [0, 1].map(|axis| filters.iter().map(|filter| filter.0[axis]).max().unwrap_or(1));
         let filters = filters
             .iter()
             .flat_map(|(size, n)| std::iter::repeat_n(*size, *n))
@@ -41,7 +42,7 @@ impl Problem {
         let maps = sizes.iter().enumerate().map(|(it, size)| {
             let area = (size[0] + largest[0] - 1) * (size[1] + largest[1] - 1);
             let cells = noise(!seed ^ it as u64, area * N_CHANNELS);
-            (*size, cells.into_iter().map(|it| it as f32).collect())
+            (*size, cells.into_iter().map(|cell| cell as f32).collect())
         });
         Self {
             filters,
@@ -124,12 +125,13 @@ fn share_of_bound(problem: &Problem, bank: &FilterBank, got: &[Vec<f32>]) -> f64
     let mut got = got.iter();
     let mut largest = 0.0_f64;
     for level in problem.levels() {
-        let cells: Vec<_> = level.map.cells.iter().map(|&it| f64::from(it)).collect();
+        let cells: Vec<_> = level.map.cells.iter().map(|&cell| f64::from(cell)).collect();
         for (index, filter) in problem.templates().into_iter().enumerate() {
             let map_size = [level.map.rows, level.map.cols];
             let want = correlate_f64(filter, map_size, &cells, level.size);
             let panels = 0..bank.n_panels();
-            let panel = panels.clone().find(|&it| bank.filters(it..it + 1).contains(&index));
+            let panel =
+                panels.clone().find(|&panel| bank.filters(panel..panel + 1).contains(&index));
             let factor = bank.error_factor(panel.unwrap_or(0), level.size);
             let sums: Vec<f64> = (0..N_CHANNELS)
                 .map(|k| filter.weights[k..].iter().step_by(N_CHANNELS).map(|w| w.abs()).sum())
@@ -237,7 +239,7 @@ fn a_single_weight_copies_its_channel() {
         weights: &weights,
     };
     let bank = FilterBank::new(Isa::best(), &[template]);
-    let cells: Vec<_> = (0..4 * 5 * N_CHANNELS).map(|it| it as f32).collect();
+    let cells: Vec<_> = (0..4 * 5 * N_CHANNELS).map(|i| i as f32).collect();
     let map = FeatureMap {
         rows: 4,
         cols: 5,

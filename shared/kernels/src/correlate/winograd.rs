@@ -40,7 +40,7 @@ impl Form {
 
     /// Tiles down and across that answer at all of `size`.
     pub(super) fn tiles(&self, size: [usize; 2]) -> [usize; 2] {
-        [0, 1].map(|it| size[it].div_ceil(self.placements[it]))
+        [0, 1].map(|i| size[i].div_ceil(self.placements[i]))
     }
 
     /// `G w G^T` for every channel of a filter, `area x N_CHANNELS`, in double precision.
@@ -58,7 +58,7 @@ impl Form {
         };
         let n = self.points.tile();
         (0..n * n * N_CHANNELS)
-            .map(|it| (it / N_CHANNELS / n, it / N_CHANNELS % n, it % N_CHANNELS))
+            .map(|i| (i / N_CHANNELS / n, i / N_CHANNELS % n, i % N_CHANNELS))
             .map(|(a, b, k)| value(a, b, k))
             .collect()
     }

@@ -22,11 +22,11 @@ pub(crate) fn gradients(image: &Planes, y: usize, lengths: &mut [f32], bins: &mu
         ]
     });
     for x in 0..n {
-        let [left, right, above, below] = planes[0].map(|it| it[x]);
+        let [left, right, above, below] = planes[0].map(|plane| plane[x]);
         let (mut dx, mut dy) = (right - left, below - above);
         let mut squared = dx * dx + dy * dy;
         for plane in &planes[1..] {
-            let [left, right, above, below] = plane.map(|it| it[x]);
+            let [left, right, above, below] = plane.map(|plane| plane[x]);
             let (along, down) = (right - left, below - above);
             let length = along * along + down * down;
             let longer = length > squared;

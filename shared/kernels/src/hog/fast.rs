@@ -177,7 +177,7 @@ fn normalise(
         channels[N_ORIENTATIONS + o] = clipped_sum(&value, norms, &mut unused);
     }
     for (channel, sum) in channels[N_ORIENTATIONS + N_UNSIGNED..].iter_mut().zip(texture) {
-        *channel = sum.map(|it| TEXTURE as f32 * it);
+        *channel = sum.map(|sum| TEXTURE as f32 * sum);
     }
 }
 
@@ -197,7 +197,7 @@ fn clipped_sum(value: &Lanes, norms: &[Lanes; 4], sums: &mut [Lanes; 4]) -> Lane
             channel[lane] += term;
         }
     }
-    channel.map(|it| 0.5 * it)
+    channel.map(|channel| 0.5 * channel)
 }
 
 /// Writes the channels of one cell after those of the other.

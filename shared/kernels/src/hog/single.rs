@@ -64,14 +64,14 @@ fn votes_of_block(
     // A pixel outside of 1..=last does not vote.
     let [ys, xs] = [0, 1].map(|axis| {
         let first = block[axis] * cell_px;
-        let pixels = (first..first + cell_px).filter_map(move |it| {
-            let pixel = it.checked_sub(cell_px.div_ceil(2))?;
+        let pixels = (first..first + cell_px).filter_map(move |i| {
+            let pixel = i.checked_sub(cell_px.div_ceil(2))?;
             (1..=cells[axis] * cell_px - 2).contains(&pixel).then_some(pixel)
         });
-        pixels.map(move |it| {
+        pixels.map(move |pixel| {
             (
-                it,
-                Vote::of(cell_px / 2 + it + cell_px.div_ceil(2) - first, cell_px).share,
+                pixel,
+                Vote::of(cell_px / 2 + pixel + cell_px.div_ceil(2) - first, cell_px).share,
             )
         })
     });

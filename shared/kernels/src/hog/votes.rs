@@ -29,10 +29,10 @@ impl Votes {
         self.cell_px = cell_px;
         self.n_blocks = cols + 1;
         let first = cell_px / 2;
-        let pixels = (first..first + cell_px).map(|it| Vote::of(it, cell_px).share);
+        let pixels = (first..first + cell_px).map(|i| Vote::of(i, cell_px).share);
         self.shares.clear();
-        for [up, down] in pixels.clone().map(|it| it.map(|it| it as f32)) {
-            for [left, right] in pixels.clone().map(|it| it.map(|it| it as f32)) {
+        for [up, down] in pixels.clone().map(|pixel| pixel.map(|value| value as f32)) {
+            for [left, right] in pixels.clone().map(|pixel| pixel.map(|value| value as f32)) {
                 self.shares.push([left * up, right * up, left * down, right * down]);
             }
         }

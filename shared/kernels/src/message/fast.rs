@@ -64,9 +64,9 @@ impl MessageWorkspace {
     /// Candidates that the last [`MessageRule::add_message`] on a grid of this size evaluated.
     pub fn n_candidates(&self, rule: &MessageRule, grid: Grid) -> usize {
         let transforms = self.transforms.iter().take(rule.springs.len());
-        let of_spring = transforms.map(|it| {
-            let down = it.down.n_candidates(grid.rows, BLOCK) * grid.cols;
-            down + it.along.n_candidates(grid.cols, ROW_ALIGN) * grid.rows
+        let of_spring = transforms.map(|transform| {
+            let down = transform.down.n_candidates(grid.rows, BLOCK) * grid.cols;
+            down + transform.along.n_candidates(grid.cols, ROW_ALIGN) * grid.rows
         });
         of_spring.sum()
     }

@@ -31,7 +31,7 @@ impl OwnScores<'_> {
         let cells = grid.rows * grid.cols;
         assert_eq!(self.map.len(), cells, "one response per cell");
         assert!(
-            self.term.is_none_or(|it| it.len() == cells),
+            self.term.is_none_or(|term| term.len() == cells),
             "one term per cell"
         );
         assert_eq!(plane.len(), grid.len(1), "one plane");
@@ -72,7 +72,7 @@ fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -
         simd,
         own,
         one: simd.splat(black_box(1.0)),
-        constant: own.constant.map(|it| simd.splat(it)),
+        constant: own.constant.map(|constant| simd.splat(constant)),
     };
     let mut running = RunningRange::NONE;
     let mut seen = running.load(simd);
@@ -115,7 +115,9 @@ impl<S: Simd> Sum<'_, S> {
         if let Some(term) = self.own.term {
             scores = self.simd.plus(scores, self.one, load(term));
         }
-        self.constant.map_or(scores, |it| self.simd.plus(scores, self.one, it))
+        self.constant.map_or(scores, |constant| {
+            self.simd.plus(scores, self.one, constant)
+        })
     }
 }
 

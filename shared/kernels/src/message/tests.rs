@@ -18,7 +18,7 @@ struct Case {
 impl Case {
     fn ranges(&self) -> Vec<ScoreRange> {
         let planes = 0..self.child.len() / self.grid.len(1).max(1);
-        planes.map(|it| range(self.grid, &self.child, it)).collect()
+        planes.map(|plane| range(self.grid, &self.child, plane)).collect()
     }
 
     fn scores<'a>(&'a self, ranges: &'a [ScoreRange]) -> ChildScores<'a> {
@@ -83,7 +83,7 @@ fn springs() -> impl Strategy<Value = Spring> {
 /// Four values, sixteen of them and real ones; sometimes an impossible cell or an impossible plane.
 fn scores() -> impl Strategy<Value = f32> {
     prop_oneof![
-        30 => (-8..8_i8).prop_map(|it| f32::from(it) * 0.25),
+        30 => (-8..8_i8).prop_map(|value| f32::from(value) * 0.25),
         10 => -1.0..1.0_f32,
     ]
 }
@@ -168,7 +168,7 @@ proptest! {
     ) {
         let sum = |cell: usize| {
             let score = if with_term { map[cell] + term[cell] } else { map[cell] };
-            constant.map_or(score, |it| score + it)
+            constant.map_or(score, |constant| score + constant)
         };
         let want: Vec<f32> = (0..map.len()).map(sum).collect();
         let want = Case::padded(grid, &want);

@@ -47,7 +47,7 @@ impl Pass {
     /// Candidates that all parents of a line try.
     pub(super) fn n_candidates(&self, n: usize, block: usize) -> usize {
         let parents = (0..n).step_by(block).map(|first| block.min(n - first));
-        let offsets = self.blocks.iter().map(|it| (it.end - it.start) as usize);
+        let offsets = self.blocks.iter().map(|block| (block.end - block.start) as usize);
         parents.zip(offsets).map(|(parents, offsets)| parents * offsets).sum()
     }
 

@@ -84,8 +84,8 @@ impl Body for Resize<'_> {
         down.cover(image.height(), height, part.y.clone());
         along.cover(image.width(), width, part.x.clone());
         // The columns that any sample of the part is made of.
-        let left = along.first.first().map_or(0, |it| 3 * it);
-        let right = along.first.last().map_or(0, |it| 3 * (it + along.n));
+        let left = along.first.first().map_or(0, |value| 3 * value);
+        let right = along.first.last().map_or(0, |value| 3 * (value + along.n));
         along.first.iter_mut().for_each(|it| *it -= left / 3);
         let stride = 3 * image.width();
         line.clear();
@@ -111,7 +111,7 @@ impl Body for Resize<'_> {
 #[inline(always)]
 fn sum_down(rows: &[u8], stride: usize, weights: &[f64], out: &mut [f64]) {
     let n = out.len();
-    let row = |it: usize| &rows[it * stride..][..n];
+    let row = |value: usize| &rows[value * stride..][..n];
     match *weights {
         [a] | [a, 0.0] | [a, 0.0, 0.0] => {
             for (out, it) in out.iter_mut().zip(row(0)) {

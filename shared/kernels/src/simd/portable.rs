@@ -10,7 +10,7 @@ type Four = [f32; 4];
 
 #[inline(always)]
 fn map2(a: Four, b: Four, f: impl Fn(f32, f32) -> f32) -> Four {
-    std::array::from_fn(|it| f(a[it], b[it]))
+    std::array::from_fn(|i| f(a[i], b[i]))
 }
 
 impl Simd for Portable {
@@ -52,7 +52,7 @@ impl Simd for Portable {
 
     #[inline(always)]
     fn mul_add(self, a: Four, b: Four, c: Four) -> Four {
-        std::array::from_fn(|it| a[it].mul_add(b[it], c[it]))
+        std::array::from_fn(|i| a[i].mul_add(b[i], c[i]))
     }
 
     #[inline(always)]

@@ -138,7 +138,7 @@ fn wrong_values_are_named_with_what_is_accepted() {
     for [from, to, expected] in CASES {
         assert!(TEXT.contains(from), "{from}");
         let said = Card::parse(&TEXT.replace(from, to))
-            .map_or_else(|it| it.to_string(), |_| String::new());
+            .map_or_else(|value| value.to_string(), |_| String::new());
         assert!(said.contains(expected), "{to}: {said}");
     }
 }

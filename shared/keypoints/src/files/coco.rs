@@ -67,12 +67,13 @@ impl ImageId {
             Self::Number(number) => return Some(*number),
             Self::Text(text) => text,
         };
-        let is_extension = |it: &str| it.starts_with(|it: char| it.is_ascii_alphabetic());
+        let is_extension =
+            |text: &str| text.starts_with(|letter: char| letter.is_ascii_alphabetic());
         let stem = match text.rsplit_once('.') {
             Some((stem, extension)) if is_extension(extension) => stem,
             _ => text,
         };
-        let rest = stem.trim_end_matches(|it: char| it.is_ascii_digit());
+        let rest = stem.trim_end_matches(|letter: char| letter.is_ascii_digit());
         stem[rest.len()..].parse().ok()
     }
 }
@@ -146,11 +147,11 @@ fn data_set(set: &DataSet, names: Option<&NameSet>) -> Result<Film, FileError> {
         }
         (names, _) => names.cloned(),
     };
-    let is_person = |it: &Entry| match (it.category_id, category) {
+    let is_person = |entry: &Entry| match (entry.category_id, category) {
         (Some(own), Some(people)) => own == people.id,
         _ => true,
     };
-    let frame_of = |id: u64| ids.binary_search(&id).ok().map(|it| it as u64);
+    let frame_of = |id: u64| ids.binary_search(&id).ok().map(|value| value as u64);
     let mut film = collected(
         &set.annotations,
         "annotations",
@@ -167,7 +168,7 @@ fn data_set(set: &DataSet, names: Option<&NameSet>) -> Result<Film, FileError> {
 fn results(entries: &[Entry], names: Option<&NameSet>) -> Result<Film, FileError> {
     let frame_of = |id: u64| (id < MAX_FRAMES).then_some(id);
     let mut film = collected(entries, "", names, (|_: &Entry| true, frame_of))?;
-    film.n_frames = film.frames.last_key_value().map_or(0, |it| it.0 + 1);
+    film.n_frames = film.frames.last_key_value().map_or(0, |last_key_value| last_key_value.0 + 1);
     Ok(film)
 }
 

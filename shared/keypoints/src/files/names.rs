@@ -53,8 +53,8 @@ impl NameSet {
     pub fn new(names: impl IntoIterator<Item = impl AsRef<str>>) -> Result<Self, NamesError> {
         // One more than can be, so that too many are seen without taking all of them.
         let names = names.into_iter().take(MAX_KEYPOINTS + 1);
-        let plain = |it: &str| it.trim().replace(['_', '-'], " ").to_lowercase();
-        let names: Vec<String> = names.map(|it| plain(it.as_ref())).collect();
+        let plain = |text: &str| text.trim().replace(['_', '-'], " ").to_lowercase();
+        let names: Vec<String> = names.map(|name| plain(name.as_ref())).collect();
         if !(1..=MAX_KEYPOINTS).contains(&names.len()) {
             return Err(NamesError::Number { n: names.len() });
         }
@@ -63,7 +63,7 @@ impl NameSet {
             return Err(NamesError::Twice { name: name.clone() });
         }
         if joint_rows(&names).iter().all(Option::is_none) {
-            let first: Vec<String> = names.iter().take(4).map(|it| format!("{it:?}")).collect();
+            let first: Vec<String> = names.iter().take(4).map(|name| format!("{name:?}")).collect();
             return Err(NamesError::NoJoint {
                 names: first.join(", "),
             });

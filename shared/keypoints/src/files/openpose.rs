@@ -52,7 +52,7 @@ pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Frame, FileError> {
     }
     let file: File = from_json(text, LAYOUT)?;
     at_most(file.people.len(), MAX_PEOPLE, "people in a frame")?;
-    if file.people.iter().any(|it| it.pose_keypoints_2d.is_none()) {
+    if file.people.iter().any(|person| person.pose_keypoints_2d.is_none()) {
         other_keys(text)?;
     }
     let entry = |nth: usize| format!("people[{nth}].pose_keypoints_2d");
@@ -71,7 +71,8 @@ fn other_keys(text: &[u8]) -> Result<(), FileError> {
     let whole: Whole = from_json(text, LAYOUT)?;
     for (nth, person) in whole.people.iter().enumerate() {
         let has_body = BODY.iter().any(|key| person.contains_key(*key));
-        let is_list = |value: &serde_json::Value| value.as_array().is_some_and(|it| it.len() > 2);
+        let is_list =
+            |value: &serde_json::Value| value.as_array().is_some_and(|array| array.len() > 2);
         let full = person.iter().filter(|(_, value)| is_list(value));
         let keys: Vec<String> = full.map(|(key, _)| key.chars().take(64).collect()).collect();
         if !has_body && !keys.is_empty() {
@@ -92,8 +93,10 @@ mod tests {
     use crate::decode::Keypoint;
 
     fn file(lists: &[&[f64]]) -> String {
-        let people = lists.iter().map(|it| {
-            format!("{{\"person_id\":[-1],\"pose_keypoints_2d\":{it:?},\"face_keypoints_2d\":[1]}}")
+        let people = lists.iter().map(|list| {
+            format!(
+                "{{\"person_id\":[-1],\"pose_keypoints_2d\":{list:?},\"face_keypoints_2d\":[1]}}"
+            )
         });
         let people: Vec<String> = people.collect();
         format!("{{\"version\":1.3,\"people\":[{}]}}", people.join(","))
@@ -141,7 +144,7 @@ mod tests {
 
     #[test]
     fn names_of_the_caller_go_before_the_number() {
-        let names = NameSet::new((0..24).map(|it| format!("k{it}")).chain(["neck".to_owned()]));
+        let names = NameSet::new((0..24).map(|i| format!("k{i}")).chain(["neck".to_owned()]));
         let names = names.unwrap();
         let frame = parse(file(&[&[1.0; 75]]).as_bytes(), Some(&names)).unwrap();
         assert_eq!(frame.names, Some(names));

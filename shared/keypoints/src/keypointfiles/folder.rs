@@ -61,7 +61,7 @@ fn checked(
 fn number(name: &str) -> Option<u64> {
     let stem = name.strip_suffix(".json")?;
     let stem = stem.strip_suffix("_keypoints").unwrap_or(stem);
-    let is_digit = |it: char| it.is_ascii_digit();
+    let is_digit = |letter: char| letter.is_ascii_digit();
     let upto = &stem[..=stem.rfind(is_digit)?];
     let before = upto.trim_end_matches(is_digit);
     upto[before.len()..].parse().ok()

@@ -69,7 +69,7 @@ impl KeypointSource {
         };
         Ok(Self {
             names,
-            n_frames: files.last().map_or(0, |it| it.0 + 1),
+            n_frames: files.last().map_or(0, |file| file.0 + 1),
             frames: Frames::Files(files),
         })
     }
@@ -126,7 +126,7 @@ fn told(folder: &Path, files: &[(u64, PathBuf)]) -> Result<NameSet, KeypointFile
     let mut n_looked_at = 0;
     for (_, path) in files {
         let text = read(path, MOST_OF_FRAME)?;
-        let frame = openpose::parse(&text, told.as_ref()).map_err(|it| in_file(path, it))?;
+        let frame = openpose::parse(&text, told.as_ref()).map_err(|error| in_file(path, error))?;
         told = frame.names;
         let Some(names) = &told else { continue };
         people.extend(frame.people);

@@ -188,7 +188,7 @@ fn unbiased_corner_pixels_lie_on_the_edges_of_the_box() {
     let mut card = udp_card(true);
     card.crop.margin = 1.0;
     let window = Window::new(&card, [50.0, 60.0, 146.0, 188.0]).unwrap();
-    let near = |a: [f64; 2], b: [f64; 2]| (0..2).all(|it| (a[it] - b[it]).abs() < 1e-9);
+    let near = |a: [f64; 2], b: [f64; 2]| (0..2).all(|i| (a[i] - b[i]).abs() < 1e-9);
     assert!(near(window.in_picture([0.0, 0.0]), [50.0, 60.0]));
     assert!(near(window.in_picture([95.0, 127.0]), [146.0, 188.0]));
     assert!(near(window.in_picture([47.5, 63.5]), [98.0, 124.0]));
@@ -201,7 +201,7 @@ fn unbiased_corner_pixels_lie_on_the_edges_of_the_box() {
 fn an_unbiased_box_of_as_many_steps_gives_the_picture_itself() {
     let mut card = udp_card(true);
     (card.crop.margin, card.crop.fit) = (1.0, Fit::Stretch);
-    let rgb: Vec<u8> = (0..3 * 96 * 128).map(|it| (it * 7 % 251) as u8).collect();
+    let rgb: Vec<u8> = (0..3 * 96 * 128).map(|i| (i * 7 % 251) as u8).collect();
     let window = Window::new(&card, [0.0, 0.0, 95.0, 127.0]).unwrap();
     let mut values = vec![f32::NAN; rgb.len()];
     window.fill(&card, &rgb, [96, 128], &mut values);

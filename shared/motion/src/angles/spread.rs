@@ -21,7 +21,7 @@ pub(super) fn sd(
     places: &[Place],
     angle: impl Fn(&[Vector3<f64>]) -> Option<f64>,
 ) -> Result<Option<f64>, Unknown> {
-    let mut points: Vec<Vector3<f64>> = places.iter().map(|it| it.0).collect();
+    let mut points: Vec<Vector3<f64>> = places.iter().map(|place| place.0).collect();
     let step2 = 3.0;
     let mut variance = 0.0;
     for joint in 0..places.len() {

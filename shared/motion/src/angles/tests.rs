@@ -31,7 +31,7 @@ fn standing() -> Vec<(Role, Vector3<f64>)> {
 }
 
 fn set(pose: &mut [(Role, Vector3<f64>)], role: Role, place: [f64; 3]) {
-    for it in pose.iter_mut().filter(|it| it.0 == role) {
+    for it in pose.iter_mut().filter(|pose| pose.0 == role) {
         it.1 = place.into();
     }
 }
@@ -42,7 +42,7 @@ fn estimates(pose: &[(Role, Vector3<f64>)], sd_m: f64) -> Vec<(Role, Estimate)> 
         covariance: Some(Matrix3::identity() * sd_m * sd_m),
         state: State::Measured,
     };
-    pose.iter().map(|it| (it.0, estimate(it.1))).collect()
+    pose.iter().map(|pose| (pose.0, estimate(pose.1))).collect()
 }
 
 fn of(pose: &[(Role, Vector3<f64>)], angle: Angle) -> Result<Value, Unknown> {
@@ -173,7 +173,7 @@ fn toes_up_is_dorsiflexion() {
 fn without_feet_or_a_vertical_their_angles_are_missing() {
     let pose: Vec<_> = standing();
     let no_feet: Vec<_> =
-        pose.iter().filter(|it| !matches!(it.0, Role::Heel(_))).copied().collect();
+        pose.iter().filter(|pose| !matches!(pose.0, Role::Heel(_))).copied().collect();
     assert_eq!(
         of(&no_feet, Angle::AnkleDorsiflexion(Left)),
         Err(Unknown::Missing)
@@ -226,7 +226,7 @@ fn what_the_covariances_make_of_an_angle_is_what_sampling_makes_of_it() {
         let noise = |it: &(Role, Vector3<f64>), normal: &mut dyn FnMut() -> f64| {
             (it.0, it.1 + Vector3::from_fn(|_, _| sd_m * normal()))
         };
-        let moved: Vec<_> = pose.iter().map(|it| noise(it, &mut normal)).collect();
+        let moved: Vec<_> = pose.iter().map(|pose| noise(pose, &mut normal)).collect();
         for (at, it) in angles(&estimates(&moved, 1e-4), Some(Vector3::z_axis())).iter().enumerate()
         {
             let centre = all[at].1.unwrap().degrees;
@@ -256,7 +256,7 @@ proptest! {
         prop_assume!(axis.is_some());
         let rotation = Rotation3::from_axis_angle(&axis.unwrap(), turn);
         let up = Unit::new_normalize(rotation * Vector3::z());
-        let moved: Vec<_> = bent().iter().map(|it| (it.0, rotation * it.1 + Vector3::from(place))).collect();
+        let moved: Vec<_> = bent().iter().map(|bent| (bent.0, rotation * bent.1 + Vector3::from(place))).collect();
         let before = angles(&estimates(&bent(), 0.01), Some(Vector3::z_axis()));
         let after = angles(&estimates(&moved, 0.01), Some(up));
         for (before, after) in before.iter().zip(&after) {

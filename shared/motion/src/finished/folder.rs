@@ -207,7 +207,7 @@ fn add<'a>(
     line: impl IntoIterator<Item = (&'a String, &'a JointLine)>,
 ) {
     for (name, it) in line {
-        let known = joints.iter().position(|it| it.name == *name);
+        let known = joints.iter().position(|joint| joint.name == *name);
         let joint = known.unwrap_or_else(|| {
             joints.push(Joint {
                 name: name.clone(),

@@ -108,7 +108,7 @@ fn write_angles_at(
         }
         let numbers = match value {
             Ok(it) => {
-                let sd = it.sd_degrees.map_or(String::new(), |it| format!("{it:.2}"));
+                let sd = it.sd_degrees.map_or(String::new(), |sd_degree| format!("{sd_degree:.2}"));
                 format!("{:.2},{sd},{}", it.degrees, it.state.name())
             }
             Err(why) => format!(",,{}", unknown(why, angle, up)),

@@ -92,9 +92,9 @@ impl Models {
                 None,
             );
         };
-        let is_out = |it: &Model| {
-            let innovation = it.belief.innovation(&position, &covariance);
-            innovation.is_none_or(|innovation| innovation.distance2 > GATE * it.scale)
+        let is_out = |model: &Model| {
+            let innovation = model.belief.innovation(&position, &covariance);
+            innovation.is_none_or(|innovation| innovation.distance2 > GATE * model.scale)
         };
         if models.iter().all(is_out) {
             self.n_rejected += 1;
@@ -181,10 +181,10 @@ impl Model {
 
 /// The share of every filter.
 fn shares(models: &[Model; N_MODELS]) -> [f64; N_MODELS] {
-    let best = models.iter().map(|it| it.score).fold(f64::NEG_INFINITY, f64::max);
-    let odds = models.each_ref().map(|it| (it.score - best).exp());
+    let best = models.iter().map(|model| model.score).fold(f64::NEG_INFINITY, f64::max);
+    let odds = models.each_ref().map(|model| (model.score - best).exp());
     let sum: f64 = odds.iter().sum();
-    odds.map(|it| it / sum)
+    odds.map(|odd| odd / sum)
 }
 
 /// What all filters say together; `None` if that is no number.
@@ -200,7 +200,7 @@ fn said(models: &[Model; N_MODELS], state: State) -> Option<Estimate> {
         let own = it.belief.position_covariance() * it.scale;
         covariance += (own + away * away.transpose()) * share;
     }
-    position.iter().all(|it| it.is_finite()).then_some(Estimate {
+    position.iter().all(|value| value.is_finite()).then_some(Estimate {
         position,
         covariance: Some(covariance),
         state,
@@ -215,6 +215,10 @@ fn delay_s(gain: Vector3<f64>, dt: f64) -> f64 {
     let turn = 2.0 * PI * DELAY_HZ * dt;
     let back = Complex::new(turn.cos(), -turn.sin());
     let system = Matrix3::<Complex<f64>>::identity() - feedback * back;
-    let response = system.try_inverse().map(|it| it * gain.map(|it| Complex::new(it, 0.0)));
-    response.map_or(0.0, |it| -it[0].im.atan2(it[0].re) / (2.0 * PI * DELAY_HZ))
+    let response = system
+        .try_inverse()
+        .map(|inverse| inverse * gain.map(|gain| Complex::new(gain, 0.0)));
+    response.map_or(0.0, |response| {
+        -response[0].im.atan2(response[0].re) / (2.0 * PI * DELAY_HZ)
+    })
 }

@@ -22,7 +22,7 @@ fn swing(time: f64) -> Vector3<f64> {
 fn recorded(rate_hz: f64, sd_m: f64, told_sd_m: f64, seconds: f64) -> Recorded {
     let mut random = fastrand::Rng::with_seed(5);
     let n = (rate_hz * seconds) as usize;
-    let times: Vec<f64> = (0..n).map(|it| it as f64 / rate_hz).collect();
+    let times: Vec<f64> = (0..n).map(|i| i as f64 / rate_hz).collect();
     let joints = Side::BOTH.map(|side| {
         let offset = if side == Side::Left { 0.6 } else { 0.0 };
         let mut measured = |time: &f64| {
@@ -84,7 +84,7 @@ fn covariances_that_are_wrong_by_a_factor_are_scaled() {
 fn what_the_covariances_say_is_how_far_off_the_smoothed_positions_are() {
     let recorded = recorded(60.0, 0.02, 0.02, 20.0);
     let got = crate::smooth(&recorded, &Settings::default());
-    let told = got.joints[0].iter().map(|it| it.unwrap().covariance.unwrap().trace());
+    let told = got.joints[0].iter().map(|joint| joint.unwrap().covariance.unwrap().trace());
     let told = (told.sum::<f64>() / recorded.times.len() as f64).sqrt();
     let error = error_m(&recorded, &got.joints[0]);
     assert!((0.75..1.35).contains(&(told / error)), "{told} {error}");
@@ -107,7 +107,7 @@ fn outliers_are_rejected_and_short_gaps_filled_and_both_are_marked() {
     track[200..230].fill(None);
     track[..3].fill(None);
     let got = crate::smooth(&recorded, &Settings::default());
-    let state = |at: usize| got.joints[0][at].map(|it| it.state);
+    let state = |at: usize| got.joints[0][at].map(|joint| joint.state);
     assert_eq!(state(100), Ok(State::Rejected));
     assert_eq!(state(154), Ok(State::Filled));
     assert_eq!(
@@ -126,14 +126,14 @@ fn outliers_are_rejected_and_short_gaps_filled_and_both_are_marked() {
 fn exchanged_wrists_are_taken_for_what_they_are() {
     let mut recorded = recorded(60.0, 0.01, 0.01, 5.0);
     for at in 120..126 {
-        let [a, b] = [0, 1].map(|it| recorded.joints[it].measured[at]);
+        let [a, b] = [0, 1].map(|i| recorded.joints[i].measured[at]);
         recorded.joints[0].measured[at] = b;
         recorded.joints[1].measured[at] = a;
     }
     let got = crate::smooth(&recorded, &Settings::default());
     for at in 120..126 {
         assert_eq!(
-            got.joints[0][at].map(|it| it.state),
+            got.joints[0][at].map(|joint| joint.state),
             Ok(State::Exchanged),
             "{at}"
         );
@@ -149,7 +149,7 @@ fn sides_that_are_not_certain_are_decided_by_what_is_before_and_after() {
             recorded.sides[at] = Sides::Unsure;
         }
         if at % 6 == 0 {
-            let [a, b] = [0, 1].map(|it| recorded.joints[it].measured[at]);
+            let [a, b] = [0, 1].map(|i| recorded.joints[i].measured[at]);
             recorded.joints[0].measured[at] = b;
             recorded.joints[1].measured[at] = a;
         }
@@ -208,7 +208,7 @@ fn bones_that_are_asked_for_are_constant() {
     };
     assert!((length - 0.25).abs() < 0.01, "{length}");
     for at in 0..recorded.times.len() {
-        let [a, b] = ends.map(|it| got.joints[it][at].unwrap().position);
+        let [a, b] = ends.map(|end| got.joints[end][at].unwrap().position);
         assert!(((a - b).norm() - length).abs() < 1e-6, "{at}");
     }
 }

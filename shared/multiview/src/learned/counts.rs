@@ -91,7 +91,7 @@ impl Counts {
     pub(crate) fn fits(&self, shape: &Shape) -> bool {
         [false, true].into_iter().all(|exchanged| {
             let cells = self.of(exchanged).iter().map(Vec::len);
-            cells.eq(shape.sizes(exchanged).map(|it| it[0] * it[1]))
+            cells.eq(shape.sizes(exchanged).map(|size| size[0] * size[1]))
         })
     }
 
@@ -127,7 +127,7 @@ impl Counts {
         let sizes = shape.sizes(exchanged).enumerate();
         let matrix = |(part, [rows, cols]): (usize, [usize; 2])| {
             let cells = &self.of(exchanged)[part];
-            let n: f64 = cells.iter().map(|it| f64::from(*it)).sum();
+            let n: f64 = cells.iter().map(|cell| f64::from(*cell)).sum();
             let partner = shape.partner(part, exchanged);
             DMatrix::from_fn(rows, cols, |a, b| {
                 let by_chance = marginals[part][a] * marginals[partner][b];

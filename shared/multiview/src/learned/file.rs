@@ -222,8 +222,9 @@ impl Learned {
     /// Tables for any pair of cameras.
     pub fn by_angle(&self, appearance: Appearance) -> AngleTables {
         let marginals = self.marginals();
-        let tables =
-            |it: &Counts| (it.total() > 0).then(|| self.tables(it, &marginals, appearance));
+        let tables = |counts: &Counts| {
+            (counts.total() > 0).then(|| self.tables(counts, &marginals, appearance))
+        };
         let half = self.ring.iter().map(tables).collect();
         AngleTables::new(half, &self.model.shape.mirror)
     }
@@ -238,8 +239,8 @@ impl Learned {
         appearance: Appearance,
     ) -> Option<Vec<(usize, usize, TypeTables)>> {
         let marginals = self.marginals();
-        let rig = self.rigs.iter().find(|it| it.name == name)?;
-        let index = |name: &String| cameras.iter().position(|it| it == name);
+        let rig = self.rigs.iter().find(|rig| rig.name == name)?;
+        let index = |name: &String| cameras.iter().position(|camera| camera == name);
         let pair = |pair: &NamedPair| {
             let [first, second] = [index(&pair.cameras[0])?, index(&pair.cameras[1])?];
             let tables = self.tables(&pair.counts, &marginals, appearance);
@@ -254,7 +255,7 @@ impl Learned {
 
     /// The map from parts to the joints of a set, if one was learned.
     pub fn joint_map(&self, set: &JointSet) -> Option<Arc<JointMap>> {
-        let found = self.joints.iter().find(|it| it.set == set.name)?;
+        let found = self.joints.iter().find(|joint| joint.set == set.name)?;
         JointMap::new(found.weights.clone()).map(Arc::new)
     }
 
@@ -268,15 +269,15 @@ impl Learned {
     }
 
     fn marginals(&self) -> Vec<Vec<f64>> {
-        let named = self.rigs.iter().flat_map(|it| &it.pairs);
-        let all = self.ring.iter().chain(named.map(|it| &it.counts));
+        let named = self.rigs.iter().flat_map(|rig| &rig.pairs);
+        let all = self.ring.iter().chain(named.map(|named| &named.counts));
         marginals(&self.model.shape, &all.collect::<Vec<_>>())
     }
 
     fn check(&self) -> Result<(), FileError> {
         let shape = &self.model.shape;
         let n_parts = shape.n_types.len();
-        let types = shape.n_types.iter().all(|it| (1..=255).contains(it));
+        let types = shape.n_types.iter().all(|kind| (1..=255).contains(kind));
         demand(
             types && (1..=255).contains(&n_parts),
             "model.shape.n_types",
@@ -292,7 +293,7 @@ impl Learned {
         let it = &self.weights;
         demand(in_range(it.alpha), "weights.alpha", "a number from 0")?;
         demand(in_range(it.beta), "weights.beta", "a number from 0")?;
-        let cap = it.max_distance_cells.is_none_or(|it| it.is_finite() && it > 0.0);
+        let cap = it.max_distance_cells.is_none_or(|value| value.is_finite() && value > 0.0);
         demand(
             cap,
             "weights.max_distance_cells",
@@ -301,7 +302,10 @@ impl Learned {
         let smoothing = self.smoothing.is_finite() && self.smoothing > 0.0;
         demand(smoothing, "smoothing", "a number above 0")?;
         let tau = self.tau_tenths.len() == n_parts
-            && self.tau_tenths.iter().all(|it| it.is_finite() && *it >= 0.0);
+            && self
+                .tau_tenths
+                .iter()
+                .all(|tau_tenth| tau_tenth.is_finite() && *tau_tenth >= 0.0);
         demand(tau, "tau_tenths", "a number from 0 for every part")?;
         self.check_tables()?;
         self.check_joints(n_parts)
@@ -319,7 +323,7 @@ impl Learned {
         }
         for (nth, rig) in self.rigs.iter().enumerate() {
             let others = &self.rigs[..nth];
-            let is_new = others.iter().all(|it| it.name != rig.name);
+            let is_new = others.iter().all(|other| other.name != rig.name);
             demand(
                 is_new,
                 &format!("rigs[{nth}].name"),
@@ -343,7 +347,7 @@ impl Learned {
             let is_row = |row: &Vec<f64>| {
                 let sum: f64 = row.iter().sum();
                 row.len() == n_parts
-                    && row.iter().all(|it| it.abs() < 100.0)
+                    && row.iter().all(|value| value.abs() < 100.0)
                     && (sum - 1.0).abs() < 1e-3
             };
             let rows =

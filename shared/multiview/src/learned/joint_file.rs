@@ -161,14 +161,14 @@ impl JointFile {
     /// * Returns `None` for a set with a part that is no joint there.
     pub fn map(&self, set: &JointSet) -> Option<Arc<JointMap>> {
         let of_part = |part: &usize| {
-            let joint = (0..self.joints.len()).find(|it| own(*it) == *part)?;
+            let joint = (0..self.joints.len()).find(|i| own(*i) == *part)?;
             Some(&self.joints[joint].weights)
         };
         let of_joint = |joint: &skeleton::Joint| -> Option<Vec<f64>> {
             let rows: Option<Vec<&Vec<f64>>> = joint.parts.iter().map(of_part).collect();
             let rows = rows?;
             let mean =
-                |part: usize| rows.iter().map(|it| it[part]).sum::<f64>() / rows.len() as f64;
+                |part: usize| rows.iter().map(|row| row[part]).sum::<f64>() / rows.len() as f64;
             Some((0..N_PARTS).map(mean).collect())
         };
         let rows: Option<Vec<_>> = set.joints.iter().map(of_joint).collect();
@@ -176,7 +176,7 @@ impl JointFile {
     }
 
     fn check(&self) -> Result<(), JointFileError> {
-        let is_hex = |it: char| it.is_ascii_digit() || ('a'..='f').contains(&it);
+        let is_hex = |letter: char| letter.is_ascii_digit() || ('a'..='f').contains(&letter);
         let is_fingerprint = self.model.len() == 16 && self.model.chars().all(is_hex);
         demand(is_fingerprint, "model", "16 hexadecimal digits")?;
         let n = PARSE14.joints.len();
@@ -189,7 +189,8 @@ impl JointFile {
                 &format!("{:?}", known.name),
             )?;
             let (weights, field) = (&joint.weights, format!("joints[{nth}].weights"));
-            let is_row = weights.len() == N_PARTS && weights.iter().all(|it| it.abs() <= MOST);
+            let is_row =
+                weights.len() == N_PARTS && weights.iter().all(|weight| weight.abs() <= MOST);
             let expected = format!("{N_PARTS} numbers from -{MOST} to {MOST}");
             demand(is_row, &field, &expected)?;
             let sum: f64 = weights.iter().sum();

@@ -52,7 +52,7 @@ fn person(random: &mut fastrand::Rng, noise_px: f64) -> Marked {
         }
     }
     for at in &mut joints {
-        *at = at.map(|it| it + noise(noise_px));
+        *at = at.map(|at| at + noise(noise_px));
     }
     Marked { centres, joints }
 }
@@ -110,7 +110,7 @@ fn either_side_is_the_mirror_image_of_the_other_and_rows_sum_to_one() {
     let rows = learn(&people(3, 60, 3.0));
     for (joint, row) in rows.iter().enumerate() {
         let other = MIRROR[own(joint)];
-        let other = (0..14).find(|it| own(*it) == other).unwrap();
+        let other = (0..14).find(|i| own(*i) == other).unwrap();
         for part in 0..N_PARTS {
             let difference = (row[part] - rows[other][MIRROR[part]]).abs();
             assert!(difference < 2e-6, "{joint}, part {part}: {difference}");
@@ -124,12 +124,12 @@ fn a_small_data_set_counts_as_much_as_a_large_one() {
     let (near, far) = (people(5, 400, 0.0), people(6, 40, 0.0));
     let far: Vec<Marked> = far
         .into_iter()
-        .map(|it| {
-            let mut joints = it.joints;
+        .map(|far| {
+            let mut joints = far.joints;
             for knee in [1, 4] {
-                joints[knee] = it.centres[own(knee)];
+                joints[knee] = far.centres[own(knee)];
             }
-            Marked { joints, ..it }
+            Marked { joints, ..far }
         })
         .collect();
     let [own, _] = knee(&SETTINGS.learn(&[near.iter().collect(), far.iter().collect()]));

@@ -48,7 +48,7 @@ impl JointFit {
     pub fn add(&mut self, sample: &JointSample<'_>) {
         let mirrored: Vec<[f64; 2]> = MIRROR
             .iter()
-            .map(|&it| [-sample.centres[it][0], sample.centres[it][1]])
+            .map(|&mirror| [-sample.centres[mirror][0], sample.centres[mirror][1]])
             .collect();
         self.add_one(sample);
         if let Some(parts) = mirror_of(sample.parts) {
@@ -62,17 +62,18 @@ impl JointFit {
     }
 
     fn add_one(&mut self, sample: &JointSample<'_>) {
-        let at = self.joints.iter().position(|it| it.parts == sample.parts);
+        let at = self.joints.iter().position(|joint| joint.parts == sample.parts);
         let at = at.unwrap_or_else(|| {
             self.joints.push(Normal::new(sample.parts));
             self.joints.len() - 1
         });
         let joint = &mut self.joints[at];
         for axis in 0..2 {
-            let own = sample.parts.iter().map(|&it| sample.centres[it][axis]);
+            let own = sample.parts.iter().map(|&part| sample.centres[part][axis]);
             let own = own.sum::<f64>() / sample.parts.len() as f64;
             let row = sample.centres.iter();
-            let row = DVector::from_iterator(N_PARTS, row.map(|it| (it[axis] - own) / sample.size));
+            let row =
+                DVector::from_iterator(N_PARTS, row.map(|row| (row[axis] - own) / sample.size));
             let target = (sample.joint[axis] - own) / sample.size;
             joint.products.ger(1.0, &row, &row, 1.0);
             joint.targets.axpy(target, &row, 1.0);
@@ -83,7 +84,7 @@ impl JointFit {
 
     /// The map for a set, with rows for all its joints; joints without samples keep their default.
     pub fn solve(&self, set: &JointSet, ridge: f64) -> JointWeights {
-        let rows = set.joints.iter().map(|it| self.row(it.parts, ridge));
+        let rows = set.joints.iter().map(|joint| self.row(joint.parts, ridge));
         JointWeights {
             set: set.name.to_owned(),
             weights: rows.collect(),
@@ -91,7 +92,7 @@ impl JointFit {
     }
 
     fn row(&self, parts: &[usize], ridge: f64) -> Vec<f64> {
-        let Some(joint) = self.joints.iter().find(|it| it.parts == parts) else {
+        let Some(joint) = self.joints.iter().find(|joint| joint.parts == parts) else {
             // The mean of joints that may have samples of their own.
             let n = parts.len() as f64;
             return match parts {
@@ -114,10 +115,10 @@ impl JointFit {
     /// Mean squared error of another fit's maps on the samples of this one, in units of the person's size;
     /// `None` without samples.
     pub fn error_of(&self, other: &Self, ridge: f64) -> Option<f64> {
-        let n: f64 = self.joints.iter().map(|it| it.n).sum();
+        let n: f64 = self.joints.iter().map(|joint| joint.n).sum();
         let error = |joint: &Normal| {
             let theirs = other.joints.iter().find(|it| it.parts == joint.parts);
-            let weights = theirs.and_then(|it| it.solve(ridge));
+            let weights = theirs.and_then(|theirs| theirs.solve(ridge));
             joint.error(&weights.unwrap_or_else(|| DVector::zeros(N_PARTS)))
         };
         (n > 0.0).then(|| self.joints.iter().map(error).sum::<f64>() / n)
@@ -167,10 +168,10 @@ fn rounded(weight: f64) -> f64 {
 
 /// The parts of the joint on the other side.
 fn mirror_of(parts: &[usize]) -> Option<&'static [usize]> {
-    let mut mirrored: Vec<usize> = parts.iter().map(|&it| MIRROR[it]).collect();
+    let mut mirrored: Vec<usize> = parts.iter().map(|&part| MIRROR[part]).collect();
     mirrored.sort_unstable();
-    let all = JointSet::ALL.into_iter().flat_map(|it| it.joints);
-    all.map(|it| it.parts).find(|it| *it == mirrored)
+    let all = JointSet::ALL.into_iter().flat_map(|joint_set| joint_set.joints);
+    all.map(|it| it.parts).find(|parts| *parts == mirrored)
 }
 
 #[cfg(test)]
@@ -185,7 +186,7 @@ mod tests {
         let mut person = || {
             let centres: Vec<[f64; 2]> =
                 (0..N_PARTS).map(|_| [dice.f64() * 100.0 + 30.0, dice.f64() * 200.0]).collect();
-            let wrist = [0, 1].map(|it| 1.2 * centres[6][it] - 0.2 * centres[4][it]);
+            let wrist = [0, 1].map(|i| 1.2 * centres[6][i] - 0.2 * centres[4][i]);
             (centres, wrist)
         };
         (0..n).map(|_| person()).collect()
@@ -207,7 +208,7 @@ mod tests {
     #[test]
     fn a_linear_map_is_recovered_and_mirrored() {
         let map = fit(100, 1).solve(&PARSE14, 1e-9);
-        let [right, left] = [6, 11].map(|it| &map.weights[it]);
+        let [right, left] = [6, 11].map(|i| &map.weights[i]);
         assert!((right[6] - 1.2).abs() < 1e-3 && (right[4] + 0.2).abs() < 1e-3);
         assert!((left[18] - 1.2).abs() < 1e-3 && (left[16] + 0.2).abs() < 1e-3);
     }

@@ -167,7 +167,7 @@ impl Learner {
     fn is_right(&self, view: &ViewObservation, part: usize) -> bool {
         let parent = PARENT.get(part).copied().flatten().unwrap_or(part);
         let right =
-            |it: usize| view.errors.get(it).is_some_and(|it| *it <= self.settings.max_error);
+            |it: usize| view.errors.get(it).is_some_and(|error| *error <= self.settings.max_error);
         right(part) && right(parent)
     }
 
@@ -238,12 +238,12 @@ impl Learner {
             },
             learned: self.from,
             weights,
-            tau_tenths: self.errors.iter().map(|it| median(it)).collect(),
+            tau_tenths: self.errors.iter().map(|error| median(error)).collect(),
             smoothing: self.settings.smoothing,
             ring: self.ring.clone(),
             rigs: rigs.into_iter().collect(),
             joints: ridge.map_or_else(Vec::new, |ridge| {
-                sets.map(|it| self.joints.solve(it, ridge)).collect()
+                sets.map(|set| self.joints.solve(set, ridge)).collect()
             }),
         })
     }
@@ -253,5 +253,5 @@ impl Learner {
 fn median(values: &[f32]) -> f32 {
     let median = Sorted::new(values).lower_median();
     // Four digits are more than pictures tell.
-    median.map_or(0.0, |it| (it * 1e4).round() / 1e4)
+    median.map_or(0.0, |median| (median * 1e4).round() / 1e4)
 }

@@ -54,7 +54,7 @@ impl Local {
                 continue;
             }
             let row = self.row(joint, sets);
-            let mirrored: Vec<f64> = MIRROR.iter().map(|&it| row[it]).collect();
+            let mirrored: Vec<f64> = MIRROR.iter().map(|&mirror| row[mirror]).collect();
             if MIRROR[own] == own {
                 // Symmetric but for rounding.
                 let both = row.iter().zip(&mirrored);
@@ -91,7 +91,7 @@ impl Local {
             for it in 0..n {
                 products[(it, it)] += self.ridge * total;
             }
-            let Some(solved) = products.cholesky().map(|it| it.solve(&targets)) else {
+            let Some(solved) = products.cholesky().map(|cholesky| cholesky.solve(&targets)) else {
                 break;
             };
             let moved = (&solved - &weights).amax();
@@ -131,7 +131,7 @@ pub type Tried = (Local, Vec<f64>);
 /// Tries settings on people that are left out in turn, every fifth of each data set.
 pub fn try_all(sets: &[Vec<Marked>]) -> Vec<Tried> {
     let tried = Local::tried().into_iter();
-    tried.map(|it| (it, left_out(it, sets))).collect()
+    tried.map(|tried| (tried, left_out(tried, sets))).collect()
 }
 
 /// The settings of the least error, every data set counting the same; of equal ones the first.
@@ -145,10 +145,10 @@ fn left_out(settings: Local, sets: &[Vec<Marked>]) -> Vec<f64> {
     for fold in 0..FOLDS {
         let deal = |is_in: bool| -> Vec<Vec<&Marked>> {
             let of_set = |set: &Vec<Marked>| -> Vec<usize> {
-                (0..set.len()).filter(|it| (it % FOLDS == fold) == is_in).collect()
+                (0..set.len()).filter(|i| (i % FOLDS == fold) == is_in).collect()
             };
             let sets = sets.iter().map(|set| (set, of_set(set)));
-            sets.map(|(set, at)| at.into_iter().map(|it| &set[it]).collect()).collect()
+            sets.map(|(set, at)| at.into_iter().map(|at| &set[at]).collect()).collect()
         };
         let rows = settings.learn(&deal(false));
         for (people, (sum, n)) in deal(true).iter().zip(&mut sums) {
@@ -204,7 +204,7 @@ fn sample(
     let (own, size) = (centre(own(joint)), size(&person.joints));
     Sample {
         around: [0, 1].map(|axis| {
-            let relative = around.iter().map(|&it| (centre(it)[axis] - own[axis]) / size);
+            let relative = around.iter().map(|&around| (centre(around)[axis] - own[axis]) / size);
             DVector::from_iterator(around.len(), relative)
         }),
         joint: [0, 1].map(|axis| (turned(mark)[axis] - own[axis]) / size),
@@ -227,7 +227,7 @@ pub(crate) fn own(joint: usize) -> usize {
 /// The joint of `skeleton::PARSE14` on the other side.
 fn mirror_of(joint: usize) -> usize {
     let other = MIRROR[own(joint)];
-    (0..N_JOINTS).find(|it| own(*it) == other).unwrap_or(joint)
+    (0..N_JOINTS).find(|i| own(*i) == other).unwrap_or(joint)
 }
 
 /// The parts up to `reach` bones away from a part, without it, ascending; for shoulders and hips also the one across.
@@ -246,13 +246,13 @@ fn around(own: usize, reach: usize) -> Vec<usize> {
     if ACROSS_TRUNK.contains(&own) {
         near[MIRROR[own]] = true;
     }
-    (0..N_PARTS).filter(|&it| near[it] && it != own).collect()
+    (0..N_PARTS).filter(|&i| near[i] && i != own).collect()
 }
 
 /// The longer side of the box around the joints plus a pixel, as for PCK.
 fn size(joints: &[[f64; 2]]) -> f64 {
     let side = |axis: usize| {
-        let values = || joints.iter().map(move |it| it[axis]);
+        let values = || joints.iter().map(move |joint| joint[axis]);
         values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
     };
     side(0).max(side(1)) + 1.0
@@ -260,8 +260,8 @@ fn size(joints: &[[f64; 2]]) -> f64 {
 
 /// Weights with six decimals that sum to 1: the joint's own part takes the rest.
 fn rounded(own: usize, row: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut millionths: Vec<i64> = row.map(|it| (it * 1e6).round() as i64).collect();
+    let mut millionths: Vec<i64> = row.map(|row| (row * 1e6).round() as i64).collect();
     let sum: i64 = millionths.iter().sum();
     millionths[own] += 1_000_000 - sum;
-    millionths.iter().map(|&it| it as f64 / 1e6).collect()
+    millionths.iter().map(|&millionth| millionth as f64 / 1e6).collect()
 }

@@ -60,11 +60,11 @@ impl Tally {
         for error in segments {
             self.n += 1;
             // The area under a step from 0 to 1 at `error`, over thresholds from 0 to 1.
-            self.area += error.map_or(0.0, |it| (1.0 - it).max(0.0));
-            self.right += u64::from(error.is_some_and(|it| it <= 0.5));
+            self.area += error.map_or(0.0, |error| (1.0 - error).max(0.0));
+            self.right += u64::from(error.is_some_and(|error| error <= 0.5));
         }
         self.n_pairs += iterations.len() as u64;
-        self.iterations += iterations.iter().map(|it| u64::from(*it)).sum::<u64>();
+        self.iterations += iterations.iter().map(|iteration| u64::from(*iteration)).sum::<u64>();
     }
 
     /// All frames together.
@@ -97,7 +97,7 @@ impl Grid {
 
     /// The second search: the appearance term with the best geometric weights and their neighbours.
     pub fn appearance(&self, best: &Weights) -> Vec<Weights> {
-        let at = self.alphas.iter().position(|it| *it == best.alpha);
+        let at = self.alphas.iter().position(|alpha| *alpha == best.alpha);
         let at = at.unwrap_or_default();
         let alphas = &self.alphas[at.saturating_sub(1)..(at + 2).min(self.alphas.len())];
         let forms = [
@@ -138,9 +138,10 @@ mod tests {
         let mut tally = Tally::default();
         tally.add(&errors, &[4, 6]);
         let point = tally.point(without_appearance(1.0, None));
-        let right = |gamma: f64| errors.iter().flatten().filter(|it| **it <= gamma).count() as f64;
+        let right =
+            |gamma: f64| errors.iter().flatten().filter(|error| **error <= gamma).count() as f64;
         let n = 10_000;
-        let curve = (0..n).map(|it| right((f64::from(it) + 0.5) / f64::from(n)));
+        let curve = (0..n).map(|i| right((f64::from(i) + 0.5) / f64::from(n)));
         let area = curve.sum::<f64>() / f64::from(n) / 5.0 * 100.0;
         assert!((point.area - area).abs() < 0.05, "{} {area}", point.area);
         assert_eq!((point.pcp3d, point.iterations), (40.0, 5.0));

@@ -18,7 +18,7 @@ fn shape() -> Shape {
 fn observation(types: impl Fn(usize) -> u8, error: f32, exchanged: bool) -> ViewObservation {
     ViewObservation {
         types: (0..N_PARTS).map(types).collect(),
-        centres: (0..N_PARTS).map(|it| [it as f64, 10.0 * it as f64]).collect(),
+        centres: (0..N_PARTS).map(|i| [i as f64, 10.0 * i as f64]).collect(),
         errors: vec![error; N_PARTS],
         exchanged,
         size: 100.0,
@@ -87,7 +87,7 @@ fn the_order_of_two_views_does_not_matter() {
 fn views_from_behind_have_tables_of_their_own() {
     let mut learner = learner();
     // The right arm has type 1, the left one type 2, as each picture names the sides.
-    let side = |it: usize| if it < 14 { 1 } else { 2 };
+    let side = |value: usize| if value < 14 { 1 } else { 2 };
     let (front, back) = (observation(side, 0.1, false), observation(side, 0.1, true));
     add_views(&mut learner, [&front, &back], 175.0, 100);
     let learned = learned(&learner);
@@ -183,7 +183,7 @@ proptest! {
         let marginals = marginals(&shape, &[&counts]);
         let joint = counts.joint(&shape, &marginals, weight, false);
         prop_assert!((joint[7].sum() - 1.0).abs() < 1e-9);
-        prop_assert!(joint[7].iter().all(|it| *it > 0.0));
+        prop_assert!(joint[7].iter().all(|value| *value > 0.0));
         let tables = counts.tables(&shape, &marginals, weight, Appearance::Joint);
         let row: f64 = (0..3).map(|b| tables.conditional[0].value(7, 1, b)).sum();
         prop_assert!((row - 1.0).abs() < 1e-9);

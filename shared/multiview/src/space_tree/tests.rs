@@ -67,11 +67,11 @@ impl Bumps {
     }
 
     fn of_joints(camera: &Camera, joints: &[[f64; 3]; N]) -> Self {
-        let at = joints.map(|it| {
-            let at = camera.project(&Point3::from(it)).unwrap();
+        let at = joints.map(|joint| {
+            let at = camera.project(&Point3::from(joint)).unwrap();
             Some([at.x, at.y])
         });
-        let maxima = at.map(|it| it.map_or_else(Vec::new, |it| vec![(it, 1.02_f32.ln())]));
+        let maxima = at.map(|at| at.map_or_else(Vec::new, |it| vec![(it, 1.02_f32.ln())]));
         Self {
             at,
             maxima: maxima.to_vec(),
@@ -81,8 +81,8 @@ impl Bumps {
 
 impl JointEvidence for Bumps {
     fn at(&self, joint: usize, [x, y]: [f64; 2]) -> f32 {
-        let heat = self.at[joint].map_or(0.0, |it| {
-            let squared = (x - it[0]).powi(2) + (y - it[1]).powi(2);
+        let heat = self.at[joint].map_or(0.0, |at| {
+            let squared = (x - at[0]).powi(2) + (y - at[1]).powi(2);
             (-squared / (2.0 * SIGMA * SIGMA)).exp()
         });
         (heat + EPS).ln() as f32
@@ -132,7 +132,7 @@ const RING: [f64; 4] = [10.0, 95.0, 190.0, 260.0];
 #[test]
 fn a_person_whom_all_views_show_is_found() {
     for n in 2..=4 {
-        let cameras: Vec<Camera> = RING[..n].iter().map(|it| camera(*it)).collect();
+        let cameras: Vec<Camera> = RING[..n].iter().map(|ring| camera(*ring)).collect();
         let bumps: Vec<Bumps> = cameras.iter().map(Bumps::of).collect();
         let error = worst(&solved(&cameras, &bumps));
         assert!(error < 0.03, "{n} views: {error}");
@@ -144,9 +144,9 @@ fn a_joint_that_views_put_elsewhere_is_outvoted_by_bones_and_the_other_views() {
     let cameras = RING.map(camera);
     let mut bumps = cameras.each_ref().map(Bumps::of);
     for (view, joint) in [(0, 6), (1, 6), (2, 0), (3, 10)] {
-        let wrong = bumps[view].at[joint].map(|it| [it[0] + 70.0, it[1] - 40.0]);
+        let wrong = bumps[view].at[joint].map(|at| [at[0] + 70.0, at[1] - 40.0]);
         bumps[view].at[joint] = wrong;
-        bumps[view].maxima[joint] = wrong.map(|it| (it, 0.0)).into_iter().collect();
+        bumps[view].maxima[joint] = wrong.map(|wrong| (wrong, 0.0)).into_iter().collect();
     }
     let error = worst(&solved(&cameras, &bumps));
     assert!(error < 0.03, "{error}");
@@ -169,7 +169,7 @@ fn a_joint_that_only_two_views_show_stays_and_one_that_one_view_shows_is_none() 
         view.maxima[7].clear();
     }
     let found = solved(&cameras, &bumps);
-    let missing: Vec<usize> = (0..N).filter(|it| found.joints[*it].is_none()).collect();
+    let missing: Vec<usize> = (0..N).filter(|i| found.joints[*i].is_none()).collect();
     assert_eq!(missing, [6, 7]);
     assert!(worst(&found) < 0.03);
     assert_eq!(
@@ -182,7 +182,7 @@ fn a_joint_that_only_two_views_show_stays_and_one_that_one_view_shows_is_none() 
 #[test]
 fn a_view_that_names_the_sides_the_wrong_way_is_exchanged() {
     for n in 3..=4 {
-        let cameras: Vec<Camera> = RING[..n].iter().map(|it| camera(*it)).collect();
+        let cameras: Vec<Camera> = RING[..n].iter().map(|ring| camera(*ring)).collect();
         let mut bumps: Vec<Bumps> = cameras.iter().map(Bumps::of).collect();
         for [right, left] in LIMBS.into_iter().flatten() {
             bumps[1].at.swap(right, left);
@@ -200,9 +200,9 @@ fn names_that_follow_the_picture_are_brought_together_whichever_views_exchange_t
         ..SpaceSettings::default()
     };
     for (n, exchanged) in [(2, 0b10), (3, 0b011), (4, 0b1010), (4, 0b0110), (4, 0b1111)] {
-        let cameras: Vec<Camera> = RING[..n].iter().map(|it| camera(*it)).collect();
+        let cameras: Vec<Camera> = RING[..n].iter().map(|ring| camera(*ring)).collect();
         let mut bumps: Vec<Bumps> = cameras.iter().map(Bumps::of).collect();
-        for view in (0..n).filter(|it| exchanged >> it & 1 == 1) {
+        for view in (0..n).filter(|i| exchanged >> i & 1 == 1) {
             for [right, left] in LIMBS.into_iter().flatten() {
                 bumps[view].at.swap(right, left);
                 bumps[view].maxima.swap(right, left);
@@ -239,8 +239,8 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
         flat[right] = [0.0, -flat[left][1], flat[left][2]];
     }
     let cameras = [45.0, 135.0, 225.0, 315.0].map(camera);
-    let bumps = cameras.each_ref().map(|it| {
-        let mut seen = Bumps::of_joints(it, &flat);
+    let bumps = cameras.each_ref().map(|camera| {
+        let mut seen = Bumps::of_joints(camera, &flat);
         // The side on the left of the picture is called the right one.
         for [right, left] in LIMBS.into_iter().flatten() {
             if seen.at[right].unwrap()[0] > seen.at[left].unwrap()[0] {
@@ -256,11 +256,11 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
             camera,
             evidence,
             exchanged: [false; 2],
-            front: front_in_view(camera, &place, &facing).map(|it| 10.0 * it as f32),
+            front: front_in_view(camera, &place, &facing).map(|value| 10.0 * value as f32),
         };
         let views: Vec<SpaceView<'_>> = cameras
             .iter()
-            .zip(bumps.iter().map(|it| it as &dyn JointEvidence))
+            .zip(bumps.iter().map(|bump| bump as &dyn JointEvidence))
             .map(view)
             .collect();
         let found = solve_person(&views, &settings).unwrap().pose;
@@ -285,7 +285,7 @@ fn a_camera_that_was_turned_is_left_out_where_three_others_agree() {
 #[test]
 fn bones_follow_the_stature_that_the_joints_say() {
     let of_anybody = lengths_of(None);
-    let small = STANDING.map(|it| Some(Point3::from(it) * 0.7));
+    let small = STANDING.map(|standing| Some(Point3::from(standing) * 0.7));
     let of_child = lengths_of(Some(&small));
     for (bone, (anybody, child)) in of_anybody.iter().zip(of_child).enumerate() {
         assert!(child.mean < anybody.mean, "{bone}");
@@ -301,8 +301,9 @@ fn whoever_is_the_same_person_in_most_views_is_chosen() {
     let seen = |camera: &Camera, by: [f64; 2], height: f64| SeenPerson {
         joints: STANDING
             .iter()
-            .map(|it| {
-                let at = camera.project(&(Point3::from(*it) + Vector3::new(by[0], by[1], 0.0)))?;
+            .map(|standing| {
+                let at =
+                    camera.project(&(Point3::from(*standing) + Vector3::new(by[0], by[1], 0.0)))?;
                 Some(([at.x, at.y], 0.9))
             })
             .collect(),
@@ -339,7 +340,7 @@ impl EitherLeg {
     fn of(camera: &Camera) -> Self {
         let mut bumps = Bumps::of(camera);
         for [right, left] in [[1, 4], [0, 5]] {
-            let places = [left, right].map(|it| bumps.at[it].unwrap());
+            let places = [left, right].map(|i| bumps.at[i].unwrap());
             let heats: [f32; 2] = [1.0, 0.8];
             let both = places.into_iter().zip(heats);
             let both: Vec<_> = both.map(|(at, heat)| (at, (heat + EPS as f32).ln())).collect();

@@ -44,7 +44,7 @@ pub(crate) fn between(
         // The scene has tables for its first two views.
         if views == [0, 1] {
             let types = [0, 1].map(|side| usize::from(poses[side].parts[parts[side]].mixture));
-            assert!(types.iter().all(|it| *it < N_TYPES));
+            assert!(types.iter().all(|kind| *kind < N_TYPES));
             let other_side = scene.tables.exchanged.as_ref();
             let table = if exchanged {
                 other_side.unwrap()
@@ -106,7 +106,7 @@ pub(crate) fn released(
         let other = if exchanged { mirror } else { part };
         let centre = scene.views[support].plan.centres(&poses[support])[other];
         // The program counts from 1.
-        let pixel = centre.map(|it| (it + 1.0).round());
+        let pixel = centre.map(|centre| (centre + 1.0).round());
         let size = scene.views[support].plan.layout().image_size;
         let inside = |axis: usize| pixel[axis] > 0.0 && pixel[axis] < size[axis] as f64;
         if !inside(0) || !inside(1) || !is_supporting(scene, settings, support, [other, part]) {
@@ -137,10 +137,10 @@ fn is_supporting(scene: &Scene, settings: &Settings, support: usize, parts: [usi
 fn heat(scene: &Scene, target: usize, pose: &Pose, part: usize, pixel: [f64; 2]) -> f64 {
     let [here, there] = [target, 1 - target].map(|view| scene.views[view].plan.camera());
     let fundamental = epipolar::fundamental(there, here);
-    let at = Point2::from(pixel.map(|it| it - 1.0));
+    let at = Point2::from(pixel.map(|pixel| pixel - 1.0));
     let line = epipolar::epipolar_line(&fundamental, &at).unwrap();
     let layout = scene.views[target].plan.layout();
-    let [right, bottom] = layout.image_size.map(|it| it as f64 - 0.5);
+    let [right, bottom] = layout.image_size.map(|image_size| image_size as f64 - 0.5);
     let mut ends = Vec::new();
     for x in [-0.5, right] {
         let y = -(line.x * x + line.z) / line.y;

@@ -235,7 +235,7 @@ proptest! {
             (inside.fx, inside.fy) = (2.0 * inside.fx, 2.0 * inside.fy);
             // Pixels are counted from the centre of the first one.
             (inside.cx, inside.cy) = (2.0 * inside.cx + 0.5, 2.0 * inside.cy + 0.5);
-            inside.size = inside.size.map(|it| 2 * it);
+            inside.size = inside.size.map(|size| 2 * size);
             let model = Arc::clone(scene.solver.model());
             view.plan = ViewPlan::new(camera, model, Arc::new(layout(&SIZES, 8.0)));
         }
@@ -438,7 +438,7 @@ fn without_expected_errors_the_first_support_is_the_view_with_higher_score() {
             counts[first] += 1;
         }
     }
-    assert!(counts.iter().all(|it| *it > 0), "{counts:?}");
+    assert!(counts.iter().all(|count| *count > 0), "{counts:?}");
 }
 
 #[test]

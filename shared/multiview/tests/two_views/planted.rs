@@ -86,7 +86,7 @@ pub(crate) fn model(noise: &mut Noise) -> Arc<Model> {
 /// level is twice as coarse.
 pub(crate) fn layout(sizes: &[[usize; 2]], cell_px: f64) -> Layout {
     let [rows, cols] = sizes[0];
-    let image_size = [cols, rows].map(|it| (it as f64 * cell_px) as usize);
+    let image_size = [cols, rows].map(|value| (value as f64 * cell_px) as usize);
     let mut offset = 0;
     let level = |(level, &[rows, cols]): (usize, &[usize; 2])| {
         let level_layout = LevelLayout {
@@ -114,7 +114,7 @@ pub(crate) fn camera(bearing: f64, height: f64, size: [usize; 2], lens: LensMode
     let upright = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
     // `look_at_rh` is x right, y up, z backward; half a turn about x gives OpenCV's axes.
     let opencv = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
-    let [width, rows] = size.map(|it| it as f64);
+    let [width, rows] = size.map(|size| size as f64);
     Camera {
         name: "planted".to_owned(),
         intrinsics: Intrinsics {
@@ -122,7 +122,7 @@ pub(crate) fn camera(bearing: f64, height: f64, size: [usize; 2], lens: LensMode
             fy: 1.05 * width,
             cx: width / 2.0 - 0.3,
             cy: rows / 2.0 + 0.4,
-            size: size.map(|it| it as u32),
+            size: size.map(|size| size as u32),
             lens: Lens::new(lens),
         },
         camera_from_world: opencv * upright,

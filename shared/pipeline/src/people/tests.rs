@@ -31,7 +31,7 @@ pub(crate) fn camera(view: usize) -> Camera {
 /// What a view sees of a person who stands at a place.
 fn sighting(camera: &Camera, [x, y]: [f64; 2], strength: f64) -> FoundBody {
     let line = [1.75, 1.5, 0.95, 0.5, 0.08].map(|z| Point3::new(x, y, z));
-    let points_px = line.map(|it| <[f64; 2]>::from(camera.project(&it).unwrap()));
+    let points_px = line.map(|line| <[f64; 2]>::from(camera.project(&line).unwrap()));
     FoundBody {
         points_px,
         rays: points_px.map(|[x, y]| camera.ray(&Point2::new(x, y))),
@@ -114,11 +114,11 @@ fn something_that_is_no_body_in_space_is_nobody() {
     let doll = |camera: &Camera| {
         let mut it = sighting(camera, [0.0, 0.0], 1.0);
         let line = [0.35, 0.3, 0.2, 0.1, 0.02].map(|z| Point3::new(0.0, 0.0, z));
-        it.points_px = line.map(|it| <[f64; 2]>::from(camera.project(&it).unwrap()));
+        it.points_px = line.map(|line| <[f64; 2]>::from(camera.project(&line).unwrap()));
         it.rays = it.points_px.map(|[x, y]| camera.ray(&Point2::new(x, y)));
         it
     };
-    let views = cameras.iter().map(|it| vec![doll(it)]).collect();
+    let views = cameras.iter().map(|camera| vec![doll(camera)]).collect();
     assert_eq!(of_views(&cameras, views).people, []);
 }
 
@@ -158,7 +158,7 @@ proptest! {
         let found = found(&cameras, &people);
         for (index, it) in found.people.iter().enumerate() {
             for (view, candidate) in it.candidates.iter().enumerate() {
-                prop_assert!(candidate.is_none_or(|it| it < found.views[view].len()));
+                prop_assert!(candidate.is_none_or(|candidate| candidate < found.views[view].len()));
             }
             for other in &found.people[..index] {
                 prop_assert!((it.place - other.place).norm() >= APART_M);

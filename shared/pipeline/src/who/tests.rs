@@ -82,7 +82,8 @@ fn everybody_is_told_with_the_candidate_of_every_view() {
         found.sort_unstable();
         assert_eq!((found, frame.n_seen), (vec![1, 2], 2));
         // Person p is candidate (p - v) mod 2 of view v.
-        let mut candidates: Vec<_> = frame.people.iter().map(|it| it.candidates.clone()).collect();
+        let mut candidates: Vec<_> =
+            frame.people.iter().map(|person| person.candidates.clone()).collect();
         candidates.sort();
         let [even, odd] = [0, 1].map(|first| {
             let each = (0..N_VIEWS).map(|view| Some((view + first) % 2));

@@ -94,7 +94,7 @@ fn of_frame(rows: usize, combine: Combine) -> [Count; 2] {
             solved.collect::<Vec<_>>()
         });
         let hypotheses = pairs.iter().flat_map(|pair| &pair.hypotheses);
-        let n_solutions: usize = hypotheses.map(|it| it.iterations.len()).sum();
+        let n_solutions: usize = hypotheses.map(|hypothesis| hypothesis.iterations.len()).sum();
         let (_, of_skeleton) = count(|| skeleton.run(&scene.answers, &pairs));
         last = Some((of_pairs, n_solutions, of_skeleton));
     }

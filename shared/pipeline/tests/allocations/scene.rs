@@ -135,7 +135,7 @@ fn camera(view: usize, size: [usize; 2]) -> Camera {
     let upright = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
     // `look_at_rh` is x right, y up, z backward: half a turn about x makes it OpenCV's.
     let opencv = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
-    let [width, height] = size.map(|it| it as f64);
+    let [width, height] = size.map(|size| size as f64);
     Camera {
         name: format!("camera {view}"),
         intrinsics: Intrinsics {
@@ -143,7 +143,7 @@ fn camera(view: usize, size: [usize; 2]) -> Camera {
             fy: width,
             cx: width / 2.0,
             cy: height / 2.0,
-            size: size.map(|it| it as u32),
+            size: size.map(|size| size as u32),
             lens: Lens::new(LensModel::Pinhole),
         },
         camera_from_world: opencv * upright,

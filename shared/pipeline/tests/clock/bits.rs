@@ -32,7 +32,7 @@ fn skeletons(scene: &Scene, instants: bool, skews_s: [f64; 3]) -> Vec<Skeleton> 
 
 /// Every digit of the joints; not a number is equal to itself.
 fn digits(skeletons: &[Skeleton]) -> Vec<String> {
-    skeletons.iter().map(|it| format!("{it:?}")).collect()
+    skeletons.iter().map(|skeleton| format!("{skeleton:?}")).collect()
 }
 
 #[test]

@@ -36,7 +36,8 @@ fn error_mm(film: &mut Film, skews_ms: &[f64], by: By) -> f64 {
             let taken_s = instant_s + skew_s;
             let noise = film.noise();
             let points = film.see(camera, taken_s, &noise);
-            let height = longer_side(points.iter().map(|it| [it.x, it.y])).expect("points");
+            let height =
+                longer_side(points.iter().map(|point| [point.x, point.y])).expect("points");
             let each = points.iter().enumerate().map(|(joint, at)| {
                 let velocity = tracks.velocity(joint, (taken_s, *at), height);
                 used((*at, film.noise_px), velocity, (*skew_s, height), by)
@@ -70,7 +71,7 @@ fn used(
     (skew_s, height): (f64, f64),
     by: By,
 ) -> (Point2<f64>, f64) {
-    let speed = velocity.map_or(height, |it| it.px_per_s.norm());
+    let speed = velocity.map_or(height, |velocity| velocity.px_per_s.norm());
     let (there, more) = moved(at, velocity, skew_s, [sigma_px, height]);
     match by {
         By::Nothing => (at, sigma_px),

@@ -20,7 +20,7 @@ fn watch(
 ) -> StepWatch {
     let mut watch = StepWatch::new(calibrated.to_vec());
     let cameras = film.cameras().to_vec();
-    let skews_s: Vec<f64> = skews_ms.iter().map(|it| it * 1e-3).collect();
+    let skews_s: Vec<f64> = skews_ms.iter().map(|skews_ms| skews_ms * 1e-3).collect();
     for frame in 0..n_frames {
         let instant_s = f64::from(frame) / RATE_HZ;
         let mut views = Vec::new();
@@ -28,7 +28,7 @@ fn watch(
             let taken_s = instant_s + skews_s[view] + 1e-3 * late_ms(view, frame);
             let noise = film.noise();
             let points = film.see(camera, taken_s, &noise);
-            views.push(Some(points.map(|it| [it.x, it.y]).to_vec()));
+            views.push(Some(points.map(|point| [point.x, point.y]).to_vec()));
         }
         watch.note(instant_s, &views, &skews_s);
     }
@@ -134,7 +134,7 @@ fn a_late_camera_may_look_moved_and_is_then_known_to_be_late() {
             let late_s = if view == 1 { 0.06 } else { 0.0 };
             let noise = film.noise();
             let points = film.see(camera, f64::from(frame) / RATE_HZ + late_s, &noise);
-            Some(points.map(|it| [it.x, it.y]).to_vec())
+            Some(points.map(|point| [point.x, point.y]).to_vec())
         });
         moved.note(&views.collect::<Vec<_>>());
     }

@@ -27,7 +27,7 @@ fn filled(bumps: &[Bump]) -> Vec<f32> {
 }
 
 fn bump(joint: usize, at: [f32; 2], heat: f32, sigma: [f32; 2], turned: f32) -> Bump {
-    let [p, q] = sigma.map(|it| 1.0 / (it * it));
+    let [p, q] = sigma.map(|sigma| 1.0 / (sigma * sigma));
     let (sin, cos) = turned.sin_cos();
     Bump {
         joint,
@@ -89,10 +89,10 @@ fn two_people_and_a_ridge_come_back_to_a_few_hundredths() {
         bump(4, [55.0, 70.0], 0.4, [2.0, 2.0], 0.0),
     ];
     // A limb along which the joint may lie anywhere.
-    given.extend((0..6).map(|it| {
+    given.extend((0..6).map(|i| {
         bump(
             8,
-            [30.0 + 2.0 * it as f32, 45.0 + it as f32],
+            [30.0 + 2.0 * i as f32, 45.0 + i as f32],
             0.12,
             [1.5, 1.5],
             0.0,

@@ -18,7 +18,7 @@ fn person() -> Vec<Option<Keypoint>> {
 }
 
 fn ways(names: &[&str]) -> Vec<Vec<Way>> {
-    let names: Vec<String> = names.iter().map(|&it| it.to_owned()).collect();
+    let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
     joint_ways(&names)
 }
 
@@ -167,7 +167,7 @@ fn a_small_or_strange_box_has_maps_too() {
         let maps = maps(&keypoints);
         let at = keypoints[NECK_25].unwrap().at;
         assert!(maps.at(NECK, at) > maps.floor() + 1.0);
-        assert!(maps.values.iter().all(|it| it.is_finite()));
+        assert!(maps.values.iter().all(|value| value.is_finite()));
     }
 }
 

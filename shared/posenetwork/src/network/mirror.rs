@@ -22,7 +22,7 @@ impl Mirror {
             let Some(other) = mirrored(name) else {
                 return Ok(None);
             };
-            let at = names.iter().position(|it| *it == other);
+            let at = names.iter().position(|name| *name == other);
             at.map(Some)
                 .ok_or_else(|| format!("there is a keypoint `{name}`, but no `{other}`"))
         };
@@ -129,7 +129,7 @@ impl Mirror {
                     Some(bins) => (n - bin).checked_sub(bins),
                     None => Some(bin),
                 };
-                if let Some(other) = other.filter(|it| *it < n) {
+                if let Some(other) = other.filter(|other| *other < n) {
                     let it = &mut to.values[at * n + bin];
                     *it = f32::midpoint(*it, from.values[partner * n + other]);
                 }

@@ -7,7 +7,7 @@ use super::*;
 
 /// A picture of 12 x 16 pixels in which no two pixels are alike.
 fn picture() -> Vec<u8> {
-    (0..3 * 12 * 16).map(|it| (it * 37 % 251) as u8).collect()
+    (0..3 * 12 * 16).map(|i| (i * 37 % 251) as u8).collect()
 }
 
 /// The first output without and with mirror images.
@@ -23,7 +23,7 @@ fn both(net: &Network, card: &str) -> [Vec<Vec<f32>>; 2] {
         let outline = [0.0, 0.0, 12.0, 16.0];
         let sight = network.look(image, outline, &mut workspace).unwrap();
         let outputs = sight.unwrap().outputs;
-        outputs.iter().map(|it| it.values.clone()).collect()
+        outputs.iter().map(|output| output.values.clone()).collect()
     })
 }
 
@@ -92,7 +92,7 @@ fn cells_on_the_first_of_their_pixels_are_moved_by_one() {
     let [plain, mirrored] = both(&pooled(), CARD);
     // The first column has no partner; the second one's is the third of the mirror image, which is the first of the picture.
     for row in 0..12 {
-        let [first, second, third] = [0, 1, 2].map(|it| plain[0][3 * row + it]);
+        let [first, second, third] = [0, 1, 2].map(|i| plain[0][3 * row + i]);
         let expected = [
             first,
             f32::midpoint(second, first),

@@ -6,8 +6,10 @@ use keypoints::{Card, Codec, Layout};
 use super::FitError;
 
 fn listed(ports: &[Port]) -> String {
-    let names: Vec<String> =
-        ports.iter().map(|it| format!("`{}` {}", it.name, written(&it.sides))).collect();
+    let names: Vec<String> = ports
+        .iter()
+        .map(|port| format!("`{}` {}", port.name, written(&port.sides)))
+        .collect();
     names.join(", ")
 }
 
@@ -15,7 +17,7 @@ fn listed(ports: &[Port]) -> String {
 pub(crate) fn input_of(input_card: &keypoints::Input, inputs: &[Port]) -> Result<String, FitError> {
     let input = match (&input_card.name, inputs) {
         (Some(name), _) => {
-            inputs.iter().find(|it| it.name == *name).ok_or_else(|| FitError::Name {
+            inputs.iter().find(|input| input.name == *name).ok_or_else(|| FitError::Name {
                 what: "input",
                 wanted: name.clone(),
                 has: listed(inputs),
@@ -85,7 +87,7 @@ pub(crate) fn only(
     key: &'static str,
 ) -> Result<String, FitError> {
     match (name, outputs) {
-        (Some(name), _) if outputs.iter().any(|it| it.name == *name) => Ok(name.clone()),
+        (Some(name), _) if outputs.iter().any(|output| output.name == *name) => Ok(name.clone()),
         (Some(name), _) => Err(FitError::Name {
             what: "output",
             wanted: name.clone(),

@@ -15,12 +15,12 @@ pub(crate) fn as_taken<'a>(
         Numbers::F32 => Values::F32(values),
         Numbers::I32 => {
             whole.clear();
-            whole.extend(values.iter().map(|it| it.round() as i32));
+            whole.extend(values.iter().map(|value| value.round() as i32));
             Values::I32(whole)
         }
         Numbers::U8 => {
             bytes.clear();
-            bytes.extend(values.iter().map(|it| it.round() as u8));
+            bytes.extend(values.iter().map(|value| value.round() as u8));
             Values::U8(bytes)
         }
     }

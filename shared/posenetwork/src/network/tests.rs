@@ -22,7 +22,7 @@ names = ["a", "b", "c"]
 "#;
 
 pub(super) fn sides(sides: &[usize]) -> Vec<Side> {
-    sides.iter().map(|it| Side::Fixed(*it)).collect()
+    sides.iter().map(|side| Side::Fixed(*side)).collect()
 }
 
 /// Gives what `operator` makes of its input as three maps.
@@ -223,7 +223,7 @@ fn a_cell_lies_on_the_first_of_its_pixels_or_in_their_middle() {
         let mut maps = JointMaps::default();
         maps.read(&sight, &MapSettings::default()).unwrap();
         assert_eq!(maps.maxima(2, 1)[0].0, expected);
-        let beside = expected.map(|it| it + 1.0);
+        let beside = expected.map(|expected| expected + 1.0);
         assert!(maps.at(2, expected) > maps.at(2, beside));
     }
 }
@@ -266,8 +266,8 @@ fn a_network_of_bytes_is_taken_by_the_card_of_one_of_whole_numbers() {
     );
     // The type of the input: bytes in place of single precision.
     let mut file = net.file();
-    let input = file.windows(7).rposition(|it| it == b"picture").unwrap();
-    let kind = file[input..].windows(3).position(|it| it == [8, 1, 18]);
+    let input = file.windows(7).rposition(|window| window == b"picture").unwrap();
+    let kind = file[input..].windows(3).position(|window| window == [8, 1, 18]);
     file[input + kind.unwrap() + 1] = 2;
     let fitted = |numbers: &str| {
         let card = CARD.replace(

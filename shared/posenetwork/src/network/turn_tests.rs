@@ -9,7 +9,7 @@ const TURNS: [Turn; 4] = [Turn::Up, Turn::Right, Turn::Down, Turn::Left];
 
 /// A picture of 16 x 16 pixels in which no two pixels are alike.
 fn picture() -> Vec<u8> {
-    (0..3 * 16 * 16).map(|it| (it * 37 % 251) as u8).collect()
+    (0..3 * 16 * 16).map(|i| (i * 37 % 251) as u8).collect()
 }
 
 /// The keypoints in a square box of the picture.
@@ -27,7 +27,7 @@ fn found(net: &Network, card: &str, turn: Turn) -> Vec<Keypoint> {
 fn whoever_does_not_care_sees_the_same_in_every_turn() {
     // The window is 12 x 16 or 16 x 12 pixels, widened to hold the box.
     let upright = found(&network("Relu"), CARD, Turn::Up);
-    let place = |it: &Keypoint| it.at.map(|it| it.round() as i64);
+    let place = |keypoint: &Keypoint| keypoint.at.map(|at| at.round() as i64);
     for turn in TURNS {
         for (a, b) in found(&network("Relu"), CARD, turn).iter().zip(&upright) {
             assert_eq!(place(a), place(b), "{turn:?}");
@@ -39,7 +39,7 @@ fn whoever_does_not_care_sees_the_same_in_every_turn() {
 fn distributions_over_columns_and_rows_are_turned_too() {
     let (net, simcc) = distributions();
     let upright = found(&net, &simcc, Turn::Up);
-    let place = |it: &Keypoint| it.at.map(|it| it.round() as i64);
+    let place = |keypoint: &Keypoint| keypoint.at.map(|at| at.round() as i64);
     for turn in TURNS {
         for (a, b) in found(&net, &simcc, turn).iter().zip(&upright) {
             assert_eq!(place(a), place(b), "{turn:?}");

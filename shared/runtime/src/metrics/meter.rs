@@ -178,7 +178,7 @@ impl Meter {
 }
 
 fn number_of(view: Option<usize>) -> u32 {
-    view.and_then(|it| u32::try_from(it).ok()).unwrap_or(NO_VIEW)
+    view.and_then(|view| u32::try_from(view).ok()).unwrap_or(NO_VIEW)
 }
 
 /// Truncates a name between characters.

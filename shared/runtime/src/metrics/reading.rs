@@ -191,7 +191,7 @@ impl Reading {
         for (row, it) in rows.iter_mut().zip(&self.times) {
             *row = MetricsRow {
                 span: it.span,
-                view: it.view.map_or(NO_VIEW, |it| it as u32),
+                view: it.view.map_or(NO_VIEW, |view| view as u32),
                 count: it.count,
                 millihertz: it.millihertz,
                 p50_nanos: it.p50_nanos,
@@ -221,7 +221,7 @@ impl Reading {
             peak_memory_bytes: self.peak_memory_bytes,
             queue,
             longest_queue,
-            view: self.view.as_ref().map_or(NO_VIEW, |it| it.index as u32),
+            view: self.view.as_ref().map_or(NO_VIEW, |view| view.index as u32),
             finished: u32::from(self.is_finished),
             name,
             n_rows: self.times.len().min(MAX_ROWS) as u32,
@@ -283,7 +283,7 @@ fn queue_of(message: &Metrics) -> Result<Option<[u32; 2]>, ReadingError> {
 }
 
 fn name_of(bytes: &[u8; MAX_NAME]) -> Result<String, ReadingError> {
-    let len = bytes.iter().position(|it| *it == 0).unwrap_or(MAX_NAME);
+    let len = bytes.iter().position(|byte| *byte == 0).unwrap_or(MAX_NAME);
     let (name, rest) = bytes.split_at(len);
     let name = core::str::from_utf8(name).ok().filter(|_| rest.iter().all(|it| *it == 0));
     name.map(str::to_owned).ok_or(ReadingError::Name)
@@ -346,7 +346,7 @@ mod tests {
                 n_received: counts[3],
                 n_sent: counts[4],
                 sent_millihertz: counts[5],
-                n_dropped: core::array::from_fn(|it| counts[6].rotate_left(it as u32)),
+                n_dropped: core::array::from_fn(|i| counts[6].rotate_left(i as u32)),
                 evidence_bytes: counts[7],
                 memory_bytes: counts[8],
                 peak_memory_bytes: counts[9],

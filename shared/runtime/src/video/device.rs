@@ -186,7 +186,7 @@ pub(super) fn rate_hz([numerator, denominator]: [u32; 2]) -> Option<f64> {
 
 /// A text of the kernel, which ends with a zero.
 pub(super) fn text(bytes: &[u8]) -> String {
-    let end = bytes.iter().position(|it| *it == 0).unwrap_or(bytes.len());
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
     String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
 }
 
@@ -199,8 +199,8 @@ pub fn video_devices() -> io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in fs::read_dir("/dev")? {
         let name = entry?.file_name();
-        let number = name.to_str().and_then(|it| it.strip_prefix("video")?.parse::<u32>().ok());
-        found.extend(number.map(|it| (it, Path::new("/dev").join(name))));
+        let number = name.to_str().and_then(|text| text.strip_prefix("video")?.parse::<u32>().ok());
+        found.extend(number.map(|number| (number, Path::new("/dev").join(name))));
     }
     found.sort();
     Ok(found.into_iter().map(|it| it.1).collect())
@@ -226,7 +226,7 @@ mod tests {
         assert_eq!(text(b"uvcvideo\0\0\0x"), "uvcvideo");
         assert_eq!(text(b"full"), "full");
         assert_eq!(
-            rate_hz([1001, 30_000]).map(|it| (it * 100.0).round()),
+            rate_hz([1001, 30_000]).map(|value| (value * 100.0).round()),
             Some(2997.0)
         );
         assert_eq!(rate_hz([0, 5]), None);

@@ -52,7 +52,7 @@ impl VideoFormat {
         if self.sizes.iter().any(|it| it.has(size)) {
             return Some(size);
         }
-        let all = self.sizes.iter().map(|it| it.most);
+        let all = self.sizes.iter().map(|size| size.most);
         all.max_by_key(|it| u64::from(it[0]) * u64::from(it[1]))
     }
 
@@ -263,8 +263,8 @@ impl VideoDevice {
     /// [`VideoError::Request`] if the device refuses.
     pub fn set_control(&self, name: &str, value: i64) -> Result<(), VideoError> {
         let controls = self.controls();
-        let Some(control) = controls.iter().find(|it| it.name == name) else {
-            let names: Vec<&str> = controls.iter().map(|it| it.name.as_str()).collect();
+        let Some(control) = controls.iter().find(|control| control.name == name) else {
+            let names: Vec<&str> = controls.iter().map(|control| control.name.as_str()).collect();
             let offered = if names.is_empty() {
                 "none".to_owned()
             } else {
@@ -294,8 +294,8 @@ impl VideoDevice {
 
 /// The driver's name of a control as a key: `Exposure Time, Absolute` is `exposure_time_absolute`.
 fn as_key(name: &str) -> String {
-    let is_plain = |it: char| it.is_ascii_alphanumeric();
-    let words = name.split(|it| !is_plain(it)).filter(|it| !it.is_empty());
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric();
+    let words = name.split(|it| !is_plain(it)).filter(|part| !part.is_empty());
     words.collect::<Vec<_>>().join("_").to_ascii_lowercase()
 }
 

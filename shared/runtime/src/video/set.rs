@@ -13,7 +13,7 @@ impl VideoDevice {
     pub fn set(&self, wish: &VideoWish) -> Result<VideoMode, VideoError> {
         let offered = self.formats()?;
         let now = self.mode()?;
-        let has = |it: &FourCc| offered.iter().any(|offer| offer.format == *it);
+        let has = |four_cc: &FourCc| offered.iter().any(|offer| offer.format == *four_cc);
         let format = match &wish.formats[..] {
             [] => now.format,
             wanted => *wanted.iter().find(|it| has(it)).ok_or_else(|| {
@@ -49,8 +49,9 @@ impl VideoDevice {
             return Err(self.not_offered("format", format.to_string(), names_of(offered)));
         }
         if [set.width, set.height] != size {
-            let sizes = offered.iter().filter(|it| it.format == format);
-            let sizes: Vec<String> = sizes.flat_map(|it| &it.sizes).map(VideoSize::text).collect();
+            let sizes = offered.iter().filter(|offered| offered.format == format);
+            let sizes: Vec<String> =
+                sizes.flat_map(|size| &size.sizes).map(VideoSize::text).collect();
             let wanted = format!("{}x{} in {format}", size[0], size[1]);
             return Err(self.not_offered("size", wanted, sizes.join(", ")));
         }
@@ -73,15 +74,15 @@ impl VideoDevice {
         };
         let asked = raw::ask(self.fd(), raw::S_PARM, &mut parameters);
         let set = rate_hz([parameters.numerator, parameters.denominator]);
-        let fits = |it: f64| (it / rate - 1.0).abs() <= TOLERANCE;
+        let fits = |value: f64| (value / rate - 1.0).abs() <= TOLERANCE;
         if asked.is_ok() && set.is_some_and(fits) {
             return Ok(());
         }
         let own = offered.iter().find(|it| it.format == format);
         let rates = own.map_or_else(Vec::new, |it| it.rates_at(size));
-        let rates: Vec<String> = rates.iter().map(|it| format!("{it:.2}")).collect();
+        let rates: Vec<String> = rates.iter().map(|rate| format!("{rate:.2}")).collect();
         let offered = if rates.is_empty() {
-            set.map_or_else(|| "no choice".to_owned(), |it| format!("{it:.2}"))
+            set.map_or_else(|| "no choice".to_owned(), |set| format!("{set:.2}"))
         } else {
             rates.join(", ")
         };
@@ -100,6 +101,6 @@ impl VideoDevice {
 }
 
 fn names_of(offered: &[VideoFormat]) -> String {
-    let names: Vec<String> = offered.iter().map(|it| it.format.to_string()).collect();
+    let names: Vec<String> = offered.iter().map(|offered| offered.format.to_string()).collect();
     names.join(", ")
 }

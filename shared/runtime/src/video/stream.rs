@@ -103,7 +103,7 @@ impl VideoStream {
 
     fn give_back(&self, index: u32) -> Result<(), VideoError> {
         let mut buffer = empty(index);
-        raw::ask(self.device.fd(), raw::QBUF, &mut buffer).map_err(|it| self.gone(it))
+        raw::ask(self.device.fd(), raw::QBUF, &mut buffer).map_err(|error| self.gone(error))
     }
 
     fn gone(&self, source: io::Error) -> VideoError {

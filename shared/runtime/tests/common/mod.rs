@@ -43,7 +43,7 @@ impl Deployment {
     pub(crate) fn alive(&self) -> Vec<String> {
         let base = self.namespace().base();
         let all = runtime::deployments(base).unwrap();
-        let own = |it: &runtime::Remains| it.namespace == *self.namespace();
+        let own = |remains: &runtime::Remains| remains.namespace == *self.namespace();
         all.into_iter().find(own).unwrap().processes
     }
 

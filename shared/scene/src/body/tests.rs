@@ -39,7 +39,7 @@ fn a_standing_person_has_the_requested_height() {
 #[test]
 fn left_joints_are_on_the_left() {
     let joints = bones().joints(&bones().frames(&standing()));
-    let names = skeleton::PARSE14.joints.iter().map(|it| it.name);
+    let names = skeleton::PARSE14.joints.iter().map(|joint| joint.name);
     for (name, joint) in names.zip(joints) {
         let side = match name.split(' ').next() {
             Some("left") => 1.0,

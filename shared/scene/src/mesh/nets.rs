@@ -64,8 +64,8 @@ fn around(at: [usize; 3], axis: usize) -> [[usize; 3]; 4] {
 /// The mean of the places where the surface cuts the edges of a cell.
 fn cut(grid: &Grid, cell: [usize; 3]) -> Option<Point3<f32>> {
     let corner = |bits: usize| core::array::from_fn(|axis| cell[axis] + (bits >> axis & 1));
-    let values: [f32; 8] = core::array::from_fn(|it| grid.values[grid.index(corner(it))]);
-    let n_inside = values.iter().filter(|it| **it < 0.0).count();
+    let values: [f32; 8] = core::array::from_fn(|i| grid.values[grid.index(corner(i))]);
+    let n_inside = values.iter().filter(|value| **value < 0.0).count();
     if n_inside == 0 || n_inside == 8 {
         return None;
     }

@@ -354,7 +354,7 @@ impl Placement {
         ];
         Block::new(
             centre,
-            half.map(|it| it as f32),
+            half.map(|half| half as f32),
             self.heading as f32,
             material,
         )

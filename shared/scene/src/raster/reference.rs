@@ -15,7 +15,7 @@ pub(super) fn nearest_triangle(
     let ray = camera.ray(&at)?;
     let mut best: Option<(u32, f64)> = None;
     for (index, corners) in triangles.iter().enumerate() {
-        let [a, b, c] = corners.map(|it| points[it as usize]);
+        let [a, b, c] = corners.map(|corner| points[corner as usize]);
         let normal = (b - a).cross(&(c - a));
         let facing = normal.dot(&ray.direction);
         if facing >= 0.0 {
@@ -59,7 +59,8 @@ mod tests {
         let subject = Subject::new(2);
         let (_, mesh) = mesh::of(&subject, &Bones::new(&subject.proportions));
         let up = Vector3::new(0.0, 0.0, 0.95);
-        let points: Vec<Point3<f64>> = mesh.points.iter().map(|it| it.cast::<f64>() + up).collect();
+        let points: Vec<Point3<f64>> =
+            mesh.points.iter().map(|point| point.cast::<f64>() + up).collect();
         let corner = |at: &Point3<f64>| {
             let pixel = camera.project(at).unwrap();
             let depth = (camera.camera_from_world * at).z;
@@ -69,7 +70,10 @@ mod tests {
         let mut samples = Samples::default();
         samples.begin(128, 96, &vec![0.0; 128 * 96]);
         for (index, triangle) in mesh.triangles.iter().enumerate() {
-            samples.draw(index as u32, triangle.map(|it| &corners[it as usize]));
+            samples.draw(
+                index as u32,
+                triangle.map(|triangle| &corners[triangle as usize]),
+            );
         }
         let (mut n_seen, mut n_edge) = (0, 0);
         for row in (0..96).step_by(2) {

@@ -13,7 +13,7 @@ fn recorded(number: u64, action: Action, rate_hz: f64, n: usize) -> (Recording, 
         let frames = motion.bones.frames(&motion.pose(nth as f64 / rate_hz));
         let toe = |side: usize| (frames[FOOT[side]] * Point3::from(motion.bones.sole[0])).coords;
         Posture {
-            joints: motion.bones.joints(&frames).map(|it| it.coords.into()),
+            joints: motion.bones.joints(&frames).map(|joint| joint.coords.into()),
             toes: Some([toe(RIGHT).into(), toe(LEFT).into()]),
         }
     };
@@ -112,7 +112,7 @@ fn a_scaled_and_shifted_recording_gives_the_same_motion() {
     for posture in &mut far.postures {
         let moved = |at: [f64; 3]| [3.0 * at[0] + 40.0, 3.0 * at[1] - 7.0, 3.0 * at[2] + 2.0];
         posture.joints = posture.joints.map(moved);
-        posture.toes = posture.toes.map(|it| it.map(moved));
+        posture.toes = posture.toes.map(|toe| toe.map(moved));
     }
     let (near, bones, height) = performed(&recording, 5);
     let (far, ..) = performed(&far, 5);
@@ -137,7 +137,7 @@ fn coinciding_joints_give_finite_frames() {
     };
     let (it, ..) = performed(&nowhere, 1);
     for frame in it.frames(0.0) {
-        assert!(frame.translation.vector.iter().all(|it| it.is_finite()));
-        assert!(frame.rotation.coords.iter().all(|it| it.is_finite()));
+        assert!(frame.translation.vector.iter().all(|value| value.is_finite()));
+        assert!(frame.rotation.coords.iter().all(|coord| coord.is_finite()));
     }
 }

@@ -62,8 +62,9 @@ pub(super) fn room(random: Random, cameras: &[Point3<f32>], furniture: Vec<Block
     };
     for nth in 0..22 {
         let pieces = wall_furniture(random.fork("thing").nth(nth), low, high);
-        let free =
-            |it: &Block| is_free(it, cameras) && !room.blocks.iter().any(|other| touch(it, other));
+        let free = |block: &Block| {
+            is_free(block, cameras) && !room.blocks.iter().any(|other| touch(block, other))
+        };
         if pieces.iter().all(free) {
             room.blocks.extend(pieces);
         }
@@ -212,6 +213,6 @@ fn is_free(block: &Block, cameras: &[Point3<f32>]) -> bool {
 
 /// Whether two blocks are so near that they may touch.
 fn touch(a: &Block, b: &Block) -> bool {
-    let reach = |it: &Block| it.half[0].hypot(it.half[1]);
+    let reach = |block: &Block| block.half[0].hypot(block.half[1]);
     (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1]) < reach(a) + reach(b)
 }

@@ -89,10 +89,10 @@ fn visible_joints_lie_on_the_mask_and_the_box_encloses_the_mask() {
 fn joints_behind_the_body_are_not_visible() {
     // Around the ring, every joint of the limbs is occluded in some view and visible in another.
     let scene = scene("ring:8", Action::Walking, 1);
-    let views = (0..8).map(|it| View::new(&scene, it).unwrap().truth(3).visible);
+    let views = (0..8).map(|i| View::new(&scene, i).unwrap().truth(3).visible);
     let views: Vec<_> = views.collect();
     for joint in [1, 4, 6, 7, 10, 11] {
-        let seen: BTreeSet<bool> = views.iter().map(|it| it[joint]).collect();
+        let seen: BTreeSet<bool> = views.iter().map(|view| view[joint]).collect();
         assert_eq!(seen.len(), 2, "joint {joint} is the same from everywhere");
     }
 }
@@ -120,7 +120,7 @@ fn the_same_settings_give_the_same_bits_in_any_order() {
     let second = scene("ring:2", Action::Boxing, 4);
     let mut a = View::new(&first, 1).unwrap();
     let mut b = View::new(&second, 1).unwrap();
-    let forward: Vec<_> = (0..3).map(|it| picture(&mut a, it)).collect();
+    let forward: Vec<_> = (0..3).map(|i| picture(&mut a, i)).collect();
     let mut copy = b.clone();
     drop(picture(&mut copy, 9));
     for frame in [2, 0, 1] {
@@ -163,7 +163,7 @@ fn clock_offsets_and_dropped_frames_are_in_the_truth() {
     settings.flaws.desync_s = 0.2;
     settings.flaws.drop = 0.5;
     let scene = Arc::new(Scene::new(&settings).unwrap());
-    let mut views = [0, 1].map(|it| View::new(&scene, it).unwrap());
+    let mut views = [0, 1].map(|i| View::new(&scene, i).unwrap());
     assert_eq!(
         views[0].truth(0).seconds,
         0.0,
@@ -238,7 +238,7 @@ fn others_stand_around_and_are_not_the_subject() {
     let places: Vec<Vector3<f64>> = scene
         .others
         .iter()
-        .map(|it| it.frames(1.0)[PELVIS].translation.vector)
+        .map(|other| other.frames(1.0)[PELVIS].translation.vector)
         .collect();
     assert_eq!(places.len(), 4);
     for (nth, place) in places.iter().enumerate() {

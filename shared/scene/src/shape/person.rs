@@ -39,13 +39,16 @@ impl SolidBuilder<'_> {
     /// An ellipsoid; centre and radii in metres of the mean person.
     fn ellipsoid(&mut self, bone: usize, centre: [f32; 3], radii: [f32; 3], slack: f32) {
         let s = self.scale;
-        let solid = Solid::ellipsoid(centre.map(|it| s * it), radii.map(|it| s * it));
+        let solid = Solid::ellipsoid(
+            centre.map(|centre| s * centre),
+            radii.map(|radius| s * radius),
+        );
         self.pieces.push((bone, solid.thicker(slack)));
     }
 
     /// A cone between points in metres, radii in those of the mean person.
     fn cone(&mut self, bone: usize, ends: [[f32; 3]; 2], radii: [f32; 2], slack: f32) {
-        let r = radii.map(|it| it * self.scale);
+        let r = radii.map(|radius| radius * self.scale);
         let solid = Solid::cone(ends[0], ends[1], r).thicker(slack);
         self.pieces.push((bone, solid));
     }
@@ -147,13 +150,13 @@ impl SolidBuilder<'_> {
         self.cone(
             bone,
             [at(0.005), at(0.5 * upper)],
-            [0.056, 0.046].map(|it| it * strong),
+            [0.056, 0.046].map(|value| value * strong),
             slack(0.1),
         );
         self.cone(
             bone,
             [at(0.5 * upper), at(upper)],
-            [0.046, 0.039].map(|it| it * strong),
+            [0.046, 0.039].map(|value| value * strong),
             slack(0.4),
         );
         self.ellipsoid(
@@ -167,13 +170,13 @@ impl SolidBuilder<'_> {
         self.cone(
             bone,
             [at(0.0), at(belly)],
-            [0.038, 0.042].map(|it| it * strong),
+            [0.038, 0.042].map(|value| value * strong),
             slack(0.6),
         );
         self.cone(
             bone,
             [at(belly), at(lower)],
-            [0.042, 0.027].map(|it| it * strong),
+            [0.042, 0.027].map(|value| value * strong),
             slack(0.85),
         );
         self.hand(side, out);
@@ -208,7 +211,7 @@ impl SolidBuilder<'_> {
         let until = if bottom.is_skirt { 0.0 } else { bottom.leg };
         let slack = |share: f32, of: f32| Self::cover(share, until, of * bottom.slack);
         let at = |back: f32, down: f32| [-back, 0.0, -down];
-        let thick = |radii: [f32; 2]| radii.map(|it| it * g * (1.0 + 0.03 * curves));
+        let thick = |radii: [f32; 2]| radii.map(|radius| radius * g * (1.0 + 0.03 * curves));
         let bone = THIGH[side];
         self.cone(
             bone,

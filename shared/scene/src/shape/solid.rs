@@ -37,7 +37,7 @@ impl Solid {
         match self {
             Self::Cone { ends, radii } => Self::Cone {
                 ends,
-                radii: radii.map(|it| it + by),
+                radii: radii.map(|radius| radius + by),
             },
             Self::Ellipsoid { frame, radii } => Self::Ellipsoid {
                 frame,
@@ -49,7 +49,7 @@ impl Solid {
     pub(super) fn moved(self, by: &Isometry3<f32>) -> Self {
         match self {
             Self::Cone { ends, radii } => Self::Cone {
-                ends: ends.map(|it| by * it),
+                ends: ends.map(|end| by * end),
                 radii,
             },
             Self::Ellipsoid { frame, radii } => Self::Ellipsoid {
@@ -175,7 +175,7 @@ mod tests {
             ] {
                 let [low, high] = solid.bounds();
                 if solid.distance(&at) < 0.0 {
-                    prop_assert!((0..3).all(|it| low[it] <= at[it] && at[it] <= high[it]));
+                    prop_assert!((0..3).all(|i| low[i] <= at[i] && at[i] <= high[i]));
                     prop_assert!(!solid.is_far(&at, 0.0));
                 }
                 let is_inside = solid.distance(&at) < 0.0;

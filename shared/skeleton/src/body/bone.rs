@@ -136,12 +136,12 @@ mod tests {
             for side in ["right", "left"] {
                 if bone.name.starts_with(side) {
                     let names = joints_of(bone.mask()).map(|joint| joints[joint].name);
-                    assert!(names.into_iter().all(|it| it.starts_with(side) || it == "neck"));
+                    assert!(names.into_iter().all(|name| name.starts_with(side) || name == "neck"));
                 }
             }
         }
         let ends =
-            |i: usize| joints_of(BONES[i].mask()).map(|it| joints[it].name).collect::<Vec<_>>();
+            |i: usize| joints_of(BONES[i].mask()).map(|i| joints[i].name).collect::<Vec<_>>();
         assert_eq!(ends(0), ["right ankle", "right knee"]);
         assert_eq!(ends(8), ["left elbow", "left wrist"]);
         assert_eq!(ends(12), ["right hip", "left hip", "neck"]);
@@ -161,8 +161,7 @@ mod tests {
         joints[3] = Some(Point3::new(f64::NAN, 0.0, 0.0));
         joints[4] = Some(Point3::new(0.0, f64::INFINITY, 0.0));
         joints[5] = Some(Point3::new(0.0, 1e300, 0.0));
-        let missing: Vec<usize> =
-            (0..N_JOINTS).filter(|it| clean(&joints)[*it].is_none()).collect();
+        let missing: Vec<usize> = (0..N_JOINTS).filter(|i| clean(&joints)[*i].is_none()).collect();
         assert_eq!(missing, [3, 4, 5]);
     }
 }

@@ -86,7 +86,7 @@ pub(crate) struct Expected {
 /// The length of a kind of bone, learned or else of people with this stature.
 pub(crate) fn expected(kind: Kind, stature: f64, lengths: Option<&Lengths>) -> Expected {
     let proportion = kind.proportion();
-    if let Some(Learned { metres, sd }) = lengths.and_then(|it| it.of_kind(kind)) {
+    if let Some(Learned { metres, sd }) = lengths.and_then(|length| length.of_kind(kind)) {
         let spread = sd.hypot(proportion.posture * metres);
         return Expected { metres, spread };
     }
@@ -113,7 +113,7 @@ impl<'a> Judgement<'a> {
         let lengths = bone::lengths(joints);
         let stature = of_lengths(&lengths);
         let [low, high] = STATURES;
-        let expected_of = stature.map_or(1.7, |it| it.metres.clamp(low, high));
+        let expected_of = stature.map_or(1.7, |stature| stature.metres.clamp(low, high));
         let z = core::array::from_fn(|i| {
             let it = expected(BONES[i].kind, expected_of, learned);
             let sd = it.spread.hypot(MEASUREMENT_SD);
@@ -157,8 +157,9 @@ impl<'a> Judgement<'a> {
     /// The statures that are possible, metres: those of people, about that of the learned lengths of the bones that
     /// are there.
     fn statures(&self) -> [f64; 2] {
-        let learned = |bone: usize| self.learned.and_then(|it| it.bone(bone));
-        let lengths = core::array::from_fn(|i| self.lengths[i].and(learned(i)).map(|it| it.metres));
+        let learned = |bone: usize| self.learned.and_then(|learned| learned.bone(bone));
+        let lengths =
+            core::array::from_fn(|i| self.lengths[i].and(learned(i)).map(|length| length.metres));
         let [low, high] = STATURES;
         of_lengths(&lengths).map_or(STATURES, |own| {
             let wide = LIMIT * STATURE_SPREAD * own.metres;
@@ -179,7 +180,7 @@ impl<'a> Judgement<'a> {
             }
         });
         let variance = |joint: usize| {
-            let trace = covariances[joint].map_or(0.0, |it| it.trace());
+            let trace = covariances[joint].map_or(0.0, |covariance| covariance.trace());
             if trace.is_finite() { trace } else { f64::MAX }
         };
         let order = |a: &usize, b: &usize| {

@@ -186,8 +186,8 @@ mod tests {
     fn a_body_adds_up_to_its_stature() {
         let of = |kind: Kind| kind.proportion();
         let parts = [Kind::LowerLeg, Kind::UpperLeg, Kind::Trunk, Kind::Head].map(of);
-        let adult: f64 = parts.iter().map(|it| it.adult).sum();
-        let child: f64 = parts.iter().map(|it| it.child).sum();
+        let adult: f64 = parts.iter().map(|part| part.adult).sum();
+        let child: f64 = parts.iter().map(|part| part.child).sum();
         assert!((adult + 0.039 - 1.0).abs() < 1e-9, "{adult}");
         assert!((child + 0.045 - 1.0).abs() < 1e-9, "{child}");
     }

@@ -105,11 +105,11 @@ impl Problem {
         let [low, high] = STATURES;
         let stature = stature(joints).map_or(ANY_STATURE, |it| it.metres.clamp(low, high));
         let measured = State {
-            joints: joints.map(|joint| joint.map_or(Vector3::zeros(), |it| it.coords)),
+            joints: joints.map(|joint| joint.map_or(Vector3::zeros(), |joint| joint.coords)),
             stature,
         };
         let usable = covariances.map(usable);
-        let covariances = usable.map(|it| it[0]);
+        let covariances = usable.map(|usable| usable[0]);
         let rows = Row::all(joints, stature, lengths);
         let loss = |row: Option<Row>| {
             row.map_or(1.0, |row| {
@@ -126,7 +126,7 @@ impl Problem {
             present: joints.map(|joint| joint.is_some()),
             measured,
             covariances,
-            weights: usable.map(|it| it[1]),
+            weights: usable.map(|usable| usable[1]),
             rows,
             losses: rows.map(loss),
         }
@@ -207,7 +207,7 @@ impl Problem {
             }
             target.stature += pulls[a] * row.by_stature * STATURE_VARIANCE;
         }
-        let is_finite = target.joints.iter().flatten().all(|it| it.is_finite());
+        let is_finite = target.joints.iter().flatten().all(|joint| joint.is_finite());
         (is_finite && target.stature.is_finite()).then_some(target)
     }
 
@@ -249,8 +249,8 @@ impl Problem {
 
 /// A covariance that can be worked with, and its inverse.
 fn usable(given: Option<Matrix3<f64>>) -> [Matrix3<f64>; 2] {
-    let inverse = |it: &Matrix3<f64>| {
-        let inverse = it.cholesky()?.inverse();
+    let inverse = |matrix3: &Matrix3<f64>| {
+        let inverse = matrix3.cholesky()?.inverse();
         inverse.iter().all(|entry| entry.is_finite()).then_some(inverse)
     };
     let least = Matrix3::from_diagonal_element(LEAST_VARIANCE);

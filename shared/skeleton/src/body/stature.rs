@@ -37,7 +37,7 @@ pub fn stature(joints: &Joints) -> Option<Stature> {
 pub(crate) fn of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<Stature> {
     let mut sorted = Votes::new(lengths)?;
     let metres = sorted.median();
-    let model = 1.0 / sorted.votes().iter().map(|it| it[1] * it[1]).sum::<f64>().sqrt();
+    let model = 1.0 / sorted.votes().iter().map(|vote| vote[1] * vote[1]).sum::<f64>().sqrt();
     let n = sorted.n as f64;
     for vote in sorted.votes_mut() {
         vote[0] = (vote[0] - metres).abs();
@@ -93,7 +93,7 @@ impl Votes {
 
     /// The value at half of the weight, linear between the middles of the weights.
     fn median(&self) -> f64 {
-        let half = 0.5 * self.votes().iter().map(|it| it[1]).sum::<f64>();
+        let half = 0.5 * self.votes().iter().map(|vote| vote[1]).sum::<f64>();
         let [mut last, mut at_last] = [self.votes[0][0], 0.0];
         let mut sum = 0.0;
         for &[value, weight] in self.votes() {

@@ -95,7 +95,9 @@ pub(crate) fn noisy(
         (-2.0 * (1.0 - a).ln()).sqrt() * (core::f64::consts::TAU * b).cos()
     };
     joints.map(|joint| {
-        joint.map(|it| it + Vector3::new(depth * normal(), across * normal(), across * normal()))
+        joint.map(|joint| {
+            joint + Vector3::new(depth * normal(), across * normal(), across * normal())
+        })
     })
 }
 

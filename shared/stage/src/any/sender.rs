@@ -57,7 +57,7 @@ impl Sender {
 
     /// See [`SlicePublisher::wait_for_subscribers`].
     pub fn wait_for_subscribers(&self, n: usize, patience: Patience) -> usize {
-        self.receivers().map_or(0, |it| it.wait_for(n, patience))
+        self.receivers().map_or(0, |receiver| receiver.wait_for(n, patience))
     }
 
     /// Processes that are subscribed.

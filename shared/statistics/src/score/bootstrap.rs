@@ -23,8 +23,8 @@ impl Share {
 
     /// Mean over all frames, each weighted by its number of values; `None` without a value.
     pub fn mean(frames: &[Self]) -> Option<f64> {
-        let sum: f64 = frames.iter().map(|it| it.sum).sum();
-        let n: f64 = frames.iter().map(|it| it.n).sum();
+        let sum: f64 = frames.iter().map(|frame| frame.sum).sum();
+        let n: f64 = frames.iter().map(|frame| frame.n).sum();
         (n > 0.0).then(|| sum / n)
     }
 }
@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     fn frames(values: &[f64]) -> Vec<Share> {
-        values.iter().map(|&it| Share::of([it])).collect()
+        values.iter().map(|&value| Share::of([value])).collect()
     }
 
     #[test]
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn the_interval_of_a_coin_has_the_theoretical_width() {
-        let coin: Vec<f64> = (0..400).map(|it| f64::from(it % 2)).collect();
+        let coin: Vec<f64> = (0..400).map(|i| f64::from(i % 2)).collect();
         let settings = Bootstrap {
             n_resamples: 4000,
             ..Bootstrap::default()
@@ -153,10 +153,10 @@ mod tests {
 
     #[test]
     fn the_interval_of_any_number_is_that_of_the_mean_for_the_mean() {
-        let coin: Vec<Vec<f64>> = (0..400).map(|it| vec![f64::from(it % 2)]).collect();
-        let mean = |it: &[f64]| {
-            let n = it.len() as f64;
-            (n > 0.0).then(|| it.iter().sum::<f64>() / n)
+        let coin: Vec<Vec<f64>> = (0..400).map(|i| vec![f64::from(i % 2)]).collect();
+        let mean = |values: &[f64]| {
+            let n = values.len() as f64;
+            (n > 0.0).then(|| values.iter().sum::<f64>() / n)
         };
         let settings = Bootstrap {
             n_resamples: 4000,
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn blocks_widen_the_interval_of_correlated_frames() {
-        let slow: Vec<f64> = (0..400).map(|it| f64::from(it / 50 % 2)).collect();
+        let slow: Vec<f64> = (0..400).map(|i| f64::from(i / 50 % 2)).collect();
         let width = |block: usize| {
             let settings = Bootstrap {
                 block,

@@ -47,7 +47,7 @@ impl Changes {
     /// The bins from the worst to the best: lower edge and count.
     pub fn bins(&self) -> impl Iterator<Item = (f64, usize)> + '_ {
         let middle = self.bins.len() as f64 / 2.0;
-        let edge = move |it: usize| (it as f64 - middle) * self.width;
+        let edge = move |value: usize| (value as f64 - middle) * self.width;
         let counts = self.bins.iter().enumerate();
         counts.map(move |(it, &count)| (edge(it), count))
     }
@@ -107,7 +107,7 @@ mod tests {
                 changes
             };
             let (there, back) = (count(false), count(true));
-            prop_assert_eq!(there.bins().map(|it| it.1).sum::<usize>(), pairs.len());
+            prop_assert_eq!(there.bins().map(|bin| bin.1).sum::<usize>(), pairs.len());
             prop_assert_eq!(there.improved(), back.deteriorated());
             prop_assert_eq!(there.deteriorated(), back.improved());
         }

@@ -115,8 +115,8 @@ mod tests {
         ) {
             let truth = points(&truth);
             let turn = Rotation3::new(Vector3::from(axis));
-            let place = |it: Point| (turn * Vector3::from(it) * scale + Vector3::from(shift)).into();
-            let found: Vec<Option<Point>> = truth.iter().map(|it| it.map(place)).collect();
+            let place = |point: Point| (turn * Vector3::from(point) * scale + Vector3::from(shift)).into();
+            let found: Vec<Option<Point>> = truth.iter().map(|truth| truth.map(place)).collect();
             let got = aligned(&found, &truth).unwrap();
             prop_assert!(worst(&got, &truth) < 1e-8);
         }
@@ -131,10 +131,10 @@ mod tests {
             let (truth, found) = (points(&truth), points(&found));
             let got = aligned(&found, &truth).unwrap();
             let squares = |found: &[Option<Point>]| {
-                joint_errors(found, &truth).into_iter().flatten().map(|it| it * it).sum::<f64>()
+                joint_errors(found, &truth).into_iter().flatten().map(|joint_error| joint_error * joint_error).sum::<f64>()
             };
             let turn = Rotation3::new(Vector3::from(axis));
-            let other = |it: Point| (turn * Vector3::from(it) * scale).into();
+            let other = |point: Point| (turn * Vector3::from(point) * scale).into();
             let others: Vec<Option<Point>> = got.iter().map(|it| it.map(other)).collect();
             prop_assert!(squares(&got) <= squares(&others) + 1e-9);
         }

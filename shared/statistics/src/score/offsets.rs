@@ -74,15 +74,15 @@ pub fn offsets<'a>(
         let shares = [0, 1].map(|axis| {
             let of_person = |it: &Option<[Option<[f64; 2]>; N_JOINTS]>| {
                 let joints = it.iter().flat_map(|it| both.iter().filter_map(|&at| it[at]));
-                Share::of(joints.map(|it| it[axis]))
+                Share::of(joints.map(|joint| joint[axis]))
             };
             people.iter().map(of_person).collect::<Vec<_>>()
         });
-        let [along, across] = shares.each_ref().map(|it| Share::mean(it));
-        let [low, high] = shares.each_ref().map(|it| bootstrap.interval(it));
+        let [along, across] = shares.each_ref().map(|share| Share::mean(share));
+        let [low, high] = shares.each_ref().map(|share| bootstrap.interval(share));
         Some(Offset {
             joint,
-            n_found: shares[0].iter().map(|it| it.n as usize).sum(),
+            n_found: shares[0].iter().map(|share| share.n as usize).sum(),
             n: people.len() * both.len(),
             mean: [along?, across?],
             interval: [low?, high?],
@@ -131,7 +131,7 @@ pub fn height<const D: usize>(joints: &[[f64; D]; N_JOINTS]) -> f64 {
 }
 
 fn middle<const D: usize>(joints: &[[f64; D]; N_JOINTS], of: &[usize]) -> [f64; D] {
-    std::array::from_fn(|axis| of.iter().map(|&it| joints[it][axis]).sum::<f64>() / of.len() as f64)
+    std::array::from_fn(|axis| of.iter().map(|&i| joints[i][axis]).sum::<f64>() / of.len() as f64)
 }
 
 #[cfg(test)]
@@ -176,10 +176,10 @@ mod tests {
                 it[knee][1] -= 6.0;
             }
         });
-        let knee = rows.iter().find(|it| it.joint == "knee").unwrap();
+        let knee = rows.iter().find(|row| row.joint == "knee").unwrap();
         assert!((knee.mean[0] + 5.0).abs() < 1e-9 && knee.mean[1].abs() < 1e-9);
         assert_eq!((knee.n_found, knee.n), (2, 4));
-        for it in rows.iter().filter(|it| it.joint != "knee") {
+        for it in rows.iter().filter(|row| row.joint != "knee") {
             assert_eq!(it.mean.map(f64::abs), [0.0; 2], "{}", it.joint);
         }
     }
@@ -190,14 +190,14 @@ mod tests {
             it[0][0] -= 12.0;
             it[5][0] += 12.0;
         });
-        let ankle = rows.iter().find(|it| it.joint == "ankle").unwrap();
+        let ankle = rows.iter().find(|row| row.joint == "ankle").unwrap();
         assert!((ankle.mean[1] - 10.0).abs() < 1e-9 && ankle.mean[0].abs() < 1e-9);
     }
 
     #[test]
     fn a_joint_far_from_its_mark_was_not_found() {
         let rows = of(|it| it[6] = [300.0, 300.0]);
-        let wrist = rows.iter().find(|it| it.joint == "wrist").unwrap();
+        let wrist = rows.iter().find(|row| row.joint == "wrist").unwrap();
         assert_eq!((wrist.n_found, wrist.mean), (1, [0.0; 2]));
     }
 }

@@ -25,13 +25,11 @@ pub fn joints_found<const N: usize>(
     share: f64,
 ) -> [bool; N] {
     let side = |axis: usize| {
-        let values = || truth.iter().map(move |it| it[axis]);
+        let values = || truth.iter().map(move |truth| truth[axis]);
         values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
     };
     let limit = share * (side(0).max(side(1)) + 1.0);
-    std::array::from_fn(|it| {
-        (found[it][0] - truth[it][0]).hypot(found[it][1] - truth[it][1]) <= limit
-    })
+    std::array::from_fn(|i| (found[i][0] - truth[i][0]).hypot(found[i][1] - truth[i][1]) <= limit)
 }
 
 /// The best detection of the annotated person, on an image where others may be detected too.
@@ -54,7 +52,7 @@ pub fn best_covering(detections: &[(f64, [f64; 4])], truth: [f64; 4], share: f64
     };
     let mut best: Option<usize> = None;
     for (index, &(score, place)) in detections.iter().enumerate() {
-        let is_better = best.is_none_or(|it| score > detections[it].0);
+        let is_better = best.is_none_or(|i| score > detections[i].0);
         if area(common(place)) > share * area(truth) && is_better {
             best = Some(index);
         }
@@ -76,11 +74,11 @@ mod tests {
 
     #[test]
     fn the_groups_contain_every_joint_once_and_both_sides() {
-        let mut joints: Vec<usize> = PCK_GROUPS.iter().flat_map(|it| it.1).collect();
+        let mut joints: Vec<usize> = PCK_GROUPS.iter().flat_map(|pck_group| pck_group.1).collect();
         joints.sort_unstable();
         assert_eq!(joints, (0..14).collect::<Vec<_>>());
         for (name, joints) in &PCK_GROUPS[1..] {
-            let [a, b] = joints.map(|it| skeleton::PARSE14.joints[it].name);
+            let [a, b] = joints.map(|joint| skeleton::PARSE14.joints[joint].name);
             let mut names = [a, b];
             names.sort_unstable();
             assert_eq!(names, [format!("left {name}"), format!("right {name}")]);

@@ -66,7 +66,7 @@ impl Pcp {
 pub fn pcp(found: &[[f64; 2]; 14], truth: &[[f64; 2]; 14], rule: PcpRule) -> Pcp {
     let sticks = sticks_found(found, truth, rule);
     Pcp {
-        correct: sticks.iter().filter(|it| **it).count(),
+        correct: sticks.iter().filter(|stick| **stick).count(),
         total: sticks.len(),
     }
 }
@@ -91,7 +91,7 @@ pub fn sticks_found(
         let limit = 0.5 * distance(end(truth, from), end(truth, to));
         let errors = [from, to].map(|it| distance(end(found, it), end(truth, it)));
         match rule {
-            PcpRule::BothEnds => errors.iter().all(|it| *it <= limit),
+            PcpRule::BothEnds => errors.iter().all(|error| *error <= limit),
             PcpRule::MeanOfEnds => f64::midpoint(errors[0], errors[1]) <= limit,
         }
     })

@@ -133,10 +133,10 @@ pub fn segments(set: &JointSet) -> Option<[Segment; 12]> {
         (knee_r, ankle_r),
         (knee_l, ankle_l),
     ];
-    let segment = |it: usize| Segment {
-        name: SEGMENT_NAMES[it],
-        from: between[it].0,
-        to: between[it].1,
+    let segment = |i: usize| Segment {
+        name: SEGMENT_NAMES[i],
+        from: between[i].0,
+        to: between[i].1,
     };
     Some(std::array::from_fn(segment))
 }
@@ -157,14 +157,14 @@ pub fn segment_errors(
     found: &[Option<Point>],
     truth: &[Option<Point>],
 ) -> Vec<Option<f64>> {
-    let of_segment = |it: &Segment| {
-        let [from, to] = [it.from, it.to].map(|end| mean(truth, end));
+    let of_segment = |segment: &Segment| {
+        let [from, to] = [segment.from, segment.to].map(|end| mean(truth, end));
         let (from, to) = (from?, to?);
         let length = distance(from, to);
         if length == 0.0 {
             return None;
         }
-        let ends = [(it.from, from), (it.to, to)];
+        let ends = [(segment.from, from), (segment.to, to)];
         let errors = ends.map(|(end, truth)| {
             mean(found, end).map_or(f64::INFINITY, |found| distance(found, truth))
         });
@@ -181,11 +181,11 @@ fn mean(joints: &[Option<Point>], of: &[usize]) -> Option<Point> {
             *sum += value;
         }
     }
-    Some(sum.map(|it| it / of.len() as f64))
+    Some(sum.map(|sum| sum / of.len() as f64))
 }
 
 pub(crate) fn distance(a: Point, b: Point) -> f64 {
-    let squares = [0, 1, 2].map(|it| (a[it] - b[it]) * (a[it] - b[it]));
+    let squares = [0, 1, 2].map(|i| (a[i] - b[i]) * (a[i] - b[i]));
     squares.iter().sum::<f64>().sqrt()
 }
 
@@ -206,10 +206,10 @@ mod tests {
     fn the_ends_of_a_segment_are_the_same_points_in_every_set() {
         let ends = |set: &JointSet| {
             let joints = person(set);
-            segments(set).unwrap().map(|it| {
+            segments(set).unwrap().map(|segment| {
                 [
-                    mean(&joints, it.from).unwrap(),
-                    mean(&joints, it.to).unwrap(),
+                    mean(&joints, segment.from).unwrap(),
+                    mean(&joints, segment.to).unwrap(),
                 ]
             })
         };
@@ -261,11 +261,11 @@ mod tests {
         ) {
             let set = &skeleton::PARSE14;
             let truth = person(set);
-            let add = |a: Point, b: Point| [0, 1, 2].map(|it| a[it] + b[it]);
+            let add = |a: Point, b: Point| [0, 1, 2].map(|i| a[i] + b[i]);
             let found: Vec<Option<Point>> =
                 truth.iter().zip(&off).map(|(it, off)| it.map(|it| add(it, *off))).collect();
             let elsewhere = |all: &[Option<Point>]| -> Vec<Option<Point>> {
-                let place = |it: Point| add(it, shift).map(|it| it * scale);
+                let place = |point: Point| add(point, shift).map(|value| value * scale);
                 all.iter().map(|it| it.map(place)).collect()
             };
             let segments = segments(set).unwrap();

@@ -6,7 +6,7 @@
 /// * `samples`: score, and whether it is of the class.
 /// * Returns `None` unless there are both kinds, or if a score is NaN.
 pub fn area_under_roc(samples: &[(f64, bool)]) -> Option<f64> {
-    let scores: Vec<f64> = samples.iter().map(|it| it.0).collect();
+    let scores: Vec<f64> = samples.iter().map(|sample| sample.0).collect();
     let ranks = ranks(&scores)?;
     let positives = samples.iter().zip(&ranks).filter(|it| it.0.1);
     let (n, sum) = positives.fold((0.0, 0.0), |(n, sum), it| (n + 1.0, sum + it.1));
@@ -19,8 +19,8 @@ pub fn area_under_roc(samples: &[(f64, bool)]) -> Option<f64> {
 /// * Returns `None` for fewer than two pairs, if either number is constant, or one is NaN.
 pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     let [first, second] = [
-        pairs.iter().map(|it| it.0).collect::<Vec<f64>>(),
-        pairs.iter().map(|it| it.1).collect(),
+        pairs.iter().map(|pair| pair.0).collect::<Vec<f64>>(),
+        pairs.iter().map(|pair| pair.1).collect(),
     ];
     let [first, second] = [ranks(&first)?, ranks(&second)?];
     let mean = f64::midpoint(pairs.len() as f64, 1.0);
@@ -34,7 +34,7 @@ pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
 
 /// Ranks from 1, equal numbers with the mean of theirs; `None` if one is NaN.
 fn ranks(values: &[f64]) -> Option<Vec<f64>> {
-    if values.iter().any(|it| it.is_nan()) {
+    if values.iter().any(|value| value.is_nan()) {
         return None;
     }
     let mut order: Vec<usize> = (0..values.len()).collect();
@@ -102,8 +102,8 @@ mod tests {
             let samples: Vec<(f64, bool)> =
                 samples.into_iter().map(|(score, is)| (f64::from(score), is)).collect();
             let (mut sum, mut n) = (0.0, 0.0);
-            for of in samples.iter().filter(|it| it.1) {
-                for not in samples.iter().filter(|it| !it.1) {
+            for of in samples.iter().filter(|sample| sample.1) {
+                for not in samples.iter().filter(|sample| !sample.1) {
                     n += 1.0;
                     sum += if of.0 > not.0 { 1.0 } else if of.0 == not.0 { 0.5 } else { 0.0 };
                 }

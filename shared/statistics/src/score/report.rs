@@ -75,7 +75,7 @@ impl Report {
     /// Sticks of both sides in one column each, as they are published, with their names.
     pub fn limbs(&self, rule: PcpRule) -> [(&'static str, Pcp); COLUMNS.len()] {
         COLUMNS.map(|(name, sticks)| {
-            let sticks = sticks.iter().map(|&it| self.sticks(rule)[it]);
+            let sticks = sticks.iter().map(|&stick| self.sticks(rule)[stick]);
             (name, sum(sticks))
         })
     }
@@ -99,7 +99,7 @@ impl Report {
     ///
     /// If there is no such share.
     pub fn groups(&self, share: usize) -> [Pcp; PCK_GROUPS.len()] {
-        PCK_GROUPS.map(|(_, joints)| sum(joints.iter().map(|&it| self.joints[share][it])))
+        PCK_GROUPS.map(|(_, joints)| sum(joints.iter().map(|&joint| self.joints[share][joint])))
     }
 }
 
@@ -171,11 +171,11 @@ mod tests {
         assert_eq!((report.n_images(), report.n_missed()), (2, 1));
         for rule in RULES {
             assert_eq!(report.pcp(rule).percent(), 50.0);
-            assert!(report.sticks(rule).iter().all(|it| it.percent() == 50.0));
+            assert!(report.sticks(rule).iter().all(|stick| stick.percent() == 50.0));
         }
         for share in 0..2 {
             assert_eq!(report.pck(share).percent(), 50.0);
-            assert!(report.groups(share).iter().all(|it| it.percent() == 50.0));
+            assert!(report.groups(share).iter().all(|group| group.percent() == 50.0));
         }
     }
 
@@ -193,7 +193,7 @@ mod tests {
         assert_eq!(report.groups(1)[3].percent(), 100.0, "but within 0.2");
         assert_eq!(report.pck(0).correct, 13);
         let sticks = report.sticks(PcpRule::BothEnds);
-        assert!(sticks.iter().all(|it| it.total == 1));
+        assert!(sticks.iter().all(|stick| stick.total == 1));
     }
 
     #[test]

@@ -129,8 +129,8 @@ mod tests {
             let person = Person {
                 image: PathBuf::from(image),
                 row: String::new(),
-                joints: joints.iter().map(|it| [it.0, it.1]).collect(),
-                visible: joints.iter().map(|it| it.2).collect(),
+                joints: joints.iter().map(|joint| [joint.0, joint.1]).collect(),
+                visible: joints.iter().map(|joint| joint.2).collect(),
             };
             let line = to_line(&person, name.as_deref()).unwrap();
             prop_assert!(!line.contains('\n'));

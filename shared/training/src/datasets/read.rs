@@ -116,7 +116,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<People, DatasetError> 
     let n_people = rows.len();
     let mut people = validate(&file, rows, options);
     let is_fatal = |problem: &Problem| options.fatal.contains(&problem.fault.kind());
-    let n_fatal = people.problems.iter().filter(|it| is_fatal(it)).count();
+    let n_fatal = people.problems.iter().filter(|problem| is_fatal(problem)).count();
     match people.problems.iter().position(is_fatal) {
         None => Ok(people),
         Some(first) => Err(DatasetError::Fatal {
@@ -153,7 +153,9 @@ fn annotation_file(path: &Path) -> Result<PathBuf, DatasetError> {
         };
     }
     let has_known_name = is_called(path, LABELS) || is_called(path, JOINTS);
-    let has_lines = path.extension().is_some_and(|it| it == "jsonl" || it == "json");
+    let has_lines = path
+        .extension()
+        .is_some_and(|extension| extension == "jsonl" || extension == "json");
     if has_known_name || has_lines {
         Ok(path.to_owned())
     } else {
@@ -197,7 +199,7 @@ fn numbered_images(folder: &Path, digits: &[usize]) -> ImageOf {
     };
     let shapes = [".jpg", ".png"]
         .into_iter()
-        .flat_map(|ending| digits.iter().map(move |&it| (it, ending)));
+        .flat_map(|ending| digits.iter().map(move |&digit| (digit, ending)));
     let default = (digits.first().copied().unwrap_or(4), ".jpg");
     let used = shapes.clone().find(|&(it, ending)| is_used(it, ending));
     let (n_digits, ending) = used.unwrap_or(default);
@@ -261,15 +263,16 @@ fn select(file: &Path, rows: &mut Vec<Row>, options: &ReadOptions) -> Result<(),
         Err(_) => PathBuf::new(),
     };
     let selections = [&options.only, &options.without];
-    if selections.iter().all(|it| it.is_none()) {
+    if selections.iter().all(|selection| selection.is_none()) {
         return Ok(());
     }
-    let people: BTreeMap<usize, PathBuf> = rows.iter().map(|it| (it.number, image(it))).collect();
+    let people: BTreeMap<usize, PathBuf> =
+        rows.iter().map(|row| (row.number, image(row))).collect();
     for selection in selections.into_iter().flatten() {
         selection.check(file, &people)?;
     }
     rows.retain(|row| {
-        let is_in = |it: &Selection| it.contains(row.number, &people[&row.number]);
+        let is_in = |selection: &Selection| selection.contains(row.number, &people[&row.number]);
         options.only.as_ref().is_none_or(is_in) && !options.without.as_ref().is_some_and(is_in)
     });
     Ok(())

@@ -49,7 +49,12 @@ impl Sample {
         let last = size.width as f64 - 1.0;
         let joints = joint_mirror
             .iter()
-            .map(|&it| [last - self.joints[it][0], self.joints[it][1]])
+            .map(|&joint_mirror| {
+                [
+                    last - self.joints[joint_mirror][0],
+                    self.joints[joint_mirror][1],
+                ]
+            })
             .collect();
         Self { image, joints }
     }
@@ -69,13 +74,13 @@ impl Sample {
         let (sin, cos) = degrees.to_radians().sin_cos();
         // Quarter turns are exact: remove the rounding error of a sine or cosine of 0.
         let [sin, cos] = [sin, cos].map(|it| if it.abs() < 1e-12 { 0.0 } else { it });
-        let [width, height] = [source.width, source.height].map(|it| it as f64);
-        let grown = |it: f64| (it - 1e-6).ceil().max(1.0) as usize;
+        let [width, height] = [source.width, source.height].map(|value| value as f64);
+        let grown = |value: f64| (value - 1e-6).ceil().max(1.0) as usize;
         let output = Size::new(
             grown(width * cos.abs() + height * sin.abs()),
             grown(width * sin.abs() + height * cos.abs()),
         );
-        let centre = |it: usize| (it as f64 - 1.0) / 2.0;
+        let centre = |value: usize| (value as f64 - 1.0) / 2.0;
         let from = [centre(source.width), centre(source.height)];
         let to = [centre(output.width), centre(output.height)];
         // Rows point down, so (cos, -sin; sin, cos) rotates a point of the output clockwise, which is the inverse.
@@ -116,7 +121,7 @@ mod tests {
         }
         Sample {
             image,
-            joints: vec![[3.25, 4.5], [7.0, 1.0], joint.map(|it| it as f64)],
+            joints: vec![[3.25, 4.5], [7.0, 1.0], joint.map(|joint| joint as f64)],
         }
     }
 
@@ -130,7 +135,7 @@ mod tests {
             sum[1] += weight * (at / width) as f64;
             weights += weight;
         }
-        sum.map(|it| it / weights)
+        sum.map(|sum| sum / weights)
     }
 
     /// Distance of the dot from the last joint.
@@ -181,7 +186,7 @@ mod tests {
     fn a_replicated_border_has_no_black_corners() {
         let sample = sample_with_dot(Size::new(40, 30), [20, 15]);
         let turned = sample.rotated(30.0, Fill::Replicate).unwrap();
-        assert!(turned.image.rgb().iter().all(|&it| it >= 63));
+        assert!(turned.image.rgb().iter().all(|&value| value >= 63));
         let turned = sample.rotated(30.0, Fill::Black).unwrap();
         assert_eq!(turned.image.rgb()[0], 0);
     }
@@ -207,7 +212,7 @@ mod tests {
         #[test]
         fn mirroring_twice_is_the_identity(width in 1_usize..9, height in 1_usize..9, seed: u64) {
             let size = Size::new(width, height);
-            let bytes = (0..size.rgb_bytes() as u64).map(|it| (it.wrapping_mul(seed) >> 7) as u8);
+            let bytes = (0..size.rgb_bytes() as u64).map(|i| (i.wrapping_mul(seed) >> 7) as u8);
             let sample = Sample {
                 image: Picture::new(size, bytes.collect()).unwrap(),
                 joints: vec![[0.5, 1.0], [2.0, 3.0], [4.0, 5.0]],
@@ -219,8 +224,8 @@ mod tests {
         fn rotation_keeps_distances_and_all_corners(degrees in -400.0..400.0) {
             let sample = sample_with_dot(Size::new(33, 21), [8, 10]);
             let turned = sample.rotated(degrees, Fill::Black).unwrap();
-            let distance = |it: &Sample| {
-                let [a, b] = [it.joints[0], it.joints[2]];
+            let distance = |sample: &Sample| {
+                let [a, b] = [sample.joints[0], sample.joints[2]];
                 (a[0] - b[0]).hypot(a[1] - b[1])
             };
             prop_assert!((distance(&turned) - distance(&sample)).abs() < 1e-9);

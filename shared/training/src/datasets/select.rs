@@ -157,7 +157,7 @@ impl Selection {
 
 /// Ranges of rows, separated by commas; `None` if the text is something else.
 fn ranges(text: &str) -> Option<Result<Vec<RangeInclusive<usize>>, SelectError>> {
-    let number = |it: &str| it.trim().parse::<usize>().ok();
+    let number = |text: &str| text.trim().parse::<usize>().ok();
     let ranges: Option<Vec<_>> = text
         .split(',')
         .map(|range| match range.split_once('-') {

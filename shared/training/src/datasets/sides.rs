@@ -56,7 +56,7 @@ impl Sides {
         if self == Self::Marked || !is_from_behind(&person.joints, joint_mirror) {
             return person;
         }
-        let mirror = |it: &usize| (person.joints[*it], person.visible[*it]);
+        let mirror = |i: &usize| (person.joints[*i], person.visible[*i]);
         let (joints, visible) = joint_mirror.iter().map(mirror).unzip();
         Person {
             joints,
@@ -75,9 +75,9 @@ fn is_from_behind(joints: &[[f64; 2]], joint_mirror: &[usize]) -> bool {
     let ahead: Vec<f64> = pairs
         .filter(|(right, left)| right < *left)
         .map(|(right, &left)| joints[right][0] - joints[left][0])
-        .filter(|it| it.is_finite())
+        .filter(|value| value.is_finite())
         .collect();
-    Sorted::new(ahead).median().is_some_and(|it| it > 0.0)
+    Sorted::new(ahead).median().is_some_and(|median| median > 0.0)
 }
 
 #[cfg(test)]
@@ -98,8 +98,8 @@ mod tests {
         Person {
             image: PathBuf::from("a.png"),
             row: "person 1".to_owned(),
-            joints: joints.map(|it| it.map(f64::from)).collect(),
-            visible: (0..14).map(|it| it != 7).collect(),
+            joints: joints.map(|joint| joint.map(f64::from)).collect(),
+            visible: (0..14).map(|i| i != 7).collect(),
         }
     }
 
@@ -111,8 +111,8 @@ mod tests {
     fn from_behind(person: &Person) -> Person {
         let mirror = mirror();
         Person {
-            joints: mirror.iter().map(|&it| person.joints[it]).collect(),
-            visible: mirror.iter().map(|&it| person.visible[it]).collect(),
+            joints: mirror.iter().map(|&mirror| person.joints[mirror]).collect(),
+            visible: mirror.iter().map(|&mirror| person.visible[mirror]).collect(),
             ..person.clone()
         }
     }

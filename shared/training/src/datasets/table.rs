@@ -245,7 +245,7 @@ fn check_lengths(spec: &SkeletonSpec) -> Result<(), TableError> {
         ("lists of weights", spec.weights.len(), n_parts),
         ("mirrors of joints", spec.joint_mirror.len(), n_joints),
     ];
-    match lists.into_iter().find(|it| it.1 != it.2) {
+    match lists.into_iter().find(|list| list.1 != list.2) {
         None => Ok(()),
         Some((what, got, expected)) => Err(TableError::Length {
             what,
@@ -278,7 +278,7 @@ fn check_tree(spec: &SkeletonSpec) -> Result<(), TableError> {
                 name,
             });
         }
-        if let Some(parent) = parent.filter(|&it| it >= part) {
+        if let Some(parent) = parent.filter(|&parent| parent >= part) {
             return Err(TableError::Tree {
                 part: part + 1,
                 name,
@@ -311,7 +311,7 @@ fn check_weights(spec: &SkeletonSpec) -> Result<(), TableError> {
     let n_joints = spec.joint_names.len();
     for (part, weights) in spec.weights.iter().enumerate() {
         let name = spec.names[part].clone();
-        if let Some(&(joint, _)) = weights.iter().find(|it| it.0 >= n_joints) {
+        if let Some(&(joint, _)) = weights.iter().find(|weight| weight.0 >= n_joints) {
             return Err(TableError::Joint {
                 part: part + 1,
                 name,
@@ -319,7 +319,7 @@ fn check_weights(spec: &SkeletonSpec) -> Result<(), TableError> {
                 n_joints,
             });
         }
-        let sum: f64 = weights.iter().map(|it| it.1).sum();
+        let sum: f64 = weights.iter().map(|weight| weight.1).sum();
         let is_one = (sum - 1.0).abs() <= TOLERANCE;
         if !is_one {
             return Err(TableError::Weights {
@@ -337,7 +337,7 @@ fn check_mirror(spec: &SkeletonSpec) -> Result<(), TableError> {
     let n_joints = spec.joint_names.len();
     for (part, &other) in spec.mirror.iter().enumerate() {
         let name = spec.names[part].clone();
-        if spec.parent[other] != spec.parent[part].map(|it| spec.mirror[it]) {
+        if spec.parent[other] != spec.parent[part].map(|parent| spec.mirror[parent]) {
             return Err(TableError::MirrorTree {
                 part: part + 1,
                 name,
@@ -350,7 +350,7 @@ fn check_mirror(spec: &SkeletonSpec) -> Result<(), TableError> {
         for &(joint, weight) in &spec.weights[other] {
             difference[joint] -= weight;
         }
-        if difference.iter().any(|it| it.abs() > TOLERANCE) {
+        if difference.iter().any(|value| value.abs() > TOLERANCE) {
             return Err(TableError::MirrorWeights {
                 part: part + 1,
                 name,

@@ -61,7 +61,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
             if !go_on(gap) || gap.relative() <= effort.tolerance {
                 return gap;
             }
-            let at_stake = |it: &usize| self.entries[*it].share > 0.0 || slopes[*it] > -NEAR;
+            let at_stake = |i: &usize| self.entries[*i].share > 0.0 || slopes[*i] > -NEAR;
             let mut moving: Vec<_> = (0..self.entries.len()).filter(at_stake).collect();
             for _ in 0..PASSES_OVER_MOVING {
                 // Examples of one image side by side would be faster to read, but the descent needs
@@ -96,7 +96,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
             dual += entry.share * entry.margin;
             n_support += usize::from(entry.share > 0.0);
         }
-        let half: f64 = self.solution().iter().map(|it| 0.5 * it * it).sum();
+        let half: f64 = self.solution().iter().map(|solution| 0.5 * solution * solution).sum();
         let losses = worst.iter().zip(&self.groups).map(|(it, of)| of.cost * it);
         Gap {
             primal: half + losses.sum::<f64>(),
@@ -148,7 +148,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         let givers = members
             .iter()
             .filter(|&&it| it != at && self.entries[it].share > 0.0)
-            .map(|&it| (self.slope(it), it));
+            .map(|&member| (self.slope(member), member));
         let Some((least, giver)) = givers.min_by(|a, b| a.0.total_cmp(&b.0)) else {
             return false;
         };

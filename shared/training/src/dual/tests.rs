@@ -103,7 +103,7 @@ fn examples() -> impl Strategy<Value = Vec<(usize, Vec<i8>, i8)>> {
 fn filled(examples: &[(usize, Vec<i8>, i8)]) -> Machine<usize, usize> {
     let mut machine = Machine::new(5, 4..5);
     for (it, (group, x, margin)) in examples.iter().enumerate() {
-        let x: Vec<f32> = x.iter().map(|it| f32::from(*it)).collect();
+        let x: Vec<f32> = x.iter().map(|value| f32::from(*value)).collect();
         let x = Sparse::new([(0, &x[..4]), (4, &x[4..])]);
         let demand = Constraint {
             x,
@@ -136,7 +136,7 @@ proptest! {
             prop_assert!(share >= 0.0);
             totals[examples[*it].0] += share;
         }
-        prop_assert!(totals.iter().all(|it| *it <= 0.3 + 1e-6), "{totals:?}");
+        prop_assert!(totals.iter().all(|total| *total <= 0.3 + 1e-6), "{totals:?}");
     }
 
     #[test]
@@ -144,12 +144,12 @@ proptest! {
         let effort = Effort { tolerance: 1e-4, max_passes: 20 };
         let mut machine = filled(&examples);
         solve(&mut machine, effort);
-        machine.retain(|it| examples[*it].0 != cut);
+        machine.retain(|i| examples[*i].0 != cut);
         machine.forget(0.1, usize::MAX, |_| true);
         let mut again = Machine::new(5, 4..5);
         for (it, share) in machine.entries() {
             let (group, x, margin) = &examples[*it];
-            let x: Vec<f32> = x.iter().map(|it| f32::from(*it)).collect();
+            let x: Vec<f32> = x.iter().map(|value| f32::from(*value)).collect();
             let x = Sparse::new([(0, &x[..4]), (4, &x[4..])]);
             let margin = f64::from(*margin);
             again.add(cost(*group, 0.3), *it, Constraint { x, margin }, share);
@@ -178,7 +178,7 @@ proptest! {
         solve(&mut machine, Effort { tolerance: 1e-6, max_passes: 2000 });
         let even: Vec<usize> = (0..examples.len()).step_by(2).collect();
         machine.forget(0.0, 0, |it| it % 2 == 1);
-        let kept: Vec<usize> = machine.entries().map(|it| *it.0).filter(|it| it % 2 == 0).collect();
+        let kept: Vec<usize> = machine.entries().map(|entry| *entry.0).filter(|it| it % 2 == 0).collect();
         prop_assert_eq!(kept, even);
     }
 }

@@ -21,7 +21,10 @@ fn marked(types: Option<Vec<usize>>) -> Marked {
 
 /// The score of a pose by its feature vector.
 fn score(v: &[f64], pyramid: &FeaturePyramid<'_>, pose: &Pose) -> f64 {
-    let (shape, v) = (shape(), v.iter().map(|it| *it as f32).collect::<Vec<_>>());
+    let (shape, v) = (
+        shape(),
+        v.iter().map(|value| *value as f32).collect::<Vec<_>>(),
+    );
     let map = pyramid.level(usize::from(pose.level));
     let example = Example::of(&shape, &shape.coordinates(), &map, pose);
     example.features.dot(&v) + example.fixed
@@ -70,7 +73,7 @@ fn placements(
                 level,
                 parts,
             };
-            let has_type = types.is_none_or(|it| it[part] == mixture);
+            let has_type = types.is_none_or(|kind| kind[part] == mixture);
             if has_type && overlap(model, layout, &pose, part) >= OVERLAP {
                 found.push(placed);
             }
@@ -124,7 +127,7 @@ fn an_example_times_the_vector_is_the_score_of_its_pose() {
     let poses = Solver::new(Arc::clone(&model)).above(&evidence, -1e9, 60);
     assert_eq!(poses.len(), 60);
     let all = Cells::of(&pyramid, layout.levels.len());
-    let single: Vec<f32> = v.iter().map(|it| *it as f32).collect();
+    let single: Vec<f32> = v.iter().map(|value| *value as f32).collect();
     for pose in poses {
         let own = score(&v, &pyramid, &pose);
         assert!(
@@ -162,7 +165,7 @@ fn the_nearest_pose_lies_within_half_a_cell_and_has_the_types() {
     let layout = Layout::new(&model, 71, 80).unwrap();
     let marked = marked(Some(vec![0, 1, 1]));
     let pose = nearest(&model, &layout, &marked, OVERLAP).unwrap();
-    let types: Vec<_> = pose.parts.iter().map(|it| it.mixture).collect();
+    let types: Vec<_> = pose.parts.iter().map(|part| part.mixture).collect();
     assert_eq!(types, [0, 1, 1]);
     let scale = layout.levels[usize::from(pose.level)].scale;
     for (centre, mark) in pose.centres(&model, &layout).iter().zip(&marked.parts) {

@@ -101,15 +101,15 @@ impl<'a> Trainer<'a> {
         if it.n_done > self.steps.len() {
             return damaged("more steps are done than there are");
         }
-        if !it.threshold.is_finite() || !it.v.iter().all(|it| it.is_finite()) {
+        if !it.threshold.is_finite() || !it.v.iter().all(|value| value.is_finite()) {
             return damaged("a number is not finite");
         }
         if it.v.len() != self.v.len() || it.right.len() != self.right.len() {
             return damaged("a list has another length");
         }
         let poses = it.right.iter().flatten();
-        let poses = poses.chain(it.examples.iter().map(|it| it.0.pose()));
-        if !poses.into_iter().all(|it| it.fits(self.plan.shape())) {
+        let poses = poses.chain(it.examples.iter().map(|example| example.0.pose()));
+        if !poses.into_iter().all(|pose| pose.fits(self.plan.shape())) {
             return damaged("a pose has other parts or types than the model");
         }
         let known = |origin: &Origin| match origin {
@@ -118,7 +118,11 @@ impl<'a> Trainer<'a> {
                 (*person as usize) < self.plan.n_people()
             }
         };
-        if !it.examples.iter().all(|it| known(&it.0) && it.1 >= 0.0 && it.1.is_finite()) {
+        if !it
+            .examples
+            .iter()
+            .all(|example| known(&example.0) && example.1 >= 0.0 && example.1.is_finite())
+        {
             return damaged("an example is of a person or an image that is not there");
         }
         Ok(())

@@ -129,7 +129,7 @@ impl Trainer<'_> {
                 Some((Placed::of(&pose), f64::from(pose.score)))
             }))
         })?;
-        let scores: Vec<f64> = placed.iter().flatten().map(|it| it.1).collect();
+        let scores: Vec<f64> = placed.iter().flatten().map(|placed| placed.1).collect();
         let n = scores.len();
         if n == 0 {
             let n_people = placed.len();
@@ -158,7 +158,7 @@ impl Trainer<'_> {
             let batch = order.into_iter().skip(batch * size).take(size);
             batch.collect::<Vec<_>>()
         };
-        let held: BTreeSet<&Origin> = self.machine.entries().map(|it| it.0).collect();
+        let held: BTreeSet<&Origin> = self.machine.entries().map(|entry| entry.0).collect();
         let images = share(self.album.n_backgrounds(), 0);
         let mut origins = self.hard_negatives(&images, &held)?;
         let backgrounds = origins.len();
@@ -194,11 +194,11 @@ impl Trainer<'_> {
             // The ones in the working set may all score best, as each may keep some slack.
             let n_held = n_held.get(&image).copied().unwrap_or(0);
             let poses = miner.search(&picture, -1.0, self.settings.per_image + n_held);
-            let origins = poses.iter().map(|it| Origin::Background {
+            let origins = poses.iter().map(|pose| Origin::Background {
                 image: image as u32,
-                pose: Placed::of(it),
+                pose: Placed::of(pose),
             });
-            let new = origins.filter(|it| !held.contains(it));
+            let new = origins.filter(|origin| !held.contains(origin));
             Ok(new.take(self.settings.per_image).collect::<Vec<_>>())
         })?;
         Ok(found.concat())
@@ -255,8 +255,8 @@ impl Trainer<'_> {
         let picture = self.background(image)?;
         Ok(on_pyramid(model, &picture, |pyramid, layout| {
             let cells = self.cells(image, pyramid, layout);
-            let constraint = |it: &Origin| {
-                let pose = on_layout(it.pose(), layout)?;
+            let constraint = |origin: &Origin| {
+                let pose = on_layout(origin.pose(), layout)?;
                 let wrong = Example::sharing(self.plan.shape(), &self.at, &cells, &pose);
                 Some(Constraint {
                     x: wrong.features.negated(),
@@ -282,9 +282,9 @@ impl Trainer<'_> {
                 let example = Example::of(self.plan.shape(), &self.at, &map, &pose);
                 Some((pose, example))
             };
-            let constraint = |it: &Origin| {
-                let (pose, shown) = example(it.pose())?;
-                let (x, margin) = if let Origin::Mistake { .. } = it {
+            let constraint = |origin: &Origin| {
+                let (pose, shown) = example(origin.pose())?;
+                let (x, margin) = if let Origin::Mistake { .. } = origin {
                     let (_, right) = example(self.right[person].as_ref()?)?;
                     let worst = self.settings.pose_margin;
                     let lost = loss(model, layout, &marked, worst).of_pose(model, &pose);
@@ -314,7 +314,9 @@ impl Trainer<'_> {
 fn on_layout(placed: &Placed, layout: &Layout) -> Option<Pose> {
     let pose = placed.pose();
     let level = layout.levels.get(usize::from(pose.level))?;
-    let lies = |it: &Placement| usize::from(it.x) < level.cols && usize::from(it.y) < level.rows;
+    let lies = |placement: &Placement| {
+        usize::from(placement.x) < level.cols && usize::from(placement.y) < level.rows
+    };
     pose.parts.iter().all(lies).then_some(pose)
 }
 

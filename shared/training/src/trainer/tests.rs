@@ -24,7 +24,7 @@ impl Figures {
     /// Centres of the parts of a person.
     fn parts(person: usize) -> Vec<[f64; 2]> {
         let mut random = fastrand::Rng::with_seed(person as u64);
-        let [x, y] = [30.0, 22.0].map(|it| it + 8.0 * random.f64());
+        let [x, y] = [30.0, 22.0].map(|value| value + 8.0 * random.f64());
         let lean = if person.is_multiple_of(2) { 7.0 } else { -5.0 };
         vec![[x, y], [x + 1.0, y + 18.0], [x + lean, y + 36.0]]
     }
@@ -163,7 +163,7 @@ fn off(model: &Model, person: usize) -> f64 {
 #[test]
 fn figures_outside_the_training_set_are_found() {
     let model = trained(&settings());
-    let worst = (100..120).map(|it| off(&model, it)).fold(0.0, f64::max);
+    let worst = (100..120).map(|i| off(&model, i)).fold(0.0, f64::max);
     assert!(worst < 6.0, "{worst} px");
     assert!(
         model.spec().threshold > 0.0,
@@ -290,7 +290,7 @@ fn people_stay_in_the_working_set_however_well_they_are_separated() {
             let right = |it: &(&Origin, f64)| matches!(it.0, Origin::Right { .. });
             let people: Vec<_> = trainer.machine.entries().filter(right).collect();
             assert_eq!(people.len(), album.n_people);
-            n_idle += people.iter().filter(|it| it.1 == 0.0).count();
+            n_idle += people.iter().filter(|person| person.1 == 0.0).count();
         }
     }
     assert!(

@@ -44,7 +44,7 @@ fn neighbours_separate_types_that_the_parent_does_not() {
         by_parent.anchors[2].len(),
         by_parent.anchors[2].iter().len()
     );
-    assert!(by_parent.anchors[2].iter().all(|it| *it == [0, 4]));
+    assert!(by_parent.anchors[2].iter().all(|anchor| *anchor == [0, 4]));
     let by_all = cluster(
         &people(),
         (&PARENTS, None),
@@ -64,7 +64,7 @@ fn few_people_have_few_types() {
         (&PARENTS, None),
         &settings(6, TypesBy::Parent),
     );
-    assert!(types.anchors.iter().all(|it| (1..=2).contains(&it.len())));
+    assert!(types.anchors.iter().all(|anchor| (1..=2).contains(&anchor.len())));
     let fits = |person: &Vec<usize>| person.iter().zip(&types.anchors).all(|(a, b)| *a < b.len());
     assert!(types.of_person.iter().all(fits));
 }

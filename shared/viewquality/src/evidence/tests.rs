@@ -18,7 +18,7 @@ fn model(n_types: usize) -> Model {
     };
     let part = |part: usize| PartSpec {
         name: format!("part {part}"),
-        filter_of_type: (0..n_types).map(|it| part * n_types + it).collect(),
+        filter_of_type: (0..n_types).map(|i| part * n_types + i).collect(),
         edge: (part > 0).then(|| Edge {
             parent: 0,
             bias: (0..n_types)
@@ -80,7 +80,7 @@ fn numbers(candidates: &[Pose]) -> impl Fn(&str) -> f32 + use<> {
     evidence((&model, &layout), candidates, &SCORES, &tile, &mut out).unwrap();
     assert_eq!(out.len(), n_evidence(3));
     move |name| {
-        let index = (0..out.len()).find(|it| evidence_name(*it, 3).as_deref() == Some(name));
+        let index = (0..out.len()).find(|i| evidence_name(*i, 3).as_deref() == Some(name));
         out[index.unwrap_or_else(|| panic!("no number is called {name}"))]
     }
 }
@@ -89,7 +89,7 @@ fn numbers(candidates: &[Pose]) -> impl Fn(&str) -> f32 + use<> {
 fn a_model_with_26_parts_has_424_values_with_distinct_names() {
     assert_eq!(n_evidence(26), 424);
     let names: std::collections::BTreeSet<String> =
-        (0..424).map(|it| evidence_name(it, 26).unwrap()).collect();
+        (0..424).map(|i| evidence_name(i, 26).unwrap()).collect();
     assert_eq!(names.len(), 424);
     assert_eq!(evidence_name(424, 26), None);
     assert_eq!(evidence_name(16 + 3, 26).unwrap(), "part 2 spring");
@@ -115,7 +115,7 @@ fn types_and_scores_are_those_of_the_pose() {
     let at = numbers(&[pose(2.0, [8, 9])]);
     assert_eq!((at("part 1 type_1"), at("part 1 type_2")), (0.0, 1.0));
     assert_eq!((at("part 2 type_1"), at("part 2 type_6")), (1.0, 0.0));
-    let local = ["response", "contrast", "margin"].map(|it| at(&format!("part 2 {it}")));
+    let local = ["response", "contrast", "margin"].map(|name| at(&format!("part 2 {name}")));
     assert_eq!(local, [0.5, -1.0, 0.25]);
     assert_eq!((at("score"), at("responses")), (2.0, 5.5));
     // Three cells of four pixels.

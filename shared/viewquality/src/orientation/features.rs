@@ -63,7 +63,7 @@ impl Patch {
 
 /// Number of features.
 pub(crate) fn n_features() -> usize {
-    let of_patch = |it: &Patch| it.n_gradients() + it.n_cells().pow(2) * N_COLOURS;
+    let of_patch = |patch: &Patch| patch.n_gradients() + patch.n_cells().pow(2) * N_COLOURS;
     PATCHES.iter().map(of_patch).sum()
 }
 

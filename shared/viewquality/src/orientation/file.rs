@@ -78,9 +78,9 @@ impl Network {
             &self.hidden_bias,
             &self.output,
         ] {
-            payload.extend(values.iter().flat_map(|it| it.to_le_bytes()));
+            payload.extend(values.iter().flat_map(|value| value.to_le_bytes()));
         }
-        payload.extend(self.output_bias.iter().flat_map(|it| it.to_le_bytes()));
+        payload.extend(self.output_bias.iter().flat_map(|output_bias| output_bias.to_le_bytes()));
         ENVELOPE.seal(&payload)
     }
 
@@ -113,8 +113,8 @@ impl Network {
         if numbers.len() != n || !rest.is_empty() {
             return Err(length(4 * (2 + n)));
         }
-        let numbers: Vec<f32> = numbers.iter().map(|it| f32::from_le_bytes(*it)).collect();
-        if let Some(index) = numbers.iter().position(|it| !it.is_finite()) {
+        let numbers: Vec<f32> = numbers.iter().map(|number| f32::from_le_bytes(*number)).collect();
+        if let Some(index) = numbers.iter().position(|number| !number.is_finite()) {
             let value = numbers[index];
             return Err(FileError::NotFinite { index, value });
         }
@@ -143,7 +143,7 @@ mod tests {
 
     fn network(hidden: usize) -> Network {
         let n = n_features();
-        let values = |n: usize, step: f32| (0..n).map(|it| it as f32 * step).collect();
+        let values = |n: usize, step: f32| (0..n).map(|i| i as f32 * step).collect();
         Network {
             mean: values(n, 0.5),
             inverse: values(n, 0.25),
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn sizes_that_do_not_fit_are_told() {
         let payload = |sizes: [u32; 2], n: usize| {
-            let mut bytes: Vec<u8> = sizes.iter().flat_map(|it| it.to_le_bytes()).collect();
+            let mut bytes: Vec<u8> = sizes.iter().flat_map(|size| size.to_le_bytes()).collect();
             bytes.resize(8 + n, 0);
             ENVELOPE.seal(&bytes)
         };

@@ -33,10 +33,10 @@ pub fn score(detector: &Detector, samples: &[Sample]) -> Score {
         f64::from(2.0 * (evidence[0] * right + evidence[1] * towards) / length)
     };
     let ratios: Vec<f64> = samples.par_iter().map_init(Workspace::default, log_ratio).collect();
-    let surprise: f64 = ratios.iter().map(|it| (-it).exp().ln_1p()).sum();
+    let surprise: f64 = ratios.iter().map(|ratio| (-ratio).exp().ln_1p()).sum();
     Score {
         n: ratios.len(),
-        n_right: ratios.iter().filter(|it| **it > 0.0).count(),
+        n_right: ratios.iter().filter(|ratio| **ratio > 0.0).count(),
         surprise: surprise / ratios.len().max(1) as f64,
     }
 }

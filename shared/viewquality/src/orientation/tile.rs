@@ -44,7 +44,7 @@ impl Tile {
             shape: TILE,
             ..crate::Tile::around(bounds, BOX)?
         };
-        if head.iter().any(|it| !it.is_finite()) {
+        if head.iter().any(|value| !value.is_finite()) {
             return None;
         }
         let mut planes = vec![0.0; TILE.n_values()];
@@ -52,7 +52,7 @@ impl Tile {
         let area = TILE.height * TILE.width;
         let rgb = (0..area)
             .flat_map(|at| [0, 1, 2].map(|channel| planes[channel * area + at]))
-            .map(|it| (it * 255.0).round() as u8)
+            .map(|value| (value * 255.0).round() as u8)
             .collect();
         let middle = [TILE.width, TILE.height].map(|side| (side as f64 - 1.0) / 2.0);
         let in_tile =
@@ -153,7 +153,7 @@ mod tests {
     use super::*;
 
     fn frame() -> Vec<u8> {
-        (0..300 * 200 * 3).map(|it| (it * 7 % 251) as u8).collect()
+        (0..300 * 200 * 3).map(|i| (i * 7 % 251) as u8).collect()
     }
 
     #[test]

@@ -119,8 +119,8 @@ pub fn train(
 
 /// How many times a photograph of a person from behind counts.
 fn weight_behind(samples: &[Sample]) -> f32 {
-    let photographs = || samples.iter().filter(|it| it.is_photograph);
-    let behind = photographs().filter(|it| it.front[1] < 0.0).count();
+    let photographs = || samples.iter().filter(|sample| sample.is_photograph);
+    let behind = photographs().filter(|photograph| photograph.front[1] < 0.0).count();
     (photographs().count() - behind) as f32 / behind.max(1) as f32
 }
 
@@ -149,7 +149,10 @@ fn beginning(samples: &[Sample], settings: &Settings, rng: &mut Rng) -> Network 
             *variance += (value - mean).powi(2) * share;
         }
     }
-    let inverse = variance.iter().map(|it: &f32| 1.0 / it.sqrt().max(MIN_DEVIATION)).collect();
+    let inverse = variance
+        .iter()
+        .map(|variance: &f32| 1.0 / variance.sqrt().max(MIN_DEVIATION))
+        .collect();
     let mut normal = |deviation: f32| {
         let radius = (-2.0 * (1.0 - rng.f64()).ln()).sqrt();
         (radius * (std::f64::consts::TAU * rng.f64()).cos()) as f32 * deviation
@@ -202,7 +205,7 @@ impl Trainer {
                 values
             })
             .collect();
-        let sums: Vec<Vec<f32>> = inputs.par_iter().map(|it| network.sums(it)).collect();
+        let sums: Vec<Vec<f32>> = inputs.par_iter().map(|input| network.sums(input)).collect();
         let hidden = network.n_hidden();
         let mut of_output = vec![0.0; N_OUTPUTS * hidden];
         let mut of_bias = [0.0; N_OUTPUTS];

@@ -12,7 +12,7 @@ const PLAIN: Normalisation = Normalisation {
 
 /// Rounds away the error of the normalisation.
 fn colours(values: &[f32]) -> Vec<f32> {
-    values.iter().map(|it| (it * 1e4).round() / 1e4).collect()
+    values.iter().map(|value| (value * 1e4).round() / 1e4).collect()
 }
 
 fn sampled(size: [usize; 2], data: &[u8], tile: &Tile) -> Vec<f32> {
@@ -144,7 +144,7 @@ fn reference(size: [usize; 2], data: &[u8], tile: &Tile, [row, col, channel]: [u
         at(col, width, tile.centre[0]),
         at(row, height, tile.centre[1]),
     );
-    let weight = |it: i64, at: f64| (1.0 - (it as f64 - at).abs() / reach).max(0.0);
+    let weight = |value: i64, at: f64| (1.0 - (value as f64 - at).abs() / reach).max(0.0);
     let span = |at: f64| (at - reach).floor() as i64..=(at + reach).ceil() as i64;
     let (mut sum, mut total) = (0.0, 0.0);
     for v in span(y) {
@@ -154,7 +154,7 @@ fn reference(size: [usize; 2], data: &[u8], tile: &Tile, [row, col, channel]: [u
                 u.clamp(0, size[0] as i64 - 1),
                 v.clamp(0, size[1] as i64 - 1),
             ]
-            .map(|it| it as usize);
+            .map(|value| value as usize);
             sum += w * f64::from(data[3 * (pixel[1] * size[0] + pixel[0]) + channel]);
             total += w;
         }

@@ -62,9 +62,9 @@ proptest! {
         let message = maps_to_message(&grids, [640, 480]).unwrap();
         let values: Vec<f32> = (0..n_values(&grids)).map(|nth| nth as f32).collect();
         let maps = maps_from_message(&message, &values).unwrap();
-        let back: Vec<MapGrid> = maps.iter().map(|it| *it.grid()).collect();
+        let back: Vec<MapGrid> = maps.iter().map(|map| *map.grid()).collect();
         prop_assert_eq!(back, grids);
-        let all: Vec<f32> = maps.iter().flat_map(|it| it.values().to_vec()).collect();
+        let all: Vec<f32> = maps.iter().flat_map(|map| map.values().to_vec()).collect();
         prop_assert_eq!(&all, &values);
         let longer = [&values[..], &[1.0]].concat();
         maps_from_message(&message, &longer).unwrap_err();

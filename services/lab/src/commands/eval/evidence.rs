@@ -51,7 +51,7 @@ impl Options {
         if self.stress == ["all"] {
             return Ok(Stress::ALL.to_vec());
         }
-        let each = self.stress.iter().map(|it| it.parse::<Stress>());
+        let each = self.stress.iter().map(|stress| stress.parse::<Stress>());
         let all: Result<Vec<Stress>, _> = each.collect();
         all.map_err(|error| Failure::new(ExitKind::Usage, format!("--stress: {error}")))
     }
@@ -118,7 +118,7 @@ pub(super) fn run(
         output::line(evidence_text(&rows).trim_end())?;
     }
     failure::require_results(
-        rows.iter().any(|it| it.n_frames > 0),
+        rows.iter().any(|row| row.n_frames > 0),
         "no frame was judged: there is none, or --every leaves none",
     )
 }

@@ -35,7 +35,7 @@ pub(super) fn run(
     }
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let file = arguments.model.as_ref();
-    let file = file.map_or_else(|| "the model".to_owned(), |it| it.display().to_string());
+    let file = file.map_or_else(|| "the model".to_owned(), |file| file.display().to_string());
     judged::check(&model, &file)?;
     let poses = arguments.out.join("poses");
     inputs::make_folder(&poses)?;
@@ -93,8 +93,8 @@ fn write(arguments: &Arguments, sets: &[Pictures], joints: &inputs::Joints) -> R
         ..Bootstrap::default()
     };
     let model = arguments.model.as_ref();
-    let model = model.map_or("the one that ships".to_owned(), |it| {
-        it.display().to_string()
+    let model = model.map_or("the one that ships".to_owned(), |model| {
+        model.display().to_string()
     });
     let numbers = pictures::write_report(&arguments.out, &model, sets, &bootstrap)?;
     if arguments.json {

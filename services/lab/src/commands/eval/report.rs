@@ -38,7 +38,7 @@ fn about(
     job: &Job<'_>,
     done: &Done,
 ) -> Vec<(String, String)> {
-    let n_frames: usize = done.sequences.iter().map(|it| it.1.len()).sum();
+    let n_frames: usize = done.sequences.iter().map(|sequence| sequence.1.len()).sum();
     let file = arguments.sigma.as_ref().or(arguments.network.as_ref());
     let expected = match (file, arguments.oracle) {
         (Some(file), _) => file.display().to_string(),
@@ -52,8 +52,8 @@ fn about(
     let frames = format!("{n_frames} instants; sequences: {}", done.sequences.len());
     let settings = fuse::settings(config, 1.0, job.learned);
     let model = arguments.model.as_ref();
-    let model = model.map_or("the one that ships".to_owned(), |it| {
-        it.display().to_string()
+    let model = model.map_or("the one that ships".to_owned(), |model| {
+        model.display().to_string()
     });
     let upright = if job.film.upright { ", upright" } else { "" };
     [

@@ -79,14 +79,15 @@ impl Expected {
     /// * `people`: the joints of each.
     fn of(people: &[Vec<JointError>]) -> Self {
         let auc = |errors: &[JointError]| {
-            let each = errors.iter().map(|it| (it.expected, it.is_far()));
+            let each = errors.iter().map(|error| (error.expected, error.is_far()));
             area_under_roc(&each.collect::<Vec<_>>())
         };
         let errors = people.concat();
-        let both: Vec<(f64, f64)> = errors.iter().map(|it| (it.expected, it.error)).collect();
+        let both: Vec<(f64, f64)> =
+            errors.iter().map(|error| (error.expected, error.error)).collect();
         Self {
             n_joints: errors.len(),
-            n_far: errors.iter().filter(|it| it.is_far()).count(),
+            n_far: errors.iter().filter(|error| error.is_far()).count(),
             auc: auc(&errors).zip(Bootstrap::default().interval_of(people, auc)),
             rank_correlation: rank_correlation(&both),
         }
@@ -96,8 +97,8 @@ impl Expected {
         json!({
             "joints": self.n_joints,
             "off_by_half_a_head": self.n_far,
-            "auc": self.auc.map(|it| it.0),
-            "auc_interval": self.auc.map(|it| it.1),
+            "auc": self.auc.map(|auc| auc.0),
+            "auc_interval": self.auc.map(|auc| auc.1),
             "rank_correlation": self.rank_correlation,
         })
     }
@@ -109,8 +110,9 @@ impl fmt::Display for Expected {
             || "unknown".to_owned(),
             |(auc, [low, high])| format!("{auc:.3} ({low:.3} to {high:.3})"),
         );
-        let number =
-            |it: Option<f64>| it.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.3}"));
+        let number = |value: Option<f64>| {
+            value.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.3}"))
+        };
         write!(
             to,
             "expected errors of the maxima: area under the ROC {} ({} of {} joints are off by more than half a head), rank correlation {}",

@@ -21,9 +21,10 @@ pub(super) fn costs(file: &Path) -> Result<Costs, Failure> {
     let text = failure::read_text(file)?;
     let report: Value = serde_json::from_str(&text).map_err(|error| refused(&error.to_string()))?;
     let folder = report["output"].as_str();
-    let hosts = folder
-        .and_then(|it| files::read_text(&Path::new(it).join("hosts.json"), files::SETTINGS).ok());
-    let hosts: Option<Value> = hosts.and_then(|it| serde_json::from_str(&it).ok());
+    let hosts = folder.and_then(|folder| {
+        files::read_text(&Path::new(folder).join("hosts.json"), files::SETTINGS).ok()
+    });
+    let hosts: Option<Value> = hosts.and_then(|host| serde_json::from_str(&host).ok());
     of_run(&report, hosts.as_ref()).map_err(|what| refused(&what))
 }
 
@@ -49,8 +50,8 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
         (!all.is_empty()).then(|| 1e3 * sum / (all.len() as f64 * n_frames))
     };
     let needed = |service: &str| mean(service).ok_or_else(|| format!("no process {service} in it"));
-    let workers = spent.keys().filter(|it| it.starts_with("fuse-")).count() as f64;
-    let fused = mean("fuse").map_or(0.0, |it| it * workers)
+    let workers = spent.keys().filter(|key| key.starts_with("fuse-")).count() as f64;
+    let fused = mean("fuse").map_or(0.0, |value| value * workers)
         + needed("triangulate")?
         + mean("results").unwrap_or(0.0);
     let costs = Costs {
@@ -60,7 +61,7 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
         fuse_ms: 0.0,
         ..DEFAULT
     };
-    let n_pose = spent.keys().filter(|it| it.starts_with("pose-")).count();
+    let n_pose = spent.keys().filter(|key| key.starts_with("pose-")).count();
     // Where poses cross, some are found elsewhere.
     let carries_poses = n_pose > 0 && n_pose < n_views;
     Ok(hosts.map_or(costs, |hosts| with_link(costs, hosts, carries_poses)))
@@ -71,8 +72,8 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
 /// * `hosts`: what `hosts.json` says; `carries_poses`: whether poses cross, and no frames.
 fn with_link(mut costs: Costs, hosts: &Value, carries_poses: bool) -> Costs {
     let far = hosts["hosts"].as_array().into_iter().flatten();
-    let far = far.filter_map(|it| it["views"].as_array()).flatten();
-    let far: Vec<&Value> = far.filter(|it| it["used"].as_f64() > Some(0.0)).collect();
+    let far = far.filter_map(|value| value["views"].as_array()).flatten();
+    let far: Vec<&Value> = far.filter(|far| far["used"].as_f64() > Some(0.0)).collect();
     let over_views = |value: &dyn Fn(&Value) -> Option<f64>| {
         let all: Vec<f64> = far.iter().filter_map(|it| value(it)).collect();
         (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
@@ -84,7 +85,7 @@ fn with_link(mut costs: Costs, hosts: &Value, carries_poses: bool) -> Costs {
             costs.frame_bytes = bytes;
         }
     }
-    let median = |key: &str| over_views(&|it: &Value| it[key]["p50_ms"].as_f64());
+    let median = |key: &str| over_views(&|value: &Value| value[key]["p50_ms"].as_f64());
     if !carries_poses {
         costs.encode_ms = median("encode").unwrap_or(costs.encode_ms);
         costs.decode_ms = median("decode").unwrap_or(costs.decode_ms);
@@ -157,8 +158,10 @@ mod tests {
             change(&mut it);
             of_run(&it, None).unwrap_err()
         };
-        assert!(refused(&|it| it["processor_s"] = json!(null)).contains("no report"));
-        assert!(refused(&|it| it["frames_in_footage"] = json!(0)).contains("0 frames of 3 views"));
-        assert!(refused(&|it| it["processor_s"] = json!({})).contains("no process"));
+        assert!(refused(&|value| value["processor_s"] = json!(null)).contains("no report"));
+        assert!(
+            refused(&|value| value["frames_in_footage"] = json!(0)).contains("0 frames of 3 views")
+        );
+        assert!(refused(&|value| value["processor_s"] = json!({})).contains("no process"));
     }
 }

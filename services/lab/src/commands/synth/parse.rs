@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use scene::{Action, RigChoice};
 
 pub(super) fn rig(text: &str) -> Result<RigChoice, String> {
-    RigChoice::parse(text).map_err(|it| it.to_string())
+    RigChoice::parse(text).map_err(|error| error.to_string())
 }
 
 /// Parses skews, milliseconds: `0,5,11,16`.

@@ -92,7 +92,7 @@ fn text(learned: &Learned) -> String {
     let it = &learned.file.learned;
     let mut lines = vec!["reach  ridge   error of people left out, % of their size".to_owned()];
     for (tried, errors) in &learned.tried {
-        let errors: Vec<String> = errors.iter().map(|it| format!("{it:.3}")).collect();
+        let errors: Vec<String> = errors.iter().map(|error| format!("{error:.3}")).collect();
         let is_taken = tried.reach == it.reach && tried.ridge == it.ridge;
         let mark = if is_taken { "  <- taken" } else { "" };
         let (reach, ridge) = (tried.reach, tried.ridge);

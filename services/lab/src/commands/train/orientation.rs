@@ -126,13 +126,13 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 }
 
 fn json(report: &Report) -> serde_json::Value {
-    let judged = report.judged.iter().map(|it| {
+    let judged = report.judged.iter().map(|judged| {
         json!({
-            "on": it.on,
-            "n": it.n,
-            "right": it.right,
-            "interval": it.interval,
-            "surprise_nats": it.surprise,
+            "on": judged.on,
+            "n": judged.n,
+            "right": judged.right,
+            "interval": judged.interval,
+            "surprise_nats": judged.surprise,
         })
     });
     json!({
@@ -149,14 +149,14 @@ fn text(report: &Report) -> String {
         "learned from {} photographs ({} from behind) and {} pictures of scenes",
         report.n_photographs, report.n_behind, report.n_rendered
     )];
-    lines.extend(report.judged.iter().map(|it| {
-        let [low, high] = it.interval.map(|it| 100.0 * it);
+    lines.extend(report.judged.iter().map(|judged| {
+        let [low, high] = judged.interval.map(|interval| 100.0 * interval);
         format!(
             "{}: right for {:.1} % of {} people ({low:.1} to {high:.1}), surprise {:.3} nats (0.693: knows nothing)",
-            it.on,
-            100.0 * it.right,
-            it.n,
-            it.surprise
+            judged.on,
+            100.0 * judged.right,
+            judged.n,
+            judged.surprise
         )
     }));
     lines.join("\n")

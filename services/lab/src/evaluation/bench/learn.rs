@@ -48,12 +48,12 @@ impl Bench {
             (0..found.len()).map(observe).collect();
         for learner in &mut *learners {
             let observations = views.iter().flatten();
-            observations.for_each(|it| learner.add_view(&it.1, sequence.joints));
+            observations.for_each(|observation| learner.add_view(&observation.1, sequence.joints));
             learner.end_instant();
         }
         for [first, second] in pipeline::all_pairs(views.len()) {
             if let [Some(a), Some(b)] = [&views[first], &views[second]] {
-                let names = [first, second].map(|it| sequence.views[it].camera.as_str());
+                let names = [first, second].map(|i| sequence.views[i].camera.as_str());
                 let pair = Pair {
                     views: [&a.1, &b.1],
                     angle: angle_between(&a.0, &b.0),
@@ -82,7 +82,7 @@ fn observation(
         Some([at.x, at.y])
     };
     Some(ViewObservation {
-        types: best.parts.iter().map(|it| it.mixture).collect(),
+        types: best.parts.iter().map(|part| part.mixture).collect(),
         centres,
         errors,
         exchanged,

@@ -101,7 +101,7 @@ pub(super) fn tick(value: f64) -> String {
 pub(super) fn top(most: f64) -> f64 {
     let tenth = 10_f64.powf(most.max(0.01).log10().floor());
     let steps = [1.0, 1.2, 1.6, 2.0, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
-    let fits = steps.into_iter().map(|it| it * tenth).find(|it| *it >= most - 1e-9);
+    let fits = steps.into_iter().map(|step| step * tenth).find(|value| *value >= most - 1e-9);
     fits.unwrap_or(10.0 * tenth)
 }
 
@@ -129,8 +129,8 @@ pub(super) fn bars(group: &Group, titles: &[String]) -> Html {
 /// PCP3D over the threshold, a curve for each version.
 pub(super) fn curves(group: &Group, titles: &[String]) -> Html {
     let mut plot = Plot::new(420.0, 100.0, "%");
-    let ends = group.versions.iter().filter_map(|it| it.curve.last());
-    let most = ends.map(|it| it[0]).fold(0.0, f64::max);
+    let ends = group.versions.iter().filter_map(|version| version.curve.last());
+    let most = ends.map(|end| end[0]).fold(0.0, f64::max);
     let most = if most > 0.0 { most } else { 1.0 };
     for (version, (title, it)) in titles.iter().zip(&group.versions).enumerate() {
         let point = |[gamma, percent]: &[f64; 2]| {
@@ -160,8 +160,8 @@ pub(super) fn histogram(changes: &ChangesOf) -> Html {
     let far = changes
         .bins
         .iter()
-        .filter(|it| it[0] != 0.0 && (it[0] + width(changes)).abs() > 1e-9);
-    let most = top(far.map(|it| it[1]).fold(1.0, f64::max));
+        .filter(|bin| bin[0] != 0.0 && (bin[0] + width(changes)).abs() > 1e-9);
+    let most = top(far.map(|far| far[1]).fold(1.0, f64::max));
     let mut plot = Plot::new(420.0, most, "%");
     let n = changes.bins.len().max(1) as f64;
     let slot = plot.width / n;
@@ -173,7 +173,7 @@ pub(super) fn histogram(changes: &ChangesOf) -> Html {
     }
     for nth in 0..=4 {
         let share = f64::from(nth) / 4.0;
-        let reach = changes.bins.first().map_or(0.0, |it| it[0].abs());
+        let reach = changes.bins.first().map_or(0.0, |bin| bin[0].abs());
         let at = reach * (2.0 * share - 1.0);
         plot.label(LEFT + plot.width * share, &format!("{} px", tick(at)));
     }

@@ -16,7 +16,7 @@ pub fn pictures_html(
 ) -> String {
     let mut out = begin("Parallax: evaluation");
     about_table(&mut out, about);
-    for table in sets.iter().flat_map(|it| it.tables(bootstrap)) {
+    for table in sets.iter().flat_map(|set| set.tables(bootstrap)) {
         put!(
             out,
             "<h2>{}</h2>\n<div class=\"scroll\"><table>\n<tr><th>",
@@ -36,8 +36,8 @@ pub fn pictures_html(
             for value in values {
                 put!(out, "<td>{value:.1}", [value]);
             }
-            let ends = interval.map_or([None; 2], |it| it.map(Some));
-            let [low, high] = ends.map(|it| number(it, 1));
+            let ends = interval.map_or([None; 2], |interval| interval.map(Some));
+            let [low, high] = ends.map(|end| number(end, 1));
             put!(out, "<td>{low} to {high}</tr>\n", [low, high]);
         }
         put!(out, "</table></div>\n");

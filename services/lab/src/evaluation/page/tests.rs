@@ -117,7 +117,7 @@ fn the_page_has_the_style_of_a_run_and_fits_a_telephone() {
 #[test]
 fn the_page_of_pictures_says_every_number_and_escapes_names() {
     let person =
-        |x: f64| core::array::from_fn(|it| [x + 10.0 * (it % 4) as f64, 25.0 * (it / 4) as f64]);
+        |x: f64| core::array::from_fn(|i| [x + 10.0 * (i % 4) as f64, 25.0 * (i / 4) as f64]);
     let (here, there) = (Some(person(0.0)), Some(person(500.0)));
     // Two of three pictures have their person, of whom one is found elsewhere by the best detection.
     let set = Pictures {

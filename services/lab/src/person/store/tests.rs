@@ -62,8 +62,8 @@ fn plan() -> (Plan, Settings) {
         parents: vec![None, Some(0)],
         mirror: None,
     };
-    let person = |it: f64| vec![[28.0 + it, 24.0], [30.0, 40.0 - it]];
-    let people: Vec<_> = (0..4).map(|it| person(f64::from(it))).collect();
+    let person = |value: f64| vec![[28.0 + value, 24.0], [30.0, 40.0 - value]];
+    let people: Vec<_> = (0..4).map(|i| person(f64::from(i))).collect();
     (Plan::new("m", &tree, &people, &settings).unwrap(), settings)
 }
 

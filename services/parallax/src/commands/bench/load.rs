@@ -75,7 +75,7 @@ pub(crate) struct Arguments {
 
 /// Parses a number of cameras.
 fn views(text: &str) -> Result<usize, String> {
-    let n = text.parse().ok().filter(|it| (1..=MAX_VIEWS).contains(it));
+    let n = text.parse().ok().filter(|value| (1..=MAX_VIEWS).contains(value));
     n.ok_or_else(|| format!("expected 1 to {MAX_VIEWS}"))
 }
 

@@ -56,7 +56,7 @@ pub(crate) struct Arguments {
 
 /// Parses the size of a message, bytes.
 fn bytes(text: &str) -> Result<usize, String> {
-    let n = text.parse().ok().filter(|it| (16..=1 << 30).contains(it));
+    let n = text.parse().ok().filter(|value| (16..=1 << 30).contains(value));
     n.ok_or_else(|| "expected 16 to 1073741824 bytes".to_owned())
 }
 

@@ -114,7 +114,7 @@ fn frames(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Points>>>, Failure> {
     let mut frames = BTreeMap::<u64, Vec<Option<Points>>>::new();
     for line in runfiles::lines::<ViewLine>(&failure::read_text(file)?) {
         let line = line.map_err(|error| failure::in_file(file, &error))?;
-        let Some(camera) = cameras.iter().position(|it| it.name == line.view) else {
+        let Some(camera) = cameras.iter().position(|camera| camera.name == line.view) else {
             continue;
         };
         let Some(single) = line.single else { continue };
@@ -211,7 +211,7 @@ mod tests {
         std::fs::write(&file, seen(&rig, [0, 1, 2, 3])).unwrap();
         let right = agreement(&rig, &file).unwrap();
         assert_eq!(right.disagreements, [""; 0]);
-        assert!(right.errors.cameras.iter().all(|it| it.median_px < 1.5));
+        assert!(right.errors.cameras.iter().all(|camera| camera.median_px < 1.5));
         std::fs::write(&file, seen(&rig, [0, 2, 1, 3])).unwrap();
         let wrong = agreement(&rig, &file).unwrap().disagreements.join("; ");
         assert!(wrong.contains("c1 and c2 look exchanged"), "{wrong}");

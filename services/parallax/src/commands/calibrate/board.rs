@@ -176,7 +176,7 @@ fn settings(arguments: &Arguments) -> Result<BoardSettings, Failure> {
         board,
         cameras: cameras(arguments),
         look: LookSettings {
-            every: arguments.every.map(|it| it as usize),
+            every: arguments.every.map(|every| every as usize),
             most: arguments.most_pictures as usize,
             first: None,
             frames,
@@ -191,7 +191,7 @@ fn settings(arguments: &Arguments) -> Result<BoardSettings, Failure> {
         wants_rig: !arguments.intrinsics,
         most_frames: arguments.most_frames as usize,
         is_mirrored: arguments.mirrored,
-        back: arguments.back.map(|it| match it {
+        back: arguments.back.map(|back| match back {
             BackName::Mirrored => Back::Mirrored,
             BackName::Blank => Back::Blank,
         }),
@@ -201,9 +201,9 @@ fn settings(arguments: &Arguments) -> Result<BoardSettings, Failure> {
 /// One camera for each path; several pictures are one camera where intrinsics alone are wanted.
 fn cameras(arguments: &Arguments) -> Vec<CameraFootage> {
     let each: Vec<CameraFootage> =
-        arguments.footage.iter().map(|it| CameraFootage::of(it)).collect();
-    let is_picture = |it: &CameraFootage| {
-        let path = PathBuf::from(&it.paths[0]);
+        arguments.footage.iter().map(|footage| CameraFootage::of(footage)).collect();
+    let is_picture = |camera_footage: &CameraFootage| {
+        let path = PathBuf::from(&camera_footage.paths[0]);
         path.is_file() && footage::is_image(&path).unwrap_or(false)
     };
     if arguments.intrinsics && each.len() > 1 && each.iter().all(is_picture) {

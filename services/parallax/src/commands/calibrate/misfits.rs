@@ -91,14 +91,14 @@ fn drawn(walk: &Walk, misfit: &Misfit) -> Result<Option<Vec<u8>>, Failure> {
 /// The part of a picture around its person, with the joints.
 fn around(size: Size, rgb: &[u8], joints: &[[[f64; 2]; 2]]) -> Option<Vec<u8>> {
     let ends = |axis: usize| {
-        let values = joints.iter().map(|it| it[0][axis]);
+        let values = joints.iter().map(|joint| joint[0][axis]);
         let low = values.clone().fold(f64::MAX, f64::min);
         [low, values.fold(f64::MIN, f64::max)]
     };
     let ([left, right], [top, bottom]) = (ends(0), ends(1));
     let extent = (right - left).max(bottom - top);
     let margin = MARGIN * extent;
-    let within = |it: f64, side: usize| it.clamp(0.0, side as f64) as usize;
+    let within = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
     let [left, right] = [left - margin, right + margin].map(|it| within(it, size.width));
     let [top, bottom] = [top - margin, bottom + margin].map(|it| within(it, size.height));
     let mut canvas = Canvas::part(size, rgb, [left..right, top..bottom])?;

@@ -63,7 +63,7 @@ pub(crate) struct Arguments {
 }
 
 fn rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse().ok().filter(|it| (0.1..=1000.0).contains(it));
+    let rate = text.parse().ok().filter(|value| (0.1..=1000.0).contains(value));
     rate.ok_or_else(|| format!("expected 0.1 to 1000 frames a second, got {text:?}"))
 }
 
@@ -113,7 +113,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         ))?;
     }
     output::message(format_args!("wrote {}", arguments.out.display()));
-    let below = new.cameras().iter().find(|it| it.centre_in_world().z < 0.0);
+    let below = new.cameras().iter().find(|camera| camera.centre_in_world().z < 0.0);
     match below {
         None if by_bodies => {
             let message = "the vertical is that of people who stand upright, some degrees sure: their feet stood on one spot";
@@ -139,9 +139,11 @@ fn by_board(
 ) -> Result<nalgebra::Isometry3<f64>, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let cameras: Vec<CameraFootage> =
-        arguments.footage.iter().map(|it| CameraFootage::of(it)).collect();
-    let places: Vec<usize> =
-        cameras.iter().map(|it| camera_named(rig, &it.name)).collect::<Result<_, _>>()?;
+        arguments.footage.iter().map(|footage| CameraFootage::of(footage)).collect();
+    let places: Vec<usize> = cameras
+        .iter()
+        .map(|camera| camera_named(rig, &camera.name))
+        .collect::<Result<_, _>>()?;
     let settings = LookSettings {
         every: Some(1),
         first: Some(arguments.frames),
@@ -163,9 +165,9 @@ fn by_board(
 }
 
 fn camera_named(rig: &Rig, name: &str) -> Result<usize, Failure> {
-    let found = rig.cameras().iter().position(|it| it.name == name);
+    let found = rig.cameras().iter().position(|camera| camera.name == name);
     found.ok_or_else(|| {
-        let known: Vec<&str> = rig.cameras().iter().map(|it| it.name.as_str()).collect();
+        let known: Vec<&str> = rig.cameras().iter().map(|camera| camera.name.as_str()).collect();
         Failure::new(
             ExitKind::Usage,
             format!("the rig has the cameras {}, not {name}", known.join(", ")),
@@ -178,7 +180,8 @@ fn clicks_of(rig: &Rig, texts: &[String]) -> Result<Vec<Click>, Failure> {
     let each = texts.iter().map(|text| {
         let parts = text.split_once('=').and_then(|(name, at)| {
             let (x, y) = at.split_once(',')?;
-            let number = |text: &str| text.trim().parse::<f64>().ok().filter(|it| it.is_finite());
+            let number =
+                |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
             Some((name, Point2::new(number(x)?, number(y)?)))
         });
         let (name, at) = parts.ok_or_else(|| {

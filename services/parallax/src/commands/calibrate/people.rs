@@ -77,12 +77,12 @@ pub(crate) struct Arguments {
 
 /// The standing height of a person, metres.
 pub(crate) fn height(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|it| (0.8..=2.4).contains(it));
+    let number = text.parse().ok().filter(|value| (0.8..=2.4).contains(value));
     number.ok_or_else(|| format!("expected 0.8 to 2.4 metres, got {text:?}"))
 }
 
 fn window(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|it| (0.0..=10.0).contains(it));
+    let number = text.parse().ok().filter(|value| (0.0..=10.0).contains(value));
     number.ok_or_else(|| format!("expected 0 to 10 seconds, got {text:?}"))
 }
 
@@ -90,7 +90,7 @@ fn distance(text: &str) -> Result<(String, String, f64), String> {
     let expected = || format!("expected CAMERA:CAMERA=METRES, got {text:?}");
     let (pair, metres) = text.rsplit_once('=').ok_or_else(expected)?;
     let (a, b) = pair.split_once(':').ok_or_else(expected)?;
-    let metres = metres.parse().ok().filter(|it| (0.01..=1000.0).contains(it));
+    let metres = metres.parse().ok().filter(|value| (0.01..=1000.0).contains(value));
     Ok((a.to_owned(), b.to_owned(), metres.ok_or_else(expected)?))
 }
 
@@ -98,7 +98,7 @@ fn distance(text: &str) -> Result<(String, String, f64), String> {
 fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
     let rig = inputs::rig_of(&deployment)?;
-    let lacking = deployment.cameras.iter().find(|it| rig.camera(&it.name).is_none());
+    let lacking = deployment.cameras.iter().find(|camera| rig.camera(&camera.name).is_none());
     let Some(camera) = lacking else {
         return Ok(());
     };
@@ -163,7 +163,7 @@ fn warn(cautions: &[Doubt], names: &[&str]) -> Result<(), Failure> {
     if cautions.is_empty() {
         return Ok(());
     }
-    let texts: Vec<String> = cautions.iter().map(|it| it.text(names)).collect();
+    let texts: Vec<String> = cautions.iter().map(|caution| caution.text(names)).collect();
     let message = format!(
         "the rig is usable, but not known well:\n  {}",
         texts.join("\n  ")
@@ -173,7 +173,8 @@ fn warn(cautions: &[Doubt], names: &[&str]) -> Result<(), Failure> {
 
 /// How well the worst camera is known.
 fn how_sure(outcome: &Outcome) -> String {
-    let worst = |axis: usize| outcome.reports.iter().map(|it| it.sd[axis]).fold(0.0, f64::max);
+    let worst =
+        |axis: usize| outcome.reports.iter().map(|report| report.sd[axis]).fold(0.0, f64::max);
     format!(
         ", cameras known to {:.2} degrees and {:.0} mm",
         worst(0),
@@ -295,7 +296,7 @@ fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
 }
 
 fn as_json(outcome: &Outcome, names: &[&str], finders: &[String]) -> Value {
-    let finite = |it: f64| it.is_finite().then_some(it);
+    let finite = |value: f64| value.is_finite().then_some(value);
     let each = names.iter().zip(&outcome.cameras).zip(&outcome.reports).zip(finders);
     let cameras: Vec<Value> = each
         .map(|(((name, camera), it), finder)| {
@@ -311,15 +312,15 @@ fn as_json(outcome: &Outcome, names: &[&str], finders: &[String]) -> Value {
                 "centre_sd_metres": finite(it.sd[1]),
                 "focal_px": camera.intrinsics.fx,
                 "focal_sd_px": it.focal_sd_px.and_then(finite),
-                "halves_degrees": it.halves.map(|it| it[0]),
-                "halves_metres": it.halves.map(|it| it[1]),
+                "halves_degrees": it.halves.map(|half| half[0]),
+                "halves_metres": it.halves.map(|half| half[1]),
                 "offset_ms": 1e3 * it.offset_s[0],
                 "offset_sd_ms": finite(1e3 * it.offset_s[1]),
             })
         })
         .collect();
-    let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
-    let cautions = outcome.cautions.iter().map(|it| it.text(names));
+    let doubts: Vec<String> = outcome.doubts.iter().map(|doubt| doubt.text(names)).collect();
+    let cautions = outcome.cautions.iter().map(|caution| caution.text(names));
     let cautions: Vec<String> = cautions.collect();
     json!({
         "schema_version": 1,
@@ -358,7 +359,7 @@ fn write_page(
         source_of_scale(arguments).trim_start_matches(", ").to_owned(),
     ));
     about.push(("vertical".to_owned(), vertical(outcome).to_owned()));
-    let offsets_s: Vec<f64> = outcome.reports.iter().map(|it| it.offset_s[0]).collect();
+    let offsets_s: Vec<f64> = outcome.reports.iter().map(|report| report.offset_s[0]).collect();
     let pictures = misfits::of(
         walk,
         (&outcome.cameras, &offsets_s),

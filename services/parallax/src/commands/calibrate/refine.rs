@@ -56,12 +56,12 @@ pub(crate) struct Arguments {
 }
 
 fn deviation(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|it| (1e-3..=1e4).contains(it));
+    let number = text.parse().ok().filter(|value| (1e-3..=1e4).contains(value));
     number.ok_or_else(|| format!("expected 0.001 to 10000, got {text:?}"))
 }
 
 fn clock(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|it| (0.0..=1e3).contains(it));
+    let number = text.parse().ok().filter(|value| (0.0..=1e3).contains(value));
     number.ok_or_else(|| format!("expected 0 to 1000 milliseconds, got {text:?}"))
 }
 
@@ -94,7 +94,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     if let Some(file) = &arguments.walk.report {
         let about = about(arguments, &walk);
-        let offsets_s: Vec<f64> = outcome.changes.iter().map(|it| it.offset_s).collect();
+        let offsets_s: Vec<f64> = outcome.changes.iter().map(|change| change.offset_s).collect();
         let skeletons = (&outcome.times_s[..], &outcome.skeletons);
         let pictures = misfits::of(&walk, (&outcome.cameras, &offsets_s), skeletons);
         let page = exports::report::walk::of_refinement(&outcome, &names, &about, &pictures);
@@ -186,7 +186,7 @@ fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
 }
 
 fn as_json(outcome: &Outcome, names: &[&str]) -> Value {
-    let finite = |it: f64| it.is_finite().then_some(it);
+    let finite = |value: f64| value.is_finite().then_some(value);
     let each = names.iter().zip(&outcome.changes);
     let cameras: Vec<Value> = each
         .map(|(name, it)| {
@@ -204,7 +204,7 @@ fn as_json(outcome: &Outcome, names: &[&str]) -> Value {
             })
         })
         .collect();
-    let doubts: Vec<String> = outcome.doubts.iter().map(|it| it.text(names)).collect();
+    let doubts: Vec<String> = outcome.doubts.iter().map(|doubt| doubt.text(names)).collect();
     let verdict = match (doubts.is_empty(), outcome.is_better) {
         (false, _) => "refused",
         (true, true) => "better",

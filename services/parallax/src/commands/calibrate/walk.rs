@@ -49,7 +49,7 @@ pub(super) struct WalkArguments {
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|it| (0.0..=1e6).contains(it));
+    let number = text.parse().ok().filter(|value| (0.0..=1e6).contains(value));
     number.ok_or_else(|| format!("expected 0 to 1000000 seconds, got {text:?}"))
 }
 
@@ -64,7 +64,7 @@ pub(super) struct Walk {
 impl Walk {
     /// The names of the cameras.
     pub(super) fn names(&self) -> Vec<&str> {
-        self.found.cameras.iter().map(|it| it.name.as_str()).collect()
+        self.found.cameras.iter().map(|camera| camera.name.as_str()).collect()
     }
 }
 
@@ -99,7 +99,7 @@ pub(super) fn walk(
         }
     }
     let offsets = deployment.cameras.iter();
-    let offsets_s = offsets.map(|it| 1e-3 * it.offset_ms.unwrap_or(0.0)).collect();
+    let offsets_s = offsets.map(|offset| 1e-3 * offset.offset_ms.unwrap_or(0.0)).collect();
     Ok(Walk {
         deployment,
         found,
@@ -136,7 +136,7 @@ pub(super) fn refuse(doubts: &[Doubt], names: &[&str], hint: &str) -> Result<(),
     if doubts.is_empty() {
         return Ok(());
     }
-    let texts: Vec<String> = doubts.iter().map(|it| it.text(names)).collect();
+    let texts: Vec<String> = doubts.iter().map(|doubt| doubt.text(names)).collect();
     let message = format!("the rig is not determined:\n  {}", texts.join("\n  "));
     Err(Failure::new(ExitKind::Degraded, message).with_hint(hint))
 }

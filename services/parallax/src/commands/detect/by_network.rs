@@ -109,7 +109,7 @@ impl Detector<'_> {
             }
         });
         let mut people = people.collect::<Result<Vec<Person>, Failure>>()?;
-        people.retain(|it| it.score >= eyes.least_heat);
+        people.retain(|person| person.score >= eyes.least_heat);
         people.sort_by(|a, b| b.score.total_cmp(&a.score));
         let mut apart: Vec<Person> = Vec::with_capacity(people.len());
         for person in people {
@@ -144,7 +144,7 @@ impl Detector<'_> {
         };
         let n = found.len();
         let detections = if n == 1 { "detection" } else { "detections" };
-        let frame = picture.frame.map_or(String::new(), |it| format!(" frame {it}"));
+        let frame = picture.frame.map_or(String::new(), |frame| format!(" frame {frame}"));
         output::line(format_args!(
             "{}{frame}: {n} {detections} by the network; {how}{turned}",
             picture.path.display()
@@ -152,7 +152,7 @@ impl Detector<'_> {
         for person in found {
             let [x1, y1, x2, y2] = person.outline.sides;
             let score = person.outline.score;
-            let sure = score.map_or(String::new(), |it| format!(" of score {it:.2}"));
+            let sure = score.map_or(String::new(), |score| format!(" of score {score:.2}"));
             let [x, y] = person.joints.last().copied().unwrap_or([f64::NAN; 2]);
             output::line(format_args!(
                 "  score {:5.2}  box ({x1:.0}, {y1:.0}) to ({x2:.0}, {y2:.0}){sure}  head at ({x:.1}, {y:.1})",
@@ -253,12 +253,12 @@ impl Person {
         maps.read(&sight, &settings).or_fail(ExitKind::Input)?;
         let next = maps.turn(turn);
         maps.name_sides(network, sight.front());
-        let scores: Vec<f64> = maps.peaks().iter().flatten().map(|it| it.score).collect();
+        let scores: Vec<f64> = maps.peaks().iter().flatten().map(|peak| peak.score).collect();
         let joints = maps.peaks().iter();
         let person = Self {
             outline,
             keypoints: keypoints_json(&sight)?,
-            joints: joints.map(|it| it.map_or([f64::NAN; 2], |it| it.at)).collect(),
+            joints: joints.map(|joint| joint.map_or([f64::NAN; 2], |it| it.at)).collect(),
             score: scores.iter().sum::<f64>() / scores.len().max(1) as f64,
         };
         Ok((person, next))
@@ -275,7 +275,7 @@ impl Person {
     fn json(&self, from: &str) -> Value {
         let named = PARSE14.joints.iter().zip(&self.joints);
         let joints = named.map(|(joint, at)| {
-            let at = at.iter().all(|it| it.is_finite()).then_some(at);
+            let at = at.iter().all(|value| value.is_finite()).then_some(at);
             (joint.name.to_owned(), json!(at))
         });
         let mut value = json!({

@@ -14,12 +14,12 @@ pub(super) fn json() -> String {
     let structs: Map<String, Value> = layouts().iter().map(structure).collect();
     let topics: Map<String, Value> = topics()
         .into_iter()
-        .map(|it| {
-            let elements = it.elements.map(type_name);
+        .map(|topic| {
+            let elements = topic.elements.map(type_name);
             let described = value!({
-                "name": it.name, "version": it.version, "message": it.message, "elements": elements,
+                "name": topic.name, "version": topic.version, "message": topic.message, "elements": elements,
             });
-            (it.about, described)
+            (topic.about, described)
         })
         .collect();
     let statuses: Vec<&str> = statuses().map(Status::reason).collect();
@@ -36,7 +36,7 @@ pub(super) fn json() -> String {
 }
 
 fn joint_set(set: &JointSet) -> (String, Value) {
-    let names: Vec<&str> = set.joints.iter().map(|it| it.name).collect();
+    let names: Vec<&str> = set.joints.iter().map(|joint| joint.name).collect();
     (set.name.to_owned(), names.into())
 }
 

@@ -274,11 +274,11 @@ mod tests {
         for topic in topics() {
             assert!(topic.version > 0, "{topic:?}");
             assert!(
-                layouts.iter().any(|it| it.name == topic.message),
+                layouts.iter().any(|layout| layout.name == topic.message),
                 "{topic:?}"
             );
         }
-        let names: Vec<String> = topics().into_iter().map(|it| it.name).collect();
+        let names: Vec<String> = topics().into_iter().map(|topic| topic.name).collect();
         assert!(names.contains(&"frame/v1/{}".to_owned()), "{names:?}");
         assert!(names.contains(&"skeletons/v1".to_owned()), "{names:?}");
     }

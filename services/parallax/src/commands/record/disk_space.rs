@@ -117,7 +117,7 @@ impl Forecast {
             write!(text, ", {all} for all {n_frames} frames")?;
         }
         write!(text, "; {} are free", size(self.free_bytes))?;
-        if self.n_frames.is_none_or(|it| self.n_that_fit() < it) {
+        if self.n_frames.is_none_or(|frame| self.n_that_fit() < frame) {
             write!(
                 text,
                 ", which may be full after {} frames",
@@ -146,7 +146,7 @@ impl Forecast {
 
     /// Checks that there is space for a few frames.
     pub(super) fn check(&self, file: &Path) -> Result<(), Failure> {
-        let n = self.n_frames.map_or(MIN_FRAMES, |it| it.min(MIN_FRAMES));
+        let n = self.n_frames.map_or(MIN_FRAMES, |frame| frame.min(MIN_FRAMES));
         if self.n_that_fit() >= n {
             return Ok(());
         }
@@ -217,7 +217,7 @@ impl Growth {
 fn size(bytes: u64) -> String {
     let bytes = bytes as f64;
     let units = [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
-    let unit = units.into_iter().find(|it| bytes >= it.0);
+    let unit = units.into_iter().find(|unit| bytes >= unit.0);
     unit.map_or_else(
         || format!("{bytes:.0} bytes"),
         |(of, name)| format!("{:.1} {name}", bytes / of),

@@ -35,7 +35,7 @@ pub(super) fn settle(
     for &view in &live {
         let camera = &mut recorded.deployment.cameras[view];
         let track = recording.tracks.get(&topic::picture(view));
-        if from == Stage::Capture && track.is_none_or(|it| it.entries.is_empty()) {
+        if from == Stage::Capture && track.is_none_or(|track| track.entries.is_empty()) {
             let message = format!(
                 "{} lacks the pictures of the live camera {:?}, which --from capture needs",
                 file.display(),

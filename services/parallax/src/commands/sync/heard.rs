@@ -52,7 +52,7 @@ fn sound(name: &str, spec: &SourceSpec, part: Part) -> Result<Sound, Failure> {
     let rate_hz = f64::from(RATE_HZ);
     let nth = |at_s: f64| ((at_s - begins_s) * rate_hz).clamp(0.0, samples.len() as f64) as usize;
     let from = nth(part.from_s);
-    let to = part.seconds.map_or(samples.len(), |it| nth(part.from_s + it));
+    let to = part.seconds.map_or(samples.len(), |second| nth(part.from_s + second));
     Ok(Sound {
         rate_hz,
         begins_s: begins_s + from as f64 / rate_hz,

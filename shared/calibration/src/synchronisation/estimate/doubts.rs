@@ -30,7 +30,7 @@ const MOST_DRIFT: f64 = 0.01;
 impl Study<'_> {
     pub(super) fn doubt_search(&self, found: &Found, curves: &[Curve], doubts: &mut Vec<Doubt>) {
         let window_s = self.settings.window_s;
-        for it in found.rivals.iter().filter(|it| is_close(it)) {
+        for it in found.rivals.iter().filter(|rival| is_close(rival)) {
             let Rival {
                 group,
                 away_s,
@@ -62,7 +62,7 @@ impl Study<'_> {
         }
         for &camera in self.active {
             let (mut gain, mut mean) = (0.0, 0.0);
-            for curve in curves.iter().filter(|it| it.cameras.contains(&camera)) {
+            for curve in curves.iter().filter(|curve| curve.cameras.contains(&camera)) {
                 let [a, b] = curve.cameras;
                 if let Some(nth) = curve.index(found.offsets_s[a] - found.offsets_s[b])
                     && curve.n[nth] > 0.0
@@ -139,7 +139,7 @@ impl Study<'_> {
         let middle_s = f64::midpoint(span[0], span[1]);
         let halves = [[span[0], middle_s], [middle_s, span[1]]];
         let as_they_are = vec![false; fit.clocks.len()];
-        let [first, second] = halves.map(|it| problem.refine(&fit.clocks, it, &as_they_are));
+        let [first, second] = halves.map(|half| problem.refine(&fit.clocks, half, &as_they_are));
         for &camera in self.active {
             let errors = [&first, &second].map(|it| it.errors[camera][0]);
             let at_middle = [&first, &second].map(|it| it.clocks[camera].common(middle_s));

@@ -123,7 +123,7 @@ impl<'a> Sums<'a> {
     fn solve_from(&self, mut found: DVector<f64>, uses: &dyn Fn(i64) -> bool) -> DVector<f64> {
         for _ in 0..MOST_STEPS {
             let (normal, gradient, _) = self.equations(&found, uses);
-            let Some(step) = normal.cholesky().map(|it| it.solve(&-gradient)) else {
+            let Some(step) = normal.cholesky().map(|cholesky| cholesky.solve(&-gradient)) else {
                 break;
             };
             let longest = step.amax();
@@ -144,7 +144,7 @@ impl<'a> Sums<'a> {
         let mut normal = DMatrix::zeros(size, size);
         let mut gradient = DVector::zeros(size);
         let mut blocks = Blocks::new();
-        for piece in self.pieces.iter().filter(|it| uses(it.block)) {
+        for piece in self.pieces.iter().filter(|piece| uses(piece.block)) {
             let mut entries = [(0, 0.0); 4];
             for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
                 let unknown = 2 * piece.cameras[side];
@@ -156,10 +156,10 @@ impl<'a> Sums<'a> {
             let [slope, curvature] = piece.parabola(delay_s / self.step_s, self.step_s);
             let block =
                 blocks.entry((piece.joint, piece.block)).or_insert_with(|| DVector::zeros(size));
-            for &(i, of_i) in entries.iter().filter(|it| !self.fixed[it.0]) {
+            for &(i, of_i) in entries.iter().filter(|entry| !self.fixed[entry.0]) {
                 gradient[i] += of_i * slope;
                 block[i] += of_i * slope;
-                for &(j, of_j) in entries.iter().filter(|it| !self.fixed[it.0]) {
+                for &(j, of_j) in entries.iter().filter(|entry| !self.fixed[entry.0]) {
                     normal[(i, j)] += of_i * of_j * curvature;
                 }
             }
@@ -175,7 +175,7 @@ impl<'a> Sums<'a> {
         let size = self.fixed.len();
         let (normal, _, blocks) = self.equations(found, &|_| true);
         let is_flat = |it: usize| !self.fixed[it] && normal[(it, it)] <= 0.0;
-        let Some(inverse) = normal.clone().cholesky().map(|it| it.inverse()) else {
+        let Some(inverse) = normal.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
             return vec![[f64::INFINITY; 2]; size / 2];
         };
         let mut squares = DMatrix::zeros(size, size);
@@ -185,7 +185,7 @@ impl<'a> Sums<'a> {
         let variance = &inverse * squares * &inverse * ALIKE;
         let by_parts = self.parts(found);
         let error = |nth: usize| {
-            let of_part = by_parts.as_ref().map_or(0.0, |it| it[nth]);
+            let of_part = by_parts.as_ref().map_or(0.0, |part| part[nth]);
             variance[(nth, nth)].max(of_part * ALIKE_PARTS).sqrt()
         };
         let of_camera = |camera: usize| {
@@ -206,19 +206,19 @@ impl<'a> Sums<'a> {
     }
 
     fn knows(&self, camera: usize) -> bool {
-        self.pieces.iter().any(|it| it.cameras.contains(&camera))
+        self.pieces.iter().any(|piece| piece.cameras.contains(&camera))
     }
 
     /// The variances from what is found when parts of the footage are left out (jackknife); none where it is too short.
     fn parts(&self, found: &DVector<f64>) -> Option<DVector<f64>> {
-        let blocks: BTreeSet<i64> = self.pieces.iter().map(|it| it.block).collect();
+        let blocks: BTreeSet<i64> = self.pieces.iter().map(|piece| piece.block).collect();
         let blocks: Vec<i64> = blocks.into_iter().collect();
         let n = blocks.len().min(PARTS[1]);
         if n < PARTS[0] {
             return None;
         }
         let without = |part: usize| {
-            let [from, to] = [part, part + 1].map(|it| it * blocks.len() / n);
+            let [from, to] = [part, part + 1].map(|value| value * blocks.len() / n);
             let left_out = blocks[from]..=blocks[to - 1];
             self.solve_from(found.clone(), &|it| !left_out.contains(&it))
         };

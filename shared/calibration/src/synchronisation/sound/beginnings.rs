@@ -68,10 +68,11 @@ impl Beginnings {
     pub(super) fn of(sound: &Sound) -> Self {
         let first = (sound.begins_s / HOP_S).ceil() as i64;
         let energies = energies(sound, first);
-        let mut sorted: Vec<f64> = energies.iter().copied().filter(|it| *it > 0.0).collect();
+        let mut sorted: Vec<f64> =
+            energies.iter().copied().filter(|energy| *energy > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
         // One step of the converter in every sample, where it is quieter than that.
-        let floor = sorted.get(sorted.len() / 2).map_or(1.0, |it| it.max(1.0));
+        let floor = sorted.get(sorted.len() / 2).map_or(1.0, |sorted| sorted.max(1.0));
         let mut sums = vec![0.0];
         for energy in &energies {
             sums.push(sums[sums.len() - 1] + (energy + floor).ln());
@@ -84,9 +85,9 @@ impl Beginnings {
             let before = (sums[at] - sums[at - BEFORE]) / BEFORE as f64;
             (after - before).min(GROWTH[1]) - GROWTH[0]
         };
-        let values: Vec<f64> = (0..energies.len()).map(|it| growth(it).max(0.0)).collect();
+        let values: Vec<f64> = (0..energies.len()).map(|i| growth(i).max(0.0)).collect();
         let peaks = peaks(&values);
-        let peaks = peaks.into_iter().map(|it| first + it as i64).collect();
+        let peaks = peaks.into_iter().map(|peak| first + peak as i64).collect();
         Self {
             first,
             values,
@@ -105,7 +106,7 @@ impl Beginnings {
 
     fn at(&self, hop: i64) -> f64 {
         let nth = usize::try_from(hop - self.first).ok();
-        nth.and_then(|it| self.values.get(it)).map_or(0.0, |it| *it)
+        nth.and_then(|nth| self.values.get(nth)).map_or(0.0, |it| *it)
     }
 
     /// From when to when something is recorded, hops.
@@ -125,8 +126,8 @@ impl Beginnings {
             it.peaks.iter().filter(within).count()
         };
         let starts = (from..=to - length).step_by((length / 6).max(1) as usize);
-        let spans = starts.map(|it| [it, it + length]);
-        let best = spans.max_by_key(|it| n_in(self, *it).min(n_in(other, *it)));
+        let spans = starts.map(|start| [start, start + length]);
+        let best = spans.max_by_key(|span| n_in(self, *span).min(n_in(other, *span)));
         best.unwrap_or([from, to])
     }
 
@@ -135,7 +136,7 @@ impl Beginnings {
     /// * `span`: the part of this recording that is compared, hops.
     /// * `around_s`: offsets around the first, up to the second both ways, seconds.
     pub(super) fn compare(&self, other: &Self, span: [i64; 2], around_s: [f64; 2]) -> Match {
-        let [centre, half] = around_s.map(|it| (it / HOP_S).round() as i64);
+        let [centre, half] = around_s.map(|around_s| (around_s / HOP_S).round() as i64);
         let own: Vec<(i64, f64)> = (span[0]..span[1])
             .map(|hop| (hop, self.at(hop)))
             .filter(|it| it.1 > 0.0)
@@ -145,13 +146,14 @@ impl Beginnings {
             squares.push(squares[squares.len() - 1] + value * value);
         }
         let energy = |[from, to]: [i64; 2]| {
-            let within = |it: i64| (it - other.first).clamp(0, other.values.len() as i64) as usize;
+            let within =
+                |value: i64| (value - other.first).clamp(0, other.values.len() as i64) as usize;
             squares[within(to)] - squares[within(from)]
         };
         let all: f64 = own.iter().map(|it| it.1 * it.1).sum();
         let most = energy(other.span());
         let cosine = |offset: i64| {
-            let [low, high] = other.span().map(|it| it - offset);
+            let [low, high] = other.span().map(|span| span - offset);
             let (mut product, mut of_own) = (0.0, 0.0);
             for (hop, value) in &own {
                 if (low..high).contains(hop) {
@@ -180,7 +182,7 @@ impl Beginnings {
         let is_shared = |hop: &&i64| {
             let of_other = other.peaks.iter();
             (span[0]..span[1]).contains(*hop)
-                && of_other.clone().any(|it| (**hop + offset - it).abs() <= TOGETHER)
+                && of_other.clone().any(|value| (**hop + offset - value).abs() <= TOGETHER)
         };
         self.peaks.iter().filter(is_shared).count()
     }
@@ -188,14 +190,15 @@ impl Beginnings {
 
 impl Match {
     fn of(first_s: f64, cosines: Vec<f64>) -> Self {
-        let or_none = |it: &f64| if it.is_finite() { *it } else { 0.0 };
-        let known: Vec<f64> = cosines.iter().copied().filter(|it| it.is_finite()).collect();
+        let or_none = |value: &f64| if value.is_finite() { *value } else { 0.0 };
+        let known: Vec<f64> = cosines.iter().copied().filter(|cosine| cosine.is_finite()).collect();
         let n = known.len().max(1) as f64;
         let mean = known.iter().sum::<f64>() / n;
-        let spread = (known.iter().map(|it| (it - mean).powi(2)).sum::<f64>() / n).sqrt();
+        let spread = (known.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / n).sqrt();
         let highest = |skip: Option<usize>| {
             let each = cosines.iter().enumerate();
-            let allowed = each.filter(|(nth, _)| skip.is_none_or(|it| nth.abs_diff(it) > OTHER));
+            let allowed =
+                each.filter(|(nth, _)| skip.is_none_or(|skip| nth.abs_diff(skip) > OTHER));
             let best = allowed.max_by(|a, b| or_none(a.1).total_cmp(&or_none(b.1)));
             best.map_or((0, 0.0), |(nth, it)| (nth, or_none(it)))
         };
@@ -240,8 +243,8 @@ fn energies(sound: &Sound, first: i64) -> Vec<f64> {
     let mut hop = first;
     while at(hop + 1) < sound.samples.len() && at(hop + 1) > at(hop) {
         let from = at(hop).max(1);
-        let each = (from..at(hop + 1)).map(|it| {
-            let [last, this] = [it - 1, it].map(|it| f64::from(sound.samples[it]));
+        let each = (from..at(hop + 1)).map(|k| {
+            let [last, this] = [k - 1, k].map(|i| f64::from(sound.samples[i]));
             (this - EMPHASIS * last).powi(2)
         });
         energies.push(each.sum());
@@ -271,17 +274,17 @@ fn peaks(values: &[f64]) -> Vec<usize> {
 
 /// Means over neighbours, with weights that fall to both sides.
 fn smooth(cosines: &[f64]) -> Vec<f64> {
-    let at = |nth: i64| usize::try_from(nth).ok().and_then(|it| cosines.get(it));
+    let at = |nth: i64| usize::try_from(nth).ok().and_then(|value| cosines.get(value));
     let each = (0..cosines.len() as i64).map(|nth| {
         let (mut sum, mut weights) = (0.0, 0.0);
         for by in -SMOOTH..=SMOOTH {
-            if let Some(value) = at(nth + by).filter(|it| it.is_finite()) {
+            if let Some(value) = at(nth + by).filter(|value| value.is_finite()) {
                 let weight = 1.0 - by.abs() as f64 / (SMOOTH + 1) as f64;
                 sum += weight * value;
                 weights += weight;
             }
         }
-        if at(nth).is_some_and(|it| it.is_finite()) {
+        if at(nth).is_some_and(|value| value.is_finite()) {
             sum / weights
         } else {
             f64::NAN

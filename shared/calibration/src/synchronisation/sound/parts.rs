@@ -36,29 +36,29 @@ struct Line {
 
 impl Drift {
     fn determined(&self) -> Option<Line> {
-        self.line.filter(|it| it.error * it.length_s <= MOST_ERROR_S)
+        self.line.filter(|line| line.error * line.length_s <= MOST_ERROR_S)
     }
 
     /// Its standard error, where it is determined.
     pub(super) fn error(&self) -> Option<f64> {
-        self.determined().map(|it| it.error)
+        self.determined().map(|determined| determined.error)
     }
 
     fn line(&self) -> Option<Line> {
         let line = self.determined();
-        line.filter(|it| it.slope.abs() >= SURE * it.error)
+        line.filter(|line| line.slope.abs() >= SURE * line.error)
     }
 
     /// By how much a second of the camera is longer than one of the reference; 0 where that is not told from none.
     pub(super) fn sure(&self) -> f64 {
-        self.line().map_or(0.0, |it| it.slope)
+        self.line().map_or(0.0, |line| line.slope)
     }
 
     /// The offset at time 0 of the camera.
     ///
     /// * `constant_s`: the offset if there is no drift.
     pub(super) fn offset_s(&self, constant_s: f64) -> f64 {
-        self.line().map_or(constant_s, |it| it.at_zero_s)
+        self.line().map_or(constant_s, |line| line.at_zero_s)
     }
 
     pub(super) fn doubt(&self, camera: usize) -> Option<Doubt> {
@@ -100,13 +100,13 @@ pub(super) fn parts(
     }
     let most_s = 2.0 * way_s + SPARE_S;
     let slope = median(slopes(&points));
-    let at_zero_s = median(points.iter().map(|it| it[1] - slope * it[0]).collect());
+    let at_zero_s = median(points.iter().map(|point| point[1] - slope * point[0]).collect());
     let away_s = |it: &[f64; 2]| (it[1] - at_zero_s - slope * it[0]).abs();
-    let mut far: Vec<f64> = points.iter().map(away_s).filter(|it| *it > most_s).collect();
+    let mut far: Vec<f64> = points.iter().map(away_s).filter(|value| *value > most_s).collect();
     let too_many = far.len() as f64 > MOST_AWAY * points.len() as f64;
     far.sort_by(f64::total_cmp);
-    let contradiction_s = far.last().filter(|_| too_many).map(|it| [*it, most_s]);
-    points.retain(|it| away_s(it) <= most_s);
+    let contradiction_s = far.last().filter(|_| too_many).map(|far| [*far, most_s]);
+    points.retain(|point| away_s(point) <= most_s);
     Drift {
         line: fitted(&points),
         contradiction_s,
@@ -133,13 +133,13 @@ fn fitted(points: &[[f64; 2]]) -> Option<Line> {
         return None;
     }
     let n = points.len() as f64;
-    let [x, y] = [0, 1].map(|axis| points.iter().map(|it| it[axis]).sum::<f64>() / n);
-    let spread: f64 = points.iter().map(|it| (it[0] - x).powi(2)).sum();
-    let slope = points.iter().map(|it| (it[0] - x) * (it[1] - y)).sum::<f64>() / spread;
+    let [x, y] = [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / n);
+    let spread: f64 = points.iter().map(|point| (point[0] - x).powi(2)).sum();
+    let slope = points.iter().map(|point| (point[0] - x) * (point[1] - y)).sum::<f64>() / spread;
     let at_zero_s = y - slope * x;
-    let residuals = points.iter().map(|it| (it[1] - at_zero_s - slope * it[0]).powi(2));
+    let residuals = points.iter().map(|point| (point[1] - at_zero_s - slope * point[0]).powi(2));
     let variance = (residuals.sum::<f64>() / (n - 2.0)).max(HEARD_S.powi(2));
-    let ends = points.iter().map(|it| it[0]);
+    let ends = points.iter().map(|point| point[0]);
     let [first, last] = [
         ends.clone().fold(f64::INFINITY, f64::min),
         ends.fold(f64::NEG_INFINITY, f64::max),

@@ -60,7 +60,7 @@ impl Room {
                     for nth in 0..1200 {
                         let value = burst.f64() - 0.5;
                         let at = usize::try_from(from + nth).ok();
-                        if let Some(sample) = at.and_then(|it| heard.get_mut(it)) {
+                        if let Some(sample) = at.and_then(|at| heard.get_mut(at)) {
                             let fall = (-(nth as f64) / 240.0).exp();
                             *sample += level / metres * share * fall * value;
                         }
@@ -70,7 +70,7 @@ impl Room {
             Sound {
                 rate_hz: RATE_HZ,
                 begins_s: 0.0,
-                samples: heard.iter().map(|it| it.clamp(-32e3, 32e3) as i16).collect(),
+                samples: heard.iter().map(|heard| heard.clamp(-32e3, 32e3) as i16).collect(),
             }
         })
         .collect()
@@ -154,7 +154,7 @@ fn what_tells_nothing_is_refused() {
     );
     // A metronome.
     let (mut beats, mut random) = Room::of(7, 30.0, 0);
-    beats.sounds_s = (0..40).map(|it| 8.0 + 0.5 * f64::from(it)).collect();
+    beats.sounds_s = (0..40).map(|i| 8.0 + 0.5 * f64::from(i)).collect();
     let doubts = refused(&beats.record(&mut random));
     assert!(!doubts.is_empty());
     // Beyond the window.

@@ -46,7 +46,12 @@ pub(super) fn corners(camera: &CameraOutcome) -> Html {
         middle[0],
         middle[1]
     );
-    for it in camera.residuals.iter().step_by(step).filter(|it| !it.is_wrong && is_known(it)) {
+    for it in camera
+        .residuals
+        .iter()
+        .step_by(step)
+        .filter(|residual| !residual.is_wrong && is_known(residual))
+    {
         let at =
             [0, 1].map(|axis| middle[axis] + (PIXEL * it.off[axis]).clamp(-0.5 * PLOT, 0.5 * PLOT));
         put!(
@@ -61,7 +66,7 @@ pub(super) fn corners(camera: &CameraOutcome) -> Html {
 }
 
 fn is_known(corner: &Residual) -> bool {
-    corner.off.iter().all(|it| it.is_finite())
+    corner.off.iter().all(|value| value.is_finite())
 }
 
 fn corner(out: &mut Html, it: &Residual, scale: f64) {

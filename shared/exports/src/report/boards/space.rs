@@ -37,7 +37,7 @@ struct Frame {
 
 impl Frame {
     fn of(points: &[Vector2<f64>]) -> Self {
-        let finite = points.iter().filter(|it| it.iter().all(|c| c.is_finite()));
+        let finite = points.iter().filter(|point| point.iter().all(|c| c.is_finite()));
         let low = finite.clone().fold(Vector2::repeat(f64::MAX), |low, it| low.inf(it));
         let high = finite.fold(Vector2::repeat(f64::MIN), |high, it| high.sup(it));
         let extent = (high - low).max().max(1e-6);
@@ -57,9 +57,9 @@ fn view(out: &mut Html, page: &Page<'_>, map: &Matrix2x3<f64>) {
         .outcome
         .cameras
         .iter()
-        .map(|it| {
-            let centre = it.camera.centre_in_world();
-            let ahead = centre + it.camera.axis_in_world().into_inner() * 0.3;
+        .map(|camera| {
+            let centre = camera.camera.centre_in_world();
+            let ahead = centre + camera.camera.axis_in_world().into_inner() * 0.3;
             (map * centre.coords, map * ahead.coords)
         })
         .collect();
@@ -69,9 +69,12 @@ fn view(out: &mut Html, page: &Page<'_>, map: &Matrix2x3<f64>) {
         .boards
         .iter()
         .step_by(step)
-        .map(|(_, pose)| page.outline.map(|it| map * (pose * Point3::new(it.x, it.y, 0.0)).coords))
+        .map(|(_, pose)| {
+            page.outline
+                .map(|outline| map * (pose * Point3::new(outline.x, outline.y, 0.0)).coords)
+        })
         .collect();
-    let ends = cameras.iter().flat_map(|it| [it.0, it.1]);
+    let ends = cameras.iter().flat_map(|camera| [camera.0, camera.1]);
     let all: Vec<Vector2<f64>> = ends.chain(boards.iter().flatten().copied()).collect();
     let frame = Frame::of(&all);
     put!(
@@ -103,7 +106,7 @@ fn view(out: &mut Html, page: &Page<'_>, map: &Matrix2x3<f64>) {
 
 fn outlines(out: &mut Html, frame: &Frame, boards: Vec<[Vector2<f64>; 4]>) {
     for corners in boards {
-        let [a, b, c, d] = corners.map(|it| frame.place(it));
+        let [a, b, c, d] = corners.map(|corner| frame.place(corner));
         put!(
             out,
             "<path d=\"M{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}Z\" fill=\"#808894\" fill-opacity=\"0.08\" stroke=\"#808894\" \
@@ -125,7 +128,7 @@ fn ruler(out: &mut Html, scale: f64) {
     let metres = [
         0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0,
     ];
-    let fitting = metres.iter().rev().find(|it| *it * scale <= 0.4 * SIDE);
+    let fitting = metres.iter().rev().find(|value| *value * scale <= 0.4 * SIDE);
     let Some(length) = fitting else {
         return;
     };

@@ -49,18 +49,18 @@ pub struct Moment {
 impl Space {
     /// For the script: coordinates in whole millimetres.
     pub(crate) fn json(&self) -> Value {
-        let mm = |it: &Point| it.map(|it| (1000.0 * it).round() as i64);
+        let mm = |point: &Point| point.map(|value| (1000.0 * value).round() as i64);
         let eyes = self
             .eyes
             .iter()
-            .map(|it| json!({ "name": it.name, "at": mm(&it.at), "axis": it.axis }));
-        let moments = self.moments.iter().map(|it| {
+            .map(|eye| json!({ "name": eye.name, "at": mm(&eye.at), "axis": eye.axis }));
+        let moments = self.moments.iter().map(|moment| {
             json!({
-                "frame": it.frame,
-                "seconds": (100.0 * it.seconds).round() / 100.0,
-                "found": it.found.iter().map(|it| it.as_ref().map(mm)).collect::<Vec<_>>(),
-                "truth": it.truth.iter().map(mm).collect::<Vec<_>>(),
-                "views": it.views,
+                "frame": moment.frame,
+                "seconds": (100.0 * moment.seconds).round() / 100.0,
+                "found": moment.found.iter().map(|it| it.as_ref().map(mm)).collect::<Vec<_>>(),
+                "truth": moment.truth.iter().map(mm).collect::<Vec<_>>(),
+                "views": moment.views,
             })
         });
         json!({

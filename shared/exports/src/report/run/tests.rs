@@ -70,7 +70,9 @@ fn the_page_asks_for_nothing_outside_itself() {
     for outside in ["http:", "https:", "url(", "@import", "<link", "<iframe"] {
         assert!(!html.contains(outside), "{outside}");
     }
-    let sources = html.match_indices("src=\"").map(|it| &html[it.0 + 5..it.0 + 10]);
+    let sources = html
+        .match_indices("src=\"")
+        .map(|match_index| &html[match_index.0 + 5..match_index.0 + 10]);
     assert_eq!(sources.collect::<Vec<_>>(), ["data:"]);
     assert!(html.contains("default-src 'none'"));
     testkit::chromium::check_in_browser(&html);

@@ -19,7 +19,7 @@ const ROW: f64 = 18.0;
 
 /// Draws the views of all results over time.
 pub(crate) fn svg(space: &Space, marks: &[Mark]) -> Html {
-    let times = space.moments.iter().map(|it| it.seconds);
+    let times = space.moments.iter().map(|moment| moment.seconds);
     let end = times.fold(1.0, f64::max);
     let x = |seconds: f64| LEFT + WIDTH * (seconds / end).clamp(0.0, 1.0);
     let bottom = TOP + ROW * space.eyes.len() as f64;

@@ -17,7 +17,7 @@ fn outcome(spec: &ModelSpec, field: &str, change: impl FnOnce(&mut Mat)) -> Stri
     let Mat::Structs(names, mut values) = model(spec) else {
         unreachable!("a model is a struct");
     };
-    let at = names.iter().position(|&it| it == field).unwrap();
+    let at = names.iter().position(|&name| name == field).unwrap();
     change(&mut values[at]);
     match parse(&file("model", &Mat::Structs(names, values), false)) {
         Ok(_) => "fine".to_owned(),

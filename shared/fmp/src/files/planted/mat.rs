@@ -13,19 +13,19 @@ pub(crate) fn model(spec: &ModelSpec) -> Mat {
         .flat_map(|part| component(part, &mut biases, &mut springs))
         .collect();
     let parents = spec.parts.iter().map(parent_id).collect();
-    let filters = spec.filters.iter().flat_map(|it| {
+    let filters = spec.filters.iter().flat_map(|filter| {
         let weight = move |at: usize| {
-            let (row, col) = (at % it.rows, at / it.rows % it.cols);
-            it.weights[(row * it.cols + col) * N_CHANNELS + at / it.rows / it.cols]
+            let (row, col) = (at % filter.rows, at / filter.rows % filter.cols);
+            filter.weights[(row * filter.cols + col) * N_CHANNELS + at / filter.rows / filter.cols]
         };
-        let values = (0..it.weights.len()).map(weight).collect();
+        let values = (0..filter.weights.len()).map(weight).collect();
         [
-            Mat::Numbers(vec![it.rows, it.cols, N_CHANNELS], values),
+            Mat::Numbers(vec![filter.rows, filter.cols, N_CHANNELS], values),
             number(1.0),
         ]
     });
     let [rows, cols] = [spec.filters[0].rows, spec.filters[0].cols];
-    let biases = biases.into_iter().flat_map(|it| [number(it), number(1.0)]);
+    let biases = biases.into_iter().flat_map(|bias| [number(bias), number(1.0)]);
     let fields = [
         ("bias", Mat::Structs(vec!["w", "i"], biases.collect())),
         ("filters", Mat::Structs(vec!["w", "i"], filters.collect())),
@@ -49,7 +49,11 @@ pub(crate) fn model(spec: &ModelSpec) -> Mat {
 
 /// `biasid`, `filterid`, `defid`, `parent` of a part.
 fn component(part: &PartSpec, biases: &mut Vec<f64>, springs: &mut Vec<Mat>) -> [Mat; 4] {
-    let filter_ids = part.filter_of_type.iter().map(|&it| it as f64 + 1.0).collect();
+    let filter_ids = part
+        .filter_of_type
+        .iter()
+        .map(|&filter_of_type| filter_of_type as f64 + 1.0)
+        .collect();
     let Some(edge) = &part.edge else {
         let nothing = Mat::Numbers(vec![0, 0], vec![]);
         return [number(1.0), row(filter_ids), nothing, number(0.0)];

@@ -93,9 +93,9 @@ fn planes(filter: &Filter) -> String {
 
 fn springs(springs: &[Spring]) -> String {
     let n_springs = springs.len();
-    let weights = (0..4).flat_map(|it| springs.iter().map(move |spring| spring.w[it]));
+    let weights = (0..4).flat_map(|i| springs.iter().map(move |spring| spring.w[i]));
     let anchors = (0..3).flat_map(|axis| {
-        let of = move |anchor: [i32; 2]| anchor.get(axis).map_or(0, |it| it + 1);
+        let of = move |anchor: [i32; 2]| anchor.get(axis).map_or(0, |anchor| anchor + 1);
         springs.iter().map(move |spring| of(spring.anchor))
     });
     [
@@ -139,6 +139,6 @@ fn array<T: ToString>(
 }
 
 fn listed<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
-    let values: Vec<String> = values.into_iter().map(|it| it.to_string()).collect();
+    let values: Vec<String> = values.into_iter().map(|value| value.to_string()).collect();
     values.join(" ") + " "
 }

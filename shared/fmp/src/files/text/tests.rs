@@ -37,7 +37,7 @@ fn the_published_tree_gets_its_names_and_its_mirror() {
 #[test]
 fn the_length_and_the_objective_may_be_absent() {
     let text = text();
-    let [start, end] = ["len ", "thresh "].map(|it| text.find(it).unwrap());
+    let [start, end] = ["len ", "thresh "].map(|name| text.find(name).unwrap());
     let without = text[..start].to_owned() + &text[end..];
     assert_eq!(outcome(&without), "fine");
     assert_eq!(outcome(&text[..text.find("obj").unwrap()]), "fine");

@@ -89,7 +89,7 @@ impl<'a> Tokens<'a> {
         let behind = &self.rest[bytes..];
         self.rest = behind.trim_start();
         let space = &behind[..behind.len() - self.rest.len()];
-        self.place.line += space.bytes().filter(|&it| it == b'\n').count();
+        self.place.line += space.bytes().filter(|&byte| byte == b'\n').count();
         self.place.token += 1;
     }
 }

@@ -20,7 +20,7 @@ fn heading(labels: &[String], n_frames: u32) -> Heading<'_> {
 }
 
 fn names(n: usize) -> Vec<String> {
-    (0..n).map(|it| format!("point {it}")).collect()
+    (0..n).map(|i| format!("point {i}")).collect()
 }
 
 fn seen(position: [f64; 3]) -> Marker {
@@ -35,7 +35,7 @@ fn seen(position: [f64; 3]) -> Marker {
 fn more_frames_than_16_bits_count_are_read_back() {
     let (labels, n) = (names(1), 70_000_u32);
     let mut file = Vec::new();
-    let frames = (0..n).map(|it| vec![Some(seen([f64::from(it), 0.0, 0.0]))]);
+    let frames = (0..n).map(|i| vec![Some(seen([f64::from(i), 0.0, 0.0]))]);
     write(&mut file, &heading(&labels, n), frames).unwrap();
     let read = C3d::parse(&file).unwrap();
     assert_eq!(read.n_frames(), 70_000);
@@ -43,7 +43,7 @@ fn more_frames_than_16_bits_count_are_read_back() {
     // Files of others have only one of the two.
     for name in [&b"LONG_FRAMES"[..], b"ACTUAL_END_FIELD"] {
         let mut one = file.clone();
-        let at = one.windows(name.len()).position(|it| it == name);
+        let at = one.windows(name.len()).position(|window| window == name);
         one[at.unwrap()] = b'X';
         assert_eq!(C3d::parse(&one).unwrap().n_frames(), 70_000);
     }
@@ -54,7 +54,7 @@ fn more_frames_than_16_bits_count_are_read_back() {
 fn the_number_of_frames_is_a_whole_number() {
     for n_frames in [1, 70_000] {
         let bytes = section(&heading(&names(1), n_frames), 3);
-        let at = bytes.windows(8).position(|it| it == b"\x06\x01FRAMES");
+        let at = bytes.windows(8).position(|window| window == b"\x06\x01FRAMES");
         let at = at.unwrap() + 10;
         let word = n_frames.min(65_535) as u16;
         assert_eq!(bytes[at..at + 2], [2, 0], "kind and number of sizes");
@@ -119,7 +119,7 @@ proptest! {
         let heading = Heading { first_frame, ..heading(&labels, frames.len() as u32) };
         let mut file = Vec::new();
         let points = frames.iter().map(|frame| {
-            frame.iter().map(|it| it.map(seen)).collect()
+            frame.iter().map(|frame| frame.map(seen)).collect()
         });
         write(&mut file, &heading, points).unwrap();
         prop_assert_eq!(file.len() % BLOCK, 0);
@@ -130,7 +130,7 @@ proptest! {
         for (nth, frame) in frames.iter().enumerate() {
             let due: Vec<_> = frame
                 .iter()
-                .map(|it| it.map(|at| at.map(|value| f64::from(value as f32))))
+                .map(|frame| frame.map(|at| at.map(|value| f64::from(value as f32))))
                 .collect();
             prop_assert_eq!(read.frame(nth), &due[..]);
         }

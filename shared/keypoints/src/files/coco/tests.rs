@@ -78,11 +78,11 @@ fn the_category_of_people_gives_the_names_and_others_are_passed_over() {
 #[test]
 fn frames_of_results_are_their_image_ids_as_numbers_or_texts() {
     let ids = ["4", "\"000001\"", "\"cam01_0004.jpg\"", "\"cam1.0002\""];
-    let all = ids.map(|it| annotation(it, 1, &list(5.0, 0.5)));
+    let all = ids.map(|id| annotation(id, 1, &list(5.0, 0.5)));
     let text = format!(" [{}]", all.join(","));
     let film = parse(text.as_bytes(), None).unwrap();
     assert_eq!(film.n_frames, 5);
-    let of: Vec<(u64, usize)> = film.frames.iter().map(|it| (*it.0, it.1.len())).collect();
+    let of: Vec<(u64, usize)> = film.frames.iter().map(|frame| (*frame.0, frame.1.len())).collect();
     assert_eq!(of, [(1, 1), (2, 1), (4, 2)]);
     assert_eq!(film.frames[&4][0].keypoints[3].unwrap().score, 0.5);
 }

@@ -126,8 +126,7 @@ fn one_file_in_the_layout_of_coco_has_all_frames() {
     let source = KeypointSource::open(&folder.path().join("results.json"), None).unwrap();
     assert_eq!((source.n_frames(), source.names().n()), (3, 17));
     let mut people = Vec::new();
-    let of: Vec<Option<usize>> =
-        (0..4).map(|it| source.of_frame(it, &mut people).unwrap()).collect();
+    let of: Vec<Option<usize>> = (0..4).map(|i| source.of_frame(i, &mut people).unwrap()).collect();
     assert_eq!(of, [Some(1), None, Some(1), None]);
     let error = KeypointSource::open(&folder.path().join("frame.json"), None).unwrap_err();
     assert!(error.to_string().contains("frame.json: expected"));
@@ -144,7 +143,7 @@ fn upright(names: &[&str]) -> String {
         "head top" | "nose" => [100.0, 10.0],
         _ => [100.0, 200.0],
     };
-    let values = names.iter().flat_map(|it| [at(it)[0], at(it)[1], 0.5]);
+    let values = names.iter().flat_map(|name| [at(name)[0], at(name)[1], 0.5]);
     let values: Vec<f64> = values.collect();
     format!("{{\"people\":[{{\"pose_keypoints_2d\":{values:?}}}]}}")
 }
@@ -155,9 +154,9 @@ fn the_other_25_keypoints_of_openpose_are_not_taken_for_the_usual_ones() {
     let other = upright(&crate::BODY_25B);
     let open = |files: &[(&str, &str)], names: Option<&str>| {
         let folder = folder(files);
-        let names = names.map(|it| NameSet::of_set(it).unwrap());
+        let names = names.map(|name| NameSet::of_set(name).unwrap());
         let opened = KeypointSource::open(folder.path(), names);
-        opened.map(|it| it.names().clone()).map_err(|it| it.to_string())
+        opened.map(|opened| opened.names().clone()).map_err(|error| error.to_string())
     };
     let taken = open(
         &[("1.json", &usual), ("2.json", &usual), ("3.json", &other)],
@@ -173,7 +172,7 @@ fn the_other_25_keypoints_of_openpose_are_not_taken_for_the_usual_ones() {
     for set in ["body-25b", "body-25"] {
         assert_eq!(
             open(&files, Some(set)),
-            NameSet::of_set(set).map_err(|it| it.to_string())
+            NameSet::of_set(set).map_err(|error| error.to_string())
         );
     }
 }

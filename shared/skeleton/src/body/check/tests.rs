@@ -12,7 +12,7 @@ fn verdict(joints: &Joints) -> Verdict {
 
 fn moved(joints: &Joints, joint: usize, by: [f64; 3]) -> Joints {
     let mut joints = *joints;
-    joints[joint] = joints[joint].map(|it| it + Vector3::from(by));
+    joints[joint] = joints[joint].map(|joint| joint + Vector3::from(by));
     joints
 }
 
@@ -80,7 +80,7 @@ fn a_child_is_possible_with_noise() {
 fn a_skeleton_on_somebodys_chest_is_nobody() {
     for posture in POSTURES {
         let person = posture(1.76);
-        let small = person.map(|joint| joint.map(|it| it * (0.72 / 1.76)));
+        let small = person.map(|joint| joint.map(|joint| joint * (0.72 / 1.76)));
         let reason = verdict(&small).nobody;
         let Some(Reason::Stature { metres, limits }) = reason else {
             panic!("{reason:?}");
@@ -92,7 +92,7 @@ fn a_skeleton_on_somebodys_chest_is_nobody() {
 
 #[test]
 fn a_giant_is_nobody() {
-    let giant = testing::standing(1.7).map(|joint| joint.map(|it| it * 1.5));
+    let giant = testing::standing(1.7).map(|joint| joint.map(|joint| joint * 1.5));
     assert!(matches!(
         verdict(&giant).nobody,
         Some(Reason::Stature { .. })
@@ -261,7 +261,7 @@ proptest! {
         }
         let found = check(&joints, &covariances, Some(&lengths));
         prop_assert!(found.deviation.is_finite() && found.deviation >= 0.0);
-        prop_assert!(found.stature.is_none_or(|it| it.metres.is_finite() && it.sd.is_finite()));
+        prop_assert!(found.stature.is_none_or(|stature| stature.metres.is_finite() && stature.sd.is_finite()));
         let kept = found.keep(&joints);
         if found.nobody.is_none() {
             // What is kept is possible.
@@ -274,8 +274,8 @@ proptest! {
         for i in 0..N_JOINTS {
             prop_assert_eq!(refined.joints[i].is_some(), clean(&joints)[i].is_some());
             prop_assert_eq!(refined.joints[i].is_some(), refined.covariances[i].is_some());
-            prop_assert!(refined.joints[i].is_none_or(|it| it.iter().all(|x| x.is_finite())));
-            prop_assert!(refined.covariances[i].is_none_or(|it| it.iter().all(|x| x.is_finite())));
+            prop_assert!(refined.joints[i].is_none_or(|joint| joint.iter().all(|x| x.is_finite())));
+            prop_assert!(refined.covariances[i].is_none_or(|covariance| covariance.iter().all(|x| x.is_finite())));
         }
     }
 }

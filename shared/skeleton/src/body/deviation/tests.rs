@@ -40,11 +40,11 @@ fn what_is_no_person_deviates_more() {
         &mut fastrand::Rng::with_seed(1),
     );
     let usual = deviation(&person);
-    let scaled = |by: f64| deviation(&person.map(|joint| joint.map(|it| it * by)));
+    let scaled = |by: f64| deviation(&person.map(|joint| joint.map(|joint| joint * by)));
     assert!(scaled(0.4) > usual + 8.0, "{}", scaled(0.4));
     assert!(scaled(1.6) > usual + 8.0, "{}", scaled(1.6));
     let mut long = person;
-    long[6] = long[6].map(|it| it + Vector3::new(1.0, 0.0, 0.0));
+    long[6] = long[6].map(|long| long + Vector3::new(1.0, 0.0, 0.0));
     assert!(deviation(&long) > usual + 5.0);
     let mut flat = person;
     for joint in [0, 1, 4, 5] {

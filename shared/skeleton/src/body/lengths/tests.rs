@@ -42,8 +42,8 @@ fn wild_frames_do_not_count() {
     let mut lengths = Lengths::default();
     let person = testing::standing(1.7);
     let mut wild = person;
-    wild[6] = wild[6].map(|it| it + Vector3::new(0.0, 1.0, 0.0));
-    let small = person.map(|joint| joint.map(|it| it * 0.3));
+    wild[6] = wild[6].map(|wild| wild + Vector3::new(0.0, 1.0, 0.0));
+    let small = person.map(|joint| joint.map(|joint| joint * 0.3));
     for frame in 0..90 {
         add(&mut lengths, [&person, &wild, &small][frame % 3]);
     }
@@ -68,7 +68,7 @@ fn memory_is_bounded_and_the_last_frames_count() {
         lengths
             .frames
             .iter()
-            .all(|it| it.len() == MAX_FRAMES && it.capacity() == MAX_FRAMES)
+            .all(|frame| frame.len() == MAX_FRAMES && frame.capacity() == MAX_FRAMES)
     );
 }
 

@@ -25,7 +25,7 @@ fn the_reach_is_the_way_along_the_bones() {
 fn a_joint_is_alone_where_its_neighbours_are_missing() {
     let mut joints = testing::standing(1.7);
     let all = (1 << N_JOINTS) - 1;
-    assert!(pieces(&joints).iter().all(|it| *it == all));
+    assert!(pieces(&joints).iter().all(|piece| *piece == all));
     joints[7] = None;
     let found = pieces(&joints);
     assert_eq!(found[6], 1 << 6);

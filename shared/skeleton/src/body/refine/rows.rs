@@ -87,10 +87,10 @@ impl Row {
         let of_bone = |bone: usize| {
             let kind = BONES[bone].kind;
             let spread = expected(kind, stature, lengths).spread.max(LEAST_SPREAD);
-            let learned = lengths.and_then(|it| it.of_kind(kind));
-            let of = learned.map_or(Of::Share { bone }, |it| Of::Learned {
+            let learned = lengths.and_then(|length| length.of_kind(kind));
+            let of = learned.map_or(Of::Share { bone }, |learned| Of::Learned {
                 bone,
-                metres: it.metres,
+                metres: learned.metres,
             });
             is_there(bone).then_some(Self {
                 of,

@@ -21,7 +21,7 @@ fn errors(body: impl Fn(&Joints) -> Joints, tall: f64, lengths: Option<&Lengths>
             sum[1] += testing::error(&refined.joints, &truth);
         }
     }
-    sum.map(|it| it / (60.0 * POSTURES.len() as f64))
+    sum.map(|sum| sum / (60.0 * POSTURES.len() as f64))
 }
 
 /// Legs longer and arms shorter than the mean, by two standard deviations among people.
@@ -68,7 +68,11 @@ fn unusual_bodies_are_not_made_worse() {
 
 #[test]
 fn a_child_with_the_proportions_of_an_adult_is_not_made_worse() {
-    let [before, after] = errors(|it| it.map(|joint| joint.map(|it| it * 0.5)), 2.0, None);
+    let [before, after] = errors(
+        |it| it.map(|joint| joint.map(|joint| joint * 0.5)),
+        2.0,
+        None,
+    );
     assert!(after < before, "{before} {after}");
 }
 
@@ -178,7 +182,7 @@ fn the_result_is_a_minimum() {
 fn an_impossible_limb_does_not_drag_its_neighbours() {
     let person = testing::walking(1.7);
     let mut wrong = person;
-    wrong[6] = wrong[6].map(|it| it + Vector3::new(0.2, -1.0, 0.5));
+    wrong[6] = wrong[6].map(|wrong| wrong + Vector3::new(0.2, -1.0, 0.5));
     let covariances = [Some(Matrix3::identity() * 4e-4); N_JOINTS];
     let found = refine(&wrong, &covariances, None);
     for joint in (0..N_JOINTS).filter(|joint| *joint != 6) {

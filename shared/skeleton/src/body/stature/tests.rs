@@ -24,7 +24,7 @@ fn a_mean_body_has_its_stature_in_every_posture() {
 fn one_limb_that_is_wrong_changes_little() {
     let mut joints = testing::walking(1.7);
     for joint in [6, 7] {
-        joints[joint] = joints[joint].map(|it| it + Vector3::new(0.8, 0.0, 0.0));
+        joints[joint] = joints[joint].map(|joint| joint + Vector3::new(0.8, 0.0, 0.0));
     }
     assert!((of(&joints) - 1.7).abs() < 0.05, "{}", of(&joints));
 }
@@ -32,7 +32,7 @@ fn one_limb_that_is_wrong_changes_little() {
 #[test]
 fn an_adult_scaled_is_as_much_taller() {
     let joints = testing::bent(1.7);
-    let scaled = joints.map(|joint| joint.map(|it| it * 1.2));
+    let scaled = joints.map(|joint| joint.map(|joint| joint * 1.2));
     assert!((of(&scaled) - 1.2 * of(&joints)).abs() < 1e-9);
 }
 
@@ -45,7 +45,7 @@ fn turning_moving_and_mirroring_change_nothing() {
         &mut fastrand::Rng::with_seed(1),
     );
     let turn = Rotation3::from_euler_angles(0.3, 1.0, -2.0);
-    let moved = joints.map(|joint| joint.map(|it| turn * it + Vector3::new(5.0, -3.0, 1.0)));
+    let moved = joints.map(|joint| joint.map(|joint| turn * joint + Vector3::new(5.0, -3.0, 1.0)));
     assert!((of(&moved) - of(&joints)).abs() < 1e-9);
     assert_eq!(of(&testing::mirrored(&joints)), of(&joints));
 }
@@ -65,7 +65,7 @@ fn the_uncertainty_covers_the_noise() {
             (found.metres - 1.7) / found.sd
         })
         .collect();
-    let n_beyond = errors.iter().filter(|it| it.abs() > 2.0).count();
+    let n_beyond = errors.iter().filter(|error| error.abs() > 2.0).count();
     assert!(n_beyond < 30, "{n_beyond}");
 }
 

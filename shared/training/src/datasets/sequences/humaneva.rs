@@ -154,7 +154,8 @@ fn sync(folder: &Path, action: &str) -> Result<Sync, SequenceError> {
 }
 
 fn cameras(folder: &Path, action: &str, sync: &Sync) -> Result<(Rig, Vec<View>), SequenceError> {
-    let calibrations = CAMERAS.map(|it| folder.join("Calibration_Data").join(format!("{it}.cal")));
+    let calibrations =
+        CAMERAS.map(|camera| folder.join("Calibration_Data").join(format!("{camera}.cal")));
     let files: Vec<&Path> = calibrations.iter().map(PathBuf::as_path).collect();
     let options = ReadOptions {
         up: Some(Vector3::z_axis()),

@@ -71,7 +71,7 @@ pub fn read_motion(
     };
     let trial = trial.part(file, options)?;
     let columns = Columns::new(file, &trial, &table, options)?;
-    let names = PARSE14.joints.iter().map(|it| it.name);
+    let names = PARSE14.joints.iter().map(|joint| joint.name);
     let joints: Vec<Vec<[f64; 3]>> =
         names.map(|joint| columns.joint(&table, joint)).collect::<Result<_, _>>()?;
     let toes = if table.has_toes() {

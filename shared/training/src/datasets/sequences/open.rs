@@ -21,7 +21,7 @@ use crate::datasets::sequences::{
 ///
 /// [`SequenceError`], which names the file.
 pub fn read(path: &Path, options: &Options) -> Result<Vec<Sequence>, SequenceError> {
-    if path.extension().is_some_and(|it| it == "toml") {
+    if path.extension().is_some_and(|extension| extension == "toml") {
         return Ok(vec![described::read(path, options)?]);
     }
     if let Some(sequences) = folder(path, options) {

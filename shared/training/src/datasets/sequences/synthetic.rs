@@ -43,7 +43,7 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
         let what = format!("{format:?} {version}, expected \"parallax-truth\" 2");
         return Err(invalid(&path, 1, what));
     }
-    if !header.joints.iter().eq(PARSE14.joints.iter().map(|it| it.name)) {
+    if !header.joints.iter().eq(PARSE14.joints.iter().map(|joint| joint.name)) {
         return Err(invalid(&path, 1, "joints other than the 14 of PARSE"));
     }
     let mut frames = Vec::new();
@@ -62,7 +62,7 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
     let range = options.range(frames.len());
     frames = frames.drain(range).collect();
     let rig = geometry::files::read(&folder.join("rig.toml"), &ReadOptions::default())?;
-    let known = rig.cameras().iter().map(|it| it.name.as_str());
+    let known = rig.cameras().iter().map(|camera| camera.name.as_str());
     if !header.cameras.iter().map(String::as_str).eq(known) {
         return Err(invalid(&path, 1, "other cameras than `rig.toml`"));
     }

@@ -43,7 +43,7 @@ fn umpm(root: &Path) {
     std::fs::create_dir_all(folder.join("Groundtruth")).unwrap();
     let description = "{\"id\": 1, \"calib\": \"calib_l06\",}";
     std::fs::write(folder.join("p2_chair_2.json"), description).unwrap();
-    let names = ["f", "l", "r", "s"].map(|it| format!("calib_l06_{it}"));
+    let names = ["f", "l", "r", "s"].map(|name| format!("calib_l06_{name}"));
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     std::fs::create_dir_all(root.join("Calib")).unwrap();
     geometry::files::write(&root.join("Calib"), Format::Umpm, &rig(&names, [644, 486])).unwrap();
@@ -51,13 +51,13 @@ fn umpm(root: &Path) {
         touch(&folder.join(format!("Video/p2_chair_2_{camera}.avi")));
     }
     let frame = |pose: usize| {
-        let joint = |it: usize| Some([pose as f64, it as f64, 0.0]);
+        let joint = |value: usize| Some([pose as f64, value as f64, 0.0]);
         (0..30).map(joint).collect()
     };
     let trial = Trial {
         rate_hz: 100.0,
         units: "mm".to_owned(),
-        labels: (0..30).map(|it| format!("J{it}")).collect(),
+        labels: (0..30).map(|i| format!("J{i}")).collect(),
         frames: (0..9).map(frame).collect(),
         n_analog: 0,
     };
@@ -77,10 +77,10 @@ fn every_second_pose_of_umpm_belongs_to_a_frame() {
         let got = read(dir.path(), &options).unwrap().remove(0);
         assert_eq!((got.action.as_str(), got.joints), ("Chair", &UMPM15));
         assert_eq!(got.views.len(), 4);
-        let pose = |it: &crate::datasets::sequences::Frame| {
-            let [x, y, _] = it.joints[14].unwrap();
+        let pose = |frame: &crate::datasets::sequences::Frame| {
+            let [x, y, _] = frame.joints[14].unwrap();
             assert!((y - 0.014).abs() < 1e-9, "metres, of the first person");
-            (it.index, (x * 1000.0).round() as u32)
+            (frame.index, (x * 1000.0).round() as u32)
         };
         got.frames.iter().map(pose).collect::<Vec<_>>()
     };
@@ -110,7 +110,7 @@ fn the_last_fifth_can_be_chosen() {
         ..Options::default()
     };
     let got = read(dir.path(), &options).unwrap().remove(0);
-    let numbers: Vec<u64> = got.frames.iter().map(|it| it.number).collect();
+    let numbers: Vec<u64> = got.frames.iter().map(|frame| frame.number).collect();
     assert_eq!(numbers, [5]);
 }
 
@@ -122,7 +122,7 @@ fn synthetic(folder: &Path, lines: &[String]) {
 }
 
 fn truth_lines() -> Vec<String> {
-    let names: Vec<&str> = PARSE14.joints.iter().map(|it| it.name).collect();
+    let names: Vec<&str> = PARSE14.joints.iter().map(|joint| joint.name).collect();
     let header = serde_json::json!({
         "format": "parallax-truth", "version": 2, "subject": 3, "action": "walking", "seed": 1,
         "frame_rate_hz": 30.0, "up": [0.0, 0.0, 1.0], "joints": names, "cameras": ["A", "B"],
@@ -177,8 +177,8 @@ fn any_other_sequence_can_be_described() {
         &rig(&["A", "B"], [640, 480]),
     )
     .unwrap();
-    let names: Vec<String> = (0..14).map(|it| format!("M{it}")).collect();
-    let cells: Vec<String> = (0..14).map(|it| format!("{it}\t2\t3")).collect();
+    let names: Vec<String> = (0..14).map(|i| format!("M{i}")).collect();
+    let cells: Vec<String> = (0..14).map(|i| format!("{i}\t2\t3")).collect();
     let trc = format!(
         "PathFileType\t4\nDataRate\tUnits\n60\tm\nFrame#\tTime\t{}\n\n1\t0\t{}\n",
         names.join("\t\t\t"),

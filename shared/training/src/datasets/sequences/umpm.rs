@@ -89,7 +89,7 @@ fn cameras(
         folder.to_owned(),
     ];
     let file = |camera: &str| format!("{calibration}_{camera}.ini");
-    let place = places.iter().find(|it| it.join(file("f")).is_file());
+    let place = places.iter().find(|place| place.join(file("f")).is_file());
     let place = place.unwrap_or(&places[1]);
     let files = CAMERAS.map(|camera| place.join(file(camera)));
     let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
@@ -100,7 +100,7 @@ fn cameras(
     let rig = geometry::files::read_many(&files, &options)?;
     let view = |(camera, of_rig): (&str, &geometry::Camera)| {
         let stem = folder.join("Video").join(format!("{name}_{camera}"));
-        let [video, packed] = ["avi", "avi.xz"].map(|it| stem.with_extension(it));
+        let [video, packed] = ["avi", "avi.xz"].map(|name| stem.with_extension(name));
         if packed.is_file() && !video.is_file() {
             let hint = "unpack it first (`xz -dk`)";
             return Err(SequenceError::NoFootage { path: packed, hint });
@@ -134,7 +134,7 @@ fn value(text: &str, key: &str) -> Option<String> {
 /// `chair` as in the paper's tables: `Chair`.
 fn capital(word: &str) -> String {
     let mut letters = word.chars();
-    let first = letters.next().map(|it| it.to_ascii_uppercase());
+    let first = letters.next().map(|letter| letter.to_ascii_uppercase());
     first.into_iter().chain(letters).collect()
 }
 

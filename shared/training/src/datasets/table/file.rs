@@ -108,7 +108,7 @@ impl SkeletonTable {
     /// ```
     pub fn parse(text: &str) -> Result<Self, SkeletonFileError> {
         let file: Skeleton = toml::from_str(text)?;
-        let names: Vec<String> = file.part.iter().map(|it| it.name.clone()).collect();
+        let names: Vec<String> = file.part.iter().map(|part| part.name.clone()).collect();
         let mut spec = SkeletonSpec {
             parent: Vec::new(),
             mirror: Vec::new(),
@@ -125,14 +125,14 @@ impl SkeletonTable {
                     name: name.to_owned(),
                 })
             };
-            let part_named = |it: &String| find("part", &spec.names, it);
+            let part_named = |text: &String| find("part", &spec.names, text);
             let parent = part.parent.as_ref().map(part_named).transpose()?;
             let mirror = part.mirror.as_ref().map(part_named).transpose()?;
             let mut weights = Vec::new();
             for (joint, weight) in &part.joints {
                 weights.push((find("joint", &spec.joint_names, joint)?, *weight));
             }
-            weights.sort_unstable_by_key(|it| it.0);
+            weights.sort_unstable_by_key(|weight| weight.0);
             spec.parent.push(parent);
             spec.mirror.push(mirror.unwrap_or(own));
             spec.weights.push(weights);

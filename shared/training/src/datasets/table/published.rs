@@ -48,7 +48,7 @@ impl SkeletonTable {
             parent: PARENT.to_vec(),
             mirror: MIRROR.to_vec(),
             weights: WEIGHTS.map(<[_]>::to_vec).to_vec(),
-            joint_names: PARSE14.joints.iter().map(|it| it.name.to_owned()).collect(),
+            joint_names: PARSE14.joints.iter().map(|joint| joint.name.to_owned()).collect(),
             joint_mirror: JOINT_MIRROR.to_vec(),
         })
     }

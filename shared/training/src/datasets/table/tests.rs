@@ -53,7 +53,7 @@ fn the_upper_body_file_agrees_with_the_published_skeleton() {
     for (part, name) in upper.names().iter().enumerate() {
         let same = published.names().iter().position(|it| it == name).unwrap();
         let parent = |table: &SkeletonTable, part: usize| {
-            table.parent()[part].map(|it| table.names()[it].clone())
+            table.parent()[part].map(|folder| table.names()[folder].clone())
         };
         assert_eq!(parent(&upper, part), parent(&published, same), "{name}");
         assert_eq!(place(&upper, part), place(&published, same), "{name}");
@@ -174,9 +174,9 @@ proptest! {
         for table in [SkeletonTable::published(), upper_body()] {
             let joints: Vec<[f64; 2]> = joints.iter().map(|&(x, y)| [x, y]).collect();
             let flipped = |it: [f64; 2]| [-it[0], it[1]];
-            let mirrored: Vec<_> = table.joint_mirror().iter().map(|&it| flipped(joints[it])).collect();
+            let mirrored: Vec<_> = table.joint_mirror().iter().map(|&joint_mirror| flipped(joints[joint_mirror])).collect();
             let parts = table.parts_of(&joints);
-            let expected: Vec<_> = table.mirror().iter().map(|&it| flipped(parts[it])).collect();
+            let expected: Vec<_> = table.mirror().iter().map(|&mirror| flipped(parts[mirror])).collect();
             for (a, b) in table.parts_of(&mirrored).iter().zip(expected) {
                 prop_assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9);
             }

@@ -55,7 +55,7 @@ impl Checkpoint {
     /// [`CheckpointBytesError::Encode`], beyond 4 GiB.
     pub fn to_bytes(&self, stamp: u64) -> Result<Vec<u8>, CheckpointBytesError> {
         let payload = bincode::serde::encode_to_vec((stamp, self), configuration());
-        let payload = payload.map_err(|it| CheckpointBytesError::Encode(Box::new(it)))?;
+        let payload = payload.map_err(|error| CheckpointBytesError::Encode(Box::new(error)))?;
         Ok(ENVELOPE.seal(&payload))
     }
 
@@ -69,7 +69,7 @@ impl Checkpoint {
         let payload = ENVELOPE.open(bytes)?;
         let decoded = bincode::serde::decode_from_slice(payload, configuration());
         let ((stamp, checkpoint), n_read): ((u64, Self), usize) =
-            decoded.map_err(|it| CheckpointBytesError::Payload(Box::new(it)))?;
+            decoded.map_err(|error| CheckpointBytesError::Payload(Box::new(error)))?;
         match payload.len() - n_read {
             0 => Ok((checkpoint, stamp)),
             left => Err(CheckpointBytesError::Left { left }),

@@ -58,12 +58,12 @@ pub(super) fn table(calibrated: &Calibrated) -> Result<(), Failure> {
 }
 
 fn pictures(calibrated: &Calibrated, camera: usize) -> Option<usize> {
-    calibrated.looked.as_ref().map(|it| it.cameras[camera].n_pictures)
+    calibrated.looked.as_ref().map(|looked| looked.cameras[camera].n_pictures)
 }
 
 fn focal_sd(camera: &CameraOutcome) -> Option<f64> {
-    let focal = camera.numbers.iter().find(|it| it.name == "focal length");
-    focal.map(|it| it.sd)
+    let focal = camera.numbers.iter().find(|number| number.name == "focal length");
+    focal.map(|focal| focal.sd)
 }
 
 fn distance(calibrated: &Calibrated, [a, b]: [usize; 2]) -> f64 {
@@ -74,12 +74,12 @@ fn distance(calibrated: &Calibrated, [a, b]: [usize; 2]) -> f64 {
 /// One object.
 pub(super) fn json(calibrated: &Calibrated) -> Value {
     let doubts = calibrated.doubts();
-    let finite = |it: f64| it.is_finite().then_some(it);
+    let finite = |value: f64| value.is_finite().then_some(value);
     let cameras = calibrated.outcome.cameras.iter().enumerate().map(|(nth, it)| {
-        let wrong = it.residuals.iter().filter(|it| it.is_wrong).count();
-        let number = |it: &calibration::board::Known| {
-            let value = json!({ "value": finite(it.value), "sd": finite(it.sd) });
-            (it.name.clone(), value)
+        let wrong = it.residuals.iter().filter(|residual| residual.is_wrong).count();
+        let number = |known: &calibration::board::Known| {
+            let value = json!({ "value": finite(known.value), "sd": finite(known.sd) });
+            (known.name.clone(), value)
         };
         let numbers: Map<String, Value> = it.numbers.iter().map(number).collect();
         json!({
@@ -96,12 +96,12 @@ pub(super) fn json(calibrated: &Calibrated) -> Value {
             "numbers": numbers,
         })
     });
-    let pairs = calibrated.outcome.pairs.iter().map(|it| {
+    let pairs = calibrated.outcome.pairs.iter().map(|pair| {
         json!({
-            "cameras": it.cameras.map(|nth| &calibrated.task.names[nth]),
-            "together": it.n,
-            "agree": it.n_agree,
-            "distance_m": finite(distance(calibrated, it.cameras)),
+            "cameras": pair.cameras.map(|nth| &calibrated.task.names[nth]),
+            "together": pair.n,
+            "agree": pair.n_agree,
+            "distance_m": finite(distance(calibrated, pair.cameras)),
         })
     });
     json!({
@@ -128,6 +128,6 @@ pub(super) fn about(arguments: &Arguments, calibrated: &Calibrated) -> Vec<(Stri
     if let Some(known) = &arguments.known {
         about.push(("intrinsics kept of".to_owned(), known.display().to_string()));
     }
-    about.extend(calibrated.notes.iter().map(|it| ("note".to_owned(), it.clone())));
+    about.extend(calibrated.notes.iter().map(|note| ("note".to_owned(), note.clone())));
     about
 }

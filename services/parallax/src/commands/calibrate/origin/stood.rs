@@ -26,7 +26,7 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
     let mut skeletons: Skeletons = Vec::new();
     let mut frames = Vec::new();
     let cut = read_lines(run, |_, line| {
-        let time_s = rate_hz.map_or(line.time_s, |it| Some(line.frame as f64 / it));
+        let time_s = rate_hz.map_or(line.time_s, |rate_hz| Some(line.frame as f64 / rate_hz));
         let time_s = time_s.ok_or_else(|| {
             let message = format!("{}: the frames of the run have no times", run.display());
             Failure::new(ExitKind::Input, message).with_hint("pass the frames per second by --rate")
@@ -76,7 +76,7 @@ fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result
         })?;
         let skeleton = frames.binary_search(&line.frame).ok();
         let parts = line.fused.iter().flat_map(|it| &it.parts);
-        let parts: Option<Vec<[f64; 2]>> = parts.map(|it| Some([it.x?, it.y?])).collect();
+        let parts: Option<Vec<[f64; 2]>> = parts.map(|part| Some([part.x?, part.y?])).collect();
         let Some((skeleton, parts)) = skeleton.zip(parts) else {
             continue;
         };
@@ -95,7 +95,7 @@ fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result
         let both = seen.iter().zip(&skeletons[skeleton]);
         let both = both.filter_map(|(seen, joint)| {
             let projected = camera.project(joint.as_ref()?);
-            let away = projected.map(|it| (it - Point2::from(*seen)).norm());
+            let away = projected.map(|projected| (projected - Point2::from(*seen)).norm());
             Some(away.unwrap_or(f64::INFINITY) / size)
         });
         off.extend(both);

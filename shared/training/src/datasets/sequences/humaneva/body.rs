@@ -73,7 +73,7 @@ pub(crate) struct Measures {
 impl Measures {
     /// From the static trial and the text of the `.mp` file; `None` if either is incomplete.
     pub(crate) fn new(still: &C3d, parameters: &str) -> Option<Self> {
-        let [left, right] = ["LSHO", "RSHO"].map(|it| still.point(it));
+        let [left, right] = ["LSHO", "RSHO"].map(|name| still.point(name));
         let (left, right) = (left?, right?);
         let width = |frame: usize| {
             let [left, right] = [left, right].map(|it| seen(still, frame, it));
@@ -119,7 +119,7 @@ impl<'a> Body<'a> {
     /// The name of the first point that is missing.
     pub(crate) fn new(trial: &'a C3d, measures: Measures) -> Result<Self, String> {
         let marker = |names: &&[&str]| {
-            let found = names.iter().find_map(|it| trial.point(it));
+            let found = names.iter().find_map(|name| trial.point(name));
             found.ok_or_else(|| names[0].to_owned())
         };
         let markers = MARKERS.iter().map(marker).collect::<Result<_, _>>()?;
@@ -244,7 +244,7 @@ struct Pose<'a> {
 impl Pose<'_> {
     fn points(&self, name: &str) -> Option<[Vector3<f64>; 2]> {
         let point = self.trial.point(name)?;
-        let [low, high] = self.frames.map(|it| seen(self.trial, it, point));
+        let [low, high] = self.frames.map(|frame| seen(self.trial, frame, point));
         Some([low?, high?])
     }
 
@@ -259,7 +259,7 @@ impl Pose<'_> {
 
     /// The axes of a segment at another origin, interpolated: the origin linearly, the rotation spherically.
     fn segment(&self, axes: &str, origin: &str) -> Option<Isometry3<f64>> {
-        let [o, x, y, z] = ["O", "A", "L", "P"].map(|it| self.points(&format!("{axes}{it}")));
+        let [o, x, y, z] = ["O", "A", "L", "P"].map(|name| self.points(&format!("{axes}{name}")));
         let (o, x, y, z) = (o?, x?, y?, z?);
         let turn = |frame: usize| {
             let columns = [x, y, z].map(|it| (it[frame] - o[frame]).try_normalize(1e-9));

@@ -16,8 +16,8 @@ impl Offset {
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let numbers: Vec<f64> = text
             .split_whitespace()
-            .map_while(|it| it.parse().ok())
-            .filter(|it: &f64| it.is_finite())
+            .map_while(|word| word.parse().ok())
+            .filter(|value: &f64| value.is_finite())
             .collect();
         match numbers[..] {
             [image, motion, rate, ..] => Some(Self {
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn cameras_that_began_later_skip_fewer_frames() {
         // At motion 101 the first camera is at frame 11, the second at 31: it began 20 frames earlier.
-        let got = Sync::new(&[11.0, 31.0].map(|it| Some(offset(it, 101.0, 2.0)))).unwrap();
+        let got = Sync::new(&[11.0, 31.0].map(|value| Some(offset(value, 101.0, 2.0)))).unwrap();
         assert_eq!(got.image_first, [Some(1), Some(21)]);
         assert_eq!((got.motion_first, got.motion_rate), (81.0, 2.0));
         assert_eq!(got.motion_at(11), 101.0);

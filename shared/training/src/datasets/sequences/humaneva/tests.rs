@@ -10,7 +10,7 @@ use crate::datasets::sequences::tests::{rig, touch};
 
 #[test]
 fn the_paper_tests_on_4493_frames_of_each_camera() {
-    let n: usize = PAPER_TEST.iter().map(|it| it.n_frames).sum();
+    let n: usize = PAPER_TEST.iter().map(|paper_test| paper_test.n_frames).sum();
     assert_eq!(n, 4493);
     for it in PAPER_TEST {
         assert!(it.n_frames as u64 <= it.last - it.first + 1, "{it:?}");
@@ -32,9 +32,9 @@ fn subject(folder: &Path) -> PathBuf {
         std::fs::write(offset, format!("{image}\n100.0\n2.0\n")).unwrap();
     }
     let places: Vec<_> =
-        (1..=1300).map(|it| Isometry3::translation(f64::from(it), 0.0, 0.0)).collect();
+        (1..=1300).map(|i| Isometry3::translation(f64::from(i), 0.0, 0.0)).collect();
     let mut walk = person(&places);
-    let lost = walk.labels.iter().position(|it| it == "C7").unwrap();
+    let lost = walk.labels.iter().position(|label| label == "C7").unwrap();
     for frame in 101..=104 {
         walk.frames[frame - 1][lost] = None;
     }
@@ -64,9 +64,9 @@ fn a_subject_is_read_with_synchronised_streams() {
     );
     assert_eq!(walking.rig.cameras().len(), 3);
     // At motion 100 the cameras are at 20, 30, 25: C1 began last. Motion 62 is frame 1 of the trial.
-    let first: Vec<u64> = walking.views.iter().map(|it| it.first).collect();
+    let first: Vec<u64> = walking.views.iter().map(|view| view.first).collect();
     assert_eq!(first, [0, 10, 5]);
-    let numbers: Vec<u64> = walking.frames.iter().map(|it| it.number).collect();
+    let numbers: Vec<u64> = walking.frames.iter().map(|frame| frame.number).collect();
     assert_eq!(&numbers[..3], &[6, 7, 8]);
     // Motion 101 to 104 lie in 62 + 2 (f - 1) for f = 21 and 22.
     assert!(!numbers.contains(&21) && !numbers.contains(&22));

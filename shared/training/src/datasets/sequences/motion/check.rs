@@ -26,7 +26,7 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
         let [hip, knee, ankle] = [hip, knee, ankle].map(|it| joint(frame, it));
         (knee - hip).norm() + (ankle - knee).norm()
     };
-    let leg = median(all().flat_map(|frame| LEGS.map(|it| length(frame, it))));
+    let leg = median(all().flat_map(|frame| LEGS.map(|leg| length(frame, leg))));
     if !(LEG_METRES[0]..=LEG_METRES[1]).contains(&leg) {
         return refuse(format!(
             "a leg would be {leg:.3} m long: another unit? (unit = \"mm\" in a marker table)"
@@ -53,7 +53,7 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
 
 /// How much the knees bend backward; negative if forward, 0 if they are straight.
 fn fold(frame: &[[f64; 3]; 14]) -> f64 {
-    let joint = |it: usize| Vector3::from(frame[it]);
+    let joint = |i: usize| Vector3::from(frame[i]);
     let left = joint(LEGS[0][0]) - joint(LEGS[1][0]);
     let of_leg = |[hip, knee, ankle]: [usize; 3]| {
         let thigh = (joint(knee) - joint(hip)).try_normalize(1e-9);

@@ -12,6 +12,6 @@ const TEXTS: [&str; 4] = [
 
 /// The text of one of [`PRESETS`].
 pub(super) fn preset(name: &str) -> Option<&'static str> {
-    let place = PRESETS.iter().position(|it| *it == name)?;
+    let place = PRESETS.iter().position(|preset| *preset == name)?;
     Some(TEXTS[place])
 }

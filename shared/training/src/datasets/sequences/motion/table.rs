@@ -70,12 +70,12 @@ impl MarkerTable {
 
     /// Parses the text of a table; the error describes what is wrong.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
-        let file: File = toml::from_str(text).map_err(|it| it.to_string())?;
+        let file: File = toml::from_str(text).map_err(|error| error.to_string())?;
         let unit_metres = match &file.unit {
             None => None,
             Some(unit) => Some(metres_per(unit).ok_or(format!("unit {unit:?} is not known"))?),
         };
-        let known = PARSE14.joints.iter().map(|it| it.name);
+        let known = PARSE14.joints.iter().map(|joint| joint.name);
         let missing = known.clone().find(|it| !file.joints.contains_key(*it));
         if let Some(joint) = missing {
             return Err(format!("nothing makes the joint {joint:?}"));
@@ -105,7 +105,7 @@ impl MarkerTable {
 
     /// The markers of all joints; one may occur several times.
     pub(super) fn markers(&self) -> impl Iterator<Item = &str> {
-        self.joints.values().flatten().map(|it| it.0.as_str())
+        self.joints.values().flatten().map(|value| value.0.as_str())
     }
 
     pub(super) fn has_toes(&self) -> bool {
@@ -134,8 +134,8 @@ fn weights(markers: Markers) -> Result<Vec<(String, f64)>, String> {
         }
         Markers::Sum(weights) => weights.into_iter().collect(),
     };
-    let sum: f64 = weights.iter().map(|it| it.1).sum();
-    if (sum - 1.0).abs() > 1e-6 || weights.iter().any(|it| !it.1.is_finite()) {
+    let sum: f64 = weights.iter().map(|weight| weight.1).sum();
+    if (sum - 1.0).abs() > 1e-6 || weights.iter().any(|weight| !weight.1.is_finite()) {
         return Err(format!("the weights add up to {sum}, not to 1"));
     }
     Ok(weights)

@@ -12,7 +12,7 @@ use super::*;
 /// A person that moves up and down with bent knees: joints of PARSE14 in metres, z up, and toes.
 fn posture(frame: usize) -> [[f64; 3]; 16] {
     let down = 0.05 * (frame as f64 * 0.3).sin();
-    let z = |it: f64| it - down;
+    let z = |value: f64| value - down;
     [
         [0.0, -0.1, 0.08],
         [0.15, -0.1, z(0.5)],
@@ -57,9 +57,9 @@ fn names(with_toes: bool) -> Vec<String> {
             "LSmallToe",
         ]
     } else {
-        PARSE14.joints.iter().map(|it| it.name).collect()
+        PARSE14.joints.iter().map(|joint| joint.name).collect()
     };
-    names.into_iter().map(|it| it.replace(' ', "_")).collect()
+    names.into_iter().map(|name| name.replace(' ', "_")).collect()
 }
 
 /// A TRC file, y up, without the frames and markers for which `missing` is true.
@@ -105,7 +105,7 @@ fn read_by(
     let folder = TempDir::new().unwrap();
     let file = folder.path().join(name);
     fs::write(&file, bytes).unwrap();
-    let table = table.map(|it| MarkerTable::parse(it).unwrap());
+    let table = table.map(|table| MarkerTable::parse(table).unwrap());
     read_motion(&file, table.as_ref(), options)
 }
 
@@ -116,7 +116,7 @@ fn refused(got: Result<Motion, MotionError>) -> String {
 }
 
 fn assert_near(got: &[f64; 3], expected: &[f64; 3], tolerance: f64) {
-    let off = (0..3).map(|it| (got[it] - expected[it]).abs());
+    let off = (0..3).map(|i| (got[i] - expected[i]).abs());
     assert!(off.fold(0.0, f64::max) <= tolerance, "{got:?} {expected:?}");
 }
 
@@ -157,12 +157,12 @@ fn joints_of_a_trc_file_are_read_with_z_up() {
 fn c3d(unit: &str, per_metre: f64) -> Vec<u8> {
     let frame = |frame: usize| {
         let points = posture(frame).into_iter().take(14);
-        points.map(|it| Some(it.map(|it| it * per_metre))).collect()
+        points.map(|it| Some(it.map(|value| value * per_metre))).collect()
     };
     let trial = Written {
         rate_hz: 120.0,
         units: unit.to_owned(),
-        labels: names(false).iter().map(|it| format!("Bob:{it}")).collect(),
+        labels: names(false).iter().map(|name| format!("Bob:{name}")).collect(),
         frames: (0..40).map(frame).collect(),
         n_analog: 0,
     };
@@ -171,8 +171,8 @@ fn c3d(unit: &str, per_metre: f64) -> Vec<u8> {
 
 /// A table with `up = "z"`, and more lines before the joints.
 fn own_table(more: &str) -> String {
-    let joints = PARSE14.joints.iter().map(|it| it.name);
-    let lines = joints.map(|it| format!("\"{it}\" = [\"{}\"]\n", it.replace(' ', "_")));
+    let joints = PARSE14.joints.iter().map(|joint| joint.name);
+    let lines = joints.map(|joint| format!("\"{joint}\" = [\"{}\"]\n", joint.replace(' ', "_")));
     format!(
         "up = \"z\"\n{more}\n[joints]\n{}",
         lines.collect::<String>()
@@ -213,7 +213,7 @@ fn short_gaps_are_interpolated_and_long_ones_are_refused_with_their_frames() {
     let ends = [posture(9)[1], posture(22)[1]];
     for frame in 9..=22 {
         let share = (frame - 9) as f64 / 13.0;
-        let expected = core::array::from_fn(|it| ends[0][it] + share * (ends[1][it] - ends[0][it]));
+        let expected = core::array::from_fn(|i| ends[0][i] + share * (ends[1][i] - ends[0][i]));
         assert_near(&got.joints[frame][1], &expected, 1e-12);
     }
     let got = read(
@@ -321,7 +321,7 @@ proptest! {
     ) {
         let points: Vec<Option<[f64; 3]>> = seen.iter().map(|it| it.map(|x| [x, 2.0 * x, 1.0])).collect();
         let gaps: Vec<usize> = points.split(Option::is_some).map(<[_]>::len).collect();
-        let is_fine = seen.iter().any(Option::is_some) && gaps.iter().all(|it| *it <= longest);
+        let is_fine = seen.iter().any(Option::is_some) && gaps.iter().all(|gap| *gap <= longest);
         match interpolated(&points, longest as f64) {
             Err([from, to]) => {
                 prop_assert!(!is_fine);

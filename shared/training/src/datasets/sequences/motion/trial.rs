@@ -90,7 +90,7 @@ impl Trial {
     pub(super) fn marker(&self, name: &str) -> Option<usize> {
         let n_points = self.frames.first().map_or(0, Vec::len);
         let place = self.names.iter().position(|it| it == name);
-        place.filter(|it| *it < n_points)
+        place.filter(|place| *place < n_points)
     }
 
     /// The requested frames.

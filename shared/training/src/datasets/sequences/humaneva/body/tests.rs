@@ -39,7 +39,7 @@ pub(crate) fn person(places: &[Isometry3<f64>]) -> Trial {
         ];
         for (axis, end) in ends {
             labels.push(format!("S1:{name}{axis}"));
-            points.push(Point3::from([0, 1, 2].map(|it| origin[it] + end[it])));
+            points.push(Point3::from([0, 1, 2].map(|i| origin[i] + end[i])));
         }
     }
     for (nth, names) in MARKERS.iter().enumerate() {
@@ -48,7 +48,7 @@ pub(crate) fn person(places: &[Isometry3<f64>]) -> Trial {
         points.push(Point3::new(50.0, side * 200.0, 900.0 + nth as f64));
     }
     let frame =
-        |place: &Isometry3<f64>| points.iter().map(|it| Some((place * it).into())).collect();
+        |place: &Isometry3<f64>| points.iter().map(|point| Some((place * point).into())).collect();
     Trial {
         rate_hz: 120.0,
         units: "mm".to_owned(),
@@ -116,7 +116,7 @@ fn the_trunk_leans_back_and_the_elbows_come_forwards() {
 fn a_lost_marker_invalidates_the_frames_around_it() {
     let here = Isometry3::identity();
     let mut trial = person(&[here; 4]);
-    let lost = trial.labels.iter().position(|it| it == "T10").unwrap();
+    let lost = trial.labels.iter().position(|label| label == "T10").unwrap();
     trial.frames[2][lost] = None;
     let trial = read(&trial);
     let body = Body::new(&trial, Measures::default()).unwrap();
@@ -137,7 +137,7 @@ fn there_are_no_joints_outside_of_the_trial() {
 #[test]
 fn a_missing_point_is_named() {
     let mut trial = person(&[Isometry3::identity()]);
-    let at = trial.labels.iter().position(|it| it == "S1:LTIO").unwrap();
+    let at = trial.labels.iter().position(|label| label == "S1:LTIO").unwrap();
     trial.labels[at] = "other".to_owned();
     let trial = read(&trial);
     let got = Body::new(&trial, Measures::default());
