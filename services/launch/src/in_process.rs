@@ -62,14 +62,12 @@ impl InProcess {
         let settings = NetworkEstimatorSettings {
             who: who_settings(resolved, &prepared),
             space: space_settings(resolved, &prepared),
-            start_frame: deployment.capture.start_frame,
-            frame_step: deployment.capture.frame_step.max(1),
             frame_rate_hz: resolved.frame_rate_hz(),
             most_apart: most_apart(resolved),
         };
         Ok(Self {
-            start_frame: settings.start_frame,
-            frame_step: settings.frame_step,
+            start_frame: deployment.capture.start_frame,
+            frame_step: deployment.capture.frame_step.max(1),
             n_frames: 0,
             estimator: NetworkEstimator::new(&plans, steps, prepared.up_in_world, settings),
             keypoints,
@@ -111,6 +109,6 @@ impl InProcess {
                 skew_s: sent.skew_nanos as f64 * 1e-9,
             }));
         }
-        self.estimator.estimate(&seen).or_fail(ExitKind::Run)
+        self.estimator.estimate(frame, &seen).or_fail(ExitKind::Run)
     }
 }

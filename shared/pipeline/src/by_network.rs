@@ -21,10 +21,6 @@ pub struct NetworkEstimatorSettings {
     pub who: WhoSettings,
     /// The step in space.
     pub space: SpaceStepSettings,
-    /// Number of the first frame.
-    pub start_frame: u64,
-    /// Distance between frames, at least 1.
-    pub frame_step: u64,
     /// Frames per second, if that is known: without it nothing is moved from the time of its picture to the instant of its frame.
     pub frame_rate_hz: Option<f64>,
     /// Most frames from one in which people are seen to the next one in which they are in their boxes.
@@ -74,8 +70,6 @@ pub struct NetworkEstimator {
     who: WhoStep,
     space: SpaceStep,
     settings: NetworkEstimatorSettings,
-    /// Number of frames estimated so far.
-    n_frames: u64,
 }
 
 impl NetworkEstimator {
@@ -99,13 +93,13 @@ impl NetworkEstimator {
             who: WhoStep::new(cameras, settings.who),
             space: SpaceStep::new(plans.to_vec(), up_in_world, settings.space.clone()),
             settings,
-            n_frames: 0,
         }
     }
 
-    /// Estimates the next frame. The result depends on the frames before. Views run in parallel on the current rayon pool; the result
+    /// Estimates a frame. The result depends on the frames before. Views run in parallel on the current rayon pool; the result
     /// does not depend on the number of threads.
     ///
+    /// * `frame`: its number; larger than that of the frame before.
     /// * `frames`: one per view; `None` for a view that is missing.
     ///
     /// # Errors
@@ -113,10 +107,9 @@ impl NetworkEstimator {
     /// [`LookError`] if a network or detector fails.
     pub fn estimate(
         &mut self,
+        frame: u64,
         frames: &[Option<ViewFrame<'_>>],
     ) -> Result<NetworkEstimate, LookError> {
-        let frame = self.settings.start_frame + self.n_frames * self.settings.frame_step.max(1);
-        self.n_frames += 1;
         let most_apart = self.settings.most_apart;
         let viewed = self.views.par_iter_mut().zip(frames);
         let sightings: Result<Vec<Option<Sightings>>, LookError> = viewed

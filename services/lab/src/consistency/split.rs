@@ -84,6 +84,7 @@ mod tests {
             action: String::new(),
             rig: rig(),
             views: Vec::new(),
+            frame_rate_hz: None,
             joints: &PARSE14,
             frames: Vec::new(),
         }

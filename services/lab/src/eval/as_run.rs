@@ -78,7 +78,7 @@ impl AsRun<'_> {
                 as_seen,
                 ..WhoSettings::default()
             },
-            frame_step: 1,
+            frame_rate_hz: sequence.frame_rate_hz,
             ..NetworkEstimatorSettings::default()
         };
         let up = sequence.rig.up_in_world();
@@ -86,7 +86,9 @@ impl AsRun<'_> {
     }
 }
 
-/// The joints of `skeleton::PARSE14` in the next frame of a film.
+/// The joints of `skeleton::PARSE14` in a frame of a film.
+///
+/// * `index`: of the frame, larger than before.
 ///
 /// # Errors
 ///
@@ -102,7 +104,7 @@ pub fn joints(
         skew_s: 0.0,
     };
     let frames: Vec<_> = images.into_iter().map(|image| image.map(view)).collect();
-    let estimate = estimator.estimate(&frames).or_fail(ExitKind::Input)?;
+    let estimate = estimator.estimate(index, &frames).or_fail(ExitKind::Input)?;
     let Some(followed) = estimate.skeletons.first() else {
         return Ok(vec![None; PARSE14.joints.len()]);
     };

@@ -96,7 +96,7 @@ pub(crate) fn read(file: &Path, options: &Options) -> Result<Sequence, SequenceE
         let path = rig_file.clone();
         SequenceError::Cameras { path, source }
     })?;
-    let (joints, frames) = truth(file, folder, &description.truth, options)?;
+    let (frame_rate_hz, joints, frames) = truth(file, folder, &description.truth, options)?;
     let action = description.action.unwrap_or_else(|| description.name.clone());
     Ok(Sequence {
         dataset: description.dataset.unwrap_or_else(|| description.name.clone()),
@@ -105,6 +105,7 @@ pub(crate) fn read(file: &Path, options: &Options) -> Result<Sequence, SequenceE
         action,
         rig,
         views,
+        frame_rate_hz: Some(frame_rate_hz).filter(|rate| rate.is_finite() && *rate > 0.0),
         joints,
         frames,
     })
@@ -115,7 +116,7 @@ fn truth(
     folder: &Path,
     truth: &Truth,
     options: &Options,
-) -> Result<(&'static JointSet, Vec<Frame>), SequenceError> {
+) -> Result<(f64, &'static JointSet, Vec<Frame>), SequenceError> {
     let set = JointSet::by_name(&truth.joints)
         .ok_or_else(|| invalid(file, 0, format!("no joint set {:?}", truth.joints)))?;
     if truth.markers.len() != set.joints.len() {
@@ -154,5 +155,9 @@ fn truth(
             joints: joints.collect(),
         }
     };
-    Ok((set, options.range(trc.frames.len()).map(frame).collect()))
+    Ok((
+        trc.rate_hz,
+        set,
+        options.range(trc.frames.len()).map(frame).collect(),
+    ))
 }

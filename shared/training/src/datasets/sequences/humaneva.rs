@@ -25,6 +25,9 @@ const CAMERAS: [&str; 3] = ["C1", "C2", "C3"];
 /// All cameras, in the order in which the toolbox uses their offsets.
 const ALL_CAMERAS: [&str; 7] = ["C1", "C2", "C3", "BW1", "BW2", "BW3", "BW4"];
 
+/// Frames per second of the colour cameras.
+const FRAME_RATE_HZ: f64 = 60.0;
+
 /// The trial whose first half is the paper's test set: the part that the data set's authors intended for validation.
 pub const TRIAL: u32 = 1;
 
@@ -127,6 +130,7 @@ fn read(folder: &Path, test: &PaperTest, options: &Options) -> Result<Sequence, 
         action: test.action.to_owned(),
         rig,
         views,
+        frame_rate_hz: Some(FRAME_RATE_HZ),
         joints: &HUMANEVA20,
         frames,
     })

@@ -19,6 +19,8 @@ pub struct Sequence {
     pub rig: Rig,
     /// The footage, one for each camera.
     pub views: Vec<View>,
+    /// Frames per second of the footage.
+    pub frame_rate_hz: Option<f64>,
     /// The set of the true joints.
     pub joints: &'static JointSet,
     /// The frames that are evaluated, ascending.

@@ -19,6 +19,7 @@ struct Header {
     version: u32,
     subject: u64,
     action: String,
+    frame_rate_hz: f64,
     joints: Vec<String>,
     cameras: Vec<String>,
 }
@@ -80,6 +81,7 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
         action: header.action,
         views: header.cameras.iter().map(view).collect(),
         rig,
+        frame_rate_hz: Some(header.frame_rate_hz).filter(|rate| rate.is_finite() && *rate > 0.0),
         joints: &PARSE14,
         frames,
     })

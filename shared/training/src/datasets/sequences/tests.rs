@@ -144,6 +144,7 @@ fn synthetic_scenes_are_read() {
         (got.name.as_str(), got.action.as_str()),
         ("s3 walking", "walking")
     );
+    assert_eq!(got.frame_rate_hz, Some(30.0));
     assert_eq!(got.frames.len(), 3);
     assert_eq!(got.frames[2].joints[13], Some([2.0, 0.5, 1.0]));
     assert!(got.views[1].source.ends_with("cameras/B"));
@@ -195,6 +196,7 @@ fn any_other_sequence_can_be_described() {
     let got = read(&file, &Options::default()).unwrap().remove(0);
     assert_eq!(got.rig.cameras()[0].name, "B");
     assert_eq!(got.views[0].first, 4);
+    assert_eq!(got.frame_rate_hz, Some(60.0));
     assert_eq!(got.frames[0].joints[5], Some([3.0, 5.0, 2.0]));
 
     std::fs::write(&file, description.replace("\"B\"", "\"D\"")).unwrap();

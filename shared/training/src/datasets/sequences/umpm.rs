@@ -20,6 +20,9 @@ const CAMERAS: [&str; 4] = ["f", "l", "r", "s"];
 /// Poses for each frame of a camera.
 const POSES_PER_FRAME: usize = 2;
 
+/// Frames per second of the cameras.
+const FRAME_RATE_HZ: f64 = 50.0;
+
 /// The description of the sequence in a folder, if it is one of UMPM.
 pub(crate) fn description(folder: &Path) -> Option<PathBuf> {
     let name = folder.file_name()?.to_str()?;
@@ -72,6 +75,7 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
         action,
         rig,
         views,
+        frame_rate_hz: Some(FRAME_RATE_HZ),
         joints: &UMPM15,
         frames: options.range(n).filter_map(frame).collect(),
     })
