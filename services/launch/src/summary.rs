@@ -1,6 +1,7 @@
 //! The progress of a run, and the report at its end.
 
 mod cameras;
+mod everybody;
 mod page;
 mod people;
 mod recorded;
@@ -332,6 +333,7 @@ impl Report {
             )?;
             self.write_slow(text, it);
             writeln!(text, "  people        {}", it.people.text())?;
+            text.push_str(&everybody::table(&it.people));
             text.push_str(&trust::text(it, &self.doubts()));
             self.write_views(text, it)?;
             self.write_misplaced(text, it)?;

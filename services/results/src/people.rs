@@ -1,13 +1,18 @@
-//! How many people there are besides the one who is followed.
+//! Everybody over the run: how many people there are besides the one who is followed, and a summary of each.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use deployment::person::Follow;
-use messages::{Skeletons, Status};
-use runfiles::People;
+use messages::{SkeletonMessage, Skeletons, Status};
+use runfiles::{People, PersonLine, PersonSummary};
+
+use crate::pose3d::is_placed;
+use crate::trust::Trusted;
 
 /// Results with others before it is said: a ghost of few frames is not worth a warning.
 const MANY: u64 = 10;
+/// Nobody has the same id after a longer absence, seconds: `people` forgets who has been gone for a minute.
+pub(crate) const GONE_S: f64 = 61.0;
 
 /// Counts the people of the results; says once that there are several.
 #[derive(Debug)]
@@ -17,6 +22,59 @@ pub(crate) struct Counted {
     most: u32,
     /// Of all who were followed.
     ids: BTreeSet<u64>,
+    /// Those who are there, or may come back.
+    each: BTreeMap<u64, One>,
+    /// Those who cannot come back.
+    gone: BTreeMap<u64, PersonSummary>,
+}
+
+/// One person so far.
+#[derive(Debug, Default)]
+struct One {
+    frames: u64,
+    first_frame: u64,
+    last_frame: u64,
+    /// When the last frame was taken, seconds.
+    seen_s: f64,
+    n_joints: u64,
+    n_placed: u64,
+    /// Sum of the squared reprojection errors, and their number.
+    squared_px: (f64, u64),
+    trusted: Trusted,
+}
+
+impl One {
+    /// Counts a frame.
+    ///
+    /// * `placed_px`: of each joint the reprojection error, pixels; `None` of a joint without a place, NaN where it is not known.
+    fn add(&mut self, frame: u64, placed_px: impl Iterator<Item = Option<f64>>) {
+        if self.frames == 0 {
+            self.first_frame = frame;
+        }
+        (self.frames, self.last_frame) = (self.frames + 1, frame);
+        for px in placed_px {
+            self.n_joints += 1;
+            let Some(px) = px else { continue };
+            self.n_placed += 1;
+            if px.is_finite() {
+                self.squared_px.0 += px.powi(2);
+                self.squared_px.1 += 1;
+            }
+        }
+    }
+
+    fn summary(&self, id: u64) -> PersonSummary {
+        let (sum, n) = self.squared_px;
+        PersonSummary {
+            first_frame: self.first_frame,
+            frames: self.frames,
+            id,
+            joints: self.n_placed as f64 / self.n_joints.max(1) as f64,
+            last_frame: self.last_frame,
+            reprojection_px: (n > 0).then(|| (sum / n as f64).sqrt()),
+            trust: self.trusted.trust(),
+        }
+    }
 }
 
 impl Counted {
@@ -26,7 +84,50 @@ impl Counted {
             n_with_others: 0,
             most: 0,
             ids: BTreeSet::new(),
+            each: BTreeMap::new(),
+            gone: BTreeMap::new(),
         }
+    }
+
+    /// Adds a person of a frame, for the summary of each.
+    ///
+    /// * `limbs`: pairs of joints that a bone connects.
+    /// * `time_s`: of the frame, if it is known.
+    pub(crate) fn person(
+        &mut self,
+        frame: u64,
+        person: &SkeletonMessage,
+        limbs: &[(usize, usize)],
+        time_s: Option<f64>,
+    ) {
+        if person.status != Status::OK {
+            return;
+        }
+        let one = self.each.entry(person.id).or_default();
+        let px = person.listed_joints().iter();
+        one.add(
+            frame,
+            px.map(|joint| is_placed(joint).then_some(joint.reprojection_px)),
+        );
+        one.trusted.count(person, limbs, (time_s, &[]));
+        let Some(now_s) = time_s else { return };
+        one.seen_s = now_s;
+        let gone = self.each.extract_if(.., |_, one| now_s - one.seen_s > GONE_S);
+        self.gone.extend(gone.map(|(id, one)| (id, one.summary(id))));
+    }
+
+    /// Adds a person of a frame that a killed process had written.
+    pub(crate) fn line(&mut self, frame: u64, person: &PersonLine, time_s: Option<f64>) {
+        if person.status != runfiles::FrameLine::OK {
+            return;
+        }
+        let one = self.each.entry(person.id).or_default();
+        one.seen_s = time_s.unwrap_or(0.0);
+        let joints = person.joints.values().map(|joint| joint.placed());
+        one.add(
+            frame,
+            joints.map(|joint| Some(joint?.reprojection_px.unwrap_or(f64::NAN))),
+        );
     }
 
     /// Adds a result.
@@ -46,7 +147,11 @@ impl Counted {
 
     /// What was counted so far.
     pub(crate) fn people(&self) -> People {
+        let each = self.each.iter().map(|(id, one)| one.summary(*id));
+        let each: BTreeMap<u64, PersonSummary> =
+            each.map(|one| (one.id, one)).chain(self.gone.clone()).collect();
         People {
+            each: each.into_values().collect(),
             follow: self.follow.name().to_owned(),
             followed: self.ids.len() as u64,
             frames_with_others: self.n_with_others,
@@ -74,11 +179,35 @@ mod tests {
             counted.add(&frame);
         }
         let expected = People {
+            each: Vec::new(),
             follow: "largest".to_owned(),
             followed: 2,
             frames_with_others: 2,
             most: 3,
         };
         assert_eq!(counted.people(), expected);
+    }
+
+    #[test]
+    fn each_person_has_a_summary_of_the_own_frames() {
+        let mut counted = Counted::new(Follow::Last);
+        let mut person = SkeletonMessage {
+            status: Status::OK,
+            n_joints: 2,
+            ..SkeletonMessage::default()
+        };
+        person.joints[0].status = Status::OK;
+        person.joints[0].reprojection_px = 3.0;
+        person.joints[1].status = Status::TOO_FEW_VIEWS;
+        for (frame, id, time_s) in [(4, 7, 0.0), (5, 7, 0.1), (5, 8, 0.1), (900, 9, 90.0)] {
+            person.id = id;
+            counted.person(frame, &person, &[], Some(time_s));
+        }
+        assert_eq!(counted.each.keys().copied().collect::<Vec<_>>(), [9]);
+        let each = counted.people().each;
+        let told = |one: &PersonSummary| (one.id, one.frames, one.first_frame, one.last_frame);
+        let expected = [(7, 2, 4, 5), (8, 1, 5, 5), (9, 1, 900, 900)];
+        assert_eq!(each.iter().map(told).collect::<Vec<_>>(), expected);
+        assert_eq!((each[0].joints, each[0].reprojection_px), (0.5, Some(3.0)));
     }
 }

@@ -10,11 +10,14 @@ use runfiles::{FrameLine, MOST_PEOPLE, PersonLine, SmoothReport, SmoothedJoint, 
 
 use crate::Scene;
 use crate::lines::Lines;
+use crate::people::GONE_S;
 
 /// The smoothers of a run, and its file.
 #[derive(Debug)]
 pub(crate) struct Smoothing {
     people: BTreeMap<u64, Person>,
+    /// Those who cannot come back.
+    gone: BTreeMap<u64, SmoothedPerson>,
     /// Of every joint, then of every extra keypoint.
     names: Vec<String>,
     n_joints: usize,
@@ -29,15 +32,18 @@ struct Person {
     smoother: Smoother,
     counts: Vec<SmoothedJoint>,
     n_unsure: usize,
+    /// Time of the last frame with the person, seconds.
+    seen_s: f64,
 }
 
 impl Person {
-    fn new(names: &[String]) -> Self {
+    fn new(names: &[String], seen_s: f64) -> Self {
         let known: Vec<&str> = names.iter().map(String::as_str).collect();
         Self {
             smoother: Smoother::new(&known, FILL_S),
             counts: vec![SmoothedJoint::default(); names.len()],
             n_unsure: 0,
+            seen_s,
         }
     }
 }
@@ -48,6 +54,7 @@ impl Smoothing {
         let extras = scene.extra_keypoints.iter().cloned();
         Ok(Self {
             people: BTreeMap::new(),
+            gone: BTreeMap::new(),
             names: joints.chain(extras).collect(),
             n_joints: scene.joints.joints.len(),
             n_frames: 0,
@@ -63,8 +70,10 @@ impl Smoothing {
         let there: Vec<u64> = line.people.iter().map(|person| person.id).collect();
         for id in &there {
             let names = &self.names;
-            self.people.entry(*id).or_insert_with(|| Person::new(names));
+            let person = self.people.entry(*id).or_insert_with(|| Person::new(names, time_s));
+            person.seen_s = time_s;
         }
+        self.forget(time_s);
         self.n_frames += 1;
         let ids: Vec<u64> = self.people.keys().copied().collect();
         let absent = ids.into_iter().filter(|id| !there.contains(id));
@@ -76,6 +85,13 @@ impl Smoothing {
         let people = smoothed.take(MOST_PEOPLE).collect();
         let line = lines::with_people(line.clone(), people);
         self.file.append(&runfiles::to_line(&line)?)
+    }
+
+    /// Lets go of the smoothers of those who cannot come back: a run of days sees many people.
+    fn forget(&mut self, time_s: f64) {
+        let names = &self.names;
+        let gone = self.people.extract_if(.., |_, person| time_s - person.seen_s > GONE_S);
+        self.gone.extend(gone.map(|(id, person)| (id, report_of(names, id, &person))));
     }
 
     /// * `measured`: `None` in a frame without the person.
@@ -110,7 +126,8 @@ impl Smoothing {
 
     /// What became of it; since the process was started last.
     pub(crate) fn report(&self) -> SmoothReport {
-        let people = self.people.iter();
+        let gone = self.gone.values().cloned();
+        let people = self.people.iter().map(|(id, person)| report_of(&self.names, *id, person));
         let delays = self.people.values();
         let delays = delays.filter_map(|person| person.smoother.delay_s());
         SmoothReport {
@@ -118,24 +135,23 @@ impl Smoothing {
             fill_s: FILL_S,
             method: "kalman".to_owned(),
             n_frames: self.n_frames,
-            people: people.map(|(id, person)| self.person_report(*id, person)).collect(),
+            people: gone.chain(people).collect(),
             rate_hz: self.rate_hz,
             schema_version: runfiles::VERSION,
             ..SmoothReport::default()
         }
     }
+}
 
-    fn person_report(&self, id: u64, person: &Person) -> SmoothedPerson {
-        let joints = self.names.iter().cloned();
-        SmoothedPerson {
-            ids: vec![id],
-            joints: joints.zip(person.counts.iter().copied()).collect(),
-            unsure: runfiles::Unsure {
-                left_out: person.n_unsure,
-                ..runfiles::Unsure::default()
-            },
-            ..SmoothedPerson::default()
-        }
+fn report_of(names: &[String], id: u64, person: &Person) -> SmoothedPerson {
+    SmoothedPerson {
+        ids: vec![id],
+        joints: names.iter().cloned().zip(person.counts.iter().copied()).collect(),
+        unsure: runfiles::Unsure {
+            left_out: person.n_unsure,
+            ..runfiles::Unsure::default()
+        },
+        ..SmoothedPerson::default()
     }
 }
 
@@ -148,4 +164,38 @@ fn add(count: &mut SmoothedJoint, it: &Smoothed) {
         Err(_) => &mut count.absent,
     };
     *count += 1;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::scene;
+
+    #[test]
+    fn the_smoothers_of_those_who_cannot_come_back_go_and_their_counts_stay() {
+        let file = tempfile::tempfile().unwrap();
+        let mut smoothing = Smoothing::begin(&scene(), file).unwrap();
+        for (frame, time_s, id) in [(0, 0.0, 1), (1, 30.0, 2), (2, 60.0, 2), (3, 62.0, 3)] {
+            let person = PersonLine {
+                id,
+                ..PersonLine::default()
+            };
+            let line = FrameLine {
+                frame,
+                people: vec![person],
+                reason: None,
+                seen: None,
+                status: FrameLine::OK.to_owned(),
+                time_s: Some(time_s),
+                views_missing: BTreeMap::new(),
+                views_present: Vec::new(),
+            };
+            smoothing.frame(&line).unwrap();
+        }
+        assert_eq!(smoothing.people.keys().copied().collect::<Vec<_>>(), [2, 3]);
+        let report = smoothing.report();
+        let absent = |person: &SmoothedPerson| (person.ids[0], person.joints["head"].absent);
+        let counts: Vec<_> = report.people.iter().map(absent).collect();
+        assert_eq!(counts, [(1, 3), (2, 3), (3, 1)]);
+    }
 }

@@ -74,6 +74,9 @@ impl Tally {
         let why = |name: &str| line.views_missing.get(name).map(Missing::text);
         self.frame(scene, line.frame, line.has_pose());
         self.views(&is_used, &why);
+        for person in &line.people {
+            self.people.line(line.frame, person, line.time_s);
+        }
         let joints = line.people.iter().flat_map(|person| person.joints.values());
         let placed = joints.filter_map(|joint| joint.placed());
         for px in placed.filter_map(|joint| joint.reprojection_px) {
@@ -105,6 +108,9 @@ impl Tally {
             &own::distances_m(scene, record)[..],
         );
         self.trusted.add(record.followed(), scene.joints.limbs, seen);
+        for person in people {
+            self.people.person(record.frame(), person, scene.joints.limbs, seen.0);
+        }
         self.people.add(frame);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
             *count = it.frame.as_ref().map_or(*count, |frame| frame.n_dropped);

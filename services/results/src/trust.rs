@@ -21,7 +21,7 @@ const SD_PER_MAD: f64 = 1.4826;
 /// Steps in which deviations of bodies are counted, standard deviations.
 const STEP: f64 = 0.05;
 
-/// Counts what speaks for and against the results; warns once of each reason not to trust them.
+/// Counts what speaks for and against the results.
 #[derive(Debug, Default)]
 pub(crate) struct Trusted {
     frames: u64,
@@ -45,25 +45,44 @@ pub(crate) struct Trusted {
 }
 
 impl Trusted {
-    /// Adds the person who is followed in a result.
+    /// Adds the person who is followed in a result; warns once of each reason not to trust the results.
     ///
-    /// * `limbs`: pairs of joints that a bone connects.
-    /// * `time_s`: of the frame, if it is known.
-    /// * `distances_m`: of what the views show from the joints, metres.
+    /// * `person`, `limbs`, the rest: as for [`Trusted::count`].
     pub(crate) fn add(
         &mut self,
         person: Option<&SkeletonMessage>,
         limbs: &[(usize, usize)],
-        (time_s, distances_m): (Option<f64>, &[f64]),
+        seen: (Option<f64>, &[f64]),
     ) {
         let Some(pose) = person else {
             return;
         };
+        if !self.count(pose, limbs, seen) {
+            return;
+        }
+        for doubt in self.trust().doubts() {
+            if !self.warned.iter().any(|it| it.is_like(&doubt)) {
+                tracing::warn!("the results may be wrong: {doubt}");
+                self.warned.push(doubt);
+            }
+        }
+    }
+
+    /// Adds a person of a result; returns false for what is not judged, skeletons of something else than people.
+    ///
+    /// * `limbs`: pairs of joints that a bone connects.
+    /// * `time_s`: of the frame, if it is known.
+    /// * `distances_m`: of what the views show from the joints, metres.
+    pub(crate) fn count(
+        &mut self,
+        pose: &SkeletonMessage,
+        limbs: &[(usize, usize)],
+        (time_s, distances_m): (Option<f64>, &[f64]),
+    ) -> bool {
         let is_nobody = pose.status == Status::IMPLAUSIBLE;
         let is_body = pose.status == Status::OK && pose.stature_m > 0.0;
-        // Skeletons of something else than people are not judged.
         if !is_body && !is_nobody {
-            return;
+            return false;
         }
         self.frames += 1;
         self.n_implausible += u64::from(is_nobody);
@@ -74,12 +93,7 @@ impl Trusted {
             self.distances.0 += distances_m.iter().sum::<f64>();
             self.distances.1 += distances_m.len() as u64;
         }
-        for doubt in self.trust().doubts() {
-            if !self.warned.iter().any(|it| it.is_like(&doubt)) {
-                tracing::warn!("the results may be wrong: {doubt}");
-                self.warned.push(doubt);
-            }
-        }
+        true
     }
 
     fn skeleton(&mut self, pose: &SkeletonMessage) {

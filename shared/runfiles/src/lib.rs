@@ -37,7 +37,9 @@ pub use missing::Missing;
 pub use read::{Line, ReadError, lines, to_line};
 pub use running::{Running, RunningError, RunningView};
 pub use smooth::{SmoothReport, SmoothedJoint, SmoothedPerson, Unsure};
-pub use summary::{CameraFit, Contradicted, Exchanged, People, RunSummary, Summary, ViewSummary};
+pub use summary::{
+    CameraFit, Contradicted, Exchanged, People, PersonSummary, RunSummary, Summary, ViewSummary,
+};
 pub use times::{CameraTimes, PoseTimes, TimesLine, ViewTimes};
 pub use trust::{Doubt, Trust};
 pub use view::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};

@@ -94,8 +94,10 @@ pub struct Summary {
 }
 
 /// The people in view.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct People {
+    /// Everybody who had a skeleton, by id.
+    pub each: Vec<PersonSummary>,
     /// Which of several is followed: `last`, `largest` or `clearest`.
     pub follow: String,
     /// How many people were followed, one after the other.
@@ -110,6 +112,7 @@ impl People {
     /// For people, in one line.
     pub fn text(&self) -> String {
         let Self {
+            each: _,
             follow,
             followed,
             frames_with_others,
@@ -127,6 +130,26 @@ impl People {
             "up to {most} in view, more than one in {frames_with_others} frames; person.follow = \"{follow}\" chooses{followed}"
         )
     }
+}
+
+/// One person over the whole run.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct PersonSummary {
+    /// The first frame with a skeleton.
+    pub first_frame: u64,
+    /// Frames with a skeleton.
+    pub frames: u64,
+    /// Identity within the run, from 1.
+    pub id: u64,
+    /// Share of the joints that have a place, 0 to 1, of the frames with a skeleton.
+    pub joints: f64,
+    /// The last frame with a skeleton.
+    pub last_frame: u64,
+    /// Root mean square reprojection error over all joints, pixels of the frame.
+    #[serde(deserialize_with = "nullable")]
+    pub reprojection_px: Option<f64>,
+    /// How far the results of this person can be trusted; since the process was started last.
+    pub trust: Trust,
 }
 
 /// How well a camera fits the others, over the last frames.
