@@ -83,9 +83,9 @@ fn vertical(all: &[Standing]) -> Option<Vertical> {
     if all.len() < LEAST_PEOPLE {
         return None;
     }
-    let normals: Vec<Vector3<f64>> = all.iter().map(|it| it.normal).collect();
-    let up = common_normal(&normals, all.iter().map(|it| it.upward).sum())?;
-    let n_agreeing = all.iter().filter(|it| it.upward.dot(&up) > 0.0).count();
+    let normals: Vec<Vector3<f64>> = all.iter().map(|person| person.normal).collect();
+    let up = common_normal(&normals, all.iter().map(|person| person.upward).sum())?;
+    let n_agreeing = all.iter().filter(|person| person.upward.dot(&up) > 0.0).count();
     let share = n_agreeing as f64 / all.len() as f64;
     let mut leans: Vec<f64> =
         normals.iter().map(|normal| normal.dot(&up).abs().min(1.0).asin()).collect();
@@ -112,7 +112,7 @@ fn vertical(all: &[Standing]) -> Option<Vertical> {
 fn weighted(row: &[(usize, f64)], found: impl Fn(usize) -> Option<Keypoint>) -> Option<[f64; 2]> {
     let mut sum = [0.0; 2];
     for &(nth, weight) in row {
-        let keypoint = found(nth).filter(|it| it.score >= LEAST_SCORE)?;
+        let keypoint = found(nth).filter(|keypoint| keypoint.score >= LEAST_SCORE)?;
         for (sum, at) in sum.iter_mut().zip(keypoint.at) {
             *sum += weight * at;
         }
