@@ -15,7 +15,7 @@ pub(crate) struct Counted {
     follow: Follow,
     n_with_others: u64,
     most: u32,
-    /// Of all who were followed.
+    /// Ids of all who were followed.
     ids: BTreeSet<u64>,
 }
 
@@ -44,7 +44,7 @@ impl Counted {
         }
     }
 
-    /// What was counted so far.
+    /// Returns the counts so far.
     pub(crate) fn people(&self) -> People {
         People {
             follow: self.follow.name().to_owned(),

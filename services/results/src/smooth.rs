@@ -15,7 +15,7 @@ use crate::lines::Lines;
 #[derive(Debug)]
 pub(crate) struct Smoothing {
     people: BTreeMap<u64, Person>,
-    /// Of every joint, then of every extra keypoint.
+    /// Names of the joints, then of the extra keypoints.
     names: Vec<String>,
     n_joints: usize,
     n_frames: u64,
@@ -108,7 +108,7 @@ impl Smoothing {
         lines::smoothed(id, measured.cloned(), joints)
     }
 
-    /// What became of it; since the process was started last.
+    /// Returns the report of the smoothing since the process was started last.
     pub(crate) fn report(&self) -> SmoothReport {
         let people = self.people.iter();
         let delays = self.people.values();
@@ -140,7 +140,7 @@ impl Smoothing {
 }
 
 fn add(count: &mut SmoothedJoint, it: &Smoothed) {
-    let count = match it.map(|it| it.state) {
+    let count = match it.map(|smoothed| smoothed.state) {
         Ok(State::Measured) => &mut count.measured,
         Ok(State::Exchanged) => &mut count.exchanged,
         Ok(State::Filled) => &mut count.filled,

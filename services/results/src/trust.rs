@@ -75,7 +75,7 @@ impl Trusted {
             self.distances.1 += distances_m.len() as u64;
         }
         for doubt in self.trust().doubts() {
-            if !self.warned.iter().any(|it| it.is_like(&doubt)) {
+            if !self.warned.iter().any(|known| known.is_like(&doubt)) {
                 tracing::warn!("the results may be wrong: {doubt}");
                 self.warned.push(doubt);
             }
@@ -116,7 +116,7 @@ impl Trusted {
 
     fn moved(&mut self, pose: &SkeletonMessage, time_s: Option<f64>) {
         let places = (0..pose.n_joints as usize).filter_map(|joint| place(pose, joint));
-        let (sum, n) = places.fold((Vector3::zeros(), 0), |(sum, n), it| (sum + it, n + 1));
+        let (sum, n) = places.fold((Vector3::zeros(), 0), |(sum, n), at| (sum + at, n + 1));
         let Some(now_s) = time_s.filter(|_| n > 0) else {
             return;
         };
@@ -135,7 +135,7 @@ impl Trusted {
         (!scatters.is_empty()).then(|| scatters.iter().sum::<f64>() / scatters.len() as f64)
     }
 
-    /// What is known so far.
+    /// Returns the trust so far.
     pub(crate) fn trust(&self) -> Trust {
         let share = |n: u64, of: u64| n as f64 / of.max(1) as f64;
         let (sum, n) = self.squared;
