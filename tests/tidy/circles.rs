@@ -60,7 +60,7 @@ fn sources(src: &Path, files: &[PathBuf]) -> BTreeMap<Module, String> {
         of_tests.extend(tests.into_iter().map(below));
         sources.insert(module, code);
     }
-    sources.retain(|module, _| !of_tests.iter().any(|it| module.starts_with(it)));
+    sources.retain(|module, _| !of_tests.iter().any(|prefix| module.starts_with(prefix)));
     sources
 }
 
@@ -178,11 +178,11 @@ fn branch(prefix: &[String], tree: &str, is_public: bool, found: &mut Vec<Import
 
 /// The names that a module re-exports, and where they come from.
 fn exports(module: &Module, text: &str) -> Exports {
-    let public = imports(text).0.into_iter().filter(|it| it.is_public);
+    let public = imports(text).0.into_iter().filter(|import| import.is_public);
     public
-        .filter_map(|it| {
-            let (name, from) = it.path.split_last()?;
-            Some((it.name, (absolute(from, module), name.clone())))
+        .filter_map(|import| {
+            let (name, from) = import.path.split_last()?;
+            Some((import.name, (absolute(from, module), name.clone())))
         })
         .collect()
 }

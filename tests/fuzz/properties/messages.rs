@@ -1,4 +1,4 @@
-//! What must hold of every decoder of messages: each begins with messages that are right, and the input
+//! Properties that hold for every decoder of messages: each begins with messages that are right, and the input
 //! says what in them is changed, ten bytes a change: field, entry, and the value.
 
 use std::sync::{Arc, OnceLock};
@@ -264,7 +264,7 @@ fn candidates(input: &[u8]) {
     let extras = wire::extras_from_message(&message, 2, message.n_candidates as usize);
     if let Ok(extras) = extras {
         let found = extras.iter().flatten();
-        assert!(found.flat_map(|it| [it.0[0], it.0[1], it.1]).all(f64::is_finite));
+        assert!(found.flat_map(|extra| [extra.0[0], extra.0[1], extra.1]).all(f64::is_finite));
     }
     if let Ok(scores) = wire::local_from_message(&message, model.n_parts()) {
         assert!(scores.iter().all(|score| score.margin.is_finite()));
@@ -305,7 +305,7 @@ fn pair_pose(input: &[u8]) -> PairPose {
     (message.stamp, message.timing) = stamp();
     (message.status, message.n_hypotheses) = (Status::OK, 2);
     for it in &mut message.hypotheses {
-        it.poses = [pose(), pose()].map(|it| wire::pose_to_message(&it).expect("it fits"));
+        it.poses = [pose(), pose()].map(|pose| wire::pose_to_message(&pose).expect("it fits"));
     }
     for it in Change::all(input) {
         let place = it.value.to_le_bytes()[7];
