@@ -246,7 +246,7 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
     let first = deployment
         .cameras
         .par_iter()
-        .map(|camera| FirstImages::of(camera, &deployment.capture));
+        .map(|camera| FirstImages::read(camera, &deployment.capture));
     let first: Vec<Option<FirstImages>> = first.collect();
     let cameras = deployment.cameras.iter().zip(&first);
     let mut warnings: Vec<String> = cameras
@@ -302,7 +302,7 @@ struct FirstImages {
 
 impl FirstImages {
     /// None for a live or a synthetic camera, for one without pictures, and for unreadable footage.
-    fn of(
+    fn read(
         camera: &deployment::capture::Camera,
         capture: &deployment::capture::Config,
     ) -> Option<Self> {

@@ -86,7 +86,7 @@ impl Table {
             };
             let name = name_of(&first);
             if name == camera[..camera.floor_char_boundary(MAX_NAME)] {
-                return Self::of(camera, &first, &heads, rate_hz);
+                return Self::from_heads(camera, &first, &heads, rate_hz);
             }
             known.push(name);
         }
@@ -96,7 +96,7 @@ impl Table {
         })
     }
 
-    fn of(
+    fn from_heads(
         camera: &str,
         first: &PictureHeader,
         heads: &[(Entry, PictureHeader)],

@@ -62,7 +62,7 @@ pub(super) fn find(
                 let ankles = [joint(0), joint(5)].into_iter().flatten();
                 let ankles: Vec<[f64; 2]> = ankles.collect();
                 let head = joint(13).or_else(|| joint(12))?;
-                Standing::of(at(head)?, at(middle(&ankles)?)?)
+                Standing::from_rays(at(head)?, at(middle(&ankles)?)?)
             });
             all.extend(standing);
         }
@@ -72,7 +72,7 @@ pub(super) fn find(
 
 impl Standing {
     /// * Directions of rays in the world.
-    fn of(head: UnitVector3<f64>, ankles: UnitVector3<f64>) -> Option<Self> {
+    fn from_rays(head: UnitVector3<f64>, ankles: UnitVector3<f64>) -> Option<Self> {
         let normal = head.cross(&ankles).try_normalize(1e-3)?;
         let upward = ankles.cross(&normal);
         Some(Self { normal, upward })
@@ -153,7 +153,7 @@ mod tests {
                     Some(camera.ray(&pixel)?.direction)
                 };
                 if let (Some(head), Some(ankles)) = (ray(place + 1.5 * body), ray(place)) {
-                    all.extend(Standing::of(head, ankles));
+                    all.extend(Standing::from_rays(head, ankles));
                 }
             }
         }
