@@ -261,7 +261,7 @@ fn files_of_users_are_written_through_one_room() {
     for (_, dir) in crates() {
         for file in rust_files(&dir.join("src")) {
             let name = file.strip_prefix(root()).unwrap().display().to_string();
-            if may.iter().any(|it| name.starts_with(it)) || name.contains("/test") {
+            if may.iter().any(|prefix| name.starts_with(prefix)) || name.contains("/test") {
                 continue;
             }
             let text = fs::read_to_string(&file).unwrap();

@@ -41,9 +41,12 @@ pub fn write(trial: &Trial, processor: Processor, integer_scale: Option<f32>) ->
     let parameters = parameters(&out, trial, integer_scale.unwrap_or(-1.0));
     let n_blocks = parameters.len().div_ceil(512);
     let first_data = 2 + n_blocks;
-    let n = |it: usize| {
-        assert!(u16::try_from(it).is_ok(), "{it} does not fit into 16 bits");
-        it as u16
+    let n = |value: usize| {
+        assert!(
+            u16::try_from(value).is_ok(),
+            "{value} does not fit into 16 bits"
+        );
+        value as u16
     };
     let mut file = vec![2, 0x50];
     let words = [

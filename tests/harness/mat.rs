@@ -72,7 +72,7 @@ fn matrix(name: &str, value: &Mat) -> Vec<u8> {
         Mat::Cell(values) => body.extend(values.iter().flat_map(|value| matrix("", value))),
         Mat::Structs(fields, values) => {
             body.extend(element(5, &32_i32.to_le_bytes()));
-            let padded = |it: &&str| format!("{it:\0<32}").into_bytes();
+            let padded = |name: &&str| format!("{name:\0<32}").into_bytes();
             body.extend(element(
                 1,
                 &fields.iter().flat_map(padded).collect::<Vec<_>>(),

@@ -27,7 +27,7 @@ pub enum NpyError {
     Format {
         /// The file.
         path: String,
-        /// What is wrong.
+        /// The mistake.
         what: String,
     },
 }
@@ -75,15 +75,15 @@ fn parse(bytes: &[u8]) -> Result<Array, String> {
     let shape: Vec<usize> = shape
         .split(',')
         .map(str::trim)
-        .filter(|it| !it.is_empty())
-        .map(|it| it.parse().map_err(|_it| format!("shape ({shape})")))
+        .filter(|length| !length.is_empty())
+        .map(|length| length.parse().map_err(|_error| format!("shape ({shape})")))
         .collect::<Result<_, _>>()?;
     let data = &bytes[start + length..];
     let values: Vec<f64> = match field(&header, "'descr': '", "'")? {
         "<f8" => numbers(data, f64::from_le_bytes),
-        "<f4" => numbers(data, |it| f64::from(f32::from_le_bytes(it))),
-        "<i4" => numbers(data, |it| f64::from(i32::from_le_bytes(it))),
-        "|u1" => numbers(data, |[it]| f64::from(it)),
+        "<f4" => numbers(data, |bytes| f64::from(f32::from_le_bytes(bytes))),
+        "<i4" => numbers(data, |bytes| f64::from(i32::from_le_bytes(bytes))),
+        "|u1" => numbers(data, |[byte]| f64::from(byte)),
         other => return Err(format!("numbers of type {other}")),
     };
     if values.len() != shape.iter().product::<usize>() {
@@ -104,8 +104,8 @@ fn fixed<const N: usize>(bytes: &[u8], at: usize) -> Result<[u8; N], String> {
 }
 
 fn field<'a>(header: &'a str, before: &str, after: &str) -> Result<&'a str, String> {
-    let rest = header.split_once(before).map(|it| it.1);
-    let found = rest.and_then(|it| it.split_once(after)).map(|it| it.0);
+    let rest = header.split_once(before).map(|parts| parts.1);
+    let found = rest.and_then(|rest| rest.split_once(after)).map(|parts| parts.0);
     found.ok_or_else(|| format!("no {before} in the header"))
 }
 

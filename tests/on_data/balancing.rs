@@ -140,7 +140,7 @@ pub(crate) fn rig() -> Rig {
     geometry::files::read(&file, &geometry::files::ReadOptions::default()).unwrap()
 }
 
-/// What tells front from back, as it ships.
+/// Returns the detector that tells front from back, as it ships.
 fn orientation() -> Arc<Detector> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let bytes = std::fs::read(root.join("configs/models/person.orientation")).unwrap();
@@ -177,7 +177,7 @@ fn errors(
         let images: Vec<_> = clip
             .frames
             .iter()
-            .map(|it| Rgb8View::new(SIZE[0] as usize, SIZE[1] as usize, &it[frame]).ok())
+            .map(|frames| Rgb8View::new(SIZE[0] as usize, SIZE[1] as usize, &frames[frame]).ok())
             .collect();
         let got = rayon::ThreadPoolBuilder::new()
             .build()
@@ -220,7 +220,7 @@ pub(crate) fn compare(
     for (view, camera) in cameras.iter().enumerate() {
         let seen: Vec<[f64; 2]> = truth
             .iter()
-            .map(|truth| camera.project(truth).map_or([f64::NAN; 2], |it| [it.x, it.y]))
+            .map(|truth| camera.project(truth).map_or([f64::NAN; 2], |pixel| [pixel.x, pixel.y]))
             .collect();
         let target = torso(&seen);
         let off = |centres: &[[f64; 2]]| {

@@ -248,7 +248,7 @@ fn the_cameras_of_panoptic_are_on_a_dome_above_its_floor() {
     }
     let warnings: Vec<String> = files::check(&rig)
         .iter()
-        .filter(|it| it.severity() > Severity::Warning)
+        .filter(|finding| finding.severity() > Severity::Warning)
         .map(ToString::to_string)
         .collect();
     assert_eq!(warnings, Vec::<String>::new());

@@ -44,7 +44,7 @@ pub(crate) fn recorded(shared: &std::path::Path) -> (Vec<Film>, usize) {
     (films, n_joints)
 }
 
-/// What a camera with another clock would have: it begins `first` frames later, and its frames are `pace` of a frame apart.
+/// Returns the film of a camera with another clock: it begins `first` frames later, and its frames are `pace` of a frame apart.
 fn resampled(film: &Film, first: f64, pace: f64) -> Film {
     let last = film.shots.len() - 1;
     let times = (0..).map(|nth| first + pace * f64::from(nth));
@@ -121,7 +121,7 @@ fn shifts_of_the_balancing_cameras_are_found_within_five_milliseconds() {
             .collect();
         let shifted = films.iter().zip(&clocks);
         let shifted: Vec<Film> =
-            shifted.map(|(it, [first, pace])| resampled(it, *first, *pace)).collect();
+            shifted.map(|(film, [first, pace])| resampled(film, *first, *pace)).collect();
         let settings = Settings {
             reference: 0,
             window_s: if seed < 15 { 2.0 } else { 10.0 },
@@ -133,7 +133,7 @@ fn shifts_of_the_balancing_cameras_are_found_within_five_milliseconds() {
             .cameras
             .iter()
             .zip(&clocks)
-            .map(|(it, [first, _])| 1e3 * (it.offset_s - (first - clocks[0][0]) / RATE_HZ))
+            .map(|(clock, [first, _])| 1e3 * (clock.offset_s - (first - clocks[0][0]) / RATE_HZ))
             .collect();
         println!("seed {seed}: off by {off_ms:.2?} ms; {:?}", outcome.doubts);
         if outcome.doubts.is_empty() {

@@ -69,8 +69,8 @@ fn files_of_other_laboratories_are_read_and_an_empty_one_is_refused() {
     assert_eq!(walk.n_frames(), 1854);
     let span = |axis: usize| {
         let seen = (0..walk.n_frames()).flat_map(|i| walk.frame(i)).flatten();
-        seen.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
-            [low.min(it[axis]), high.max(it[axis])]
+        seen.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], point| {
+            [low.min(point[axis]), high.max(point[axis])]
         })
     };
     let [low, high] = span(2);

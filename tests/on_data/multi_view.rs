@@ -95,7 +95,7 @@ fn lines_off(cameras: &[Camera; 2], run: &Value) -> f64 {
         |steps: u32, side: f64| (0..steps).map(move |i| side * f64::from(i) / f64::from(steps));
     let mut off = 0.0_f64;
     for in_a in across(16, width).flat_map(|x| across(12, height).map(move |y| Point2::new(x, y))) {
-        let lines = [ours, theirs].map(|it| epipolar_line(&it, &in_a).unwrap());
+        let lines = [ours, theirs].map(|matrix| epipolar_line(&matrix, &in_a).unwrap());
         for x in across(16, width) {
             let in_b = Point2::new(x, -(lines[0].x * x + lines[0].z) / lines[0].y);
             if (0.0..height).contains(&in_b.y) {

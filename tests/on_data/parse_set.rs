@@ -46,18 +46,21 @@ fn pcp_on_images_101_to_200_agrees_with_the_original_program() {
     let report = |found: fn(&Outcome) -> &Joints| {
         evaluate(outcomes.iter().map(|outcome| (Some(found(outcome)), &outcome.truth)))
     };
-    let (ours, theirs) = (report(|it| &it.ours), report(|it| &it.theirs));
-    let covering = report(|it| &it.theirs_covering);
+    let (ours, theirs) = (
+        report(|outcome| &outcome.ours),
+        report(|outcome| &outcome.theirs),
+    );
+    let covering = report(|outcome| &outcome.theirs_covering);
     println!("ours: {ours}\ntheirs: {theirs}\ntheirs on the person annotated: {covering}");
-    let describe = |(number, it): (usize, &Outcome)| {
-        let same = it.same_level && it.same_parts == 26;
-        let level = if it.same_level { "same" } else { "other" };
-        let (parts, off) = (it.same_parts, it.score_off);
+    let describe = |(number, outcome): (usize, &Outcome)| {
+        let same = outcome.same_level && outcome.same_parts == 26;
+        let level = if outcome.same_level { "same" } else { "other" };
+        let (parts, off) = (outcome.same_parts, outcome.score_off);
         (!same).then(|| format!("im{number:04}: {parts} parts, {level} level, score {off:+.1e}"))
     };
     let differing: Vec<_> = (101..).zip(&outcomes).filter_map(describe).collect();
     let pcp = |report: &Report| {
-        [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|it| report.pcp(it).percent())
+        [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|rule| report.pcp(rule).percent())
     };
     // As recorded in the reference; its PCK is recorded for all 205 images only: 73.1.
     assert_eq!(
@@ -68,7 +71,7 @@ fn pcp_on_images_101_to_200_agrees_with_the_original_program() {
     for (got, expected) in pcp(&ours).into_iter().zip(pcp(&theirs)) {
         assert!((got - expected).abs() <= 0.3, "PCP {got}");
     }
-    let pck = [&ours, &theirs].map(|it| it.pck(0).percent());
+    let pck = [&ours, &theirs].map(|report| report.pck(0).percent());
     assert!((pck[0] - pck[1]).abs() <= 0.3, "PCK {pck:?}");
     assert!(differing.len() <= 3, "{differing:#?}");
 }
@@ -102,6 +105,6 @@ fn outcome(model: &Model, solver: &Solver, evidence: &Evidence, theirs: &Value) 
         theirs_covering: joints_of(&parts_of(&theirs["best_overlapping_gt_box"])),
         score_off: f64::from(pose.score) - number(&best["score"]),
         same_level: best["level"].as_u64() == Some(u64::from(pose.level) + 1),
-        same_parts: our_parts.iter().zip(&their_parts).filter(|it| near(*it)).count(),
+        same_parts: our_parts.iter().zip(&their_parts).filter(|pair| near(*pair)).count(),
     }
 }

@@ -21,7 +21,7 @@ fn in_order(films: &[Film]) -> (Vec<Film>, Vec<usize>) {
     let set = NameSet::of_set("body-25b").unwrap();
     let names = set.names();
     let mut rows: Vec<Vec<(usize, f64)>> = joint_rows(names).into_iter().flatten().collect();
-    let extra = names.iter().enumerate().filter(|it| !is_joint(it.1));
+    let extra = names.iter().enumerate().filter(|entry| !is_joint(entry.1));
     let extra: Vec<(usize, &String)> = extra.collect();
     rows.extend(extra.iter().map(|extra| vec![(extra.0, 1.0)]));
     let n = PARSE14.joints.len();
@@ -30,7 +30,7 @@ fn in_order(films: &[Film]) -> (Vec<Film>, Vec<usize>) {
         (sides[right], sides[left]) = (left, right);
     }
     for (nth, (_, name)) in extra.iter().enumerate() {
-        let other = mirrored(name).and_then(|it| extra.iter().position(|of| *of.1 == it));
+        let other = mirrored(name).and_then(|other| extra.iter().position(|of| *of.1 == other));
         sides[n + nth] = n + other.unwrap_or(nth);
     }
     // Every joint is a keypoint of this set.
@@ -97,8 +97,8 @@ fn the_balancing_cameras_are_found_from_the_person_alone() {
         let mean = |of: &dyn Fn(&calibration::Difference) -> f64| {
             apart.iter().map(of).sum::<f64>() / apart.len() as f64
         };
-        ways_mm.push(mean(&|it| 1e3 * it.way));
-        turns.push(mean(&|it| it.turn.to_degrees()));
+        ways_mm.push(mean(&|difference| 1e3 * difference.way));
+        turns.push(mean(&|difference| difference.turn.to_degrees()));
     }
     let n = ways_mm.len();
     let way = Sorted::new(ways_mm).upper_median().unwrap();

@@ -43,7 +43,7 @@ fn the_shipped_model_has_the_accuracy_of_its_card() {
     let found: Vec<_> = people.people.par_iter().map(find).collect();
     let report = evaluate(found.iter().map(|(found, truth)| (Some(found), truth)));
     println!("{report}");
-    let pcp = [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|it| report.pcp(it).percent());
+    let pcp = [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|rule| report.pcp(rule).percent());
     // Other image decoders may change single limbs.
     for (got, card) in pcp.into_iter().zip(CARD) {
         assert!((got - card).abs() <= 0.5, "PCP {got}, the card says {card}");
@@ -86,7 +86,7 @@ fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_bett
             let first = looker.look((image, outline), &mut memory, &mut maps);
             let first = first.unwrap().unwrap();
             let last = looker.look_closer((image, first), &mut memory, &mut maps);
-            shares.push([outline, last.unwrap().outline].map(|it| overlap(it, truth)));
+            shares.push([outline, last.unwrap().outline].map(|outline| overlap(outline, truth)));
         }
     }
     for (what, shares) in ["too large", "beside the person"].into_iter().zip(&shares) {

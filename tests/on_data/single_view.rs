@@ -194,9 +194,11 @@ fn responses_messages_and_root_scores_equal_the_test_vectors() {
         let pointer = |at: &[usize]| f64::from(of(&messages[at[2]].child[cell(at)])) + 1.0;
         assert_eq!(difference(&stages.array(name), pointer), 0.0, "{name}");
     };
-    from_1("message_part26_Ix1based", |it| it.x);
-    from_1("message_part26_Iy1based", |it| it.y);
-    from_1("message_part26_Ik1based", |it| it.mixture.into());
+    from_1("message_part26_Ix1based", |placement| placement.x);
+    from_1("message_part26_Iy1based", |placement| placement.y);
+    from_1("message_part26_Ik1based", |placement| {
+        placement.mixture.into()
+    });
 
     let solved = reference::solve(&stages.model, &responses, size);
     let off = difference(&stages.array("root_scores_level2_by_type"), |at| {
@@ -314,7 +316,7 @@ fn compare_levels(
         let size = ["score_rows", "score_cols"].map(|name| row[name].as_u64().unwrap() as usize);
         assert_eq!([it.rows, it.cols], size, "{name}: size of level {level}");
         let roots = solver.root_scores(evidence, level as u16, None);
-        above += roots.iter().filter(|&&it| it >= -1.0).count() as u64;
+        above += roots.iter().filter(|&&score| score >= -1.0).count() as u64;
         let best = f64::from(roots.iter().copied().fold(f32::NEG_INFINITY, f32::max));
         worst = worst.max((best - row["max_root_score"].as_f64().unwrap()).abs());
     }

@@ -77,7 +77,7 @@ fn tracking_is_nearly_as_accurate_as_a_full_search() {
     assert!(share > 0.75, "the same pose in {share} of the frames");
     assert!(of_default[0] <= 1.1 * median, "{} {median}", of_default[0]);
     let [of_full, of_tracked] =
-        [None, Some(default)].map(|it| fused(&model, &rig, &clip, (&truth, it)));
+        [None, Some(default)].map(|tracking| fused(&model, &rig, &clip, (&truth, tracking)));
     println!("fused, cm median / p90: full {of_full:.1?}, tracked {of_tracked:.1?}");
     assert!(of_tracked[0] <= 1.1 * of_full[0], "{of_tracked:?}");
 }

@@ -60,7 +60,7 @@ fn sources(src: &Path, files: &[PathBuf]) -> BTreeMap<Module, String> {
         of_tests.extend(tests.into_iter().map(below));
         sources.insert(module, code);
     }
-    sources.retain(|module, _| !of_tests.iter().any(|it| module.starts_with(it)));
+    sources.retain(|module, _| !of_tests.iter().any(|prefix| module.starts_with(prefix)));
     sources
 }
 
@@ -178,11 +178,11 @@ fn branch(prefix: &[String], tree: &str, is_public: bool, found: &mut Vec<Import
 
 /// The names that a module re-exports, and where they come from.
 fn exports(module: &Module, text: &str) -> Exports {
-    let public = imports(text).0.into_iter().filter(|it| it.is_public);
+    let public = imports(text).0.into_iter().filter(|import| import.is_public);
     public
-        .filter_map(|it| {
-            let (name, from) = it.path.split_last()?;
-            Some((it.name, (absolute(from, module), name.clone())))
+        .filter_map(|import| {
+            let (name, from) = import.path.split_last()?;
+            Some((import.name, (absolute(from, module), name.clone())))
         })
         .collect()
 }
@@ -289,8 +289,8 @@ fn circles(needs: &BTreeMap<&Module, BTreeSet<&Module>>) -> Vec<Vec<String>> {
 mod tests {
     use super::*;
 
-    /// The circles of a crate of these files.
-    fn of(files: &[(&str, &str)]) -> Vec<Vec<String>> {
+    /// Returns the circles of a crate of these files.
+    fn circles_in(files: &[(&str, &str)]) -> Vec<Vec<String>> {
         let folder = tempfile::tempdir().unwrap();
         let write = |(name, text): &(&str, &str)| {
             let file = folder.path().join(name);
@@ -314,8 +314,8 @@ mod tests {
             ("c.rs", "fn f() -> u8 {\n    crate::a::g()\n}\n"),
             ("d.rs", "use crate::a::A;\n"),
         ];
-        assert_eq!(of(&files), [["a", "b", "c"]]);
-        assert!(of(&files[..3]).is_empty(), "no way back");
+        assert_eq!(circles_in(&files), [["a", "b", "c"]]);
+        assert!(circles_in(&files[..3]).is_empty(), "no way back");
     }
 
     #[test]
@@ -326,7 +326,7 @@ mod tests {
             ("b.rs", "mod inner;\npub use inner::{Bee, Other};\n"),
             ("b/inner.rs", "use crate::a::A;\n"),
         ];
-        assert_eq!(of(&files), [["a", "b/inner"]]);
+        assert_eq!(circles_in(&files), [["a", "b/inner"]]);
     }
 
     #[test]
@@ -338,7 +338,7 @@ mod tests {
                 (parent, "mod b;\nuse b::B;\n"),
                 ("a/b.rs", child),
             ];
-            assert!(of(&files).is_empty(), "{parent}");
+            assert!(circles_in(&files).is_empty(), "{parent}");
         }
     }
 
@@ -358,11 +358,11 @@ mod tests {
             ("c.rs", "use crate::a::A;\nuse crate::b::B;\n"),
             ("c/d.rs", "use crate::b::B;\n"),
         ];
-        assert!(of(&files).is_empty());
+        assert!(circles_in(&files).is_empty());
         let back = format!("{}use super::a::A;\n", files[2].1);
         let files = [files[0], files[1], ("b.rs", &back)];
         assert_eq!(
-            of(&files),
+            circles_in(&files),
             [["a", "b"]],
             "what comes after the tests counts"
         );

@@ -13,7 +13,7 @@ pub struct Address {
     pub hosts: Vec<String>,
     /// The address of the host that fuses: name or number, and port.
     pub address: String,
-    /// Whether this is that host.
+    /// True if this host is the one that fuses.
     pub listens: bool,
     /// The keys; none if the deployment is insecure.
     pub keys: Option<KeyFiles>,

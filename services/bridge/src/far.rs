@@ -87,7 +87,7 @@ impl Evidence {
 struct Lane {
     view: usize,
     port: Port,
-    /// What crosses with its messages.
+    /// Maps that are sent with its messages.
     evidence: Option<Evidence>,
     /// The end of its stream, once it came.
     end: Option<Item>,

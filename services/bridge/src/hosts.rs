@@ -1,4 +1,4 @@
-//! What crosses between the hosts of a deployment, and what it means there: framing, clocks, order, counts. Pure.
+//! Messages between the hosts of a deployment, and their meaning there: framing, clocks, order, counts. Pure.
 //!
 //! | what | where |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! What the process has to do.
+//! Task of the process.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -9,16 +9,16 @@ use deployment::hosts::Carry;
 use crate::address::Address;
 use crate::maps::ViewMaps;
 
-/// What the process has to do.
+/// Task of the process.
 #[derive(Debug)]
 pub struct Job {
     /// Where it connects to, or listens, and as whom.
     pub address: Address,
-    /// What must be the same on all hosts.
+    /// Fingerprint of the files and settings that must be the same on all hosts.
     pub fingerprint: Fingerprint,
-    /// What crosses.
+    /// Kind of messages sent between the hosts.
     pub carry: Carry,
-    /// Whether expected errors cross with poses.
+    /// True if expected errors are sent with poses.
     pub has_quality: bool,
     /// By view, where the maps of the views cross with their poses; else empty.
     pub maps: Vec<ViewMaps>,

@@ -32,9 +32,9 @@ pub enum JoinError {
 
 /// The differences, in the words of the host that reads them: the one that fuses wrote them.
 pub(crate) fn listed(all: &[Difference]) -> String {
-    let each = all.iter().map(|it| {
-        let (there, here) = (&it.here, &it.there);
-        format!("{} is {here} here, {there} there", it.what)
+    let each = all.iter().map(|difference| {
+        let (there, here) = (&difference.here, &difference.there);
+        format!("{} is {here} here, {there} there", difference.what)
     });
     each.collect::<Vec<_>>().join("; ")
 }
@@ -109,7 +109,7 @@ pub fn join(
 /// When a run began, by our clock.
 fn begin(clock: &Clock, welcome: Welcome) -> u64 {
     let now = now_nanos();
-    clock.estimate(now).map_or(now, |it| it.ours(welcome.session))
+    clock.estimate(now).map_or(now, |estimate| estimate.ours(welcome.session))
 }
 
 fn listen(

@@ -57,7 +57,7 @@ impl KeyFiles {
             key: folder.join(format!("{host}.key")),
         };
         let all = [&files.authority, &files.certificate, &files.key];
-        let missing = all.into_iter().find(|it| !it.is_file()).cloned();
+        let missing = all.into_iter().find(|file| !file.is_file()).cloned();
         match missing {
             Some(missing) => Err(KeyError::Missing(missing)),
             None => Ok(files),
@@ -80,7 +80,7 @@ pub fn make_keys(folder: &Path, hosts: &[(String, Vec<String>)]) -> Result<Vec<P
     let file = |name: &str, ending: &str| folder.join(format!("{name}.{ending}"));
     let names = || core::iter::once("ca").chain(hosts.iter().map(|host| host.0.as_str()));
     let mut all = names().flat_map(|name| [file(name, "pem"), file(name, "key")]);
-    if let Some(exists) = all.find(|it| it.exists()) {
+    if let Some(exists) = all.find(|file| file.exists()) {
         return Err(KeyError::Exists(exists));
     }
     let failed = |host: &str, error: &dyn core::fmt::Display| KeyError::Make {
@@ -146,7 +146,7 @@ fn write_private(file: &Path, text: &str) -> Result<(), KeyError> {
     }
     let mut options = std::fs::File::options();
     let open = options.write(true).create_new(true).mode(0o600).open(file);
-    open.and_then(|mut it| it.write_all(text.as_bytes())).map_err(failed)
+    open.and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed)
 }
 
 #[cfg(test)]

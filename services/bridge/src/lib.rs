@@ -38,7 +38,7 @@ pub use one_thread::{ONE_THREAD, has_one_thread};
 use failure::Failure;
 use runtime::Service;
 
-/// Whether this build has what carries messages between hosts.
+/// True if this build can carry messages between hosts.
 pub const HAS_LINK: bool = cfg!(feature = "zenoh");
 
 /// Carries messages until the run ends or a stop is requested.

@@ -152,8 +152,8 @@ fn config(address: &Address) -> Value {
     config
 }
 
-/// What every host may say to the one that fuses: what is its own, by the common name of its certificate. Whoever has the keys of one host
-/// cannot speak for another.
+/// Returns the access rules of the host that fuses: every host may send only its own messages, by the common name of its
+/// certificate. The keys of one host do not let anybody speak for another.
 fn access(address: &Address) -> Value {
     let topics = Topics::of(&address.deployment);
     let everything = [
@@ -303,10 +303,13 @@ mod tests {
         rack.close();
         desk.close();
         let said: Vec<String> = arrived.try_iter().collect();
-        assert!(said.iter().all(|it| *it == topics.data("rack")), "{said:?}");
+        assert!(
+            said.iter().all(|topic| *topic == topics.data("rack")),
+            "{said:?}"
+        );
         let heard: Vec<String> = orders.try_iter().collect();
         assert!(
-            heard.iter().all(|it| *it == topics.down("rack")),
+            heard.iter().all(|topic| *topic == topics.down("rack")),
             "{heard:?}"
         );
     }

@@ -220,16 +220,18 @@ mod tests {
             error.to_string()
         };
         let room = 1 << 20;
-        assert!(refused(|it| it.people[1].size = [0, 64], room).contains("grid.size"));
-        assert!(refused(|it| it.people[0].cell_px[0] = f64::NAN, room).contains("NaN"));
-        assert!(refused(|it| it.people = vec![it.people[0].clone(); 9], room).contains('9'));
+        assert!(refused(|maps| maps.people[1].size = [0, 64], room).contains("grid.size"));
+        assert!(refused(|maps| maps.people[0].cell_px[0] = f64::NAN, room).contains("NaN"));
+        assert!(refused(|maps| maps.people = vec![maps.people[0].clone(); 9], room).contains('9'));
         assert!(refused(|_| {}, 100).contains("at most 100"));
-        let heat = refused(|it| it.people[1].gaussians[3].heat = f32::NAN, room);
+        let heat = refused(|maps| maps.people[1].gaussians[3].heat = f32::NAN, room);
         assert!(
             heat.contains("Gaussian 3 of the maps of person 1"),
             "{heat}"
         );
-        assert!(refused(|it| it.people[0].gaussians[2].joint = 14, room).contains("Gaussian 2"));
+        assert!(
+            refused(|maps| maps.people[0].gaussians[2].joint = 14, room).contains("Gaussian 2")
+        );
         let cut = maps().to_bytes();
         let cut = view(room).unpack(&cut[..30]).unwrap_err().to_string();
         assert!(cut.contains("30 bytes"), "{cut}");

@@ -178,9 +178,9 @@ impl Receiving<'_> {
     fn until_due(&self) -> Duration {
         let now = now_nanos();
         let open = self.views.iter().filter(|view| !view.has_ended);
-        let due = open.map(|it| {
-            let is_there = self.remotes[it.remote].is_there(now);
-            it.arrivals.due_nanos(is_there).saturating_sub(now)
+        let due = open.map(|view| {
+            let is_there = self.remotes[view.remote].is_there(now);
+            view.arrivals.due_nanos(is_there).saturating_sub(now)
         });
         let due = Duration::from_nanos(due.min().unwrap_or(0));
         due.clamp(Duration::from_millis(1), LONGEST)

@@ -1,4 +1,4 @@
-//! What stands in the place of the link in a build without it: everything says so.
+//! Stand-in for the link in a build without it: everything says so.
 
 use core::convert::Infallible;
 use core::time::Duration;

@@ -11,8 +11,8 @@ pub const ONE_THREAD: (&str, &str) = (
     "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), net: (handover: rx))",
 );
 
-/// Whether this process was started with it.
+/// Returns true if this process was started with that variable.
 pub fn has_one_thread() -> bool {
     let (name, value) = ONE_THREAD;
-    std::env::var_os(name).is_some_and(|it| it == value)
+    std::env::var_os(name).is_some_and(|set| set == value)
 }

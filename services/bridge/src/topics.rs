@@ -9,7 +9,7 @@ impl Topics {
         Self(format!("parallax/{deployment}"))
     }
 
-    /// What a host with cameras sends of its views.
+    /// Frames and results of the views of a host with cameras.
     pub(crate) fn data(&self, host: &str) -> String {
         format!("{}/data/{host}", self.0)
     }

@@ -6,7 +6,7 @@ use footage::{FootageError, FrameView, Size, SourceSpec};
 
 use crate::info::FeedInfo;
 
-/// What an address begins with.
+/// Scheme of an address.
 const SCHEME: &str = "blank://";
 /// Brightness of all pixels.
 const GREY: u8 = 128;
@@ -32,7 +32,7 @@ pub enum BlankError {
     /// Something is missing, or strange.
     #[error("expected an address such as `blank://1920x1080?frames=70&rate=60`: {what}")]
     Layout {
-        /// What is wrong.
+        /// The mistake.
         what: String,
     },
     /// A number is out of range.
@@ -40,15 +40,15 @@ pub enum BlankError {
     Value {
         /// Which number.
         key: &'static str,
-        /// What it is.
+        /// Its value.
         got: String,
-        /// What is accepted.
+        /// Accepted values.
         expected: String,
     },
 }
 
 impl Blank {
-    /// Whether a source is meant to be grey footage.
+    /// Returns true if a source is the address of grey footage.
     pub fn is_blank(source: &str) -> bool {
         source.starts_with(SCHEME)
     }

@@ -127,7 +127,7 @@ impl<'a> Camera<'a> {
         Some(sent)
     }
 
-    /// Whether the run is to end; a turn of the main loop.
+    /// Returns true if the run is to end; a turn of the main loop.
     pub(crate) fn is_stopped(&self) -> Result<bool, Failure> {
         Ok(self.stage.wait(Duration::ZERO)? == Woken::Stop)
     }

@@ -20,7 +20,7 @@ pub enum FeedError {
     Address {
         /// As the user wrote it.
         address: String,
-        /// What is wrong with it.
+        /// The mistake in it.
         source: AddressError,
     },
     /// The address of grey footage is invalid.
@@ -28,7 +28,7 @@ pub enum FeedError {
     Blank {
         /// As the user wrote it.
         address: String,
-        /// What is wrong with it.
+        /// The mistake in it.
         source: BlankError,
     },
     /// The pictures of a recording cannot be used.
@@ -36,7 +36,7 @@ pub enum FeedError {
     Recorded {
         /// As the user wrote it.
         address: String,
-        /// What is wrong.
+        /// The cause.
         source: RecordedError,
     },
     /// The scene of an address cannot be made.
@@ -44,7 +44,7 @@ pub enum FeedError {
     Scene {
         /// As the user wrote it.
         address: String,
-        /// What is wrong with it.
+        /// The cause.
         source: SceneError,
     },
 }
@@ -179,7 +179,7 @@ impl Feed {
         }
     }
 
-    /// Whether the pictures are all the same by nature, a single image or grey, which does not count as frozen.
+    /// Returns true if the pictures are all the same by nature (a single image, or grey), which does not count as frozen.
     pub fn is_still(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Still,
@@ -188,7 +188,7 @@ impl Feed {
         }
     }
 
-    /// Whether the source is a video: a decoder leaves out frames that it cannot decode.
+    /// Returns true if the source is a video: a decoder leaves out frames that it cannot decode.
     pub fn is_video(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Video,
@@ -196,7 +196,7 @@ impl Feed {
         }
     }
 
-    /// What the decoder of a video has complained about so far.
+    /// Returns the complaints of the decoder of a video so far.
     pub fn complaints(&self) -> Complaints {
         match self {
             Self::Footage(source) => source.complaints(),
@@ -336,7 +336,7 @@ mod tests {
         const GREY: &str = "blank://32x16?rate=20&frames=10";
         let whole = frames(&SourceSpec::new(GREY), 0);
         assert_eq!(whole.len(), 10);
-        assert!(whole.iter().all(|it| it.1 == [128; 32 * 16 * 3]));
+        assert!(whole.iter().all(|frame| frame.1 == [128; 32 * 16 * 3]));
         let part = SourceSpec {
             start: 1,
             step: 3,

@@ -32,7 +32,7 @@ impl Guard {
         }
     }
 
-    /// What is wrong with a frame, if anything is.
+    /// Returns the fault of a frame, if it has one.
     ///
     /// * `index`: in the footage.
     /// * `time_s`: timestamp of the camera, seconds.
@@ -83,7 +83,7 @@ impl Guard {
 /// A hash of all bytes, to tell pictures apart: four independent lanes, so that it costs less than a copy.
 fn fingerprint(bytes: &[u8]) -> u64 {
     const PRIME: u64 = 0x9e37_79b9_7f4a_7c15;
-    let mut lanes = [1, 2, 3, 4].map(|it: u64| it.wrapping_mul(PRIME));
+    let mut lanes = [1, 2, 3, 4].map(|i: u64| i.wrapping_mul(PRIME));
     let chunks = bytes.chunks_exact(32);
     let mut rest = [0; 32];
     rest[..chunks.remainder().len()].copy_from_slice(chunks.remainder());

@@ -1,4 +1,4 @@
-//! What is known of a camera's pictures before the first one.
+//! Properties of a camera's pictures that are known before the first one.
 
 use footage::{Depth, Size, Turn};
 
@@ -13,16 +13,16 @@ pub struct FeedInfo {
     pub n_frames: u64,
     /// Frames per second of the scene, where it is known.
     pub frame_rate_hz: Option<f64>,
-    /// What the tag of the first image or of the video asks, whether it is done or not.
+    /// Turn that the tag of the first image or of the video asks for, done or not.
     pub tag: Turn,
     /// How many bits images with 16 use, where these are fewer.
     pub depth: Option<Depth>,
-    /// Whether every picture is two, of different moments, line by line.
+    /// True if every picture is two, of different moments, line by line.
     pub is_interlaced: bool,
 }
 
 impl FeedInfo {
-    /// Of pictures that are made as they are to be.
+    /// Returns the properties of generated pictures.
     pub(crate) fn plain(size: Size, n_frames: u64, frame_rate_hz: f64) -> Self {
         Self {
             size,

@@ -1,4 +1,4 @@
-//! What the process has to do.
+//! Task of the process.
 
 use core::time::Duration;
 
@@ -9,7 +9,7 @@ use crate::live::LiveJob;
 use deployment::Timeline;
 use deployment::capture::{Faults, Mode, Pace};
 
-/// What one camera's process has to do.
+/// Task of the process of one camera.
 #[derive(Debug)]
 pub struct Job {
     /// The view.
@@ -31,7 +31,7 @@ pub struct Job {
     pub skew_nanos: i64,
     /// From the footage to the frames of the pipeline.
     pub framing: Framing,
-    /// Whether frames may be dropped.
+    /// Mode: decides whether frames may be dropped.
     pub mode: Mode,
     /// How fast frames are sent.
     pub pace: Pace,

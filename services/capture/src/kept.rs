@@ -16,7 +16,7 @@ const MOST_IN_TURN: usize = 16;
 pub(crate) struct Kept {
     publisher: SlicePublisher<u8, PictureHeader>,
     originals: Arc<Originals>,
-    /// What all headers have in common.
+    /// Fields that all headers have in common.
     common: PictureHeader,
     has_warned: bool,
 }

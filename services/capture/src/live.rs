@@ -30,7 +30,7 @@ pub struct LiveJob {
     pub size: footage::Size,
     /// Common instants per second, before `frame_step`.
     pub rate_hz: f64,
-    /// Whether its pictures are recorded as they come.
+    /// True if its pictures are recorded as they come.
     pub is_kept: bool,
     /// Its name.
     pub name: String,

@@ -46,7 +46,7 @@ struct Live<'a, 'b> {
 ///
 /// # Errors
 ///
-/// What the transport reports. A camera that cannot be opened is opened again and again.
+/// Errors of the transport. A camera that cannot be opened is opened again and again.
 pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Failure> {
     let mut camera = Camera::live(service, job, live.size)?;
     let step = job.source.step as f64;
@@ -166,7 +166,7 @@ impl Live<'_, '_> {
         if !is_new {
             return;
         }
-        let known = self.said.iter_mut().find(|it| it.0 == status);
+        let known = self.said.iter_mut().find(|known| known.0 == status);
         let n = if let Some((_, n)) = known {
             *n += 1;
             *n

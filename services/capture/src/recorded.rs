@@ -15,7 +15,7 @@ use recording::{Buffer, Kind, ReadError};
 use crate::info::FeedInfo;
 use table::{Picture, Table};
 
-/// What separates the file from the camera.
+/// Separator between the file and the camera.
 const MARK: &str = ".mcap#";
 
 /// A camera of a recording.
@@ -47,12 +47,12 @@ pub enum RecordedError {
         /// The cameras of which it has some.
         known: Vec<String>,
     },
-    /// What it says of the camera cannot be.
+    /// Its record of the camera's pictures contradicts itself.
     #[error("its pictures of {camera:?} cannot be used: {what}")]
     Malformed {
         /// Which.
         camera: String,
-        /// What is wrong.
+        /// The mistake.
         what: &'static str,
     },
     /// The choice of frames.
@@ -70,7 +70,7 @@ fn others(known: &[String]) -> String {
 }
 
 impl Recorded {
-    /// Whether a source is meant to be a recording.
+    /// Returns true if a source is the address of a recording.
     pub fn is_recorded(source: &str) -> bool {
         let is_file = Path::new(source).extension().is_some_and(|extension| extension == "mcap");
         source.contains(MARK) || is_file

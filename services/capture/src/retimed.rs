@@ -89,9 +89,9 @@ impl Retimed {
     /// The properties of the pictures.
     pub fn info(&self) -> FeedInfo {
         let info = self.feed.info();
-        self.times.as_ref().map_or(info, |it| FeedInfo {
-            n_frames: it.n_instants,
-            frame_rate_hz: Some(it.timeline.instants_hz() / it.step as f64),
+        self.times.as_ref().map_or(info, |times| FeedInfo {
+            n_frames: times.n_instants,
+            frame_rate_hz: Some(times.timeline.instants_hz() / times.step as f64),
             ..info
         })
     }

@@ -37,7 +37,7 @@ pub(crate) struct Supply {
     timeline: Option<Timeline>,
     faults: Faults,
     info: FeedInfo,
-    /// Whether frames follow a clock, so that a camera may come back.
+    /// True if frames follow a clock, so that a camera may come back.
     is_live: bool,
     feed: Option<Retimed>,
     /// Position of the next frame among those that are used.
@@ -376,7 +376,7 @@ fn spin() -> ! {
     }
 }
 
-/// What was read from a camera.
+/// Result of a reading from a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Read {
     /// A picture, and its timestamp, seconds.

@@ -12,12 +12,12 @@ pub(crate) enum Input {
     Errors(Errors),
 }
 
-/// What was found in a picture.
+/// Poses found in a picture.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidates {
     /// Distinct poses, best first.
     pub(crate) poses: Vec<Pose>,
-    /// What the picture says of the front of each.
+    /// Evidence of the picture for the front of each.
     pub(crate) front: Vec<FrontEvidence>,
     /// How long after the instant of the frame it was taken, seconds.
     pub(crate) skew_s: f64,

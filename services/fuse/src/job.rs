@@ -1,4 +1,4 @@
-//! What the process has to do.
+//! Task of the process.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -6,12 +6,12 @@ use std::sync::Arc;
 use multiview::ViewPlan;
 use pipeline::{Follow, FuseStep, Views};
 
-/// What one worker's process has to do.
+/// Task of the process of one worker.
 #[derive(Debug)]
 pub struct Job {
     /// The worker.
     pub worker: usize,
-    /// Whether views are solved in pairs or all at once.
+    /// Grouping of the views: solved in pairs or all at once.
     pub views: Views,
     /// Which of several people is followed.
     pub follow: Follow,
@@ -21,7 +21,7 @@ pub struct Job {
     pub step: Arc<FuseStep>,
     /// The views of the rig.
     pub plans: Vec<Arc<ViewPlan>>,
-    /// Whether there are processes that send expected errors.
+    /// True if there are processes that send expected errors.
     pub has_quality: bool,
     /// How long a frame waits for expected errors where the latest frame wins.
     pub quality_deadline: Duration,

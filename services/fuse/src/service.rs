@@ -15,7 +15,7 @@ use stage::Stage;
 ///
 /// # Errors
 ///
-/// What the transport reports.
+/// Errors of the transport.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let n_views = job.plans.len();
     let mut stage = Stage::new(service, job.patience);

@@ -49,7 +49,7 @@ pub fn settings(config: &Config, frame_scale: f32, learned: Option<&Learned>) ->
     }
 }
 
-/// What the views of a frame are solved in.
+/// Returns the grouping in which the views of a frame are solved.
 pub fn views(from: Views) -> pipeline::Views {
     match from {
         Views::Pairs => pipeline::Views::Pairs,
@@ -92,7 +92,7 @@ pub fn tau_px(tau: &Tau) -> Vec<f32> {
 /// The median training errors, by which the released energy takes one of two switched-off views
 /// back; empty if they are not known.
 fn rescue_px(tau: &Tau) -> Vec<f32> {
-    training(tau).map_or_else(Vec::new, |it| it.median_px.to_vec())
+    training(tau).map_or_else(Vec::new, |errors| errors.median_px.to_vec())
 }
 
 /// Which of several people is followed.

@@ -30,7 +30,7 @@ pub struct WhoJob {
 ///
 /// # Errors
 ///
-/// What the transport reports.
+/// Errors of the transport.
 pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
     let n_views = job.cameras.len();
     let mut stage = Stage::new(service, job.patience);

@@ -34,12 +34,12 @@ impl Budget {
         }
     }
 
-    /// Whether frames were measured and the budget was met.
+    /// Returns true if frames were measured and the budget was met.
     pub fn is_held(&self) -> bool {
         self.p99_ms.is_some_and(|p99_ms| p99_ms <= self.limit_ms)
     }
 
-    /// Whether frames were measured and the budget was exceeded.
+    /// Returns true if frames were measured and the budget was exceeded.
     pub fn is_exceeded(&self) -> bool {
         self.p99_ms.is_some() && !self.is_held()
     }
@@ -84,7 +84,7 @@ impl Budget {
 /// The latency table, milliseconds: a header, a row per stage and one end to end; empty if nothing was measured.
 pub fn table(latency: &LatencyReport) -> String {
     let mut text = String::new();
-    for (name, percentiles) in rows(latency).filter(|(_, it)| it.count > 0) {
+    for (name, percentiles) in rows(latency).filter(|(_, percentiles)| percentiles.count > 0) {
         if text.is_empty() {
             let titles = ["p50", "p99", "p99.9", "max"];
             row(&mut text, "  latency, ms", titles.map(str::to_owned));

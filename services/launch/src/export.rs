@@ -1,6 +1,6 @@
 //! A finished run in the files of other tools: what is read, what is written where, and what is said about it.
 //!
-//! What each format holds is the business of the crate `exports`; here are the files, the cameras and their pictures.
+//! The crate `exports` defines the content of each format; here are the files, the cameras and their pictures.
 
 mod origin;
 mod per_view;
@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 pub use origin::{Given, Lines, Origin};
 use pictures::Pictures;
 
-/// What can be asked for.
+/// A format that the user can ask for.
 #[derive(Debug, Clone, Copy)]
 pub enum Format {
     /// A format of one file.
@@ -61,16 +61,16 @@ impl Format {
     }
 }
 
-/// What is written, and where.
+/// Task of an export: formats, folder and name.
 #[derive(Debug, Clone)]
 pub struct Job {
     /// Which formats.
     pub formats: Vec<Format>,
     /// The folder, made if it is not there.
     pub out: PathBuf,
-    /// What the files are called, without what tells formats apart.
+    /// Name of the files, without the part that tells formats apart.
     pub name: String,
-    /// Whether existing files are replaced.
+    /// True if existing files are replaced.
     pub force: bool,
 }
 
@@ -83,7 +83,7 @@ pub struct Written {
     pub path: PathBuf,
     /// Its unit, its axes, what a gap is, and how uncertainty is held.
     pub about: [&'static str; 4],
-    /// What the format cannot say in itself.
+    /// Facts that the format cannot say in itself.
     pub notes: Notes,
 }
 
@@ -170,7 +170,7 @@ pub fn export(
     Ok(written)
 }
 
-/// What was exported, for programs.
+/// Returns the list of the exported files as JSON, for programs.
 pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
     let (trials, trial) = (&origin.trials, &origin.trials[0]);
     let labels = trial.labels();

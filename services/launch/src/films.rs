@@ -1,5 +1,5 @@
-//! What the cameras of a deployment see, as films whose clocks can be compared: keypoints of files, or what a network
-//! finds in the footage.
+//! Joints of people in every camera of a deployment, as films whose clocks can be compared: from files of keypoints, or found by
+//! a network in the footage.
 
 mod eyes;
 mod upright;
@@ -31,27 +31,27 @@ pub struct Part {
     pub seconds: Option<f64>,
 }
 
-/// What is known of where the cameras stand.
+/// Known poses of the cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Poses {
-    /// What the rig says: people are looked for in pictures that are turned upright, as in a run.
+    /// The poses of the rig: people are looked for in pictures that are turned upright, as in a run.
     OfRig,
     /// Nothing.
     Unknown,
 }
 
-/// What all cameras see.
+/// The films of all cameras.
 #[derive(Debug)]
 pub struct Films {
     /// The cameras, in the order of the deployment.
     pub cameras: Vec<Camera>,
-    /// What each saw, by its own clock.
+    /// Film of each camera, by its own clock.
     pub films: Vec<Film>,
     /// Number of joints of a person.
     pub n_joints: usize,
-    /// Of each joint the one on the other side, where sides follow the picture in some camera.
+    /// Joint on the other side of each joint, where sides follow the picture in some camera.
     pub mirror: Option<Vec<usize>>,
-    /// Of each joint the one on the other side.
+    /// Joint on the other side of each joint.
     pub sides: Vec<usize>,
     /// Who found the joints of each camera.
     pub finders: Vec<String>,
@@ -136,7 +136,7 @@ pub fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failur
     deployment.cameras.iter().map(of_entry).collect()
 }
 
-/// What turns the pictures of a camera upright, radians; 0 where that is not known, or not wanted.
+/// Returns the angle that turns the pictures of a camera upright, radians; 0 where it is not known, or not wanted.
 fn roll(deployment: &Deployment, rig: &Rig, (camera, poses): (&Camera, Poses)) -> f64 {
     if poses == Poses::Unknown || !deployment.capture.upright {
         return 0.0;
@@ -175,7 +175,7 @@ impl Finder {
 fn extra(names: &[Vec<String>]) -> Vec<String> {
     let mut extra: Vec<String> = Vec::new();
     for name in names.iter().flatten() {
-        let n = names.iter().filter(|it| it.contains(name)).count();
+        let n = names.iter().filter(|other| other.contains(name)).count();
         if n > 1 && !keypoints::is_joint(name) && !extra.contains(name) {
             extra.push(name.clone());
         }
@@ -196,7 +196,7 @@ fn rows(names: &[String], extra: &[String]) -> Rows {
     rows
 }
 
-/// Of each joint the one on the other side.
+/// Returns the joint on the other side of each joint.
 fn mirror(extra: &[String]) -> Vec<usize> {
     let n = PARSE14.joints.len();
     let mut mirror: Vec<usize> = (0..n + extra.len()).collect();
@@ -204,7 +204,8 @@ fn mirror(extra: &[String]) -> Vec<usize> {
         (mirror[right], mirror[left]) = (left, right);
     }
     for (nth, name) in extra.iter().enumerate() {
-        let other = mirrored(name).and_then(|other| extra.iter().position(|it| *it == other));
+        let other =
+            mirrored(name).and_then(|other| extra.iter().position(|candidate| *candidate == other));
         mirror[n + nth] = n + other.unwrap_or(nth);
     }
     mirror
@@ -266,7 +267,7 @@ impl Reader<'_> {
             if known.is_some() {
                 shots.push(Shot {
                     time_s: frame as f64 / rate_hz,
-                    people: found.iter().map(|it| self.person(&it.keypoints)).collect(),
+                    people: found.iter().map(|person| self.person(&person.keypoints)).collect(),
                 });
             }
         }
@@ -382,7 +383,8 @@ mod tests {
 
     #[test]
     fn what_one_camera_alone_has_is_not_compared() {
-        let names = |all: &[&str]| -> Vec<String> { all.iter().map(|&it| it.to_owned()).collect() };
+        let names =
+            |all: &[&str]| -> Vec<String> { all.iter().map(|&name| name.to_owned()).collect() };
         let each = [
             names(&["left hip", "right hip", "left heel", "nose", "right heel"]),
             names(&["left hip", "left heel", "right heel", "chin"]),

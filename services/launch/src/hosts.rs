@@ -90,7 +90,7 @@ pub fn address(deployment: &Deployment, host: &Host) -> Result<Address, Failure>
     })
 }
 
-/// What must be the same on all hosts: the files that results depend on, and the settings.
+/// Returns the fingerprint that must be the same on all hosts: the files that results depend on, and the settings.
 ///
 /// # Errors
 ///

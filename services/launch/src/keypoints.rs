@@ -34,16 +34,16 @@ pub fn of_camera(camera: &Camera) -> Result<Option<KeypointSource>, Failure> {
     Ok(Some(source))
 }
 
-/// What is known of the keypoints that the networks and keypoint files of the cameras find.
+/// Properties of the keypoints that the networks and keypoint files of the cameras find.
 #[derive(Debug, Default)]
 pub(crate) struct Found {
     /// Names of those beside the joints, each once, in the order of the cameras.
     pub(crate) extra: Vec<String>,
-    /// Whether left and right of a network follow the picture.
+    /// True if left and right of a network follow the picture.
     pub(crate) as_seen: bool,
 }
 
-/// What the cards and the names of the keypoints of a deployment say.
+/// Reads the cards and the names of the keypoints of a deployment.
 ///
 /// # Errors
 ///
@@ -89,7 +89,9 @@ pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
 /// Number of frames of the keypoints of every camera, from the first frame of the footage on; none for a camera without them.
 pub(crate) fn lengths(deployment: &Deployment) -> Result<Vec<Option<u64>>, Failure> {
     let cameras = deployment.cameras.iter();
-    cameras.map(|camera| Ok(of_camera(camera)?.map(|it| it.n_frames()))).collect()
+    cameras
+        .map(|camera| Ok(of_camera(camera)?.map(|keypoints| keypoints.n_frames())))
+        .collect()
 }
 
 /// The deployment with grey footage for every camera without a source: of the size that the rig says, as long as its keypoints.

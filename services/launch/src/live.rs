@@ -81,7 +81,7 @@ impl Live {
         }
     }
 
-    /// Whether the deployment is ending; the observer must then be dropped.
+    /// Returns true if the deployment is ending; the observer must then be dropped.
     pub fn is_over(&self) -> bool {
         self.observer.is_over()
     }
@@ -105,7 +105,7 @@ pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
         return Namespace::new(&name).or_fail(ExitKind::Usage);
     }
     let mut running = deployments(&Namespace::usual_base())?;
-    running.retain(|it| it.supervisor.is_some());
+    running.retain(|deployment| deployment.supervisor.is_some());
     if running.len() > 1 {
         let names: Vec<&str> = running.iter().map(|running| running.namespace.name()).collect();
         let message = format!("{} deployments run: {}", names.len(), names.join(", "));
@@ -115,7 +115,7 @@ pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
     running.pop().map(|running| running.namespace).ok_or_else(none)
 }
 
-/// What a running deployment says about itself: its settings, without passwords of cameras.
+/// Returns the description that a running deployment gives of itself: its settings, without passwords of cameras.
 ///
 /// # Errors
 ///

@@ -16,7 +16,7 @@ pub enum LoadError {
     Read {
         /// The file.
         file: PathBuf,
-        /// What kind of file it is instead; empty if the error of the system suffices.
+        /// Kind of the file, where it is of another one; empty if the error of the system suffices.
         why: &'static str,
         /// The error of the system.
         source: std::io::Error,
@@ -113,7 +113,7 @@ impl Machine for ThisMachine {
     }
 }
 
-/// What kind of file it is instead; empty if the error of the system suffices.
+/// Returns the kind of the file, where it is of another one; empty if the error of the system suffices.
 fn why_not(file: &Path, error: &std::io::Error) -> &'static str {
     if error.kind() == ErrorKind::InvalidData {
         ": it is no text (not UTF-8)"

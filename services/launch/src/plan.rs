@@ -136,13 +136,19 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
 ///
 /// * `names`: the names of its processes.
 pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String]) -> Vec<TopicPlan> {
-    let sizes = prepared.views.iter().enumerate().map(|(view, it)| ViewSize {
+    let sizes = prepared.views.iter().enumerate().map(|(view, prepared)| ViewSize {
         picture_bytes: picture_bytes(resolved, view),
-        frame_bytes: it.framing.out_size().map(|side| side as usize).iter().product::<usize>() * 3,
+        frame_bytes: prepared
+            .framing
+            .out_size()
+            .map(|side| side as usize)
+            .iter()
+            .product::<usize>()
+            * 3,
         evidence_values: if resolved.deployment.has_maps() {
             pipeline::most_values(resolved.deployment.network.people)
         } else {
-            it.plan.layout().n_responses()
+            prepared.plan.layout().n_responses()
         },
     });
     let delivery = resolved.delivery();
@@ -157,8 +163,9 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
     let mut rooms = topology.rooms(mode, &sizes, held_frames);
     if resolved.is_far() {
         // The others' views, and what is fused, are elsewhere.
-        let uses =
-            |it: &Process, topic: &String| it.inputs.contains(topic) || it.outputs.contains(topic);
+        let uses = |process: &Process, topic: &String| {
+            process.inputs.contains(topic) || process.outputs.contains(topic)
+        };
         rooms.retain(|room| topology.processes().iter().any(|process| uses(process, &room.topic)));
     }
     let between = rooms.into_iter().map(|room| topic_of(room, delivery));
@@ -212,7 +219,7 @@ fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
 fn processes(resolved: &Resolved, file: &Path) -> Vec<ProcessSpec> {
     let topology = resolved.topology();
     let processes = topology.processes().iter();
-    processes.map(|it| process(it, &topology, resolved, file)).collect()
+    processes.map(|each| process(each, &topology, resolved, file)).collect()
 }
 
 fn process(
@@ -244,7 +251,7 @@ fn process(
             deployment::Role::Redundant => Role::Redundant,
             deployment::Role::Optional => Role::Optional,
         },
-        senders: topology.senders_to(process).map(|it| it.name.clone()).collect(),
+        senders: topology.senders_to(process).map(|sender| sender.name.clone()).collect(),
         scheduling: scheduling::requested(
             &resolved.deployment.runtime,
             process.service,

@@ -92,7 +92,7 @@ impl Planned {
 
     /// Makes a process enter an endless loop in epoch 0, once it has sent a message about a frame after `after_frame`.
     pub fn spin(&mut self, process: &str, after_frame: u64) {
-        let spec = self.plan.processes.iter_mut().find(|it| it.name == process);
+        let spec = self.plan.processes.iter_mut().find(|spec| spec.name == process);
         if let Some(spec) = spec {
             let args = ["--spin-after".to_owned(), after_frame.to_string()];
             spec.args.extend(args.map(Into::into));

@@ -70,7 +70,7 @@ impl Prepared {
             names.enumerate().map(|(index, name)| (name, framing(resolved, &rig, index)));
         let framings = inputs::advice::of_all(framings.collect())?;
         for (camera, framing) in deployment.cameras.iter().zip(framings) {
-            sizes.extend(rig.camera(&camera.name).map(|it| it.intrinsics.size));
+            sizes.extend(rig.camera(&camera.name).map(|camera| camera.intrinsics.size));
             let plan = pipeline::plan(&model, framing.camera()).or_fail(ExitKind::Input)?;
             views.push(View {
                 name: camera.name.clone(),
@@ -147,7 +147,7 @@ impl Prepared {
                 return Ok(());
             };
             let frame = |nth: u64| capture.start_frame + nth * capture.frame_step;
-            if !(0..footage.n_frames).any(|it| predictor.sigma_px(frame(it)).is_some()) {
+            if !(0..footage.n_frames).any(|nth| predictor.sigma_px(frame(nth)).is_some()) {
                 tracing::warn!(
                     view = self.views[view].name,
                     "the table of paper.errors has no row for any frame of this view: see its frame_offset \
@@ -180,7 +180,7 @@ pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Fr
         (None, Some(scale)) => OutSize::Scale(scale),
         (None, None) => {
             let chosen = resolved.search_size.as_ref();
-            OutSize::Scale(chosen.map_or(1.0, |it| it.scale(&entry.name)))
+            OutSize::Scale(chosen.map_or(1.0, |size| size.scale(&entry.name)))
         }
     };
     let roll = if deployment.capture.upright {

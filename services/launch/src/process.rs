@@ -78,7 +78,7 @@ impl Name {
 
     /// The process with the given name.
     pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|it| it.name() == name)
+        Self::ALL.into_iter().find(|process| process.name() == name)
     }
 
     /// Its description in the help of the command line.
@@ -442,7 +442,7 @@ mod tests {
         assert_eq!(all.pop(), Some(Name::Replay), "no process of its own");
         assert_eq!(all.pop(), Some(Name::Bridge), "with hosts alone");
         assert_eq!(found.len(), all.len());
-        assert!(all.iter().all(|it| found.contains(it)), "{found:?}");
+        assert!(all.iter().all(|name| found.contains(name)), "{found:?}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What a running deployment says about itself to other programs.
+//! Description of a running deployment for other programs.
 
 use failure::{ExitKind, Failure, OrFail as _};
 use runfiles::{Running, RunningView};

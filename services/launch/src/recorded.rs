@@ -131,12 +131,12 @@ pub fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure>
     })
 }
 
-/// Whether the file is undamaged and contains every message that was sent, as far as the file tells.
+/// Returns true if the file is undamaged and contains every message that was sent, as far as the file tells.
 pub fn is_whole(recording: &Recording) -> bool {
     is_undamaged(recording) && recording.n_lost() == 0
 }
 
-/// Whether the file is complete and undamaged, as far as a scan tells; the content of the messages is not checked.
+/// Returns true if the file is complete and undamaged, as far as a scan tells; the content of the messages is not checked.
 pub fn is_undamaged(recording: &Recording) -> bool {
     let extent = &recording.extent;
     extent.is_complete
@@ -268,9 +268,9 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
 /// Describes a recording as JSON.
 pub fn json(file: &Path, recording: &Recording) -> Value {
     let extent = &recording.extent;
-    let topics = recording.tracks.iter().map(|(topic, it)| {
+    let topics = recording.tracks.iter().map(|(topic, track)| {
         let lost = recording.counts.get(topic).map(|count| count.lost);
-        let entry = json!({ "messages": it.entries.len(), "lost": lost });
+        let entry = json!({ "messages": track.entries.len(), "lost": lost });
         (topic.clone(), entry)
     });
     json!({

@@ -25,7 +25,7 @@ pub struct Resolved {
     pub search_size: Option<SearchSize>,
     /// Names of the keypoints that the networks and keypoint files of the cameras have beside the joints, each once.
     pub extra_keypoints: Vec<String>,
-    /// Whether left and right of a network follow the picture: which are those of the person is decided over all views.
+    /// True if left and right of a network follow the picture: all views together decide which are those of the person.
     pub sides_as_seen: bool,
     /// The host that runs, of a deployment of several.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -55,12 +55,12 @@ impl Resolved {
         self.footage.iter().map(|footage| footage.n_frames).max().unwrap_or(0)
     }
 
-    /// Whether it runs until it is stopped: it has a live camera, and no number of frames.
+    /// Returns true if the deployment runs until it is stopped: it has a live camera, and no number of frames.
     pub fn is_endless(&self) -> bool {
         self.deployment.capture.n_frames.is_none() && self.has_live()
     }
 
-    /// Whether it has a live camera.
+    /// Returns true if the deployment has a live camera.
     pub fn has_live(&self) -> bool {
         let mut cameras = self.deployment.cameras.iter();
         cameras.any(|camera| crate::cameras::is_live(&camera.source))
@@ -70,14 +70,14 @@ impl Resolved {
     pub fn live_views(&self) -> Vec<usize> {
         let cameras = self.deployment.cameras.iter().enumerate();
         let live = cameras.filter(|camera| crate::cameras::is_live(&camera.1.source));
-        live.map(|it| it.0).collect()
+        live.map(|view| view.0).collect()
     }
 
     /// Instants per second that live cameras are brought together at, before `frame_step`: as the deployment says, else the
     /// rate of the slowest.
     pub fn instants_hz(&self) -> f64 {
         let step = self.deployment.capture.frame_step as f64;
-        let own = self.footage.iter().filter_map(|it| it.frame_rate_hz);
+        let own = self.footage.iter().filter_map(|footage| footage.frame_rate_hz);
         let slowest = own.fold(f64::INFINITY, f64::min) * step;
         self.deployment.capture.frame_rate_hz.unwrap_or(slowest)
     }
@@ -89,7 +89,7 @@ impl Resolved {
         if self.has_live() {
             return Some(self.instants_hz());
         }
-        let known = self.footage.iter().filter_map(|it| it.frame_rate_hz);
+        let known = self.footage.iter().filter_map(|footage| footage.frame_rate_hz);
         let all: Vec<f64> = known.map(|value| value * step).collect();
         // If the files contradict each other, the setting of the deployment counts.
         let agree = all.iter().all(|value| (value / all[0] - 1.0).abs() < 1e-3);
@@ -166,7 +166,7 @@ impl Resolved {
         self.deployment.host(self.host.as_deref()?)
     }
 
-    /// Whether this is a host with cameras that leaves the results to another.
+    /// Returns true if this is a host with cameras that leaves the results to another.
     pub fn is_far(&self) -> bool {
         self.own_host().is_some_and(|own_host| !own_host.fuses)
     }

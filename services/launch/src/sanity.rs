@@ -18,7 +18,7 @@ use crate::resolved::Resolved;
 const MAX_RATE_RATIO: f64 = 1.02;
 /// The least range of brightness, of 255, over the cells of an image at which it is compared with others.
 const MIN_CONTRAST: f64 = 16.0;
-/// What is said of footage without a rate.
+/// Warning about footage without a rate.
 const NO_RATE: &str = "nothing says how many frames per second the footage has: times, speeds and pose3d.trc are left out; \
     `capture.frame_rate_hz` says it";
 /// A picture whose brightest value is less, of 255, uses a small part of its range.
@@ -83,7 +83,7 @@ fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
         deployment.cameras.iter().map(|camera| canonical(&camera.source)).collect();
     for (nth, source) in all.iter().enumerate() {
         let is_blank = Blank::is_blank(&deployment.cameras[nth].source);
-        let Some(first) = all[..nth].iter().position(|it| it == source && !is_blank) else {
+        let Some(first) = all[..nth].iter().position(|other| other == source && !is_blank) else {
             continue;
         };
         let [a, b] = [first, nth].map(|i| &deployment.cameras[i].name);
@@ -123,7 +123,7 @@ fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
         let failure = Failure::new(ExitKind::Calibration, message);
         return Err(failure.with_hint(hint(first)));
     }
-    let warnings = rest.into_iter().filter(|it| it.severity() >= Severity::Warning);
+    let warnings = rest.into_iter().filter(|finding| finding.severity() >= Severity::Warning);
     Ok(warnings
         .map(|warning| format!("{}: {warning}", deployment.rig.display()))
         .collect())
@@ -153,7 +153,7 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     let step = deployment.capture.frame_step as f64;
     let views = deployment.cameras.iter().zip(&resolved.footage);
     let known: Vec<(&str, f64)> = views
-        .filter_map(|(camera, it)| Some((camera.name.as_str(), it.frame_rate_hz? * step)))
+        .filter_map(|(camera, footage)| Some((camera.name.as_str(), footage.frame_rate_hz? * step)))
         .collect();
     let slowest = known.iter().min_by(|a, b| a.1.total_cmp(&b.1));
     let fastest = known.iter().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -217,12 +217,12 @@ fn check_lengths(resolved: &Resolved) -> Option<String> {
 fn shorter(all: &[(&str, u64)]) -> Option<String> {
     const LEAST_FRAMES: u64 = 5;
     const LEAST_SHARE: f64 = 0.05;
-    let (long, many) = *all.iter().max_by_key(|it| it.1)?;
+    let (long, many) = *all.iter().max_by_key(|camera| camera.1)?;
     let is_short = |few: u64| {
         let missing = many - few;
         missing >= LEAST_FRAMES && missing as f64 > LEAST_SHARE * many as f64
     };
-    let short = all.iter().filter(|it| is_short(it.1));
+    let short = all.iter().filter(|camera| is_short(camera.1));
     let short: Vec<String> = short
         .map(|(name, few)| {
             let share = 100.0 * (many - few) as f64 / many as f64;
@@ -246,7 +246,7 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
     let first = deployment
         .cameras
         .par_iter()
-        .map(|camera| FirstImages::of(camera, &deployment.capture));
+        .map(|camera| FirstImages::read(camera, &deployment.capture));
     let first: Vec<Option<FirstImages>> = first.collect();
     let cameras = deployment.cameras.iter().zip(&first);
     let mut warnings: Vec<String> = cameras
@@ -294,7 +294,7 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
 /// The first images of a camera.
 struct FirstImages {
     rgb: Vec<Vec<u8>>,
-    /// Whether there is something to be seen in the first.
+    /// True if the first image has contrast.
     has_contrast: bool,
     /// Mean brightness of the cells of the first image, row by row.
     grid: Vec<f64>,
@@ -302,7 +302,7 @@ struct FirstImages {
 
 impl FirstImages {
     /// None for a live or a synthetic camera, for one without pictures, and for unreadable footage.
-    fn of(
+    fn read(
         camera: &deployment::capture::Camera,
         capture: &deployment::capture::Config,
     ) -> Option<Self> {

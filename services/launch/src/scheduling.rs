@@ -34,12 +34,12 @@ pub(crate) fn remove_denied(
     let mut denials: Vec<(Denied, Vec<String>)> = Vec::new();
     for process in processes.iter_mut() {
         let requested = process.scheduling.clone();
-        let denied = match known.iter().find(|it| it.0 == requested) {
+        let denied = match known.iter().find(|entry| entry.0 == requested) {
             Some((_, denied)) => denied.clone(),
             None => rehearse(&requested),
         };
         for denial in &denied {
-            match denials.iter_mut().find(|it| it.0 == *denial) {
+            match denials.iter_mut().find(|entry| entry.0 == *denial) {
                 Some((_, names)) => names.push(process.name.clone()),
                 None => denials.push((denial.clone(), vec![process.name.clone()])),
             }
@@ -48,7 +48,7 @@ pub(crate) fn remove_denied(
         known.push((requested, denied));
     }
     let warning = |(denied, names): &(Denied, Vec<String>)| {
-        let reason = core::error::Error::source(denied).map(|it| format!(" ({it})"));
+        let reason = core::error::Error::source(denied).map(|source| format!(" ({source})"));
         format!(
             "{}: {denied}{}; going on without. Try: {}",
             names.join(", "),

@@ -31,7 +31,7 @@ pub struct CameraSize {
     pub person_px: Option<f64>,
     /// The same in its frames.
     pub person_in_frame_px: Option<f64>,
-    /// Whether the person is smaller than is good because the number of pixels is limited.
+    /// True if the person is smaller than is good because the number of pixels is limited.
     pub is_limited: bool,
 }
 
@@ -66,8 +66,8 @@ impl SearchSize {
 
     /// The scale of a camera's frames.
     pub(crate) fn scale(&self, camera: &str) -> f64 {
-        let found = self.cameras.iter().find(|it| it.name == camera);
-        found.map_or(1.0, |it| it.scale)
+        let found = self.cameras.iter().find(|entry| entry.name == camera);
+        found.map_or(1.0, |entry| entry.scale)
     }
 
     /// The choice and its reason, on one line.

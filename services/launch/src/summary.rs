@@ -65,9 +65,9 @@ pub struct Report {
     measured: BTreeMap<String, Value>,
     /// The summary of the process `results`: `summary.json`.
     recorded: Recorded,
-    /// What became of the pictures of live cameras, a line each.
+    /// Counts of the pictures of live cameras, a line each.
     live: String,
-    /// Whether another host fuses, and has the results.
+    /// True if another host fuses, and has the results.
     is_far: bool,
 }
 
@@ -101,9 +101,9 @@ impl Report {
                 .collect(),
             processor_s: processes
                 .iter()
-                .filter_map(|it| {
-                    let last = it.last.as_ref()?;
-                    Some((it.name.clone(), f64::from(last.cpu_millis) * 1e-3))
+                .filter_map(|process| {
+                    let last = process.last.as_ref()?;
+                    Some((process.name.clone(), f64::from(last.cpu_millis) * 1e-3))
                 })
                 .collect(),
             n_dropped: processes.iter().map(|process| process.counts.n_dropped).sum(),
@@ -168,13 +168,13 @@ impl Report {
     /// The cameras whose pictures were taken at other times than they say.
     pub fn out_of_step(&self) -> impl Iterator<Item = (&String, &CameraFit)> {
         let summary = self.recorded.summary().into_iter();
-        let fits = summary.flat_map(|it| &it.calibration);
+        let fits = summary.flat_map(|summary| &summary.calibration);
         fits.filter(|(_, fit)| fit.out_of_step)
     }
 
     fn suspected(&self) -> impl Iterator<Item = (&String, &CameraFit)> {
         let summary = self.recorded.summary().into_iter();
-        let fits = summary.flat_map(|it| &it.calibration);
+        let fits = summary.flat_map(|summary| &summary.calibration);
         fits.filter(|(_, fit)| fit.suspected)
     }
 
@@ -198,7 +198,7 @@ impl Report {
         }
     }
 
-    /// Whether views, frames or processes were lost, or the losses are unknown. False for an interrupted run.
+    /// Returns true if views, frames or processes were lost, or the losses are unknown. False for an interrupted run.
     fn is_degraded(&self) -> bool {
         if self.is_far {
             return !self.given_up.is_empty() || !self.restarts.is_empty();
@@ -218,7 +218,7 @@ impl Report {
         summary.map_or_else(Vec::new, |summary| summary.trust.doubts())
     }
 
-    /// Whether frames were lost or the cameras contradict each other.
+    /// Returns true if frames were lost or the cameras contradict each other.
     fn is_lossy(&self, summary: &Summary) -> bool {
         let is_incomplete = summary.frames_missed > 0 || summary.frames < self.n_frames;
         trust::are_cameras_doubtful(summary)
@@ -477,13 +477,13 @@ fn write_latency(text: &mut String, latency: &LatencyReport) -> core::fmt::Resul
 
 /// The last metrics of every process as JSON; null if they are invalid.
 fn measured(outcome: &Outcome) -> BTreeMap<String, Value> {
-    let measured = outcome.processes.iter().filter_map(|it| {
-        let reading = Reading::from_message(it.measured.as_ref()?);
+    let measured = outcome.processes.iter().filter_map(|process| {
+        let reading = Reading::from_message(process.measured.as_ref()?);
         let reading = reading.inspect_err(|error| {
-            tracing::warn!(process = it.name, %error, "unreadable times and counts");
+            tracing::warn!(process = process.name, %error, "unreadable times and counts");
         });
         let value = reading.map_or(Value::Null, |reading| live::measured(&reading));
-        Some((it.name.clone(), value))
+        Some((process.name.clone(), value))
     });
     measured.collect()
 }
@@ -491,6 +491,6 @@ fn measured(outcome: &Outcome) -> BTreeMap<String, Value> {
 /// The counts of refused messages by the name of the cause, without zeros.
 fn by_cause(counts: &[u64; Refusal::N]) -> BTreeMap<&'static str, u64> {
     let all = Refusal::ALL.iter().zip(counts);
-    let some = all.filter(|it| *it.1 > 0);
+    let some = all.filter(|entry| *entry.1 > 0);
     some.map(|(cause, n)| (cause.name(), *n)).collect()
 }

@@ -116,7 +116,7 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
 fn choose(tried: &[Hypothesis]) -> Option<Hypothesis> {
     let score = |hypothesis: &Hypothesis| hypothesis.score.unwrap_or(f64::NEG_INFINITY);
     let best = tried.iter().map(score).fold(f64::NEG_INFINITY, f64::max);
-    tried.iter().find(|it| score(it) >= best - SAME_SCORE).copied()
+    tried.iter().find(|hypothesis| score(hypothesis) >= best - SAME_SCORE).copied()
 }
 
 fn text(up: &UnitVector3<f64>) -> String {
@@ -131,7 +131,10 @@ fn reason(best: &Hypothesis, tried: &[Hypothesis], cameras: &[Camera]) -> String
         let score = |hypothesis: &Hypothesis| hypothesis.score.unwrap_or(f64::NEG_INFINITY);
         score(a).total_cmp(&score(b))
     });
-    let people = match (best.score, next.and_then(|it| Some((it.up, it.score?)))) {
+    let people = match (
+        best.score,
+        next.and_then(|hypothesis| Some((hypothesis.up, hypothesis.score?))),
+    ) {
         (Some(score), Some((up, other))) => format!(
             "people are found with a score of {score:.2}, with up = {} of {other:.2}",
             text(&up)
@@ -158,7 +161,7 @@ fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
     let level = common_normal(&right, -down.iter().sum::<Vector3<f64>>());
     let upright = common_normal(&down, right.iter().sum());
     let world = world_axes();
-    let found = [level, upright].map(|it| it.map(snapped));
+    let found = [level, upright].map(|axis| axis.map(snapped));
     let [level, upright] = found;
     let likely = level.into_iter().chain(upright).chain(upright.map(|upright| -upright));
     let opposite = level.map(|level| -level);
@@ -194,10 +197,11 @@ fn common_normal(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3
     let mut found = None;
     for _ in 0..5 {
         let weighted = all.iter().zip(&weights);
-        let sum: Matrix3<f64> = weighted.map(|(it, weight)| it * it.transpose() * *weight).sum();
+        let sum: Matrix3<f64> =
+            weighted.map(|(vector, weight)| vector * vector.transpose() * *weight).sum();
         let eigen = SymmetricEigen::new(sum);
         let order = eigen.eigenvalues.iter().enumerate();
-        let mut order: Vec<(usize, f64)> = order.map(|(nth, it)| (nth, *it)).collect();
+        let mut order: Vec<(usize, f64)> = order.map(|(nth, value)| (nth, *value)).collect();
         order.sort_by(|a, b| a.1.total_cmp(&b.1));
         // The vectors are parallel, as for cameras that all look the same way or at each other.
         if order[1].1 < 0.02 * order[2].1 {
@@ -295,11 +299,11 @@ impl<'a> View<'a> {
     fn score(&mut self, search: &Search, up: UnitVector3<f64>) -> Option<f64> {
         let degrees = roll_degrees(self.camera, &up);
         let difference = |other: f64| ((degrees - other + 540.0).rem_euclid(360.0) - 180.0).abs();
-        if let Some((_, score)) = self.tried.iter().find(|it| difference(it.0) < SAME_ROLL) {
+        if let Some((_, score)) = self.tried.iter().find(|tried| difference(tried.0) < SAME_ROLL) {
             return *score;
         }
         let scores: Vec<f64> =
-            self.rgb.iter().filter_map(|it| self.search_at(search, it, degrees)).collect();
+            self.rgb.iter().filter_map(|rgb| self.search_at(search, rgb, degrees)).collect();
         let n = scores.len();
         let score = (n > 0).then(|| scores.iter().sum::<f64>() / n as f64);
         self.tried.push((degrees, score));
@@ -328,8 +332,10 @@ impl<'a> View<'a> {
         warp.apply(rgb, &mut turned);
         let image = Rgb8View::new(output.width, output.height, &turned).ok()?;
         let layout = Layout::new(&search.model, output.width, output.height).ok()?;
-        let best = search.on(image, &layout, |it| search.solver.best(it, None));
-        best.map(|it| f64::from(it.score))
+        let best = search.on(image, &layout, |responses| {
+            search.solver.best(responses, None)
+        });
+        best.map(|pose| f64::from(pose.score))
     }
 }
 
@@ -343,11 +349,11 @@ mod tests {
         let rig = rig.unwrap().rig().unwrap();
         let turn = nalgebra::UnitQuaternion::rotation_between(&up, &rig.up_in_world().unwrap());
         let world = nalgebra::Isometry3::rotation(turn.unwrap().scaled_axis());
-        let cameras = rig.cameras().iter().zip(rolls).map(|(it, roll)| {
+        let cameras = rig.cameras().iter().zip(rolls).map(|(camera, roll)| {
             let roll = nalgebra::Isometry3::rotation(Vector3::z() * roll.to_radians());
             Camera {
-                camera_from_world: roll * it.camera_from_world * world,
-                ..it.clone()
+                camera_from_world: roll * camera.camera_from_world * world,
+                ..camera.clone()
             }
         });
         cameras.collect()

@@ -42,8 +42,8 @@ impl ViewReport {
     /// * `summary`: the summary, if there is one.
     pub fn all(resolved: &Resolved, outcome: &Outcome, summary: Option<&Summary>) -> Vec<Self> {
         let counts = |process: String| {
-            let found = outcome.processes.iter().find(|it| it.name == process);
-            found.map_or_else(Counts::default, |it| it.counts)
+            let found = outcome.processes.iter().find(|candidate| candidate.name == process);
+            found.map_or_else(Counts::default, |process| process.counts)
         };
         let n_reached = n_reached(resolved, outcome);
         let cameras = resolved.deployment.cameras.iter().zip(&resolved.footage);
@@ -78,10 +78,11 @@ impl ViewReport {
         let answered = pose.n_sent.max(used + empty);
         let not_processed =
             (camera.n_dropped + pose.n_dropped).min(frames.saturating_sub(answered));
-        let of = |reason: &str| missing.iter().find(|it| it.0.text() == reason);
-        let lost = of(Missing::PROCESS_LOST).map_or(0, |it| it.1).min(not_processed);
+        let of = |reason: &str| missing.iter().find(|entry| entry.0.text() == reason);
+        let lost = of(Missing::PROCESS_LOST).map_or(0, |entry| entry.1).min(not_processed);
         let faults = Status::CAMERA_FAULTS.iter();
-        let faults = faults.filter_map(|it| Some((it.reason().to_owned(), of(it.reason())?.1)));
+        let faults =
+            faults.filter_map(|status| Some((status.reason().to_owned(), of(status.reason())?.1)));
         Self {
             name: name.to_owned(),
             frames,
@@ -96,7 +97,7 @@ impl ViewReport {
         }
     }
 
-    /// Whether the view is missing from a result for a reason that is not expected with this delivery.
+    /// Returns true if the view is missing from a result for a reason that is not expected with this delivery.
     pub fn is_lost(&self, is_lossless: bool) -> bool {
         let is_expected = |reason: &Missing| match reason {
             Missing::Late | Missing::Dropped => !is_lossless,
@@ -116,8 +117,8 @@ pub(crate) fn n_reached(resolved: &Resolved, outcome: &Outcome) -> u64 {
         .processes
         .iter()
         .filter(|process| ["capture", "bridge"].contains(&process.service.as_str()));
-    let last = cameras.filter_map(|camera| camera.last.as_ref().filter(|it| it.n_sent > 0));
-    let last = last.map(|it| it.last_frame.saturating_sub(capture.start_frame)).max();
+    let last = cameras.filter_map(|camera| camera.last.as_ref().filter(|last| last.n_sent > 0));
+    let last = last.map(|last| last.last_frame.saturating_sub(capture.start_frame)).max();
     last.map_or(0, |value| value / capture.frame_step.max(1) + 1)
 }
 
@@ -211,7 +212,7 @@ mod tests {
         ] {
             let mut missing = json!({});
             missing[reason] = json!(1);
-            let got = [false, true].map(|it| view(&missing).is_lost(it));
+            let got = [false, true].map(|is_lossless| view(&missing).is_lost(is_lossless));
             assert_eq!(got, expected, "{reason}");
         }
     }

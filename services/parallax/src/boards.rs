@@ -30,7 +30,7 @@ pub struct CameraFootage {
 }
 
 impl CameraFootage {
-    /// Of `NAME=PATH`, or of a path whose stem is the name.
+    /// Reads `NAME=PATH`, or a path whose stem is the name.
     pub fn of(text: &str) -> Self {
         let named = text
             .split_once('=')
@@ -81,7 +81,7 @@ pub(crate) fn footage_failure(error: FootageError) -> Failure {
     Failure::new(ExitKind::Input, error)
 }
 
-/// What was seen of the board by one camera.
+/// Sights of the board by one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// Width and height of its pictures.
@@ -100,7 +100,7 @@ pub struct Seen {
     pub pictures: BTreeMap<usize, [usize; 2]>,
 }
 
-/// What all cameras saw.
+/// Sights of the board by all cameras.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Looked {
     /// The board as it is.
@@ -109,7 +109,7 @@ pub struct Looked {
     pub note: Option<String>,
     /// Its points, metres.
     pub layout: Layout,
-    /// Of each camera.
+    /// Sights of each camera.
     pub cameras: Vec<Seen>,
 }
 
@@ -121,8 +121,8 @@ impl Looked {
 
     /// The cameras whose pictures are mirrored.
     pub fn mirrored(&self) -> Vec<usize> {
-        let is_mirrored = |it: &&Seen| 2 * it.n_mirrored > it.sights.len();
+        let is_mirrored = |camera: &&Seen| 2 * camera.n_mirrored > camera.sights.len();
         let each = self.cameras.iter().enumerate();
-        each.filter(|it| is_mirrored(&it.1)).map(|it| it.0).collect()
+        each.filter(|camera| is_mirrored(&camera.1)).map(|camera| camera.0).collect()
     }
 }

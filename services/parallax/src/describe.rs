@@ -54,8 +54,11 @@ impl<'a> Placed<'a> {
             .into_iter()
             .map(|centre| self.at(centre))
             .collect();
-        let parts: Vec<Value> =
-            centres.iter().enumerate().map(|(part, it)| self.part(part, *it)).collect();
+        let parts: Vec<Value> = centres
+            .iter()
+            .enumerate()
+            .map(|(part, centre)| self.part(part, *centre))
+            .collect();
         let scale = self.layout.levels[usize::from(self.pose.level)].scale;
         let mut value = json!({
             "score": self.pose.score,
@@ -101,7 +104,7 @@ fn joints_of(centres: &[[f64; 2]], joints: &NamedJoints) -> Value {
     let named = set.joints.iter().zip(found);
     Value::Object(
         named
-            .map(|(joint, it)| (joint.name.to_owned(), json!(it)))
+            .map(|(joint, place)| (joint.name.to_owned(), json!(place)))
             .collect::<Map<_, _>>(),
     )
 }

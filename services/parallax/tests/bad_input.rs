@@ -23,7 +23,7 @@ struct Row {
     broken: fn(&Case),
     arguments: &'static [&'static str],
     code: i32,
-    /// What the message must contain.
+    /// Words that the message must contain.
     words: &'static [&'static str],
 }
 

@@ -139,7 +139,7 @@ fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
     );
 }
 
-/// What takes long; see `.ci/run`.
+/// Long tests; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
     use crate::common::PACED;

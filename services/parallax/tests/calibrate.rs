@@ -93,7 +93,7 @@ fn a_room_from_people_is_made_step_by_step() {
     );
 }
 
-/// What takes long; see `.ci/run`.
+/// Long tests; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
     use calibration::differences;

@@ -61,7 +61,7 @@ fn scenarios_are_listed_and_impossible_ones_refused() {
     assert!(ended.stderr.contains("--list"), "{}", ended.stderr);
 }
 
-/// What takes long; see `.ci/run`.
+/// Long tests; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
     use serde_json::json;
@@ -161,7 +161,7 @@ mod long {
             let flagged = flagged(it);
             assert_eq!(flagged.len(), n_causes);
             assert!(
-                flagged.iter().all(|it| it.1 > 0),
+                flagged.iter().all(|cause| cause.1 > 0),
                 "{flagged:?}\n{}",
                 ended.stderr
             );

@@ -147,7 +147,7 @@ fn a_killed_camera_was_lost_and_not_late(case: &Case, killed: &Value) {
     }
 }
 
-/// What takes long; see `.ci/run`.
+/// Long tests; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
     use super::*;

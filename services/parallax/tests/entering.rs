@@ -2,7 +2,7 @@
 #![cfg(feature = "long-tests")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-/// What takes long; see `.ci/run`.
+/// Long tests; see `.ci/run`.
 mod long {
     use std::ops::Range;
     use std::path::PathBuf;
@@ -20,7 +20,7 @@ mod long {
         case.path(&format!("room/{of}/{camera}/{frame:06}.png"))
     }
 
-    /// What is behind the person at one time is seen at another.
+    /// Returns the empty room: the background behind the person at one time is seen at another.
     fn empty_room(case: &Case, camera: &str) -> RgbImage {
         let open = |of: &str, frame: usize| image::open(picture(case, of, camera, frame)).unwrap();
         let mut empty = open("cameras", 0).into_rgb8();
@@ -75,7 +75,7 @@ mod long {
         };
         let found: Vec<bool> = text.lines().map(is_found).collect();
         assert_eq!(found.len(), N_FRAMES);
-        let count = |frames: Range<usize>| found[frames].iter().filter(|it| **it).count();
+        let count = |frames: Range<usize>| found[frames].iter().filter(|seen| **seen).count();
         assert_eq!(count(0..THERE.start), 0, "{found:?}");
         assert_eq!(count(THERE.end..N_FRAMES), 0, "{found:?}");
         // Every view looks for people once a second.

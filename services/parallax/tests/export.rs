@@ -68,7 +68,7 @@ fn a_run_is_exported_from_its_folder_and_from_its_recording() {
     assert!(of_folder["people"][0]["frames_with_points"].as_u64().unwrap() > 0);
     done(&case, "run.mcap", &told);
     for name in FILES {
-        let [a, b] = ["out/export", "run-export"].map(|it| fs::read(case.path(it).join(name)));
+        let [a, b] = ["out/export", "run-export"].map(|from| fs::read(case.path(from).join(name)));
         assert!(a.unwrap() == b.unwrap(), "{name} differs");
     }
     check_positions(&case);
@@ -101,15 +101,15 @@ fn check_positions(case: &Case) {
     for (frame, due) in found.iter().enumerate() {
         for (joint, due) in due.iter().enumerate() {
             let [x, y, z] = due.unwrap_or([f64::NAN; 3]);
-            let mm = c3d.frame(frame)[joint].map(|it| it.map(|value| value / 1e3));
+            let mm = c3d.frame(frame)[joint].map(|point| point.map(|value| value / 1e3));
             for (read, due) in [(mm, [x, y, z]), (trc.frames[frame][joint], [y, z, x])] {
                 assert_eq!(
                     read.is_none(),
                     due[0].is_nan(),
                     "frame {frame}, joint {joint}"
                 );
-                let off = read.map_or(0.0, |it| {
-                    (0..3).map(|axis| (it[axis] - due[axis]).abs()).fold(0.0, f64::max)
+                let off = read.map_or(0.0, |read| {
+                    (0..3).map(|axis| (read[axis] - due[axis]).abs()).fold(0.0, f64::max)
                 });
                 assert!(off < 1e-5, "frame {frame}, joint {joint}: {off} m");
             }
@@ -117,7 +117,7 @@ fn check_positions(case: &Case) {
     }
 }
 
-/// What programs of others read of a folder, by format; those that Python lacks are left out, and named.
+/// Returns the content that programs of others read of a folder, by format; those that Python lacks are left out, and named.
 fn read_by_python<'a>(folder: &Path, formats: &[&'a str]) -> Vec<(&'a str, Value)> {
     const SCRIPT: &str = include_str!("export.py");
     let read = Command::new("python3")
@@ -136,7 +136,7 @@ fn read_by_python<'a>(folder: &Path, formats: &[&'a str]) -> Vec<(&'a str, Value
     let text = String::from_utf8_lossy(&read.stdout);
     let said: Value = serde_json::from_str(text.lines().last().unwrap_or_default()).unwrap();
     let all = formats.iter().map(|&format| (format, said[format].clone()));
-    let (lacking, found): (Vec<_>, Vec<_>) = all.partition(|it| it.1.is_null());
+    let (lacking, found): (Vec<_>, Vec<_>) = all.partition(|entry| entry.1.is_null());
     for (format, _) in lacking {
         eprintln!("skipped: Python has no package that reads {format} (see .ci/run)");
     }

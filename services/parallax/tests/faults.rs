@@ -61,7 +61,7 @@ impl Signalled {
         let reasons: Vec<&str> =
             without.map(|without| without["reason"].as_str().unwrap()).collect();
         assert!(reasons.len() < n, "{reasons:?}");
-        let known = |it: &&str| expected.contains(it);
+        let known = |reason: &&str| expected.contains(reason);
         assert!(reasons.iter().all(known), "{reasons:?}");
         assert_eq!(self.summary["frames_missed"], json!(reasons.len()));
         let counted = self.summary["frames"].as_u64().unwrap();
@@ -216,7 +216,7 @@ fn a_suspended_pose_process_is_detected_and_no_frame_is_lost() {
     let without = run.incomplete();
     assert!(without.len() <= 2, "{without:?}");
     assert!(
-        without.iter().all(|it| **it == json!(["a", "c"])),
+        without.iter().all(|views| **views == json!(["a", "c"])),
         "{without:?}"
     );
 }
@@ -263,7 +263,7 @@ fn assert_back_after_a_gap(lines: &[Value]) {
     assert!(there > lost, "it is not back: {lines:?}");
 }
 
-/// What takes long; see `.ci/run`.
+/// Long tests; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
     use super::*;

@@ -3,7 +3,7 @@
 #![cfg(feature = "long-tests")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-/// What takes long; see `.ci/run`.
+/// Long tests; see `.ci/run`.
 mod long {
     use std::collections::BTreeMap;
 
@@ -147,7 +147,7 @@ mod long {
         assert!(error < 0.075 && share > 0.85, "{error} m, {share}");
     }
 
-    /// What a slow machine has time for: frames far apart, and hardly a search.
+    /// The case of a slow machine: frames far apart, and hardly a search.
     #[test]
     fn who_runs_is_followed_over_half_a_second_without_a_search() {
         let case = case("apart", "jogging", 2);

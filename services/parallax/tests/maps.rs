@@ -200,7 +200,9 @@ fn found(case: &Case) -> Vec<(String, f64)> {
             Some((Point3::new(axis(0)?, axis(1)?, axis(2)?) - truth).norm())
         };
         let each: Option<Vec<f64>> = names.zip(&truth).map(distance).collect();
-        let mean = each.map_or(f64::INFINITY, |it| it.iter().sum::<f64>() / it.len() as f64);
+        let mean = each.map_or(f64::INFINITY, |distances| {
+            distances.iter().sum::<f64>() / distances.len() as f64
+        });
         (line["status"].as_str().unwrap_or_default().to_owned(), mean)
     });
     frames.collect()
@@ -313,7 +315,7 @@ fn a_detector_that_finds_nobody_leaves_no_result_and_says_so() {
         ended.stdout
     );
     assert!(ended.stdout.contains("40 empty"), "{}", ended.stdout);
-    assert!(found(&case).iter().all(|it| it.1.is_infinite()));
+    assert!(found(&case).iter().all(|frame| frame.1.is_infinite()));
 }
 
 #[test]
@@ -424,7 +426,7 @@ fn what_keypoints_have_beside_the_joints_is_written_by_name() {
     // The third view names the legs the wrong way round.
     let named = |view: usize, name: &str| {
         let leg = ["hip", "knee", "ankle", "toe", "heel"];
-        let is_leg = leg.iter().any(|it| name.ends_with(it));
+        let is_leg = leg.iter().any(|part| name.ends_with(part));
         let other = keypoints::mirrored(name).filter(|_| view == 2 && is_leg);
         other.unwrap_or_else(|| name.to_owned())
     };
@@ -455,7 +457,7 @@ fn what_keypoints_have_beside_the_joints_is_written_by_name() {
 /// Mean distance of the joints of all frames but the first from the truth, millimetres, and that of the extra keypoints.
 fn errors_mm(case: &Case) -> [f64; 2] {
     let found = found(case);
-    let joints: f64 = found[1..].iter().map(|it| it.1).sum();
+    let joints: f64 = found[1..].iter().map(|frame| frame.1).sum();
     let (mut extras, mut n) = (0.0, 0.0);
     for line in &case.lines("pose3d.jsonl")[1..] {
         for (name, it) in line["people"][0]["keypoints"].as_object().unwrap() {
@@ -488,7 +490,7 @@ fn pictures_of_other_moments_are_moved_to_the_instants_of_their_frames() {
     // Joints and extra keypoints: most that is left of what was told, and how much more is left of what was not. Joints stand by evidence
     // whose places are rounded to cells, and so do their velocities.
     for (which, most, more) in [(0, 2.5, 1.5), (1, 2.5, 2.0)] {
-        let [told, untold] = [told, untold].map(|it| it[which] - without[which]);
+        let [told, untold] = [told, untold].map(|mm| mm[which] - without[which]);
         assert!(told < most && untold > more * told, "{errors:?}");
     }
 }

@@ -234,7 +234,7 @@ fn options_of_the_filters_are_refused_beside_a_network() {
     }
 }
 
-/// What the network that ships is for: nothing is given but the picture.
+/// The purpose of the network that ships: nothing is given but the picture.
 #[test]
 fn with_the_network_that_ships_everybody_is_found_once_and_where_they_are() {
     let case = Case::new("net-ships", &[1, 1], PLAIN);

@@ -68,7 +68,7 @@ const CALIBRATIONS: &[Row] = &[
     ("as it is", |_| (), CHECK, 0, &[]),
     (
         "a rig in millimetres",
-        |it| move_cameras(it, |metres| 1000.0 * metres),
+        |case| move_cameras(case, |metres| 1000.0 * metres),
         CHECK,
         5,
         &[
@@ -79,16 +79,16 @@ const CALIBRATIONS: &[Row] = &[
     ),
     (
         "the same, run",
-        |it| move_cameras(it, |metres| 1000.0 * metres),
+        |case| move_cameras(case, |metres| 1000.0 * metres),
         RUN,
         5,
         &["unit = \"mm\""],
     ),
     (
         "the same, with the unit",
-        |it| {
-            move_cameras(it, |metres| 1000.0 * metres);
-            add(it, "unit = \"mm\"");
+        |case| {
+            move_cameras(case, |metres| 1000.0 * metres);
+            add(case, "unit = \"mm\"");
         },
         CHECK,
         0,
@@ -96,9 +96,9 @@ const CALIBRATIONS: &[Row] = &[
     ),
     (
         "far away, and meant",
-        |it| {
-            move_cameras(it, |metres| 1000.0 * metres);
-            add(it, "unit = \"m\"");
+        |case| {
+            move_cameras(case, |metres| 1000.0 * metres);
+            add(case, "unit = \"m\"");
         },
         CHECK,
         0,
@@ -106,14 +106,14 @@ const CALIBRATIONS: &[Row] = &[
     ),
     (
         "cameras beyond the Earth",
-        |it| move_cameras(it, |metres| 3e307 * metres.signum()),
+        |case| move_cameras(case, |metres| 3e307 * metres.signum()),
         CHECK,
         5,
         &["3e307 m from the origin"],
     ),
     (
         "cameras at one place",
-        |it| move_cameras(it, |_| 0.0),
+        |case| move_cameras(case, |_| 0.0),
         RUN,
         5,
         &["3 cameras are at one place", "0.0 mm apart", "stand apart"],

@@ -88,7 +88,7 @@ fn a_killed_pose_process_is_restarted_and_its_gap_is_reported() {
     let without = lines.iter().filter(|line| line["views_present"] != all);
     let without: Vec<_> = without.map(|without| without["views_missing"].clone()).collect();
     assert!(
-        without.iter().all(|it| *it == json!({ "b": "process lost" })),
+        without.iter().all(|missing| *missing == json!({ "b": "process lost" })),
         "{without:?}"
     );
     assert_eq!(lines[99]["views_present"], all, "the view is not back");

@@ -40,7 +40,7 @@ fn mapped_file(bytes: &[u8]) -> String {
     let of_line = |line: &str| {
         let (range, _) = line.split_once(' ')?;
         let (begin, end) = range.split_once('-')?;
-        let [begin, end] = [begin, end].map(|it| usize::from_str_radix(it, 16));
+        let [begin, end] = [begin, end].map(|address| usize::from_str_radix(address, 16));
         (begin.ok()?..end.ok()?).contains(&at).then(|| line.to_owned())
     };
     let line = maps.lines().find_map(of_line).unwrap_or_default();
@@ -240,7 +240,7 @@ mod long {
     use std::path::Path;
     use std::process::Command;
 
-    /// Whether a Python has all that its tests need.
+    /// Returns true if a Python has all that its tests need.
     fn is_able(python: &str) -> bool {
         let imports = Command::new(python).args(["-c", "import iceoryx2, numpy, pytest"]).output();
         imports.is_ok_and(|import| import.status.success())

@@ -51,7 +51,7 @@ fn network(tau: f32) -> Network {
         ..Card::default()
     };
     let entries = card.entries().into_iter();
-    net.metadata = entries.map(|(name, it)| (name.to_owned(), it)).collect();
+    net.metadata = entries.map(|(name, value)| (name.to_owned(), value)).collect();
     net
 }
 
@@ -148,7 +148,7 @@ fn a_joint_follows_the_views_with_small_expected_errors() {
         };
         let mut step = SkeletonStep::new(plans.clone(), None, settings);
         let found = step.run(answers, &[]).joints.into_iter();
-        found.map(|it| it.unwrap().in_world).collect()
+        found.map(|joint| joint.unwrap().in_world).collect()
     };
     // The first view has another frame than the others.
     let mut answers = answers(&plans, &[7, 0, 0, 0]);
@@ -163,7 +163,7 @@ fn a_joint_follows_the_views_with_small_expected_errors() {
     let aware = joints(&answers, 1.0);
     let off = |of: &[Point3<f64>]| -> f64 {
         let joints = of.iter().zip(&others);
-        joints.map(|(it, other)| (it - other).norm()).sum()
+        joints.map(|(joint, other)| (joint - other).norm()).sum()
     };
     let (aware, without) = (off(&aware), off(&unaware));
     assert!(without > 0.1, "{without} m: nothing to tell apart");
@@ -213,7 +213,7 @@ fn a_prediction_that_never_ends_is_detected_by_its_missing_progress() {
     assert_eq!(spun["run"]["restarts"], expected, "{}", ended.stderr);
 }
 
-/// What takes long; see `.ci/run`.
+/// Long tests; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
     use crate::common::started::signal;

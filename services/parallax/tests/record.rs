@@ -63,7 +63,8 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
             ended.stderr
         );
         for name in RESULTS {
-            let [before, after] = [case.path("out"), case.path(from)].map(|it| text(&it, name));
+            let [before, after] =
+                [case.path("out"), case.path(from)].map(|folder| text(&folder, name));
             assert!(before == after, "{name} differs when replayed from {from}");
         }
     }
@@ -96,7 +97,7 @@ fn a_truncated_recording_is_replayed_up_to_its_end() {
         ended.stderr
     );
     let [before, after] = ["out", "part"].map(|name| text(&case.path(name), "pose3d.jsonl"));
-    let same = before.lines().zip(after.lines()).take_while(|it| it.0 == it.1);
+    let same = before.lines().zip(after.lines()).take_while(|lines| lines.0 == lines.1);
     assert!(same.count() >= 2, "{before}\n{after}");
     assert!(after.lines().count() < 8, "{after}");
 }
@@ -151,7 +152,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     let entry = poses.iter().find(|pose| pose.frame == Some(3)).unwrap();
     // Behind stamp and times, in the content. Six bytes of a pose move a joint.
     let at = (entry.offset + entry.len / 2) as usize;
-    file[at..at + 6].iter_mut().for_each(|it| *it ^= 0x15);
+    file[at..at + 6].iter_mut().for_each(|byte| *byte ^= 0x15);
     case.write("run.mcap", &file);
 
     let ended = replayed(&case, &["--from", "triangulate", "--out", "less", "--json"]);
@@ -232,7 +233,7 @@ fn all_views_at_once_are_recorded_and_replayed_with_any_number_of_workers() {
             ended.stderr
         );
         let [before, after] = [case.path("out"), case.path(from)];
-        let [before, after] = [before, after].map(|it| text(&it, "pose3d.jsonl"));
+        let [before, after] = [before, after].map(|folder| text(&folder, "pose3d.jsonl"));
         assert_eq!(before, after, "from {from}");
     }
 }

@@ -242,7 +242,7 @@ fn no_process_of_a_run_has_a_network_socket() {
     assert_eq!(all.len(), 7, "{all:?}");
     let mut n_sockets = 0;
     let run = u32::try_from(started.id()).unwrap();
-    for pid in all.iter().map(|it| it.0).chain([run]) {
+    for pid in all.iter().map(|process| process.0).chain([run]) {
         let own = sockets(pid);
         n_sockets += own.len();
         for protocol in [
@@ -251,7 +251,8 @@ fn no_process_of_a_run_has_a_network_socket() {
             let table = fs::read_to_string(format!("/proc/{pid}/net/{protocol}"));
             let table = table.unwrap_or_default();
             let words: BTreeSet<&str> = table.split_ascii_whitespace().collect();
-            let open: Vec<_> = own.iter().filter(|it| words.contains(it.as_str())).collect();
+            let open: Vec<_> =
+                own.iter().filter(|socket| words.contains(socket.as_str())).collect();
             assert!(open.is_empty(), "process {pid} has a {protocol} socket");
         }
     }
@@ -260,7 +261,7 @@ fn no_process_of_a_run_has_a_network_socket() {
     assert_eq!(started.wait().status.code(), Some(0));
 }
 
-/// What takes long; see `.ci/run`.
+/// Long tests; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
     use super::*;

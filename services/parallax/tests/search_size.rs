@@ -20,8 +20,8 @@ fn deployment(case: &Case, sizes: &[[u32; 2]], focal: f64, units_per_metre: f64)
         height: 1.3,
     };
     let ring = ring.rig().unwrap();
-    let cameras = ring.cameras().iter().zip(sizes).map(|(it, size)| {
-        let mut place: Isometry3<f64> = it.camera_from_world;
+    let cameras = ring.cameras().iter().zip(sizes).map(|(camera, size)| {
+        let mut place: Isometry3<f64> = camera.camera_from_world;
         place.translation.vector *= units_per_metre;
         Camera {
             camera_from_world: place,
@@ -31,9 +31,9 @@ fn deployment(case: &Case, sizes: &[[u32; 2]], focal: f64, units_per_metre: f64)
                 cx: f64::from(size[0]) / 2.0,
                 cy: f64::from(size[1]) / 2.0,
                 size: *size,
-                ..it.intrinsics
+                ..camera.intrinsics
             },
-            ..it.clone()
+            ..camera.clone()
         }
     });
     let rig = Rig::new(cameras.collect(), ring.up_in_world(), "planted").unwrap();

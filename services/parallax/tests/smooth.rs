@@ -282,8 +282,8 @@ fn text(lines: impl IntoIterator<Item = FrameLine>) -> String {
 fn what_a_folder_lacks_is_said_and_by_exit_code() {
     let case = Case::new("smooth-attack", &[0], "");
     fs::create_dir(case.path("run")).unwrap();
-    let at = |it: u64| Some(it as f64 / 60.0);
-    let whole = |it: u64| line(it, at(it), placed(it as f64 * 0.01, 1e-4));
+    let at = |frame: u64| Some(frame as f64 / 60.0);
+    let whole = |frame: u64| line(frame, at(frame), placed(frame as f64 * 0.01, 1e-4));
     let whole_text = text((0..50).map(whole));
     let cut = whole_text[..whole_text.len() - 30].to_owned();
     let torn = whole_text.replacen("\"frame\":20", "\"frame\":\"x\"", 1);

@@ -1,4 +1,4 @@
-//! What the files of cameras say of themselves, in whole runs: numbers with gaps, tags of orientation.
+//! Facts that the files of cameras hold about themselves, in whole runs: numbers with gaps, tags of orientation.
 
 use std::fs;
 
@@ -45,7 +45,7 @@ fn cameras_that_do_not_begin_with_the_same_number_are_told() {
     let said = "cameras do not begin with the same picture (a 0 to 5, b 1 to 5)";
     assert!(ended.stderr.contains(said), "{}", ended.stderr);
     for nth in (1..6).rev() {
-        let [from, to] = [nth, nth + 1000].map(|it| case.path(&format!("b/{it:04}.png")));
+        let [from, to] = [nth, nth + 1000].map(|i| case.path(&format!("b/{i:04}.png")));
         fs::rename(from, to).unwrap();
     }
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();

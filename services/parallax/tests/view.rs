@@ -34,7 +34,7 @@ impl View {
         started.until("the address", |_| {
             let text = fs::read_to_string(&out).unwrap_or_default();
             let said: Option<Value> = serde_json::from_str(&text).ok();
-            let url = said.and_then(|it| Some(it["url"].as_str()?.to_owned()));
+            let url = said.and_then(|line| Some(line["url"].as_str()?.to_owned()));
             address = url.unwrap_or_default();
             !address.is_empty()
         });

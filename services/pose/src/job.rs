@@ -1,4 +1,4 @@
-//! What the process has to do.
+//! Task of the process.
 
 use core::time::Duration;
 
@@ -10,7 +10,7 @@ use pipeline::{NetworkStep, ViewStep};
 /// Keypoints that another program found in the footage of a view.
 #[derive(Debug)]
 pub struct Keypoints {
-    /// What makes evidence of them.
+    /// Step that makes evidence of them.
     pub step: NetworkStep,
     /// Where they are.
     pub source: Source,
@@ -75,7 +75,7 @@ impl Step {
     }
 }
 
-/// What one view's process has to do.
+/// Task of the process of one view.
 #[derive(Debug)]
 pub struct Job {
     /// The view.

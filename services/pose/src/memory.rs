@@ -1,11 +1,11 @@
-//! What a view keeps from frame to frame.
+//! State of a view that is kept from frame to frame.
 
 use fmp::Tracker;
 use keypoints::files::SeenKeypoints;
 use messages::Stamp;
 use pipeline::NetworkMemory;
 
-/// What is kept from frame to frame.
+/// State that is kept from frame to frame.
 pub(crate) enum Memory {
     /// The last pose, and responses that do not lie in shared memory.
     Filters(Tracker, Vec<f32>),
@@ -16,13 +16,13 @@ pub(crate) enum Memory {
 /// How long nobody is seen before a warning says so, nanoseconds: a minute.
 const LONG_NANOS: u64 = 60_000_000_000;
 
-/// What is kept of a view that a network looks at.
+/// State of a view that a network looks at.
 #[derive(Debug, Default)]
 pub(crate) struct NetworkState {
     pub(crate) memory: NetworkMemory,
     /// When somebody was seen last, or a warning was given, and the number of frames since.
     pub(crate) nobody: Option<(u64, u64)>,
-    /// Whether a failure of the network was told.
+    /// True if a failure of the network was told.
     pub(crate) has_failed: bool,
 }
 
@@ -46,11 +46,11 @@ impl NetworkState {
     }
 }
 
-/// What is kept of a view whose keypoints another program found.
+/// State of a view whose keypoints another program found.
 #[derive(Debug, Default)]
 pub(crate) struct KeypointState {
     pub(crate) memory: NetworkMemory,
     pub(crate) people: Vec<SeenKeypoints>,
-    /// Whether a file that cannot be read was told.
+    /// True if a file that cannot be read was told.
     pub(crate) has_failed: bool,
 }

@@ -15,7 +15,7 @@ use wire::WireError;
 use crate::job::{Job, Step};
 use crate::memory::Memory;
 
-/// What was found in a frame, and its evidence if a process receives it.
+/// Poses found in a frame, and the evidence if a process receives it.
 pub(crate) struct Found<'a> {
     /// Without stamp and times, as `header`.
     pub(crate) message: ViewPose,

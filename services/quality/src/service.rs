@@ -12,7 +12,7 @@ use stage::{Context, Stage};
 use viewquality::{ForecastInput, Forecaster, Predictor};
 use wire::WireError;
 
-/// What one view's process has to do.
+/// Task of the process of one view.
 #[derive(Debug)]
 pub struct Job {
     /// The view.
@@ -53,7 +53,7 @@ pub struct NetworkSource {
 ///
 /// # Errors
 ///
-/// What the transport reports.
+/// Errors of the transport.
 pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
     let view = job.view;
     let frame_scale = job.frame_scale;

@@ -1,4 +1,4 @@
-//! What Foxglove shows of a recording as it is: its own message types as JSON, beside ours.
+//! Messages for Foxglove, which shows such a recording as it is: its own message types as JSON, beside ours.
 //!
 //! The schemas (`foxglove/`) are those of Foxglove, of `@foxglove/schemas` 2.1.0 without descriptions (MIT licence).
 
@@ -42,7 +42,7 @@ pub struct Stage {
 #[derive(Debug)]
 pub(crate) struct Foxglove {
     stage: Stage,
-    /// Whether it has been said where the cameras are.
+    /// True if the places of the cameras have been written.
     is_begun: bool,
     /// The people that were there in the frame before.
     shown: BTreeSet<u64>,
@@ -148,7 +148,9 @@ impl Foxglove {
         let transforms: Vec<Value> = self.stage.cameras.iter().map(transform).collect();
         let mut all = vec![(TRANSFORMS, json!({ "transforms": transforms }))];
         let calibrations = self.stage.cameras.iter().enumerate();
-        all.extend(calibrations.map(|(view, it)| (VIEWS + 2 * view, calibration(it, time))));
+        all.extend(
+            calibrations.map(|(view, camera)| (VIEWS + 2 * view, calibration(camera, time))),
+        );
         all
     }
 
@@ -198,7 +200,7 @@ impl Foxglove {
         };
         let joints = person.listed_joints().iter();
         let joints: Vec<Option<&Joint3d>> =
-            joints.map(|it| Some(it).filter(|it| found(it))).collect();
+            joints.map(|joint| Some(joint).filter(|joint| found(joint))).collect();
         let names = self.stage.joints.joints.iter().map(|joint| joint.name);
         let named = joints.iter().zip(names);
         let named = named.filter_map(|(joint, name)| Some(((*joint)?, name)));
@@ -210,7 +212,7 @@ impl Foxglove {
         }
         let (mut points, mut colours) = (Vec::new(), Vec::new());
         for &(from, to) in self.stage.joints.limbs {
-            let ends = [from, to].map(|it| joints.get(it).copied().flatten());
+            let ends = [from, to].map(|i| joints.get(i).copied().flatten());
             let [Some(from_joint), Some(to_joint)] = ends else {
                 continue;
             };

@@ -16,7 +16,7 @@ const TURN: Duration = Duration::from_millis(4);
 /// How long the last heartbeats are waited for after the last result.
 const LAST_HEARTBEATS: Duration = Duration::from_millis(500);
 
-/// What became of a recording.
+/// Outcome of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kept {
     /// Messages that were sent meanwhile and are not in the file.

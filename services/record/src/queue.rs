@@ -83,7 +83,7 @@ pub(crate) fn queue(n_topics: usize, max_bytes: u64) -> (Inlet, Outlet) {
 }
 
 impl Inlet {
-    /// Whether there is room for a message of `n_bytes`.
+    /// Returns true if there is room for a message of `n_bytes`.
     pub(crate) fn has_room(&self, n_bytes: usize) -> bool {
         let waiting = self.shared.n_bytes.load(Ordering::Acquire);
         let n_items = self.shared.n_items.load(Ordering::Acquire);
@@ -92,7 +92,7 @@ impl Inlet {
             && (waiting == 0 || waiting + n_bytes as u64 <= self.max_bytes)
     }
 
-    /// Whether the file cannot be written any more.
+    /// Returns true if the file cannot be written any more.
     pub(crate) fn is_broken(&self) -> bool {
         self.shared.is_broken.load(Ordering::Acquire)
     }

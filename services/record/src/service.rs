@@ -25,7 +25,7 @@ const LONGEST_WAIT: Duration = Duration::from_mins(1);
 /// How long the process waits for the last heartbeats after the last result.
 const LAST_HEARTBEATS: Duration = Duration::from_millis(500);
 
-/// What the process has to do.
+/// Task of the process.
 #[derive(Debug)]
 pub struct Job {
     /// The recording.
@@ -129,7 +129,7 @@ pub(crate) struct Recorder<'a> {
     /// By topic: the topics whose messages it counts.
     counts: Vec<Vec<usize>>,
     n_evidence: Vec<u64>,
-    /// Whether the last result has been received.
+    /// True if the last result has been received.
     pub(crate) is_over: bool,
 }
 
@@ -172,7 +172,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Whether there is room for a number of bytes; waits for it with lossless delivery.
+    /// Returns true if there is room for a number of bytes; waits for it with lossless delivery.
     fn has_room(&self, n_bytes: usize) -> bool {
         let Some(service) = self.service else {
             return self.inlet.has_room(n_bytes);

@@ -10,7 +10,7 @@ pub struct Topics {
     pub n_views: usize,
     /// Topics of the fusion processes, by process.
     pub fused: Vec<String>,
-    /// Whether there are processes that send expected errors.
+    /// True if there are processes that send expected errors.
     pub has_quality: bool,
     /// Views whose live cameras' pictures are kept as they came.
     pub pictures: Vec<usize>,
@@ -124,11 +124,12 @@ mod tests {
             elsewhere: vec![topic::frame(1), topic::evidence(1), topic::skeletons()],
         };
         let all = topics.channels(Without::default());
-        let names: Vec<&str> = all.iter().map(|it| it.name.as_str()).collect();
+        let names: Vec<&str> = all.iter().map(|channel| channel.name.as_str()).collect();
         let [near, far] = [0, 1].map(topic::view_pose);
         assert!(names.contains(&near.as_str()) && names.contains(&far.as_str()));
         assert!(!names.contains(&topic::frame(1).as_str()), "{names:?}");
-        let sender = |name: &str| all.iter().find(|it| it.name == name).unwrap().sender.clone();
+        let sender =
+            |name: &str| all.iter().find(|channel| channel.name == name).unwrap().sender.clone();
         assert_eq!(sender(&near).as_deref(), Some("pose-0"));
         assert_eq!(sender(&far), None);
     }

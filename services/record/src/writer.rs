@@ -39,7 +39,7 @@ pub(crate) struct Task {
     pub file: File,
     pub about: About,
     pub topics: Vec<String>,
-    /// What is written for Foxglove besides.
+    /// Messages for Foxglove, if they are written besides.
     pub foxglove: Option<Foxglove>,
 }
 

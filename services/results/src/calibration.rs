@@ -1,5 +1,5 @@
-//! Whether the cameras stand where the calibration says, and took their pictures when their times say, from what every view found on
-//! its own.
+//! Check of the cameras by the poses that every view found on its own: do they stand where the calibration says, and did they take
+//! their pictures when their times say?
 
 use std::collections::BTreeMap;
 
@@ -92,8 +92,8 @@ impl Calibration {
         self.steps.note(instant_s, points, &skews_s);
         for (view, fit) in self.fits.iter_mut().enumerate() {
             let step = self.steps.step(view);
-            fit.offset_ms = step.map(|it| it.offset_ms);
-            fit.offset_error_ms = step.map(|it| it.error_ms);
+            fit.offset_ms = step.map(|step| step.offset_ms);
+            fit.offset_error_ms = step.map(|step| step.error_ms);
             // With the footage of another camera, nothing fits.
             let is_named = self.steps.is_reported(view) && self.exchanged.is_none();
             if is_named && !fit.out_of_step {
@@ -150,7 +150,7 @@ impl Calibration {
         );
     }
 
-    /// Whether the cameras contradict each other for another reason than that two are exchanged.
+    /// Returns the contradiction between the cameras, if it has another reason than that two are exchanged.
     ///
     /// * `names`: of the views, in their order.
     pub(crate) fn contradicted(&self, names: impl Iterator<Item = String>) -> Option<Contradicted> {

@@ -13,7 +13,7 @@ const MARK: &str = ".parallax";
 #[derive(Debug, thiserror::Error)]
 #[error("cannot {doing} {}", path.display())]
 pub struct FolderError {
-    /// What was tried.
+    /// The attempted action.
     pub doing: &'static str,
     /// The file or folder.
     pub path: PathBuf,
@@ -53,7 +53,7 @@ impl Folder {
         })
     }
 
-    /// Whether a run has left all its files there under their final names.
+    /// Returns true if a run has left all its files there under their final names.
     pub fn is_finished(dir: &Path, session: u64) -> bool {
         let text =
             files::read_text(&dir.join(RunSummary::FILE), files::SETTINGS).unwrap_or_default();
@@ -262,7 +262,7 @@ fn other_than_pictures(folder: &Path, deep: usize) -> io::Result<Option<PathBuf>
             continue;
         }
         let name = entry.file_name().into_string().unwrap_or_default();
-        let number = name.split_once('.').filter(|it| matches!(it.1, "png" | "png.part"));
+        let number = name.split_once('.').filter(|parts| matches!(parts.1, "png" | "png.part"));
         if !number.is_some_and(|number| number.0.bytes().all(|digit| digit.is_ascii_digit())) {
             return Ok(Some(path));
         }

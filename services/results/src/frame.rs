@@ -50,7 +50,7 @@ pub struct Absent {
 pub struct FusedRecord {
     /// Index of the pair; 0 for all views at once in space.
     pub index: usize,
-    /// Whether there is a result.
+    /// Status of the result: good, or the reason why there is none.
     pub status: Status,
     /// When it was received and sent.
     pub timing: Timing,
@@ -100,7 +100,7 @@ impl FrameRecord {
         self.skeletons.followed()
     }
 
-    /// What a view has of the person who is followed; `None` if it has no pose.
+    /// Returns the pose of the person who is followed in a view; `None` if it has none.
     pub(crate) fn fused(&self, view: usize) -> Option<&FusedView> {
         let fused = self.followed()?.listed_views().get(view)?;
         (fused.status == Status::OK).then_some(fused)
@@ -173,13 +173,13 @@ impl FrameRecord {
     }
 }
 
-/// What a view found by itself of one person.
+/// The pose of one person that a view found alone.
 #[derive(Debug, Clone)]
 pub(crate) struct Own {
     /// The parts of the body, pixels of the frame, by the names of the view; NaN for one that is not seen.
     pub(crate) centres_px: Vec<[f64; 2]>,
     pub(crate) score: f32,
-    /// Whether the view is sure that it is a person.
+    /// True if the view is sure that it is a person.
     pub(crate) is_clear: bool,
     /// By the paper's method.
     pub(crate) pose: Option<Pose>,

@@ -26,11 +26,11 @@ pub(crate) struct Gather {
     /// The first frame that has no line yet.
     next: u64,
     frame_step: u64,
-    /// Whether an earlier epoch of this process was killed, and no result has been received since.
+    /// True if an earlier epoch of this process was killed, and no result has been received since.
     is_resumed: bool,
 }
 
-/// What a result settles.
+/// Frames that a result settles.
 #[derive(Debug)]
 pub(crate) struct Settled {
     /// Frames before it without a result, in order.
@@ -105,8 +105,8 @@ impl Gather {
         }
     }
 
-    /// Whether expected errors of a frame are still on their way: fusion used them, and their sender gives them to one receiver after
-    /// another.
+    /// Returns true if expected errors of a frame are still on their way: fusion used them, and their sender gives them to one receiver
+    /// after another.
     pub(crate) fn awaits_quality(&self, frame: u64) -> bool {
         let Some(parts) = self.frames.get(&frame) else {
             return false;

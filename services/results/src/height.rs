@@ -47,7 +47,7 @@ impl Heights {
             return;
         }
         let known = self.counts.iter().enumerate();
-        let mut known = known.filter(|(_, it)| it.values().sum::<u64>() >= MIN_POSES);
+        let mut known = known.filter(|(_, counts)| counts.values().sum::<u64>() >= MIN_POSES);
         let outside = known.find_map(|(view, counts)| {
             let px = median(counts)?;
             let [least, most] = USABLE_PX;
@@ -87,7 +87,7 @@ fn median(counts: &BTreeMap<u32, u64>) -> Option<f64> {
         n += count.1;
         n >= half
     });
-    found.map(|it| f64::from(*it.0))
+    found.map(|entry| f64::from(*entry.0))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What the process has to do.
+//! Task of the process.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use deployment::results::Config;
 
 use crate::Scene;
 
-/// What the process has to do.
+/// Task of the process.
 #[derive(Debug)]
 pub struct Job {
     /// Names and geometry that the messages refer to by number.
@@ -19,6 +19,6 @@ pub struct Job {
     pub start_frame: u64,
     /// Number of fusion workers.
     pub n_workers: usize,
-    /// Whether there are processes that send expected errors.
+    /// True if there are processes that send expected errors.
     pub has_quality: bool,
 }

@@ -103,7 +103,7 @@ impl Latency {
     /// The path of a frame, from the result back to its capture.
     fn walk(&mut self, record: &FrameRecord) -> Option<()> {
         let result = record.skeletons.timing;
-        let pair = record.fused.iter().max_by_key(|it| it.timing.sent_at_nanos)?;
+        let pair = record.fused.iter().max_by_key(|pair| pair.timing.sent_at_nanos)?;
         let view = (0..record.views.len())
             .filter(|i| record.views[*i].pose.is_some())
             .max_by_key(|i| record.views[*i].pose.map(|pose| pose.timing.sent_at_nanos))?;
@@ -176,7 +176,7 @@ impl Latency {
             let those = self.histograms.iter().filter(move |histogram| histogram.0.0 == kind);
             those
                 .filter(|those| !those.1.is_empty())
-                .map(|(key, it)| (key.1.to_owned(), percentiles(it)))
+                .map(|(key, histogram)| (key.1.to_owned(), percentiles(histogram)))
                 .collect::<BTreeMap<_, _>>()
         };
         let whole = self.total.end_to_end as f64;

@@ -26,12 +26,12 @@ impl Lines {
         })
     }
 
-    /// Whether nothing has been written yet.
+    /// Returns true if nothing has been written yet.
     pub(crate) fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Whether lines could not be written.
+    /// Returns true if lines could not be written.
     pub(crate) fn lacks_some(&self) -> bool {
         self.lacks_some
     }

@@ -30,7 +30,7 @@ impl Missing {
     }
 }
 
-/// What has been received from one view's processes.
+/// State of one view's processes, by the messages that were received.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ViewHistory {
     /// The connected ports of its capture and pose processes.
@@ -89,7 +89,7 @@ impl ViewHistory {
 
     /// Takes the ports that are connected. A process that was restarted at once was lost all the same.
     pub(crate) fn note_ports(&mut self, ports: [Vec<u128>; 2]) {
-        let is_gone = |it: &u128| !ports.iter().flatten().any(|other| other == it);
+        let is_gone = |port: &u128| !ports.iter().flatten().any(|other| other == port);
         let is_lost = self.ports.iter().flatten().any(is_gone);
         self.lost_process |= is_lost && self.last_frame.is_some();
         // A pose of a frame that capture sent before its death does not mean that capture is back.
@@ -122,7 +122,7 @@ impl ViewHistory {
         }
     }
 
-    /// Whether its capture process was not running when the frame was due.
+    /// Returns true if the capture process was not running when the frame was due.
     fn was_not_captured(&self, frame: u64) -> bool {
         let is_later = self.captured.is_some_and(|(_, last)| last < frame);
         let is_between = self.gap.is_some_and(|[last, first]| last < frame && frame < first);
@@ -148,7 +148,7 @@ mod tests {
         }
     }
 
-    /// Of a capture process, and of the `n`-th start of a pose process.
+    /// Returns the ports of a capture process, and of the `n`-th start of a pose process.
     fn ports(n: u128) -> [Vec<u128>; 2] {
         [vec![7], vec![n]]
     }

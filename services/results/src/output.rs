@@ -134,7 +134,7 @@ impl Output {
         }
     }
 
-    /// What waited for the disk too long was left out.
+    /// Writes lines for the frames that were left out because they waited for the disk too long.
     fn fill_up_to(&mut self, frame: u64) {
         let begin = self.next_frame().unwrap_or(frame);
         for frame in (begin..frame).step_by(self.scene.frame_step.max(1) as usize) {
@@ -220,7 +220,7 @@ impl Output {
         &self.scene
     }
 
-    /// What was seen so far.
+    /// Returns the summary so far.
     pub fn summary(&self) -> Summary {
         self.tally.summary()
     }

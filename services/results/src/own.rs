@@ -1,4 +1,4 @@
-//! What every view found by itself, beside the person who is followed in space.
+//! Poses that every view found alone, beside the person who is followed in space.
 
 use geometry::Camera;
 use messages::{Joint3d, SkeletonMessage};
@@ -26,7 +26,7 @@ pub(crate) fn readings(
     Some([named.clone(), exchanged.unwrap_or(named)])
 }
 
-/// Whether the solution fits the parts of a view better with the sides exchanged.
+/// Returns true if the solution fits the parts of a view better with the sides exchanged.
 pub(crate) fn is_exchanged(
     scene: &Scene,
     record: &FrameRecord,
@@ -49,7 +49,7 @@ pub(crate) fn distances_m(scene: &Scene, record: &FrameRecord) -> Vec<f64> {
         let distances = distances(scene, record, view, &readings[usize::from(is_exchanged)]);
         let mut metres: Vec<f64> = distances.iter().map(|distance| distance[1]).collect();
         metres.sort_by(f64::total_cmp);
-        Some(metres).filter(|it| !it.is_empty())
+        Some(metres).filter(|metres| !metres.is_empty())
     };
     let views: Vec<Vec<f64>> = (0..scene.views.len()).filter_map(of_view).collect();
     let is_same = |metres: &Vec<f64>| metres[metres.len() / 2] < SAME_PERSON_M;

@@ -20,7 +20,7 @@ pub(crate) struct Counted {
     follow: Follow,
     n_with_others: u64,
     most: u32,
-    /// Of all who were followed.
+    /// Ids of all who were followed.
     ids: BTreeSet<u64>,
     /// Those who are there, or may come back.
     each: BTreeMap<u64, One>,
@@ -145,7 +145,7 @@ impl Counted {
         }
     }
 
-    /// What was counted so far.
+    /// Returns the counts so far.
     pub(crate) fn people(&self) -> People {
         let each = self.each.iter().map(|(id, one)| one.summary(*id));
         let each: BTreeMap<u64, PersonSummary> =

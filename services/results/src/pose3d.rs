@@ -32,7 +32,7 @@ pub(crate) fn keypoints<'a>(
     names.zip(person.listed_keypoints())
 }
 
-/// Whether a joint has a position that can be written down.
+/// Returns true if a joint has a position that can be written down.
 pub(crate) fn is_placed(joint: &Joint3d) -> bool {
     joint.status == Status::OK && joint.in_world.iter().all(|value| value.is_finite())
 }
@@ -92,7 +92,7 @@ pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
         seen: None,
         status: FrameLine::NO_RESULT.to_owned(),
         time_s: scene.time_s(it.frame),
-        views_missing: views.map(|(view, it)| (it.name.clone(), why(view).into())).collect(),
+        views_missing: views.map(|(view, named)| (named.name.clone(), why(view).into())).collect(),
         views_present: Vec::new(),
     }
 }
@@ -135,7 +135,7 @@ pub(crate) fn missing<'a>(
 ) -> BTreeMap<&'a str, &'static str> {
     let views = scene.views.iter().zip(&record.views);
     views
-        .filter_map(|(view, it)| Some((view.name.as_str(), it.missing?.reason())))
+        .filter_map(|(view, record)| Some((view.name.as_str(), record.missing?.reason())))
         .collect()
 }
 
@@ -169,19 +169,19 @@ fn rows_of(scene: &Scene, frame: u64, person: &SkeletonMessage) -> String {
     };
     joints(scene, person)
         .chain(keypoints(scene, person))
-        .map(|(name, it)| {
-            let views = scene.names(it.views_used).join("+");
-            let numbers = if is_placed(it) {
-                let all = it.in_world.iter().chain(&it.covariance);
+        .map(|(name, joint)| {
+            let views = scene.names(joint.views_used).join("+");
+            let numbers = if is_placed(joint) {
+                let all = joint.in_world.iter().chain(&joint.covariance);
                 let mut cells: Vec<String> = all.map(|value| cell(*value)).collect();
-                cells.push(cell(it.reprojection_px));
+                cells.push(cell(joint.reprojection_px));
                 cells.join(",")
             } else {
                 ",".repeat(9)
             };
             format!(
                 "{frame},{time},{id},{name},{numbers},{views},{}\n",
-                it.status.reason()
+                joint.status.reason()
             )
         })
         .collect::<Vec<_>>()

@@ -1,4 +1,4 @@
-//! What the numbers in messages mean: names of views and joints, models, and pixels of the footage.
+//! Meaning of the numbers in messages: names of views and joints, models, and pixels of the footage.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ pub struct Scene {
     pub model: Arc<Model>,
     /// The views, as they are numbered in messages.
     pub views: Vec<View>,
-    /// Whether the candidates of a view are the people that a network sees: which of them is the person is fusion's to say.
+    /// True if the candidates of a view are the people that a network sees: fusion decides which of them is the person.
     pub has_maps: bool,
     /// Heat that half of the joints of a person have who tells whether the cameras stand where they should, 0 to 1.
     pub least_heat: f64,
@@ -56,7 +56,7 @@ impl Scene {
             .iter()
             .enumerate()
             .filter(|(view, _)| *view < 32 && mask >> view & 1 == 1)
-            .map(|(_, it)| it.name.as_str())
+            .map(|(_, view)| view.name.as_str())
             .collect()
     }
 

@@ -18,7 +18,7 @@ pub(crate) struct Smoothing {
     people: BTreeMap<u64, Person>,
     /// Those who cannot come back.
     gone: BTreeMap<u64, SmoothedPerson>,
-    /// Of every joint, then of every extra keypoint.
+    /// Names of the joints, then of the extra keypoints.
     names: Vec<String>,
     n_joints: usize,
     n_frames: u64,
@@ -124,7 +124,7 @@ impl Smoothing {
         lines::smoothed(id, measured.cloned(), joints)
     }
 
-    /// What became of it; since the process was started last.
+    /// Returns the report of the smoothing since the process was started last.
     pub(crate) fn report(&self) -> SmoothReport {
         let gone = self.gone.values().cloned();
         let people = self.people.iter().map(|(id, person)| report_of(&self.names, *id, person));
@@ -156,7 +156,7 @@ fn report_of(names: &[String], id: u64, person: &Person) -> SmoothedPerson {
 }
 
 fn add(count: &mut SmoothedJoint, it: &Smoothed) {
-    let count = match it.map(|it| it.state) {
+    let count = match it.map(|smoothed| smoothed.state) {
         Ok(State::Measured) => &mut count.measured,
         Ok(State::Exchanged) => &mut count.exchanged,
         Ok(State::Filled) => &mut count.filled,

@@ -1,4 +1,4 @@
-//! What was seen and what was missed, over the whole run.
+//! Counts of the seen and the missed, over the whole run.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -197,7 +197,7 @@ impl Tally {
         self.summary.frames + self.n_without
     }
 
-    /// What was seen so far.
+    /// Returns the summary so far.
     pub(crate) fn summary(&self) -> Summary {
         let (sum, n) = self.squared_px;
         let names = self.summary.views_used.iter().map(|views_used| &views_used.0);

@@ -10,15 +10,15 @@ pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> TimesLine {
     let pose = &record.skeletons;
     let ms = |nanos: u64| milliseconds(nanos, pose.stamp.session);
     let views = scene.views.iter().zip(&record.views);
-    let views = views.map(|(view, it)| {
-        let camera = it.frame.filter(|frame| frame.status == Status::OK);
+    let views = views.map(|(view, record)| {
+        let camera = record.frame.filter(|frame| frame.status == Status::OK);
         let times = ViewTimes {
             camera: camera.map(|camera| CameraTimes {
                 captured_ms: ms(camera.stamp.captured_at_nanos),
                 epoch: camera.stamp.epoch,
                 sent_ms: ms(camera.timing.sent_at_nanos),
             }),
-            pose: it.pose.map(|pose| PoseTimes {
+            pose: record.pose.map(|pose| PoseTimes {
                 epoch: pose.stamp.epoch,
                 sent_ms: ms(pose.timing.sent_at_nanos),
             }),

@@ -61,7 +61,7 @@ impl Trusted {
             return;
         }
         for doubt in self.trust().doubts() {
-            if !self.warned.iter().any(|it| it.is_like(&doubt)) {
+            if !self.warned.iter().any(|known| known.is_like(&doubt)) {
                 tracing::warn!("the results may be wrong: {doubt}");
                 self.warned.push(doubt);
             }
@@ -130,7 +130,7 @@ impl Trusted {
 
     fn moved(&mut self, pose: &SkeletonMessage, time_s: Option<f64>) {
         let places = (0..pose.n_joints as usize).filter_map(|joint| place(pose, joint));
-        let (sum, n) = places.fold((Vector3::zeros(), 0), |(sum, n), it| (sum + it, n + 1));
+        let (sum, n) = places.fold((Vector3::zeros(), 0), |(sum, n), at| (sum + at, n + 1));
         let Some(now_s) = time_s.filter(|_| n > 0) else {
             return;
         };
@@ -149,7 +149,7 @@ impl Trusted {
         (!scatters.is_empty()).then(|| scatters.iter().sum::<f64>() / scatters.len() as f64)
     }
 
-    /// What is known so far.
+    /// Returns the trust so far.
     pub(crate) fn trust(&self) -> Trust {
         let share = |n: u64, of: u64| n as f64 / of.max(1) as f64;
         let (sum, n) = self.squared;

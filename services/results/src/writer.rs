@@ -16,7 +16,7 @@ use crate::{Absent, Folder, FrameRecord, Output};
 /// Results that may wait to be written.
 const QUEUE: usize = 256;
 
-/// What is to be written: frames without a result, then one with a result.
+/// Records to be written: frames without a result, then one with a result.
 struct Batch {
     absent: Vec<Absent>,
     record: Option<FrameRecord>,
@@ -73,7 +73,7 @@ impl Writer {
         })
     }
 
-    /// Whether the pixels of a frame are needed.
+    /// Returns true if the pixels of a frame are needed.
     pub(crate) fn draws(&self, frame: u64) -> bool {
         let nth = frame.saturating_sub(self.start_frame) / self.frame_step;
         self.overlay_every > 0 && nth.is_multiple_of(self.overlay_every)

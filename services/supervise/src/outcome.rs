@@ -7,12 +7,12 @@ use messages::{Health, Metrics, Refusal};
 pub struct Outcome {
     /// All processes, in the order of the plan.
     pub processes: Vec<ProcessOutcome>,
-    /// Whether the run was stopped before it had finished.
+    /// True if the run was stopped before it had finished.
     pub interrupted: bool,
 }
 
 impl Outcome {
-    /// Whether a process was given up, or had not finished when all others had.
+    /// Returns true if a process was given up, or had not finished when all others had.
     pub fn is_degraded(&self) -> bool {
         self.processes.iter().any(|process| match process.state {
             State::GivenUp => true,

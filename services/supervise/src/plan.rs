@@ -14,13 +14,13 @@ pub struct Plan {
     pub executable: PathBuf,
     /// The standard input of every process, also after a restart: a file could be removed in the meantime.
     pub given: Vec<u8>,
-    /// What others of this user can read about the deployment while it runs ([`Namespace::description`]).
+    /// Description of the deployment that others of this user can read while it runs ([`Namespace::description`]).
     pub description: Vec<u8>,
     /// The location of the deployment.
     pub namespace: Namespace,
     /// The session, which goes into the stamp of every message.
     pub session: u64,
-    /// What happens when a receiver is slower than its sender.
+    /// Delivery: decides what happens when a receiver is slower than its sender.
     pub delivery: Delivery,
     /// All topics, including those of the heartbeats.
     pub topics: Vec<TopicPlan>,
@@ -41,7 +41,7 @@ pub struct ProcessSpec {
     pub service: String,
     /// Its own arguments; those of every service are added.
     pub args: Vec<OsString>,
-    /// What happens to the run without it.
+    /// Role: decides what happens to the run without the process.
     pub role: Role,
     /// Names of the processes that send to it. Once all of them are given up, it is stopped: its receivers would wait
     /// for a process that is alive and has nothing to send.
@@ -54,7 +54,7 @@ pub struct ProcessSpec {
     pub most_work: Option<u32>,
 }
 
-/// What happens to the run when a process has been given up.
+/// Consequence for the run when a process has been given up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// The run fails.

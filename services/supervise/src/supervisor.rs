@@ -21,7 +21,7 @@ const TURN: Duration = Duration::from_millis(50);
 const ASLEEP: Duration = Duration::from_secs(2);
 /// Longest time without an answer from shared memory: the transport may wait for ever for a file that was cut off.
 const LONGEST_STALL: Duration = Duration::from_mins(1);
-/// What is said then.
+/// Message after such a stall.
 const STALLED: &str = "error: shared memory of the deployment has not answered the supervisor for a minute\n  \
     hint: something else has filled, cut off or changed files in /dev/shm while they were in use: make room there; \
     `parallax clean` removes what is left\n";
@@ -379,7 +379,7 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Whether the run can go on without a process.
+    /// Returns an error if the run cannot go on without a process.
     fn check_needed(&self, index: usize, death: Death) -> Result<(), SuperviseError> {
         let watch = &self.watches[index];
         let needed = match watch.spec.role {
@@ -402,7 +402,7 @@ impl Supervisor<'_> {
         })
     }
 
-    /// Whether all processes have finished, or the others only wait: if one was given up or restarted, others
+    /// Returns true if all processes have finished, or the others only wait: if one was given up or restarted, others
     /// may never receive the end of stream.
     fn is_done(&self, now: Instant) -> bool {
         let was_lost = |watch: &Watch| watch.is_given_up() || watch.epoch > 0;

@@ -31,7 +31,7 @@ pub(crate) struct Watch {
     restarts: VecDeque<Instant>,
     /// Time of the first iteration of the main loop since the last start.
     at_work_since: Option<Instant>,
-    /// Whether the main loop ran before an earlier restart: its input was good then.
+    /// True if the main loop ran before an earlier restart: its input was good then.
     has_worked: bool,
     /// How many times in a row it died before [`Policy::steady_after`].
     n_hasty: u32,
@@ -51,7 +51,7 @@ pub(crate) struct Watch {
     /// The last received message.
     received: Change,
     work: Work,
-    /// Whether it was stopped because nothing is left that sends to it.
+    /// True if it was stopped because nothing is left that sends to it.
     pub(crate) is_dismissed: bool,
 }
 
@@ -116,7 +116,7 @@ impl Work {
     }
 }
 
-/// What follows a death.
+/// Consequence of a death.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sequel {
     /// A restart, after a pause.
@@ -235,7 +235,7 @@ impl Watch {
         self.received.at = now;
     }
 
-    /// Whether the process should be killed, and why.
+    /// Returns the reason to kill the process, if there is one.
     pub(crate) fn overdue(&self, policy: &Policy, now: Instant) -> Option<Death> {
         let child = self.child()?;
         let since = |change: Change| now.saturating_duration_since(change.at);
@@ -261,7 +261,7 @@ impl Watch {
         }
     }
 
-    /// Whether the current iteration takes far longer than any before.
+    /// Returns true if the current iteration takes far longer than any before.
     fn is_in_endless_loop(&self, policy: &Policy, now: Instant) -> bool {
         let worked = |since| now.saturating_duration_since(since) >= policy.steady_after;
         let is_too_much = |factor| {
@@ -312,7 +312,7 @@ impl Watch {
         });
     }
 
-    /// Whether it has received the end of stream and sent it on.
+    /// Returns true if it has received the end of stream and sent it on.
     pub(crate) fn is_finished(&self) -> bool {
         match self.phase {
             Phase::Ended(_) => true,
@@ -321,7 +321,7 @@ impl Watch {
         }
     }
 
-    /// Whether it waits for messages, and has received none for so long that none will come.
+    /// Returns true if it waits for messages, and has received none for so long that none will come.
     pub(crate) fn is_idle(&self, policy: &Policy, now: Instant) -> bool {
         let since = |change: Change| now.saturating_duration_since(change.at);
         self.child().is_some()
@@ -329,7 +329,7 @@ impl Watch {
             && since(self.received) > policy.idle_limit
     }
 
-    /// Whether its heartbeats report that it has finished.
+    /// Returns true if its heartbeats report that it has finished.
     pub(crate) fn reports_finished(&self) -> bool {
         self.current.is_some_and(|health| health.finished != 0)
     }
@@ -338,7 +338,7 @@ impl Watch {
         matches!(self.phase, Phase::GivenUp)
     }
 
-    /// Whether it will send nothing more, without having sent the end of its stream.
+    /// Returns true if it will send nothing more, without having sent the end of its stream.
     pub(crate) fn is_lost(&self) -> bool {
         match self.phase {
             Phase::GivenUp => true,

@@ -42,7 +42,7 @@ fn is_line(event: &Recorded, process: &str, text: &str) -> bool {
     matches!(event, Recorded::Line(name, line) if name == process && line == text)
 }
 
-/// Whether the sink reports a frame of this epoch of its sender.
+/// Returns true if the sink reports a frame of this epoch of its sender.
 fn is_from_epoch(event: &Recorded, epoch: u32) -> bool {
     let begin = format!("got {epoch} ");
     matches!(event, Recorded::Line(name, line) if name == "sink" && line.starts_with(&begin))
@@ -50,7 +50,12 @@ fn is_from_epoch(event: &Recorded, epoch: u32) -> bool {
 
 fn state_of(run: &Run, process: &str) -> State {
     let outcome = run.outcome();
-    outcome.processes.iter().find(|it| it.name == process).unwrap().state
+    outcome
+        .processes
+        .iter()
+        .find(|candidate| candidate.name == process)
+        .unwrap()
+        .state
 }
 
 #[test]

@@ -47,7 +47,7 @@ const SPIN_LIMIT: &str = "supervise.hang_limit_s=3";
 /// The outcome of the scenarios.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Whether all limits held.
+    /// True if all limits held.
     pub is_held: bool,
     /// The report as JSON; the content of `chaos.json`.
     pub json: Value,
@@ -94,10 +94,10 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
 fn chosen(requested: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>, Failure> {
     if requested.is_empty() {
         let mut all = Scenario::all();
-        all.retain(|it| it.is_possible(processes));
+        all.retain(|scenario| scenario.is_possible(processes));
         return Ok(all);
     }
-    match requested.iter().find(|it| !it.is_possible(processes)) {
+    match requested.iter().find(|scenario| !scenario.is_possible(processes)) {
         None => Ok(requested.to_vec()),
         Some(it) => {
             let why = match it {

@@ -73,7 +73,7 @@ const KILL_AFTER: f64 = 0.4;
 /// The outcome of the demo.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Whether all limits held.
+    /// True if all limits held.
     pub is_held: bool,
     /// The report as JSON; the content of `report.json`.
     pub json: Value,

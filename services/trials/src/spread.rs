@@ -36,7 +36,7 @@ impl Spread {
         let Some(spread) = spread else {
             return ["-"; 4].map(str::to_owned);
         };
-        [spread.p50, spread.p99, spread.p99_9, spread.max].map(|it| format!("{it:.digits$}"))
+        [spread.p50, spread.p99, spread.p99_9, spread.max].map(|value| format!("{value:.digits$}"))
     }
 }
 

@@ -1,4 +1,4 @@
-//! What the trials share: synthetic deployments, the injection of process faults, results, and limits.
+//! Common parts of the trials: synthetic deployments, the injection of process faults, results, and limits.
 
 pub(crate) mod synthetic;
 

@@ -45,7 +45,7 @@ enum Input {
 ///
 /// # Errors
 ///
-/// What the transport reports.
+/// Errors of the transport.
 pub fn run_in_space(service: &Service, job: &SpaceJob, mut step: SpaceStep) -> Result<(), Failure> {
     let mut stage = Stage::new(service, job.patience);
     stage.skip_when_behind(job.frame_step);

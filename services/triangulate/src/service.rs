@@ -15,12 +15,12 @@ use wire::{SolvedPerson, WireError};
 /// Identity of the person by the paper's method, which names nobody: the one who is followed.
 const UNNAMED: u64 = 1;
 
-/// What the process has to do.
+/// Task of the process.
 #[derive(Debug)]
 pub struct Job {
     /// The views of the rig.
     pub plans: Vec<Arc<ViewPlan>>,
-    /// Whether views are solved in pairs or all at once.
+    /// Grouping of the views: solved in pairs or all at once.
     pub views: Views,
     /// The pairs of the deployment; if all views are solved at once: the first view with each other one. They are assigned
     /// to the workers in turn.
@@ -42,7 +42,7 @@ pub struct Job {
 ///
 /// # Errors
 ///
-/// What the transport reports.
+/// Errors of the transport.
 pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), Failure> {
     let n_views = job.plans.len();
     let mut stage = Stage::new(service, job.patience);
@@ -96,11 +96,11 @@ enum Input {
     Pair(Box<PairInput>),
 }
 
-/// What a view found.
+/// Poses that a view found.
 #[derive(Debug)]
 struct Found {
     candidates: Vec<Pose>,
-    /// What their pictures say about the direction in which they face.
+    /// Evidence of their pictures for the direction in which they face.
     front: Vec<FrontEvidence>,
     /// How long after the instant of the frame the picture was taken, seconds.
     skew_s: f64,

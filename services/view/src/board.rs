@@ -59,7 +59,7 @@ struct Inner {
     scene: Option<Arc<Scene>>,
     /// Rung after every change.
     bells: Vec<Weak<OwnedFd>>,
-    /// Whether what runs is to be recorded; taken by the thread that looks on.
+    /// Request to begin or end a recording; taken by the thread that looks on.
     record: Option<bool>,
     /// The page that has asked for it last.
     recorder: Option<usize>,
@@ -130,7 +130,7 @@ impl Board {
         });
     }
 
-    /// What is new since a change, and the number of the last one.
+    /// Returns the messages that are new since a change, and the number of the last change.
     ///
     /// * `pictures`: whether the page shows the pictures of a view.
     pub(crate) fn since(&self, seen: u64, pictures: &[bool; MAX_VIEWS]) -> (u64, Vec<Message>) {
@@ -145,7 +145,7 @@ impl Board {
         take(&inner.state);
         take(&inner.moment);
         let shown = inner.pictures.iter().zip(pictures);
-        shown.filter(|shown| *shown.1).for_each(|it| take(it.0));
+        shown.filter(|shown| *shown.1).for_each(|slot| take(slot.0));
         let events = inner.events.iter().filter(|event| event.0 > seen);
         new.extend(events.map(|event| event.1.clone()));
         (inner.version, new)
@@ -194,7 +194,7 @@ impl Board {
         }
     }
 
-    /// What was asked about recording since the last call.
+    /// Returns the request about recording since the last call.
     pub(crate) fn take_record(&self) -> Option<bool> {
         self.lock().record.take()
     }
@@ -204,7 +204,7 @@ impl Board {
         &self.n_pages
     }
 
-    /// Whether a page is open.
+    /// Returns true if a page is open.
     pub(crate) fn has_pages(&self) -> bool {
         self.n_pages.load(Ordering::Relaxed) > 0
     }
@@ -214,9 +214,9 @@ impl Board {
         self.wanted.get(view)
     }
 
-    /// Whether a page shows the pictures of a view.
+    /// Returns true if a page shows the pictures of a view.
     pub(crate) fn wants(&self, view: usize) -> bool {
-        self.wanted(view).is_some_and(|it| it.load(Ordering::Relaxed) > 0)
+        self.wanted(view).is_some_and(|count| count.load(Ordering::Relaxed) > 0)
     }
 
     fn change(&self, change: impl FnOnce(&mut Inner, u64)) {
@@ -288,7 +288,7 @@ mod tests {
         board.begin(&json!({ "type": "hello" }), None);
         let new = board.since(0, &NONE).1;
         assert_eq!(new.len(), 1);
-        assert!(new[0].to_text().is_ok_and(|it| it.contains("hello")));
+        assert!(new[0].to_text().is_ok_and(|text| text.contains("hello")));
     }
 
     #[test]
@@ -299,7 +299,7 @@ mod tests {
         }
         let new = board.since(0, &NONE).1;
         assert_eq!(new.len(), MOST_EVENTS);
-        let last = new.last().map(|it| it.to_text().unwrap_or_default());
-        assert!(last.is_some_and(|it| it.contains("event 399")));
+        let last = new.last().map(|message| message.to_text().unwrap_or_default());
+        assert!(last.is_some_and(|text| text.contains("event 399")));
     }
 }

@@ -110,7 +110,7 @@ fn watch(mut command: Command, over: &AtomicBool) {
 fn end(mut child: Child) {
     drop(child.stdin.take());
     for _ in 0..20 {
-        if child.try_wait().is_ok_and(|it| it.is_some()) {
+        if child.try_wait().is_ok_and(|status| status.is_some()) {
             return;
         }
         std::thread::sleep(TURN);

@@ -105,7 +105,7 @@ impl Peer {
         })
     }
 
-    /// Whether the other end is a process of the same user on this machine, or of root.
+    /// Returns true if the other end is a process of the same user on this machine, or of root.
     pub(crate) fn is_same_user(self) -> bool {
         let tables = ["/proc/net/tcp", "/proc/net/tcp6"];
         let owner = tables.iter().find_map(|table| {

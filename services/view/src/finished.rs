@@ -53,7 +53,7 @@ impl Finished {
         }
     }
 
-    /// What the page has to know first.
+    /// Returns the first message to a page.
     pub(crate) fn hello(&self) -> Value {
         let (frames, name, notes) = match self {
             Self::Folder(it) => (it.frames(), it.name(), it.notes()),
@@ -95,7 +95,7 @@ impl Finished {
 pub(crate) struct Frame {
     /// Its number.
     pub number: u64,
-    /// Whether it has a skeleton, if that is known without reading it.
+    /// True if it has a skeleton, where that is known without reading it.
     pub has_pose: Option<bool>,
     /// Where it lies: bytes from the beginning of its file, or the number of its message.
     pub place: u64,

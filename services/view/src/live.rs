@@ -44,7 +44,7 @@ pub(crate) fn follow(named: Option<&str>, pictures_per_second: u32, board: &Boar
     }
 }
 
-/// What pages show while nothing runs.
+/// Returns the first message to a page while nothing runs.
 fn waiting(named: Option<&str>, why: &str) -> Value {
     json!({ "type": "hello", "mode": "waiting", "name": named, "why": why })
 }

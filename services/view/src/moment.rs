@@ -58,7 +58,7 @@ pub(crate) struct Seen {
     pub joints: Option<Vec<[f64; 2]>>,
     /// Why the view has no part in the result; none if it has one.
     pub why: Option<String>,
-    /// Whether it sees the person from behind.
+    /// True if it sees the person from behind.
     pub behind: bool,
 }
 
@@ -72,7 +72,7 @@ impl Moment {
         // Of nobody no joint is anywhere.
         let nowhere = vec![Joint3d::default(); scene.joints.joints.len()];
         let joints = person.map_or(&nowhere[..], SkeletonMessage::listed_joints);
-        let found = |it: &&Joint3d| person.is_some() && it.status == Status::OK;
+        let found = |joint: &&Joint3d| person.is_some() && joint.status == Status::OK;
         let others = message.listed().iter().skip(1);
         let views = scene.views.iter().enumerate();
         let latency = message.timing.sent_at_nanos;
@@ -90,7 +90,7 @@ impl Moment {
             joints: places(joints, person.is_some()),
             spread: joints
                 .iter()
-                .map(|it| Some(it).filter(found).and_then(|it| spread(it.covariance)))
+                .map(|joint| Some(joint).filter(found).and_then(|joint| spread(joint.covariance)))
                 .collect(),
             views: views.map(|(view, _)| seen(scene, message, view)).collect(),
             people: Some(message.n_seen).filter(|n_seen| *n_seen > 0),

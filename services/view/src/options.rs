@@ -1,9 +1,9 @@
-//! What to show, and where to listen.
+//! Options: subject of the page, and address to listen on.
 
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
-/// What a page shows.
+/// Subject of a page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Subject {
     /// A deployment while it runs, by its name; the only one that runs if there is no name.
@@ -19,9 +19,9 @@ pub enum Subject {
 pub struct Listen {
     /// The address; the port is 0 for any free one.
     pub address: SocketAddr,
-    /// Whether another port is taken if this one is in use.
+    /// True if another port is taken where this one is in use.
     pub may_move: bool,
-    /// What a page must know; none only on the loopback.
+    /// Token that a page must know; none only on the loopback.
     pub token: Option<String>,
 }
 
@@ -42,7 +42,7 @@ impl Listen {
 /// The options of a view.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Options {
-    /// What to show.
+    /// Subject of the page.
     pub subject: Subject,
     /// Where to listen.
     pub listen: Listen,

@@ -1,4 +1,4 @@
-//! What the numbers about a run mean: its cameras and joints.
+//! Meaning of the numbers about a run: its cameras and joints.
 
 use failure::Failure;
 use geometry::Camera;
@@ -24,7 +24,7 @@ pub(crate) struct Scene {
     pub up: [f64; 3],
     /// Frames per second of the footage, where known.
     pub frame_rate_hz: Option<f64>,
-    /// Whether results tell which views see the person from behind: those of the filters do.
+    /// True if results tell which views see the person from behind: those of the filters do.
     pub tells_facing: bool,
     /// Why the cameras are not known, if they are not.
     pub problem: Option<String>,
@@ -90,7 +90,7 @@ impl Scene {
         })
     }
 
-    /// What the page has to know about it.
+    /// Returns the facts about the scene that the page needs.
     pub(crate) fn json(&self) -> Value {
         let joints = self.joints.joints.iter().map(|joint| joint.name);
         let views = self.views.iter().map(|view| {

@@ -148,7 +148,7 @@ fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {
     }
 }
 
-/// Whether a host, with its port, is a name of the loopback. Any port: a tunnel has its own.
+/// Returns true if a host, with its port, is a name of the loopback. Any port: a tunnel has its own.
 fn is_loopback(host: &str) -> bool {
     let name = match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,

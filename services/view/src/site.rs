@@ -1,11 +1,11 @@
-//! What every page gets its answers from.
+//! Source of the answers to every page.
 
 use std::sync::{Arc, Mutex};
 
 use crate::board::Board;
 use crate::finished::Finished;
 
-/// What is served.
+/// Content that is served.
 #[derive(Debug, Clone)]
 pub(crate) struct Site {
     /// The newest of everything.
@@ -14,6 +14,6 @@ pub(crate) struct Site {
     pub finished: Option<Arc<Finished>>,
     /// Held while a frame of it is read: pages take turns.
     pub reading: Arc<Mutex<()>>,
-    /// What a page must know; none only on the loopback.
+    /// Token that a page must know; none only on the loopback.
     pub token: Option<String>,
 }

@@ -32,7 +32,7 @@ const MOST_REFUSED: u32 = 20;
 /// Most points whose lines are asked for at once.
 const MOST_POINTS: usize = 64;
 
-/// What a page may ask; everything that it leaves out stays.
+/// Question of a page; everything that it leaves out stays.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Question {
@@ -40,7 +40,7 @@ struct Question {
     pictures: Option<Vec<usize>>,
     /// The frame of a finished run that it shows, from 0.
     at: Option<usize>,
-    /// Whether to record what runs.
+    /// Request to begin (true) or end a recording.
     record: Option<bool>,
     /// Points whose lines in other views it shows: view, and pixel in it.
     epipolar: Option<Vec<(usize, [f64; 2])>>,
@@ -50,7 +50,7 @@ struct Question {
 struct Page {
     site: Site,
     number: usize,
-    /// Whether it may begin and end recordings: the others are of another user, and have no token.
+    /// True if it may begin and end recordings: the others are of another user, and have no token.
     may_record: bool,
     shown: [bool; MAX_VIEWS],
     seen: u64,
@@ -67,13 +67,13 @@ impl Drop for Page {
 /// A page that may be talked with.
 #[derive(Debug)]
 pub(crate) struct Opened {
-    /// What it is told first.
+    /// First response to the page.
     pub(crate) response: Response,
     /// Bytes that it has sent already.
     pub(crate) rest: Vec<u8>,
     /// Counts the page while it is open.
     pub(crate) seat: Seat,
-    /// Whether it may begin and end recordings.
+    /// True if it may begin and end recordings.
     pub(crate) may_record: bool,
 }
 
@@ -262,7 +262,7 @@ mod tests {
     use super::*;
     use crate::scene::{Scene, View};
 
-    /// What pages ask.
+    /// Questions of pages.
     const QUESTIONS: [&str; 8] = [
         r#"{"pictures":[0,1]}"#,
         r#"{"pictures":[]}"#,
@@ -349,7 +349,8 @@ mod tests {
             .map(|array| [array[0].as_u64().unwrap(), array[1].as_u64().unwrap()])
             .collect();
         assert!(
-            between.contains(&[0, 1]) && between.iter().all(|it| it.iter().all(|value| *value < 2)),
+            between.contains(&[0, 1])
+                && between.iter().all(|pair| pair.iter().all(|value| *value < 2)),
             "{between:?}"
         );
         let refused = ask(&mut page, r#"{"pictures":[-1]}"#);

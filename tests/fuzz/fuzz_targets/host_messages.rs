@@ -1,4 +1,4 @@
-//! What another host sends.
+//! Messages of another host.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|input: &[u8]| properties::host_messages(input));

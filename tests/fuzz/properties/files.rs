@@ -1,4 +1,4 @@
-//! What must hold of every reader of files, whatever is in them.
+//! Properties that hold for every reader of files, whatever is in them.
 
 use deployment::{AnyMachine, Loaded, Stage, Topology};
 use exports::{FILES, Gathering, Trial};
@@ -26,7 +26,7 @@ fn with_checksum(magic: [u8; 8], payload: &[u8]) -> Vec<u8> {
 }
 /// Deployment files; the first line may be an option of the command line.
 ///
-/// What is taken shows all its keys, is taken again as it was written out, and has processes that fit together.
+/// Accepted text shows all its keys, is accepted again as it was written out, and has processes that fit together.
 pub fn deployment_text(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -39,7 +39,7 @@ pub fn deployment_text(input: &[u8]) {
         Err(error) => {
             let told = error.to_string();
             let place = ["deployment.toml", "--set"];
-            assert!(place.iter().any(|it| told.starts_with(it)), "{told}");
+            assert!(place.iter().any(|begin| told.starts_with(begin)), "{told}");
             return;
         }
     };
@@ -51,12 +51,13 @@ pub fn deployment_text(input: &[u8]) {
     assert_eq!(again.deployment, loaded.deployment);
     let topology = Topology::new(&loaded.deployment, None, None);
     let all = topology.processes();
-    let sends = |topic: &String| all.iter().filter(|it| it.outputs.contains(topic)).count();
-    for topic in all.iter().flat_map(|it| &it.inputs) {
+    let sends =
+        |topic: &String| all.iter().filter(|process| process.outputs.contains(topic)).count();
+    for topic in all.iter().flat_map(|process| &process.inputs) {
         assert_eq!(sends(topic), 1, "{topic}");
     }
     for stage in Stage::ALL {
-        let n = all.iter().filter(|it| it.service == stage.name()).count();
+        let n = all.iter().filter(|process| process.service == stage.name()).count();
         let most = if stage == Stage::Fuse {
             topology.n_workers()
         } else {
@@ -112,7 +113,7 @@ pub fn quality_network(input: &[u8]) {
         let entries = text.lines().filter_map(|line| line.split_once('='));
         if let Ok(card) = Card::parse(entries, 2) {
             let entries = card.entries();
-            let entries = entries.iter().map(|(name, it)| (*name, it.as_str()));
+            let entries = entries.iter().map(|(name, value)| (*name, value.as_str()));
             assert_eq!(Card::parse(entries, 2), Ok(card));
         }
     }
@@ -125,7 +126,7 @@ pub fn type_table(input: &[u8]) {
         return;
     };
     let (there, back) = input.split_once('#').unwrap_or((input, input));
-    let tables = [there, back].map(|it| Compatibility::parse(it, &[2, 3]));
+    let tables = [there, back].map(|text| Compatibility::parse(text, &[2, 3]));
     if let [Ok(there), Ok(back)] = tables {
         let (_, disagreement) =
             Compatibility::joint_from_conditionals(&there, &back).expect("the same types");
@@ -133,7 +134,7 @@ pub fn type_table(input: &[u8]) {
     }
 }
 
-/// What was learned about several views: the file, and the tables that are made of it.
+/// The learned consistency of several views: the file, and the tables that are made of it.
 pub fn consistency(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -262,7 +263,7 @@ pub fn calibration(input: &[u8]) {
 
 /// Tables of corners of boards, as other programs write them.
 ///
-/// What is taken is written as it would be after it was read again.
+/// An accepted table is written as it would be after it was read again.
 pub fn board_corners(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;

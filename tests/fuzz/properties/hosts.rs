@@ -1,4 +1,4 @@
-//! What another host sends: packets, maps, signals, introductions.
+//! Messages of another host: packets, maps, signals, introductions.
 
 use bridge::hosts::{
     Answer, Clock, Content, Exchange, Expected, Head, Hello, Maps, Packet, Signal,

@@ -1,4 +1,4 @@
-//! What must hold of every decoder of messages: each begins with messages that are right, and the input
+//! Properties that hold for every decoder of messages: each begins with messages that are right, and the input
 //! says what in them is changed, ten bytes a change: field, entry, and the value.
 
 use std::sync::{Arc, OnceLock};
@@ -43,8 +43,8 @@ impl Change {
         })
     }
 
-    /// One of `n` entries.
-    fn of(self, n: usize) -> usize {
+    /// Returns an index below `n`.
+    fn below(self, n: usize) -> usize {
         usize::from(self.entry) % n
     }
 
@@ -173,7 +173,7 @@ fn change_stamp(stamp: &mut Stamp, timing: &mut Timing, it: Change) {
 }
 
 fn change_pose(pose: &mut PoseMessage, field: u8, it: Change) {
-    let part = it.of(MAX_PARTS);
+    let part = it.below(MAX_PARTS);
     match field {
         0 => pose.score = it.float(),
         1 => pose.level = it.value as u16,
@@ -235,12 +235,12 @@ fn view_pose(input: &[u8]) -> ViewPose {
             7 => message.n_candidates = it.value as u32,
             8 => message.width = it.value as u32,
             9 => message.height = it.value as u32,
-            10 => message.local[it.of(MAX_PARTS)].margin = it.float(),
-            11 => message.front[it.of(MAX_CANDIDATES)][1] = it.float(),
+            10 => message.local[it.below(MAX_PARTS)].margin = it.float(),
+            11 => message.front[it.below(MAX_CANDIDATES)][1] = it.float(),
             12 => message.n_keypoints = it.value as u32,
-            13 => message.keypoints[it.of(4)][it.of(3)] = it.float(),
-            14 => message.heats[it.of(2)][it.of(MAX_JOINTS)] = it.float(),
-            15 => message.joints[it.of(2)][it.of(MAX_JOINTS)][it.of(2)] = it.float(),
+            13 => message.keypoints[it.below(4)][it.below(3)] = it.float(),
+            14 => message.heats[it.below(2)][it.below(MAX_JOINTS)] = it.float(),
+            15 => message.joints[it.below(2)][it.below(MAX_JOINTS)][it.below(2)] = it.float(),
             _ => change_stamp(&mut message.stamp, &mut message.timing, it),
         }
     }
@@ -264,7 +264,7 @@ fn candidates(input: &[u8]) {
     let extras = wire::extras_from_message(&message, 2, message.n_candidates as usize);
     if let Ok(extras) = extras {
         let found = extras.iter().flatten();
-        assert!(found.flat_map(|it| [it.0[0], it.0[1], it.1]).all(f64::is_finite));
+        assert!(found.flat_map(|extra| [extra.0[0], extra.0[1], extra.1]).all(f64::is_finite));
     }
     if let Ok(scores) = wire::local_from_message(&message, model.n_parts()) {
         assert!(scores.iter().all(|score| score.margin.is_finite()));
@@ -278,9 +278,9 @@ fn view_quality(input: &[u8]) -> ViewQuality {
         match it.field % 5 {
             0 => message.status = Status(it.value as u32),
             1 => message.n_parts = it.value as u32,
-            2 => message.sigma_px[it.of(MAX_PARTS)] = it.float(),
+            2 => message.sigma_px[it.below(MAX_PARTS)] = it.float(),
             3 => message.n_thresholds = it.value as u32,
-            _ => message.tau_px[it.of(MAX_PARTS)] = it.float(),
+            _ => message.tau_px[it.below(MAX_PARTS)] = it.float(),
         }
     }
     message
@@ -305,7 +305,7 @@ fn pair_pose(input: &[u8]) -> PairPose {
     (message.stamp, message.timing) = stamp();
     (message.status, message.n_hypotheses) = (Status::OK, 2);
     for it in &mut message.hypotheses {
-        it.poses = [pose(), pose()].map(|it| wire::pose_to_message(&it).expect("it fits"));
+        it.poses = [pose(), pose()].map(|pose| wire::pose_to_message(&pose).expect("it fits"));
     }
     for it in Change::all(input) {
         let place = it.value.to_le_bytes()[7];
@@ -320,15 +320,16 @@ fn pair_pose(input: &[u8]) -> PairPose {
             }
             6 => message.status = Status(it.value as u32),
             7 => message.n_hypotheses = it.value as u32,
-            8 => message.views[it.of(2)] = it.value as u32,
+            8 => message.views[it.below(2)] = it.value as u32,
             9 => hypothesis.energy = it.double(),
-            10 => hypothesis.start[it.of(2)] = it.value as u8,
+            10 => hypothesis.start[it.below(2)] = it.value as u8,
             11 => hypothesis.active_parts = it.value,
             12 => hypothesis.exchanged = it.value as u32 & 1,
             13 => {
                 let side = usize::from(place & 1);
                 message.sigma_age[side] = it.value as u16;
-                message.sigma_px[side][it.of(MAX_PARTS)] = f32::from_bits((it.value >> 16) as u32);
+                message.sigma_px[side][it.below(MAX_PARTS)] =
+                    f32::from_bits((it.value >> 16) as u32);
             }
             _ => change_stamp(&mut message.stamp, &mut message.timing, it),
         }
@@ -364,15 +365,15 @@ fn result(input: &[u8]) {
         person.n_keypoints = 2;
     }
     for it in Change::all(input) {
-        let person = &mut message.people[it.of(MAX_PEOPLE)];
+        let person = &mut message.people[it.below(MAX_PEOPLE)];
         match it.field % 10 {
             0 => person.n_joints = it.value as u32,
             1 => person.n_views = it.value as u32,
-            2 => person.views[it.of(MAX_VIEWS)].n_parts = it.value as u32,
-            3 => person.joints[it.of(MAX_JOINTS)].in_world[0] = it.double(),
-            4 => person.views[it.of(MAX_VIEWS)].centres_px[0][1] = it.double(),
+            2 => person.views[it.below(MAX_VIEWS)].n_parts = it.value as u32,
+            3 => person.joints[it.below(MAX_JOINTS)].in_world[0] = it.double(),
+            4 => person.views[it.below(MAX_VIEWS)].centres_px[0][1] = it.double(),
             5 => person.n_keypoints = it.value as u32,
-            6 => person.keypoints[it.of(MAX_KEYPOINTS)].in_world[1] = it.double(),
+            6 => person.keypoints[it.below(MAX_KEYPOINTS)].in_world[1] = it.double(),
             7 => person.id = it.value,
             8 => message.n_people = it.value as u32,
             _ => message.status = Status(it.value as u32),
@@ -501,21 +502,21 @@ fn evidence(input: &[u8]) -> (EvidenceHeader, Vec<f32>) {
     let n = layout.n_responses();
     let mut values: Vec<f32> = (0..n).map(|i| (i * 37 % 101) as f32 * 0.01).collect();
     for it in Change::all(input) {
-        let level = it.of(MAX_LEVELS);
+        let level = it.below(MAX_LEVELS);
         match it.field % 14 {
             0 => header.width = it.value as u32,
             1 => header.n_levels = it.value as u32,
-            2 => header.x[it.of(2)] = it.value as u32,
-            3 => header.y[it.of(2)] = it.value as u32,
-            4 => header.scope_levels[it.of(2)] = it.value as u16,
+            2 => header.x[it.below(2)] = it.value as u32,
+            3 => header.y[it.below(2)] = it.value as u32,
+            4 => header.scope_levels[it.below(2)] = it.value as u16,
             5 => header.levels[level] = it.value as u16,
             6 => header.best[level] = it.float(),
             7 => header.size[level] = it.float(),
             8 => values.truncate(it.value as usize),
             9 => values.fill(it.float()),
             10 => header.n_people = it.value as u32,
-            11 => header.people[it.of(MAX_CANDIDATES)].size[it.of(2)] = it.value as u32,
-            12 => header.people[it.of(MAX_CANDIDATES)].cell_px[it.of(2)] = it.double(),
+            11 => header.people[it.below(MAX_CANDIDATES)].size[it.below(2)] = it.value as u32,
+            12 => header.people[it.below(MAX_CANDIDATES)].cell_px[it.below(2)] = it.double(),
             _ => {
                 let n = values.len().max(1);
                 if let Some(value) = values.get_mut((it.value >> 32) as usize % n) {

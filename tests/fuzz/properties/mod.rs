@@ -1,4 +1,4 @@
-//! What must hold of every reader and decoder, whatever it is given: the body of every fuzz target, also
+//! Properties that hold for every reader and decoder, whatever it is given: the body of every fuzz target, also
 //! run by a plain test over the seeds and their mutations.
 
 mod files;

@@ -43,7 +43,7 @@ pub enum Gap {
 }
 
 impl Gap {
-    /// What is published in its place.
+    /// Status that is published in place of the message.
     pub fn status(self) -> Status {
         match self {
             Self::Late => Status::LATE,
@@ -64,7 +64,7 @@ pub enum Place {
     Surplus,
 }
 
-/// What became of the frames and the messages of a view.
+/// Counts of the frames and messages of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Tally {
     /// Frames with a message.
@@ -111,12 +111,12 @@ impl Arrivals {
         self.next
     }
 
-    /// Whether every frame of the run has been published.
+    /// Returns true if every frame of the run has been published.
     pub fn is_over(&self) -> bool {
         self.next >= self.n_frames
     }
 
-    /// What became of the frames so far.
+    /// Returns the counts of the frames so far.
     pub fn tally(&self) -> Tally {
         self.tally
     }

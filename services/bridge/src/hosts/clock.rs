@@ -54,10 +54,10 @@ pub enum ExchangeError {
     },
 }
 
-/// What is known of another host's clock.
+/// Estimate of another host's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// What is added to our time to have theirs, nanoseconds.
+    /// Difference between their time and ours, added to ours to have theirs, nanoseconds.
     pub offset_nanos: i64,
     /// By how much a second of theirs is shorter than ours, billionths.
     pub drift_ppb: f64,
@@ -147,7 +147,7 @@ impl Clock {
             None => self.parts.push_back((part, sample)),
         }
         while self.parts.len() > N_PARTS
-            || self.parts.front().is_some_and(|it| it.0 + (N_PARTS as u64) <= part)
+            || self.parts.front().is_some_and(|front| front.0 + (N_PARTS as u64) <= part)
         {
             self.parts.pop_front();
         }
@@ -165,17 +165,17 @@ impl Clock {
         self.n_resets
     }
 
-    /// What is known at a time of ours; none before the first exchange.
+    /// Returns the estimate at a time of ours; `None` before the first exchange.
     pub fn estimate(&self, now: u64) -> Option<Estimate> {
         let all = || self.parts.iter().map(|part| part.1);
-        let best = all().min_by_key(|it| it.trip)?;
+        let best = all().min_by_key(|sample| sample.trip)?;
         let line = Line::through(&all(), best);
         let at = |time: u64| line.at(time);
-        let bound = all().map(|it| {
+        let bound = all().map(|sample| {
             // What the exchange itself bounds, how far the line misses it, and what an error of the drift makes since.
-            let off = (at(it.at) - it.offset as f64).abs();
-            let age = time_between(now, it.at).abs();
-            it.trip as f64 / 2.0 + off + line.drift_error * age
+            let off = (at(sample.at) - sample.offset as f64).abs();
+            let age = time_between(now, sample.at).abs();
+            sample.trip as f64 / 2.0 + off + line.drift_error * age
         });
         let bound = bound.fold(f64::INFINITY, f64::min);
         Some(Estimate {
@@ -187,7 +187,7 @@ impl Clock {
         })
     }
 
-    /// Whether an exchange cannot be of the clock that is known.
+    /// Returns true if an exchange cannot come from the clock that is known.
     fn contradicts(&self, sample: &Sample) -> bool {
         let Some(known) = self.estimate(sample.at) else {
             return false;
@@ -244,8 +244,8 @@ impl Line {
             drift: 0.0,
             drift_error: MOST_DRIFT,
         };
-        let first = all.clone().min_by_key(|it| it.at);
-        let last = all.clone().max_by_key(|it| it.at);
+        let first = all.clone().min_by_key(|sample| sample.at);
+        let last = all.clone().max_by_key(|sample| sample.at);
         let (Some(first), Some(last)) = (first, last) else {
             return level;
         };
@@ -284,11 +284,11 @@ fn drift_error(drift: f64, all: &(impl Iterator<Item = Sample> + Clone)) -> f64 
     let pairs = all
         .clone()
         .enumerate()
-        .flat_map(|(nth, it)| all.clone().skip(nth + 1).map(move |other| (it, other)));
-    let errors = pairs.filter_map(|(it, other)| {
-        let span = time_between(other.at, it.at);
-        let change = (i128::from(other.offset) - i128::from(it.offset)) as f64;
-        let unknown = f64::midpoint(it.trip as f64, other.trip as f64) / span.abs();
+        .flat_map(|(nth, sample)| all.clone().skip(nth + 1).map(move |other| (sample, other)));
+    let errors = pairs.filter_map(|(sample, other)| {
+        let span = time_between(other.at, sample.at);
+        let change = (i128::from(other.offset) - i128::from(sample.offset)) as f64;
+        let unknown = f64::midpoint(sample.trip as f64, other.trip as f64) / span.abs();
         (span.abs() >= LEAST_SPAN as f64).then(|| (change / span - drift).abs() + unknown)
     });
     errors.fold(MOST_DRIFT + drift.abs(), f64::min)

@@ -1,4 +1,4 @@
-//! Whether two hosts of a deployment have the same files and settings.
+//! Comparison of the files and settings of two hosts of a deployment.
 
 use formats::checksum::fnv1a;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ pub struct Fingerprint(Vec<(String, String)>);
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("{what} differs: {here} here, {there} there")]
 pub struct Difference {
-    /// What it is: `rig`, `model`.
+    /// Name of the file or setting: `rig`, `model`.
     pub what: String,
     /// Its hash on the host that compares.
     pub here: String,
@@ -31,13 +31,13 @@ impl Fingerprint {
         self.0.push((what.to_owned(), text.to_owned()));
     }
 
-    /// What the other has differently, in our order; then what only the other has.
+    /// Returns the entries that differ, in our order; then those that only the other has.
     pub fn differences(&self, other: &Self) -> Vec<Difference> {
         let find = |all: &Self, what: &str| {
-            let found = all.0.iter().find(|it| it.0 == what);
-            found.map_or_else(|| "nothing".to_owned(), |it| it.1.clone())
+            let found = all.0.iter().find(|entry| entry.0 == what);
+            found.map_or_else(|| "nothing".to_owned(), |entry| entry.1.clone())
         };
-        let only_there = other.0.iter().filter(|it| !self.0.iter().any(|own| own.0 == it.0));
+        let only_there = other.0.iter().filter(|entry| !self.0.iter().any(|own| own.0 == entry.0));
         let all = self.0.iter().chain(only_there);
         let compared = all.map(|(what, _)| Difference {
             what: what.clone(),
@@ -52,7 +52,7 @@ impl Fingerprint {
         self.0.len()
     }
 
-    /// Whether it has nothing.
+    /// Returns true if there are no entries.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

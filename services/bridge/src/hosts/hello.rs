@@ -17,7 +17,7 @@ pub struct Hello {
     pub host: String,
     /// The start of its bridge.
     pub origin: u64,
-    /// What it has.
+    /// Fingerprint of its files and settings.
     pub fingerprint: Fingerprint,
 }
 
@@ -31,7 +31,7 @@ pub enum Answer {
     Refused(Vec<Difference>),
 }
 
-/// What a host with cameras needs to know of the run.
+/// Facts about the run that a host with cameras needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Welcome {
     /// The start of the bridge of the host that fuses.
@@ -66,7 +66,7 @@ impl Hello {
         Ok(serde_json::from_slice(short(bytes)?)?)
     }
 
-    /// What it is answered.
+    /// Returns the answer to this introduction.
     ///
     /// * `is_known`: whether there is a host of that name with cameras.
     /// * `ours`: what the host that fuses has.

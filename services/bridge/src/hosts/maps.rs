@@ -51,7 +51,7 @@ pub enum MapsError {
     Length {
         /// Their length.
         len: usize,
-        /// What they say, or the shortest possible.
+        /// Length by their own head, or the shortest possible.
         expected: usize,
     },
     /// There are more than any host sends.

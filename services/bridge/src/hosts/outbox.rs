@@ -1,4 +1,4 @@
-//! What waits to be sent to another host. It never grows: of every lane the newest waits, and few are on their way.
+//! Messages that wait to be sent to another host. Bounded: the newest of every lane waits, and few are on their way.
 
 use std::collections::VecDeque;
 
@@ -7,7 +7,7 @@ const MOST_ON_WAY: usize = 3;
 /// After this time without an acknowledgement a parcel counts as lost, nanoseconds.
 const LOST_AFTER: u64 = 1_500_000_000;
 
-/// What is to be sent next.
+/// A message to be sent next.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Parcel<T> {
     /// Its lane.
@@ -16,11 +16,11 @@ pub struct Parcel<T> {
     pub sequence: u64,
     /// Parcels of its lane that newer ones overtook before they were sent.
     pub n_overtaken: u64,
-    /// What is sent.
+    /// Content of the message.
     pub item: T,
 }
 
-/// What became of the parcels of a lane.
+/// Counts of the parcels of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Sent {
     /// Offered.
@@ -78,8 +78,10 @@ impl<T> Outbox<T> {
             lane.forget_lost(now_nanos);
         }
         let ready = self.lanes.iter_mut().enumerate();
-        let ready = ready.filter(|(_, it)| it.waiting.is_some() && it.on_way.len() < MOST_ON_WAY);
-        let (index, lane) = ready.min_by_key(|(_, it)| it.on_way.len())?;
+        let ready = ready.filter(|(_, candidate)| {
+            candidate.waiting.is_some() && candidate.on_way.len() < MOST_ON_WAY
+        });
+        let (index, lane) = ready.min_by_key(|(_, candidate)| candidate.on_way.len())?;
         let item = lane.waiting.take()?;
         let sequence = lane.sent.n_sent;
         lane.sent.n_sent += 1;
@@ -97,7 +99,7 @@ impl<T> Outbox<T> {
     /// Returns how long after it was sent, nanoseconds; none if it was not on its way.
     pub fn acknowledge(&mut self, lane: usize, sequence: u64, now_nanos: u64) -> Option<u64> {
         let lane = self.lanes.get_mut(lane)?;
-        let at = lane.on_way.iter().position(|it| it.0 == sequence)?;
+        let at = lane.on_way.iter().position(|parcel| parcel.0 == sequence)?;
         let (_, sent_at) = lane.on_way[at];
         lane.on_way.drain(..=at);
         lane.sent.n_acknowledged += 1;
@@ -105,7 +107,7 @@ impl<T> Outbox<T> {
         Some(now_nanos.saturating_sub(sent_at))
     }
 
-    /// What became of the parcels of a lane.
+    /// Returns the counts of the parcels of a lane.
     pub fn sent(&self, lane: usize) -> Sent {
         self.lanes.get(lane).map_or_else(Sent::default, |lane| lane.sent)
     }
@@ -115,7 +117,7 @@ impl<T> Outbox<T> {
         self.lanes.iter().filter(|lane| lane.waiting.is_some()).count()
     }
 
-    /// Whether nothing waits, and nothing is on its way.
+    /// Returns true if nothing waits, and nothing is on its way.
     pub fn is_empty(&self) -> bool {
         self.lanes.iter().all(|lane| lane.waiting.is_none() && lane.on_way.is_empty())
     }

@@ -15,7 +15,7 @@ const MOST_FRAMES: u64 = 1 << 48;
 /// The furthest that a picture may be from the instant of its frame, nanoseconds: an hour.
 const MOST_SKEW: u64 = 3_600_000_000_000;
 
-/// What the body is.
+/// Kind of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Content {
     /// A frame as JPEG; empty without a picture.
@@ -45,11 +45,11 @@ impl Content {
 /// The head of a packet. All times are of the sending host's `CLOCK_MONOTONIC`, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Head {
-    /// What the body is.
+    /// Kind of the body.
     pub content: Content,
     /// The view.
     pub view: u32,
-    /// Whether there is a result, or why not.
+    /// Status of the result: good, or the reason why there is none.
     pub status: Status,
     /// The start of the sending bridge, a number of its own: sequences begin anew with it.
     pub origin: u64,
@@ -86,7 +86,7 @@ pub struct Packet<'a> {
     pub body: &'a [u8],
 }
 
-/// What a packet is checked against.
+/// Limits that a packet is checked against.
 #[derive(Debug, Clone, Copy)]
 pub struct Expected<'a> {
     /// The views of the sending host.
@@ -105,7 +105,7 @@ pub enum PacketError {
     Length {
         /// Its length.
         len: usize,
-        /// What its head says, or the shortest possible.
+        /// Length by its head, or the shortest possible.
         expected: usize,
     },
     /// It does not begin as packets do.
@@ -122,19 +122,19 @@ pub enum PacketError {
     /// Its bytes are not those that were sent.
     #[error("hash {got:016x} of the content, expected {expected:016x}")]
     Hash {
-        /// Of its bytes.
+        /// Hash of its bytes.
         got: u64,
-        /// What its head says.
+        /// Hash by its head.
         expected: u64,
     },
     /// A number that cannot be.
     #[error("{field} is {got}, expected {expected}")]
     Value {
-        /// Of what.
+        /// Name of the field.
         field: &'static str,
         /// Its value.
         got: u64,
-        /// What would do, or the most.
+        /// Accepted value, or the largest.
         expected: u64,
     },
 }
@@ -276,7 +276,7 @@ fn most(field: &'static str, got: u64, expected: u64) -> Result<(), PacketError>
     Ok(())
 }
 
-/// Of a head without its last field, and a body.
+/// Returns the hash of a head without its last field, and a body.
 fn hash(head: &[u8], body: &[u8]) -> u64 {
     // Of the body word by word: FNV byte by byte takes as long as a network.
     let words = body.chunks(8).fold(0xcbf2_9ce4_8422_2325_u64, |sum, word| {
@@ -372,7 +372,10 @@ mod tests {
         let sent = bytes(|_| {}, b"picture");
         let got = Packet::parse(&sent, &EXPECTED).unwrap();
         assert_eq!((got.head, got.body), (head(), &b"picture"[..]));
-        let empty = bytes(|it| (it.status, it.size) = (Status::UNPLUGGED, [0; 2]), b"");
+        let empty = bytes(
+            |head| (head.status, head.size) = (Status::UNPLUGGED, [0; 2]),
+            b"",
+        );
         assert_eq!(Packet::parse(&empty, &EXPECTED).unwrap().body, b"");
     }
 
@@ -381,14 +384,20 @@ mod tests {
         let refused = |bytes: &[u8]| Packet::parse(bytes, &EXPECTED).unwrap_err().to_string();
         for (change, words) in [
             (
-                (|it| it.view = 0) as fn(&mut Head),
+                (|head| head.view = 0) as fn(&mut Head),
                 "view of another host is 0",
             ),
-            (|it| it.frame = u64::MAX, "frame is 18446744073709551615"),
-            (|it| it.skew_nanos = i64::MIN, "skew is 9223372036854775808"),
-            (|it| it.size = [8, 8], "height is 8, expected 9"),
-            (|it| it.n_dropped = u64::MAX, "n_dropped is"),
-            (|it| it.status = Status::FROZEN, "body is 7, expected 0"),
+            (
+                |head| head.frame = u64::MAX,
+                "frame is 18446744073709551615",
+            ),
+            (
+                |head| head.skew_nanos = i64::MIN,
+                "skew is 9223372036854775808",
+            ),
+            (|head| head.size = [8, 8], "height is 8, expected 9"),
+            (|head| head.n_dropped = u64::MAX, "n_dropped is"),
+            (|head| head.status = Status::FROZEN, "body is 7, expected 0"),
         ] {
             let got = refused(&bytes(change, b"picture"));
             assert!(got.contains(words), "{words}: {got}");

@@ -11,7 +11,7 @@ const BYTES: usize = 56;
 /// A short message between two bridges. Times are of the clock of who writes them, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
-    /// What time is it there?
+    /// A question for the time of the other host.
     Ping {
         /// The start of the asking bridge.
         origin: u64,

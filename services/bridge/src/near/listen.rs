@@ -1,4 +1,4 @@
-//! What comes over the link: every packet is checked, decoded in a thread of its view, and acknowledged then.
+//! Receipt of packets over the link: every packet is checked, decoded in a thread of its view, and acknowledged then.
 
 use std::sync::{Arc, Mutex};
 
@@ -43,7 +43,7 @@ impl Arrived {
         self.head.view as usize
     }
 
-    /// Whether it goes beside another message of its frame, which is the one that counts.
+    /// Returns true if it goes beside another message of its frame, which is the one that counts.
     pub(super) fn is_beside(&self) -> bool {
         self.head.content == Content::ViewQuality
     }
@@ -185,7 +185,7 @@ struct Decoder {
     /// Where acknowledgements go.
     down: String,
     size: [u32; 2],
-    /// Of its maps, where they cross.
+    /// Properties of the view's maps, if they are sent.
     maps: Option<ViewMaps>,
     arrived: Sender<Arrived>,
 }

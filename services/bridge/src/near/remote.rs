@@ -1,4 +1,4 @@
-//! What is known of another host.
+//! State of another host.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -18,7 +18,7 @@ pub(super) struct Remote {
     state: Mutex<State>,
 }
 
-/// What changes.
+/// The part of a remote host that changes.
 #[derive(Debug, Default, Clone)]
 pub(super) struct State {
     pub(super) clock: Clock,
@@ -62,12 +62,12 @@ impl Remote {
         self.state().heard_at = Some(now);
     }
 
-    /// Whether it was welcomed, and heard lately.
+    /// Returns true if it was welcomed, and heard lately.
     pub(super) fn is_there(&self, now: u64) -> bool {
         self.state().is_there(now)
     }
 
-    /// What is known of its clock.
+    /// Returns the estimate of its clock.
     pub(super) fn estimate(&self, now: u64) -> Option<Estimate> {
         self.state().clock.estimate(now)
     }

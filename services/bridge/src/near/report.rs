@@ -87,7 +87,7 @@ impl Report {
             .enumerate()
             .map(|(index, remote)| {
                 let own = views.iter().filter(|view| view.1 == index);
-                self.host(remote, own.map(|it| (it.0, it.2)))
+                self.host(remote, own.map(|view| (view.0, view.2)))
             })
             .collect();
         let seconds = self.begin.elapsed().as_secs_f64();
@@ -103,13 +103,13 @@ impl Report {
     fn host(&self, remote: &Remote, views: impl Iterator<Item = (usize, Tally)>) -> Value {
         let now = now_nanos();
         let state = remote.state().clone();
-        let clock = state.clock.estimate(now).map(|it| {
+        let clock = state.clock.estimate(now).map(|clock| {
             json!({
-                "offset_ms": it.offset_nanos as f64 * 1e-6,
-                "drift_ppm": it.drift_ppb * 1e-3,
-                "bound_ms": it.bound_nanos as f64 * 1e-6,
-                "trip_ms": it.trip_nanos as f64 * 1e-6,
-                "exchanges": it.n_exchanges,
+                "offset_ms": clock.offset_nanos as f64 * 1e-6,
+                "drift_ppm": clock.drift_ppb * 1e-3,
+                "bound_ms": clock.bound_nanos as f64 * 1e-6,
+                "trip_ms": clock.trip_nanos as f64 * 1e-6,
+                "exchanges": clock.n_exchanges,
                 "resets": state.clock.n_resets(),
             })
         });
@@ -145,10 +145,10 @@ impl Report {
             "surplus": tally.n_surplus,
             "overtaken": times.map_or(0, |time| time.n_overtaken),
             "bytes": times.map_or(0, |time| time.n_bytes),
-            "encode": of(|it| &it.encode),
-            "network": of(|it| &it.network),
-            "decode": of(|it| &it.decode),
-            "all": of(|it| &it.all),
+            "encode": of(|times| &times.encode),
+            "network": of(|times| &times.network),
+            "decode": of(|times| &times.decode),
+            "all": of(|times| &times.all),
         })
     }
 }

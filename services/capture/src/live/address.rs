@@ -1,4 +1,4 @@
-//! What live camera to open, and how.
+//! Settings of a live camera: address, format, size, rate, controls.
 
 use std::collections::BTreeMap;
 
@@ -18,11 +18,11 @@ pub struct LiveCamera {
     pub size: Option<[u32; 2]>,
     /// Pictures per second; none for what the camera has.
     pub rate_hz: Option<f64>,
-    /// What to set of a device, by name.
+    /// Controls to set on a device, by name.
     pub controls: BTreeMap<String, i64>,
     /// How packets of an RTSP camera travel.
     pub transport: Option<Transport>,
-    /// Whether the times that an RTSP camera tells of its pictures are used, where they can be right.
+    /// True if the times that an RTSP camera tells of its pictures are used, where they can be right.
     pub has_own_clock: bool,
 }
 
@@ -166,7 +166,7 @@ impl LiveCamera {
         Ok((mode, pixels.ok_or_else(unknown)?))
     }
 
-    /// Whether it is read over HTTP.
+    /// Returns true if the camera is read over HTTP.
     pub(super) fn is_http(&self) -> bool {
         let LiveAddress::Stream(address) = &self.address else {
             return false;

@@ -29,15 +29,15 @@ impl Least {
         if all.back().is_some_and(is_jump) {
             all.clear();
         }
-        while all.back().is_some_and(|it| it.1 >= number) {
+        while all.back().is_some_and(|last| last.1 >= number) {
             all.pop_back();
         }
         all.push_back((at_nanos, number));
         let begin = at_nanos.saturating_sub(WINDOW_NANOS);
-        while all.front().is_some_and(|it| it.0 < begin) {
+        while all.front().is_some_and(|first| first.0 < begin) {
             all.pop_front();
         }
-        all.front().map_or(number, |it| it.1)
+        all.front().map_or(number, |least| least.1)
     }
 }
 
@@ -58,7 +58,7 @@ impl ClockMap {
     }
 }
 
-/// What the clock of a camera is taken for.
+/// Verdict on the clock of a camera.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) enum Verdict {
     /// Too few pictures so far.
@@ -78,7 +78,7 @@ pub(super) enum Verdict {
 pub(super) struct OwnClock {
     least: Least,
     n: u32,
-    /// What it is taken for.
+    /// Verdict so far.
     pub(super) verdict: Verdict,
     /// The shortest delay of the last ten seconds, nanoseconds.
     pub(super) delay_nanos: i64,

@@ -64,7 +64,7 @@ impl Grid {
         at_nanos.cast_signed().wrapping_sub(self.start_nanos.cast_signed()) as f64 / self.period
     }
 
-    /// What is wrong with the time of a picture: equal to or before that of the one before, or not of this moment.
+    /// Returns the fault of the time of a picture: equal to or before that of the one before, or not of this moment.
     pub(crate) fn wrong_clock(&mut self, at_nanos: u64, arrived_at_nanos: u64) -> Option<Status> {
         if at_nanos.abs_diff(arrived_at_nanos) > MAX_OFF_NANOS {
             return Some(Status::CLOCK_JUMPED);
@@ -144,7 +144,7 @@ mod tests {
     }
 
     fn n_surplus(all: &[Option<u64>]) -> usize {
-        all.iter().filter(|it| it.is_none()).count()
+        all.iter().filter(|instant| instant.is_none()).count()
     }
 
     #[test]

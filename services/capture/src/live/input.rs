@@ -23,7 +23,7 @@ const SILENCE_NANOS: u64 = 5_000_000_000;
 /// A gap between two times of a stream beyond which pictures are missing, in periods.
 const GAP: f64 = 1.5;
 
-/// What was read of a camera.
+/// One picture as read from a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Taken {
     /// When it was taken, `CLOCK_MONOTONIC`, nanoseconds.
@@ -34,9 +34,9 @@ pub(super) struct Taken {
     pub n_lost: u64,
     /// Pictures before it that were lost for want of a buffer, because this process was slow.
     pub n_overtaken: u64,
-    /// Whether its pixels are good.
+    /// True if its pixels are good.
     pub is_whole: bool,
-    /// What says when it was taken.
+    /// Clock that says when it was taken.
     pub timed_by: TimedBy,
     /// The shortest delay of its pictures by the camera's own clock, believed or not, nanoseconds; none where that is not known.
     pub delay_nanos: Option<i64>,
@@ -82,7 +82,7 @@ impl Input {
         }
     }
 
-    /// What to recognise the device by.
+    /// Returns the properties by which the device is recognised.
     pub(super) fn about(&self) -> Option<VideoAbout> {
         match self {
             Self::Device(it) => Some(it.about.clone()),
@@ -213,7 +213,7 @@ fn again(path: &Path, about: &VideoAbout) -> Result<VideoDevice, LiveError> {
         let Ok(device) = VideoDevice::open(&other) else {
             continue;
         };
-        if device.about().is_ok_and(|it| it == *about) {
+        if device.about().is_ok_and(|found| found == *about) {
             tracing::warn!(was = %path.display(), now = %other.display(), "this camera has another number now");
             return Ok(device);
         }
@@ -349,7 +349,7 @@ fn settled_picture(
     let mut n_whole = 0;
     loop {
         let taken = input.next(&mut rgb)?;
-        n_whole += usize::from(taken.is_some_and(|it| it.is_whole));
+        n_whole += usize::from(taken.is_some_and(|taken| taken.is_whole));
         if n_whole > n_skipped {
             return Ok(rgb);
         }

@@ -16,7 +16,7 @@ const SAME_NANOS: u64 = 1_000_000;
 /// A picture as it came.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Original {
-    /// What its bytes are, as [`messages::PictureHeader::format`].
+    /// Format of its bytes, as [`messages::PictureHeader::format`].
     pub format: [u8; 4],
     pub bytes: Vec<u8>,
     /// When it was taken, and when it was here; `CLOCK_MONOTONIC`, nanoseconds.
@@ -168,7 +168,7 @@ impl KeptStream {
 
     /// When the picture of a piece was taken: as its decoded one, else by the distance to the last.
     fn taken_at(&self, nanos: i64) -> u64 {
-        let is_it = |it: &&(i64, u64)| it.0.abs_diff(nanos) <= SAME_NANOS;
+        let is_it = |decoded: &&(i64, u64)| decoded.0.abs_diff(nanos) <= SAME_NANOS;
         if let Some(&(_, at)) = self.decoded.iter().find(is_it) {
             return at;
         }

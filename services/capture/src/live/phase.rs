@@ -20,7 +20,7 @@ pub(crate) struct Phase {
     measured: VecDeque<(u64, i64)>,
     /// Periods that were added so far, nanoseconds.
     added: i64,
-    /// Whether the times are those of the camera's own clock.
+    /// True if the times are those of the camera's own clock.
     is_own_time: bool,
 }
 
@@ -56,7 +56,7 @@ impl Phase {
         if self.newest.len() < N_PICTURES {
             return false;
         }
-        self.newest.sort_unstable_by_key(|it| it.1);
+        self.newest.sort_unstable_by_key(|picture| picture.1);
         let (_, skew) = self.newest[N_PICTURES / 2];
         self.newest.clear();
         let period = self.period_nanos.max(1).cast_signed();
@@ -89,21 +89,21 @@ impl Phase {
         }
         let n = self.measured.len() as f64;
         let from = *ends.0;
-        let place = |it: &(u64, i64)| {
+        let place = |picture: &(u64, i64)| {
             (
-                (it.0.wrapping_sub(from.0)) as f64,
-                it.1.wrapping_sub(from.1) as f64,
+                (picture.0.wrapping_sub(from.0)) as f64,
+                picture.1.wrapping_sub(from.1) as f64,
             )
         };
         let sums = self.measured.iter().map(place);
-        let (x, y) = sums.fold((0.0, 0.0), |sum, it| (sum.0 + it.0, sum.1 + it.1));
+        let (x, y) = sums.fold((0.0, 0.0), |sum, point| (sum.0 + point.0, sum.1 + point.1));
         let (x, y) = (x / n, y / n);
         let products = self
             .measured
             .iter()
             .map(place)
-            .map(|it| it.0 - x)
-            .zip(self.measured.iter().map(place).map(|it| it.1 - y));
+            .map(|point| point.0 - x)
+            .zip(self.measured.iter().map(place).map(|point| point.1 - y));
         let (above, below) =
             products.fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x * y, sum.1 + x * x));
         (below > 0.0).then(|| (1e9 * above / below).round() as i64)

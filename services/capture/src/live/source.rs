@@ -35,11 +35,11 @@ pub(crate) struct Picture {
     pub arrived_at_nanos: u64,
     /// Pictures before it that it has overtaken: this process was slow.
     pub n_overtaken: u64,
-    /// What says when it was taken.
+    /// Clock that says when it was taken.
     pub timed_by: TimedBy,
 }
 
-/// What became of the pictures up to here.
+/// Counts of the pictures up to here.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Tally {
     pub n_connections: u64,
@@ -163,7 +163,7 @@ impl Drop for Source {
     }
 }
 
-/// What the thread has.
+/// State of the thread that keeps the camera open.
 struct Keeper {
     shared: Arc<Shared>,
     camera: LiveCamera,

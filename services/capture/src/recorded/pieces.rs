@@ -20,7 +20,7 @@ pub(super) fn from(
     let parts = &table.parts;
     let is_of = |part: &Part| part.connection == first.connection;
     let own: Vec<Part> = parts.iter().copied().filter(is_of).collect();
-    let here = own.iter().position(|it| it.entry == first.entry);
+    let here = own.iter().position(|part| part.entry == first.entry);
     let head = |part: &Part| part.format == *b"MKV0";
     let begin = own[..here.unwrap_or(0)].iter().rposition(head);
     let mut state = State::Begin;
@@ -28,7 +28,7 @@ pub(super) fn from(
     let mut buffer = Buffer::default();
     let from_begin = own.into_iter().skip(begin.unwrap_or(0));
     Ok(from_begin.filter_map(move |part| {
-        let is_next = last.is_none_or(|it: u64| it.checked_add(1) == Some(part.number));
+        let is_next = last.is_none_or(|number: u64| number.checked_add(1) == Some(part.number));
         last = Some(part.number);
         let read = recording::read(&mut input, Kind::Picture, &part.entry, &mut buffer);
         let message = read.ok();
@@ -42,7 +42,7 @@ pub(super) fn from(
     }))
 }
 
-/// What may follow.
+/// State of the stream: decides which pieces may follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     /// Nothing was sent.

@@ -33,7 +33,7 @@ pub(super) struct Picture {
 }
 
 impl Picture {
-    /// Whether it is a piece of a stream.
+    /// Returns true if the picture is a piece of a stream.
     pub(super) fn is_piece(&self) -> bool {
         is_stream(self.format)
     }
@@ -86,7 +86,7 @@ impl Table {
             };
             let name = name_of(&first);
             if name == camera[..camera.floor_char_boundary(MAX_NAME)] {
-                return Self::of(camera, &first, &heads, rate_hz);
+                return Self::from_heads(camera, &first, &heads, rate_hz);
             }
             known.push(name);
         }
@@ -96,7 +96,7 @@ impl Table {
         })
     }
 
-    fn of(
+    fn from_heads(
         camera: &str,
         first: &PictureHeader,
         heads: &[(Entry, PictureHeader)],
@@ -133,15 +133,15 @@ impl Table {
 
     /// Gives every instant its picture.
     fn place(&mut self, heads: &[(Entry, PictureHeader)]) {
-        let is_picture = |it: &&(Entry, PictureHeader)| {
-            let header = &it.1;
+        let is_picture = |picture: &&(Entry, PictureHeader)| {
+            let header = &picture.1;
             header.status == Status::OK
                 && header.format != *b"MKV0"
                 && [header.width, header.height].map(|value| value as usize)
                     == [self.size.width, self.size.height]
         };
         let mut by_time: Vec<_> = heads.iter().filter(is_picture).collect();
-        by_time.sort_by_key(|it| it.1.stamp.captured_at_nanos);
+        by_time.sort_by_key(|picture| picture.1.stamp.captured_at_nanos);
         let times = by_time.iter().map(|by_time| by_time.1.stamp.captured_at_nanos);
         self.grid.learn(times);
         let mut next = 0;
@@ -184,7 +184,7 @@ impl Table {
     /// The first picture after those of the connection of another.
     pub(super) fn after_connection(&self, at: usize) -> usize {
         let rest = self.pictures.get(at..).unwrap_or_default();
-        let n = rest.iter().take_while(|it| it.connection == rest[0].connection);
+        let n = rest.iter().take_while(|picture| picture.connection == rest[0].connection);
         at + n.count()
     }
 
@@ -193,7 +193,7 @@ impl Table {
         let from = (connection, label_nanos.saturating_sub(SAME_NANOS));
         let to = (connection, label_nanos.saturating_add(SAME_NANOS));
         let near = self.labels.range(from..=to);
-        let nearest = near.min_by_key(|it| it.0.1.abs_diff(label_nanos));
+        let nearest = near.min_by_key(|label| label.0.1.abs_diff(label_nanos));
         nearest.map(|nearest| *nearest.1)
     }
 

@@ -1,4 +1,4 @@
-//! What is known of the pictures of every camera before the run: of files, and of live cameras.
+//! Properties of the pictures of every camera before the run: of files, and of live cameras.
 
 use std::path::Path;
 use std::thread;
@@ -15,7 +15,7 @@ use super::{Footage, advice, source};
 /// Frames of a live camera that runs until it is stopped: the most of any footage.
 pub(crate) const ENDLESS: u64 = 1_000_000_000_000;
 
-/// Whether the source of a camera is live: a file of such a name is none.
+/// Returns true if the source of a camera is live: a file of such a name is none.
 pub fn is_live(source: &str) -> bool {
     footage::is_live(source) && !Path::new(source).is_file()
 }
@@ -64,7 +64,7 @@ pub(crate) fn footage(
                 }
                 None => elsewhere(deployment, camera),
                 Some(Ok(found)) => {
-                    found.map(|it| of_live(it, capture)).map_err(|error| refused(error, camera))
+                    found.map(|look| of_live(look, capture)).map_err(|error| refused(error, camera))
                 }
                 Some(Err(_panic)) => {
                     Err(Failure::new(ExitKind::Run, "a camera could not be asked"))
@@ -169,12 +169,12 @@ fn of_live((size, rate_hz): (footage::Size, f64), capture: &Config) -> Footage {
     }
 }
 
-/// What is known of a camera of another host.
+/// Returns the properties of a camera of another host.
 fn elsewhere(deployment: &Deployment, camera: &Camera) -> Result<Footage, Failure> {
     let capture = &deployment.capture;
     let rig = inputs::rig_of(deployment)?;
     // One that is not in the rig is reported later, by name.
-    let size = rig.camera(&camera.name).map_or([1; 2], |it| it.intrinsics.size);
+    let size = rig.camera(&camera.name).map_or([1; 2], |camera| camera.intrinsics.size);
     let rate_hz = capture.frame_rate_hz;
     Ok(Footage {
         size,

@@ -1,4 +1,4 @@
-//! What the files of cameras say of themselves: how their pictures are to be turned, and which frames their numbers are.
+//! Facts that the files of cameras hold about their pictures: how these are to be turned, and which frames their numbers are.
 
 use deployment::Deployment;
 use deployment::capture::{Camera, Rotate, Tag};
@@ -63,7 +63,7 @@ fn turn(deployment: &mut Deployment, files: &[usize]) -> Result<(), Failure> {
 /// How the pictures of a file are turned for a camera of a rig; logs what is done.
 pub fn rotation(source: &str, camera: &str, rig: &Rig) -> Rotation {
     let is_turned =
-        Tagged::read(source).is_some_and(|it| it.does_turn(camera, &with_up(rig.clone())));
+        Tagged::read(source).is_some_and(|tagged| tagged.does_turn(camera, &with_up(rig.clone())));
     if is_turned {
         Rotation::Tag
     } else {
@@ -89,7 +89,7 @@ impl<'a> Tagged<'a> {
         })
     }
 
-    /// Whether the calibration of a camera is of the turned picture; logs it.
+    /// Returns true if the calibration of a camera is of the turned picture; logs the reason.
     fn does_turn(&self, camera: &str, rig: &Rig) -> bool {
         let (does_turn, why) = by_calibration(camera, rig, self.stored, self.tag);
         let done = if does_turn {
@@ -119,7 +119,7 @@ fn with_up(rig: Rig) -> Rig {
     level.unwrap_or(rig)
 }
 
-/// Whether a calibration is of the turned picture, and why it seems so.
+/// Returns true if a calibration is of the turned picture, and the reason for it.
 fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, String) {
     const BY_HAND: &str = "`rotate = 0` (as they are stored) or `rotate = \"tag\"` of the [[camera]] says it for good";
     let Some(camera) = rig.camera(name) else {
@@ -159,16 +159,23 @@ fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, Stri
 }
 
 fn count(deployment: &mut Deployment, files: &[usize]) {
-    let is_open = |it: &&usize| deployment.cameras[**it].numbers.is_none();
-    let numbered = files.iter().filter(is_open).filter_map(|&it| {
-        let numbers = footage::picture_numbers(&deployment.cameras[it].source);
-        Some((it, numbers.ok()??))
+    let is_open = |file: &&usize| deployment.cameras[**file].numbers.is_none();
+    let numbered = files.iter().filter(is_open).filter_map(|&file| {
+        let numbers = footage::picture_numbers(&deployment.cameras[file].source);
+        Some((file, numbers.ok()??))
     });
     let (cameras, numbers): (Vec<usize>, Vec<Vec<u64>>) = numbered.unzip();
     let name = |nth: usize| &deployment.cameras[cameras[nth]].name;
     let ends = || {
         let all = numbers.iter().enumerate();
-        let all = all.map(|(nth, it)| format!("{} {} to {}", name(nth), it[0], it[it.len() - 1]));
+        let all = all.map(|(nth, numbers)| {
+            format!(
+                "{} {} to {}",
+                name(nth),
+                numbers[0],
+                numbers[numbers.len() - 1]
+            )
+        });
         all.collect::<Vec<_>>().join(", ")
     };
     if numbers.is_empty() {
@@ -222,7 +229,7 @@ fn gaps(numbers: &[u64], counted: PictureNumbers) -> Option<String> {
     let missing: Vec<[u64; 2]> = numbers
         .windows(2)
         .map(|pair| [frame(pair[0]) + 1, frame(pair[1])])
-        .filter(|it| it[1] > it[0])
+        .filter(|range| range[1] > range[0])
         .collect();
     let n: u64 = missing.iter().map(|missing| missing[1] - missing[0]).sum();
     let named = missing.iter().take(MOST_NAMED).map(|[from, end]| {

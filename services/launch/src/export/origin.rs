@@ -1,4 +1,4 @@
-//! What is exported: the folder of a run, or its recording.
+//! Source of an export: the folder of a run, or its recording.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
@@ -36,12 +36,12 @@ impl Lines {
     }
 }
 
-/// What the user says about a run.
+/// Options of the user for a run.
 #[derive(Debug, Clone, Default)]
 pub struct Given {
-    /// What the files call it.
+    /// Name of the trial in the files.
     pub name: String,
-    /// What they call the points.
+    /// Names of the points in the files.
     pub naming: Naming,
     /// Which trajectories.
     pub lines: Lines,
@@ -54,13 +54,13 @@ pub struct Given {
 /// A run to be exported.
 #[derive(Debug)]
 pub struct Origin {
-    /// What was found of each person; at least one.
+    /// Trajectories of each person; at least one.
     pub trials: Vec<Trial>,
     /// The folder or the recording.
     pub source: PathBuf,
     /// Which trajectories of it.
     pub lines: Lines,
-    /// What of the run is missing or damaged, in words.
+    /// Missing or damaged parts of the run, in words.
     pub flaws: Vec<String>,
     /// Why it is not known which way is up; none where the rig has been asked, even if it does not know.
     pub up_unknown: Option<String>,
@@ -111,9 +111,9 @@ impl Origin {
         // All have the same places.
         check_rate(&trials[0], given)?;
         flaws.extend(of_times(&trials[0], n_lines));
-        let setup = resolved.and_then(|it| {
-            let rig = inputs::rig_of(&it.deployment).map_err(|error| error.to_string())?;
-            Ok((it, rig))
+        let setup = resolved.and_then(|resolved| {
+            let rig = inputs::rig_of(&resolved.deployment).map_err(|error| error.to_string())?;
+            Ok((resolved, rig))
         });
         let up_in_world = given.up.or_else(|| setup.as_ref().ok()?.1.up_in_world());
         for trial in &mut trials {
@@ -170,7 +170,7 @@ fn check_rate(trial: &Trial, given: &Given) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What is wrong with the frames and their times.
+/// Returns the faults of the frames and their times.
 fn of_times(trial: &Trial, n_lines: usize) -> Vec<String> {
     let mut flaws = Vec::new();
     if trial.n_repeated > 0 {
@@ -226,7 +226,7 @@ fn lines(
     flaws: &mut Vec<String>,
 ) -> Result<Gathering, Failure> {
     let name = which.file();
-    let [whole, part] = [name.to_owned(), format!("{name}.part")].map(|it| folder.join(it));
+    let [whole, part] = [name.to_owned(), format!("{name}.part")].map(|name| folder.join(name));
     let is_whole = whole.exists() || !part.exists();
     let path = if is_whole { whole } else { part };
     let file = files::open(&path).map_err(|error| {

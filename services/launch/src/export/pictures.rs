@@ -83,7 +83,7 @@ impl Pictures {
                 while !*is_over && at.is_none_or(|at| at < frame) {
                     let next = feed.next_frame().or_fail(ExitKind::Input)?;
                     *is_over = next.is_none();
-                    *at = next.map(|it| it.index).or(*at);
+                    *at = next.map(|frame| frame.index).or(*at);
                 }
                 let is_it = *at == Some(frame) && feed.pixels().len() == n_bytes;
                 Ok(is_it.then(|| feed.pixels()))
@@ -152,7 +152,7 @@ fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, Str
 fn recorded(origin: &Origin, recording: &Recording, nth: usize) -> Option<From> {
     let track = recording.tracks.get(&topic::frame(nth))?;
     let has_pixels = !recording.about.as_ref().is_ok_and(|about| about.without.pixels);
-    let frames = track.entries.iter().filter_map(|it| Some((it.frame?, *it)));
+    let frames = track.entries.iter().filter_map(|entry| Some((entry.frame?, *entry)));
     has_pixels.then_some(From::Recording {
         path: origin.source.clone(),
         file: files::open(&origin.source).ok()?,

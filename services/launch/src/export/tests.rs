@@ -35,7 +35,7 @@ fn person(id: u64, x_m: f64) -> String {
         r#"{{"covariance_m2":[1e-4,0,0,1e-4,0,1e-4],"position_m":[{x_m:?},2.0,3.0],"reprojection_px":1.0,"views":["a"]}}"#
     );
     let joints = skeleton::PARSE14.joints.iter();
-    let joints = joints.map(|it| format!("\"{}\":{joint}", it.name));
+    let joints = joints.map(|named| format!("\"{}\":{joint}", named.name));
     let joints = joints.collect::<Vec<_>>().join(",");
     format!(
         r#"{{"facing_margin":null,"id":{id},"joints":{{{joints}}},"pairs":1,"status":"ok","views_used":["a"]}}"#
@@ -77,7 +77,7 @@ fn run(files: &[(&str, &str)]) -> tempfile::TempDir {
 fn job(folder: &Path, formats: &[&str]) -> Job {
     let all = Format::all().into_iter();
     Job {
-        formats: all.filter(|it| formats.contains(&it.name())).collect(),
+        formats: all.filter(|format| formats.contains(&format.name())).collect(),
         out: folder.join("export"),
         name: "x".to_owned(),
         force: false,

@@ -44,7 +44,7 @@ impl Eyes {
         self.joints.names()
     }
 
-    /// Whether sides follow the picture.
+    /// Returns true if sides follow the picture.
     pub(super) fn as_seen(&self) -> bool {
         self.joints.card().keypoints.sides == Sides::Seen
     }
@@ -97,7 +97,7 @@ impl Watch {
         // Tells the boxes of the next picture.
         self.step.sightings(&mut self.memory);
         let found = |maps: &JointMaps| {
-            let each = (0..self.n_keypoints).map(|i| maps.keypoint(i).map(|it| it.0));
+            let each = (0..self.n_keypoints).map(|i| maps.keypoint(i).map(|found| found.0));
             each.collect()
         };
         Ok(self.memory.maps().map(found).collect())

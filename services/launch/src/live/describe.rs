@@ -60,7 +60,7 @@ pub fn measured(reading: &Reading) -> Value {
     })
 }
 
-/// What became of the pictures of a live camera.
+/// Returns the counts of the pictures of a live camera as JSON.
 fn camera(it: &CameraCounts) -> Value {
     json!({
         "connections": it.n_connections,

@@ -88,12 +88,12 @@ impl Snapshot {
         let readings = self.processes.iter().filter_map(|process| process.reading.as_ref());
         readings
             .filter_map(|reading| reading.view.as_ref())
-            .filter(|it| !it.name.is_empty())
-            .map(|it| (it.index, it.name.as_str()))
+            .filter(|view| !view.name.is_empty())
+            .map(|view| (view.index, view.name.as_str()))
             .collect()
     }
 
-    /// Whether every live process has sent metrics.
+    /// Returns true if every live process has sent metrics.
     pub(super) fn is_complete(&self) -> bool {
         let is_starting =
             |process_snapshot: &ProcessSnapshot| process_snapshot.state == State::Starting;
@@ -110,7 +110,7 @@ impl ProcessSnapshot {
             Some(Ok(reading)) => (Some(reading), None),
             Some(Err(problem)) => (None, Some(problem)),
         };
-        let current = reading.as_ref().filter(|it| observed.pid == Some(it.pid));
+        let current = reading.as_ref().filter(|reading| observed.pid == Some(reading.pid));
         let state = match (observed.pid, current) {
             (None, _) => State::Dead,
             (Some(_), None) if problem.is_none() => State::Starting,
@@ -132,7 +132,7 @@ impl ProcessSnapshot {
 /// The sort key of a process: position of its service in the pipeline, index, name.
 fn sort_key(process: &str) -> (usize, usize, String) {
     let (service, index) = process.split_once('-').unwrap_or((process, "0"));
-    let nth = SERVICES.iter().position(|it| *it == service);
+    let nth = SERVICES.iter().position(|name| *name == service);
     let index = index.parse().unwrap_or(usize::MAX);
     (nth.unwrap_or(SERVICES.len()), index, process.to_owned())
 }

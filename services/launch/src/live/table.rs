@@ -53,7 +53,7 @@ const CAMERAS: [&str; 13] = [
     "<TIMED BY",
 ];
 
-/// What became of the pictures of live cameras; empty without any.
+/// Returns the table of the pictures of live cameras; empty without any.
 fn cameras(snapshot: &Snapshot) -> String {
     let rows: Vec<Vec<String>> = snapshot
         .processes
@@ -74,7 +74,7 @@ fn cameras(snapshot: &Snapshot) -> String {
                     it.n_overtaken,
                     it.n_refused,
                 ]
-                .map(|it| it.to_string()),
+                .map(|count| count.to_string()),
             );
             row.push(if it.rate_microhertz > 0 {
                 format!("{:.3}", it.rate_microhertz as f64 / 1e6)
@@ -135,7 +135,7 @@ fn process_row(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<String> {
         or_none(
             reading
                 .and_then(|reading| reading.view.as_ref())
-                .map(|it| view(snapshot, it.index)),
+                .map(|shown| view(snapshot, shown.index)),
         ),
         process.state.name().to_owned(),
         or_none(reading.filter(|_| is_active).map(uptime)),
@@ -185,7 +185,7 @@ fn time_rows(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<Vec<String>>
         return Vec::new();
     };
     let mut sorted: Vec<&Timed> = reading.times.iter().collect();
-    sorted.sort_by_key(|it| (it.span, it.view));
+    sorted.sort_by_key(|timed| (timed.span, timed.view));
     let own_view = reading.view.as_ref().map(|view| view.index);
     let rows = sorted.into_iter().enumerate().map(|(nth, timed)| {
         let ms = [

@@ -77,7 +77,7 @@ pub(crate) fn of_view(
     Ok(pose::Step::Network(Box::new(step)))
 }
 
-/// Of every extra keypoint of the deployment its number among the names of a camera.
+/// Returns the number of every extra keypoint of the deployment among the names of a camera.
 fn extras(resolved: &Resolved, names: &[String]) -> Vec<Option<usize>> {
     let number = |wanted: &String| names.iter().position(|name| name == wanted);
     resolved.extra_keypoints.iter().map(number).collect()

@@ -36,7 +36,7 @@ pub(super) fn contradicted(contradicted: &Contradicted) -> String {
 
 /// Text on a camera whose pictures were taken at other times than they say.
 pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
-    let [offset, error] = [fit.offset_ms, fit.offset_error_ms].map(|it| it.unwrap_or(f64::NAN));
+    let [offset, error] = [fit.offset_ms, fit.offset_error_ms].map(|ms| ms.unwrap_or(f64::NAN));
     let how = if offset < 0.0 { "before" } else { "after" };
     format!(
         "  clock         {camera} is out of step: its pictures were taken {:.0} ms {how} the time that they say, +-{error:.0}, by how \
@@ -45,8 +45,8 @@ pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
     )
 }
 
-/// What became of the pictures of every live camera, a line each; of a process that was restarted since then. Then whether the
-/// times of some can be compared with those of others.
+/// Returns the counts of the pictures of every live camera, a line each; those of a restarted process since its restart. A warning
+/// follows if the times of some cameras cannot be compared with those of others.
 pub(super) fn live(outcome: &Outcome) -> String {
     let readings = outcome
         .processes
@@ -62,7 +62,7 @@ pub(super) fn live(outcome: &Outcome) -> String {
     text
 }
 
-/// What became of the pictures of a live camera.
+/// Returns the line on the pictures of a live camera.
 fn line((name, it): &(String, CameraCounts)) -> String {
     let mut parts = vec![format!(
         "{} pictures made, {} lost by the camera, {} used",
@@ -117,15 +117,15 @@ fn times(it: &CameraCounts) -> Option<String> {
 /// * `cameras`: name and counts.
 fn unlike_times(cameras: &[(String, CameraCounts)]) -> Option<String> {
     let named = |which: fn(TimedBy) -> bool| -> Vec<&str> {
-        let those = cameras.iter().filter(|(_, it)| which(it.timed_by));
+        let those = cameras.iter().filter(|(_, counts)| which(counts.timed_by));
         those.map(|(name, _)| name.as_str()).collect()
     };
-    let told = named(|it| matches!(it, TimedBy::CAMERA | TimedBy::DRIVER));
+    let told = named(|timed_by| matches!(timed_by, TimedBy::CAMERA | TimedBy::DRIVER));
     let late = named(TimedBy::is_arrival);
     if told.is_empty() || late.is_empty() {
         return None;
     }
-    let own = named(|it| it == TimedBy::CAMERA);
+    let own = named(|timed_by| timed_by == TimedBy::CAMERA);
     let remedy = if own.len() == told.len() {
         format!(
             "; where their delays are alike, `clock = \"arrival\"` of {} is better",

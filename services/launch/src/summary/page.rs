@@ -18,7 +18,7 @@ const MOST_MOMENTS: usize = 400;
 const N_STRIPS: usize = 3;
 const JPEG_QUALITY: u8 = 85;
 
-/// What the page is made of.
+/// Content of the page.
 pub(super) struct Content<'a> {
     pub(super) name: &'a str,
     pub(super) verdict: Verdict,
@@ -76,10 +76,14 @@ fn reported(text: &str) -> Table {
 
 fn latency(report: &LatencyReport) -> Table {
     let all = [("capture to result", &report.end_to_end)].into_iter();
-    let all = all.chain(report.stages.iter().map(|(stage, it)| (stage.as_str(), it)));
-    let rows = all.map(|(what, it)| {
-        let numbers = [it.p50_ms, it.p99_ms, it.max_ms].map(|ms| format!("{ms:.1}"));
-        [vec![what.to_owned(), it.count.to_string()], numbers.into()].concat()
+    let all = all.chain(report.stages.iter().map(|(stage, latency)| (stage.as_str(), latency)));
+    let rows = all.map(|(what, latency)| {
+        let numbers = [latency.p50_ms, latency.p99_ms, latency.max_ms].map(|ms| format!("{ms:.1}"));
+        [
+            vec![what.to_owned(), latency.count.to_string()],
+            numbers.into(),
+        ]
+        .concat()
     });
     Table {
         heading: "Latency".to_owned(),
@@ -169,7 +173,7 @@ fn strips(folder: &Path, cameras: &[String]) -> Vec<Strip> {
     shown.map(strip).collect()
 }
 
-/// What the pictures of a file name such as `000010.png` show.
+/// Returns the caption of the pictures of a file name such as `000010.png`.
 fn caption(name: &str) -> String {
     let number = name.trim_end_matches(".png");
     let number = number.parse().map_or(number.to_owned(), |value: u64| value.to_string());

@@ -1,4 +1,4 @@
-//! Whether people were as high in the frames as the search is good for, and what to set if they were not.
+//! Views in which people are not as high as the search is good for, and the setting that helps.
 
 use geometry::search_size::{USABLE_PX, better_scale};
 use runfiles::RunSummary;
@@ -7,11 +7,11 @@ use serde::Serialize;
 /// Views in which people are smaller or larger than the search is good for.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Outside {
-    /// Of each: the median height of people, pixels of its frames.
+    /// Name of each view, and the median height of people, pixels of its frames.
     pub views: Vec<(String, f64)>,
-    /// What is good for all views: `capture.scale`.
+    /// Scale that is good for all views: `capture.scale`.
     pub scale: f64,
-    /// Whether the deployment sets `capture.size`, which wins.
+    /// True if the deployment sets `capture.size`, which wins.
     pub has_size: bool,
 }
 
@@ -20,10 +20,10 @@ impl Outside {
     ///
     /// * `has_size`: whether the deployment sets `capture.size`.
     pub(super) fn of(run: &RunSummary, has_size: bool) -> Option<Self> {
-        let views = run.views.iter().filter_map(|it| {
-            let px = run.summary.person_px.get(&it.name).copied().flatten()?;
-            let [[a, b, _], [c, d, _]] = it.source_from_frame;
-            Some((it.name.clone(), 1.0 / (a * d - b * c).abs().sqrt(), px))
+        let views = run.views.iter().filter_map(|view| {
+            let px = run.summary.person_px.get(&view.name).copied().flatten()?;
+            let [[a, b, _], [c, d, _]] = view.source_from_frame;
+            Some((view.name.clone(), 1.0 / (a * d - b * c).abs().sqrt(), px))
         });
         let views: Vec<(String, f64, f64)> = views.collect();
         let seen: Vec<[f64; 2]> = views.iter().map(|view| [view.1, view.2]).collect();
@@ -83,7 +83,7 @@ mod tests {
             trc_axes: "y up".to_owned(),
             views: views.into(),
         };
-        Outside::of(&run, scale < 1.0).map(|it| it.text())
+        Outside::of(&run, scale < 1.0).map(|outside| outside.text())
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Whether the machine had time for the frames of a run.
+//! Warning that the machine had no time for many frames of a run.
 
 use runfiles::Summary;
 

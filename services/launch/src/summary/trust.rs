@@ -1,10 +1,10 @@
-//! Whether the results can be trusted, for people.
+//! Trust in the results, as text for people.
 
 use core::fmt::Write as _;
 
 use runfiles::{Doubt, Summary, Trust};
 
-/// Whether cameras contradict each other or the calibration.
+/// Returns true if cameras contradict each other or the calibration.
 pub(super) fn are_cameras_doubtful(summary: &Summary) -> bool {
     let mut fits = summary.calibration.values();
     summary.exchanged.is_some()

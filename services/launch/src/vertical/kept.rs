@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::Vertical;
 
-/// What the file holds.
+/// Content of the file.
 #[derive(Debug, Serialize, Deserialize)]
 struct Kept {
-    /// Of the cameras for which it was found.
+    /// Hash of the cameras for which the vertical was found.
     cameras: String,
     up: [f64; 3],
     why: String,

@@ -62,7 +62,7 @@ pub(super) fn find(
                 let ankles = [joint(0), joint(5)].into_iter().flatten();
                 let ankles: Vec<[f64; 2]> = ankles.collect();
                 let head = joint(13).or_else(|| joint(12))?;
-                Standing::of(at(head)?, at(middle(&ankles)?)?)
+                Standing::from_rays(at(head)?, at(middle(&ankles)?)?)
             });
             all.extend(standing);
         }
@@ -72,7 +72,7 @@ pub(super) fn find(
 
 impl Standing {
     /// * Directions of rays in the world.
-    fn of(head: UnitVector3<f64>, ankles: UnitVector3<f64>) -> Option<Self> {
+    fn from_rays(head: UnitVector3<f64>, ankles: UnitVector3<f64>) -> Option<Self> {
         let normal = head.cross(&ankles).try_normalize(1e-3)?;
         let upward = ankles.cross(&normal);
         Some(Self { normal, upward })
@@ -83,9 +83,9 @@ fn vertical(all: &[Standing]) -> Option<Vertical> {
     if all.len() < LEAST_PEOPLE {
         return None;
     }
-    let normals: Vec<Vector3<f64>> = all.iter().map(|it| it.normal).collect();
-    let up = common_normal(&normals, all.iter().map(|it| it.upward).sum())?;
-    let n_agreeing = all.iter().filter(|it| it.upward.dot(&up) > 0.0).count();
+    let normals: Vec<Vector3<f64>> = all.iter().map(|person| person.normal).collect();
+    let up = common_normal(&normals, all.iter().map(|person| person.upward).sum())?;
+    let n_agreeing = all.iter().filter(|person| person.upward.dot(&up) > 0.0).count();
     let share = n_agreeing as f64 / all.len() as f64;
     let mut leans: Vec<f64> =
         normals.iter().map(|normal| normal.dot(&up).abs().min(1.0).asin()).collect();
@@ -112,7 +112,7 @@ fn vertical(all: &[Standing]) -> Option<Vertical> {
 fn weighted(row: &[(usize, f64)], found: impl Fn(usize) -> Option<Keypoint>) -> Option<[f64; 2]> {
     let mut sum = [0.0; 2];
     for &(nth, weight) in row {
-        let keypoint = found(nth).filter(|it| it.score >= LEAST_SCORE)?;
+        let keypoint = found(nth).filter(|keypoint| keypoint.score >= LEAST_SCORE)?;
         for (sum, at) in sum.iter_mut().zip(keypoint.at) {
             *sum += weight * at;
         }
@@ -153,7 +153,7 @@ mod tests {
                     Some(camera.ray(&pixel)?.direction)
                 };
                 if let (Some(head), Some(ankles)) = (ray(place + 1.5 * body), ray(place)) {
-                    all.extend(Standing::of(head, ankles));
+                    all.extend(Standing::from_rays(head, ankles));
                 }
             }
         }

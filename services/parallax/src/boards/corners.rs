@@ -35,12 +35,12 @@ pub fn read_corners(path: &Path, names: &[String]) -> Result<Read, Failure> {
 ///
 /// # Errors
 ///
-/// What is wrong with it.
+/// A description of the mistake in the table.
 pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| error.to_string())?.clone();
     let column = |wanted: &[&str]| {
-        let found = header.iter().position(|it| wanted.contains(&it.trim()));
+        let found = header.iter().position(|title| wanted.contains(&title.trim()));
         found.ok_or_else(|| format!("no column {}", wanted[0]))
     };
     let columns = [

@@ -47,7 +47,7 @@ fn table(text: &str) -> Result<FrameTable, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| error.to_string())?.clone();
     let column = |names: &[&str]| {
-        let found = header.iter().position(|it| names.contains(&it.trim()));
+        let found = header.iter().position(|title| names.contains(&title.trim()));
         found.ok_or_else(|| format!("no column {}: expected sync_index and cam_id", names[0]))
     };
     let (sync, camera) = (column(&["sync_index"])?, column(&["cam_id", "port"])?);
@@ -78,7 +78,7 @@ pub(crate) fn by_clock(index: u64, time_s: Option<f64>, slowest_hz: Option<f64>)
 /// The rate by which frames are counted, if the cameras' rates are known and differ.
 pub(crate) fn slowest(rates_hz: &[Option<f64>]) -> Option<f64> {
     let known: Option<Vec<f64>> = rates_hz.iter().copied().collect();
-    let known = known.filter(|it| it.len() > 1)?;
+    let known = known.filter(|rates| rates.len() > 1)?;
     let least = known.iter().copied().fold(f64::MAX, f64::min);
     let most = known.iter().copied().fold(0.0, f64::max);
     (most > 1.001 * least).then_some(least)

@@ -36,7 +36,7 @@ struct Sighting {
     found: Found,
 }
 
-/// What one camera's footage gave.
+/// Search result of one camera's footage.
 struct Raw {
     size: [u32; 2],
     n_pictures: usize,
@@ -222,46 +222,50 @@ impl CameraTask<'_> {
     }
 }
 
-/// What the pictures of a camera so far agree about.
+/// Returns the properties that the pictures of a camera so far agree about.
 fn hints(found: &[Sighting]) -> Hints {
-    let all_same = |it: &dyn Fn(&Found) -> usize| {
-        let first = it(&found.first()?.found);
-        (found.len() >= SURE && found.iter().all(|one| it(&one.found) == first)).then_some(first)
+    let all_same = |property: &dyn Fn(&Found) -> usize| {
+        let first = property(&found.first()?.found);
+        (found.len() >= SURE && found.iter().all(|one| property(&one.found) == first))
+            .then_some(first)
     };
     Hints {
-        is_inverted: all_same(&|it| usize::from(it.is_inverted)).map(|it| it == 1),
-        variant: all_same(&|it| it.variant),
+        is_inverted: all_same(&|found| usize::from(found.is_inverted)).map(|value| value == 1),
+        variant: all_same(&|found| found.variant),
     }
 }
 
 /// The board that most pictures have, and what each camera saw of it.
 fn agreed(finder: &Finder, raw: Vec<Raw>) -> Looked {
     let mut votes = vec![0; finder.variants().len()];
-    for it in raw.iter().flat_map(|it| &it.found) {
+    for it in raw.iter().flat_map(|camera| &camera.found) {
         votes[it.found.variant] += it.found.corners.len();
     }
     // The first of the best: the board as it was said to be.
     let best = (0..votes.len()).rev().max_by_key(|i| votes[*i]).unwrap_or(0);
     let variant = &finder.variants()[best];
     let cameras = raw.into_iter().enumerate().map(|(camera, raw)| {
-        let own: Vec<&Sighting> = raw.found.iter().filter(|it| it.found.variant == best).collect();
-        let count = |is: &dyn Fn(&Found) -> bool| own.iter().filter(|it| is(&it.found)).count();
+        let own: Vec<&Sighting> =
+            raw.found.iter().filter(|sighting| sighting.found.variant == best).collect();
+        let count =
+            |is: &dyn Fn(&Found) -> bool| own.iter().filter(|sighting| is(&sighting.found)).count();
         let mut nothing: Vec<(Nothing, usize)> = raw.nothing.into_iter().collect();
-        nothing.sort_by_key(|it| core::cmp::Reverse(it.1));
+        nothing.sort_by_key(|entry| core::cmp::Reverse(entry.1));
         Seen {
             size: raw.size,
             n_pictures: raw.n_pictures,
-            n_inverted: count(&|it| it.is_inverted),
-            n_mirrored: count(&|it| it.is_mirrored),
+            n_inverted: count(&|found| found.is_inverted),
+            n_mirrored: count(&|found| found.is_mirrored),
             sights: own
                 .iter()
-                .map(|it| {
-                    let corners = it.found.corners.iter().map(|corner| (corner.id, corner.at));
-                    Sight::new(camera, it.frame, corners, &variant.layout.points)
+                .map(|sighting| {
+                    let corners =
+                        sighting.found.corners.iter().map(|corner| (corner.id, corner.at));
+                    Sight::new(camera, sighting.frame, corners, &variant.layout.points)
                 })
                 .collect(),
             nothing,
-            pictures: own.iter().map(|it| (it.frame, it.picture)).collect(),
+            pictures: own.iter().map(|sighting| (sighting.frame, sighting.picture)).collect(),
         }
     });
     Looked {

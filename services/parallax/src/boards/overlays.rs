@@ -44,7 +44,7 @@ pub fn worst(
         frames.dedup();
         for frame in frames {
             let each = camera.residuals.iter().filter(|residual| residual.frame == frame);
-            let squares: Vec<f64> = each.map(|it| it.off.norm_squared()).collect();
+            let squares: Vec<f64> = each.map(|residual| residual.off.norm_squared()).collect();
             own.push((
                 frame,
                 (squares.iter().sum::<f64>() / squares.len() as f64).sqrt(),

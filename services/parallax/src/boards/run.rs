@@ -21,7 +21,7 @@ const GUESSED_PICTURES: usize = 6;
 /// The fewest pictures of each side of a board by which one camera shows that it has two, or two cameras that they stand on both.
 const LEAST_OF_EACH: usize = 3;
 
-/// What is to be done.
+/// Settings of a calibration from a board.
 #[derive(Debug, Clone)]
 pub struct BoardSettings {
     /// The board.
@@ -34,15 +34,15 @@ pub struct BoardSettings {
     pub corners: Option<PathBuf>,
     /// Cameras whose intrinsics are kept, by name.
     pub known: Option<Rig>,
-    /// What is found of lenses.
+    /// Kind of lens that is determined.
     pub lens: LensKind,
-    /// Whether the poses are wanted.
+    /// True if the poses are wanted.
     pub wants_rig: bool,
     /// The most frames that are used.
     pub most_frames: usize,
     /// Mirrored pictures are meant to be.
     pub is_mirrored: bool,
-    /// What is on the back of the board, where that is known.
+    /// Back of the board, where it is known.
     pub back: Option<Back>,
 }
 
@@ -55,7 +55,7 @@ pub enum Back {
     Blank,
 }
 
-/// What mirrored codes come from.
+/// Origin of mirrored codes.
 enum Mirrored {
     /// There are none, or it is said, or a camera saw both sides.
     Known,
@@ -66,15 +66,15 @@ enum Mirrored {
 /// A calibration, with what it is of.
 #[derive(Debug, Clone)]
 pub struct Calibrated {
-    /// What was adjusted.
+    /// Task of the adjustment.
     pub task: Task,
-    /// What was looked for; `None` where corners were read.
+    /// Sights of the board; `None` where corners were read.
     pub looked: Option<Looked>,
-    /// What came out.
+    /// Outcome of the adjustment.
     pub outcome: Outcome,
     /// The board.
     pub board: Board,
-    /// What the user should know: how the board differs from what was said, inverted pictures.
+    /// Remarks for the user: how the board differs from the given one, inverted pictures.
     pub notes: Vec<String>,
 }
 
@@ -163,7 +163,7 @@ fn refuse_twins(names: &[String]) -> Result<(), Failure> {
 /// Footage that was looked at, sights, the points of the board, the sizes of the pictures.
 type Sighted = (Option<Looked>, Vec<Sight>, Vec<Point2<f64>>, Vec<[u32; 2]>);
 
-/// What was seen of the board: read from a table, or looked for.
+/// Returns the sights of the board: read from a table, or looked for.
 fn sighted(
     settings: &BoardSettings,
     names: &[String],
@@ -232,11 +232,12 @@ fn mirrored(
     Ok(Mirrored::Known)
 }
 
-/// Whether cameras that see the back of a board stand behind it, as those that see the front agree with. Where the pictures are mirrored and the
-/// board has one side, every picture puts the camera elsewhere.
+/// Returns true if cameras that see the back of a board stand behind it, by those that see the front. Where the pictures are mirrored and
+/// the board has one side, every picture puts the camera elsewhere.
 fn sides_agree(outcome: &Outcome, behind: &[usize]) -> bool {
-    let crosses =
-        |it: &&Together| it.cameras.iter().filter(|camera| behind.contains(camera)).count() == 1;
+    let crosses = |pair: &&Together| {
+        pair.cameras.iter().filter(|camera| behind.contains(camera)).count() == 1
+    };
     let (mut n, mut n_agree) = (0, 0);
     for it in outcome.pairs.iter().filter(crosses) {
         n += it.n;
@@ -364,10 +365,10 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
 fn reasons(looked: &Looked) -> String {
     use calibration::boards::Nothing;
 
-    let most = looked.cameras.iter().flat_map(|camera| &camera.nothing).max_by_key(|it| {
+    let most = looked.cameras.iter().flat_map(|camera| &camera.nothing).max_by_key(|reason| {
         // What says more goes first.
-        let says = !matches!(it.0, Nothing::NoGrid | Nothing::NoMarkers);
-        (says, it.1)
+        let says = !matches!(reason.0, Nothing::NoGrid | Nothing::NoMarkers);
+        (says, reason.1)
     });
     match most.map(|most| most.0) {
         Some(Nothing::OtherGrid { columns, rows }) => format!(
@@ -408,10 +409,10 @@ fn refused(error: &BoardError, looked: Option<&Looked>, task: &Task) -> Failure 
 }
 
 impl Calibrated {
-    /// What forbids to trust it, as sentences.
+    /// Returns the reasons not to trust the calibration, as sentences.
     pub fn doubts(&self) -> Vec<String> {
         let each = self.outcome.doubts.iter();
-        each.map(|it| it.text(&self.task.names)).collect()
+        each.map(|doubt| doubt.text(&self.task.names)).collect()
     }
 
     /// The cameras as a rig; all at the origin where poses were not wanted.

@@ -203,7 +203,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
 }
 
 fn has_place(rig: &Rig, camera: &Camera) -> bool {
-    rig.left_out().iter().all(|it| it.camera != camera.name)
+    rig.left_out().iter().all(|missing| missing.camera != camera.name)
 }
 
 fn describe(camera: &Camera, rig: &Rig) -> Value {
@@ -236,7 +236,7 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
             .collect();
         let cameras = report.as_ref().map(|report| {
             let each = report.errors.cameras.iter();
-            each.map(|it| json!({ "camera": name(it.camera), "median_px": it.median_px, "points": it.n_points }))
+            each.map(|error| json!({ "camera": name(error.camera), "median_px": error.median_px, "points": error.n_points }))
                 .collect::<Vec<_>>()
         });
         output::json(&json!({
@@ -251,7 +251,7 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
         if findings.is_empty() {
             output::line("OK: nothing odd was found; compare these numbers with a tape measure")?;
         }
-        for camera in report.iter().flat_map(|it| &it.errors.cameras) {
+        for camera in report.iter().flat_map(|report| &report.errors.cameras) {
             output::line(format_args!(
                 "{}: median epipolar error {:.2} px over {} pairs of points",
                 name(camera.camera),

@@ -89,7 +89,7 @@ fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
             .cameras
             .iter()
             .filter(|camera| launch::cameras::is_live(&camera.source));
-        let names: Vec<&str> = live.map(|it| it.name.as_str()).collect();
+        let names: Vec<&str> = live.map(|camera| camera.name.as_str()).collect();
         let message = format!("{} has no live camera {name:?}", file.display());
         let hint = if names.is_empty() {
             "it has none".to_owned()
@@ -157,9 +157,10 @@ fn look(path: &Path) -> Result<Found, VideoError> {
 fn stable_names(path: &Path) -> Vec<PathBuf> {
     let folders = ["/dev/v4l/by-id", "/dev/v4l/by-path"];
     let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
-    let links = entries.filter_map(|it| Some(it.ok()?.path()));
-    let mut names: Vec<PathBuf> =
-        links.filter(|link| link.canonicalize().is_ok_and(|it| it == path)).collect();
+    let links = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut names: Vec<PathBuf> = links
+        .filter(|link| link.canonicalize().is_ok_and(|target| target == path))
+        .collect();
     names.sort();
     names
 }
@@ -231,7 +232,7 @@ fn text(it: &Found) -> String {
         }
     }
     lines.extend(it.controls.iter().map(|control| {
-        let value = control.value.map_or_else(|| "-".to_owned(), |it| it.to_string());
+        let value = control.value.map_or_else(|| "-".to_owned(), |value| value.to_string());
         let fixed = if control.is_fixed {
             ", cannot be set now"
         } else {

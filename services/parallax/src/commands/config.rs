@@ -107,7 +107,7 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn document(entries: &[Entry]) -> Vec<String> {
     let mut lines = Vec::new();
     let mut section = "";
-    let of_size = |it: &&Entry| ["capture.size", "capture.scale"].contains(&it.key.as_str());
+    let of_size = |entry: &&Entry| ["capture.size", "capture.scale"].contains(&entry.key.as_str());
     let is_by_itself = entries.iter().filter(of_size).all(|entry| entry.value.is_none());
     for entry in entries {
         let (of, name) = entry.key.split_once('.').unwrap_or(("", &entry.key));

@@ -83,16 +83,16 @@ fn status_of(named: &str, json: bool) -> Result<ExitCode, Failure> {
 pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
     let found = deployments(&Namespace::usual_base())?;
     for name in &arguments.names {
-        if !found.iter().any(|it| it.namespace.name() == name) {
+        if !found.iter().any(|remains| remains.namespace.name() == name) {
             let message = format!("there is nothing of a deployment {name:?}");
             return Err(Failure::new(ExitKind::Usage, message));
         }
     }
-    let is_selected = |it: &&Remains| match &arguments.names[..] {
-        [] => it.supervisor.is_none() && it.is_marked,
-        names => names.iter().any(|name| name == it.namespace.name()),
+    let is_selected = |remains: &&Remains| match &arguments.names[..] {
+        [] => remains.supervisor.is_none() && remains.is_marked,
+        names => names.iter().any(|name| name == remains.namespace.name()),
     };
-    for it in found.iter().filter(|it| !it.is_marked) {
+    for it in found.iter().filter(|remains| !remains.is_marked) {
         let path = it.namespace.root().display();
         output::message(format_args!("{path}: {UNMARKED}"));
     }

@@ -95,10 +95,10 @@ pub(crate) struct Arguments {
     /// The filters search all pixels, whatever the size of the image.
     #[arg(long, conflicts_with = "size")]
     full: bool,
-    /// Of a video, search every n-th frame.
+    /// Search every n-th frame of a video.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
-    /// Of a video, search at most this many frames.
+    /// Search at most this many frames of a video.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     frames: Option<u64>,
     /// Print one line of JSON per image.
@@ -166,17 +166,18 @@ impl Arguments {
         ];
         let given = |options: &[(bool, &'static str)]| {
             let mut given = options.iter().filter(|option| option.0);
-            given.next().map(|it| it.1)
+            given.next().map(|option| option.1)
         };
         let network = match self.network.as_deref() {
             Some(file) => (!deployment::is_none(file)).then_some(file),
             None => given(&of_filters[..N_IMPLY]).is_none().then(|| Path::new(deployment::SHIPPED)),
         };
         let wrong = match network {
-            Some(_) => given(&of_filters).map(|it| (it, "the filters", "a network", "none")),
-            None => {
-                given(&of_network).map(|it| (it, "a network", "the filters", deployment::SHIPPED))
+            Some(_) => {
+                given(&of_filters).map(|option| (option, "the filters", "a network", "none"))
             }
+            None => given(&of_network)
+                .map(|option| (option, "a network", "the filters", deployment::SHIPPED)),
         };
         match wrong {
             None => Ok(network),
@@ -350,7 +351,7 @@ impl Detector<'_> {
             self.report(&picture, &searched, &found)?;
             self.draw(&picture, &searched, &found)?;
             if let Some(sheet) = sheet.as_deref_mut() {
-                let best = found.first().map(|it| self.skeleton(&searched, it));
+                let best = found.first().map(|pose| self.skeleton(&searched, pose));
                 sheet.add(&picture.title(), picture.size, &picture.rgb, best.as_ref())?;
             }
         }
@@ -369,7 +370,7 @@ impl Detector<'_> {
     ) -> Result<(), Failure> {
         let (layout, model) = (searched.layout(), &self.search.model);
         if self.arguments.json {
-            let placed = |it| Placed::new(it, model, layout).scaled(searched.per_pixel());
+            let placed = |pose| Placed::new(pose, model, layout).scaled(searched.per_pixel());
             let detections = found.iter().map(placed);
             let detections: Vec<_> =
                 detections.map(|detection| detection.json(Some(&self.joints))).collect();
@@ -418,7 +419,9 @@ impl Detector<'_> {
         let Self {
             search, settings, ..
         } = self;
-        search.on(image, layout, |it| search.solver.candidates(it, settings))
+        search.on(image, layout, |responses| {
+            search.solver.candidates(responses, settings)
+        })
     }
 
     fn skeleton(&self, searched: &Searched, pose: &Pose) -> Skeleton {

@@ -228,7 +228,7 @@ fn remains() -> Finding {
         Ok(all) => all,
         Err(error) => return Finding::good(what, error.to_string()),
     };
-    let running = all.iter().filter(|it| it.supervisor.is_some()).count();
+    let running = all.iter().filter(|deployment| deployment.supervisor.is_some()).count();
     let dead = all.len() - running;
     let found = Finding::good(
         what,

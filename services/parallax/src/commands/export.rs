@@ -9,7 +9,7 @@ use launch::export::{Format, Given, Job, Lines, Naming, Origin, Trial, Written, 
 use nalgebra::{UnitVector3, Vector3};
 use terminal::{Globals, Terminal, output};
 
-/// What is said where the format is not in the build.
+/// Remark where the format is not in the build.
 const NO_PARQUET: &str = "this build writes none: cargo build --release --features parquet";
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
@@ -91,7 +91,7 @@ enum Trajectories {
     Smooth,
 }
 
-/// What the joints are called.
+/// Names of the joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Names {
     /// `right_ankle`, `left_hip`, `head`.
@@ -105,7 +105,7 @@ type Formats = Vec<Format>;
 
 fn formats(text: &str) -> Result<Formats, String> {
     let all = Format::all();
-    let names: Vec<&str> = all.iter().map(|it| it.name()).collect();
+    let names: Vec<&str> = all.iter().map(|format| format.name()).collect();
     let mut found: Formats = Vec::new();
     for wanted in text.split(',').map(str::trim) {
         let of_name = |format: &Format| wanted == "all" || format.name() == wanted;
@@ -120,7 +120,7 @@ fn formats(text: &str) -> Result<Formats, String> {
             ));
         }
         for format in chosen {
-            if !found.iter().any(|it| it.name() == format.name()) {
+            if !found.iter().any(|other| other.name() == format.name()) {
                 found.push(format);
             }
         }
@@ -174,7 +174,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         name: arguments.name.clone(),
         force: arguments.force,
     };
-    let has_parquet = Format::all().iter().any(|it| it.name() == "parquet");
+    let has_parquet = Format::all().iter().any(|format| format.name() == "parquet");
     if !has_parquet && job.formats.len() == Format::all().len() && !globals.quiet {
         output::message(format_args!("without parquet: {NO_PARQUET}"));
     }
@@ -227,7 +227,7 @@ fn report(origin: &Origin, written: &[Written]) -> Result<(), Failure> {
         trial.first_frame,
         found(trials)
     ))?;
-    let turned = written.iter().any(|it| it.about[1].ends_with(" up"));
+    let turned = written.iter().any(|file| file.about[1].ends_with(" up"));
     if turned && trial.up_in_world.is_none() {
         output::line(
             "the rig does not say which way is up: axes are those of the rig; --up 0,0,1 turns them",

@@ -211,8 +211,8 @@ fn keys(arguments: &KeysArguments) -> Result<ExitCode, Failure> {
         .or_fail(ExitKind::Config)?;
     let names = deployment.hosts.iter().map(|host| {
         let address = host.address.iter();
-        let name = address.filter_map(|address| address.rsplit_once(':')).map(|it| {
-            let name = it.0.trim_start_matches('[').trim_end_matches(']');
+        let name = address.filter_map(|address| address.rsplit_once(':')).map(|parts| {
+            let name = parts.0.trim_start_matches('[').trim_end_matches(']');
             name.to_owned()
         });
         (host.name.clone(), name.collect())

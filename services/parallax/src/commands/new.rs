@@ -132,7 +132,7 @@ impl Step {
     /// The exit code that ends everything, if it does.
     fn run(&self, arguments: &Arguments, globals: Globals) -> Result<Option<ExitCode>, Failure> {
         let line: Vec<String> = self.words.iter().map(failure::wording::shell).collect();
-        if let Some(file) = self.done.as_ref().filter(|it| it.exists()) {
+        if let Some(file) = self.done.as_ref().filter(|file| file.exists()) {
             output::message(format_args!("kept {}", file.display()));
             return Ok(None);
         }
@@ -149,12 +149,12 @@ impl Step {
         }
         let status = command.status().or_fail(ExitKind::Run)?;
         let code = status.code().unwrap_or(1);
-        let doubts = [ExitKind::Degraded, ExitKind::Limit].map(|it| i32::from(it.status()));
+        let doubts = [ExitKind::Degraded, ExitKind::Limit].map(|kind| i32::from(kind.status()));
         let is_doubt = doubts.contains(&code);
         if status.success() || (is_doubt && arguments.go_on) {
             return Ok(None);
         }
-        if let Some(file) = self.done.as_ref().filter(|it| is_doubt && it.exists()) {
+        if let Some(file) = self.done.as_ref().filter(|file| is_doubt && file.exists()) {
             output::message(format_args!(
                 "{} is written: the same command again goes on with it",
                 file.display()
@@ -260,9 +260,9 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
     }
     let is_camera = |name: &str| {
         let names = arguments.camera.iter().map(|camera| CameraFootage::of(camera).name);
-        names.into_iter().any(|it| it == name)
+        names.into_iter().any(|camera| camera == name)
     };
-    if let Some(stray) = arguments.offset.iter().find(|it| !is_camera(&it.camera)) {
+    if let Some(stray) = arguments.offset.iter().find(|offset| !is_camera(&offset.camera)) {
         let message = format!("--offset {}: no --camera has that name", stray.camera);
         return Err(Failure::new(ExitKind::Usage, message));
     }
@@ -273,7 +273,7 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
         text.extend([format!(
             "\n[[camera]]\nname = {name:?}\nsource = {source}\n"
         )]);
-        if let Some(offset) = arguments.offset.iter().find(|it| it.camera == name) {
+        if let Some(offset) = arguments.offset.iter().find(|offset| offset.camera == name) {
             text.extend([format!("source_offset_px = {:?}\n", offset.px)]);
         }
     }

@@ -133,7 +133,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let report = planned.run(globals.quiet, &stop, &mut |_| growth.message())?;
     let recording = recorded::open(&file)?;
     let later = (1..MAX_EPOCHS).map(|i| record::file_of_life(&file, i));
-    let later: Vec<PathBuf> = later.take_while(|it| it.exists()).collect();
+    let later: Vec<PathBuf> = later.take_while(|file| file.exists()).collect();
     if arguments.json {
         let mut value = report.json();
         value["recording"] = recorded::json(&file, &recording);
@@ -165,9 +165,9 @@ fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<For
             &planned.plan().topics,
             !arguments.without.contains(&Bulk::Foxglove),
         ),
-        without: [Bulk::Pixels, Bulk::Evidence].map(|it| arguments.without.contains(&it)),
+        without: [Bulk::Pixels, Bulk::Evidence].map(|bulk| arguments.without.contains(&bulk)),
         n_frames: (!resolved.is_endless()).then(|| resolved.n_frames()),
-        rate_hz: resolved.footage.iter().find_map(|it| it.frame_rate_hz),
+        rate_hz: resolved.footage.iter().find_map(|footage| footage.frame_rate_hz),
         free_bytes: disk_space::free_beside(file)? + replaced,
     })
 }
@@ -193,7 +193,7 @@ fn remove_existing(file: &Path, force: bool) -> Result<(), Failure> {
             return Err(failure.with_hint("choose another name, or replace it with --force"));
         }
         let is_busy = files::open(&file)
-            .is_ok_and(|it| matches!(it.try_lock_shared(), Err(TryLockError::WouldBlock)));
+            .is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)));
         if is_busy {
             let message = format!("{} is being recorded to by another run", file.display());
             let failure = Failure::new(ExitKind::Config, message);

@@ -129,9 +129,9 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// What the stages that run are given.
+/// Returns the settings of the stages that run.
 ///
-/// * `recorded`: what those of the recorded run were given.
+/// * `recorded`: the settings of the recorded run.
 fn resolve(
     deployment: Deployment,
     recorded: Resolved,
@@ -278,7 +278,7 @@ fn check_views(
             track.is_none_or(|track| track.entries.is_empty())
         };
         let names = cameras.clone().filter(|(view, _)| is_empty(*view));
-        names.map(|(_, it)| it.name.as_str()).collect::<Vec<_>>()
+        names.map(|(_, camera)| camera.name.as_str()).collect::<Vec<_>>()
     };
     let poses = from > Stage::Pose;
     let wanted = [
@@ -330,7 +330,9 @@ fn needed(resolved: &Resolved, from: Stage) -> impl Iterator<Item = (Kind, &'sta
         _ => true,
     };
     let given = all.into_iter();
-    given.filter(move |it| it.0 < from && is_sent(it.0)).map(|it| (it.1, it.2))
+    given
+        .filter(move |input| input.0 < from && is_sent(input.0))
+        .map(|input| (input.1, input.2))
 }
 
 #[cfg(test)]

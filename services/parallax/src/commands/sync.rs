@@ -87,7 +87,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What tells the clocks.
+/// Evidence by which the clocks are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum By {
     /// The movement of people.
@@ -373,10 +373,10 @@ fn refuse(outcome: &Outcome, names: &[&str], by: By) -> Result<(), Failure> {
 }
 
 fn write(file: &Path, outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
-    let keys = |(name, it): (&&str, &calibration::synchronisation::CameraClock)| ClockKeys {
+    let keys = |(name, clock): (&&str, &calibration::synchronisation::CameraClock)| ClockKeys {
         name: (*name).to_owned(),
-        offset_ms: 1e3 * it.offset_s,
-        drift_ppm: it.drift_error.map(|_| 1e6 * it.drift).filter(|it| *it != 0.0),
+        offset_ms: 1e3 * clock.offset_s,
+        drift_ppm: clock.drift_error.map(|_| 1e6 * clock.drift).filter(|ppm| *ppm != 0.0),
     };
     let keys: Vec<ClockKeys> = names.iter().zip(&outcome.cameras).map(keys).collect();
     let text = failure::read_text(file)?;

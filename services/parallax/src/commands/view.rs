@@ -122,7 +122,7 @@ pub(crate) fn beside(name: &str) -> Result<view::Companion, Failure> {
     view::Companion::start(&executable, name)
 }
 
-/// What a word on the command line means.
+/// Returns the meaning of a word on the command line.
 fn subject(named: Option<&str>) -> Result<Subject, Failure> {
     let Some(named) = named else {
         return Ok(Subject::Deployment(None));
@@ -156,11 +156,11 @@ fn subject(named: Option<&str>) -> Result<Subject, Failure> {
     Ok(Subject::Deployment(Some(named.to_owned())))
 }
 
-/// Whether a deployment of that name runs.
+/// Returns true if a deployment of that name runs.
 fn runs(name: &str) -> Result<bool, Failure> {
     let all = deployments(&Namespace::usual_base())?;
-    let mut running = all.iter().filter(|it| it.supervisor.is_some());
-    Ok(running.any(|it| it.namespace.name() == name))
+    let mut running = all.iter().filter(|deployment| deployment.supervisor.is_some());
+    Ok(running.any(|deployment| deployment.namespace.name() == name))
 }
 
 /// The token in a file, without space around it.
@@ -182,7 +182,7 @@ fn token_in(file: &Path) -> Result<String, Failure> {
 fn random_token() -> Result<String, Failure> {
     let mut bytes = [0; 16];
     let source = Path::new("/dev/urandom");
-    let read = File::open(source).and_then(|mut it| it.read_exact(&mut bytes));
+    let read = File::open(source).and_then(|mut file| file.read_exact(&mut bytes));
     read.map_err(|error| failure::in_file(source, &error))?;
     let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
     let digits = digits.filter_map(|digit| char::from_digit(digit.into(), 16));

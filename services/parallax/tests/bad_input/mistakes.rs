@@ -26,9 +26,9 @@ pub(crate) struct Mistake {
     /// The arguments of the program, as shell text.
     pub(crate) command: &'static str,
     pub(crate) code: i32,
-    /// What is wrong, and where.
+    /// Words of the message that name the mistake and its place.
     pub(crate) says: &'static [&'static str],
-    /// What to try.
+    /// Words of the hint.
     pub(crate) tries: &'static [&'static str],
 }
 
@@ -109,7 +109,7 @@ const fn live(what: &'static str, made: fn(&Case), says: &'static [&'static str]
 const NO_FILES: &[Mistake] = &[
     live(
         "RTSP",
-        |it| source(it, "rtsp://me:secret@127.0.0.1:9/live"),
+        |case| source(case, "rtsp://me:secret@127.0.0.1:9/live"),
         &[
             "no pictures from rtsp://127.0.0.1:9/live",
             "Connection refused",
@@ -117,27 +117,27 @@ const NO_FILES: &[Mistake] = &[
     ),
     live(
         "HTTP",
-        |it| source(it, "http://127.0.0.1:9/b"),
+        |case| source(case, "http://127.0.0.1:9/b"),
         &["http://127.0.0.1:9/b", "Connection refused"],
     ),
     live(
         "V4L2",
-        |it| source(it, "v4l2:/dev/null"),
+        |case| source(case, "v4l2:/dev/null"),
         &["/dev/null is no camera"],
     ),
     live(
         "device",
-        |it| source(it, "/dev/video97"),
+        |case| source(case, "/dev/video97"),
         &["cannot open the camera /dev/video97", "No such file"],
     ),
     live(
         "number of a webcam",
-        |it| source(it, "0"),
+        |case| source(case, "0"),
         &["number of a webcam", "its source is /dev/video0"],
     ),
     live(
         "file:// address",
-        |it| source(it, "file:///tmp/b.mp4"),
+        |case| source(case, "file:///tmp/b.mp4"),
         &["without file://: /tmp/b.mp4"],
     ),
     Mistake {
@@ -150,7 +150,7 @@ const NO_FILES: &[Mistake] = &[
     },
     Mistake {
         what: "scene of an unknown rig",
-        made: |it| source(it, "synth://humanevaa?camera=C1"),
+        made: |case| source(case, "synth://humanevaa?camera=C1"),
         command: CHECK,
         code: 4,
         says: &["synth://humanevaa", "is not a rig"],
@@ -182,51 +182,51 @@ const fn footage(
 const FOOTAGE: &[Mistake] = &[
     footage(
         "absent video",
-        |it| source(it, "films/b.mp4"),
+        |case| source(case, "films/b.mp4"),
         &["no such footage", "there is no folder", "camera \"b\""],
         &["relative to the deployment file"],
     ),
     footage(
         "empty video",
-        |it| {
-            source(it, "b.mp4");
-            it.write("b.mp4", "");
+        |case| {
+            source(case, "b.mp4");
+            case.write("b.mp4", "");
         },
         &["b.mp4", "0 bytes"],
         &["ffprobe"],
     ),
     footage(
         "video whose copying was cut off",
-        |it| {
-            source(it, "b.mp4");
-            it.write("b.mp4", b"\0\0\0\x20ftypisom\0\0\x02\0");
+        |case| {
+            source(case, "b.mp4");
+            case.write("b.mp4", b"\0\0\0\x20ftypisom\0\0\x02\0");
         },
         &["cannot decode the video", "b.mp4"],
         &["ffprobe"],
     ),
     footage(
         "text",
-        |it| source(it, "rig.toml"),
+        |case| source(case, "rig.toml"),
         &["cannot decode", "rig.toml", "camera \"b\""],
         &["shows whether the file is whole"],
     ),
     footage(
         "pattern without a match",
-        |it| source(it, "b/%04d.jpg"),
+        |case| source(case, "b/%04d.jpg"),
         &["no image", "b/%04d.jpg"],
         &["a folder of images, a glob"],
     ),
     footage(
         "later first frame than there are",
-        |it| capture(it, "start_frame = 9"),
+        |case| capture(case, "start_frame = 9"),
         &["first frame 9", "2 frames"],
         &["`capture.start_frame`"],
     ),
     Mistake {
         what: "no ffmpeg",
-        made: |it| {
-            source(it, "b.mp4");
-            it.write("b.mp4", "x");
+        made: |case| {
+            source(case, "b.mp4");
+            case.write("b.mp4", "x");
         },
         command: "PATH=/nowhere exec \"$PARALLAX\" config check deployment.toml",
         code: 4,
@@ -271,35 +271,35 @@ const fn forbidden(
 const MAY_NOT: &[Mistake] = &[
     forbidden(
         "folder of images",
-        |it| forbid(it, "b"),
+        |case| forbid(case, "b"),
         &["cannot read", "/b", "Permission denied"],
         &["camera \"b\"", "must be able to read it"],
     ),
     forbidden(
         "rig",
-        |it| forbid(it, "rig.toml"),
+        |case| forbid(case, "rig.toml"),
         &["cannot read", "rig.toml", "Permission denied"],
         &["must be able to read"],
     ),
     forbidden(
         "model",
-        |it| forbid(it, "model.plx"),
+        |case| forbid(case, "model.plx"),
         &["cannot read the model file", "model.plx"],
         &["Permission denied"],
     ),
     forbidden(
         "deployment",
-        |it| forbid(it, "deployment.toml"),
+        |case| forbid(case, "deployment.toml"),
         &["cannot read the deployment file deployment.toml"],
         &["Permission denied"],
     ),
     forbidden(
         "folder above the footage",
-        |it| {
-            fs::create_dir(it.path("films")).unwrap();
-            fs::rename(it.path("b"), it.path("films/b")).unwrap();
-            source(it, "films/b");
-            forbid(it, "films");
+        |case| {
+            fs::create_dir(case.path("films")).unwrap();
+            fs::rename(case.path("b"), case.path("films/b")).unwrap();
+            source(case, "films/b");
+            forbid(case, "films");
         },
         &["cannot read", "films/b", "Permission denied"],
         &["enter (x) every folder above it"],

@@ -25,7 +25,7 @@ const fn config(
 const FILES: &[Mistake] = &[
     config(
         "text for a number",
-        |it| capture(it, "n_frames = \"many\""),
+        |case| capture(case, "n_frames = \"many\""),
         &[
             "deployment.toml:16",
             "`capture.n_frames`",
@@ -241,13 +241,13 @@ const INPUTS: &[Mistake] = &[
     ),
     input(
         "absent network",
-        |it| errors(it, "person.quality.onnx"),
+        |case| errors(case, "person.quality.onnx"),
         &["person.quality.onnx"],
         &["`paper.errors`", "\"shipped\""],
     ),
     input(
         "model for a network",
-        |it| errors(it, "model.plx"),
+        |case| errors(case, "model.plx"),
         &["model.plx"],
         &["not an ONNX file"],
     ),
@@ -277,23 +277,23 @@ const INPUTS: &[Mistake] = &[
     ),
     input(
         "absent joints",
-        |it| joints(it, "person.joints"),
+        |case| joints(case, "person.joints"),
         &["person.joints"],
         &["`paper.joint_map`", "\"shipped\""],
     ),
     input(
         "joints of another model",
-        |it| {
+        |case| {
             let file = include_str!("../../../../configs/models/person.joints");
-            it.write("person.joints", file);
-            joints(it, "person.joints");
+            case.write("person.joints", file);
+            joints(case, "person.joints");
         },
         &["person.joints", "learned with another model"],
         &["`parallax-lab train joints`"],
     ),
     input(
         "rig for joints",
-        |it| joints(it, "rig.toml"),
+        |case| joints(case, "rig.toml"),
         &["rig.toml"],
         &["not JSON"],
     ),
@@ -335,7 +335,7 @@ const INPUTS: &[Mistake] = &[
     ),
     rig(
         "size as text",
-        |it| super::replace_line(it, "size_px", "size_px = \"96x128\""),
+        |case| super::replace_line(case, "size_px", "size_px = \"96x128\""),
         &[
             "rig.toml",
             "size_px = \"96x128\"",
@@ -345,7 +345,7 @@ const INPUTS: &[Mistake] = &[
     ),
     rig(
         "negative focal length",
-        |it| super::replace_line(it, "focal_px", "focal_px = [-170.0, 170.0]"),
+        |case| super::replace_line(case, "focal_px", "focal_px = [-170.0, 170.0]"),
         &["rig.toml", "camera \"a\"", "-170"],
         &["is not positive"],
     ),

@@ -7,15 +7,15 @@ pub(crate) struct Block {
     pub(crate) line: usize,
     /// Words of its info string: language, then marks.
     pub(crate) info: Vec<String>,
-    /// What lies between the fences.
+    /// Text between the fences.
     pub(crate) text: String,
 }
 
 impl Block {
-    /// Whether it is of a language and carries a mark.
+    /// Returns true if the block is of a language and carries a mark.
     pub(crate) fn is(&self, language: &str, mark: &str) -> bool {
         self.info.first().is_some_and(|info| info == language)
-            && self.info.iter().any(|it| it == mark)
+            && self.info.iter().any(|word| word == mark)
     }
 }
 

@@ -68,7 +68,7 @@ impl Line {
         }
     }
 
-    /// Whether what it asks of cargo is not there: a package or a feature.
+    /// Returns the package or feature that the command asks of cargo and that is not there.
     pub(crate) fn cargo_problem(&self) -> Option<String> {
         if self.0.first()? != "cargo" {
             return None;
@@ -96,7 +96,7 @@ impl Line {
         (!declared).then(|| format!("there is no feature {feature}"))
     }
 
-    /// What it names in the repository.
+    /// Returns the paths in the repository that the command names.
     pub(crate) fn repository_paths(&self) -> Vec<String> {
         let words = self.0.iter().map(|word| word.trim_end_matches('/'));
         words
@@ -139,7 +139,7 @@ fn words(line: &str) -> Vec<String> {
     words
 }
 
-/// Whether the executable takes these arguments.
+/// Checks that the executable takes these arguments.
 ///
 /// It parses them itself, `--help` behind them: what it does not know, and values of another kind, it refuses
 /// before it comes to that. What is missing it would not notice; that is compared with its usage line.
@@ -177,7 +177,7 @@ pub(crate) fn check((program, arguments): (Program, &[String])) -> Result<(), St
     usage.compare(rest)
 }
 
-/// What the usage line of a command asks for.
+/// Arguments that the usage line of a command asks for.
 struct Usage<'a> {
     help: &'a str,
     /// Fewest arguments that are no options, and most.
@@ -245,7 +245,7 @@ impl<'a> Usage<'a> {
         let shown = self.help.lines().find_map(|line| {
             let line = line.trim_start();
             let long = line.split_once(", ").map_or(line, |(_, long)| long);
-            let rest = [line, long].into_iter().find_map(|it| it.strip_prefix(option))?;
+            let rest = [line, long].into_iter().find_map(|text| text.strip_prefix(option))?;
             rest.starts_with([' ', '\n']).then_some(rest)
         });
         let shown = shown.unwrap_or_default().trim_start_matches(' ');
@@ -269,7 +269,7 @@ fn help_of(program: Program, path: &[String]) -> Result<String, String> {
     Ok(said)
 }
 
-/// Whether it succeeded, and what it printed: on success to standard output, else to standard error.
+/// Runs a program. Returns true on success, and the text that it printed: standard output on success, else standard error.
 fn run(program: Program, arguments: &[String]) -> (bool, String) {
     let ended = Command::new(program.file()).args(arguments).output().unwrap();
     let said = if ended.status.success() {

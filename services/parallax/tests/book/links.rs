@@ -63,5 +63,5 @@ fn anchor_of(heading: &str) -> String {
     let heading = heading.trim_start_matches('#').trim();
     let letters = heading.to_lowercase();
     let kept = letters.chars().filter(|c| c.is_alphanumeric() || [' ', '-', '_'].contains(c));
-    kept.map(|it| if it == ' ' { '-' } else { it }).collect()
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::blocks::prose;
 use super::files_below;
 
-/// What declares a name.
+/// Keywords that declare a name.
 const KEYWORDS: [&str; 7] = ["fn", "struct", "enum", "trait", "mod", "const", "type"];
 
 /// All code spans that are a path in a crate.
@@ -23,7 +23,7 @@ pub(crate) fn paths(text: &str) -> Vec<String> {
     spans.filter(is_path).map(str::to_owned).collect()
 }
 
-/// Whether the crate is there, and declares everything that the path names.
+/// Returns true if the crate is there, and declares everything that the path names.
 pub(crate) fn exists(root: &Path, path: &str) -> bool {
     let mut segments = path.split("::");
     let name = segments.next().unwrap_or_default();
@@ -36,7 +36,7 @@ pub(crate) fn exists(root: &Path, path: &str) -> bool {
     segments.all(|segment| texts.iter().any(|text| declares(text, segment)))
 }
 
-/// Whether a file declares a name, or has it as a variant of an enum.
+/// Returns true if a file declares a name, or has it as a variant of an enum.
 fn declares(text: &str, name: &str) -> bool {
     let is_end =
         |rest: &str| !rest.starts_with(|letter: char| letter.is_alphanumeric() || letter == '_');

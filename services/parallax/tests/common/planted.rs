@@ -39,7 +39,7 @@ pub(crate) fn rig(n_views: usize) -> Rig {
 /// The same cameras with lens distortion, each with another roll angle.
 pub(crate) fn tilted_rig(n_views: usize) -> Rig {
     let tilted = rig(n_views).cameras().to_vec().into_iter().enumerate();
-    let cameras = tilted.map(|(view, it)| {
+    let cameras = tilted.map(|(view, camera)| {
         let roll = 0.5 - 0.4 * view as f64;
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
         let lens = LensModel::BrownConrady {
@@ -47,13 +47,13 @@ pub(crate) fn tilted_rig(n_views: usize) -> Rig {
             p: [0.002, -0.001],
         };
         Camera {
-            camera_from_world: turn * it.camera_from_world,
+            camera_from_world: turn * camera.camera_from_world,
             intrinsics: Intrinsics {
                 fy: 168.0,
                 lens: Lens::new(lens),
-                ..it.intrinsics
+                ..camera.intrinsics
             },
-            ..it
+            ..camera
         }
     });
     Rig::new(cameras.collect(), Some(Vector3::z_axis()), "planted").unwrap()
@@ -93,7 +93,7 @@ fn figure(frame: usize) -> [Point3<f64>; N_PARTS] {
 
 /// The 14 joints of the figure, metres.
 pub(crate) fn joints(frame: usize) -> Vec<[f64; 3]> {
-    let parts = figure(frame).map(|it| it.coords.into());
+    let parts = figure(frame).map(|point| point.coords.into());
     skeleton::PARSE14.from_parts(&parts)
 }
 
@@ -149,9 +149,9 @@ fn spec() -> ModelSpec {
 }
 
 fn filter(seed: usize) -> Filter {
-    let weight = |it: usize| match it % N_CHANNELS {
+    let weight = |i: usize| match i % N_CHANNELS {
         31 => -1.0,
-        _ => 0.1 + 0.1 * ((seed * 1000 + it) as f64).sin(),
+        _ => 0.1 + 0.1 * ((seed * 1000 + i) as f64).sin(),
     };
     Filter {
         rows: 3,

@@ -22,7 +22,7 @@ pub(crate) struct OneProcess {
     pub(crate) upright_size: Option<[u32; 2]>,
     /// Expected errors of the parts in a frame of a view, if there are any.
     pub(crate) sigma_px: Option<fn(frame: usize, view: usize) -> Vec<f32>>,
-    /// Whether a view is missing in a frame; without it, none is.
+    /// Predicate: true if a view is missing in a frame; without it, none is.
     pub(crate) is_missing: Option<fn(frame: usize, view: usize) -> bool>,
 }
 
@@ -48,7 +48,7 @@ impl OneProcess {
         for frame in 0..n_frames {
             let pictures = rig.cameras().iter().map(|camera| planted::picture(camera, frame));
             let frames: Vec<Vec<u8>> =
-                pictures.zip(&mut views).map(|(it, view)| view.frame(&it)).collect();
+                pictures.zip(&mut views).map(|(picture, view)| view.frame(&picture)).collect();
             let is_missing =
                 |view: usize| self.is_missing.is_some_and(|is_missing| is_missing(frame, view));
             let images = frames.iter().zip(&views).enumerate();
@@ -62,7 +62,7 @@ impl OneProcess {
             n_placed += estimate.skeleton.joints.iter().flatten().count();
             assert_same_skeleton(&pose3d[frame], frame, &estimate.skeleton);
             let there = views.iter().enumerate();
-            for (view, it) in there.filter(|it| !is_missing(it.0)) {
+            for (view, it) in there.filter(|view| !is_missing(view.0)) {
                 let line = &pose2d[frame * n_views + view];
                 let layout = estimator.plans()[view].layout();
                 it.assert_same(line, [frame, view], &estimate, layout);

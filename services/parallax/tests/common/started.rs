@@ -164,7 +164,7 @@ impl Started {
     /// Waits until it has said something on standard error while it runs.
     pub(crate) fn until_said(&mut self, words: &str) {
         let file = self.log.with_extension("err");
-        let said = || fs::read_to_string(&file).is_ok_and(|it| it.contains(words));
+        let said = || fs::read_to_string(&file).is_ok_and(|text| text.contains(words));
         self.until(words, |_| said());
     }
 

@@ -49,13 +49,13 @@ fn one(id: u64) -> Box<Skeletons> {
     frame
 }
 
-/// What a frame becomes.
+/// Returns the Foxglove messages of a frame.
 fn shown(foxglove: &mut Foxglove, frame: &Skeletons) -> Vec<(usize, Value)> {
     let [head, people] = recording::split_skeletons(frame);
     made(foxglove, Kind::Skeletons, head, people)
 }
 
-/// What a message of ours becomes.
+/// Returns the Foxglove messages of one of our messages.
 fn made(foxglove: &mut Foxglove, kind: Kind, head: &[u8], elements: &[u8]) -> Vec<(usize, Value)> {
     let mut data = Vec::new();
     encode(kind, head, elements, &mut data);
@@ -112,7 +112,7 @@ fn messages_are_as_the_schemas_of_foxglove_say_and_the_cameras_come_first() {
     let mut two = one(1);
     (two.n_people, two.people[1]) = (2, one(7).people[0]);
     let mut all = shown(&mut foxglove, &two);
-    let order: Vec<usize> = all.iter().map(|it| it.0).collect();
+    let order: Vec<usize> = all.iter().map(|message| message.0).collect();
     assert_eq!(order, [1, 2, 4, 0]);
     let head = FrameHeader {
         width: 8,
@@ -153,7 +153,8 @@ fn a_skeleton_is_its_joints_with_a_place_their_spread_and_the_lines_between_them
     // Two of the joints have no place or spread that is a number.
     let n = PARSE14.joints.len() - 2;
     assert_eq!(entity["spheres"].as_array().map(Vec::len), Some(2 * n));
-    let has_both = |it: &&(usize, usize)| [it.0, it.1].iter().all(|it| ![2, 3].contains(it));
+    let has_both =
+        |limb: &&(usize, usize)| [limb.0, limb.1].iter().all(|joint| ![2, 3].contains(joint));
     let n_lines = PARSE14.limbs.iter().filter(has_both).count();
     let points = entity["lines"][0]["points"].as_array().map(Vec::len);
     assert_eq!(points, Some(2 * n_lines));

@@ -1,11 +1,11 @@
-//! What the process has to do.
+//! Task of the process.
 
 use core::time::Duration;
 use std::path::PathBuf;
 
 use crate::replay::Pace;
 
-/// What the process has to do.
+/// Task of the process.
 #[derive(Debug)]
 pub struct Job {
     /// The recording.

@@ -170,7 +170,7 @@ pub(crate) fn kill(signal: &str, pid: u32) {
     assert!(status.unwrap().success(), "kill {signal} {pid}");
 }
 
-/// Whether a process runs: it exists, and is not a zombie.
+/// Returns true if a process runs: it exists, and is not a zombie.
 pub(crate) fn is_alive(pid: u32) -> bool {
     let line = std::fs::read(Path::new("/proc").join(pid.to_string()).join("cmdline"));
     line.is_ok_and(|line| !line.is_empty())

@@ -32,7 +32,7 @@ fn serve() -> ExitCode {
         Err(error) => return Failure::from(error).exit(),
     };
     let rest: Vec<String> = rest.iter().filter_map(text).collect();
-    let number = |index: usize| rest.get(index).and_then(|it| it.parse().ok()).unwrap_or(0);
+    let number = |index: usize| rest.get(index).and_then(|word| word.parse().ok()).unwrap_or(0);
     run_service(launch, |service| match rest.first().map(String::as_str) {
         Some("send") => send(service, number(1), number(2), number(3) as usize, false),
         Some("send-and-leave") => send(service, number(1), number(2), number(3) as usize, true),
@@ -121,7 +121,7 @@ fn receive(service: &Service, pause: u64, dies: bool) -> Result<(), Failure> {
         while let Some(sample) = subscriber.receive()? {
             let header = sample.header();
             let value = header.stamp.frame as u8;
-            if sample.payload().iter().any(|&it| it != value) {
+            if sample.payload().iter().any(|&byte| byte != value) {
                 print_line("torn")?;
             }
             if header.status == Status::END {

@@ -184,10 +184,10 @@ fn no_report(child: &mut Child) -> Failure {
 
 /// The number of messages whose location both processes know, and of those with the same location.
 fn compare(sent: &[Spot], received: &[Spot]) -> (usize, usize) {
-    let of = |message: u64| sent.iter().find(move |it| it.message == message);
-    let pairs = received.iter().filter_map(|it| Some((it, of(it.message)?)));
+    let of = |message: u64| sent.iter().find(move |spot| spot.message == message);
+    let pairs = received.iter().filter_map(|spot| Some((spot, of(spot.message)?)));
     let pairs: Vec<_> = pairs.collect();
-    let n_same = pairs.iter().filter(|(it, other)| it == other).count();
+    let n_same = pairs.iter().filter(|(spot, other)| spot == other).count();
     (pairs.len(), n_same)
 }
 

@@ -123,7 +123,7 @@ impl Options {
 
     /// The requested limits, checked on the run with all cameras.
     fn limits(&self, all: &[Measured]) -> Vec<Limit> {
-        let whole = all.iter().rfind(|it| !it.case.has_dead);
+        let whole = all.iter().rfind(|measured| !measured.case.has_dead);
         let end_to_end = whole.and_then(|whole| whole.end_to_end);
         let rate = whole.and_then(|whole| whole.rate_hz);
         let limits = [
@@ -154,7 +154,8 @@ fn table(all: &[Measured]) -> Table {
         "<run", "results", "a second", "p50", "p99", "p99.9", "max", "cpu", "dropped",
     ]);
     for measured in all {
-        let number = |value: Option<f64>| value.map_or("-".to_owned(), |it| format!("{it:.1}"));
+        let number =
+            |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1}"));
         let mut row = vec![
             measured.case.to_string(),
             measured.n_results.to_string(),

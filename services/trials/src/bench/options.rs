@@ -15,9 +15,9 @@ pub struct Options {
     pub rate_hz: f64,
     /// Seed of the motion, the room and the lighting.
     pub seed: u64,
-    /// Whether the capture processes render their pictures during the run.
+    /// True if the capture processes render their pictures during the run.
     pub live: bool,
-    /// Whether stages poll for messages.
+    /// True if stages poll for messages.
     pub spin: bool,
     /// `key=value` pairs that replace values of the deployment.
     pub set: Vec<String>,

@@ -115,7 +115,7 @@ pub(super) fn write(message: u64, payload: &mut [u8]) {
     }
 }
 
-/// Whether a payload is that of a message; checks both ends and one byte in the middle.
+/// Returns true if a payload is that of a message; checks both ends and one byte in the middle.
 fn is_of(message: u64, payload: &[u8]) -> bool {
     let number = message.to_le_bytes();
     let is_whole = payload.len() < 24 || payload[payload.len() / 2] == message as u8;

@@ -24,7 +24,7 @@ pub struct Transport {
     pub interval_us: u64,
     /// Sizes of messages, bytes, at least 16; one series each.
     pub bytes: Vec<usize>,
-    /// Whether only the polling receiver is measured.
+    /// True if only the polling receiver is measured.
     pub spin: bool,
     /// Cores of the sender and the receiver; any if empty.
     pub cores: Vec<usize>,
@@ -157,19 +157,23 @@ impl Transport {
             }
         }
         let sum = |of: fn(&Measured) -> u64| rows.iter().map(|row| of(&row.measured)).sum::<u64>();
-        let compared = sum(|it| it.n_compared as u64);
+        let compared = sum(|measured| measured.n_compared as u64);
         limits.extend([
             limit::at_least("messages asked where they lie", 1.0, Some(compared as f64)),
             limit::at_most(
                 "of these elsewhere than they were written",
                 0.0,
-                Some((compared - sum(|it| it.n_same_place as u64)) as f64),
+                Some((compared - sum(|measured| measured.n_same_place as u64)) as f64),
             ),
-            limit::at_most("bytes copied", 0.0, Some(sum(|it| it.copied_bytes) as f64)),
+            limit::at_most(
+                "bytes copied",
+                0.0,
+                Some(sum(|measured| measured.copied_bytes) as f64),
+            ),
             limit::at_most(
                 "messages with another content",
                 0.0,
-                Some(sum(|it| it.receiver.broken) as f64),
+                Some(sum(|measured| measured.receiver.broken) as f64),
             ),
         ]);
         limits

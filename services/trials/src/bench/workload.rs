@@ -32,9 +32,9 @@ const TICKS_HZ: f64 = 100.0;
 pub(super) struct Case {
     /// Number of cameras.
     pub n_views: usize,
-    /// Whether every frame is processed, as fast as possible.
+    /// True if every frame is processed, as fast as possible.
     pub is_lossless: bool,
-    /// Whether the process of the last camera is killed.
+    /// True if the process of the last camera is killed.
     pub has_dead: bool,
 }
 
@@ -102,7 +102,7 @@ impl Measured {
     /// The measurements as JSON.
     pub(super) fn json(&self) -> Value {
         let stages = self.stages.iter();
-        let stages = stages.map(|(name, it)| ((*name).to_owned(), json!(it)));
+        let stages = stages.map(|(name, spread)| ((*name).to_owned(), json!(spread)));
         json!({
             "run": self.case.to_string(),
             "views": self.case.n_views,
@@ -273,7 +273,7 @@ impl Workload {
 }
 
 fn measured(case: Case, results: &[FrameResult], cpu_seconds: f64, report: &Report) -> Measured {
-    let took = |it: &FrameResult| Some(it.sent_ms - it.captured_ms()?);
+    let took = |result: &FrameResult| Some(result.sent_ms - result.captured_ms()?);
     let run = report.json();
     let stages = report.recorded().latency().map(|latency| &latency.stages);
     Measured {
@@ -283,7 +283,7 @@ fn measured(case: Case, results: &[FrameResult], cpu_seconds: f64, report: &Repo
         end_to_end: Spread::of(results.iter().filter_map(took).collect()),
         stages: STAGES
             .into_iter()
-            .filter_map(|it| Some((it, spread(stages?.get(it)?))))
+            .filter_map(|stage| Some((stage, spread(stages?.get(stage)?))))
             .collect(),
         cpu_seconds,
         n_dropped: run["dropped"].as_u64().unwrap_or(0),
@@ -315,7 +315,7 @@ fn keep_views(deployment: &mut Deployment, n_views: usize) {
     let names: Vec<String> = deployment.cameras.iter().map(|camera| camera.name.clone()).collect();
     let is_kept = |name: &String| names.contains(name);
     deployment.paper.pairs.retain(|pair| pair.iter().all(is_kept));
-    deployment.paper.compatibility.retain(|it| it.views.iter().all(is_kept));
+    deployment.paper.compatibility.retain(|entry| entry.views.iter().all(is_kept));
     if let Some(Errors::Table(table)) = &mut deployment.paper.errors {
         table.views.retain(|name, _| is_kept(name));
     }

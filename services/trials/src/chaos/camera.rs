@@ -20,7 +20,7 @@ const SHARE: f64 = 0.2;
 /// The number of repetitions after which a picture counts as frozen: small, so that a short run shows it.
 const FROZEN_AFTER: &str = "capture.frozen_after=2";
 
-/// What a run with a camera fault showed. Times are in milliseconds.
+/// Measurements of a run with a camera fault. Times are in milliseconds.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(super) struct CameraFailure {
     /// The camera.
@@ -61,11 +61,12 @@ impl CameraFailure {
             let n = during.iter().filter(|during| reason(during).as_deref() == Some(cause)).count();
             (cause.to_owned(), n)
         });
-        let has_others = |it: &&&FrameResult| it.views.iter().any(|view| view.missing.is_none());
+        let has_others =
+            |result: &&&FrameResult| result.views.iter().any(|view| view.missing.is_none());
         let pauses = during.windows(2).map(|pair| pair[1].sent_ms - pair[0].sent_ms);
         let last = during.last().map(|during| during.sent_ms);
         let mut after = results.iter().filter(|result| result.frame >= span[1]);
-        let back = after.find(|it| reason(it).is_none()).map(|after| after.sent_ms);
+        let back = after.find(|result| reason(result).is_none()).map(|after| after.sent_ms);
         Self {
             camera: camera.to_owned(),
             span,

@@ -26,7 +26,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// The host with cameras.
 const FAR: &str = "rack";
 
-/// What was measured.
+/// Measurements of a run with a host fault.
 #[derive(Debug, Default)]
 struct Measured {
     gone_ms: Option<f64>,
@@ -58,7 +58,7 @@ pub(super) fn attempt(
     let mut far = Running(start(testbed, &far_file, FAR, &output)?);
     let watch = Watch { testbed, state };
     let mut measured = Measured::default();
-    if watch.until(PATIENCE, |it| n_used(it) > 2).is_some() {
+    if watch.until(PATIENCE, |state| n_used(state) > 2).is_some() {
         match fault {
             HostFault::Cut => relay.cut(true),
             HostFault::Kill => far.end(),
@@ -194,7 +194,7 @@ fn write(testbed: &Testbed, host: &str, port: u16) -> Result<PathBuf, Failure> {
     let plan = testbed.plan(host, &[])?;
     let cameras = &plan.resolved().deployment.cameras;
     let names = |all: &[deployment::capture::Camera]| {
-        let quoted = all.iter().map(|it| toml::Value::from(it.name.as_str()).to_string());
+        let quoted = all.iter().map(|camera| toml::Value::from(camera.name.as_str()).to_string());
         quoted.collect::<Vec<_>>().join(", ")
     };
     let (near, far) = cameras.split_at(cameras.len() / 2);

@@ -135,21 +135,31 @@ pub(super) fn random(
             at_most(what, most.round(), Some(number(last) as f64 / unit))
         };
         limits.extend([
-            grown("memory at last, MB", |it| it.memory_bytes, MORE_BYTES, 1e6),
+            grown(
+                "memory at last, MB",
+                |used| used.memory_bytes,
+                MORE_BYTES,
+                1e6,
+            ),
             grown(
                 "memory of the supervisor at last, MB",
-                |it| it.supervisor_memory_bytes,
+                |used| used.supervisor_memory_bytes,
                 MORE_BYTES,
                 1e6,
             ),
             grown(
                 "shared memory at last, MB",
-                |it| it.shared_bytes,
+                |used| used.shared_bytes,
                 MORE_BYTES,
                 1e6,
             ),
-            grown("descriptors at last", |it| it.descriptors, MORE_FILES, 1.0),
-            grown("files at last", |it| it.files, MORE_FILES, 1.0),
+            grown(
+                "descriptors at last",
+                |used| used.descriptors,
+                MORE_FILES,
+                1.0,
+            ),
+            grown("files at last", |used| used.files, MORE_FILES, 1.0),
         ]);
     }
     limits
@@ -232,32 +242,35 @@ mod tests {
         let nothing: &[&str] = &[];
         let changes: [(Change, &[&str]); 11] = [
             (|_, _| (), nothing),
-            (|it, _| it.noticed_ms = Some(1001.0), &["noticed after, ms"]),
-            (|it, _| it.back_ms = Some(8001.0), &["back after, ms"]),
-            (|it, _| it.back_ms = None, &["back after, ms"]),
             (
-                |it, _| it.longest_pause_ms = Some(2001.0),
+                |cost, _| cost.noticed_ms = Some(1001.0),
+                &["noticed after, ms"],
+            ),
+            (|cost, _| cost.back_ms = Some(8001.0), &["back after, ms"]),
+            (|cost, _| cost.back_ms = None, &["back after, ms"]),
+            (
+                |cost, _| cost.longest_pause_ms = Some(2001.0),
                 &["longest pause of results meanwhile, ms"],
             ),
-            (|_, it| it.n_results = 0, &["results"]),
+            (|_, outcome| outcome.n_results = 0, &["results"]),
             (
-                |_, it| it.unanswered = 3,
+                |_, outcome| outcome.unanswered = 3,
                 &["frames whose end is not known"],
             ),
             (
-                |_, it| it.failed = vec!["pose-1".to_owned()],
+                |_, outcome| outcome.failed = vec!["pose-1".to_owned()],
                 &["processes that failed by themselves"],
             ),
             (
-                |_, it| it.leftovers = vec!["px".to_owned()],
+                |_, outcome| outcome.leftovers = vec!["px".to_owned()],
                 &["left in shared memory"],
             ),
             (
-                |_, it| it.suspected = vec!["c1".to_owned()],
+                |_, outcome| outcome.suspected = vec!["c1".to_owned()],
                 &["cameras accused that stand where they should"],
             ),
             (
-                |_, it| it.failure = Some("it broke".to_owned()),
+                |_, outcome| outcome.failure = Some("it broke".to_owned()),
                 &["failures of the run", "frames whose end is not known"],
             ),
         ];
@@ -268,14 +281,16 @@ mod tests {
 
     #[test]
     fn without_an_injected_fault_the_limits_are_missed() {
-        let got = missed_once(ProcessFault::Kill, "pose-1", |it, _| *it = Cost::default());
+        let got = missed_once(ProcessFault::Kill, "pose-1", |cost, _| {
+            *cost = Cost::default()
+        });
         assert_eq!(got.len(), 3, "{got:?}");
     }
 
     #[test]
     fn the_hang_limit_extends_the_limits_of_a_stopped_process_only() {
-        let late = |it: &mut Cost, _: &mut RunOutcome| {
-            (it.noticed_ms, it.back_ms) = (Some(3100.0), Some(10_900.0));
+        let late = |cost: &mut Cost, _: &mut RunOutcome| {
+            (cost.noticed_ms, cost.back_ms) = (Some(3100.0), Some(10_900.0));
         };
         assert_eq!(missed_once(ProcessFault::Stop, "pose-1", late), [""; 0]);
         let got = missed_once(ProcessFault::Kill, "pose-1", late);
@@ -284,7 +299,7 @@ mod tests {
 
     #[test]
     fn the_pause_may_last_as_long_as_triangulate_is_away() {
-        let pause = |it: &mut Cost, _: &mut RunOutcome| it.longest_pause_ms = Some(2500.0);
+        let pause = |cost: &mut Cost, _: &mut RunOutcome| cost.longest_pause_ms = Some(2500.0);
         assert_eq!(
             missed_once(ProcessFault::Kill, "triangulate", pause),
             [""; 0]
@@ -320,25 +335,25 @@ mod tests {
         let nothing: &[&str] = &[];
         let changes: [(Change, &[&str]); 8] = [
             (|_, _| (), nothing),
-            (|it, _| it.n_kills = 4, &["came back"]),
+            (|series, _| series.n_kills = 4, &["came back"]),
             (
-                |it, _| it.downtime_ms = Spread::of(vec![500.0, 700.0, 8001.0]),
+                |series, _| series.downtime_ms = Spread::of(vec![500.0, 700.0, 8001.0]),
                 &["back after (p99), ms"],
             ),
             (
-                |_, it| it.memory_bytes = 143_000_000,
+                |_, used| used.memory_bytes = 143_000_000,
                 &["memory at last, MB"],
             ),
             (
-                |_, it| it.supervisor_memory_bytes = 44_000_000,
+                |_, used| used.supervisor_memory_bytes = 44_000_000,
                 &["memory of the supervisor at last, MB"],
             ),
             (
-                |_, it| it.shared_bytes = 39_000_000,
+                |_, used| used.shared_bytes = 39_000_000,
                 &["shared memory at last, MB"],
             ),
-            (|_, it| it.descriptors = 119, &["descriptors at last"]),
-            (|_, it| it.files = 64, &["files at last"]),
+            (|_, used| used.descriptors = 119, &["descriptors at last"]),
+            (|_, used| used.files = 64, &["files at last"]),
         ];
         for (change, expected) in changes {
             assert_eq!(missed_random(change), expected);

@@ -23,13 +23,13 @@ fn moved(rig: &Rig, camera: &str, random: &mut Rng) -> Result<Rig, Failure> {
     let bearing = core::f64::consts::TAU * random.f64();
     let axis = Vector3::new(bearing.cos(), bearing.sin(), 0.0);
     let turn = UnitQuaternion::new(axis * DEGREES.to_radians());
-    let cameras = rig.cameras().iter().map(|it| Camera {
-        camera_from_world: if it.name == camera {
-            turn * it.camera_from_world
+    let cameras = rig.cameras().iter().map(|original| Camera {
+        camera_from_world: if original.name == camera {
+            turn * original.camera_from_world
         } else {
-            it.camera_from_world
+            original.camera_from_world
         },
-        ..it.clone()
+        ..original.clone()
     });
     Rig::new(cameras.collect(), rig.up_in_world(), rig.source()).or_fail(ExitKind::Calibration)
 }
@@ -52,7 +52,7 @@ pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, F
     let run = testbed.run(&planned, &mut |_| None);
     let mut outcome = run.outcome(|_| 0);
     let is_named = outcome.suspected.contains(&camera);
-    outcome.suspected.retain(|it| *it != camera);
+    outcome.suspected.retain(|name| *name != camera);
     let summary = run.report.as_ref().ok().and_then(|report| report.recorded().summary());
     let fits = summary.map(|summary| &summary.calibration);
     let fit = fits.and_then(|fit| fit.get(&camera)).copied();

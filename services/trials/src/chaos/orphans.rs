@@ -87,12 +87,12 @@ fn wait_for_results(testbed: &Testbed, supervisor: &mut Child, file: &Path) -> R
 fn children(parent: u32) -> BTreeSet<u32> {
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
     let pids = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
-    pids.filter(|pid| state(*pid).is_some_and(|it| it.1 == parent)).collect()
+    pids.filter(|pid| state(*pid).is_some_and(|state| state.1 == parent)).collect()
 }
 
-/// Whether a process runs; a zombie does not.
+/// Returns true if a process runs; a zombie does not.
 fn is_alive(pid: u32) -> bool {
-    state(pid).is_some_and(|it| !['Z', 'X'].contains(&it.0))
+    state(pid).is_some_and(|state| !['Z', 'X'].contains(&state.0))
 }
 
 /// The state and the parent of a process.

@@ -1,7 +1,7 @@
 //! Measures the resources of a run every second: memory, descriptors and files.
 //!
 //! Buffers of a process grow to what its largest frame needed, so that an old process holds more than one that was just started.
-//! What a run holds at its start and at its end is therefore compared at equal ages of its processes.
+//! The resources of a run at its start and at its end are therefore compared at equal ages of its processes.
 
 use core::ops::Range;
 use std::collections::BTreeMap;
@@ -51,11 +51,11 @@ struct Watched {
     epoch: u32,
     /// When it was started, `failure::now_nanos`.
     started_at: u64,
-    /// Whether it has worked in this epoch.
+    /// True if it has worked in this epoch.
     has_worked: bool,
 }
 
-/// What was in use at one time.
+/// Resources in use at one time.
 #[derive(Debug)]
 struct Sample {
     /// When, `failure::now_nanos`.
@@ -186,8 +186,8 @@ fn at_equal_ages(parts: [&[Sample]; 2]) -> [u64; 2] {
             .copied()
             .collect();
         for (sum, classes) in sums.iter_mut().zip(by_class) {
-            let medians = both.iter().filter_map(|it| {
-                let mut all = classes.get(it)?.clone();
+            let medians = both.iter().filter_map(|class| {
+                let mut all = classes.get(class)?.clone();
                 all.sort_unstable();
                 all.get(all.len() / 2).copied()
             });
@@ -206,11 +206,11 @@ fn median(samples: impl Iterator<Item = ResourceUse>) -> Option<ResourceUse> {
         all.get(all.len() / 2).copied().unwrap_or(0)
     };
     (!samples.is_empty()).then(|| ResourceUse {
-        memory_bytes: of(|it| it.memory_bytes),
-        supervisor_memory_bytes: of(|it| it.supervisor_memory_bytes),
-        descriptors: of(|it| it.descriptors),
-        files: of(|it| it.files),
-        shared_bytes: of(|it| it.shared_bytes),
+        memory_bytes: of(|used| used.memory_bytes),
+        supervisor_memory_bytes: of(|used| used.supervisor_memory_bytes),
+        descriptors: of(|used| used.descriptors),
+        files: of(|used| used.files),
+        shared_bytes: of(|used| used.shared_bytes),
     })
 }
 
@@ -239,7 +239,7 @@ pub(super) fn measure(namespace: &Namespace, pids: &[u32]) -> Measured {
 /// Allocated size of a file in shared memory, bytes: less than its length if pages were never written.
 fn shared(name: &str) -> u64 {
     let found = fs::metadata(Path::new("/dev/shm").join(name));
-    found.map_or(0, |it| it.blocks() * 512)
+    found.map_or(0, |file| file.blocks() * 512)
 }
 
 /// Number of files of a deployment, including those in shared memory.
@@ -336,7 +336,7 @@ mod tests {
             .collect();
         assert_eq!(taken, [(2, 2), (5, 2)]);
         let within = |span: Range<u64>| monitor.within(&(span.start * PERIOD..span.end * PERIOD));
-        assert_eq!(within(3..6).map(|it| it.files), Some(5));
+        assert_eq!(within(3..6).map(|used| used.files), Some(5));
         assert_eq!(within(3..5), None);
     }
 
@@ -352,13 +352,13 @@ mod tests {
     #[test]
     fn memory_is_compared_at_equal_ages() {
         // At first it is killed often, and at last grows old: what it holds depends on its age alone.
-        let young = [(1, 50), (5, 60), (1, 50), (2, 55)].map(|(age, it)| sample(age, it));
-        let old = [(5, 60), (20, 120), (100, 180)].map(|(age, it)| sample(age, it));
+        let young = [(1, 50), (5, 60), (1, 50), (2, 55)].map(|(age, memory)| sample(age, memory));
+        let old = [(5, 60), (20, 120), (100, 180)].map(|(age, memory)| sample(age, memory));
         assert_eq!(at_equal_ages([&young, &old]), [60, 60]);
         // What every new process holds more of was left by those before it.
-        let leaking = [(1, 90), (2, 95), (5, 100)].map(|(age, it)| sample(age, it));
+        let leaking = [(1, 90), (2, 95), (5, 100)].map(|(age, memory)| sample(age, memory));
         assert_eq!(at_equal_ages([&young, &leaking]), [55, 95]);
-        let older = [(50, 90)].map(|(age, it)| sample(age, it));
+        let older = [(50, 90)].map(|(age, memory)| sample(age, memory));
         assert_eq!(at_equal_ages([&young, &older]), [0, 0], "no age in common");
     }
 

@@ -53,7 +53,7 @@ impl Scenario {
     ///
     /// There is no scenario of that name; the message is for the user.
     pub fn by_name(name: &str) -> Result<Self, String> {
-        let found = Self::all().into_iter().find(|it| it.name() == name);
+        let found = Self::all().into_iter().find(|scenario| scenario.name() == name);
         found.ok_or_else(|| "there is no scenario of this name; --list names them all".to_owned())
     }
 
@@ -72,7 +72,7 @@ impl Scenario {
         }
     }
 
-    /// What happens in it, for the user.
+    /// Returns the events of the scenario as text for the user.
     pub fn summary(self) -> String {
         match self {
             Self::Once(ProcessFault::Kill, service) => {
@@ -99,7 +99,7 @@ impl Scenario {
         }
     }
 
-    /// Whether it is possible with the processes of a deployment.
+    /// Returns true if the scenario is possible with the processes of a deployment.
     ///
     /// * `processes`: their names.
     pub fn is_possible(self, processes: &[String]) -> bool {
@@ -124,7 +124,7 @@ impl Scenario {
 
 /// The service of a process.
 pub(super) fn service_of(process: &str) -> &str {
-    process.split_once('-').map_or(process, |it| it.0)
+    process.split_once('-').map_or(process, |parts| parts.0)
 }
 
 #[cfg(test)]
@@ -146,7 +146,7 @@ mod tests {
         let processes = ["pose-0", "pose-1", "results"].map(str::to_owned);
         let names: Vec<String> = Scenario::all()
             .into_iter()
-            .filter(|it| it.is_possible(&processes))
+            .filter(|scenario| scenario.is_possible(&processes))
             .map(Scenario::name)
             .collect();
         let expected = [

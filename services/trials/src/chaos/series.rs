@@ -44,7 +44,7 @@ pub(super) fn parts(
         let span: Range<u64> = from..from + length.max(1);
         let killed = kills.iter().filter_map(|kill| kill.times.injected);
         let of_part = results.iter().filter(|result| span.contains(&sent(result)));
-        let latency = |it: &FrameResult| Some(it.sent_ms - it.captured_ms()?);
+        let latency = |result: &FrameResult| Some(result.sent_ms - result.captured_ms()?);
         Part {
             from_s: (from - session) as f64 / 1e9,
             kills: killed.filter(|killed| span.contains(killed)).count(),

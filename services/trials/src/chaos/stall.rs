@@ -241,8 +241,8 @@ mod tests {
             n_results: 20,
             ..RunOutcome::default()
         };
-        let missed = |it: Option<StallMeasurement>, every_frame| {
-            let limits = judge(&asked, it.as_ref(), every_frame, &outcome).into_iter();
+        let missed = |measurement: Option<StallMeasurement>, every_frame| {
+            let limits = judge(&asked, measurement.as_ref(), every_frame, &outcome).into_iter();
             limits.filter(|limit| !limit.held).map(|limit| limit.what).collect::<Vec<_>>()
         };
         let with = |rate| {

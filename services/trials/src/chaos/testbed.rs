@@ -30,7 +30,7 @@ pub(super) struct Testbed {
     pub folder: PathBuf,
     /// `key=value` pairs that replace values of the file.
     pub set: Vec<String>,
-    /// What is printed and logged.
+    /// Verbosity: decides what is printed and logged.
     pub verbosity: Verbosity,
     /// Ends the trial.
     pub stop: Stop,

@@ -26,7 +26,7 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    /// Whether all limits held.
+    /// Returns true if all limits held.
     pub(super) fn is_held(&self) -> bool {
         self.limits.iter().all(|limit| limit.held)
     }

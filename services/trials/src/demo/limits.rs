@@ -99,7 +99,7 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
     limits
 }
 
-/// Whether the camera was away for so long that there must be results of the other views meanwhile: longer than the
+/// Returns true if the camera was away for so long that there must be results of the other views meanwhile: longer than the
 /// usual pauses between results and the deadline of a late view.
 fn needs_results_meanwhile(cost: &Cost, deadline_ms: f64) -> bool {
     let away = cost.back_ms.unwrap_or(f64::INFINITY);
@@ -223,29 +223,35 @@ mod tests {
     fn every_limit_can_be_missed_alone() {
         type Change = fn(&mut Run);
         let changes: [(Change, &str); 10] = [
-            (|it| it.n_results = [9, 9], "frames with a result, %"),
-            (|it| it.n_results = [90, 80], "of these with a skeleton, %"),
-            (|it| it.score = score(Some(49.9)), "PCP3D at 0.5, %"),
-            (|it| it.score = score(None), "PCP3D at 0.5, %"),
+            (|run| run.n_results = [9, 9], "frames with a result, %"),
             (
-                |it| it.changed_cost(|it| it.back_ms = Some(8001.0)),
+                |run| run.n_results = [90, 80],
+                "of these with a skeleton, %",
+            ),
+            (|run| run.score = score(Some(49.9)), "PCP3D at 0.5, %"),
+            (|run| run.score = score(None), "PCP3D at 0.5, %"),
+            (
+                |run| run.changed_cost(|cost| cost.back_ms = Some(8001.0)),
                 "killed camera back after, ms",
             ),
             (
-                |it| it.changed_cost(|it| it.back_ms = None),
+                |run| run.changed_cost(|cost| cost.back_ms = None),
                 "killed camera back after, ms",
             ),
             (
-                |it| it.changed_cost(|it| it.results_without_it = 0),
+                |run| run.changed_cost(|cost| cost.results_without_it = 0),
                 "results of the others meanwhile",
             ),
             (
-                |it| it.changed_cost(|it| it.longest_pause_ms = Some(2001.0)),
+                |run| run.changed_cost(|cost| cost.longest_pause_ms = Some(2001.0)),
                 "longest pause of results meanwhile, ms",
             ),
-            (|it| it.views[0] = view(2), "frames whose end is not known"),
             (
-                |it| it.failed.push("pose-1".to_owned()),
+                |run| run.views[0] = view(2),
+                "frames whose end is not known",
+            ),
+            (
+                |run| run.failed.push("pose-1".to_owned()),
                 "processes that failed by themselves",
             ),
         ];
@@ -253,10 +259,13 @@ mod tests {
             assert_eq!(missed(change), [expected]);
         }
         assert_eq!(
-            missed(|it| it.n_unwritten = Some(1)),
+            missed(|run| run.n_unwritten = Some(1)),
             ["results not written"]
         );
-        assert_eq!(missed(|it| it.n_unwritten = None), ["results not written"]);
+        assert_eq!(
+            missed(|run| run.n_unwritten = None),
+            ["results not written"]
+        );
     }
 
     #[test]
@@ -271,24 +280,24 @@ mod tests {
                 &["longest pause of results meanwhile, ms"],
             ),
         ] {
-            let got = missed(|it| {
-                slow(it);
-                if let Some(cost) = &mut it.cost {
+            let got = missed(|run| {
+                slow(run);
+                if let Some(cost) = &mut run.cost {
                     (cost.back_ms, cost.longest_pause_ms) = (Some(back_ms), Some(pause_ms));
                 }
             });
             assert_eq!(got, expected);
         }
-        let got = missed(|it| {
-            slow(it);
-            it.score = score(Some(49.9));
+        let got = missed(|run| {
+            slow(run);
+            run.score = score(Some(49.9));
         });
         assert_eq!(got, ["PCP3D at 0.5, %"]);
     }
 
     #[test]
     fn a_planned_kill_that_did_not_happen_misses_limits() {
-        let got = missed(|it| it.cost = Some(Cost::default()));
+        let got = missed(|run| run.cost = Some(Cost::default()));
         assert_eq!(got.len(), 3, "{got:?}");
     }
 
@@ -307,7 +316,7 @@ mod tests {
 
     #[test]
     fn without_a_kill_no_frame_may_be_unaccounted_for() {
-        let got = missed(|it| it.cost = None);
+        let got = missed(|run| run.cost = None);
         assert_eq!(got, ["frames whose end is not known"]);
     }
 }

@@ -23,7 +23,7 @@ pub struct Options {
     pub seed: u64,
     /// How long a stage waits for a late view, milliseconds; by default 500, or more on a slow machine.
     pub deadline_ms: Option<u64>,
-    /// Whether a camera's process is killed.
+    /// True if a camera's process is killed.
     pub kills: bool,
     /// Configurable limits.
     pub limits: Limits,

@@ -71,8 +71,9 @@ struct Clock {
 
 impl Clock {
     fn new(run: &Run<'_>) -> Self {
-        let begin =
-            |it: &FrameResult| Some(it.captured_ms()? - 1000.0 * it.frame as f64 / run.rate_hz);
+        let begin = |result: &FrameResult| {
+            Some(result.captured_ms()? - 1000.0 * result.frame as f64 / run.rate_hz)
+        };
         let first = run.results.iter().filter_map(begin).reduce(f64::min);
         Self {
             first_ms: first.unwrap_or(0.0),
@@ -134,7 +135,7 @@ fn table<const N: usize>(heading: &str, note: &str, columns: [&str; N]) -> Table
 }
 
 fn number(value: Option<f64>, digits: usize) -> String {
-    value.map_or_else(|| "–".to_owned(), |it| format!("{it:.digits$}"))
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
 }
 
 fn of_cost(cost: &Cost, camera: &str) -> Table {
@@ -143,9 +144,11 @@ fn of_cost(cost: &Cost, camera: &str) -> Table {
          a result has count as back."
     );
     let mut table = table("What the killed camera cost", &note, ["", ""]);
-    let ms =
-        |value: Option<f64>| value.map_or_else(|| "never".to_owned(), |it| format!("{it:.0} ms"));
-    let count = |it: Option<u64>| it.map_or_else(|| "–".to_owned(), |it| it.to_string());
+    let ms = |value: Option<f64>| {
+        value.map_or_else(|| "never".to_owned(), |value| format!("{value:.0} ms"))
+    };
+    let count =
+        |value: Option<u64>| value.map_or_else(|| "–".to_owned(), |number| number.to_string());
     table.rows = [
         ("its death was noticed after", ms(cost.noticed_ms)),
         ("it was started again after", ms(cost.restarted_ms)),
@@ -220,9 +223,14 @@ fn latency(run: &Run<'_>) -> Table {
     let latency = run.report.recorded().latency();
     let rows = latency.into_iter().flat_map(budget::rows);
     table.rows = rows
-        .map(|(name, it)| {
-            let times = [it.p50_ms, it.p99_ms, it.max_ms].map(|ms| number(Some(ms), 1));
-            [vec![name.to_owned(), it.count.to_string()], times.into()].concat()
+        .map(|(name, percentiles)| {
+            let times = [percentiles.p50_ms, percentiles.p99_ms, percentiles.max_ms]
+                .map(|ms| number(Some(ms), 1));
+            [
+                vec![name.to_owned(), percentiles.count.to_string()],
+                times.into(),
+            ]
+            .concat()
         })
         .collect();
     table
@@ -302,10 +310,11 @@ fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
 fn chosen<'a>(drawn: &[&'a FrameResult], killed_at: Option<u64>) -> Vec<&'a FrameResult> {
     let middle = drawn.get(drawn.len() / 2).map_or(0, |drawn| drawn.frame);
     let killed_at = killed_at.unwrap_or(middle);
-    let is_complete = |it: &&&FrameResult| it.views.iter().all(|view| view.missing.is_none());
+    let is_complete =
+        |result: &&&FrameResult| result.views.iter().all(|view| view.missing.is_none());
     let (before, after): (Vec<&FrameResult>, Vec<&FrameResult>) =
-        drawn.iter().partition(|it| it.frame <= killed_at);
-    let without = after.iter().find(|it| it.views[VICTIM].missing.is_some());
+        drawn.iter().partition(|result| result.frame <= killed_at);
+    let without = after.iter().find(|result| result.views[VICTIM].missing.is_some());
     let four = [
         before.iter().find(is_complete),
         before.iter().rev().find(is_complete),
@@ -313,7 +322,7 @@ fn chosen<'a>(drawn: &[&'a FrameResult], killed_at: Option<u64>) -> Vec<&'a Fram
         after.iter().rev().find(is_complete),
     ];
     let mut shown: Vec<&FrameResult> = four.into_iter().flatten().copied().collect();
-    shown.dedup_by_key(|it| it.frame);
+    shown.dedup_by_key(|result| result.frame);
     shown
 }
 
@@ -344,9 +353,9 @@ mod tests {
     }
 
     fn frames(of: &[(u64, bool)], killed_at: Option<u64>) -> Vec<u64> {
-        let results: Vec<FrameResult> = of.iter().map(|it| drawn(it.0, it.1)).collect();
+        let results: Vec<FrameResult> = of.iter().map(|frame| drawn(frame.0, frame.1)).collect();
         let all: Vec<&FrameResult> = results.iter().collect();
-        chosen(&all, killed_at).iter().map(|it| it.frame).collect()
+        chosen(&all, killed_at).iter().map(|result| result.frame).collect()
     }
 
     #[test]

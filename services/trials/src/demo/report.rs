@@ -36,11 +36,11 @@ impl Report {
             ("all results", of(&|_| true)),
             (
                 "with every camera",
-                of(&|it| it.views.iter().all(|view| view.missing.is_none())),
+                of(&|result| result.views.iter().all(|view| view.missing.is_none())),
             ),
             (
                 "without the killed one",
-                of(&|it| it.views[VICTIM].missing.is_some()),
+                of(&|result| result.views[VICTIM].missing.is_some()),
             ),
         ];
         let cost = run.killed.map(|killed| {
@@ -64,7 +64,9 @@ impl Report {
             slowness: run.machine.map_or(1.0, |machine| machine.slowness()),
             spread: run.machine.map_or(1.0, |machine| machine.spread()),
             views: run.report.views(),
-            failed: &run.report.unexpected_failures(|it| u32::from(was_killed && it == killed)),
+            failed: &run
+                .report
+                .unexpected_failures(|process| u32::from(was_killed && process == killed)),
             n_unwritten: summary.map(|summary| summary.writes_failed + summary.frames_not_recorded),
         };
         let limits = limits::judge(requested, &measured);
@@ -75,7 +77,7 @@ impl Report {
         }
     }
 
-    /// Whether all limits held.
+    /// Returns true if all limits held.
     pub(super) fn is_held(&self) -> bool {
         self.limits.iter().all(|limit| limit.held)
     }

@@ -46,7 +46,9 @@ pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [P
         frames += 1;
     }
     let share = |n: usize, of: usize| (of > 0).then(|| 100.0 * n as f64 / of as f64);
-    let all = right.iter().fold([0; 2], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
+    let all = right.iter().fold([0; 2], |sum, counts| {
+        [sum[0] + counts[0], sum[1] + counts[1]]
+    });
     let mean = distances.iter().sum::<f64>() / distances.len() as f64;
     Score {
         frames,
@@ -56,7 +58,7 @@ pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [P
         segments: segments
             .iter()
             .zip(&right)
-            .map(|(it, count)| (it.name, share(count[0], count[1])))
+            .map(|(segment, count)| (segment.name, share(count[0], count[1])))
             .collect(),
     }
 }
@@ -76,7 +78,7 @@ mod tests {
         let found: Vec<Option<Point>> = truth.iter().copied().map(Some).collect();
         let far: Vec<Option<Point>> =
             truth.iter().map(|truth| Some([truth[0], 9.0, 0.0])).collect();
-        let pair = |it| (it, &truth[..]);
+        let pair = |found| (found, &truth[..]);
         let good = score([pair(&found[..])].into_iter());
         assert_eq!(
             (good.frames, good.pcp3d_percent, good.mpjpe_mm),

@@ -61,7 +61,7 @@ impl EpochSource {
     /// planning of the run; none if there is no such result.
     pub(crate) fn began_ms(self, epoch: u32, results: &[FrameResult]) -> Option<f64> {
         let mut sent = results.iter().filter_map(|result| self.epoch(result));
-        sent.find(|it| it.0 == epoch).map(|sent| sent.1)
+        sent.find(|pair| pair.0 == epoch).map(|sent| sent.1)
     }
 }
 
@@ -82,25 +82,25 @@ impl Cost {
         };
         let ms = |nanos: u64| nanos as f64 / 1e6;
         let injected_at = ms(injected.saturating_sub(session));
-        let after = |it: u64| ms(it.saturating_sub(injected));
-        let epochs = results.iter().filter_map(|it| Some((it, source.epoch(it)?)));
+        let after = |nanos: u64| ms(nanos.saturating_sub(injected));
+        let epochs = results.iter().filter_map(|result| Some((result, source.epoch(result)?)));
         let (old, new): (Vec<_>, Vec<_>) = epochs.partition(|epoch| epoch.1.0 == 0);
         let (last, first) = (old.last(), new.first());
         let recovered = times.recovered.filter(|_| source == EpochSource::Unrecorded).map(after);
         // The pause ends with the first result of the new epoch, or else with the first result after the recovery.
         let is_after_recovery =
-            |it: &&FrameResult| recovered.is_some_and(|ms| it.sent_ms >= injected_at + ms);
+            |result: &&FrameResult| recovered.is_some_and(|ms| result.sent_ms >= injected_at + ms);
         let end = first
-            .map(|it| it.0)
+            .map(|first| first.0)
             .or_else(|| results.iter().find(is_after_recovery))
-            .map(|it| it.sent_ms);
+            .map(|result| result.sent_ms);
         let end = end.unwrap_or(f64::INFINITY);
-        let is_between = |it: &&FrameResult| match source {
-            EpochSource::Unrecorded => it.sent_ms > injected_at && it.sent_ms < end,
+        let is_between = |result: &&FrameResult| match source {
+            EpochSource::Unrecorded => result.sent_ms > injected_at && result.sent_ms < end,
             // By frame number: the result of a frame captured in the meantime may be sent later.
             _ => {
-                last.is_none_or(|last| it.frame > last.0.frame)
-                    && first.is_none_or(|first| it.frame < first.0.frame)
+                last.is_none_or(|last| result.frame > last.0.frame)
+                    && first.is_none_or(|first| result.frame < first.0.frame)
             }
         };
         let away = results.iter().filter(is_between);
@@ -108,9 +108,9 @@ impl Cost {
             killed_at_ms: Some(injected_at),
             noticed_ms: times.noticed.map(after),
             restarted_ms: times.restarted.map(after),
-            back_ms: first.map(|it| it.1.1 - injected_at).or(recovered),
-            last_frame: last.map(|it| it.0.frame),
-            first_frame: first.map(|it| it.0.frame),
+            back_ms: first.map(|first| first.1.1 - injected_at).or(recovered),
+            last_frame: last.map(|last| last.0.frame),
+            first_frame: first.map(|first| first.0.frame),
             frames_lost: last
                 .zip(first)
                 .map(|(last, first)| first.0.frame.saturating_sub(last.0.frame + 1)),

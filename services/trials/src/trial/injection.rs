@@ -179,7 +179,7 @@ impl Injector {
     }
 }
 
-/// Whether a process has worked in this epoch or a later one: has sent messages, or, for `results`, received some.
+/// Returns true if a process has worked in this epoch or a later one: has sent messages, or, for `results`, received some.
 pub(crate) fn has_worked(process: &str, health: &Health, epoch: u32) -> bool {
     let has_messages = health.n_sent > 0 || (process == "results" && health.n_received > 0);
     health.epoch >= epoch && has_messages

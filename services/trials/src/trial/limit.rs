@@ -44,7 +44,7 @@ fn limit(what: &str, asked: String, got: Option<f64>, held: bool) -> Limit {
         asked,
         got: got.map_or_else(
             || "nothing".to_owned(),
-            |it| format!("{it:.0$}", digits(it)),
+            |value| format!("{value:.0$}", digits(value)),
         ),
         held,
     }

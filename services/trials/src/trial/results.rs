@@ -35,7 +35,7 @@ pub(crate) struct ViewResult {
 }
 
 impl FrameResult {
-    /// Whether any joint was found.
+    /// Returns true if any joint was found.
     pub(crate) fn is_posed(&self) -> bool {
         self.joints.iter().any(Option::is_some)
     }
@@ -73,7 +73,7 @@ fn lines<L: Line>(folder: &Path) -> Result<Vec<L>, Failure> {
 fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<FrameResult> {
     let times = times.into_iter().map(|time| (time.frame, time));
     let times: BTreeMap<u64, TimesLine> = times.collect();
-    let both = frames.iter().filter_map(|it| Some((it, times.get(&it.frame)?)));
+    let both = frames.iter().filter_map(|line| Some((line, times.get(&line.frame)?)));
     both.map(|(line, time)| {
         let person = line.followed();
         let joint = |name: &str| Some(person?.joints.get(name)?.placed()?.position_m);
@@ -86,7 +86,7 @@ fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<
             frame: line.frame,
             epoch: time.epoch,
             sent_ms: time.sent_ms,
-            joints: PARSE14.joints.iter().map(|it| joint(it.name)).collect(),
+            joints: PARSE14.joints.iter().map(|named| joint(named.name)).collect(),
             views: cameras.iter().map(view).collect(),
         }
     })

@@ -33,11 +33,11 @@ pub(crate) struct Folder {
     /// Where the lines of a frame about its views begin, and how many there are.
     views: BTreeMap<u64, (u64, usize)>,
     view_lines: Option<Mutex<File>>,
-    /// Of every view: its folder of pictures, and the numbers of their frames, ascending.
+    /// Folder of the pictures of every view, and the numbers of their frames, ascending.
     pictures: Vec<(PathBuf, Vec<u64>)>,
 }
 
-/// What of a line about a frame is needed to find it again.
+/// The part of a line about a frame that is needed to find it again.
 #[derive(Deserialize)]
 struct Head {
     frame: u64,
@@ -110,7 +110,7 @@ impl Folder {
         &self.frames
     }
 
-    /// What its user should know of it.
+    /// Returns the remarks for the user.
     pub(crate) fn notes(&self) -> &[String] {
         &self.notes
     }
@@ -137,7 +137,7 @@ impl Folder {
     /// A picture, of the frame or of the last one before it.
     pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
         let (folder, frames) = self.pictures.get(view)?;
-        let before = frames.partition_point(|it| *it <= frame);
+        let before = frames.partition_point(|number| *number <= frame);
         let frame = *frames.get(before.checked_sub(1)?)?;
         let file = folder.join(format!("{frame:06}.png"));
         let (width, height) = image::image_dimensions(&file).ok()?;
@@ -275,7 +275,9 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
     };
     let places = |placed: &[Option<PlacedJoint>]| {
         let places = placed.iter();
-        places.map(|place| place.as_ref().map(|it| in_world(it.position_m))).collect()
+        places
+            .map(|place| place.as_ref().map(|joint| in_world(joint.position_m)))
+            .collect()
     };
     let others = line.people.iter().skip(1).map(|other| Other {
         id: other.id,
@@ -300,7 +302,7 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
         joints: places(&followed),
         spread: followed
             .iter()
-            .map(|followed| followed.as_ref().and_then(|it| spread(it.covariance_m2)))
+            .map(|followed| followed.as_ref().and_then(|joint| spread(joint.covariance_m2)))
             .collect(),
         views: views.collect(),
         people: line.seen,
@@ -314,7 +316,7 @@ fn see(scene: &Scene, moment: &mut Moment, line: &ViewLine) {
     let Some(view) = scene.views.iter().position(|view| view.name == line.view) else {
         return;
     };
-    let parts = line.fused.iter().flat_map(|it| &it.parts);
+    let parts = line.fused.iter().flat_map(|pose| &pose.parts);
     let centres: Option<Vec<[f64; 2]>> = parts.map(|part| Some([part.x?, part.y?])).collect();
     let joints = centres.and_then(|centre| scene.joints_of(&centre));
     if let Some(seen) = moment.views.get_mut(view) {

@@ -25,7 +25,7 @@ pub(crate) struct Tape {
     frames: Vec<Frame>,
     notes: Vec<String>,
     poses: Vec<Entry>,
-    /// Of every view: its pictures by their frames.
+    /// Pictures of every view by their frames.
     pictures: Vec<BTreeMap<u64, Entry>>,
 }
 
@@ -47,23 +47,25 @@ impl Tape {
         let track = recording.tracks.get(&topic::skeletons());
         let mut poses = track.map_or_else(Vec::new, |track| track.entries.clone());
         let mut input = files::open(path).map_err(|why| failure::in_file(path, &why))?;
-        poses.retain(|pose| read_pose(&mut input, pose).is_ok_and(|it| it.status != Status::END));
+        poses.retain(|pose| {
+            read_pose(&mut input, pose).is_ok_and(|message| message.status != Status::END)
+        });
         if poses.is_empty() {
             return Err(refused("it has no result".to_owned()));
         }
         poses.sort_by_key(|pose| pose.frame);
         let frame = |(place, entry): (usize, &Entry)| Frame {
             number: entry.frame.unwrap_or(place as u64),
-            has_pose: read_pose(&mut input, entry).ok().map(|it| it.status == Status::OK),
+            has_pose: read_pose(&mut input, entry).ok().map(|message| message.status == Status::OK),
             place: place as u64,
         };
         let frames = poses.iter().enumerate().map(frame).collect();
         let of_view = |view: usize| {
             let track = recording.tracks.get(&topic::frame(view));
-            let entries = track.into_iter().flat_map(|it| &it.entries);
+            let entries = track.into_iter().flat_map(|track| &track.entries);
             let with_pixels =
                 entries.filter(|entry| entry.len as usize > size_of::<FrameHeader>() + 64);
-            with_pixels.filter_map(|it| Some((it.frame?, *it))).collect()
+            with_pixels.filter_map(|entry| Some((entry.frame?, *entry))).collect()
         };
         Ok(Self {
             name: path.display().to_string(),
@@ -91,7 +93,7 @@ impl Tape {
         &self.frames
     }
 
-    /// What its user should know of it.
+    /// Returns the remarks for the user.
     pub(crate) fn notes(&self) -> &[String] {
         &self.notes
     }
@@ -129,7 +131,7 @@ fn read_pose(file: &mut File, entry: &Entry) -> Result<Box<Skeletons>, Failure> 
     message.skeletons().ok_or_else(refused)
 }
 
-/// What is wrong with a recording.
+/// Adds the faults of a recording to the notes.
 fn note(recording: &Recording, notes: &mut Vec<String>) {
     if !recording.extent.is_complete {
         notes.push("the recording was cut off, or goes on".to_owned());

@@ -1,4 +1,4 @@
-//! What happens in a deployment, as lines for its user: told by the differences between two looks.
+//! Events in a deployment, as lines for its user: told by the differences between two looks.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ const IN_A_ROW: u32 = 3;
 /// Shortest time between two lines about what one process has lost.
 const LOSSES: Duration = Duration::from_secs(10);
 
-/// What was seen last.
+/// State at the last look.
 #[derive(Debug)]
 pub(crate) struct Events {
     /// Status of the last frame of every view.
@@ -24,11 +24,11 @@ pub(crate) struct Events {
     processes: BTreeMap<String, Seen>,
     /// Results without a skeleton in a row.
     n_without: u32,
-    /// Whether a message was refused.
+    /// True if a message was refused.
     has_refused: bool,
 }
 
-/// What was seen of a process.
+/// State of a process at the last look.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     state: State,
@@ -101,8 +101,8 @@ impl Events {
             let mut seen = Seen {
                 state: process.state,
                 restarts: reading.map_or(0, |reading| reading.restarts),
-                told: known.and_then(|it| it.told),
-                dropped: known.map_or([0; Cause::ALL.len()], |it| it.dropped),
+                told: known.and_then(|seen| seen.told),
+                dropped: known.map_or([0; Cause::ALL.len()], |seen| seen.dropped),
             };
             if let Some(reading) = reading {
                 lost(
@@ -148,11 +148,11 @@ fn tell(board: &Board, name: &str, known: Seen, seen: Seen) {
 /// Says what was lost, not more often than every few seconds.
 fn lost(board: &Board, name: &str, seen: &mut Seen, now: &[u64; Cause::ALL.len()]) {
     // Counts of a process that was started again begin at 0.
-    let is_less = now.iter().zip(&seen.dropped).any(|it| it.0 < it.1);
+    let is_less = now.iter().zip(&seen.dropped).any(|counts| counts.0 < counts.1);
     if is_less {
         seen.dropped = [0; Cause::ALL.len()];
     }
-    if seen.told.is_some_and(|it| it.elapsed() < LOSSES) {
+    if seen.told.is_some_and(|at| at.elapsed() < LOSSES) {
         return;
     }
     let counts = now.iter().zip(&seen.dropped).zip(Cause::ALL);

@@ -23,7 +23,7 @@ const STATE_PERIOD: Duration = Duration::from_millis(500);
 /// The longest pause between two looks at the cameras while no result comes.
 const PATIENCE: Duration = Duration::from_millis(90);
 
-/// Whether to look again.
+/// Decision to look again, or not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Look {
     /// Yes.
@@ -112,7 +112,7 @@ impl Session {
         Arc::clone(&self.scene)
     }
 
-    /// What a page has to know first.
+    /// Returns the first message to a page.
     pub(crate) fn hello(&self) -> Value {
         json!({
             "type": "hello", "mode": "live", "name": self.scene.name, "scene": self.scene.json(),
@@ -134,7 +134,7 @@ impl Session {
                 self.look_at(view, board)?;
             }
         }
-        if self.told.is_none_or(|it| it.elapsed() >= STATE_PERIOD) {
+        if self.told.is_none_or(|at| at.elapsed() >= STATE_PERIOD) {
             self.told = Some(Instant::now());
             self.look_at_processes(board)?;
             if self.live.is_over() {
@@ -151,7 +151,7 @@ impl Session {
         }
     }
 
-    /// Whether a result has come.
+    /// Returns true if a result has come.
     fn look_at_poses(&mut self, board: &Board) -> Result<bool, Failure> {
         let Some(message) = self.poses.latest_boxed()? else {
             return Ok(false);

@@ -33,7 +33,7 @@ impl Tape {
     ///
     /// # Errors
     ///
-    /// What the run was made of cannot be read, or the thread cannot be started.
+    /// The settings and files of the run cannot be read, or the thread cannot be started.
     pub(crate) fn start(
         namespace: &Namespace,
         resolved: &Resolved,
@@ -85,7 +85,7 @@ impl Tape {
         &self.file
     }
 
-    /// Whether it has ended by itself.
+    /// Returns true if it has ended by itself.
     pub(crate) fn is_finished(&self) -> bool {
         self.thread.is_finished()
     }

@@ -150,12 +150,21 @@ fn times_that_cannot_be_are_refused() {
         clock.add(it)
     };
     let backwards = Err(ExchangeError::Backwards);
-    assert_eq!(add(&mut clock, |it| it.heard_at = 99), backwards);
-    assert_eq!(add(&mut clock, |it| it.answered_at = 899), backwards);
+    assert_eq!(
+        add(&mut clock, |exchange| exchange.heard_at = 99),
+        backwards
+    );
+    assert_eq!(
+        add(&mut clock, |exchange| exchange.answered_at = 899),
+        backwards
+    );
     let [inside, outside] = [101, 100];
     let expected = Err(ExchangeError::Inside { inside, outside });
-    assert_eq!(add(&mut clock, |it| it.answered_at = 1001), expected);
-    let slow = add(&mut clock, |it| it.heard_at = u64::MAX);
+    assert_eq!(
+        add(&mut clock, |exchange| exchange.answered_at = 1001),
+        expected
+    );
+    let slow = add(&mut clock, |exchange| exchange.heard_at = u64::MAX);
     assert!(matches!(slow, Err(ExchangeError::Slow { .. })));
     assert_eq!(clock.estimate(0), None);
     assert_eq!(add(&mut clock, |_| {}), Ok(()));
@@ -219,6 +228,6 @@ proptest! {
         let [asked_at, received_at, answered_at, heard_at] = times;
         let mut clock = Clock::default();
         let _taken = clock.add(Exchange { asked_at, received_at, answered_at, heard_at }).is_ok();
-        let _known = clock.estimate(now).map(|it| (it.ours(now), it.theirs(now)));
+        let _known = clock.estimate(now).map(|estimate| (estimate.ours(now), estimate.theirs(now)));
     }
 }

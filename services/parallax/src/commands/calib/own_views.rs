@@ -1,4 +1,4 @@
-//! What every view of a run found by itself, held against a rig.
+//! Comparison of a rig with the poses that every view of a run found alone.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,7 +16,7 @@ type Points = Vec<[f64; 2]>;
 pub(super) struct Agreement {
     /// Epipolar errors of the cameras.
     pub(super) errors: EpipolarReport,
-    /// What contradicts the rig, for people.
+    /// Contradictions of the rig, for people.
     pub(super) disagreements: Vec<String>,
 }
 
@@ -163,9 +163,9 @@ mod tests {
         Rig::new((0..4).map(camera).collect(), None, "test").unwrap()
     }
 
-    /// What the cameras see of somebody who walks about; one that sees the back names sides as it sees them.
+    /// Returns the poses of somebody who walks about, as the cameras see them; one that sees the back names sides as it sees them.
     ///
-    /// * `shown`: of every camera the one whose pictures it has.
+    /// * `shown`: for every camera the one whose pictures it has.
     fn seen(rig: &Rig, shown: [usize; 4]) -> String {
         let mut text = String::new();
         let random = &mut fastrand::Rng::with_seed(5);

@@ -171,7 +171,11 @@ fn settings(arguments: &Arguments) -> Result<BoardSettings, Failure> {
         lenses_suffice: true,
         ..ReadOptions::default()
     };
-    let known = arguments.known.as_ref().map(|it| inputs::rig(&[it], &options)).transpose()?;
+    let known = arguments
+        .known
+        .as_ref()
+        .map(|known| inputs::rig(&[known], &options))
+        .transpose()?;
     Ok(BoardSettings {
         board,
         cameras: cameras(arguments),
@@ -208,7 +212,7 @@ fn cameras(arguments: &Arguments) -> Vec<CameraFootage> {
     };
     if arguments.intrinsics && each.len() > 1 && each.iter().all(is_picture) {
         let name = each[0].name.clone();
-        let paths = each.into_iter().flat_map(|it| it.paths).collect();
+        let paths = each.into_iter().flat_map(|camera| camera.paths).collect();
         return vec![CameraFootage { name, paths }];
     }
     each

@@ -79,7 +79,7 @@ fn drawn(walk: &Walk, misfit: &Misfit) -> Result<Option<Vec<u8>>, Failure> {
         return Ok(None);
     };
     let offset = camera.source_offset_px.unwrap_or([0, 0]).map(f64::from);
-    let in_footage = |it: &[f64; 2]| [it[0] - offset[0], it[1] - offset[1]];
+    let in_footage = |point: &[f64; 2]| [point[0] - offset[0], point[1] - offset[1]];
     let joints: Vec<[[f64; 2]; 2]> = misfit
         .joints
         .iter()
@@ -99,12 +99,13 @@ fn around(size: Size, rgb: &[u8], joints: &[[[f64; 2]; 2]]) -> Option<Vec<u8>> {
     let extent = (right - left).max(bottom - top);
     let margin = MARGIN * extent;
     let within = |value: f64, side: usize| value.clamp(0.0, side as f64) as usize;
-    let [left, right] = [left - margin, right + margin].map(|it| within(it, size.width));
-    let [top, bottom] = [top - margin, bottom + margin].map(|it| within(it, size.height));
+    let [left, right] = [left - margin, right + margin].map(|edge| within(edge, size.width));
+    let [top, bottom] = [top - margin, bottom + margin].map(|edge| within(edge, size.height));
     let mut canvas = Canvas::part(size, rgb, [left..right, top..bottom])?;
     let thick = (extent / 250.0).clamp(1.0, 4.0);
     for [seen, expected] in joints {
-        let [at, to] = [seen, expected].map(|it| [it[0] - left as f64, it[1] - top as f64]);
+        let [at, to] =
+            [seen, expected].map(|point| [point[0] - left as f64, point[1] - top as f64]);
         canvas.line(at, to, 1.2 * thick, RIGHT);
         canvas.ring(at, 3.0 * thick, thick, LEFT);
     }

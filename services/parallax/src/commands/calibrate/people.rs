@@ -14,12 +14,12 @@ use terminal::{Globals, output};
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 
-/// What to try where the answer is refused.
+/// Hint where the answer is refused.
 const HINT: &str = "let one person walk through the whole volume, in view of at least two cameras at every moment, for half a minute, \
 with arms and turns; check that the intrinsics are those of the pictures (`parallax calib show`); if the cameras were not started \
 together, search their clocks with --window 2; if there is no telling, calibrate with a board";
 
-/// What to try where it is not known well.
+/// Hint where the answer is not known well.
 const CAUTION_HINT: &str = "longer footage, with more of the volume walked through in all directions, makes it better; how much joints in \
 space are off on account of it, a run with this rig tells by its residuals";
 
@@ -193,7 +193,7 @@ fn source_of_scale(arguments: &Arguments) -> String {
 fn settings(arguments: &Arguments, walk: &Walk) -> Result<Settings, Failure> {
     let number = |name: &String| {
         let names = walk.names();
-        names.iter().position(|it| it == name).ok_or_else(|| {
+        names.iter().position(|other| other == name).ok_or_else(|| {
             let message = format!(
                 "--distance: no camera {name:?}; there are {}",
                 names.join(", ")

@@ -14,7 +14,7 @@ use terminal::{Globals, output};
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 
-/// What to try where the answer is refused.
+/// Hint where the answer is refused.
 const HINT: &str = "let one person walk through the whole volume for half a minute; if a camera was moved far, \
 or the rig is not that of these cameras, begin anew: parallax calibrate people";
 
@@ -189,18 +189,18 @@ fn as_json(outcome: &Outcome, names: &[&str]) -> Value {
     let finite = |value: f64| value.is_finite().then_some(value);
     let each = names.iter().zip(&outcome.changes);
     let cameras: Vec<Value> = each
-        .map(|(name, it)| {
+        .map(|(name, change)| {
             json!({
                 "name": name,
-                "moved_degrees": finite(it.moved[0]),
-                "moved_metres": finite(it.moved[1]),
-                "rotation_sd_degrees": finite(it.sd[0]),
-                "centre_sd_metres": finite(it.sd[1]),
-                "is_told": it.is_told,
-                "before_px": finite(it.held_out_px[0]),
-                "after_px": finite(it.held_out_px[1]),
-                "residual_px": finite(it.residual_px),
-                "offset_ms": 1e3 * it.offset_s,
+                "moved_degrees": finite(change.moved[0]),
+                "moved_metres": finite(change.moved[1]),
+                "rotation_sd_degrees": finite(change.sd[0]),
+                "centre_sd_metres": finite(change.sd[1]),
+                "is_told": change.is_told,
+                "before_px": finite(change.held_out_px[0]),
+                "after_px": finite(change.held_out_px[1]),
+                "residual_px": finite(change.residual_px),
+                "offset_ms": 1e3 * change.offset_s,
             })
         })
         .collect();

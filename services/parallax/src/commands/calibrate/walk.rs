@@ -1,4 +1,4 @@
-//! What `calibrate people` and `calibrate refine` have in common: people seen by all cameras, and a rig file at the end.
+//! Common part of `calibrate people` and `calibrate refine`: people seen by all cameras, and a rig file at the end.
 
 use std::path::{Path, PathBuf};
 
@@ -57,7 +57,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 pub(super) struct Walk {
     pub(super) deployment: Deployment,
     pub(super) found: Films,
-    /// What is added to the times of each camera, by the deployment, seconds.
+    /// Offsets that are added to the times of each camera, by the deployment, seconds.
     pub(super) offsets_s: Vec<f64>,
 }
 

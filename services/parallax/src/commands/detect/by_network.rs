@@ -113,7 +113,8 @@ impl Detector<'_> {
         people.sort_by(|a, b| b.score.total_cmp(&a.score));
         let mut apart: Vec<Person> = Vec::with_capacity(people.len());
         for person in people {
-            let is_same = |it: &Person| overlap(it.outline.sides, person.outline.sides) > SAME;
+            let is_same =
+                |other: &Person| overlap(other.outline.sides, person.outline.sides) > SAME;
             if !apart.iter().any(is_same) {
                 apart.push(person);
             }
@@ -172,7 +173,7 @@ impl Detector<'_> {
             From::Given => "given",
             From::Detector => "detector",
         };
-        let detections: Vec<Value> = found.iter().map(|it| it.json(from)).collect();
+        let detections: Vec<Value> = found.iter().map(|person| person.json(from)).collect();
         let mut line = json!({
             "image": picture.path,
             "width": picture.size.width,
@@ -221,7 +222,7 @@ impl Person {
         Ok(person)
     }
 
-    /// Of who lies, or stands on the hands, the picture is looked at once more, turned; what is seen better counts.
+    /// Looks at the picture once more, turned, if a person lies or stands on the hands; returns the sight with the better score.
     fn seen(
         network: &PoseNetwork,
         picture: &Picture,
@@ -258,7 +259,7 @@ impl Person {
         let person = Self {
             outline,
             keypoints: keypoints_json(&sight)?,
-            joints: joints.map(|joint| joint.map_or([f64::NAN; 2], |it| it.at)).collect(),
+            joints: joints.map(|joint| joint.map_or([f64::NAN; 2], |place| place.at)).collect(),
             score: scores.iter().sum::<f64>() / scores.len().max(1) as f64,
         };
         Ok((person, next))

@@ -25,8 +25,10 @@ pub(super) fn json() -> String {
     let statuses: Vec<&str> = statuses().map(Status::reason).collect();
     let sides = [Sides::AS_SEEN, Sides::SURE, Sides::UNSURE].map(Sides::name);
     let kept = [Kept::SOLVED, Kept::START].map(Kept::name);
-    let limits: Map<String, Value> =
-        limits().into_iter().map(|(name, it)| (name.to_owned(), it.into())).collect();
+    let limits: Map<String, Value> = limits()
+        .into_iter()
+        .map(|(name, limit)| (name.to_owned(), limit.into()))
+        .collect();
     let joint_sets: Map<String, Value> = JointSet::ALL.into_iter().map(joint_set).collect();
     let whole = value!({
         "joint_sets": joint_sets, "kept": kept, "limits": limits, "sides": sides, "statuses": statuses,
@@ -67,7 +69,7 @@ fn type_name(kind: Kind) -> &'static str {
 
 fn statuses() -> impl Iterator<Item = Status> {
     let all = (0..u32::MAX).map(Status);
-    all.take_while(|it| it.reason() != "unknown")
+    all.take_while(|status| status.reason() != "unknown")
 }
 
 fn limits() -> [(&'static str, usize); 11] {

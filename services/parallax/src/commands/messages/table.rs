@@ -49,12 +49,12 @@ pub(super) struct Layout {
     pub(super) fields: Vec<Field>,
 }
 
-/// What is sent on the topics of one kind.
+/// Topics of one kind, and their messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Topic {
     /// Its name, with `{}` in place of the view, worker or process.
     pub(super) name: String,
-    /// What it is about: `frame`.
+    /// Subject of the messages: `frame`.
     pub(super) about: String,
     /// The version in its name.
     pub(super) version: u32,
@@ -195,7 +195,7 @@ structs! {
 /// Replaces the view, worker or process in the name of a topic.
 const ANY: usize = 7_777_777;
 
-/// What is sent on which topic.
+/// Returns the topics of all kinds, with their messages.
 pub(super) fn topics() -> Vec<Topic> {
     let number = |shape: (Kind, Vec<usize>)| Some(shape.0);
     let any = ANY.to_string();

@@ -75,7 +75,7 @@ impl PerFrame {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Forecast {
     pub per_frame: PerFrame,
-    /// Whether pixels and evidence are left out.
+    /// True if pixels are left out, and true if evidence is.
     pub without: [bool; 2],
     /// None for a run until it is stopped.
     pub n_frames: Option<u64>,

@@ -53,7 +53,7 @@ pub(super) fn settle(
         recorded.footage[view].frame_rate_hz = Some(rate_hz / step);
     }
     let capture = &mut recorded.deployment.capture;
-    if from == Stage::Capture && !set.iter().any(|it| it.starts_with("capture.mode=")) {
+    if from == Stage::Capture && !set.iter().any(|setting| setting.starts_with("capture.mode=")) {
         capture.mode = Mode::Lossless;
     }
     Ok(())

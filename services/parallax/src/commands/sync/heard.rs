@@ -1,4 +1,4 @@
-//! What the cameras of a deployment heard.
+//! Synchronisation of the cameras of a deployment by sound.
 
 use calibration::synchronisation::{Outcome, Sound, SoundSettings, estimate_by_sound};
 use deployment::Deployment;

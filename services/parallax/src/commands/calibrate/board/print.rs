@@ -19,7 +19,7 @@ pub(super) fn run(board: &Board, paper: Paper, out: Option<&Path>) -> Result<Exi
         vec![file.to_path_buf()]
     } else {
         let name = board.to_string().replace([':', '='], "-");
-        ["pdf", "svg"].map(|it| PathBuf::from(format!("{name}.{it}"))).to_vec()
+        ["pdf", "svg"].map(|ending| PathBuf::from(format!("{name}.{ending}"))).to_vec()
     };
     for file in files {
         let ending = file.extension().unwrap_or_default().to_ascii_lowercase();

@@ -1,4 +1,4 @@
-//! What came out, as a table and as JSON.
+//! Outcome of a calibration from a board, as a table and as JSON.
 
 use calibration::board::CameraOutcome;
 use failure::Failure;
@@ -75,24 +75,24 @@ fn distance(calibrated: &Calibrated, [a, b]: [usize; 2]) -> f64 {
 pub(super) fn json(calibrated: &Calibrated) -> Value {
     let doubts = calibrated.doubts();
     let finite = |value: f64| value.is_finite().then_some(value);
-    let cameras = calibrated.outcome.cameras.iter().enumerate().map(|(nth, it)| {
-        let wrong = it.residuals.iter().filter(|residual| residual.is_wrong).count();
+    let cameras = calibrated.outcome.cameras.iter().enumerate().map(|(nth, camera)| {
+        let wrong = camera.residuals.iter().filter(|residual| residual.is_wrong).count();
         let number = |known: &calibration::board::Known| {
             let value = json!({ "value": finite(known.value), "sd": finite(known.sd) });
             (known.name.clone(), value)
         };
-        let numbers: Map<String, Value> = it.numbers.iter().map(number).collect();
+        let numbers: Map<String, Value> = camera.numbers.iter().map(number).collect();
         json!({
             "name": calibrated.task.names[nth],
-            "size_px": it.camera.intrinsics.size,
+            "size_px": camera.camera.intrinsics.size,
             "pictures": pictures(calibrated, nth),
-            "boards": it.n_boards[0],
-            "boards_used": it.n_boards[1],
-            "corners": it.residuals.len() - wrong,
+            "boards": camera.n_boards[0],
+            "boards_used": camera.n_boards[1],
+            "corners": camera.residuals.len() - wrong,
             "left_out": wrong,
-            "rms_px": finite(it.rms_px),
-            "rms_of_all_px": finite(it.rms_of_all_px),
-            "coverage": it.coverage,
+            "rms_px": finite(camera.rms_px),
+            "rms_of_all_px": finite(camera.rms_of_all_px),
+            "coverage": camera.coverage,
             "numbers": numbers,
         })
     });
@@ -116,7 +116,7 @@ pub(super) fn json(calibrated: &Calibrated) -> Value {
     })
 }
 
-/// What the report says of the command.
+/// Returns the facts about the command for the report.
 pub(super) fn about(arguments: &Arguments, calibrated: &Calibrated) -> Vec<(String, String)> {
     let mut about = vec![
         ("board".to_owned(), calibrated.board.to_string()),

@@ -75,7 +75,7 @@ fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result
             Failure::new(ExitKind::Calibration, message).with_hint("give a run of this rig")
         })?;
         let skeleton = frames.binary_search(&line.frame).ok();
-        let parts = line.fused.iter().flat_map(|it| &it.parts);
+        let parts = line.fused.iter().flat_map(|pose| &pose.parts);
         let parts: Option<Vec<[f64; 2]>> = parts.map(|part| Some([part.x?, part.y?])).collect();
         let Some((skeleton, parts)) = skeleton.zip(parts) else {
             continue;
@@ -84,13 +84,15 @@ fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result
             continue;
         }
         let seen = PARSE14.from_parts(&parts);
-        let [low, high] =
-            seen.iter().fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |all, it| {
+        let [low, high] = seen.iter().fold(
+            [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
+            |all, joint| {
                 [
-                    [0, 1].map(|axis| all[0][axis].min(it[axis])),
-                    [0, 1].map(|axis| all[1][axis].max(it[axis])),
+                    [0, 1].map(|axis| all[0][axis].min(joint[axis])),
+                    [0, 1].map(|axis| all[1][axis].max(joint[axis])),
                 ]
-            });
+            },
+        );
         let size = (high[0] - low[0]).max(high[1] - low[1]).max(1.0);
         let both = seen.iter().zip(&skeletons[skeleton]);
         let both = both.filter_map(|(seen, joint)| {
