@@ -35,7 +35,7 @@ impl Room {
         (room, random)
     }
 
-    /// What the cameras record: every sound rises at once and dies away, with an echo, from its own place.
+    /// Returns the recordings of the cameras: every sound rises at once and dies away, with an echo, from its own place.
     fn record(&self, random: &mut fastrand::Rng) -> Vec<Sound> {
         let sources: Vec<(f64, Point3<f64>, f64, u64)> = self
             .sounds_s
