@@ -111,7 +111,7 @@ impl fmt::Display for Expected {
             |(auc, [low, high])| format!("{auc:.3} ({low:.3} to {high:.3})"),
         );
         let number = |value: Option<f64>| {
-            value.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.3}"))
+            value.map_or_else(|| "unknown".to_owned(), |number| format!("{number:.3}"))
         };
         write!(
             to,
