@@ -32,7 +32,7 @@ pub(crate) fn cluster(
     let other = |part: usize| mirror.map_or(part, |mirror| mirror[part]);
     let clustered = |part: usize| -> Vec<(usize, OfPart)> {
         let mut random = fastrand::Rng::with_seed(settings.seed ^ ((part as u64) << 32));
-        let sight = Offsets::of(part, parents, settings.types_by);
+        let sight = Offsets::new(part, parents, settings.types_by);
         match mirror {
             Some(mirror) if other(part) == part && settings.n_types > 1 => {
                 let both = [
@@ -76,7 +76,7 @@ struct Offsets {
 
 impl Offsets {
     /// The parts whose offsets define the types of `part`, its parent first.
-    fn of(part: usize, parents: &[Option<usize>], by: TypesBy) -> Self {
+    fn new(part: usize, parents: &[Option<usize>], by: TypesBy) -> Self {
         let children = (0..parents.len()).filter(|&i| parents[i] == Some(part));
         let mut neighbours: Vec<_> = parents[part].into_iter().collect();
         match by {

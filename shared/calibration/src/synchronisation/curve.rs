@@ -136,10 +136,10 @@ impl Curve {
                 }
             }
         }
-        (!samples.is_empty()).then(|| Self::of(numbers, half, samples))
+        (!samples.is_empty()).then(|| Self::from_samples(numbers, half, samples))
     }
 
-    fn of(cameras: [usize; 2], half: i64, samples: Vec<Costs>) -> Self {
+    fn from_samples(cameras: [usize; 2], half: i64, samples: Vec<Costs>) -> Self {
         let n_offsets = (2 * half + 1) as usize;
         let mut it = Self {
             cameras,

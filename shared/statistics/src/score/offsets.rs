@@ -159,7 +159,7 @@ mod tests {
         ]
     }
 
-    fn of(move_it: impl Fn(&mut [[f64; 2]; N_JOINTS])) -> Vec<Offset> {
+    fn offsets_after(move_it: impl Fn(&mut [[f64; 2]; N_JOINTS])) -> Vec<Offset> {
         let truth = person();
         let mut found = truth;
         move_it(&mut found);
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn a_knee_on_the_thigh_has_a_negative_offset_along_its_bone() {
         assert_eq!(height(&person()), 120.0);
-        let rows = of(|joints| {
+        let rows = offsets_after(|joints| {
             for knee in [1, 4] {
                 joints[knee][1] -= 6.0;
             }
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn outwards_is_positive_on_both_sides() {
-        let rows = of(|joints| {
+        let rows = offsets_after(|joints| {
             joints[0][0] -= 12.0;
             joints[5][0] += 12.0;
         });
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn a_joint_far_from_its_mark_was_not_found() {
-        let rows = of(|joints| joints[6] = [300.0, 300.0]);
+        let rows = offsets_after(|joints| joints[6] = [300.0, 300.0]);
         let wrist = rows.iter().find(|row| row.joint == "wrist").unwrap();
         assert_eq!((wrist.n_found, wrist.mean), (1, [0.0; 2]));
     }

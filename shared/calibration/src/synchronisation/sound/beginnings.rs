@@ -172,7 +172,7 @@ impl Beginnings {
         let cosines: Vec<f64> = (centre - half..=centre + half).map(cosine).collect();
         let cosines = smooth(&cosines);
         let first_s = (centre - half) as f64 * HOP_S;
-        let mut found = Match::of(first_s, cosines);
+        let mut found = Match::from_cosines(first_s, cosines);
         found.n = self.together(other, span, (found.offset_s / HOP_S).round() as i64);
         found
     }
@@ -189,7 +189,7 @@ impl Beginnings {
 }
 
 impl Match {
-    fn of(first_s: f64, cosines: Vec<f64>) -> Self {
+    fn from_cosines(first_s: f64, cosines: Vec<f64>) -> Self {
         let or_none = |value: &f64| if value.is_finite() { *value } else { 0.0 };
         let known: Vec<f64> = cosines.iter().copied().filter(|cosine| cosine.is_finite()).collect();
         let n = known.len().max(1) as f64;
